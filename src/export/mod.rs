@@ -1,0 +1,3 @@
+//! Meshes as files: one module per format.
+//!
+//! STUB: the owner of this folder writes the module page.

@@ -1,0 +1,145 @@
+//! From voxel indices to the patient.
+//!
+//! A volume is an array with indices (i, j, k), i fastest; index (0, 0, 0) is the *centre* of
+//! the first voxel. [`VoxelToPatient`] takes (fractional) indices to millimetres in DICOM's
+//! patient frame, LPS: x grows to the patient's left, y to posterior, z to superior. NIfTI
+//! speaks RAS, which differs by the signs of x and y; [`VoxelToPatient::from_ras`] is the one
+//! place where that is turned.
+
+use super::Vec3;
+use nalgebra::{Matrix3, Matrix4};
+
+/// The affine map from voxel indices to LPS millimetres. Always invertible and finite.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VoxelToPatient {
+    linear: Matrix3<f64>,
+    origin: Vec3,
+    inverse: Matrix3<f64>,
+}
+
+/// A map that is not finite or cannot be inverted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the affine is singular or not finite")]
+pub struct SingularAffine;
+
+impl VoxelToPatient {
+    /// `linear`'s columns are the steps of i, j, k in millimetres (LPS); `origin` is the
+    /// centre of voxel (0, 0, 0).
+    ///
+    /// # Errors
+    /// [`SingularAffine`] unless every entry is finite and the volume of a voxel is not
+    /// vanishing against the product of its spacings.
+    pub fn new(linear: Matrix3<f64>, origin: Vec3) -> Result<Self, SingularAffine> {
+        let spacing_product: f64 = linear.column_iter().map(|c| c.norm()).product();
+        let finite = linear.iter().chain(origin.iter()).all(|x| x.is_finite());
+        if !finite || !(spacing_product > 0.0) || !spacing_product.is_finite() {
+            return Err(SingularAffine);
+        }
+        if linear.determinant().abs() < 1e-6 * spacing_product {
+            return Err(SingularAffine);
+        }
+        let inverse = linear.try_inverse().ok_or(SingularAffine)?;
+        Ok(Self {
+            linear,
+            origin,
+            inverse,
+        })
+    }
+
+    /// Takes NIfTI's affine (index to RAS+ millimetres) over into LPS.
+    ///
+    /// # Errors
+    /// See [`VoxelToPatient::new`].
+    pub fn from_ras(ras: &Matrix4<f64>) -> Result<Self, SingularAffine> {
+        let turn = Matrix3::from_diagonal(&Vec3::new(-1.0, -1.0, 1.0));
+        let linear = turn * ras.fixed_view::<3, 3>(0, 0);
+        let origin = turn * ras.fixed_view::<3, 1>(0, 3);
+        Self::new(linear, origin)
+    }
+
+    /// Axis-aligned voxels of `spacing` mm with the array's centre at `centre`.
+    ///
+    /// # Errors
+    /// See [`VoxelToPatient::new`].
+    pub fn centred(
+        shape: [usize; 3],
+        spacing: [f64; 3],
+        centre: Vec3,
+    ) -> Result<Self, SingularAffine> {
+        let half = Vec3::from_fn(|r, _| (shape[r] as f64 - 1.0) / 2.0 * spacing[r]);
+        Self::new(Matrix3::from_diagonal(&Vec3::from(spacing)), centre - half)
+    }
+
+    /// The affine for NIfTI: index to RAS+ millimetres.
+    pub fn to_ras(&self) -> Matrix4<f64> {
+        let mut m = self.matrix();
+        m.row_mut(0).neg_mut();
+        m.row_mut(1).neg_mut();
+        m
+    }
+
+    /// The 4×4 matrix, index to LPS millimetres.
+    pub fn matrix(&self) -> Matrix4<f64> {
+        let mut m = Matrix4::identity();
+        m.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.linear);
+        m.fixed_view_mut::<3, 1>(0, 3).copy_from(&self.origin);
+        m
+    }
+
+    /// Voxel index (fractional) to LPS millimetres.
+    pub fn to_patient(&self, index: &Vec3) -> Vec3 {
+        self.linear * index + self.origin
+    }
+
+    /// LPS millimetres to voxel index (fractional).
+    pub fn to_voxel(&self, patient: &Vec3) -> Vec3 {
+        self.inverse * (patient - self.origin)
+    }
+
+    /// The 3×3 part: columns are the steps along i, j, k.
+    pub fn linear(&self) -> &Matrix3<f64> {
+        &self.linear
+    }
+
+    /// Distance of neighbouring voxel centres along i, j, k in millimetres.
+    pub fn spacing(&self) -> [f64; 3] {
+        [0, 1, 2].map(|axis| self.linear.column(axis).norm())
+    }
+
+    /// Volume of one voxel in cubic millimetres.
+    pub fn voxel_volume(&self) -> f64 {
+        self.linear.determinant().abs()
+    }
+
+    /// Whether the map mirrors: triangles that turn outward in index space must then be
+    /// turned over.
+    pub fn is_left_handed(&self) -> bool {
+        self.linear.determinant() < 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ras_and_back_is_the_identity() {
+        let ras = Matrix4::new(
+            3.0, 0.4, 0.0, -90.0, -0.3, 3.2, 0.1, -80.0, 0.0, 0.2, -4.0, 60.0, 0.0, 0.0, 0.0, 1.0,
+        );
+        let map = VoxelToPatient::from_ras(&ras).unwrap();
+        assert!((map.to_ras() - ras).norm() < 1e-12);
+        let index = Vec3::new(3.5, 7.0, 1.25);
+        assert!((map.to_voxel(&map.to_patient(&index)) - index).norm() < 1e-12);
+        assert!(map.is_left_handed());
+    }
+
+    #[test]
+    fn flat_and_infinite_maps_are_refused() {
+        assert!(VoxelToPatient::new(Matrix3::zeros(), Vec3::zeros()).is_err());
+        let mut flat = Matrix3::identity();
+        flat.set_column(2, &Vec3::new(1.0, 1.0, 0.0));
+        assert!(VoxelToPatient::new(flat, Vec3::zeros()).is_err());
+        assert!(VoxelToPatient::new(Matrix3::identity() * f64::NAN, Vec3::zeros()).is_err());
+    }
+}

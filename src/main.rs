@@ -1,0 +1,3 @@
+//! The `ventriform` command.
+
+fn main() {}

@@ -1,0 +1,3 @@
+//! A volume's way through every stage.
+//!
+//! STUB.
