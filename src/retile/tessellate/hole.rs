@@ -41,7 +41,7 @@ pub(super) fn close(mesh: &Patchwork, star: &Star, demand: Demand) -> Option<Vec
     let hole = Hole::new(mesh, star, demand);
     if let Some(flat) = hole.flat_triangulation()
         && hole.admits_all(&flat)
-        && hole.offender(&flat).is_none()
+        && hole.offenders(&flat).is_empty()
     {
         return Some(hole.named(&flat));
     }
@@ -156,36 +156,34 @@ impl<'a> Hole<'a> {
         Some(1.0 / triangle::radius_ratio(&a, &b, &c).max(0.05) + 2.0 * turned)
     }
 
-    /// A triangle of the proposal that pierces the mesh or another one of the proposal.
-    fn offender(&self, triangles: &[[u32; 3]]) -> Option<[u32; 3]> {
+    /// The triangles of the proposal that pierce the mesh or an earlier one of the proposal.
+    fn offenders(&self, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
         let named = self.named(triangles);
-        // Three neighbours and a fourth vertex: closing the hole would glue two triangles
-        // back to back.
-        let [a, b, c] = named[0];
-        if named.len() == 1
-            && self
-                .mesh
-                .triangle_along(b, a)
-                .is_some_and(|(_, third)| third == c)
-        {
-            return Some(triangles[0]);
+        if self.closes_a_tetrahedron(&named) {
+            return triangles.to_vec();
         }
         if self.demand == Demand::Topology {
-            return None;
+            return Vec::new();
         }
-        let meets_another = |k: usize| {
+        let meets_earlier = |k: usize| {
+            let corners = self.mesh.corners(named[k]);
             named[..k].iter().any(|other| {
-                triangles_intersect(
-                    named[k],
-                    &self.mesh.corners(named[k]),
-                    *other,
-                    &self.mesh.corners(*other),
-                )
+                triangles_intersect(named[k], &corners, *other, &self.mesh.corners(*other))
             })
         };
         (0..named.len())
-            .find(|&k| self.mesh.pierces(named[k], &self.star.triangles) || meets_another(k))
+            .filter(|&k| self.mesh.pierces(named[k], &self.star.triangles) || meets_earlier(k))
             .map(|k| triangles[k])
+            .collect()
+    }
+
+    /// Three neighbours and one vertex more, and that is the whole component: closing the hole
+    /// would glue two triangles back to back.
+    fn closes_a_tetrahedron(&self, named: &[[u32; 3]]) -> bool {
+        let [[a, b, c]] = *named else { return false };
+        self.mesh
+            .triangle_along(b, a)
+            .is_some_and(|(_, third)| third == c)
     }
 
     /// The cheapest triangulation in space that pierces nothing.
@@ -200,10 +198,11 @@ impl<'a> Hole<'a> {
                 let t = [i, k, j].map(|m| m as u32);
                 table[self.place(i, k, j)].filter(|_| !forbidden.contains(&t))
             })?;
-            match self.offender(&triangles) {
-                None => return Some(self.named(&triangles)),
-                Some(t) => forbidden.insert(t),
-            };
+            let offenders = self.offenders(&triangles);
+            if offenders.is_empty() {
+                return Some(self.named(&triangles));
+            }
+            forbidden.extend(offenders);
         }
         None
     }

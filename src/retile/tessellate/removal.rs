@@ -3,9 +3,9 @@
 //! In rounds: the vertices that are left are taken in ascending order of valence, then id; one
 //! whose neighbour went in the same round waits for the next, so that the surface thins out
 //! evenly and log n rounds suffice. Every hole is closed by [`hole::close`] under the
-//! strictest [`Demand`]. A round without any removal first lifts the limit of valence, then
-//! flips an edge at every vertex that is stuck, which lowers its valence, and then lowers the
-//! demand; any removal brings the strictest demand back.
+//! strictest [`Demand`]. A round without any removal steps down the [`ladder`]: longer rings,
+//! triangles that may turn, edges flipped at the vertices that are stuck, and only then
+//! triangles that may pierce each other. Any removal brings the strictest demand back.
 //!
 //! A hole is a disc and is closed by a disc whose inner edges are new: closedness, orientation,
 //! genus and components cannot change. As long as the lowest demand is not needed, neither
@@ -24,47 +24,33 @@ const HIGH_VALENCE: usize = 14;
 /// Rounds of flips that each demand gets without a removal in between.
 const MOST_FLIP_ROUNDS: usize = 12;
 
-/// What a round may do; on failure the next one of the ladder.
+/// What a round may do.
 #[derive(Debug, Clone, Copy)]
 struct Rung {
     demand: Demand,
     any_valence: bool,
-    flip_rounds: usize,
+    /// What flips must satisfy that precede the round, if there are any.
+    flips: Option<Demand>,
 }
 
-impl Rung {
-    const FIRST: Self = Self {
-        demand: Demand::Smooth,
-        any_valence: false,
-        flip_rounds: 0,
+/// From strict to lenient: a round without a removal steps down, a removal leads back up.
+fn ladder() -> Vec<Rung> {
+    let rung = |demand, any_valence, flips| Rung {
+        demand,
+        any_valence,
+        flips,
     };
-
-    /// The next rung, after a round without a removal; `flipped` says whether the flips that
-    /// precede it changed anything.
-    fn next(self, flipped: bool) -> Option<Self> {
-        if !self.any_valence {
-            return Some(Self {
-                any_valence: true,
-                ..self
-            });
-        }
-        if flipped && self.flip_rounds < MOST_FLIP_ROUNDS {
-            return Some(Self {
-                flip_rounds: self.flip_rounds + 1,
-                ..self
-            });
-        }
-        let demand = match self.demand {
-            Demand::Smooth => Demand::Embedded,
-            Demand::Embedded => Demand::Topology,
-            Demand::Topology => return None,
-        };
-        Some(Self {
-            demand,
-            any_valence: true,
-            flip_rounds: 0,
-        })
+    let mut ladder = vec![
+        rung(Demand::Smooth, false, None),
+        rung(Demand::Smooth, true, None),
+        rung(Demand::Embedded, true, None),
+    ];
+    for flips in [Demand::Smooth, Demand::Embedded] {
+        ladder.extend([rung(Demand::Embedded, true, Some(flips)); MOST_FLIP_ROUNDS]);
     }
+    ladder.push(rung(Demand::Topology, true, None));
+    ladder.extend([rung(Demand::Topology, true, Some(Demand::Topology)); MOST_FLIP_ROUNDS]);
+    ladder
 }
 
 /// Removes all vertices from `kept` on. Returns those that could not be removed, ascending.
@@ -75,22 +61,19 @@ pub(super) fn remove_old_vertices(
 ) -> Result<Vec<u32>, Cancelled> {
     let mut left: Vec<u32> = (kept..mesh.positions.len() as u32).collect();
     let mut touched = vec![0u32; mesh.positions.len()];
-    let mut rung = Rung::FIRST;
+    let ladder = ladder();
+    let mut step = 0;
     for round in 1.. {
+        let Some(rung) = ladder.get(step) else { break };
+        if let Some(demand) = rung.flips {
+            flip_round(mesh, &left, demand, step % MOST_FLIP_ROUNDS, monitor)?;
+        }
         let before = left.len();
-        left = remove_round(mesh, left, &mut touched, round, rung, monitor)?;
+        left = remove_round(mesh, left, &mut touched, round, *rung, monitor)?;
         if left.is_empty() {
             break;
         }
-        if left.len() < before {
-            rung = Rung::FIRST;
-            continue;
-        }
-        let flipped = rung.any_valence && flip_round(mesh, &left, rung.demand, monitor)?;
-        match rung.next(flipped) {
-            Some(next) => rung = next,
-            None => break,
-        }
+        step = if left.len() < before { 0 } else { step + 1 };
     }
     left.sort_unstable();
     Ok(left)
@@ -132,31 +115,53 @@ fn remove(mesh: &mut Patchwork, v: u32, touched: &mut [u32], round: u32, demand:
     true
 }
 
-/// Flips the best legal edge at every stuck vertex; says whether there was any.
+/// Flips an edge at every stuck vertex that has one to flip. In odd rounds (`turn`) other edges
+/// than the spokes come first, lest the same ones flip to and fro.
 fn flip_round(
     mesh: &mut Patchwork,
     stuck: &[u32],
     demand: Demand,
+    turn: usize,
     monitor: &Monitor,
-) -> Result<bool, Cancelled> {
-    let mut flipped = false;
+) -> Result<(), Cancelled> {
     for &v in stuck {
         monitor.check()?;
-        if mesh.valence(v) < 4 {
-            continue;
-        }
-        let best = mesh
-            .star(v)
-            .ring
-            .iter()
-            .filter_map(|&w| Flip::new(mesh, v, w, demand))
-            .max_by(|f, g| f.shape.total_cmp(&g.shape).then(g.edge.cmp(&f.edge)));
+        let ring = mesh.star(v).ring;
+        let kinds = [spokes(v, &ring), chords(&ring), rim(&ring)];
+        let first = if turn % 2 == 1 { 1 + turn / 2 % 2 } else { 0 };
+        let best = (0..kinds.len()).find_map(|k| {
+            kinds[(first + k) % kinds.len()]
+                .iter()
+                .filter_map(|&[a, b]| Flip::new(mesh, a, b, demand))
+                .max_by(|f, g| f.shape.total_cmp(&g.shape).then(g.edge.cmp(&f.edge)))
+        });
         if let Some(flip) = best {
             mesh.replace(&flip.old, &flip.new);
-            flipped = true;
         }
     }
-    Ok(flipped)
+    Ok(())
+}
+
+/// The edges from `v` to its ring: flipping one lowers the valence of `v`.
+fn spokes(v: u32, ring: &[u32]) -> Vec<[u32; 2]> {
+    ring.iter().map(|&w| [v, w]).collect()
+}
+
+/// The pairs of neighbours that may be joined outside of the star, which forbids to join them
+/// inside. On the throat of a handle nothing else is in the way.
+fn chords(ring: &[u32]) -> Vec<[u32; 2]> {
+    let m = ring.len();
+    (0..m)
+        .flat_map(|i| (i + 2..m).map(move |j| (i, j)))
+        .filter(|(i, j)| (*i, *j) != (0, m - 1))
+        .map(|(i, j)| [ring[i], ring[j]])
+        .collect()
+}
+
+/// The edges opposite to `v`: flipping one changes the hole's form.
+fn rim(ring: &[u32]) -> Vec<[u32; 2]> {
+    let m = ring.len();
+    (0..m).map(|i| [ring[i], ring[(i + 1) % m]]).collect()
 }
 
 /// An edge that may be flipped.
