@@ -2,6 +2,10 @@
 //!
 //! STUB: the owner of this folder writes the module page.
 
+pub mod labels;
+pub mod marching_cubes;
+pub mod table;
+
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Monitor};
