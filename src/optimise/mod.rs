@@ -16,6 +16,8 @@ pub enum FitnessForm {
     Raw,
     /// Each term in (0, 1].
     Normalised,
+    /// Reciprocals of angles in degrees and of millimetres: for comparison between tools.
+    Robust,
 }
 
 /// What a flip must gain.
@@ -99,6 +101,8 @@ pub struct FitnessSummary {
     pub raw: f64,
     /// Mean fitness in the normalised form, 0..=1.
     pub normalised: f64,
+    /// Mean fitness in the robust form, equal weights.
+    pub robust: f64,
     /// Mean of A, the angle between the two triangles' normals, radians.
     pub a_mean: f64,
     /// Mean of B, the angles to the outer neighbours, radians.

@@ -1,0 +1,110 @@
+//! The stages' facts by the names of the report.
+//!
+//! The one place that knows both: a field that a stage adds to its facts appears in the
+//! report by one line here.
+
+use serde_json::{Map, Value, json};
+
+use super::{Forms, SurfaceSection};
+use crate::mesh::topology;
+use crate::optimise::{FitnessForm, FitnessSummary, OptimiseFacts, Optimised};
+use crate::retile::{RetileFacts, Tiled};
+use crate::surface::Surface;
+
+fn object(value: Value) -> Map<String, Value> {
+    match value {
+        Value::Object(map) => map,
+        _ => Map::new(),
+    }
+}
+
+pub fn surface(surface: &Surface) -> SurfaceSection {
+    let mesh = &surface.mesh;
+    // S is a closed manifold by its type's promise: 3F = 2E.
+    let edges = 3 * mesh.triangles.len() / 2;
+    let components = topology::components(mesh.vertices.len(), &mesh.triangles);
+    SurfaceSection {
+        iso_value: surface.facts.iso_value,
+        vertices: mesh.vertices.len(),
+        triangles: mesh.triangles.len(),
+        euler_characteristic: mesh.vertices.len() as i64 - edges as i64
+            + mesh.triangles.len() as i64,
+        components: components.iter().max().map_or(0, |m| *m as usize + 1),
+        volume_ml: mesh.volume() / 1000.0,
+        area_mm2: mesh.area(),
+        voxel_mm: surface.spacing,
+        facts: Map::new(),
+    }
+}
+
+pub fn retile(facts: &RetileFacts) -> Map<String, Value> {
+    object(json!({
+        "repulsion_rounds": facts.repulsion_rounds,
+        "relaxation_rounds": facts.relaxation_rounds,
+        "attempts": facts.attempts,
+    }))
+}
+
+pub fn optimise(facts: &OptimiseFacts) -> Map<String, Value> {
+    object(json!({
+        "flips": facts.flips,
+        "sweeps": facts.sweeps,
+        "ended": facts.ended,
+        "fit_rounds": facts.fit_rounds,
+    }))
+}
+
+pub fn warnings(surface: &Surface, tiled: &Tiled, optimised: &Optimised) -> Vec<String> {
+    [
+        &surface.facts.warnings,
+        &tiled.facts.warnings,
+        &optimised.facts.warnings,
+    ]
+    .into_iter()
+    .flatten()
+    .cloned()
+    .collect()
+}
+
+pub fn form_name(form: FitnessForm) -> &'static str {
+    match form {
+        FitnessForm::Raw => "raw",
+        FitnessForm::Normalised => "normalised",
+        FitnessForm::Robust => "robust",
+    }
+}
+
+pub fn driving_form(summary: &FitnessSummary, form: FitnessForm) -> f64 {
+    match form {
+        FitnessForm::Raw => summary.raw,
+        FitnessForm::Normalised => summary.normalised,
+        FitnessForm::Robust => summary.robust,
+    }
+}
+
+pub fn forms(summary: &&FitnessSummary) -> Forms {
+    Forms {
+        raw: summary.raw,
+        normalised: summary.normalised,
+        robust: summary.robust,
+    }
+}
+
+/// Numerators and floors of A, B (radians), C and D (mm) in every form.
+pub fn scales(spacing: f64) -> Map<String, Value> {
+    let degree = 1f64.to_radians();
+    object(json!({
+        "raw": {
+            "numerator": [1.0, 1.0, 1.0, spacing],
+            "floor": [0.05, 0.05, 1.0, 0.05 * spacing],
+        },
+        "normalised": {
+            "numerator": [10.0 * degree, 10.0 * degree, 1.0, 0.25 * spacing],
+            "floor": [10.0 * degree, 10.0 * degree, 1.0, 0.25 * spacing],
+        },
+        "robust": {
+            "numerator": [degree, degree, 1.0, 1.0],
+            "floor": [degree, degree, 1.0, 0.01],
+        },
+    }))
+}
