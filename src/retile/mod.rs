@@ -2,6 +2,11 @@
 //!
 //! STUB: the owner of this folder writes the module page.
 
+mod cells;
+mod dual;
+mod refined;
+mod samples;
+mod sizing;
 pub mod tessellate;
 
 use crate::geometry::Vec3;
@@ -125,9 +130,10 @@ pub enum RetileError {
 /// # Errors
 /// See [`RetileError`].
 pub fn retile(
-    _surface: &Surface,
-    _parameters: &RetileParameters,
-    _monitor: &Monitor,
+    surface: &Surface,
+    parameters: &RetileParameters,
+    monitor: &Monitor,
 ) -> Result<Tiled, RetileError> {
-    Err(RetileError::Cancelled(Cancelled))
+    monitor.report(crate::progress::Stage::Retile, 0.0)?;
+    refined::retile(surface, parameters, monitor)
 }
