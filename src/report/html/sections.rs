@@ -195,7 +195,7 @@ pub fn model(mesh: &TriMesh) -> String {
         String::new()
     };
     format!(
-        r#"<section><h2>The model</h2><p class="hint">Every triangle as it is. Letters: L left, R right, A anterior, P posterior, S superior, I inferior side of the patient.</p><div class="row">{}{turning}</div></section>"#,
+        r#"<section><h2>The model</h2><p class="hint">Every triangle as it is. Letters: L left, R right, A anterior, P posterior, S superior, I inferior side of the patient.</p><div class="row four">{}{turning}</div></section>"#,
         shown(&views::plain(mesh), "The model")
     )
 }
@@ -211,7 +211,7 @@ fn shown(pictures: &Pictures, what: &str) -> String {
                 r#"<i class="east" aria-hidden="true">{east}</i><i class="north" aria-hidden="true">{north}</i><i class="west" aria-hidden="true">{west}</i><i class="south" aria-hidden="true">{south}</i>"#
             );
             format!(
-                r#"<figure><div class="view"><img src="{uri}" alt="{what}, {} view" width="560" height="560">{marks}</div><figcaption>{name}</figcaption></figure>"#,
+                r#"<figure><div class="view"><img src="{uri}" alt="{what}, {} view" width="500" height="500">{marks}</div><figcaption>{name}</figcaption></figure>"#,
                 name.to_lowercase()
             )
         })
@@ -271,7 +271,7 @@ fn direction_row(name: &str, direction: &Direction) -> String {
     .iter()
     .map(|x| format!(r#"<td class="n">{}</td>"#, number(*x, 3)))
     .collect();
-    let samples = direction.samples + direction.vertices;
+    let samples = direction.samples;
     format!(r#"<tr><th scope="row">{name}</th>{cells}<td class="n">{samples}</td></tr>"#)
 }
 

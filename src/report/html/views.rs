@@ -2,13 +2,13 @@
 
 use rayon::prelude::*;
 
-use super::raster::{Colour, Facet, View, data_uri, png};
+use super::raster::{Colour, Facet, Style, View, data_uri, png};
 use crate::geometry::Vec3;
 use crate::geometry::bvh::{Aabb, Bvh};
 use crate::mesh::TriMesh;
 
 /// Side of a picture in pixels; shown at half of that or less.
-const SIDE: usize = 560;
+const SIDE: usize = 500;
 /// Most distance queries for a coloured model.
 const MOST_QUERIES: usize = 20_000;
 /// The wall of the heart.
@@ -26,7 +26,7 @@ pub fn plain(mesh: &TriMesh) -> Pictures {
             lines: [true; 3],
         })
         .collect();
-    pictures(&facets, mesh)
+    pictures(&facets, mesh, 0.34)
 }
 
 /// The model coloured by its signed distance to `reference`, and the distance in mm at which
@@ -51,7 +51,7 @@ pub fn by_distance(mesh: &TriMesh, reference: &TriMesh) -> (Pictures, f64) {
             ..facet
         })
         .collect();
-    (pictures(&facets, mesh), full)
+    (pictures(&facets, mesh, 0.62), full)
 }
 
 /// The colour for -1 (blue) over 0 (near white) to 1 (red).
@@ -65,19 +65,22 @@ pub fn diverging(x: f64) -> Colour {
     [0, 1, 2].map(|r| 0.95 + (end[r] - 0.95) * x)
 }
 
-fn pictures(facets: &[Facet], mesh: &TriMesh) -> Pictures {
+fn pictures(facets: &[Facet], mesh: &TriMesh, ambient: f64) -> Pictures {
     let aabb = Aabb::of(&mesh.vertices);
-    let centre = (aabb.min + aabb.max) / 2.0;
-    let radius = (mesh.vertices.iter())
-        .map(|v| (v - centre).norm())
-        .fold(0.0, f64::max);
+    let reach = (aabb.max - aabb.min).amax() / 2.0;
     // Lines of many small triangles would black everything out.
     let edge = (4.0 * mesh.area() / 3f64.sqrt() / mesh.triangles.len() as f64).sqrt();
-    let pixels = edge / radius * SIDE as f64 / 2.0;
-    let line = (pixels / 16.0).clamp(0.0, 1.6);
+    let pixels = edge / reach * SIDE as f64 / 2.0;
+    let style = Style {
+        centre: (aabb.min + aabb.max) / 2.0,
+        reach,
+        side: SIDE,
+        line: (pixels / 16.0).clamp(0.0, 1.6),
+        ambient,
+    };
     View::ALL
         .par_iter()
-        .map(|view| data_uri(&png(facets, view, (centre, radius), (SIDE, line))))
+        .map(|view| data_uri(&png(facets, view, &style)))
         .collect()
 }
 
