@@ -66,8 +66,9 @@ pub struct Facet {
     pub corners: [Vec3; 3],
     /// Colour before shading.
     pub colour: Colour,
-    /// Which sides to draw a line along: corners k to k + 1.
-    pub lines: [bool; 3],
+    /// Corners of the triangle whose sides are drawn where this one meets them: itself, or
+    /// the whole one that it is a part of.
+    pub outline: [Vec3; 3],
 }
 
 /// A square picture under work.
@@ -114,26 +115,23 @@ pub fn png(facets: &[Facet], view: &View, style: &Style) -> Vec<u8> {
             continue;
         }
         // x right, y down, z toward the eye.
-        let seen = facet.corners.map(|p| {
+        let project = |p: Vec3| {
             let p = (p - style.centre) * scale;
             Vec3::new(
                 middle + p.dot(&view.right),
                 middle - p.dot(&view.up),
                 p.dot(&toward),
             )
-        });
+        };
+        let seen = facet.corners.map(project);
+        let outline = facet.outline.map(project);
         let local = Vec3::new(
             normal.dot(&view.right),
             normal.dot(&view.up),
             normal.dot(&toward),
         );
         let colour = shade(facet.colour, &local, style.ambient);
-        canvas.fill(
-            &seen,
-            colour,
-            facet.lines,
-            style.line * SUPERSAMPLING as f64,
-        );
+        canvas.fill(&seen, colour, &outline, style.line * SUPERSAMPLING as f64);
     }
     canvas.encode(side)
 }
@@ -148,17 +146,14 @@ fn shade(colour: Colour, normal: &Vec3, ambient: f64) -> Colour {
 }
 
 impl Canvas {
-    fn fill(&mut self, [a, b, c]: &[Vec3; 3], colour: Colour, lines: [bool; 3], width: f64) {
-        let cross =
-            |p: &Vec3, q: &Vec3, r: &Vec3| (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x);
+    fn fill(&mut self, [a, b, c]: &[Vec3; 3], colour: Colour, outline: &[Vec3; 3], width: f64) {
         let doubled_area = cross(a, b, c);
         if doubled_area == 0.0 {
             return;
         }
-        let lengths = [(a, b), (b, c), (c, a)].map(|(p, q)| (q.x - p.x).hypot(q.y - p.y));
-        let rows = self.span([a.y, b.y, c.y]);
+        let dark = colour.map(|c| 0.42 * c);
         let columns = self.span([a.x, b.x, c.x]);
-        for row in rows {
+        for row in self.span([a.y, b.y, c.y]) {
             for column in columns.clone() {
                 let p = Vec3::new(column as f64 + 0.5, row as f64 + 0.5, 0.0);
                 // Twice the areas over the sides ab, bc, ca.
@@ -168,16 +163,11 @@ impl Canvas {
                 }
                 let depth = (a.z * over[1] + b.z * over[2] + c.z * over[0]) / doubled_area;
                 let at = row * self.side + column;
-                if depth <= self.depth[at] {
-                    continue;
+                if depth > self.depth[at] {
+                    self.depth[at] = depth;
+                    let on_line = near_side(&p, outline, width / 2.0);
+                    self.pixels[at] = Some(if on_line { dark } else { colour });
                 }
-                let on_line = (0..3).any(|k| lines[k] && over[k].abs() < width / 2.0 * lengths[k]);
-                self.depth[at] = depth;
-                self.pixels[at] = Some(if on_line {
-                    colour.map(|c| 0.42 * c)
-                } else {
-                    colour
-                });
             }
         }
     }
@@ -221,6 +211,19 @@ impl Canvas {
     }
 }
 
+/// Twice the signed area of a triangle in the picture.
+fn cross(p: &Vec3, q: &Vec3, r: &Vec3) -> f64 {
+    (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x)
+}
+
+/// Whether `p`, inside of the triangle, lies within `distance` of one of its sides.
+fn near_side(p: &Vec3, [a, b, c]: &[Vec3; 3], distance: f64) -> bool {
+    [(a, b), (b, c), (c, a)].iter().any(|(q, r)| {
+        let length = (r.x - q.x).hypot(r.y - q.y);
+        cross(q, r, p).abs() < distance * length
+    })
+}
+
 /// A PNG as a `data:` URI.
 pub fn data_uri(png: &[u8]) -> String {
     format!("data:image/png;base64,{}", STANDARD.encode(png))
@@ -236,7 +239,7 @@ mod tests {
             .map(|t| Facet {
                 corners: mesh.corners(t),
                 colour: [1.0; 3],
-                lines: [false; 3],
+                outline: mesh.corners(t),
             })
             .collect()
     }
