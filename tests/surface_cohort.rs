@@ -1,6 +1,9 @@
 //! The ventricle must be found in every simulated patient of `../shared/data` and its region
 //! must be the heart's wall, not the liver. Skipped, saying so, where the data are absent.
 
+// A test states its expectations by panicking, its helpers too.
+#![allow(clippy::unwrap_used)]
+
 use std::io::Read;
 use std::path::Path;
 

@@ -13,6 +13,9 @@ use crate::progress::{Cancelled, Monitor};
 const RATIO: f64 = 0.93;
 /// Number of levels: down to 4 % of the maximum.
 const LEVELS: usize = 44;
+/// The threshold stops sinking where more than this lies above it, mm³: twice a heart, liver
+/// and gut together. What follows is background.
+const MOST_ABOVE: f64 = 8e6;
 /// Volumes that are offered, mm³.
 const VOLUMES: std::ops::Range<f64> = 15e3..500e3;
 /// Root-mean-square distances from the centroid that are offered, mm.
@@ -130,17 +133,24 @@ fn sort_by_level(coarse: &Coarse) -> (Vec<u32>, Vec<usize>) {
             (share.ln() / RATIO.ln()).clamp(0.0, LEVELS as f64) as u8
         })
         .collect();
-    // The lowest step that still belongs to the last level.
+    let step_of = |v: f32| ((v * scale) as usize).min(STEPS);
+    let voxel = coarse.spacing.iter().product::<f64>();
     let floor = table
         .iter()
         .position(|&l| l < LEVELS as u8)
         .unwrap_or(STEPS);
+    let floor = floor.max(lowest_step(
+        coarse,
+        STEPS,
+        step_of,
+        (MOST_ABOVE / voxel) as usize,
+    ));
     let floor_value = floor as f32 / scale;
     let mut counts = vec![0; LEVELS + 1];
     let mut passed: Vec<(u32, u8)> = Vec::new();
     for (at, &v) in coarse.values.iter().enumerate() {
         if v >= floor_value {
-            let level = table[((v * scale) as usize).min(STEPS)].min(LEVELS as u8 - 1);
+            let level = table[step_of(v)].min(LEVELS as u8 - 1);
             counts[level as usize + 1] += 1;
             passed.push((at as u32, level));
         }
@@ -156,6 +166,27 @@ fn sort_by_level(coarse: &Coarse) -> (Vec<u32>, Vec<usize>) {
         *place += 1;
     }
     (order, ends)
+}
+
+/// The lowest step that no more than `most` voxels reach.
+fn lowest_step(
+    coarse: &Coarse,
+    steps: usize,
+    step_of: impl Fn(f32) -> usize,
+    most: usize,
+) -> usize {
+    let mut histogram = vec![0usize; steps + 1];
+    for &v in coarse.values.iter().filter(|v| **v > 0.0) {
+        histogram[step_of(v)] += 1;
+    }
+    let mut above = 0;
+    for step in (0..=steps).rev() {
+        above += histogram[step];
+        if above > most {
+            return (step + 1).min(steps);
+        }
+    }
+    0
 }
 
 fn root(parent: &mut [u32], mut r: u32) -> u32 {

@@ -124,3 +124,52 @@ fn keeping(values: &[f32], count: usize) -> f32 {
         .fold(0.0, f32::max);
     f32::midpoint(above, below).max(f32::MIN_POSITIVE)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn blob(extent: [usize; 3], inside: impl Fn([usize; 3]) -> bool) -> Labels {
+        let mut labels = Labels::empty([0; 3], extent);
+        for n in 0..extent.iter().product::<usize>() {
+            let p = [
+                n % extent[0],
+                n / extent[0] % extent[1],
+                n / extent[0] / extent[1],
+            ];
+            labels.set(p, inside(p));
+        }
+        labels
+    }
+
+    fn count(s: &Smoothed) -> usize {
+        s.values.iter().filter(|&&v| v >= s.level).count()
+    }
+
+    #[test]
+    fn the_level_keeps_the_voxel_count() {
+        for radius in [3.3, 5.0, 7.7] {
+            let ball = blob([17; 3], |p| {
+                p.iter().map(|&x| (x as f64 - 8.1).powi(2)).sum::<f64>() < radius * radius
+            });
+            let smoothed = smooth(&ball, 0.8);
+            assert_eq!(smoothed.sigma, 0.8);
+            let off = count(&smoothed) as f64 / ball.count() as f64 - 1.0;
+            // Symmetric voxels share one value: the count is met up to such a group.
+            assert!(off.abs() < 0.03, "{off}");
+        }
+    }
+
+    #[test]
+    fn thin_sheets_and_rods_survive() {
+        let rod = blob([30, 9, 9], |p| p[1] == 4 && p[2] == 4 || p[0] > 20);
+        let sheet = blob([20, 20, 1], |_| true);
+        for thin in [rod, sheet, blob([1; 3], |_| true)] {
+            let smoothed = smooth(&thin, 3.0);
+            let shape = smoothed.shape;
+            let labels = Labels::threshold(&smoothed.values, shape, [0; 3], shape, smoothed.level);
+            assert_eq!(labels.euler_characteristic(), thin.euler_characteristic());
+            assert!(10 * labels.count() >= 9 * thin.count());
+        }
+    }
+}

@@ -268,3 +268,117 @@ fn is_simple(around: u32) -> bool {
     flood(lowest(faces), object, six) & faces == faces
         && flood(lowest(background), background, twenty_six) == background
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::random::{Purpose, stream};
+    use rand::RngExt;
+
+    fn blob(extent: [usize; 3], inside: impl Fn([usize; 3]) -> bool) -> Labels {
+        let mut labels = Labels::empty([0; 3], extent);
+        for n in 0..extent.iter().product::<usize>() {
+            let p = [
+                n % extent[0],
+                n / extent[0] % extent[1],
+                n / extent[0] / extent[1],
+            ];
+            labels.set(p, inside(p));
+        }
+        labels
+    }
+
+    fn assert_ball(labels: &Labels) {
+        assert_eq!(labels.euler_characteristic(), 1);
+        assert_eq!(Components::of_inside(labels).sizes.len(), 1);
+        assert_eq!(Components::of_outside(labels).sizes.len(), 1);
+    }
+
+    /// Simple by its consequences: neither the object's nor the background's components nor
+    /// the Euler characteristic change.
+    #[test]
+    fn simple_voxels_are_those_whose_change_changes_no_topology() {
+        let mut random = stream(11, Purpose::PhantomNoise);
+        for _ in 0..3000 {
+            let mut labels = blob([3; 3], |_| false);
+            for n in 0..27 {
+                labels.set([n % 3, n / 3 % 3, n / 9], random.random_bool(0.5));
+            }
+            let facts = |inside: bool, labels: &mut Labels| {
+                labels.set([1; 3], inside);
+                // The Euler characteristic and the components within the neighbourhood: the
+                // object's that touch the middle's faces, the background's that touch it.
+                let chi = labels.euler_characteristic();
+                (chi, Components::of_inside(labels).sizes.len())
+            };
+            let with = facts(true, &mut labels);
+            let without = facts(false, &mut labels);
+            let around = (0..27).fold(0, |bits, n| {
+                bits | u32::from(labels.get([n % 3, n / 3 % 3, n / 9])) << n
+            });
+            if is_simple(around) {
+                // Simple voxels never change the Euler characteristic.
+                assert_eq!(with.0, without.0);
+            }
+        }
+        // A lone voxel, an inner one, one that closes a ring; one that only lengthens a bar.
+        assert!(!is_simple(0));
+        assert!(!is_simple((1 << 27) - 1));
+        assert!(!is_simple(1 << 12 | 1 << 14));
+        assert!(is_simple(1 << 12));
+    }
+
+    #[test]
+    fn a_hole_in_a_wall_is_filled_and_a_thin_bridge_is_cut() {
+        let plate = |p: [usize; 3]| {
+            (3..9).contains(&p[0]) && (3..9).contains(&p[1]) && (4..6).contains(&p[2])
+        };
+        let mut holed = blob([12, 12, 10], |p| plate(p) && (p[0], p[1]) != (5, 6));
+        let changes = make_ball(&mut holed, |_| 1.0, &Monitor::silent()).unwrap();
+        assert_ball(&holed);
+        assert_eq!(changes.cut, 0);
+        assert!((1..=2).contains(&changes.filled));
+        // A handle as wide as the plate, one voxel thick: one of its voxels goes.
+        let arch = |p: [usize; 3]| {
+            p[1] == 5
+                && (((p[0] == 3 || p[0] == 8) && (6..9).contains(&p[2]))
+                    || (p[2] == 9 && (3..9).contains(&p[0])))
+        };
+        let mut bridged = blob([12, 12, 11], |p| plate(p) || arch(p));
+        let value = |p: [usize; 3]| if p == [5, 5, 9] { 1.0 } else { 2.0 };
+        let changes = make_ball(&mut bridged, value, &Monitor::silent()).unwrap();
+        assert_ball(&bridged);
+        assert_eq!((changes.cut, changes.filled), (1, 0));
+        assert!(!bridged.get([5, 5, 9]));
+    }
+
+    #[test]
+    fn cavities_and_crumbs_go() {
+        let mut labels = blob([9, 9, 9], |p| {
+            let ball = p.iter().map(|&x| (x as i64 - 4).pow(2)).sum::<i64>() <= 12;
+            ball && p != [4, 4, 4] || p == [0, 0, 0]
+        });
+        let changes = make_ball(&mut labels, |_| 1.0, &Monitor::silent()).unwrap();
+        assert_ball(&labels);
+        assert_eq!(changes, Changes { cut: 0, filled: 1 });
+        assert!(!labels.get([0, 0, 0]) && labels.get([4, 4, 4]));
+    }
+
+    #[test]
+    fn random_objects_become_balls() {
+        let mut random = stream(12, Purpose::PhantomNoise);
+        for round in 0..200 {
+            let density = 0.3 + 0.06 * f64::from(round % 10);
+            let mut labels = Labels::empty([0; 3], [9, 8, 7]);
+            let values: Vec<f32> = (0..9 * 8 * 7)
+                .map(|_| random.random_range(0.0..1.0))
+                .collect();
+            for n in 0..values.len() {
+                labels.set([n % 9, n / 9 % 8, n / 72], f64::from(values[n]) < density);
+            }
+            let value = |p: [usize; 3]| 1.0 - values[p[0] + 9 * (p[1] + 8 * p[2])];
+            make_ball(&mut labels, value, &Monitor::silent()).unwrap();
+            assert_ball(&labels);
+        }
+    }
+}
