@@ -17,12 +17,7 @@ use super::Bar;
 writes phantom/spect.nii.gz, phantom/lv_truth.nii.gz and phantom/params.json")]
 pub struct PhantomArgs {
     /// The folder to write to (made where missing)
-    #[arg(
-        short,
-        long = "output",
-        value_name = "DIR",
-        default_value = "phantom"
-    )]
+    #[arg(short, long = "output", value_name = "DIR", default_value = "phantom")]
     output: PathBuf,
     /// Voxels along each axis
     #[arg(long, value_name = "N", default_value_t = 128)]

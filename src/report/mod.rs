@@ -253,9 +253,7 @@ impl Report {
             ),
             format!(
                 "radius ratio 2r/R {:.3} mean, {:.3} least; {:.1}° mean angle between neighbours",
-                shape.radius_ratio.mean,
-                shape.radius_ratio.min,
-                self.smoothness.dihedral_deg.mean
+                shape.radius_ratio.mean, shape.radius_ratio.min, self.smoothness.dihedral_deg.mean
             ),
             format!(
                 "{:.2} mm mean and {:.2} mm largest distance to the surface, volume {:+.2} %",

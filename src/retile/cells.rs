@@ -43,10 +43,7 @@ impl Cells {
             labels[v as usize] = site;
         }
         flood(samples, &mut labels, &mut front);
-        let sites = seeds
-            .iter()
-            .map(|&v| samples.working[v as usize])
-            .collect();
+        let sites = seeds.iter().map(|&v| samples.working[v as usize]).collect();
         Self { labels, sites }
     }
 

@@ -125,6 +125,21 @@ pub enum RetileError {
     },
 }
 
+impl RetileError {
+    /// What the caller can do about it.
+    pub fn fix(&self) -> String {
+        match self {
+            RetileError::Cancelled(_) => "Ask again if the result is still wanted.".into(),
+            RetileError::TooFewPoints { needed, .. } => {
+                format!("Set `points` to {needed} or more, or `topology` to genus0.")
+            }
+            RetileError::TooManyPoints { limit, .. } => {
+                format!("Set `points` to {limit} or fewer.")
+            }
+        }
+    }
+}
+
 /// Re-tiles `surface`.
 ///
 /// # Errors

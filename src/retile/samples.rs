@@ -25,12 +25,7 @@ pub(super) struct Samples {
 impl Samples {
     /// Samples of the surface with at least `wanted` vertices, but not more than one
     /// subdivision beyond that.
-    pub fn new(
-        surface: &[Vec3],
-        working: &[Vec3],
-        triangles: &[[u32; 3]],
-        wanted: usize,
-    ) -> Self {
+    pub fn new(surface: &[Vec3], working: &[Vec3], triangles: &[[u32; 3]], wanted: usize) -> Self {
         let mut samples = Self::of(surface.to_vec(), working.to_vec(), triangles.to_vec());
         while samples.len() < wanted {
             samples = samples.subdivided();
