@@ -34,3 +34,5 @@ pub mod export;
 
 pub mod parameters;
 pub mod pipeline;
+
+pub mod cli;
