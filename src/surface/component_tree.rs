@@ -61,11 +61,7 @@ pub fn parts(coarse: &Coarse, monitor: &Monitor) -> Result<Vec<Part>, Cancelled>
         for here in begin..end {
             let at = order[here] as usize;
             let (i, j, k) = (at % nx, at / nx % ny, at / (nx * ny));
-            let position = Vec3::new(
-                i as f64 * coarse.spacing[0],
-                j as f64 * coarse.spacing[1],
-                k as f64 * coarse.spacing[2],
-            );
+            let position = coarse.position([i, j, k]);
             sums.push(Sums {
                 count: 1.0,
                 position,

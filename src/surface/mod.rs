@@ -715,19 +715,13 @@ fn find_ventricle(
     facts: &mut SurfaceFacts,
     monitor: &Monitor,
 ) -> Result<Option<Labels>, SurfaceError> {
-    let coarse = coarse::Coarse::new(volume, survey.minimum, survey.not_finite > 0);
-    let found = left_ventricle::find(&coarse, monitor)?;
-    let Some(mut ventricle) = found.filter(|v| v.score >= PLAUSIBLE) else {
+    let found = left_ventricle::find(volume, survey, monitor)?;
+    let Some(ventricle) = found.filter(|v| v.score >= PLAUSIBLE) else {
         facts.warnings.push(
             "no left ventricle was recognised; the largest connected part was taken instead".into(),
         );
         return Ok(None);
     };
-    // Blocks of several voxels have their centre behind their first voxel's.
-    let fine = volume.frame.spacing();
-    for r in 0..3 {
-        ventricle.centre[r] += (coarse.factor[r] as f64 - 1.0) / 2.0 * fine[r];
-    }
     facts.ventricle_score = Some(ventricle.score);
     let wall = region::Wall::new(volume, &ventricle);
     let iso = iso_value(parameters.iso, wall.reference, survey)?;
