@@ -176,28 +176,26 @@ struct Wall {
 }
 
 fn look(coarse: &Coarse, centre: &Vec3, direction: &Vec3, level: f64) -> Wall {
-    let mut values = [0.0; SAMPLES + BEHIND];
-    for (n, value) in values.iter_mut().enumerate() {
-        *value = coarse.at_mm(&(centre + direction * (STEP * n as f64)));
-    }
-    let mut darkest = values[0].min(values[1]);
+    let value = |n: usize| coarse.at_mm(&(centre + direction * (STEP * n as f64)));
+    // Five samples in a row: v is the middle one.
+    let mut window = [value(0), value(1), value(2), value(3), 0.0];
+    let mut darkest = window[0].min(window[1]);
     for n in 2..SAMPLES {
-        let v = values[n];
-        let is_peak = v >= 0.7 * level
-            && v >= values[n - 1]
-            && v >= values[n + 1]
-            && v >= values[n - 2]
-            && v >= values[n + 2];
+        window[4] = value(n + 2);
+        let v = window[2];
+        let is_peak = v >= 0.7 * level && window.iter().all(|other| v >= *other);
         if is_peak && darkest <= 0.8 * v {
-            let behind = values[n..n + BEHIND].iter().copied().fold(v, f64::min);
+            let limit = 0.7 * v;
+            let ends = (n + 1..n + BEHIND).any(|m| value(m) <= limit);
             return Wall {
                 distance: STEP * n as f64,
                 peak: v,
-                weight: if behind <= 0.7 * v { 1.0 } else { 0.4 },
+                weight: if ends { 1.0 } else { 0.4 },
                 cavity: darkest / v,
             };
         }
         darkest = darkest.min(v);
+        window.rotate_left(1);
     }
     Wall::default()
 }
@@ -248,7 +246,11 @@ fn judge(coarse: &Coarse, table: &[Vec3], part: &Part) -> Option<Ventricle> {
         if !(12.0..55.0).contains(&radius) || (fitted - part.centroid).norm() > 45.0 {
             break;
         }
+        let moved = (fitted - centre).norm();
         centre = fitted;
+        if moved < 1.0 {
+            break;
+        }
     }
     best
 }

@@ -759,7 +759,8 @@ fn reference_in_box(
     extent: [usize; 3],
     survey: &Survey,
 ) -> f32 {
-    let highest = values_in_box(volume, origin, extent)
+    let values = || rows_in_box(volume, origin, extent).flatten().copied();
+    let highest = values()
         .filter(|v| v.is_finite())
         .fold(survey.minimum, f32::max);
     let floor = if highest > 0.0 {
@@ -774,7 +775,7 @@ fn reference_in_box(
         return highest;
     }
     let mut histogram = vec![0u64; BINS];
-    for v in values_in_box(volume, origin, extent).filter(|v| v.is_finite() && *v > floor) {
+    for v in values().filter(|v| v.is_finite() && *v > floor) {
         let bin = ((f64::from(v) - f64::from(floor)) / width * BINS as f64) as usize;
         histogram[bin.min(BINS - 1)] += 1;
     }
@@ -791,22 +792,22 @@ fn reference_in_box(
 
 fn otsu_in_box(volume: &Volume, origin: [usize; 3], extent: [usize; 3], survey: &Survey) -> f32 {
     survey::otsu(
-        values_in_box(volume, origin, extent),
+        rows_in_box(volume, origin, extent),
         survey.minimum,
         survey.maximum,
     )
 }
 
-fn values_in_box(
+fn rows_in_box(
     volume: &Volume,
     origin: [usize; 3],
     extent: [usize; 3],
-) -> impl Iterator<Item = f32> + '_ {
+) -> impl Iterator<Item = &[f32]> {
     let [nx, ny, _] = volume.shape;
-    (0..extent[1] * extent[2]).flat_map(move |row| {
+    (0..extent[1] * extent[2]).map(move |row| {
         let (j, k) = (row % extent[1] + origin[1], row / extent[1] + origin[2]);
         let start = origin[0] + nx * (j + ny * k);
-        volume.voxels[start..start + extent[0]].iter().copied()
+        &volume.voxels[start..start + extent[0]]
     })
 }
 
