@@ -21,12 +21,10 @@
 
 mod configurations;
 mod connectivity;
-mod equations;
 mod fit;
 pub mod fitness;
 mod flips;
 mod legality;
-mod samples;
 
 use configurations::Configurations;
 use connectivity::Connectivity;
