@@ -252,10 +252,18 @@ fn the_slice_vector_orders_the_frames() {
         e.remove(&(0x54, 0x80));
     });
     assert!(without.unwrap().facts.warnings[0].contains("no Slice Vector"));
-    let energy = changed(|e| {
-        e.insert((0x28, 0x09), ("AT", Shorts(vec![0x54, 0x10, 0x54, 0x80])));
-    });
-    assert_eq!(complaint(energy).1, "(0054,0010) (0054,0080)");
+    let windows = |vector: Vec<u16>| {
+        changed(|e| {
+            let pointer = vec![0x54, 0x10, 0x54, 0x80];
+            e.insert((0x28, 0x09), ("AT", Shorts(pointer)));
+            e.insert((0x54, 0x10), ("US", Shorts(vector)));
+        })
+    };
+    assert!(windows(vec![1; 4]).is_ok());
+    assert_eq!(
+        complaint(windows(vec![1, 1, 2, 2])).1,
+        "(0054,0010) (0054,0080)"
+    );
 }
 
 const SLICE_VECTOR: &str = "Slice Vector (0054,0080)";
