@@ -293,6 +293,52 @@ pub enum SurfaceError {
     },
 }
 
+impl SurfaceError {
+    /// The parameter that the error is about, by its name for users.
+    pub fn field(&self) -> Option<&'static str> {
+        match self {
+            SurfaceError::NoSurface { .. } | SurfaceError::BadIso { .. } => Some("iso"),
+            SurfaceError::BadSmoothing { .. } => Some("mask_smoothing"),
+            SurfaceError::NoSuchLabel { .. } => Some("label"),
+            SurfaceError::EmptyBox { .. } => Some("box"),
+            SurfaceError::OutsideVolume { .. } => Some("isolate"),
+            SurfaceError::SeedOutside { .. } => Some("seed_point"),
+            _ => None,
+        }
+    }
+
+    /// What the caller can do about it.
+    pub fn fix(&self) -> String {
+        match self {
+            SurfaceError::Cancelled(_) => "Ask again if the result is still wanted.".into(),
+            SurfaceError::NoFiniteVoxel { .. } | SurfaceError::Constant { .. } => {
+                "Look at the file in a viewer: there is nothing in it.".into()
+            }
+            SurfaceError::NoSurface {
+                minimum, maximum, ..
+            } => {
+                format!(
+                    "Set `iso` to auto or to an absolute value between {minimum} and {maximum}."
+                )
+            }
+            SurfaceError::BadIso { expected, .. } => format!("Set `iso` to {expected}."),
+            SurfaceError::BadSmoothing { .. } => "Set `mask_smoothing` from 0 to 3.".into(),
+            SurfaceError::NoSuchLabel { .. } => "Set `label` to one that occurs.".into(),
+            SurfaceError::OutsideVolume { shape, .. } => {
+                format!("Give voxel indices below {shape:?}, counted from 0.")
+            }
+            SurfaceError::EmptyBox { .. } => "Give the lower corner of the box first.".into(),
+            SurfaceError::SeedOutside { value, .. } => {
+                format!("Choose a voxel inside the wall, or an `iso` below {value}.")
+            }
+            SurfaceError::BadShape { .. }
+            | SurfaceError::TooManyVertices(_)
+            | SurfaceError::NotClosed(_)
+            | SurfaceError::BadVertex { .. } => "Send a smaller or a valid object.".into(),
+        }
+    }
+}
+
 fn describe_labels(present: &[(i64, usize)]) -> String {
     if present.is_empty() {
         return "no labels (its values are intensities)".into();
@@ -715,19 +761,13 @@ fn find_ventricle(
     facts: &mut SurfaceFacts,
     monitor: &Monitor,
 ) -> Result<Option<Labels>, SurfaceError> {
-    let coarse = coarse::Coarse::new(volume, survey.minimum, survey.not_finite > 0);
-    let found = left_ventricle::find(&coarse, monitor)?;
-    let Some(mut ventricle) = found.filter(|v| v.score >= PLAUSIBLE) else {
+    let found = left_ventricle::find(volume, survey, monitor)?;
+    let Some(ventricle) = found.filter(|v| v.score >= PLAUSIBLE) else {
         facts.warnings.push(
             "no left ventricle was recognised; the largest connected part was taken instead".into(),
         );
         return Ok(None);
     };
-    // Blocks of several voxels have their centre behind their first voxel's.
-    let fine = volume.frame.spacing();
-    for r in 0..3 {
-        ventricle.centre[r] += (coarse.factor[r] as f64 - 1.0) / 2.0 * fine[r];
-    }
     facts.ventricle_score = Some(ventricle.score);
     let wall = region::Wall::new(volume, &ventricle);
     let iso = iso_value(parameters.iso, wall.reference, survey)?;
@@ -765,7 +805,8 @@ fn reference_in_box(
     extent: [usize; 3],
     survey: &Survey,
 ) -> f32 {
-    let highest = values_in_box(volume, origin, extent)
+    let values = || rows_in_box(volume, origin, extent).flatten().copied();
+    let highest = values()
         .filter(|v| v.is_finite())
         .fold(survey.minimum, f32::max);
     let floor = if highest > 0.0 {
@@ -780,7 +821,7 @@ fn reference_in_box(
         return highest;
     }
     let mut histogram = vec![0u64; BINS];
-    for v in values_in_box(volume, origin, extent).filter(|v| v.is_finite() && *v > floor) {
+    for v in values().filter(|v| v.is_finite() && *v > floor) {
         let bin = ((f64::from(v) - f64::from(floor)) / width * BINS as f64) as usize;
         histogram[bin.min(BINS - 1)] += 1;
     }
@@ -797,22 +838,22 @@ fn reference_in_box(
 
 fn otsu_in_box(volume: &Volume, origin: [usize; 3], extent: [usize; 3], survey: &Survey) -> f32 {
     survey::otsu(
-        values_in_box(volume, origin, extent),
+        rows_in_box(volume, origin, extent),
         survey.minimum,
         survey.maximum,
     )
 }
 
-fn values_in_box(
+fn rows_in_box(
     volume: &Volume,
     origin: [usize; 3],
     extent: [usize; 3],
-) -> impl Iterator<Item = f32> + '_ {
+) -> impl Iterator<Item = &[f32]> {
     let [nx, ny, _] = volume.shape;
-    (0..extent[1] * extent[2]).flat_map(move |row| {
+    (0..extent[1] * extent[2]).map(move |row| {
         let (j, k) = (row % extent[1] + origin[1], row / extent[1] + origin[2]);
         let start = origin[0] + nx * (j + ny * k);
-        volume.voxels[start..start + extent[0]].iter().copied()
+        &volume.voxels[start..start + extent[0]]
     })
 }
 
