@@ -1,13 +1,60 @@
 //! Exactly N evenly spread points on the surface, joined to triangles.
 //!
-//! STUB: the owner of this folder writes the module page.
+//! In: a closed surface S with its smoothed twin W. Out: a closed mesh with exactly N vertices
+//! that lie on S, of S's topology. After Turk, "Re-Tiling Polygonal Surfaces", SIGGRAPH 1992
+//! (doi:10.1145/133994.134008), in two ways:
+//!
+//! [`Method::Paper`]
+//! 1. [`placement`]: random points, uniform by area.
+//! 2. [`repulsion`]: they push each other apart along the surface (geodesics: [`log_map`],
+//!    straight moves: [`trace`]).
+//! 3. [`tessellate`]: mutual tessellation by constrained Delaunay, old vertices removed.
+//!
+//! [`Method::Refined`]
+//! 1. [`placement`], as above.
+//! 2. [`clusters`], then [`relaxation`]: centroidal Voronoi points, first in space with
+//!    clusters of vertices, then along the surface.
+//! 3. [`dual`] of the geodesic [`voronoi`] diagram; where it does not carry the topology or
+//!    pierces itself, [`refined`] relocates points and tries again.
+//!
+//! [`sizing`] makes the points denser where [`curvature`] is high, in both ways. Lengths are
+//! taken on W, since noise and voxel steps make S longer than it is; a point (triangle and
+//! barycentric coordinates) lies on both.
+//!
+//! **Guaranteed** for what is returned: exactly N vertices, closed, edge- and vertex-manifold,
+//! outward, components and Euler characteristic of S, no self-intersection (checked exactly).
+//! **Not** guaranteed: that N points can carry every surface; [`RetileError::TooFewPoints`]
+//! says how many would do. The same input gives the same bytes on any number of threads.
 
+mod clusters;
+mod curvature;
+mod domain;
+mod dual;
+mod log_map;
+mod paper;
+mod placement;
+mod refined;
+mod relaxation;
+mod repulsion;
+mod sizing;
 pub mod tessellate;
+mod trace;
+mod voronoi;
 
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
-use crate::progress::{Cancelled, Monitor};
+use crate::mesh::topology::{self, Census, Defect};
+use crate::progress::{Cancelled, Monitor, Stage};
 use crate::surface::Surface;
+
+use domain::Domain;
+use sizing::Sizing;
+
+/// Fewest points a model may have: an icosahedron's.
+pub const LEAST_POINTS: usize = 12;
+
+/// Most points a model may have.
+pub const MOST_POINTS: usize = 50_000;
 
 /// Which route makes the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,6 +149,12 @@ pub enum RetileError {
     /// Asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+    /// The surface is not a closed manifold.
+    #[error("the surface is not a closed manifold: {0}")]
+    OpenSurface(#[from] Defect),
+    /// The surface has no area, or a coordinate that is not finite.
+    #[error("the surface has no finite, positive area")]
+    NoArea,
     /// N points cannot carry the surface's handles and components.
     #[error("{points} points cannot carry the surface's topology; about {needed} would")]
     TooFewPoints {
@@ -118,6 +171,28 @@ pub enum RetileError {
         /// Most points possible.
         limit: usize,
     },
+    /// The triangles pierce each other whatever is tried: the wall is too thin for N points.
+    #[error(
+        "with {points} points the mesh pierces itself near ({:.1}, {:.1}, {:.1}) mm (LPS); \
+         the wall is too thin there: use more points",
+        place[0], place[1], place[2]
+    )]
+    SelfIntersecting {
+        /// Points asked for.
+        points: usize,
+        /// Where, LPS mm.
+        place: [f64; 3],
+    },
+    /// A parameter is out of its range.
+    #[error("{name} is {value}, outside {range}")]
+    BadParameter {
+        /// The field of [`RetileParameters`].
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        range: &'static str,
+    },
 }
 
 /// Re-tiles `surface`.
@@ -125,9 +200,109 @@ pub enum RetileError {
 /// # Errors
 /// See [`RetileError`].
 pub fn retile(
-    _surface: &Surface,
-    _parameters: &RetileParameters,
-    _monitor: &Monitor,
+    surface: &Surface,
+    parameters: &RetileParameters,
+    monitor: &Monitor,
 ) -> Result<Tiled, RetileError> {
-    Err(RetileError::Cancelled(Cancelled))
+    validate(parameters)?;
+    monitor.report(Stage::Retile, 0.0)?;
+    let job = Job::new(surface, parameters, monitor)?;
+    let tiled = match parameters.method {
+        Method::Paper => paper::tile(&job),
+        Method::Refined => refined::tile(&job),
+    }?;
+    monitor.report(Stage::Retile, 1.0)?;
+    Ok(tiled)
+}
+
+fn validate(parameters: &RetileParameters) -> Result<(), RetileError> {
+    let bad = |name, value, range| Err(RetileError::BadParameter { name, value, range });
+    let p = parameters;
+    if p.points < LEAST_POINTS {
+        return Err(RetileError::TooFewPoints {
+            points: p.points,
+            needed: LEAST_POINTS,
+        });
+    }
+    if p.points > MOST_POINTS {
+        return Err(RetileError::TooManyPoints {
+            points: p.points,
+            limit: MOST_POINTS,
+        });
+    }
+    if !(0.0..=1.0).contains(&p.adaptive) {
+        return bad("adaptive", p.adaptive, "0..=1");
+    }
+    if !(p.repulsion_strength > 0.0 && p.repulsion_strength <= 1.0) {
+        return bad("repulsion_strength", p.repulsion_strength, "(0, 1]");
+    }
+    if p.repulsion_iterations > 1000 {
+        let value = p.repulsion_iterations as f64;
+        return bad("repulsion_iterations", value, "0..=1000");
+    }
+    if p.relaxation_iterations > 1000 {
+        let value = p.relaxation_iterations as f64;
+        return bad("relaxation_iterations", value, "0..=1000");
+    }
+    Ok(())
+}
+
+/// What both methods work on.
+struct Job<'a> {
+    surface: &'a Surface,
+    parameters: &'a RetileParameters,
+    monitor: &'a Monitor<'a>,
+    /// The surface's numbers, which the model must repeat.
+    census: Census,
+    /// W.
+    domain: Domain,
+    sizing: Sizing,
+}
+
+impl<'a> Job<'a> {
+    fn new(
+        surface: &'a Surface,
+        parameters: &'a RetileParameters,
+        monitor: &'a Monitor<'a>,
+    ) -> Result<Self, RetileError> {
+        let census = topology::check(&surface.mesh)?;
+        let domain = Domain::new(surface.working.clone(), surface.mesh.triangles.clone())?;
+        if !(domain.area > 0.0 && domain.area.is_finite()) {
+            return Err(RetileError::NoArea);
+        }
+        let sizing = Sizing::adaptive(&domain, parameters.adaptive);
+        monitor.check()?;
+        Ok(Self {
+            surface,
+            parameters,
+            monitor,
+            census,
+            domain,
+            sizing,
+        })
+    }
+
+    /// The finished model of `points` on the surface.
+    fn finish(&self, points: &[SurfacePoint], mesh: TriMesh, facts: RetileFacts) -> Tiled {
+        let sizing = points
+            .iter()
+            .map(|p| {
+                let corners = self.domain.triangles[p.triangle as usize];
+                self.sizing.at(corners, p.barycentric)
+            })
+            .collect();
+        Tiled {
+            mesh,
+            sizing,
+            facts,
+        }
+    }
+
+    fn positions(&self, points: &[SurfacePoint]) -> Vec<Vec3> {
+        let mesh = &self.surface.mesh;
+        points
+            .iter()
+            .map(|p| p.position(&mesh.vertices, &mesh.triangles))
+            .collect()
+    }
 }

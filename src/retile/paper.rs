@@ -1,0 +1,88 @@
+//! The paper's route: repulsion, mutual tessellation, removal of the old vertices.
+
+use super::tessellate::{TessellateError, tessellate};
+use super::{Job, RetileError, RetileFacts, SurfacePoint, Tiled, placement, repulsion};
+use crate::mesh::TriMesh;
+use crate::progress::{Cancelled, Stage};
+
+/// Seeds tried before the surface is refused.
+const SEEDS: u64 = 4;
+
+/// Share of the stage that repulsion takes.
+const REPULSION_SHARE: f64 = 0.6;
+
+pub(super) fn tile(job: &Job) -> Result<Tiled, RetileError> {
+    let mut last = None;
+    for attempt in 0..SEEDS {
+        let points = spread(job, job.parameters.points, attempt)?;
+        match join(job, &points) {
+            Ok(mesh) => {
+                let facts = RetileFacts {
+                    repulsion_rounds: job.parameters.repulsion_iterations,
+                    attempts: attempt as usize + 1,
+                    ..RetileFacts::default()
+                };
+                return Ok(job.finish(&points, mesh, facts));
+            }
+            Err(TessellateError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Err(error) => last = Some(error),
+        }
+    }
+    Err(refusal(job, last)?)
+}
+
+/// Points after repulsion; `attempt` changes the seed.
+fn spread(job: &Job, count: usize, attempt: u64) -> Result<Vec<SurfacePoint>, RetileError> {
+    let seed = job.parameters.seed.wrapping_add(attempt << 32);
+    let mut points = placement::place(&job.domain, &job.sizing, count, seed)?;
+    repulsion::repel(
+        &job.domain,
+        &job.sizing,
+        &mut points,
+        job.parameters,
+        |share| {
+            if attempt == 0 {
+                job.monitor.report(Stage::Retile, REPULSION_SHARE * share)
+            } else {
+                job.monitor.check()
+            }
+        },
+    )?;
+    Ok(points)
+}
+
+fn join(job: &Job, points: &[SurfacePoint]) -> Result<TriMesh, TessellateError> {
+    let mesh = &job.surface.mesh;
+    tessellate(&mesh.vertices, &mesh.triangles, points, job.monitor)
+}
+
+/// The error to give up with: for a topology that N points do not carry, a number that does.
+fn refusal(job: &Job, last: Option<TessellateError>) -> Result<RetileError, Cancelled> {
+    let asked = job.parameters.points;
+    match last {
+        Some(TessellateError::OpenSurface(defect)) => Ok(RetileError::OpenSurface(defect)),
+        Some(TessellateError::SelfIntersecting { pairs, mesh, .. }) => {
+            let [t, _] = pairs[0];
+            let [a, b, c] = mesh.corners(t as usize);
+            Ok(RetileError::SelfIntersecting {
+                points: asked,
+                place: ((a + b + c) / 3.0).into(),
+            })
+        }
+        _ => {
+            let mut needed = asked;
+            while needed < super::MOST_POINTS {
+                needed = (needed * 3 / 2).min(super::MOST_POINTS);
+                match spread(job, needed, 0) {
+                    Ok(points) if join(job, &points).is_ok() => break,
+                    Err(RetileError::Cancelled(cancelled)) => return Err(cancelled),
+                    _ => {}
+                }
+            }
+            Ok(RetileError::TooFewPoints {
+                points: asked,
+                needed,
+            })
+        }
+    }
+}
