@@ -69,7 +69,6 @@ fn value_name(kind: &Kind) -> &'static str {
     match kind {
         Kind::Integer { .. } => "N",
         Kind::Number { .. } => "X",
-        Kind::Boolean => "BOOL",
         Kind::Choice(_) => "WORD",
         Kind::Integers { count: 1 } => "N",
         Kind::Integers { count: 3 } => "I,J,K",

@@ -65,7 +65,7 @@ pub enum Gain {
 /// Parameters of [`optimise`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct OptimiseParameters {
-    /// Default [`FitnessForm::Normalised`].
+    /// Default [`FitnessForm::Robust`].
     pub fitness: FitnessForm,
     /// Weights w1..w4 of the four terms A, B, C, D; not negative, not all zero. Default 1.
     pub weights: [f64; 4],
@@ -89,7 +89,7 @@ pub struct FitParameters {
     /// Default 20.
     pub worst_weight: f64,
     /// How far triangles may choose their own size, 0..=1: 0 draws all to one size (times the
-    /// wanted relative spacing), 1 to the size that each has. Default 1.
+    /// wanted relative spacing), 1 to the size that each has. Default 0.9.
     pub free_size: f64,
     /// How much more a distant sample counts: its weight is 1 + this · r²/mean r², 0..=10.
     /// Lowers the largest distance at the cost of the mean. Default 0.
@@ -110,7 +110,7 @@ impl Default for FitParameters {
             rounds: 20,
             shape_weight: 0.05,
             worst_weight: 20.0,
-            free_size: 1.0,
+            free_size: 0.9,
             peak_weight: 0.0,
             damping: 0.01,
             samples_per_triangle: 20,
@@ -122,7 +122,7 @@ impl Default for FitParameters {
 impl Default for OptimiseParameters {
     fn default() -> Self {
         Self {
-            fitness: FitnessForm::Normalised,
+            fitness: FitnessForm::Robust,
             weights: [1.0; 4],
             gain: Gain::Total,
             guard: 0.9,

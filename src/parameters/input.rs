@@ -17,7 +17,6 @@ pub enum Input<'a> {
 pub(super) enum Checked {
     Integer(u64),
     Number(f64),
-    Boolean(bool),
     Integers(Vec<i64>),
     Text(String),
 }
@@ -42,10 +41,6 @@ impl Input<'_> {
                 }
                 Ok(Checked::Number(x))
             }
-            Kind::Boolean => self
-                .as_bool()
-                .map(Checked::Boolean)
-                .ok_or(format!("{self} is neither true nor false")),
             Kind::Choice(words) => match self.as_text() {
                 Some(word) if words.contains(&word) => Ok(Checked::Text(word.into())),
                 _ => Err(format!("{self} is none of the choices")),
@@ -73,13 +68,6 @@ impl Input<'_> {
         match self {
             Input::Text(t) => t.parse().ok().filter(|x: &f64| x.is_finite()),
             Input::Json(v) => v.as_f64(),
-        }
-    }
-
-    fn as_bool(&self) -> Option<bool> {
-        match self {
-            Input::Text(t) => t.parse().ok(),
-            Input::Json(v) => v.as_bool(),
         }
     }
 

@@ -66,8 +66,6 @@ pub enum Kind {
         /// Largest value.
         max: f64,
     },
-    /// `true` or `false`.
-    Boolean,
     /// One of some words.
     Choice(&'static [&'static str]),
     /// `count` whole numbers, separated by commas (in JSON also an array).
@@ -107,7 +105,7 @@ struct Draft {
     retile: RetileParameters,
     optimise: OptimiseParameters,
     isolate_words: Vec<&'static str>,
-    fit_iterations: Option<usize>,
+    fit_rounds: Option<usize>,
 }
 
 impl Draft {
@@ -134,9 +132,9 @@ impl Draft {
         // The paper leaves the points on the surface; the fit belongs to the refined route.
         let usual_fit = match self.retile.method {
             Method::Paper => 0,
-            Method::Refined => self.optimise.fit_iterations,
+            Method::Refined => self.optimise.fit.rounds,
         };
-        self.optimise.fit_iterations = self.fit_iterations.unwrap_or(usual_fit);
+        self.optimise.fit.rounds = self.fit_rounds.unwrap_or(usual_fit);
         Ok(ModelParameters {
             frame: self.frame,
             surface: self.surface,
@@ -215,7 +213,6 @@ impl ParameterSpec {
             Kind::Integer { min, max: u64::MAX } => format!("a whole number from {min}"),
             Kind::Integer { min, max } => format!("a whole number from {min} to {max}"),
             Kind::Number { min, max } => format!("a number from {min} to {max}"),
-            Kind::Boolean => "true or false".into(),
             Kind::Choice(words) => format!("one of {}", words.join(", ")),
             Kind::Integers { count } => format!("{count} whole numbers separated by commas"),
             Kind::Text { example, .. } => format!("for example {example}"),
@@ -274,7 +271,7 @@ mod tests {
             ],
             &[("iso", "absolute:0.47"), ("box", "1,2,3,40,50,60")],
             &[("method", "paper"), ("label", "-3"), ("w2", "0.5")],
-            &[("seed_point", "3,4,5"), ("guard", "false"), ("frame", "2")],
+            &[("seed_point", "3,4,5"), ("guard", "0"), ("frame", "2")],
         ] {
             let parameters = pairs(list).unwrap();
             let Value::Object(written) = parameters.to_json() else {
@@ -359,7 +356,7 @@ mod tests {
             json!({"points": "67"}),
             json!({"points": 67.5}),
             json!({"points": null}),
-            json!({"guard": "true"}),
+            json!({"guard": true}),
             json!({"method": 1}),
             json!({"adaptive": [0.2]}),
             json!({"seed_point": [1, 2]}),

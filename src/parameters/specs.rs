@@ -27,6 +27,26 @@ macro_rules! weight_spec {
     };
 }
 
+/// A row for one number of the fit.
+macro_rules! fit_spec {
+    ($name:literal, $field:ident, $min:literal..=$max:literal, $default:literal, $summary:literal) => {
+        ParameterSpec {
+            name: $name,
+            kind: Kind::Number {
+                min: $min,
+                max: $max,
+            },
+            default: $default,
+            summary: $summary,
+            read: |d, v| {
+                d.optimise.fit.$field = v.f64();
+                Ok(())
+            },
+            write: |p| json!(p.optimise.fit.$field),
+        }
+    };
+}
+
 /// Every parameter of a model, in the order in which the stages use them.
 pub const SPECS: &[ParameterSpec] = &[
     ParameterSpec {
@@ -262,40 +282,62 @@ pub const SPECS: &[ParameterSpec] = &[
         write: |p| json!(p.retile.relaxation_iterations),
     },
     ParameterSpec {
-        name: "fit_iterations",
+        name: "fit_rounds",
         kind: Kind::Integer { min: 0, max: 200 },
         default: "",
-        summary: "Most rounds of the least-squares fit; 0 leaves the points on the surface \
-                  (default 40 for refined, 0 for paper)",
+        summary: "Rounds of the least-squares fit; 0 leaves the points on the surface (default \
+                  20 for refined, 0 for paper)",
         read: |d, v| {
-            d.fit_iterations = Some(v.usize());
+            d.fit_rounds = Some(v.usize());
             Ok(())
         },
-        write: |p| json!(p.optimise.fit_iterations),
+        write: |p| json!(p.optimise.fit.rounds),
     },
-    ParameterSpec {
-        name: "fit_shape_weight",
-        kind: Kind::Number {
-            min: 0.0001,
-            max: 1.0,
-        },
-        default: "0.1",
-        summary: "Weight of triangle shape against distance in the fit",
-        read: |d, v| {
-            d.optimise.fit_shape_weight = v.f64();
-            Ok(())
-        },
-        write: |p| json!(p.optimise.fit_shape_weight),
-    },
+    fit_spec!(
+        "fit_shape_weight",
+        shape_weight,
+        0.0001..=10.0,
+        "0.05",
+        "Weight of triangle shape against squared distance in the fit"
+    ),
+    fit_spec!(
+        "fit_worst_weight",
+        worst_weight,
+        0.0..=100.0,
+        "20",
+        "How much more a misshapen triangle counts in the fit"
+    ),
+    fit_spec!(
+        "fit_free_size",
+        free_size,
+        0.0..=1.0,
+        "1",
+        "How far the fit lets triangles choose their own size"
+    ),
+    fit_spec!(
+        "fit_peak_weight",
+        peak_weight,
+        0.0..=10.0,
+        "0",
+        "How much more a distant sample counts in the fit: lowers the largest distance"
+    ),
+    fit_spec!(
+        "fit_midpoint_weight",
+        midpoint_weight,
+        0.0..=10.0,
+        "1",
+        "Weight of the model's own edge midpoints in the fit"
+    ),
     ParameterSpec {
         name: "fitness",
-        kind: Kind::Choice(&["raw", "normalised"]),
+        kind: Kind::Choice(&["raw", "normalised", "robust"]),
         default: "normalised",
-        summary: "Form of the fitness that drives the flips: the paper's raw reciprocals, or \
-                  each term between 0 and 1",
+        summary: "Form of the fitness that drives the flips: the paper's raw reciprocals, each term \
+                  between 0 and 1, or reciprocals floored at 1 degree and 0.01 mm",
         read: |d, v| {
             d.optimise.fitness = match v.text() {
                 "raw" => FitnessForm::Raw,
+                "robust" => FitnessForm::Robust,
                 _ => FitnessForm::Normalised,
             };
             Ok(())
@@ -304,6 +346,7 @@ pub const SPECS: &[ParameterSpec] = &[
             json!(match p.optimise.fitness {
                 FitnessForm::Raw => "raw",
                 FitnessForm::Normalised => "normalised",
+                FitnessForm::Robust => "robust",
             })
         },
     },
@@ -340,11 +383,12 @@ pub const SPECS: &[ParameterSpec] = &[
     },
     ParameterSpec {
         name: "guard",
-        kind: Kind::Boolean,
-        default: "true",
-        summary: "Whether flips may not make slivers",
+        kind: Kind::Number { min: 0.0, max: 1.0 },
+        default: "0.9",
+        summary: "Radius ratio 2r/R below which a flip may not make a triangle, unless it \
+                  replaces one as bad; 0 lets slivers pass",
         read: |d, v| {
-            d.optimise.guard = v.bool();
+            d.optimise.guard = v.f64();
             Ok(())
         },
         write: |p| json!(p.optimise.guard),
@@ -386,13 +430,6 @@ impl Checked {
         match self {
             Checked::Number(x) => *x,
             _ => unreachable!("checked against Kind::Number"),
-        }
-    }
-
-    fn bool(&self) -> bool {
-        match self {
-            Checked::Boolean(b) => *b,
-            _ => unreachable!("checked against Kind::Boolean"),
         }
     }
 

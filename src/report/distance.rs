@@ -1,22 +1,31 @@
 //! Two-sided distances between a model and the surface it was made from.
 //!
-//! Each side is sampled evenly by area and at its vertices, and every sample looks for the
-//! closest point of the other side, as Metro does (Cignoni, Rocchini, Scopigno 1998). Means
-//! and percentiles are over the even samples, maxima over all points: sharp corners are
-//! vertices, so that the Hausdorff distance rarely falls between samples.
+//! Each side is sampled evenly by area, and every sample looks for the closest point of the
+//! other side, as Metro does (Cignoni, Rocchini, Scopigno 1998): means and percentiles.
+//!
+//! Samples miss the largest distance. [`farthest`] bounds it from both sides instead: no
+//! point of a triangle is farther from the other side than the triangle's centroid is, plus
+//! the way to the centroid; nor than the triangle's farthest corner is from any one triangle
+//! of the other side. Triangles whose bound exceeds the best distance found are cut in four
+//! and looked at again, until [`TOLERANCE`] is reached. Where a mesh is too large for that,
+//! samples and vertices have to do, and the bound is absent.
 
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::summary::Summary;
-use crate::geometry::Vec3;
 use crate::geometry::bvh::Bvh;
+use crate::geometry::{Vec3, triangle};
 use crate::mesh::TriMesh;
 use crate::optimise::Reference;
 use crate::progress::{Cancelled, Monitor};
 
 /// Queries between two looks at the cancel token, some 10 ms of work.
 const CHUNK: usize = 8192;
+/// How far the largest distance may lie above the one reported, as a share of it.
+const TOLERANCE: f64 = 0.01;
+/// Most queries for a largest distance, in units of the even samples.
+const MOST_REFINED: usize = 40;
 
 /// How far model and surface lie apart.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -27,8 +36,10 @@ pub struct Distance {
     pub rms_mm: f64,
     /// The larger of the two directions' 95th percentiles, mm.
     pub hd95_mm: f64,
-    /// The largest distance of either direction (Hausdorff), mm.
+    /// The largest distance of either direction (Hausdorff), mm: one that was found.
     pub hausdorff_mm: f64,
+    /// What the largest distance surely does not exceed, mm; absent for very large meshes.
+    pub hausdorff_at_most_mm: Option<f64>,
     /// The mean in units of the smallest voxel spacing.
     pub mean_voxels: f64,
     /// The Hausdorff distance in the same unit.
@@ -54,16 +65,16 @@ pub struct Distance {
 pub struct Direction {
     /// Even samples taken.
     pub samples: usize,
-    /// Vertices looked at besides.
-    pub vertices: usize,
     /// Mean over the even samples, mm.
     pub mean_mm: f64,
     /// Root mean square over the even samples, mm.
     pub rms_mm: f64,
     /// 95th percentile over the even samples, mm.
     pub p95_mm: f64,
-    /// Largest over samples and vertices, mm.
+    /// Largest found anywhere, mm.
     pub max_mm: f64,
+    /// What the largest surely does not exceed, mm; absent for very large meshes.
+    pub max_at_most_mm: Option<f64>,
 }
 
 /// Measures `model` against `reference` with `samples` even samples on each side.
@@ -78,8 +89,8 @@ pub fn distance(
 ) -> Result<Distance, Cancelled> {
     let surface = &reference.mesh;
     let model_tree = Bvh::new(&model.vertices, &model.triangles);
-    let there = Direction::between(model, &reference.bvh, samples, monitor)?;
-    let back = Direction::between(surface, &model_tree, samples, monitor)?;
+    let there = Direction::between(model, surface, &reference.bvh, samples, monitor)?;
+    let back = Direction::between(surface, model, &model_tree, samples, monitor)?;
 
     let mean_mm = f64::midpoint(there.mean_mm, back.mean_mm);
     let hausdorff_mm = there.max_mm.max(back.max_mm);
@@ -90,6 +101,8 @@ pub fn distance(
         rms_mm: f64::midpoint(there.rms_mm.powi(2), back.rms_mm.powi(2)).sqrt(),
         hd95_mm: there.p95_mm.max(back.p95_mm),
         hausdorff_mm,
+        hausdorff_at_most_mm: (there.max_at_most_mm.zip(back.max_at_most_mm))
+            .map(|(a, b)| a.max(b)),
         mean_voxels: mean_mm / reference.spacing,
         hausdorff_voxels: hausdorff_mm / reference.spacing,
         voxel_mm: reference.spacing,
@@ -105,23 +118,86 @@ pub fn distance(
 impl Direction {
     fn between(
         from: &TriMesh,
-        to: &Bvh,
+        to: &TriMesh,
+        tree: &Bvh,
         samples: usize,
         monitor: &Monitor,
     ) -> Result<Self, Cancelled> {
-        let even = distances(&even_samples(from, samples), to, monitor)?;
-        let vertices = some_vertices(from, 4 * samples);
-        let corners = distances(&vertices, to, monitor)?;
-        let summary = Summary::of(&even);
+        let even = Summary::of(&distances(&even_samples(from, samples), tree, monitor)?);
+        let corners = Summary::of(&distances(&some_vertices(from, samples), tree, monitor)?);
+        let found = even.max.max(corners.max);
+        let (max_mm, max_at_most_mm) =
+            farthest(from, (to, tree), found, MOST_REFINED * samples, monitor)?;
         Ok(Self {
-            samples: even.len(),
-            vertices: vertices.len(),
-            mean_mm: summary.mean,
-            rms_mm: summary.rms,
-            p95_mm: summary.p95,
-            max_mm: corners.iter().fold(summary.max, |max, d| max.max(*d)),
+            samples,
+            mean_mm: even.mean,
+            rms_mm: even.rms,
+            p95_mm: even.p95,
+            max_mm,
+            max_at_most_mm,
         })
     }
+}
+
+/// The largest distance of any point of `from` to `to`: one that was found, at least
+/// `found`, and a bound that holds, if `budget` queries reach one within [`TOLERANCE`].
+fn farthest(
+    from: &TriMesh,
+    (to, tree): (&TriMesh, &Bvh),
+    found: f64,
+    budget: usize,
+    monitor: &Monitor,
+) -> Result<(f64, Option<f64>), Cancelled> {
+    let mut best = found;
+    let mut spent = 0;
+    let mut cells: Vec<[Vec3; 3]> = (0..from.triangles.len()).map(|t| from.corners(t)).collect();
+    while !cells.is_empty() {
+        spent += cells.len();
+        if spent > budget {
+            return Ok((best, None));
+        }
+        let mut bounds = Vec::with_capacity(cells.len());
+        for chunk in cells.chunks(CHUNK) {
+            monitor.check()?;
+            bounds.par_extend(
+                chunk
+                    .par_iter()
+                    .with_min_len(256)
+                    .map(|c| bound(c, to, tree)),
+            );
+        }
+        best = bounds.iter().fold(best, |best, (at, _)| best.max(*at));
+        let limit = best * (1.0 + TOLERANCE) + f64::EPSILON;
+        cells = (cells.iter().zip(&bounds))
+            .filter(|(_, (_, at_most))| *at_most > limit)
+            .flat_map(|(cell, _)| quarters(cell))
+            .collect();
+    }
+    Ok((best, Some(best * (1.0 + TOLERANCE))))
+}
+
+/// The distance of a triangle's centroid, and a bound for all its points. The distance to
+/// one fixed triangle is convex, so that it is largest at a corner.
+fn bound(cell: &[Vec3; 3], to: &TriMesh, tree: &Bvh) -> (f64, f64) {
+    let centroid = (cell[0] + cell[1] + cell[2]) / 3.0;
+    let Some(closest) = tree.closest(&centroid) else {
+        return (f64::INFINITY, f64::INFINITY);
+    };
+    let at = closest.squared_distance.sqrt();
+    let [a, b, c] = to.corners(closest.triangle as usize);
+    let farthest = |distance: &dyn Fn(&Vec3) -> f64| cell.iter().map(distance).fold(0.0, f64::max);
+    let to_one = farthest(&|p| {
+        let [u, v, w] = triangle::closest_barycentric(p, &a, &b, &c);
+        (a * u + b * v + c * w - p).norm()
+    });
+    let around = at + farthest(&|p| (p - centroid).norm());
+    (at, to_one.min(around))
+}
+
+/// The triangle cut at the middles of its sides.
+fn quarters([a, b, c]: &[Vec3; 3]) -> [[Vec3; 3]; 4] {
+    let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(p, q)| (p + q) / 2.0);
+    [[*a, ab, ca], [ab, *b, bc], [ca, bc, *c], [ab, bc, ca]]
 }
 
 /// The distance from each point to the closest point of `to`, in the points' order.
@@ -206,6 +282,7 @@ mod tests {
         let cup = shapes::cup(80.0, 32.0, 10.0, 30);
         let d = distance(&cup, &reference(cup.clone()), 2000, &Monitor::silent()).unwrap();
         assert!(d.hausdorff_mm < 1e-6);
+        assert!(d.hausdorff_at_most_mm.is_some_and(|h| h < 1e-6));
         assert_eq!(d.volume_error_percent, 0.0);
     }
 
@@ -217,6 +294,22 @@ mod tests {
         let d = distance(&spiky, &reference(sphere), 2000, &Monitor::silent()).unwrap();
         assert!((d.hausdorff_mm - 6.0).abs() < 0.1, "{d:?}");
         assert!(d.mean_mm < 0.05 && d.hd95_mm < 0.05);
+    }
+
+    #[test]
+    fn the_largest_distance_is_enclosed_where_samples_miss_it() {
+        let surface = shapes::cup(80.0, 32.0, 10.0, 60);
+        let model = shapes::cup(80.0, 32.0, 10.0, 9);
+        let tree = Bvh::new(&surface.vertices, &surface.triangles);
+        let dense = distances(&even_samples(&model, 300_000), &tree, &Monitor::silent()).unwrap();
+        let dense = Summary::of(&dense).max;
+        let d = distance(&model, &reference(surface), 2000, &Monitor::silent()).unwrap();
+        let (found, at_most) = (d.model_to_surface.max_mm, d.model_to_surface.max_at_most_mm);
+        assert!(
+            found >= 0.99 * dense && at_most.unwrap() >= dense,
+            "{d:?} {dense}"
+        );
+        assert!((at_most.unwrap() - 1.01 * found).abs() < 1e-9);
     }
 
     #[test]

@@ -7,7 +7,8 @@ use serde_json::{Map, Value, json};
 
 use super::{Forms, SurfaceSection};
 use crate::mesh::topology;
-use crate::optimise::{FitnessForm, FitnessSummary, OptimiseFacts, Optimised};
+use crate::optimise::fitness::Scales;
+use crate::optimise::{Ended, FitnessForm, FitnessSummary, OptimiseFacts, Optimised};
 use crate::retile::{RetileFacts, Tiled};
 use crate::surface::Surface;
 
@@ -49,8 +50,15 @@ pub fn optimise(facts: &OptimiseFacts) -> Map<String, Value> {
     object(json!({
         "flips": facts.flips,
         "sweeps": facts.sweeps,
-        "ended": facts.ended,
+        "ended": match facts.ended {
+            Ended::NoFlipGains => "no_flip_gains",
+            Ended::Cycle => "cycle",
+            Ended::SweepLimit => "sweep_limit",
+        },
         "fit_rounds": facts.fit_rounds,
+        "fit_flips": facts.fit_flips,
+        "fit_shortened": facts.fit_shortened,
+        "self_intersections_before": facts.self_intersections_before,
     }))
 }
 
@@ -92,19 +100,16 @@ pub fn forms(summary: &&FitnessSummary) -> Forms {
 
 /// Numerators and floors of A, B (radians), C and D (mm) in every form.
 pub fn scales(spacing: f64) -> Map<String, Value> {
-    let degree = 1f64.to_radians();
-    object(json!({
-        "raw": {
-            "numerator": [1.0, 1.0, 1.0, spacing],
-            "floor": [0.05, 0.05, 1.0, 0.05 * spacing],
-        },
-        "normalised": {
-            "numerator": [10.0 * degree, 10.0 * degree, 1.0, 0.25 * spacing],
-            "floor": [10.0 * degree, 10.0 * degree, 1.0, 0.25 * spacing],
-        },
-        "robust": {
-            "numerator": [degree, degree, 1.0, 1.0],
-            "floor": [degree, degree, 1.0, 0.01],
-        },
-    }))
+    [
+        FitnessForm::Raw,
+        FitnessForm::Normalised,
+        FitnessForm::Robust,
+    ]
+    .into_iter()
+    .map(|form| {
+        let scales = Scales::new(form, spacing);
+        let value = json!({ "numerator": scales.numerator, "floor": scales.floor });
+        (form_name(form).to_owned(), value)
+    })
+    .collect()
 }

@@ -10,9 +10,9 @@ use crate::progress::{Cancelled, Monitor, Stage};
 /// Parameters of [`measure`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MeasureParameters {
-    /// Even samples on each of model and surface, 100..=1_000_000; vertices are looked at
-    /// besides. Default 4000: on Marching Cubes surfaces of phantoms the mean distance is
-    /// then within 1 % of that of 50,000 random samples.
+    /// Even samples on each of model and surface, 100..=1_000_000. Default 4000: for models
+    /// of 67..300 points on two phantoms the mean distance was then within 1 % of that of
+    /// 400,000 samples.
     pub samples: usize,
 }
 

@@ -14,6 +14,7 @@ pub mod distance;
 pub mod elements;
 mod facts;
 pub mod html;
+mod input;
 pub mod measure;
 pub mod summary;
 
@@ -21,6 +22,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 pub use html::html;
+pub use input::input;
 pub use measure::{MeasureParameters, Measures, measure};
 
 use crate::optimise::{FitnessSummary, OptimiseParameters, Optimised};
@@ -230,6 +232,34 @@ impl Report {
             && mesh.self_intersections == 0
             && mesh.euler_characteristic == self.surface.euler_characteristic
             && mesh.components == self.surface.components
+    }
+
+    /// The report as indented JSON text.
+    pub fn to_json_text(&self) -> String {
+        serde_json::to_string_pretty(self).expect("every key of the report is a string")
+    }
+
+    /// The figures that a person looks at first, one sentence a line.
+    pub fn headlines(&self) -> Vec<String> {
+        let (mesh, shape, distance) = (&self.mesh, &self.shape, &self.distance);
+        vec![
+            format!(
+                "{} points, {} triangles, Euler characteristic {}, {} self-intersections",
+                mesh.vertices, mesh.triangles, mesh.euler_characteristic, mesh.self_intersections
+            ),
+            format!(
+                "fitness {:.3} after re-tiling, {:.3} optimised ({:+.1} %)",
+                self.fitness.retiled, self.fitness.optimised, self.fitness.gain_percent
+            ),
+            format!(
+                "radius ratio 2r/R {:.3} mean, {:.3} least; {:.1}° mean angle between neighbours",
+                shape.radius_ratio.mean, shape.radius_ratio.min, self.smoothness.dihedral_deg.mean
+            ),
+            format!(
+                "{:.2} mm mean and {:.2} mm largest distance to the surface, volume {:+.2} %",
+                distance.mean_mm, distance.hausdorff_mm, distance.volume_error_percent
+            ),
+        ]
     }
 
     /// The figures that a mesh file carries with it.

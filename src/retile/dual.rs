@@ -1,111 +1,82 @@
-//! Triangles from cells: the dual of the discrete geodesic Voronoi diagram.
+//! Triangles from cells: the dual of a partition of the surface.
 //!
-//! Where three cells meet in one triangle of the surface, their points form a triangle of the
-//! model, turned the same way. The surface's triangles meet three by three at most, so no
-//! four cells ever share a corner and no predicate is needed. The dual is homeomorphic to the
-//! surface if the cells are discs that meet in single arcs (the closed-ball property; Edels-
-//! brunner & Shah 1997). For labels on vertices that is what [`check`] asks of the dual
-//! itself: every cell used, every edge twice and in opposite directions, no triangle twice,
-//! one cycle round every vertex, and components and Euler characteristic as the surface's.
+//! Where three cells meet in one triangle of the samples, their sites are joined by a triangle
+//! of the same orientation (the dual of a discrete Voronoi diagram; Valette and Chassery,
+//! Computer Graphics Forum 2004). No predicate decides, and no co-circular case exists. The
+//! dual is accepted only if it *is* what was asked for: every site used, closed, edge- and
+//! vertex-manifold, with the surface's Euler characteristic and number of components. Where
+//! it is not, the offending sites are named.
 
-use super::voronoi::UNLABELLED;
-use crate::mesh::topology::{self, Census, Defect};
+use super::samples::Samples;
+use crate::mesh::topology::{self, Defect};
 
-/// The triangles where three cells meet.
-pub(crate) fn dual(triangles: &[[u32; 3]], label: &[u32]) -> Vec<[u32; 3]> {
-    triangles
+/// Why the cells have no usable dual.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Offence {
+    /// Sites whose cells are too large for the shape of the surface there; may be empty.
+    pub sites: Vec<u32>,
+}
+
+/// The dual of the cells given by `labels` over `sites` sites.
+pub(super) fn triangulate(
+    samples: &Samples,
+    labels: &[u32],
+    sites: usize,
+) -> Result<Vec<[u32; 3]>, Offence> {
+    let rings = cells_with_holes(samples, labels, sites);
+    if !rings.is_empty() {
+        return Err(Offence { sites: rings });
+    }
+    let dual: Vec<[u32; 3]> = samples
+        .triangles
         .iter()
-        .map(|t| t.map(|v| label[v as usize]))
-        .filter(|[a, b, c]| a != b && b != c && c != a && ![a, b, c].contains(&&UNLABELLED))
+        .map(|t| t.map(|v| labels[v as usize]))
+        .filter(|[a, b, c]| a != b && b != c && c != a)
+        .collect();
+    let census = topology::check_triangles(sites, &dual).map_err(|defect| Offence {
+        sites: offenders(defect, &dual),
+    })?;
+    let wanted = topology::components(samples.len(), &samples.triangles);
+    let components = wanted.iter().max().map_or(0, |m| *m as usize + 1);
+    let edges = samples.triangles.len() as i64 * 3 / 2;
+    let euler = samples.len() as i64 - edges + samples.triangles.len() as i64;
+    if census.euler_characteristic != euler || census.components != components {
+        return Err(Offence { sites: Vec::new() });
+    }
+    Ok(dual)
+}
+
+/// Cells that are no discs: V - E + F of the samples, edges and triangles inside is not 1.
+fn cells_with_holes(samples: &Samples, labels: &[u32], sites: usize) -> Vec<u32> {
+    let mut euler = vec![0i32; sites];
+    for v in 0..samples.len() {
+        let own = labels[v];
+        let inner_edges = samples
+            .around(v)
+            .iter()
+            .filter(|&&n| n as usize > v && labels[n as usize] == own)
+            .count();
+        euler[own as usize] += 1 - inner_edges as i32;
+    }
+    for t in &samples.triangles {
+        let [a, b, c] = t.map(|v| labels[v as usize]);
+        if a == b && b == c {
+            euler[a as usize] += 1;
+        }
+    }
+    (0..sites as u32)
+        .filter(|&site| euler[site as usize] != 1)
         .collect()
 }
 
-/// Why a dual does not carry the surface's topology.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Flaw {
-    /// At these cells the dual is no closed manifold.
-    Cells(Vec<u32>),
-    /// The dual is a closed manifold, but another one.
-    Characteristic,
-}
-
-/// Compares the dual of `points` cells with the surface it stands for.
-pub(crate) fn check(points: usize, triangles: &[[u32; 3]], surface: &Census) -> Result<(), Flaw> {
-    match topology::check_triangles(points, triangles) {
-        Ok(census)
-            if census.components == surface.components
-                && census.euler_characteristic == surface.euler_characteristic =>
-        {
-            Ok(())
+fn offenders(defect: Defect, dual: &[[u32; 3]]) -> Vec<u32> {
+    match defect {
+        Defect::OpenEdge { edge }
+        | Defect::NonManifoldEdge { edge }
+        | Defect::TurnedTriangles { edge } => edge.to_vec(),
+        Defect::NonManifoldVertex { vertex } | Defect::UnusedVertex { vertex } => vec![vertex],
+        Defect::DegenerateTriangle { triangle } | Defect::DoubledTriangle { triangle } => {
+            dual[triangle as usize].to_vec()
         }
-        Ok(_) => Err(Flaw::Characteristic),
-        Err(first) => Err(Flaw::Cells(offenders(points, triangles, first))),
-    }
-}
-
-/// Every cell at which something is wrong, ascending.
-fn offenders(points: usize, triangles: &[[u32; 3]], first: Defect) -> Vec<u32> {
-    let mut edges: Vec<[u32; 3]> = Vec::with_capacity(3 * triangles.len());
-    let mut corners = vec![0u32; points];
-    for t in triangles {
-        for k in 0..3 {
-            let (a, b) = (t[k], t[(k + 1) % 3]);
-            edges.push([a.min(b), a.max(b), u32::from(a < b)]);
-            corners[t[k] as usize] += 1;
-        }
-    }
-    edges.sort_unstable();
-    let mut wrong: Vec<u32> = (0..points as u32)
-        .filter(|p| corners[*p as usize] == 0)
-        .collect();
-    for group in edges.chunk_by(|x, y| x[..2] == y[..2]) {
-        if !matches!(group, [x, y] if x[2] != y[2]) {
-            wrong.extend(&group[0][..2]);
-        }
-    }
-    // A vertex with several fans or a doubled triangle leaves every edge in order.
-    match first {
-        Defect::NonManifoldVertex { vertex } => wrong.push(vertex),
-        Defect::DoubledTriangle { triangle } => wrong.extend(triangles[triangle as usize]),
-        _ => {}
-    }
-    wrong.sort_unstable();
-    wrong.dedup();
-    wrong
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::mesh::shapes;
-
-    #[test]
-    fn every_vertex_its_own_cell_gives_the_surface_back() {
-        let mesh = shapes::torus(9.0, 3.0, 9, 6);
-        let label: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
-        let triangles = dual(&mesh.triangles, &label);
-        assert_eq!(triangles, mesh.triangles);
-        let census = topology::check(&mesh).unwrap();
-        assert_eq!(check(mesh.vertices.len(), &triangles, &census), Ok(()));
-    }
-
-    #[test]
-    fn ring_shaped_cells_are_refused() {
-        // Cells that run all round the tube have no corners at all.
-        let mesh = shapes::torus(9.0, 3.0, 12, 6);
-        let label: Vec<u32> = (0..mesh.vertices.len() as u32).map(|v| v / 18).collect();
-        let census = topology::check(&mesh).unwrap();
-        let triangles = dual(&mesh.triangles, &label);
-        assert_eq!(
-            check(4, &triangles, &census),
-            Err(Flaw::Cells(vec![0, 1, 2, 3]))
-        );
-    }
-
-    #[test]
-    fn a_closed_dual_of_another_kind_is_refused() {
-        let torus = topology::check(&shapes::torus(9.0, 3.0, 12, 6)).unwrap();
-        let sphere = shapes::icosphere(1.0, 0);
-        assert_eq!(check(12, &sphere.triangles, &torus), Err(Flaw::Characteristic));
     }
 }

@@ -11,13 +11,12 @@
 //! 3. [`tessellate`]: mutual tessellation by constrained Delaunay, old vertices removed.
 //!
 //! [`Method::Refined`]
-//! 1. [`placement`], as above.
-//! 2. [`clusters`], then [`relaxation`]: centroidal Voronoi points, first in space with
-//!    clusters of vertices, then along the surface.
-//! 3. [`dual`] of the geodesic [`voronoi`] diagram; where it does not carry the topology or
-//!    pierces itself, [`refined`] relocates points and tries again.
+//! 1. [`samples`]: the surface's vertices, cut finely enough for N cells.
+//! 2. [`cells`]: centroidal cells of samples, grown from random ones.
+//! 3. [`dual`]: a triangle where three cells meet; where that does not carry the topology or
+//!    pierces itself, [`refined`] transplants points and tries again.
 //!
-//! [`sizing`] makes the points denser where [`curvature`] is high, in both ways. Lengths are
+//! [`sizing`] makes the points denser where the surface bends, in both ways. Lengths are
 //! taken on W, since noise and voxel steps make S longer than it is; a point (triangle and
 //! barycentric coordinates) lies on both.
 //!
@@ -26,29 +25,25 @@
 //! **Not** guaranteed: that N points can carry every surface; [`RetileError::TooFewPoints`]
 //! says how many would do. The same input gives the same bytes on any number of threads.
 
-mod clusters;
-mod curvature;
+mod cells;
 mod domain;
 mod dual;
 mod log_map;
 mod paper;
 mod placement;
+mod quotas;
 mod refined;
-mod relaxation;
 mod repulsion;
+mod samples;
 mod sizing;
 pub mod tessellate;
 mod trace;
-mod voronoi;
 
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
-use crate::mesh::topology::{self, Census, Defect};
+use crate::mesh::topology::Defect;
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::surface::Surface;
-
-use domain::Domain;
-use sizing::Sizing;
 
 /// Fewest points a model may have: an icosahedron's.
 pub const LEAST_POINTS: usize = 12;
@@ -78,7 +73,7 @@ pub struct RetileParameters {
     /// Curvature-adaptive density: spacing ∝ curvature^-γ, γ in 0..=1. Default 0 (even
     /// spacing); 0.25 is a good choice where the surface bends.
     pub adaptive: f64,
-    /// Rounds of geodesic repulsion, 0..=1000. Default 40.
+    /// Rounds of geodesic repulsion ([`Method::Paper`]), 0..=1000. Default 40.
     pub repulsion_iterations: usize,
     /// Share of the overlap that one round of repulsion moves, (0, 1]. Default 0.15 (Turk).
     pub repulsion_strength: f64,
@@ -195,6 +190,30 @@ pub enum RetileError {
     },
 }
 
+impl RetileError {
+    /// What the caller can do about it.
+    pub fn fix(&self) -> String {
+        match self {
+            RetileError::Cancelled(_) => "Ask again if the result is still wanted.".into(),
+            RetileError::TooFewPoints { needed, .. } => {
+                format!("Set `points` to {needed} or more, or `topology` to genus0.")
+            }
+            RetileError::TooManyPoints { limit, .. } => {
+                format!("Set `points` to {limit} or fewer.")
+            }
+            RetileError::OpenSurface(_) | RetileError::NoArea => {
+                "Give a closed surface of finite size.".into()
+            }
+            RetileError::SelfIntersecting { points, .. } => {
+                format!("Set `points` to more than {points}, or choose another `seed`.")
+            }
+            RetileError::BadParameter { name, range, .. } => {
+                format!("Set `{name}` to a value in {range}.")
+            }
+        }
+    }
+}
+
 /// Re-tiles `surface`.
 ///
 /// # Errors
@@ -206,10 +225,13 @@ pub fn retile(
 ) -> Result<Tiled, RetileError> {
     validate(parameters)?;
     monitor.report(Stage::Retile, 0.0)?;
-    let job = Job::new(surface, parameters, monitor)?;
+    let area = surface.mesh.area();
+    if !(area > 0.0 && area.is_finite()) {
+        return Err(RetileError::NoArea);
+    }
     let tiled = match parameters.method {
-        Method::Paper => paper::tile(&job),
-        Method::Refined => refined::tile(&job),
+        Method::Paper => paper::retile(surface, parameters, monitor),
+        Method::Refined => refined::retile(surface, parameters, monitor),
     }?;
     monitor.report(Stage::Retile, 1.0)?;
     Ok(tiled)
@@ -245,64 +267,4 @@ fn validate(parameters: &RetileParameters) -> Result<(), RetileError> {
         return bad("relaxation_iterations", value, "0..=1000");
     }
     Ok(())
-}
-
-/// What both methods work on.
-struct Job<'a> {
-    surface: &'a Surface,
-    parameters: &'a RetileParameters,
-    monitor: &'a Monitor<'a>,
-    /// The surface's numbers, which the model must repeat.
-    census: Census,
-    /// W.
-    domain: Domain,
-    sizing: Sizing,
-}
-
-impl<'a> Job<'a> {
-    fn new(
-        surface: &'a Surface,
-        parameters: &'a RetileParameters,
-        monitor: &'a Monitor<'a>,
-    ) -> Result<Self, RetileError> {
-        let census = topology::check(&surface.mesh)?;
-        let domain = Domain::new(surface.working.clone(), surface.mesh.triangles.clone())?;
-        if !(domain.area > 0.0 && domain.area.is_finite()) {
-            return Err(RetileError::NoArea);
-        }
-        let sizing = Sizing::adaptive(&domain, parameters.adaptive);
-        monitor.check()?;
-        Ok(Self {
-            surface,
-            parameters,
-            monitor,
-            census,
-            domain,
-            sizing,
-        })
-    }
-
-    /// The finished model of `points` on the surface.
-    fn finish(&self, points: &[SurfacePoint], mesh: TriMesh, facts: RetileFacts) -> Tiled {
-        let sizing = points
-            .iter()
-            .map(|p| {
-                let corners = self.domain.triangles[p.triangle as usize];
-                self.sizing.at(corners, p.barycentric)
-            })
-            .collect();
-        Tiled {
-            mesh,
-            sizing,
-            facts,
-        }
-    }
-
-    fn positions(&self, points: &[SurfacePoint]) -> Vec<Vec3> {
-        let mesh = &self.surface.mesh;
-        points
-            .iter()
-            .map(|p| p.position(&mesh.vertices, &mesh.triangles))
-            .collect()
-    }
 }

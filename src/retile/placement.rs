@@ -1,48 +1,44 @@
 //! Random points on the surface: the paper's first step.
 //!
 //! A triangle is drawn with probability proportional to its area times the wanted density, a
-//! place in it uniformly. Every component gets its share of the points by the same measure,
-//! and no fewer than a closed mesh needs.
+//! place in it uniformly. Every component gets its share ([`quotas`]) of the points.
 
 use rand::RngExt;
 
 use super::domain::Domain;
-use super::sizing::Sizing;
 use super::trace::inset;
-use super::{RetileError, SurfacePoint};
+use super::{SurfacePoint, quotas};
 use crate::geometry::random::{self, Purpose};
+use crate::geometry::triangle::area_normal;
+use crate::mesh::TriMesh;
 use crate::mesh::topology::components;
 
-/// Fewest points for a component without handles: an octahedron. Fewer close (a tetrahedron
-/// does) but leave the later steps nothing to choose.
-const LEAST_PER_COMPONENT: usize = 6;
-
-/// Draws exactly `count` points.
-///
-/// # Errors
-/// [`RetileError::TooFewPoints`] where there are not enough for every component.
+/// Draws exactly `count` points, as dense as the relative `spacing` at every vertex wants.
+/// `count` is at least [`quotas::least_points`] of `mesh`, whose connectivity the domain has.
 pub(crate) fn place(
+    mesh: &TriMesh,
     domain: &Domain,
-    sizing: &Sizing,
+    spacing: &[f64],
     count: usize,
     seed: u64,
-) -> Result<Vec<SurfacePoint>, RetileError> {
+) -> Vec<SurfacePoint> {
     let component_of = components(domain.vertices.len(), &domain.triangles);
     let number = component_of.iter().max().map_or(0, |c| *c as usize + 1);
-    let mut cumulative: Vec<Vec<(f64, u32)>> = vec![Vec::new(); number];
-    for (t, corners) in domain.triangles.iter().enumerate() {
-        let list = &mut cumulative[component_of[corners[0] as usize] as usize];
+    // Triangles of each component with the running sum of area / h².
+    let mut running: Vec<Vec<(f64, u32)>> = vec![Vec::new(); number];
+    for (t, corners) in (0u32..).zip(&domain.triangles) {
+        let list = &mut running[component_of[corners[0] as usize] as usize];
         let before = list.last().map_or(0.0, |l| l.0);
-        list.push((before + sizing.expected_points(domain, t), t as u32));
+        let [a, b, c] = corners.map(|v| domain.vertices[v as usize]);
+        let h = corners.iter().map(|v| spacing[*v as usize]).sum::<f64>() / 3.0;
+        list.push((before + area_normal(&a, &b, &c).norm() / (h * h), t));
     }
-    let shares: Vec<f64> = cumulative
-        .iter()
+    let load: Vec<f64> = (running.iter())
         .map(|list| list.last().map_or(0.0, |l| l.0))
         .collect();
-    let counts = distribute(&shares, count)?;
     let mut random = random::stream(seed, Purpose::Placement);
     let mut points = Vec::with_capacity(count);
-    for (list, n) in cumulative.iter().zip(counts) {
+    for (list, n) in running.iter().zip(quotas::share(mesh, &load, count)) {
         let total = list.last().map_or(0.0, |l| l.0);
         for _ in 0..n {
             let drawn = random.random::<f64>() * total;
@@ -55,35 +51,7 @@ pub(crate) fn place(
             });
         }
     }
-    Ok(points)
-}
-
-/// Whole numbers proportional to `shares`, at least [`LEAST_PER_COMPONENT`] each, sum `count`
-/// (largest remainders; ties to the lower index).
-fn distribute(shares: &[f64], count: usize) -> Result<Vec<usize>, RetileError> {
-    let least = LEAST_PER_COMPONENT * shares.len();
-    if count < least {
-        return Err(RetileError::TooFewPoints {
-            points: count,
-            needed: least,
-        });
-    }
-    let total: f64 = shares.iter().sum();
-    let spare = (count - least) as f64;
-    let wanted: Vec<f64> = shares.iter().map(|s| s / total * spare).collect();
-    let mut counts: Vec<usize> = wanted.iter().map(|w| *w as usize).collect();
-    let mut order: Vec<usize> = (0..shares.len()).collect();
-    order.sort_by(|&i, &j| {
-        wanted[j]
-            .fract()
-            .total_cmp(&wanted[i].fract())
-            .then(i.cmp(&j))
-    });
-    let missing = count - least - counts.iter().sum::<usize>();
-    for &i in order.iter().cycle().take(missing) {
-        counts[i] += 1;
-    }
-    Ok(counts.iter().map(|c| c + LEAST_PER_COMPONENT).collect())
+    points
 }
 
 #[cfg(test)]
@@ -95,7 +63,9 @@ mod tests {
     fn points_fall_evenly_and_never_on_edges() {
         let mesh = shapes::icosphere(10.0, 3);
         let domain = Domain::new(mesh.vertices.clone(), mesh.triangles.clone()).unwrap();
-        let points = place(&domain, &Sizing::even(&domain), 4000, 7).unwrap();
+        let even = vec![1.0; mesh.vertices.len()];
+        let draw = |seed| place(&mesh, &domain, &even, 4000, seed);
+        let points = draw(7);
         assert_eq!(points.len(), 4000);
         let mut octants = [0usize; 8];
         for p in &points {
@@ -106,21 +76,11 @@ mod tests {
             octants[bit(x.x) + 2 * bit(x.y) + 4 * bit(x.z)] += 1;
         }
         // Binomial: 500 expected, standard deviation 21.
-        assert!(octants.iter().all(|n| (400..600).contains(n)), "{octants:?}");
-        assert_eq!(points, place(&domain, &Sizing::even(&domain), 4000, 7).unwrap());
-        assert_ne!(points, place(&domain, &Sizing::even(&domain), 4000, 8).unwrap());
-    }
-
-    #[test]
-    fn every_component_gets_its_share() {
-        assert_eq!(distribute(&[3.0, 1.0], 20).unwrap(), vec![12, 8]);
-        assert_eq!(distribute(&[1000.0, 0.001], 30).unwrap(), vec![24, 6]);
-        assert_eq!(
-            distribute(&[1.0, 1.0, 1.0], 17),
-            Err(RetileError::TooFewPoints {
-                points: 17,
-                needed: 18
-            })
+        assert!(
+            octants.iter().all(|n| (400..600).contains(n)),
+            "{octants:?}"
         );
+        assert_eq!(points, draw(7));
+        assert_ne!(points, draw(8));
     }
 }

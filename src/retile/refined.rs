@@ -1,336 +1,251 @@
-//! The refined route: centroidal Voronoi points and the dual of their diagram.
+//! The refined route: centroidal cells and their dual.
 //!
-//! Where the dual does not carry the surface's topology, or pierces itself, points are taken
-//! from where cells are smallest and put where the diagram fails: on the far side of a handle
-//! that one cell swallows, else at the far end of an offending cell. N never changes. After
-//! [`RELOCATIONS`] tries another seed is taken, after [`SEEDS`] the surface is refused.
+//! 1. [`samples`](super::samples): the working surface, fine enough for N cells;
+//! 2. N samples at random, as dense as [`sizing`](super::sizing) wants them;
+//! 3. [`cells`](super::cells): relaxed until each site is the centroid of its cell;
+//! 4. [`dual`](super::dual): one triangle where three cells meet;
+//! 5. each vertex goes to the point of its own cell's part of S closest to the cell's centroid.
+//!
+//! Where a cell is too large for the shape of the surface (it runs round a handle, or the
+//! two sides of a thin wall would touch), the least loaded site elsewhere is transplanted
+//! there and the cells settle again; N never changes.
 
-use super::clusters::Clusters;
-use super::domain::{Domain, ancestor};
-use super::dual::{self, Flaw};
-use super::sizing::Sizing;
-use super::voronoi::Voronoi;
-use super::{Job, RetileError, RetileFacts, SurfacePoint, Tiled, placement, relaxation};
-use crate::mesh::TriMesh;
+use super::cells::Cells;
+use super::samples::Samples;
+use super::{RetileError, RetileFacts, RetileParameters, Tiled, dual, quotas, sizing};
+use crate::geometry::random::{Purpose, stream};
+use crate::geometry::{Vec3, triangle};
 use crate::mesh::intersections::self_intersections;
-use crate::progress::{Cancelled, Stage};
+use crate::mesh::{TriMesh, topology};
+use crate::progress::{Monitor, Stage};
+use crate::surface::Surface;
+use rand::RngExt;
 
-/// Seeds tried before the surface is refused.
-const SEEDS: u64 = 3;
+/// Samples that a cell has at least: fewer make ragged cells, more only cost time.
+const SAMPLES_PER_CELL: usize = 40;
+/// Rounds that let the cells settle after a transplantation.
+const SETTLING_ROUNDS: usize = 20;
+/// Transplantations before giving up on a start.
+const REPAIRS: usize = 24;
+/// Random starts before giving up on N.
+const STARTS: u64 = 3;
+/// Largest multiple of N that is tried to tell which N would do.
+const NEEDED_FACTOR: usize = 64;
 
-/// Tries to mend one diagram by relocating points.
-const RELOCATIONS: usize = 40;
-
-/// Rounds of relaxation along the surface after those in space.
-const GEODESIC_ROUNDS: usize = 3;
-
-/// Relocations after which points are left where they were put: further relaxation would pull
-/// them off a handle that is smaller than the spacing.
-const RELAXED_RELOCATIONS: usize = 6;
-
-/// Vertices that a cell shall have, and many cells at least: the finer the sampling, the
-/// better the centroids; a model of many points needs less of it.
-const VERTICES_PER_CELL: usize = 40;
-const VERTICES_PER_SMALL_CELL: usize = 14;
-const MANY_POINTS: usize = 600;
-
-pub(super) fn tile(job: &Job) -> Result<Tiled, RetileError> {
-    let count = job.parameters.points;
-    let mut pierced = None;
-    for attempt in 0..SEEDS {
-        let mut diagram = Diagram::new(job, count, attempt)?;
-        match diagram.mend()? {
-            Outcome::Carried(mesh) => {
-                let points = diagram.points_on_surface();
-                let facts = RetileFacts {
-                    relaxation_rounds: diagram.rounds,
-                    attempts: attempt as usize * (RELOCATIONS + 1) + diagram.tries,
-                    ..RetileFacts::default()
-                };
-                return Ok(job.finish(&points, mesh, facts));
-            }
-            Outcome::Pierced(place) => pierced = Some(place),
-            Outcome::Uncarried => pierced = None,
+/// Re-tiles `surface` by centroidal cells.
+pub(super) fn retile(
+    surface: &Surface,
+    parameters: &RetileParameters,
+    monitor: &Monitor,
+) -> Result<Tiled, RetileError> {
+    let points = parameters.points;
+    let least = quotas::least_points(&surface.mesh);
+    if points < least {
+        return Err(RetileError::TooFewPoints {
+            points,
+            needed: needed_points(surface, parameters, least, monitor)?,
+        });
+    }
+    let job = Job::new(surface, parameters, points);
+    let mut facts = RetileFacts::default();
+    for start in 0..STARTS {
+        if let Some((mesh, sizing)) = job.attempt(start, &mut facts, monitor)? {
+            return Ok(Tiled {
+                mesh,
+                sizing,
+                facts,
+            });
         }
     }
-    Err(match pierced {
-        Some(place) => RetileError::SelfIntersecting {
-            points: count,
-            place,
-        },
-        None => RetileError::TooFewPoints {
-            points: count,
-            needed: enough(job)?,
-        },
+    Err(RetileError::TooFewPoints {
+        points,
+        needed: needed_points(surface, parameters, points + 1, monitor)?,
     })
 }
 
-/// A number of points that carries the surface, found by trying.
-fn enough(job: &Job) -> Result<usize, RetileError> {
-    let mut count = job.parameters.points;
-    while count < super::MOST_POINTS {
-        count = (count * 3 / 2).min(super::MOST_POINTS);
-        if let Outcome::Carried(_) = Diagram::new(job, count, 0)?.mend()? {
+/// A number of points that carries the topology, found by trying; at least `from`.
+fn needed_points(
+    surface: &Surface,
+    parameters: &RetileParameters,
+    from: usize,
+    monitor: &Monitor,
+) -> Result<usize, RetileError> {
+    let mut points = from;
+    while points < from * NEEDED_FACTOR {
+        let quick = RetileParameters {
+            relaxation_iterations: SETTLING_ROUNDS,
+            ..parameters.clone()
+        };
+        let job = Job::new(surface, &quick, points);
+        let mut ignored = RetileFacts::default();
+        if job.attempt(0, &mut ignored, monitor)?.is_some() {
             break;
         }
+        points += points / 2 + 1;
     }
-    Ok(count)
+    Ok(points)
 }
 
-enum Outcome {
-    /// The mesh is what it shall be.
-    Carried(TriMesh),
-    /// The topology is right, but the mesh pierces itself, here (LPS mm).
-    Pierced([f64; 3]),
-    /// The topology is not right.
-    Uncarried,
+/// What every attempt shares.
+struct Job<'a> {
+    surface: &'a Surface,
+    parameters: &'a RetileParameters,
+    points: usize,
+    samples: Samples,
+    /// Relative spacing wanted at every sample.
+    spacing: Vec<f64>,
+    /// Area times density: h^-4 makes centroidal cells as large as h² (Du et al. 1999).
+    weights: Vec<f64>,
 }
 
-/// Points and their Voronoi diagram on W, cut finely enough.
-struct Diagram<'a> {
-    job: &'a Job<'a>,
-    domain: Domain,
-    sizing: Sizing,
-    /// How often W's triangles were cut in four.
-    levels: u32,
-    points: Vec<SurfacePoint>,
-    voronoi: Voronoi,
-    rounds: usize,
-    tries: usize,
-}
-
-impl<'a> Diagram<'a> {
-    fn new(job: &'a Job, count: usize, attempt: u64) -> Result<Self, RetileError> {
-        let (domain, sizing, levels) = cut(job, count);
-        job.monitor.check()?;
-        let seed = job.parameters.seed.wrapping_add(attempt << 32);
-        let points = placement::place(&domain, &sizing, count, seed)?;
-        let voronoi = Voronoi::new(domain.vertices.len());
-        let mut diagram = Self {
-            job,
-            domain,
-            sizing,
-            levels,
-            points,
-            voronoi,
-            rounds: 0,
-            tries: 0,
-        };
-        diagram.relax(attempt == 0)?;
-        Ok(diagram)
-    }
-
-    fn relax(&mut self, report: bool) -> Result<(), Cancelled> {
-        let (monitor, most) = (self.job.monitor, self.job.parameters.relaxation_iterations);
-        let geodesic = GEODESIC_ROUNDS.min(most);
-        self.voronoi.spread(&self.domain, &self.points);
-        let sites = self
-            .points
-            .iter()
-            .map(|p| p.position(&self.domain.vertices, &self.domain.triangles))
+impl<'a> Job<'a> {
+    fn new(surface: &'a Surface, parameters: &'a RetileParameters, points: usize) -> Self {
+        let samples = Samples::new(
+            &surface.mesh.vertices,
+            &surface.working,
+            &surface.mesh.triangles,
+            points * SAMPLES_PER_CELL,
+        );
+        let spacing = sizing::spacing(&samples, parameters.adaptive);
+        let weights = (samples.area.iter().zip(&spacing))
+            .map(|(area, h)| area * h.powi(-4))
             .collect();
-        let label = self.voronoi.label.clone();
-        let mut clusters = Clusters::new(&self.domain, &self.sizing, label, sites);
-        self.rounds = clusters.relax(most - geodesic, |share| {
-            if report {
-                monitor.report(Stage::Retile, 0.7 * share)
-            } else {
-                monitor.check()
-            }
-        })?;
-        self.points = clusters.settle(&self.points);
-        self.relax_along_surface(geodesic)
+        Self {
+            surface,
+            parameters,
+            points,
+            samples,
+            spacing,
+            weights,
+        }
     }
 
-    fn relax_along_surface(&mut self, rounds: usize) -> Result<(), Cancelled> {
-        let monitor = self.job.monitor;
-        self.rounds += rounds;
-        relaxation::relax(
-            &self.domain,
-            &self.sizing,
-            &mut self.points,
-            &mut self.voronoi,
-            (rounds, 1.0),
-            |_| monitor.check(),
-        )
-    }
-
-    /// Relocates points until the dual is right.
-    fn mend(&mut self) -> Result<Outcome, Cancelled> {
-        let mut outcome = Outcome::Uncarried;
-        for relocation in 0..=RELOCATIONS {
-            self.job.monitor.check()?;
-            self.tries += 1;
-            let triangles = dual::dual(&self.domain.triangles, &self.voronoi.label);
-            let wrong = match dual::check(self.points.len(), &triangles, &self.job.census) {
-                Ok(()) => {
+    /// One random start with its repairs: mesh and sizing, or `None` where the topology did
+    /// not come out.
+    fn attempt(
+        &self,
+        start: u64,
+        facts: &mut RetileFacts,
+        monitor: &Monitor,
+    ) -> Result<Option<(TriMesh, Vec<f64>)>, RetileError> {
+        let seeds = self.seeds(start);
+        let mut cells = Cells::grow(&self.samples, &seeds);
+        let rounds = self.parameters.relaxation_iterations;
+        monitor.report(Stage::Retile, 0.1)?;
+        facts.relaxation_rounds += cells.relax(&self.samples, &self.weights, rounds, monitor)?;
+        let mut moved = Vec::new();
+        for repair in 0..=REPAIRS {
+            facts.attempts += 1;
+            monitor.report(Stage::Retile, 0.8)?;
+            cells.tidy(&self.samples);
+            let crowded = match dual::triangulate(&self.samples, &cells.labels, self.points) {
+                Err(offence) => offence.sites,
+                Ok(triangles) => {
                     let mesh = TriMesh {
-                        vertices: self.job.positions(&self.points_on_surface()),
+                        vertices: self.vertices(&cells),
                         triangles,
                     };
-                    let pairs = self_intersections(&mesh);
-                    let Some(&[t, _]) = pairs.first() else {
-                        return Ok(Outcome::Carried(mesh));
+                    let crossing = self_intersections(&mesh);
+                    let Some([first, _]) = crossing.first() else {
+                        return Ok(Some((mesh, self.sizing(&cells))));
                     };
-                    let [a, b, c] = mesh.corners(t as usize);
-                    outcome = Outcome::Pierced(((a + b + c) / 3.0).into());
-                    cells_of(&mesh, &pairs)
-                }
-                Err(flaw) => {
-                    outcome = Outcome::Uncarried;
-                    match flaw {
-                        Flaw::Cells(cells) => cells,
-                        Flaw::Characteristic => Vec::new(),
-                    }
+                    mesh.triangles[*first as usize].to_vec()
                 }
             };
-            if relocation < RELOCATIONS {
-                self.relocate(&wrong);
-                let rounds = usize::from(relocation < RELAXED_RELOCATIONS);
-                self.relax_along_surface(rounds)?;
-            }
+            let Some(&crowded) = crowded.get(repair % crowded.len().max(1)) else {
+                return Ok(None);
+            };
+            let Some(site) = self.least_loaded(&cells, crowded, &moved) else {
+                return Ok(None);
+            };
+            moved.push(site);
+            cells.transplant(&self.samples, site, crowded);
+            facts.relaxation_rounds +=
+                cells.relax(&self.samples, &self.weights, SETTLING_ROUNDS, monitor)?;
         }
-        Ok(outcome)
+        Ok(None)
     }
 
-    /// Moves some of the smallest cells' points to where the diagram fails.
-    fn relocate(&mut self, wrong: &[u32]) {
-        let count = self.points.len();
-        let mut targets = self.swallowed_handles();
-        targets.extend(self.far_ends(wrong));
-        targets.truncate((count / 20).max(1));
-        let mut small: Vec<(f64, u32)> = self
-            .weights()
-            .into_iter()
-            .zip(0..)
-            .filter(|(_, cell)| wrong.binary_search(cell).is_err())
-            .collect();
-        small.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for (vertex, (_, donor)) in targets.into_iter().zip(small) {
-            self.points[donor as usize] = self.beside(vertex);
+    /// Distinct random samples, each component getting its share but at least as many as its
+    /// topology needs.
+    fn seeds(&self, start: u64) -> Vec<u32> {
+        let mut random = stream(
+            self.parameters.seed ^ start.rotate_left(32),
+            Purpose::Placement,
+        );
+        let components = topology::components(self.samples.len(), &self.samples.triangles);
+        let mut load = Vec::new();
+        for (v, &c) in components.iter().enumerate() {
+            let c = c as usize;
+            load.resize(load.len().max(c + 1), 0.0);
+            load[c] += self.samples.area[v] / self.spacing[v].powi(2);
         }
+        let quotas = quotas::share(&self.surface.mesh, &load, self.points);
+        let mut seeds = Vec::with_capacity(self.points);
+        for (component, quota) in (0u32..).zip(quotas) {
+            let mut members: Vec<u32> = (0..self.samples.len() as u32)
+                .filter(|&v| components[v as usize] == component)
+                .collect();
+            // Weighted sampling without replacement (Efraimidis and Spirakis 2006).
+            let mut keyed: Vec<(f64, u32)> = members
+                .drain(..)
+                .map(|v| {
+                    let (area, h) = (self.samples.area[v as usize], self.spacing[v as usize]);
+                    let uniform: f64 = 1.0 - random.random::<f64>();
+                    (uniform.ln() / (area / (h * h)).max(f64::MIN_POSITIVE), v)
+                })
+                .collect();
+            keyed.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            seeds.extend(keyed.iter().take(quota).map(|(_, v)| *v));
+        }
+        seeds
     }
 
-    /// A point next to a vertex, in the middle of one of its triangles.
-    fn beside(&self, vertex: u32) -> SurfacePoint {
-        SurfacePoint {
-            triangle: self.domain.outgoing[vertex as usize] / 3,
-            barycentric: [1.0 / 3.0; 3],
+    /// The site with the lightest cell that was not moved before.
+    fn least_loaded(&self, cells: &Cells, crowded: u32, moved: &[u32]) -> Option<u32> {
+        let mut load = vec![0.0; self.points];
+        for (&site, weight) in cells.labels.iter().zip(&self.weights) {
+            load[site as usize] += weight;
         }
+        (0..self.points as u32)
+            .filter(|site| *site != crowded && !moved.contains(site))
+            .min_by(|a, b| load[*a as usize].total_cmp(&load[*b as usize]))
     }
 
-    fn weights(&self) -> Vec<f64> {
-        let mut weights = vec![0.0; self.points.len()];
-        for (v, &label) in self.voronoi.label.iter().enumerate() {
-            if let Some(w) = weights.get_mut(label as usize) {
-                *w += self.sizing.weight(&self.domain, v);
-            }
-        }
-        weights
-    }
-
-    /// In every cell that is no disc, the vertex where the wave from its point meets itself.
-    fn swallowed_handles(&self) -> Vec<u32> {
-        let label = &self.voronoi.label;
-        let mut characteristic = vec![0i64; self.points.len()];
-        let mut meeting = vec![(0.0, u32::MAX); self.points.len()];
-        for &l in label {
-            if let Some(c) = characteristic.get_mut(l as usize) {
-                *c += 1;
-            }
-        }
-        for h in 0..self.domain.lengths.len() as u32 {
-            let [a, b] = self.domain.ends(h);
-            let l = label[a as usize];
-            if a > b || l != label[b as usize] || l as usize >= self.points.len() {
-                continue;
-            }
-            characteristic[l as usize] -= 1;
-            let [u, v] = [a, b].map(|v| self.voronoi.reach[v as usize].vector);
-            let gap = (u - v).norm() - self.domain.lengths[h as usize];
-            if gap > meeting[l as usize].0 {
-                meeting[l as usize] = (gap, a);
-            }
-        }
-        for t in &self.domain.triangles {
-            let [a, b, c] = t.map(|v| label[v as usize]);
-            if a == b && b == c && (a as usize) < self.points.len() {
-                characteristic[a as usize] += 1;
-            }
-        }
-        characteristic
-            .iter()
-            .zip(meeting)
-            .filter(|(c, (_, vertex))| **c < 1 && *vertex != u32::MAX)
-            .map(|(_, (_, vertex))| vertex)
-            .collect()
-    }
-
-    /// The vertex of each of the cells that lies farthest from its point, the farthest first.
-    fn far_ends(&self, cells: &[u32]) -> Vec<u32> {
-        let mut far = vec![(0.0, u32::MAX); self.points.len()];
-        for (v, (&label, reach)) in self
-            .voronoi
-            .label
-            .iter()
-            .zip(&self.voronoi.reach)
-            .enumerate()
-        {
-            if let Some(best) = far.get_mut(label as usize)
-                && reach.distance > best.0
-            {
-                *best = (reach.distance, v as u32);
-            }
-        }
-        let mut ends: Vec<(f64, u32)> = cells
-            .iter()
-            .map(|c| far[*c as usize])
-            .filter(|(_, vertex)| *vertex != u32::MAX)
-            .collect();
-        ends.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        ends.into_iter().map(|(_, vertex)| vertex).collect()
-    }
-
-    fn points_on_surface(&self) -> Vec<SurfacePoint> {
-        self.points
-            .iter()
-            .map(|p| {
-                let (triangle, barycentric) = ancestor(p.triangle, p.barycentric, self.levels);
-                SurfacePoint {
-                    triangle,
-                    barycentric,
+    /// For every site the point of its cell's part of S closest to the cell's centroid on S.
+    fn vertices(&self, cells: &Cells) -> Vec<Vec3> {
+        let positions = &self.samples.surface;
+        let centroids = cells.centroids(positions, &self.weights);
+        let mut best = vec![(f64::INFINITY, Vec3::zeros()); self.points];
+        for t in &self.samples.triangles {
+            let [a, b, c] = t.map(|v| positions[v as usize]);
+            let labels = t.map(|v| cells.labels[v as usize]);
+            for k in 0..3 {
+                if labels[..k].contains(&labels[k]) {
+                    continue;
                 }
-            })
+                let centroid = &centroids[labels[k] as usize];
+                let [u, v, w] = triangle::closest_barycentric(centroid, &a, &b, &c);
+                let point = a * u + b * v + c * w;
+                let distance = (point - centroid).norm_squared();
+                let slot = &mut best[labels[k] as usize];
+                if distance < slot.0 {
+                    *slot = (distance, point);
+                }
+            }
+        }
+        best.into_iter().map(|(_, point)| point).collect()
+    }
+
+    /// Mean wanted spacing of every cell.
+    fn sizing(&self, cells: &Cells) -> Vec<f64> {
+        let mut sums = vec![(0.0, 0u32); self.points];
+        for (&site, h) in cells.labels.iter().zip(&self.spacing) {
+            sums[site as usize].0 += h;
+            sums[site as usize].1 += 1;
+        }
+        sums.into_iter()
+            .map(|(sum, count)| sum / f64::from(count.max(1)))
             .collect()
     }
-}
-
-/// W, its sizing and how often it was cut, so that `count` cells have vertices enough.
-fn cut(job: &Job, count: usize) -> (Domain, Sizing, u32) {
-    let per_cell = if count < MANY_POINTS {
-        VERTICES_PER_CELL
-    } else {
-        VERTICES_PER_SMALL_CELL
-    };
-    let (mut domain, mut sizing) = (job.domain.clone(), job.sizing.clone());
-    let mut levels = 0;
-    while domain.vertices.len() < per_cell * count {
-        let fine = domain.subdivided();
-        sizing = sizing.subdivided(&domain, &fine);
-        domain = fine;
-        levels += 1;
-    }
-    (domain, sizing, levels)
-}
-
-/// The vertices of some pairs of triangles, ascending.
-fn cells_of(mesh: &TriMesh, pairs: &[[u32; 2]]) -> Vec<u32> {
-    let mut cells: Vec<u32> = pairs
-        .iter()
-        .flatten()
-        .flat_map(|t| mesh.triangles[*t as usize])
-        .collect();
-    cells.sort_unstable();
-    cells.dedup();
-    cells
 }

@@ -13,7 +13,6 @@ use rayon::prelude::*;
 
 use super::domain::Domain;
 use super::log_map::LogMap;
-use super::sizing::Sizing;
 use super::trace::walk;
 use super::{RetileParameters, SurfacePoint};
 use crate::geometry::Vec2;
@@ -27,10 +26,10 @@ const LONGEST_MOVE: f64 = 0.5;
 
 const NONE: u32 = u32::MAX;
 
-/// Relaxes `points` in place; `tick` is told the share done and may cancel.
+/// Relaxes `points` in place, for the relative `spacing` at every vertex; `tick` is told the share done and may cancel.
 pub(crate) fn repel(
     domain: &Domain,
-    sizing: &Sizing,
+    spacing: &[f64],
     points: &mut Vec<SurfacePoint>,
     parameters: &RetileParameters,
     tick: impl Fn(f64) -> Result<(), Cancelled> + Sync,
@@ -40,7 +39,7 @@ pub(crate) fn repel(
     for round in 0..rounds {
         let share = round as f64 / rounds as f64;
         let strength = parameters.repulsion_strength * (1.0 - ANNEALED * share);
-        let neighbourhood = Neighbourhood::new(domain, sizing, points, radius);
+        let neighbourhood = Neighbourhood::new(domain, spacing, points, radius);
         *points = (0..points.len())
             .into_par_iter()
             .map_init(
@@ -67,10 +66,10 @@ struct Neighbourhood<'a> {
 }
 
 impl<'a> Neighbourhood<'a> {
-    fn new(domain: &'a Domain, sizing: &Sizing, points: &'a [SurfacePoint], radius: f64) -> Self {
+    fn new(domain: &'a Domain, spacing: &[f64], points: &'a [SurfacePoint], radius: f64) -> Self {
         let radii: Vec<f64> = points
             .iter()
-            .map(|p| radius * sizing.at(domain.triangles[p.triangle as usize], p.barycentric))
+            .map(|p| radius * domain.interpolate(spacing, p))
             .collect();
         let mut first = vec![NONE; domain.triangles.len()];
         let mut next = vec![NONE; points.len()];
@@ -105,7 +104,10 @@ impl<'a> Neighbourhood<'a> {
         let flat = self.domain.flat(own.triangle);
         let here = combine(&flat, own.barycentric);
         for q in self.on_triangle(own.triangle) {
-            add(q, combine(&flat, self.points[q as usize].barycentric) - here);
+            add(
+                q,
+                combine(&flat, self.points[q as usize].barycentric) - here,
+            );
         }
         for &v in map.visited() {
             if map.reach(v).is_none() {

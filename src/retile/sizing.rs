@@ -1,105 +1,107 @@
-//! How large the cells shall be where: even, or finer where the surface bends.
+//! How far apart points shall lie, place by place.
 //!
-//! Target spacing h ∝ κ^-γ with κ the larger principal curvature in magnitude, h's largest
-//! and smallest at most [`LARGEST_RATIO`] apart, scaled so that h = 1 means the spacing of
-//! evenly spread points: Σ area/h² = area.
+//! Spacing h falls with curvedness: h ∝ κ^-γ, where κ = sqrt((κ1² + κ2²)/2) (Koenderink and van
+//! Doorn 1992) is the root mean square of |Δn|/|Δx| over the edges of a vertex, smoothed over
+//! the surface and held between its 5th and 97th percentile, so that noise and corners do
+//! not pile points up. h is relative: its area-weighted mean density is that of even spacing.
 
-use super::curvature::curvature;
-use super::domain::{Domain, ancestor};
+use super::samples::Samples;
+use crate::geometry::Vec3;
+use crate::geometry::triangle::area_normal;
 
-/// The finest and the coarsest spacing differ at most by this factor: steeper changes cost
-/// triangle shape and gain no distance (measured on phantoms with γ of 0.5 and more).
+/// Largest over smallest spacing.
 const LARGEST_RATIO: f64 = 2.5;
+/// Umbrella averages of the curvature.
+const SMOOTHING_ROUNDS: usize = 10;
 
-/// Relative target spacing at every vertex of a domain.
-#[derive(Debug, Clone)]
-pub(crate) struct Sizing {
-    /// h per vertex; `None` is 1 everywhere.
-    spacing: Option<Vec<f64>>,
+/// Relative spacing at every sample: 1 on average; all 1 for γ = 0.
+pub(super) fn spacing(samples: &Samples, gamma: f64) -> Vec<f64> {
+    if gamma == 0.0 {
+        return vec![1.0; samples.len()];
+    }
+    let mut curvature = curvedness(samples);
+    for _ in 0..SMOOTHING_ROUNDS {
+        curvature = (0..samples.len())
+            .map(|v| {
+                let around = samples.around(v);
+                let sum: f64 = around.iter().map(|&n| curvature[n as usize]).sum();
+                (sum / around.len() as f64 + curvature[v]) / 2.0
+            })
+            .collect();
+    }
+    let mut sorted = curvature.clone();
+    sorted.sort_by(f64::total_cmp);
+    let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share) as usize];
+    let (low, high) = (at(0.05), at(0.97));
+    if !(low > 0.0) {
+        return vec![1.0; samples.len()];
+    }
+    let high = high.min(low * LARGEST_RATIO.powf(1.0 / gamma));
+    let mut spacing: Vec<f64> = curvature
+        .iter()
+        .map(|k| k.clamp(low, high).powf(-gamma))
+        .collect();
+    // As many points as even spacing takes: the sum of area/h² is the area.
+    let area: f64 = samples.area.iter().sum();
+    let points: f64 = (0..samples.len())
+        .map(|v| samples.area[v] / spacing[v].powi(2))
+        .sum();
+    let scale = (points / area).sqrt();
+    spacing.iter_mut().for_each(|h| *h *= scale);
+    spacing
 }
 
-impl Sizing {
-    /// The same spacing everywhere.
-    pub fn even(_: &Domain) -> Self {
-        Self { spacing: None }
+fn curvedness(samples: &Samples) -> Vec<f64> {
+    let mut normals = vec![Vec3::zeros(); samples.len()];
+    for t in &samples.triangles {
+        let [a, b, c] = t.map(|v| &samples.working[v as usize]);
+        let n = area_normal(a, b, c);
+        for v in t {
+            normals[*v as usize] += n;
+        }
     }
+    for n in &mut normals {
+        *n = n.try_normalize(0.0).unwrap_or_else(Vec3::zeros);
+    }
+    (0..samples.len())
+        .map(|v| {
+            let around = samples.around(v);
+            let squares = around.iter().map(|&n| {
+                let step = samples.working[n as usize] - samples.working[v];
+                let turn = normals[n as usize] - normals[v];
+                turn.norm_squared() / step.norm_squared().max(f64::MIN_POSITIVE)
+            });
+            (squares.sum::<f64>() / around.len() as f64).sqrt()
+        })
+        .collect()
+}
 
-    /// Spacing that falls with curvature to the power `gamma`; 0 is even.
-    pub fn adaptive(domain: &Domain, gamma: f64) -> Self {
-        if !(gamma > 0.0) {
-            return Self::even(domain);
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    #[test]
+    fn a_sphere_is_evenly_curved_and_a_torus_denser_inside() {
+        let sphere = shapes::icosphere(20.0, 4);
+        let samples = Samples::new(&sphere.vertices, &sphere.vertices, &sphere.triangles, 0);
+        for k in curvedness(&samples) {
+            assert!((k * 20.0 - 1.0).abs() < 0.02, "{k}");
         }
-        let kappa = curvature(domain);
-        let mut sorted = kappa.clone();
-        sorted.sort_by(f64::total_cmp);
-        let percentile = |p: f64| sorted[((sorted.len() - 1) as f64 * p) as usize];
-        let (low, high) = (percentile(0.05), percentile(0.97));
-        if !(low > 0.0) {
-            return Self::even(domain);
+        let torus = shapes::torus(30.0, 12.0, 80, 40);
+        let samples = Samples::new(&torus.vertices, &torus.vertices, &torus.triangles, 0);
+        for (v, k) in curvedness(&samples).into_iter().enumerate() {
+            let p = samples.working[v];
+            let from_axis = p.xy().norm();
+            let (k1, k2) = (1.0 / 12.0, (from_axis - 30.0) / 12.0 / from_axis);
+            let exact = f64::midpoint(k1 * k1, k2 * k2).sqrt();
+            assert!((k / exact - 1.0).abs() < 0.1, "{k} {exact}");
         }
-        let middle = (low * high).sqrt();
-        // Spread of h over the clamped range of κ, and the share of γ that keeps it in bounds.
-        let spread = gamma * (high / low).ln();
-        let gamma = gamma * (LARGEST_RATIO.ln() / spread).min(1.0);
-        let raw: Vec<f64> = kappa
-            .iter()
-            .map(|k| (k.clamp(low, high) / middle).powf(-gamma))
-            .collect();
-        let measure: f64 = raw
-            .iter()
-            .zip(&domain.vertex_areas)
-            .map(|(h, a)| a / (h * h))
+        let h = spacing(&samples, 0.5);
+        let density: f64 = (0..samples.len())
+            .map(|v| samples.area[v] / h[v].powi(2))
             .sum();
-        let scale = (measure / domain.area).sqrt();
-        Self {
-            spacing: Some(raw.iter().map(|h| h * scale).collect()),
-        }
-    }
-
-    /// The same sizing on the domain cut in four.
-    pub fn subdivided(&self, coarse: &Domain, fine: &Domain) -> Self {
-        let Some(h) = &self.spacing else {
-            return Self { spacing: None };
-        };
-        let mut spacing = vec![0.0; fine.vertices.len()];
-        for (t, corners) in fine.triangles.iter().enumerate() {
-            for (k, &v) in corners.iter().enumerate() {
-                let mut b = [0.0; 3];
-                b[k] = 1.0;
-                let (parent, b) = ancestor(t as u32, b, 1);
-                let p = coarse.triangles[parent as usize];
-                spacing[v as usize] = (0..3).map(|k| b[k] * h[p[k] as usize]).sum();
-            }
-        }
-        Self {
-            spacing: Some(spacing),
-        }
-    }
-
-    /// h at `vertex`.
-    pub fn at_vertex(&self, vertex: u32) -> f64 {
-        self.spacing.as_ref().map_or(1.0, |h| h[vertex as usize])
-    }
-
-    /// h at a point of triangle `corners`.
-    pub fn at(&self, corners: [u32; 3], barycentric: [f64; 3]) -> f64 {
-        match &self.spacing {
-            None => 1.0,
-            Some(h) => (0..3).map(|k| barycentric[k] * h[corners[k] as usize]).sum(),
-        }
-    }
-
-    /// Weight of a vertex in centroids: its area times the density h⁻⁴, whose optimal cells
-    /// have diameters ∝ h (Gersho: cell size ∝ density^-1/4 in the plane).
-    pub fn weight(&self, domain: &Domain, vertex: usize) -> f64 {
-        let h = self.at_vertex(vertex as u32);
-        domain.vertex_areas[vertex] / (h * h * h * h)
-    }
-
-    /// Points to expect on triangle `t`, up to a common factor: area / h².
-    pub fn expected_points(&self, domain: &Domain, t: usize) -> f64 {
-        let [a, b, c] = domain.triangles[t].map(|v| domain.vertices[v as usize]);
-        let h = self.at(domain.triangles[t], [1.0 / 3.0; 3]);
-        (b - a).cross(&(c - a)).norm() / (2.0 * h * h)
+        assert!((density / torus.area() - 1.0).abs() < 1e-9);
+        assert!(spacing(&samples, 0.0).iter().all(|h| *h == 1.0));
     }
 }

@@ -293,6 +293,52 @@ pub enum SurfaceError {
     },
 }
 
+impl SurfaceError {
+    /// The parameter that the error is about, by its name for users.
+    pub fn field(&self) -> Option<&'static str> {
+        match self {
+            SurfaceError::NoSurface { .. } | SurfaceError::BadIso { .. } => Some("iso"),
+            SurfaceError::BadSmoothing { .. } => Some("mask_smoothing"),
+            SurfaceError::NoSuchLabel { .. } => Some("label"),
+            SurfaceError::EmptyBox { .. } => Some("box"),
+            SurfaceError::OutsideVolume { .. } => Some("isolate"),
+            SurfaceError::SeedOutside { .. } => Some("seed_point"),
+            _ => None,
+        }
+    }
+
+    /// What the caller can do about it.
+    pub fn fix(&self) -> String {
+        match self {
+            SurfaceError::Cancelled(_) => "Ask again if the result is still wanted.".into(),
+            SurfaceError::NoFiniteVoxel { .. } | SurfaceError::Constant { .. } => {
+                "Look at the file in a viewer: there is nothing in it.".into()
+            }
+            SurfaceError::NoSurface {
+                minimum, maximum, ..
+            } => {
+                format!(
+                    "Set `iso` to auto or to an absolute value between {minimum} and {maximum}."
+                )
+            }
+            SurfaceError::BadIso { expected, .. } => format!("Set `iso` to {expected}."),
+            SurfaceError::BadSmoothing { .. } => "Set `mask_smoothing` from 0 to 3.".into(),
+            SurfaceError::NoSuchLabel { .. } => "Set `label` to one that occurs.".into(),
+            SurfaceError::OutsideVolume { shape, .. } => {
+                format!("Give voxel indices below {shape:?}, counted from 0.")
+            }
+            SurfaceError::EmptyBox { .. } => "Give the lower corner of the box first.".into(),
+            SurfaceError::SeedOutside { value, .. } => {
+                format!("Choose a voxel inside the wall, or an `iso` below {value}.")
+            }
+            SurfaceError::BadShape { .. }
+            | SurfaceError::TooManyVertices(_)
+            | SurfaceError::NotClosed(_)
+            | SurfaceError::BadVertex { .. } => "Send a smaller or a valid object.".into(),
+        }
+    }
+}
+
 fn describe_labels(present: &[(i64, usize)]) -> String {
     if present.is_empty() {
         return "no labels (its values are intensities)".into();

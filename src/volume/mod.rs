@@ -4,12 +4,12 @@
 //! `f32`, an invertible map from voxel indices to LPS millimetres, and the [`VolumeFacts`] that
 //! tell a person what was understood of the file. The way of a file:
 //!
-//! 1. [`source`]: opened, unpacked where gzipped (several members too), every byte counted
+//! 1. `source`: opened, unpacked where gzipped (several members too), every byte counted
 //!    against the limits;
-//! 2. [`recognise`]: told by its content, never by its name;
+//! 2. `recognise`: told by its content, never by its name;
 //! 3. [`nifti`]: header checked field by field, then the voxels decoded in chunks straight into
 //!    their final place;
-//! 4. [`summary`]: what values there are, and whether they look like labels.
+//! 4. `summary`: what values there are, and whether they look like labels.
 //!
 //! Guaranteed: a file gives the values and positions that its standard assigns to them, or an
 //! error naming field and value. No size that a file states is believed before the file has

@@ -54,6 +54,23 @@ impl VolumeFile {
         }
     }
 
+    /// The file at `path`, together with its other half where it is one of a `.hdr`/`.img`
+    /// pair (either of them perhaps gzipped) and the other lies beside it.
+    pub fn with_other_half(path: impl AsRef<Path>) -> Vec<Self> {
+        let path = path.as_ref();
+        let mut files = vec![Self::at(path)];
+        let name = path.to_string_lossy();
+        let bare = name.strip_suffix(".gz").unwrap_or(&name);
+        for (this, other) in [(".hdr", ".img"), (".img", ".hdr")] {
+            let Some(stem) = bare.strip_suffix(this) else {
+                continue;
+            };
+            let others = [format!("{stem}{other}"), format!("{stem}{other}.gz")];
+            files.extend(others.iter().find(|o| Path::new(o).is_file()).map(Self::at));
+        }
+        files
+    }
+
     /// The name for messages.
     pub fn name(&self) -> &str {
         &self.name
@@ -269,5 +286,38 @@ impl Read for Members {
             }
         }
         Ok(0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_other_half_lies_beside() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("a.hdr"), b"header").unwrap();
+        std::fs::write(at("a.img.gz"), b"image").unwrap();
+        let names = |path: PathBuf| {
+            let files = VolumeFile::with_other_half(path);
+            files
+                .iter()
+                .map(|f| f.name().to_owned())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(names(at("a.hdr")), ["a.hdr", "a.img.gz"]);
+        assert_eq!(names(at("a.img.gz")), ["a.img.gz", "a.hdr"]);
+        assert_eq!(names(at("b.nii.gz")), ["b.nii.gz"]);
+        assert_eq!(names(at("b.hdr")), ["b.hdr"]);
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let missing = VolumeFile::named("upload.nii", "/nowhere/at/all");
+        assert!(matches!(
+            Source::open(&missing, 10),
+            Err(VolumeError::Io { file, .. }) if file == "upload.nii"
+        ));
     }
 }

@@ -61,20 +61,27 @@ impl Tally {
         }
     }
 
+    /// The figures of one portion, in lanes that a vector unit can hold.
     fn of(portion: &[f32]) -> Self {
-        let mut t = Self::default();
-        for &v in portion {
-            if v.is_nan() {
-                t.missing += 1;
-                continue;
-            }
-            t.minimum = t.minimum.min(v);
-            t.maximum = t.maximum.max(v);
-            t.sum += f64::from(v);
-            t.fractional |= v.trunc() != v;
+        let (groups, rest) = portion.as_chunks::<LANES>();
+        let mut lanes = Lanes::new();
+        for group in groups {
+            lanes.add(group);
         }
-        t.finite = portion.len() as u64 - t.missing;
-        t
+        // What is left over is filled up with voxels that count for nothing.
+        let mut last = [f32::NAN; LANES];
+        last[..rest.len()].copy_from_slice(rest);
+        lanes.add(&last);
+        let padding = (LANES - rest.len()) as u64;
+        let missing = lanes.missing.iter().map(|&n| u64::from(n)).sum::<u64>() - padding;
+        Self {
+            minimum: lanes.minimum.into_iter().fold(f32::INFINITY, f32::min),
+            maximum: lanes.maximum.into_iter().fold(f32::NEG_INFINITY, f32::max),
+            sum: lanes.sum.iter().sum(),
+            finite: portion.len() as u64 - missing,
+            missing,
+            fractional: lanes.fractional.contains(&true),
+        }
     }
 
     fn merge(&mut self, other: &Tally) {
@@ -98,6 +105,58 @@ impl Tally {
             missing: self.missing,
             integral: any && !self.fractional,
             labels,
+        }
+    }
+}
+
+/// Values taken side by side.
+const LANES: usize = 8;
+
+/// From here on every `f32` is whole.
+const WHOLE: f32 = 8_388_608.0;
+
+/// Figures of every eighth voxel.
+struct Lanes {
+    minimum: [f32; LANES],
+    maximum: [f32; LANES],
+    sum: [f64; LANES],
+    missing: [u32; LANES],
+    fractional: [bool; LANES],
+}
+
+impl Lanes {
+    fn new() -> Self {
+        Self {
+            minimum: [f32::INFINITY; LANES],
+            maximum: [f32::NEG_INFINITY; LANES],
+            sum: [0.0; LANES],
+            missing: [0; LANES],
+            fractional: [false; LANES],
+        }
+    }
+
+    /// Without branches: comparisons with NaN are false.
+    #[inline]
+    fn add(&mut self, group: &[f32; LANES]) {
+        for l in 0..LANES {
+            let v = group[l];
+            let nan = v.is_nan();
+            self.missing[l] += u32::from(nan);
+            self.minimum[l] = if v < self.minimum[l] {
+                v
+            } else {
+                self.minimum[l]
+            };
+            self.maximum[l] = if v > self.maximum[l] {
+                v
+            } else {
+                self.maximum[l]
+            };
+            self.sum[l] += f64::from(if nan { 0.0 } else { v });
+            // Added to 2^23, a number loses its fraction to rounding.
+            let size = v.abs();
+            let whole = (size + WHOLE) - WHOLE == size || size >= WHOLE;
+            self.fractional[l] |= !(whole | nan);
         }
     }
 }
@@ -150,7 +209,9 @@ mod tests {
         let n = 3 * PORTION + 17;
         let voxels: Vec<f32> = (0..n).map(|i| (i % 7) as f32).collect();
         let sum: f64 = voxels.iter().map(|&v| f64::from(v)).sum();
-        assert_eq!(summarise(&voxels, 128).sum, sum);
+        let s = summarise(&voxels, 128);
+        assert_eq!((s.sum, s.minimum, s.maximum), (sum, 0.0, 6.0));
+        assert_eq!((s.finite, s.missing, s.integral), (n as u64, 0, true));
     }
 
     #[test]
@@ -168,6 +229,16 @@ mod tests {
         assert_eq!((labels[0].label, labels[0].voxels), (1, 40));
         let counts: Vec<f32> = (0..400).map(|i| (i * 37 % 41) as f32).collect();
         assert!(summarise(&counts, 20).labels.is_none());
+    }
+
+    #[test]
+    fn whole_numbers_are_told_at_every_size() {
+        for whole in [0.0, -3.0, 4_194_305.0, 8_388_607.0, 16_777_213.0, -1e30] {
+            assert!(summarise(&[whole], 1).integral, "{whole}");
+        }
+        for part in [0.5, -1e-30, 4_194_304.5, 8_388_606.5] {
+            assert!(!summarise(&[part], 1).integral, "{part}");
+        }
     }
 
     #[test]

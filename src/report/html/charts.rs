@@ -8,7 +8,7 @@ use crate::report::summary::Histogram;
 const WIDTH: f64 = 340.0;
 const HEIGHT: f64 = 190.0;
 /// Left, top, right and bottom of the plotting area inside of the picture.
-const PLOT: [f64; 4] = [38.0, 10.0, 330.0, 150.0];
+const PLOT: [f64; 4] = [38.0, 10.0, 324.0, 150.0];
 
 /// A histogram of `quantity`: the re-tiled mesh as a line, the optimised one as bars, both
 /// in percent of their counts.

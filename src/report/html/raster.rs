@@ -11,8 +11,8 @@ use crate::geometry::Vec3;
 
 /// Rows and columns of rendered pixels for each of the picture's.
 const SUPERSAMPLING: usize = 2;
-/// Share of the picture's side that the object's sphere takes.
-const FILL: f64 = 0.94;
+/// Share of the picture's side that the object may take.
+const FILL: f64 = 0.88;
 
 /// A colour: red, green, blue, 0..=1, as shown on a screen.
 pub type Colour = [f64; 3];
@@ -66,8 +66,9 @@ pub struct Facet {
     pub corners: [Vec3; 3],
     /// Colour before shading.
     pub colour: Colour,
-    /// Which sides to draw a line along: corners k to k + 1.
-    pub lines: [bool; 3],
+    /// Corners of the triangle whose sides are drawn where this one meets them: itself, or
+    /// the whole one that it is a part of.
+    pub outline: [Vec3; 3],
 }
 
 /// A square picture under work.
@@ -77,21 +78,32 @@ struct Canvas {
     pixels: Vec<Option<Colour>>,
 }
 
-/// Draws `facets` from `view` into a square of `side` pixels; `centre` comes to its middle,
-/// and a sphere of `radius` mm just fits. Lines are `line` pixels wide.
-pub fn png(
-    facets: &[Facet],
-    view: &View,
-    (centre, radius): (Vec3, f64),
-    (side, line): (usize, f64),
-) -> Vec<u8> {
+/// How to draw.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Style {
+    /// What comes to the picture's middle, LPS mm.
+    pub centre: Vec3,
+    /// How far the object reaches from there to any side, mm.
+    pub reach: f64,
+    /// Rows and columns of the picture, pixels.
+    pub side: usize,
+    /// Width of lines, pixels.
+    pub line: f64,
+    /// Light from everywhere, 0..=1; the rest comes from lamps. Colours that mean something
+    /// want more of it than those of a material.
+    pub ambient: f64,
+}
+
+/// Draws `facets` from `view`.
+pub fn png(facets: &[Facet], view: &View, style: &Style) -> Vec<u8> {
+    let side = style.side;
     let fine = side * SUPERSAMPLING;
     let mut canvas = Canvas {
         side: fine,
         depth: vec![f64::NEG_INFINITY; fine * fine],
         pixels: vec![None; fine * fine],
     };
-    let scale = FILL * fine as f64 / 2.0 / radius.max(f64::MIN_POSITIVE);
+    let scale = FILL * fine as f64 / 2.0 / style.reach.max(f64::MIN_POSITIVE);
     let middle = fine as f64 / 2.0;
     let toward = view.toward();
     for facet in facets {
@@ -103,46 +115,45 @@ pub fn png(
             continue;
         }
         // x right, y down, z toward the eye.
-        let seen = facet.corners.map(|p| {
-            let p = (p - centre) * scale;
+        let project = |p: Vec3| {
+            let p = (p - style.centre) * scale;
             Vec3::new(
                 middle + p.dot(&view.right),
                 middle - p.dot(&view.up),
                 p.dot(&toward),
             )
-        });
+        };
+        let seen = facet.corners.map(project);
+        let outline = facet.outline.map(project);
         let local = Vec3::new(
             normal.dot(&view.right),
             normal.dot(&view.up),
             normal.dot(&toward),
         );
-        let colour = shade(facet.colour, &local);
-        canvas.fill(&seen, colour, facet.lines, line * SUPERSAMPLING as f64);
+        let colour = shade(facet.colour, &local, style.ambient);
+        canvas.fill(&seen, colour, &outline, style.line * SUPERSAMPLING as f64);
     }
     canvas.encode(side)
 }
 
 /// Lambert's law under a key light from the upper left and a weak one from the lower right,
 /// over some light from everywhere. `normal`: x right, y up, z toward the eye.
-fn shade(colour: Colour, normal: &Vec3) -> Colour {
+fn shade(colour: Colour, normal: &Vec3, ambient: f64) -> Colour {
     let key = normal.dot(&Vec3::new(-0.45, 0.6, 0.66)).max(0.0);
     let fill = normal.dot(&Vec3::new(0.7, -0.4, 0.59)).max(0.0);
-    let light = 0.34 + 0.62 * key + 0.16 * fill;
+    let light = ambient + (1.0 - ambient) * (0.94 * key + 0.24 * fill);
     colour.map(|c| (c * light).clamp(0.0, 1.0))
 }
 
 impl Canvas {
-    fn fill(&mut self, [a, b, c]: &[Vec3; 3], colour: Colour, lines: [bool; 3], width: f64) {
-        let cross =
-            |p: &Vec3, q: &Vec3, r: &Vec3| (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x);
+    fn fill(&mut self, [a, b, c]: &[Vec3; 3], colour: Colour, outline: &[Vec3; 3], width: f64) {
         let doubled_area = cross(a, b, c);
         if doubled_area == 0.0 {
             return;
         }
-        let lengths = [(a, b), (b, c), (c, a)].map(|(p, q)| (q.x - p.x).hypot(q.y - p.y));
-        let rows = self.span([a.y, b.y, c.y]);
+        let dark = colour.map(|c| 0.42 * c);
         let columns = self.span([a.x, b.x, c.x]);
-        for row in rows {
+        for row in self.span([a.y, b.y, c.y]) {
             for column in columns.clone() {
                 let p = Vec3::new(column as f64 + 0.5, row as f64 + 0.5, 0.0);
                 // Twice the areas over the sides ab, bc, ca.
@@ -152,16 +163,11 @@ impl Canvas {
                 }
                 let depth = (a.z * over[1] + b.z * over[2] + c.z * over[0]) / doubled_area;
                 let at = row * self.side + column;
-                if depth <= self.depth[at] {
-                    continue;
+                if depth > self.depth[at] {
+                    self.depth[at] = depth;
+                    let on_line = near_side(&p, outline, width / 2.0);
+                    self.pixels[at] = Some(if on_line { dark } else { colour });
                 }
-                let on_line = (0..3).any(|k| lines[k] && over[k].abs() < width / 2.0 * lengths[k]);
-                self.depth[at] = depth;
-                self.pixels[at] = Some(if on_line {
-                    colour.map(|c| 0.42 * c)
-                } else {
-                    colour
-                });
             }
         }
     }
@@ -205,6 +211,19 @@ impl Canvas {
     }
 }
 
+/// Twice the signed area of a triangle in the picture.
+fn cross(p: &Vec3, q: &Vec3, r: &Vec3) -> f64 {
+    (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x)
+}
+
+/// Whether `p`, inside of the triangle, lies within `distance` of one of its sides.
+fn near_side(p: &Vec3, [a, b, c]: &[Vec3; 3], distance: f64) -> bool {
+    [(a, b), (b, c), (c, a)].iter().any(|(q, r)| {
+        let length = (r.x - q.x).hypot(r.y - q.y);
+        cross(q, r, p).abs() < distance * length
+    })
+}
+
 /// A PNG as a `data:` URI.
 pub fn data_uri(png: &[u8]) -> String {
     format!("data:image/png;base64,{}", STANDARD.encode(png))
@@ -220,7 +239,7 @@ mod tests {
             .map(|t| Facet {
                 corners: mesh.corners(t),
                 colour: [1.0; 3],
-                lines: [false; 3],
+                outline: mesh.corners(t),
             })
             .collect()
     }
@@ -238,12 +257,14 @@ mod tests {
     #[test]
     fn a_sphere_covers_its_disc_without_gaps() {
         let mesh = shapes::icosphere(10.0, 4);
-        let picture = png(
-            &facets(&mesh),
-            &View::ALL[0],
-            (Vec3::zeros(), 10.0),
-            (100, 1.0),
-        );
+        let style = Style {
+            centre: Vec3::zeros(),
+            reach: 10.0,
+            side: 100,
+            line: 1.0,
+            ambient: 0.3,
+        };
+        let picture = png(&facets(&mesh), &View::ALL[0], &style);
         let (side, alpha) = alpha(&picture);
         let share = alpha.iter().map(|&a| f64::from(a)).sum::<f64>() / 255.0 / (side * side) as f64;
         let disc = std::f64::consts::PI * (FILL / 2.0).powi(2);

@@ -15,7 +15,7 @@
     const ratio = window.devicePixelRatio || 1;
     const side = canvas.clientWidth * ratio;
     if (canvas.width !== side) canvas.width = canvas.height = side;
-    const scale = 0.46 * side / radius, middle = side / 2;
+    const scale = 0.49 * side / radius, middle = side / 2;
     const [cy, sy, cp, sp] = [Math.cos(yaw), Math.sin(yaw), Math.cos(pitch), Math.sin(pitch)];
     const seen = new Float64Array(3 * count);
     for (let i = 0; i < count; i++) {

@@ -50,6 +50,7 @@ fn checks(report: &Report) -> Vec<(bool, String)> {
     };
     let same = mesh.components == surface.components
         && mesh.euler_characteristic == surface.euler_characteristic;
+    let gain = report.fitness.gain_percent;
     let mut checks: Vec<(bool, String)> = exact.into_iter().collect();
     checks.extend([
         (mesh.closed, "Closed: the surface has no hole".to_owned()),
@@ -69,15 +70,19 @@ fn checks(report: &Report) -> Vec<(bool, String)> {
             },
         ),
         (same, format!("The topology of the image's surface: {kind}")),
-        (
-            report.fitness.optimised >= report.fitness.retiled,
-            format!(
-                "Optimisation raised the fitness by {} %",
-                number(report.fitness.gain_percent, 1)
-            ),
-        ),
+        (gain >= 0.0, improvement(gain)),
     ]);
     checks
+}
+
+fn improvement(gain_percent: f64) -> String {
+    let amount = number(gain_percent.abs(), 1);
+    let verb = if gain_percent < 0.0 {
+        "lowered"
+    } else {
+        "raised"
+    };
+    format!("Optimisation {verb} the fitness by {amount}\u{a0}%")
 }
 
 /// Whether the model is sound, and each promise by itself.
@@ -144,7 +149,7 @@ pub fn figures(report: &Report) -> String {
             number(distance.hausdorff_mm, 2),
             "mm",
             format!(
-                "largest distance (Hausdorff); 95 % within {} mm",
+                "largest distance (Hausdorff); 95\u{a0}% within {}\u{a0}mm",
                 number(distance.hd95_mm, 2)
             ),
         ),
@@ -152,7 +157,7 @@ pub fn figures(report: &Report) -> String {
             number(distance.volume_ml, 1),
             "ml",
             format!(
-                "wall volume, {} % against the surface",
+                "wall volume, {}\u{a0}% against the surface",
                 signed(distance.volume_error_percent, 2)
             ),
         ),
@@ -195,7 +200,7 @@ pub fn model(mesh: &TriMesh) -> String {
         String::new()
     };
     format!(
-        r#"<section><h2>The model</h2><p class="hint">Every triangle as it is. Letters: L left, R right, A anterior, P posterior, S superior, I inferior side of the patient.</p><div class="row">{}{turning}</div></section>"#,
+        r#"<section><h2>The model</h2><p class="hint">Every triangle as it is. Letters: L left, R right, A anterior, P posterior, S superior, I inferior side of the patient.</p><div class="row four">{}{turning}</div></section>"#,
         shown(&views::plain(mesh), "The model")
     )
 }
@@ -211,7 +216,7 @@ fn shown(pictures: &Pictures, what: &str) -> String {
                 r#"<i class="east" aria-hidden="true">{east}</i><i class="north" aria-hidden="true">{north}</i><i class="west" aria-hidden="true">{west}</i><i class="south" aria-hidden="true">{south}</i>"#
             );
             format!(
-                r#"<figure><div class="view"><img src="{uri}" alt="{what}, {} view" width="560" height="560">{marks}</div><figcaption>{name}</figcaption></figure>"#,
+                r#"<figure><div class="view"><img src="{uri}" alt="{what}, {} view" width="500" height="500">{marks}</div><figcaption>{name}</figcaption></figure>"#,
                 name.to_lowercase()
             )
         })
@@ -232,7 +237,7 @@ fn turnable(mesh: &TriMesh) -> String {
     // Numbers only: nothing in it can end the script element.
     let data = json!({ "vertices": vertices, "triangles": triangles });
     format!(
-        r#"<figure id="turnable" hidden><div class="view"><canvas id="turn" tabindex="0" role="img" aria-label="The model to turn by dragging or by the arrow keys"></canvas></div><figcaption>Drag, or use the arrow keys, to turn</figcaption></figure><script type="application/json" id="mesh">{data}</script>"#
+        r#"<figure id="turnable" hidden><div class="view"><canvas id="turn" tabindex="0" role="img" aria-label="The model to turn by dragging or by the arrow keys"></canvas></div><figcaption>Drag to turn</figcaption></figure><script type="application/json" id="mesh">{data}</script>"#
     )
 }
 
@@ -256,7 +261,7 @@ pub fn closeness(report: &Report, mesh: &TriMesh, reference: &TriMesh) -> String
     .map(|(name, direction)| direction_row(name, direction))
     .collect();
     format!(
-        r#"<section><h2>How close the model is</h2><p class="hint">Distance from the model to the surface that Marching Cubes found in the image. Blue lies inside of that surface, red outside.</p><div class="row">{pictures}</div><div class="scale" role="img" aria-label="Colours from {full} mm inside to {full} mm outside"><span>−{full} mm</span><svg viewBox="0 0 100 10" preserveAspectRatio="none"><defs><linearGradient id="ramp">{stops}</linearGradient></defs><rect width="100" height="10" fill="url(#ramp)"/></svg><span>+{full} mm</span></div><div class="scroll"><table><thead><tr><th scope="col">Distances, mm</th><th scope="col" class="n">mean</th><th scope="col" class="n">RMS</th><th scope="col" class="n">95 %</th><th scope="col" class="n">largest</th><th scope="col" class="n">samples</th></tr></thead><tbody>{rows}</tbody></table></div></section>"#,
+        r#"<section><h2>How close the model is</h2><p class="hint">Distance from the model to the surface that Marching Cubes found in the image. Blue lies inside of that surface, red outside.</p><div class="row">{pictures}</div><div class="scale" role="img" aria-label="Colours from {full} mm inside to {full} mm outside"><span>−{full} mm</span><svg viewBox="0 0 100 10" preserveAspectRatio="none"><defs><linearGradient id="ramp">{stops}</linearGradient></defs><rect width="100" height="10" fill="url(#ramp)"/></svg><span>+{full} mm</span></div><div class="scroll"><table><thead><tr><th scope="col">Distances, mm</th><th scope="col" class="n">mean</th><th scope="col" class="n">RMS</th><th scope="col" class="n">95 %</th><th scope="col" class="n">largest</th><th scope="col" class="n">surely below</th><th scope="col" class="n">samples</th></tr></thead><tbody>{rows}</tbody></table></div></section>"#,
         pictures = shown(&pictures, "The model coloured by distance"),
     )
 }
@@ -267,11 +272,12 @@ fn direction_row(name: &str, direction: &Direction) -> String {
         direction.rms_mm,
         direction.p95_mm,
         direction.max_mm,
+        direction.max_at_most_mm.unwrap_or(f64::NAN),
     ]
     .iter()
     .map(|x| format!(r#"<td class="n">{}</td>"#, number(*x, 3)))
     .collect();
-    let samples = direction.samples + direction.vertices;
+    let samples = direction.samples;
     format!(r#"<tr><th scope="row">{name}</th>{cells}<td class="n">{samples}</td></tr>"#)
 }
 

@@ -1,8 +1,8 @@
 //! NIfTI-1 and NIfTI-2, in one file or two, in either byte order.
 //!
 //! After the NIfTI-1.1 header file `nifti1.h` (NIfTI DFWG 2004) and `nifti2.h` (2011), whose
-//! field names are used throughout. [`header`] reads and checks the fields, [`place`] makes the
-//! affine of them, [`voxels`] decodes, [`mod@write`] is the way back.
+//! field names are used throughout. `header` reads and checks the fields, `place` makes the
+//! affine of them, `voxels` decodes, [`mod@write`] is the way back.
 //!
 //! Colours and complex numbers are refused: there is no telling which of their parts is the
 //! uptake. So are CIFTI files, which hold matrices in a NIfTI-2 coat.

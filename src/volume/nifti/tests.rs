@@ -362,6 +362,63 @@ fn what_follows_the_voxels_is_not_unpacked() {
 }
 
 #[test]
+fn reading_can_be_cancelled() {
+    let token = crate::progress::CancelToken::new();
+    token.cancel();
+    let monitor = Monitor::new(&crate::progress::Silent, token);
+    let files = [VolumeFile::in_memory("test", File::new(false).bytes)];
+    let result = read_volume(
+        &files,
+        &ReadOptions::default(),
+        &ReadLimits::default(),
+        &monitor,
+    );
+    assert!(matches!(result, Err(VolumeError::Cancelled(_))));
+}
+
+#[test]
+fn limits_are_kept() {
+    let file = File::new(false);
+    let limited = |bytes: &[u8], limits: ReadLimits| {
+        let files = [VolumeFile::in_memory("test", bytes)];
+        read_volume(&files, &ReadOptions::default(), &limits, &Monitor::silent()).err()
+    };
+    let few = ReadLimits {
+        voxels: 23,
+        ..ReadLimits::default()
+    };
+    let short = ReadLimits {
+        unpacked_bytes: 399,
+        ..ReadLimits::default()
+    };
+    let enough = ReadLimits {
+        voxels: 24,
+        unpacked_bytes: 400,
+    };
+    for bytes in [file.bytes.clone(), gzip(&file.bytes)] {
+        let e = limited(&bytes, few);
+        assert!(matches!(
+            e,
+            Some(VolumeError::TooLarge {
+                what: "voxels",
+                asked: 24,
+                limit: 23,
+                ..
+            })
+        ));
+        let e = limited(&bytes, short);
+        assert!(matches!(
+            e,
+            Some(VolumeError::TooLarge {
+                what: "unpacked bytes",
+                ..
+            })
+        ));
+        assert_eq!(limited(&bytes, enough), None);
+    }
+}
+
+#[test]
 fn units_become_millimetres() {
     for (code, scale) in [(1, 1000.0), (2, 1.0), (3, 0.001), (0, 1.0)] {
         let mut file = File::new(false);

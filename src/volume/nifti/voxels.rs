@@ -9,8 +9,12 @@ use crate::progress::Cancelled;
 /// Voxels decoded at a time: a few milliseconds of unpacking, half a mebibyte at most.
 const PORTION: usize = 1 << 16;
 
-/// Whole numbers beyond this are not all representable as `f32`.
-const EXACT: f32 = 16_777_216.0;
+/// Whole numbers beyond this are not all representable as `f32`; as its bits.
+const EXACT: u32 = 16_777_216_f32.to_bits();
+/// The bits of infinity.
+const INFINITY: u32 = f32::INFINITY.to_bits();
+/// The bit of the sign.
+const SIGN: u32 = 1 << 31;
 
 /// How a voxel is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -139,22 +143,36 @@ impl<'a> FrameReader<'a> {
         Ok(report(1.0)?)
     }
 
-    /// Makes infinities NaN, and refuses those that the file does not hold: numbers too large.
+    /// Looks for values that `f32` cannot hold.
     fn settle(&mut self, voxels: &mut [f32], start: usize) -> Result<(), VolumeError> {
+        let (mut infinite, mut large) = (false, false);
+        for v in &voxels[start..] {
+            // Without their sign bit, floats are ordered as their bits are.
+            let size = v.to_bits() & !SIGN;
+            infinite |= size == INFINITY;
+            large |= size > EXACT && size < INFINITY;
+        }
+        self.inexact |= large && self.header.data_type != DataType::F32;
+        match infinite {
+            true => self.settle_infinite(voxels, start),
+            false => Ok(()),
+        }
+    }
+
+    /// Makes infinities NaN, and refuses those that the file does not hold: numbers too large.
+    fn settle_infinite(&mut self, voxels: &mut [f32], start: usize) -> Result<(), VolumeError> {
         let header = self.header;
-        let size = header.data_type.size();
-        for (n, v) in voxels[start..].iter_mut().enumerate() {
+        let stored = self.buffer.chunks_exact(header.data_type.size());
+        for ((n, v), bytes) in (start..).zip(&mut voxels[start..]).zip(stored) {
             if v.is_infinite() {
-                let value = exact(&self.buffer[n * size..(n + 1) * size], header);
+                let value = exact(bytes, header);
                 if value.is_finite() {
-                    return Err(overflow(header, start + n, value));
+                    return Err(overflow(header, n, value));
                 }
                 *v = f32::NAN;
                 self.infinite += 1;
             }
         }
-        let integer = !matches!(header.data_type, DataType::F32);
-        self.inexact |= integer && voxels[start..].iter().any(|v| v.abs() > EXACT);
         Ok(())
     }
 

@@ -3,12 +3,12 @@
 //! In go [`PhantomParameters`] and a seed; out come the volume, the mask of the wall as it
 //! really is, and the pose. The steps:
 //!
-//! 1. [`anatomy`]: the uptake at every voxel. The LV wall is a truncated prolate ellipsoid
+//! 1. `anatomy`: the uptake at every voxel. The LV wall is a truncated prolate ellipsoid
 //!    shell with a slanted base, perhaps with perfusion defects by AHA segment (Cerqueira et
 //!    al., Circulation 2002); round it blood, right ventricle, liver, gut, lungs and torso.
-//! 2. [`blur`]: the camera's and the collimator's resolution, a Gaussian.
-//! 3. [`poisson`]: counting noise.
-//! 4. [`blur`] again: the filter of the reconstruction, which correlates the noise.
+//! 2. `blur`: the camera's and the collimator's resolution, a Gaussian.
+//! 3. `poisson`: counting noise.
+//! 4. `blur` again: the filter of the reconstruction, which correlates the noise.
 //!
 //! Steps 2 to 4 stand for projection and reconstruction: right in resolution and in the look of
 //! the noise, without attenuation, scatter or motion.
