@@ -36,3 +36,9 @@ pub mod parameters;
 pub mod pipeline;
 
 pub mod cli;
+
+pub mod jobs;
+
+pub mod store;
+
+pub mod config;

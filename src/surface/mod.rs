@@ -761,19 +761,13 @@ fn find_ventricle(
     facts: &mut SurfaceFacts,
     monitor: &Monitor,
 ) -> Result<Option<Labels>, SurfaceError> {
-    let coarse = coarse::Coarse::new(volume, survey.minimum, survey.not_finite > 0);
-    let found = left_ventricle::find(&coarse, monitor)?;
-    let Some(mut ventricle) = found.filter(|v| v.score >= PLAUSIBLE) else {
+    let found = left_ventricle::find(volume, survey, monitor)?;
+    let Some(ventricle) = found.filter(|v| v.score >= PLAUSIBLE) else {
         facts.warnings.push(
             "no left ventricle was recognised; the largest connected part was taken instead".into(),
         );
         return Ok(None);
     };
-    // Blocks of several voxels have their centre behind their first voxel's.
-    let fine = volume.frame.spacing();
-    for r in 0..3 {
-        ventricle.centre[r] += (coarse.factor[r] as f64 - 1.0) / 2.0 * fine[r];
-    }
     facts.ventricle_score = Some(ventricle.score);
     let wall = region::Wall::new(volume, &ventricle);
     let iso = iso_value(parameters.iso, wall.reference, survey)?;
@@ -811,7 +805,8 @@ fn reference_in_box(
     extent: [usize; 3],
     survey: &Survey,
 ) -> f32 {
-    let highest = values_in_box(volume, origin, extent)
+    let values = || rows_in_box(volume, origin, extent).flatten().copied();
+    let highest = values()
         .filter(|v| v.is_finite())
         .fold(survey.minimum, f32::max);
     let floor = if highest > 0.0 {
@@ -826,7 +821,7 @@ fn reference_in_box(
         return highest;
     }
     let mut histogram = vec![0u64; BINS];
-    for v in values_in_box(volume, origin, extent).filter(|v| v.is_finite() && *v > floor) {
+    for v in values().filter(|v| v.is_finite() && *v > floor) {
         let bin = ((f64::from(v) - f64::from(floor)) / width * BINS as f64) as usize;
         histogram[bin.min(BINS - 1)] += 1;
     }
@@ -843,22 +838,22 @@ fn reference_in_box(
 
 fn otsu_in_box(volume: &Volume, origin: [usize; 3], extent: [usize; 3], survey: &Survey) -> f32 {
     survey::otsu(
-        values_in_box(volume, origin, extent),
+        rows_in_box(volume, origin, extent),
         survey.minimum,
         survey.maximum,
     )
 }
 
-fn values_in_box(
+fn rows_in_box(
     volume: &Volume,
     origin: [usize; 3],
     extent: [usize; 3],
-) -> impl Iterator<Item = f32> + '_ {
+) -> impl Iterator<Item = &[f32]> {
     let [nx, ny, _] = volume.shape;
-    (0..extent[1] * extent[2]).flat_map(move |row| {
+    (0..extent[1] * extent[2]).map(move |row| {
         let (j, k) = (row % extent[1] + origin[1], row / extent[1] + origin[2]);
         let start = origin[0] + nx * (j + ny * k);
-        volume.voxels[start..start + extent[0]].iter().copied()
+        &volume.voxels[start..start + extent[0]]
     })
 }
 

@@ -15,7 +15,7 @@ use std::collections::BinaryHeap;
 
 use super::components::Components;
 use super::labels::Labels;
-use super::left_ventricle::{Ventricle, directions};
+use super::left_ventricle::{Compass, Ventricle};
 use crate::geometry::Vec3;
 use crate::progress::{Cancelled, Monitor};
 use crate::volume::Volume;
@@ -32,7 +32,8 @@ const WALL: f64 = 12.0;
 pub struct Wall<'a> {
     volume: &'a Volume,
     ventricle: &'a Ventricle,
-    table: Vec<Vec3>,
+    compass: Compass,
+    spacing: [f64; 3],
     origin: [usize; 3],
     extent: [usize; 3],
     /// The intensity that fractions refer to.
@@ -78,7 +79,8 @@ impl<'a> Wall<'a> {
         let mut wall = Self {
             volume,
             ventricle,
-            table: directions(),
+            compass: Compass::new(),
+            spacing,
             origin,
             extent,
             reference: 0.0,
@@ -95,11 +97,10 @@ impl<'a> Wall<'a> {
     /// Distance from the wall's middle along the ray through voxel `p` of the box, mm
     /// (negative towards the cavity), and whether the wall was seen there.
     fn depth(&self, p: [usize; 3]) -> (f64, bool) {
-        let spacing = self.volume.frame.spacing();
         let offset = Vec3::from_fn(|r, _| {
-            (p[r] + self.origin[r]) as f64 * spacing[r] - self.ventricle.centre[r]
+            (p[r] + self.origin[r]) as f64 * self.spacing[r] - self.ventricle.centre[r]
         });
-        let n = self.ventricle.direction(&self.table, &offset);
+        let n = self.compass.nearest(&offset);
         (
             offset.norm() - self.ventricle.distances[n],
             self.ventricle.seen[n],
@@ -223,7 +224,7 @@ impl<'a> Wall<'a> {
                 }
             }
         }
-        let spacing = self.volume.frame.spacing();
+        let spacing = self.spacing;
         for &(p, _) in zones {
             if owner[index(p)] != THEIRS {
                 continue;

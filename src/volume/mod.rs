@@ -7,9 +7,9 @@
 //! 1. `source`: opened, unpacked where gzipped (several members too), every byte counted
 //!    against the limits;
 //! 2. `recognise`: told by its content, never by its name;
-//! 3. [`nifti`]: header checked field by field, then the voxels decoded in chunks straight into
-//!    their final place;
-//! 4. `summary`: what values there are, and whether they look like labels.
+//! 3. [`nifti`] or `dicom`: header checked field by field;
+//! 4. `decode`: the voxels, in portions, straight into their final place;
+//! 5. `summary`: what values there are, and whether they look like labels.
 //!
 //! Guaranteed: a file gives the values and positions that its standard assigns to them, or an
 //! error naming field and value. No size that a file states is believed before the file has
@@ -20,6 +20,8 @@
 //! [`phantom`] makes volumes of known truth, [`nifti::write()`] puts volumes into files, and
 //! [`preview`] draws them.
 
+mod decode;
+mod dicom;
 pub mod error;
 pub mod facts;
 pub mod nifti;
