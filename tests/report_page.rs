@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 use ventriform::geometry::Vec3;
 use ventriform::mesh::{TriMesh, shapes};
 use ventriform::optimise::{
-    FitnessSummary, OptimiseFacts, OptimiseParameters, Optimised, Reference,
+    FitnessForm, FitnessSummary, OptimiseFacts, OptimiseParameters, Optimised, Reference,
 };
 use ventriform::progress::Monitor;
 use ventriform::report::{MeasureParameters, Report, ReportInput, html, measure};
@@ -69,7 +69,10 @@ fn report(model: &TriMesh) -> Report {
         surface: &surface,
         tiled: &tiled,
         optimised: &optimised,
-        optimise_parameters: &OptimiseParameters::default(),
+        optimise_parameters: &OptimiseParameters {
+            fitness: FitnessForm::Normalised,
+            ..OptimiseParameters::default()
+        },
         measures,
         timings_ms: vec![("surface".to_owned(), 12.0), ("retile".to_owned(), 30.5)],
     })

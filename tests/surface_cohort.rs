@@ -11,7 +11,7 @@ use nalgebra::Matrix4;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::mesh::topology;
 use ventriform::progress::Monitor;
-use ventriform::surface::{SurfaceParameters, coarse, extract, left_ventricle, region, survey};
+use ventriform::surface::{SurfaceParameters, extract, left_ventricle, region, survey};
 use ventriform::volume::Volume;
 
 /// Just enough NIfTI-1 for the cohort: little endian, sform, int16, uint8 or float32.
@@ -110,8 +110,7 @@ fn every_patients_ventricle_is_found() {
         );
         let iso = surface.facts.iso_value as f32;
         let seen = survey::survey(&volume);
-        let grid = coarse::Coarse::new(&volume, seen.minimum, false);
-        let found = left_ventricle::find(&grid, &Monitor::silent())
+        let found = left_ventricle::find(&volume, &seen, &Monitor::silent())
             .unwrap()
             .unwrap();
         let region = region::Wall::new(&volume, &found)

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::connectivity::Connectivity;
+use super::connectivity::{Connectivity, Quad};
 use super::fitness::{Fitness, Terms};
 use super::legality::{Replacement, replacement};
 use super::{FitnessForm, FitnessSummary, Gain, Reference};
@@ -12,6 +12,9 @@ use crate::mesh::adjacency::{next, previous};
 
 /// Keeps C finite where a triangle has no area.
 const LEAST_RADIUS_RATIO: f64 = 1e-12;
+
+/// A new pair within this share of the new edge's length from S does not stray.
+const MOST_STRAYING: f64 = 0.01;
 
 /// A mesh with the terms of all its configurations.
 #[derive(Debug, Clone)]
@@ -175,7 +178,23 @@ impl<'a> Configurations<'a> {
             gain: gained(distance),
             distance,
         };
-        (candidate.gain > least).then_some(candidate)
+        let lawful = candidate.gain > least && (guard == 0.0 || !self.strays(&quad, distance));
+        lawful.then_some(candidate)
+    }
+
+    /// Whether the flip of `quad`'s edge would move its pair away from S. F looks at edge
+    /// midpoints alone and would let a ridge become a valley whose bottom happens to touch S.
+    fn strays(&self, quad: &Quad, new_distance: f64) -> bool {
+        let at = |v: u32| self.vertices[v as usize];
+        let off = |points: &[u32]| {
+            let middle = points.iter().map(|&v| at(v)).sum::<Vec3>() / points.len() as f64;
+            distance(&middle, self.reference)
+        };
+        let Quad { a, b, c, d } = *quad;
+        let squares = |x: [f64; 3]| x.iter().map(|d| d * d).sum::<f64>();
+        let old = squares([off(&[a, b, c]), off(&[b, a, d]), off(&[a, b])]);
+        let new = squares([off(&[c, a, d]), off(&[d, b, c]), new_distance]);
+        new > old.max((MOST_STRAYING * (at(c) - at(d)).norm()).powi(2))
     }
 
     /// Flips `h`, whose new edge's midpoint is `distance` from S.
@@ -329,9 +348,15 @@ fn shape([p, q, r]: &[Vec3; 3]) -> f64 {
 }
 
 fn midpoint_distance(vertices: &[Vec3], [a, b]: [u32; 2], reference: &Reference) -> f64 {
-    let middle = (vertices[a as usize] + vertices[b as usize]) / 2.0;
+    distance(
+        &((vertices[a as usize] + vertices[b as usize]) / 2.0),
+        reference,
+    )
+}
+
+fn distance(point: &Vec3, reference: &Reference) -> f64 {
     reference
         .bvh
-        .closest(&middle)
+        .closest(point)
         .map_or(f64::INFINITY, |found| found.squared_distance.sqrt())
 }

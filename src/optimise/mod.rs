@@ -21,12 +21,10 @@
 
 mod configurations;
 mod connectivity;
-mod equations;
 mod fit;
 pub mod fitness;
 mod flips;
 mod legality;
-mod samples;
 
 use configurations::Configurations;
 use connectivity::Connectivity;
@@ -72,7 +70,8 @@ pub struct OptimiseParameters {
     /// Default [`Gain::Total`].
     pub gain: Gain,
     /// Radius ratio 2r/R, 0..=1, below which no flip may make a triangle unless it replaces
-    /// one as bad; 0 lets slivers pass. Default 0.9.
+    /// one as bad; nor may a flip move its pair further from the surface. 0 lets slivers and
+    /// stray pairs pass, as the paper does. Default 0.9.
     pub guard: f64,
     /// The least-squares fit.
     pub fit: FitParameters,

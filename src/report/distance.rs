@@ -3,18 +3,18 @@
 //! Each side is sampled evenly by area, and every sample looks for the closest point of the
 //! other side, as Metro does (Cignoni, Rocchini, Scopigno 1998): means and percentiles.
 //!
-//! Samples miss the largest distance. [`farthest`] bounds it from both sides instead: no
-//! point of a triangle is farther from the other side than the triangle's centroid is, plus
-//! the way to the centroid; nor than the triangle's farthest corner is from any one triangle
-//! of the other side. Triangles whose bound exceeds the best distance found are cut in four
-//! and looked at again, until [`TOLERANCE`] is reached. Where a mesh is too large for that,
-//! samples and vertices have to do, and the bound is absent.
+//! Samples miss the largest distance. `farthest` bounds it from both sides instead: no
+//! point of a triangle is farther from the other side than the triangle's farthest corner is
+//! from any one triangle of the other side; nor than its centroid is, plus the way to the
+//! centroid. Triangles whose bound exceeds the best distance found are cut in four and looked
+//! at again, until none can exceed it by more than 1 %. Where a mesh is too large for that,
+//! samples and some vertices have to do, and the bound is absent.
 
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::summary::Summary;
-use crate::geometry::bvh::Bvh;
+use crate::geometry::bvh::{Bvh, Closest};
 use crate::geometry::{Vec3, triangle};
 use crate::mesh::TriMesh;
 use crate::optimise::Reference;
@@ -124,10 +124,13 @@ impl Direction {
         monitor: &Monitor,
     ) -> Result<Self, Cancelled> {
         let even = Summary::of(&distances(&even_samples(from, samples), tree, monitor)?);
-        let corners = Summary::of(&distances(&some_vertices(from, samples), tree, monitor)?);
-        let found = even.max.max(corners.max);
-        let (max_mm, max_at_most_mm) =
-            farthest(from, (to, tree), found, MOST_REFINED * samples, monitor)?;
+        let budget = MOST_REFINED * samples;
+        let (max_mm, max_at_most_mm) = if from.vertices.len() <= budget {
+            farthest(from, (to, tree), even.max, budget, monitor)?
+        } else {
+            let some = distances(&some_vertices(from, samples), tree, monitor)?;
+            (Summary::of(&some).max.max(even.max), None)
+        };
         Ok(Self {
             samples,
             mean_mm: even.mean,
@@ -148,50 +151,59 @@ fn farthest(
     budget: usize,
     monitor: &Monitor,
 ) -> Result<(f64, Option<f64>), Cancelled> {
-    let mut best = found;
-    let mut spent = 0;
-    let mut cells: Vec<[Vec3; 3]> = (0..from.triangles.len()).map(|t| from.corners(t)).collect();
+    let corners = closest_points(&from.vertices, tree, monitor)?;
+    let distance = |c: &Closest| c.squared_distance.sqrt();
+    let mut best = corners.iter().map(distance).fold(found, f64::max);
+    let mut spent = corners.len();
+    let limit = |best: f64| best * (1.0 + TOLERANCE) + f64::EPSILON;
+    let mut cells: Vec<[Vec3; 3]> = (0..from.triangles.len())
+        .filter(|&t| bound_by_corners(from, t, &corners, to) > limit(best))
+        .flat_map(|t| quarters(&from.corners(t)))
+        .collect();
     while !cells.is_empty() {
         spent += cells.len();
         if spent > budget {
             return Ok((best, None));
         }
-        let mut bounds = Vec::with_capacity(cells.len());
-        for chunk in cells.chunks(CHUNK) {
-            monitor.check()?;
-            bounds.par_extend(
-                chunk
-                    .par_iter()
-                    .with_min_len(256)
-                    .map(|c| bound(c, to, tree)),
-            );
-        }
-        best = bounds.iter().fold(best, |best, (at, _)| best.max(*at));
-        let limit = best * (1.0 + TOLERANCE) + f64::EPSILON;
-        cells = (cells.iter().zip(&bounds))
-            .filter(|(_, (_, at_most))| *at_most > limit)
-            .flat_map(|(cell, _)| quarters(cell))
+        let centroids: Vec<Vec3> = cells.iter().map(|[a, b, c]| (a + b + c) / 3.0).collect();
+        let closest = closest_points(&centroids, tree, monitor)?;
+        best = closest.iter().map(distance).fold(best, f64::max);
+        cells = (cells.iter().zip(&centroids).zip(&closest))
+            .filter(|((cell, centroid), closest)| {
+                let around = distance(closest) + farthest_corner(cell, |p| (p - *centroid).norm());
+                let triangle = to.corners(closest.triangle as usize);
+                let to_one = farthest_corner(cell, |p| distance_to(p, &triangle));
+                around.min(to_one) > limit(best)
+            })
+            .flat_map(|((cell, _), _)| quarters(cell))
             .collect();
     }
     Ok((best, Some(best * (1.0 + TOLERANCE))))
 }
 
-/// The distance of a triangle's centroid, and a bound for all its points. The distance to
-/// one fixed triangle is convex, so that it is largest at a corner.
-fn bound(cell: &[Vec3; 3], to: &TriMesh, tree: &Bvh) -> (f64, f64) {
-    let centroid = (cell[0] + cell[1] + cell[2]) / 3.0;
-    let Some(closest) = tree.closest(&centroid) else {
-        return (f64::INFINITY, f64::INFINITY);
-    };
-    let at = closest.squared_distance.sqrt();
-    let [a, b, c] = to.corners(closest.triangle as usize);
-    let farthest = |distance: &dyn Fn(&Vec3) -> f64| cell.iter().map(distance).fold(0.0, f64::max);
-    let to_one = farthest(&|p| {
-        let [u, v, w] = triangle::closest_barycentric(p, &a, &b, &c);
-        (a * u + b * v + c * w - p).norm()
+/// A bound for the distance of triangle `t`'s points, from what is closest to its corners.
+/// The distance to one fixed triangle is convex, so that it is largest at a corner.
+fn bound_by_corners(from: &TriMesh, t: usize, closest: &[Closest], to: &TriMesh) -> f64 {
+    let known = from.triangles[t].map(|v| closest[v as usize]);
+    if known.iter().all(|c| c.triangle == known[0].triangle) {
+        let squared = known.iter().map(|c| c.squared_distance);
+        return squared.fold(0.0, f64::max).sqrt();
+    }
+    let cell = from.corners(t);
+    let bounds = known.iter().map(|c| {
+        let triangle = to.corners(c.triangle as usize);
+        farthest_corner(&cell, |p| distance_to(p, &triangle))
     });
-    let around = at + farthest(&|p| (p - centroid).norm());
-    (at, to_one.min(around))
+    bounds.fold(f64::INFINITY, f64::min)
+}
+
+fn farthest_corner(cell: &[Vec3; 3], distance: impl Fn(&Vec3) -> f64) -> f64 {
+    cell.iter().map(distance).fold(0.0, f64::max)
+}
+
+fn distance_to(p: &Vec3, [a, b, c]: &[Vec3; 3]) -> f64 {
+    let [u, v, w] = triangle::closest_barycentric(p, a, b, c);
+    (a * u + b * v + c * w - p).norm()
 }
 
 /// The triangle cut at the middles of its sides.
@@ -202,16 +214,20 @@ fn quarters([a, b, c]: &[Vec3; 3]) -> [[Vec3; 3]; 4] {
 
 /// The distance from each point to the closest point of `to`, in the points' order.
 fn distances(points: &[Vec3], to: &Bvh, monitor: &Monitor) -> Result<Vec<f64>, Cancelled> {
-    let mut distances = Vec::with_capacity(points.len());
+    let closest = closest_points(points, to, monitor)?;
+    Ok(closest.iter().map(|c| c.squared_distance.sqrt()).collect())
+}
+
+/// The closest point of `to` for each point, in the points' order; none where `to` is empty.
+fn closest_points(points: &[Vec3], to: &Bvh, monitor: &Monitor) -> Result<Vec<Closest>, Cancelled> {
+    let mut closest = Vec::with_capacity(points.len());
     for chunk in points.chunks(CHUNK) {
         monitor.check()?;
         // One task takes some hundred queries, so that handing out costs nothing.
-        distances.par_extend(chunk.par_iter().with_min_len(256).map(|p| {
-            to.closest(p)
-                .map_or(f64::INFINITY, |c| c.squared_distance.sqrt())
-        }));
+        let found = chunk.par_iter().with_min_len(256);
+        closest.par_extend(found.filter_map(|p| to.closest(p)));
     }
-    Ok(distances)
+    Ok(closest)
 }
 
 /// `count` points spread evenly over the area: one in each of `count` equal shares of it, in

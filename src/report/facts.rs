@@ -10,7 +10,7 @@ use crate::mesh::topology;
 use crate::optimise::fitness::Scales;
 use crate::optimise::{Ended, FitnessForm, FitnessSummary, OptimiseFacts, Optimised};
 use crate::retile::{RetileFacts, Tiled};
-use crate::surface::Surface;
+use crate::surface::{Surface, SurfaceFacts, VolumeKind};
 
 fn object(value: Value) -> Map<String, Value> {
     match value {
@@ -34,8 +34,36 @@ pub fn surface(surface: &Surface) -> SurfaceSection {
         volume_ml: mesh.volume() / 1000.0,
         area_mm2: mesh.area(),
         voxel_mm: surface.spacing,
-        facts: Map::new(),
+        facts: surface_facts(&surface.facts),
     }
+}
+
+fn surface_facts(facts: &SurfaceFacts) -> Map<String, Value> {
+    object(json!({
+        "genus": facts.genus,
+        "iso_fraction": facts.iso_fraction,
+        "reference_intensity": facts.reference,
+        "otsu": facts.otsu,
+        "intensity_range": facts.range,
+        "kind": match facts.kind {
+            VolumeKind::Intensity => "intensity",
+            VolumeKind::Mask => "mask",
+            VolumeKind::Labels => "labels",
+        },
+        "label": facts.label,
+        "ventricle_score": facts.ventricle_score,
+        "region_ml": facts.region_ml,
+        "touches_border": facts.touches_border,
+        "not_finite_voxels": facts.not_finite,
+        "neighbour_voxels_cut": facts.neighbour_voxels_cut,
+        "neighbour_cut_mm2": facts.neighbour_cut_mm2,
+        "components_before": facts.components_before,
+        "cavities_before": facts.cavities_before,
+        "handles_before": facts.handles_before,
+        "voxels_dropped": facts.voxels_dropped,
+        "voxels_cut": facts.voxels_cut,
+        "voxels_filled": facts.voxels_filled,
+    }))
 }
 
 pub fn retile(facts: &RetileFacts) -> Map<String, Value> {

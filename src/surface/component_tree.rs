@@ -21,6 +21,9 @@ const VOLUMES: std::ops::Range<f64> = 15e3..500e3;
 /// Root-mean-square distances from the centroid that are offered, mm.
 const SPREADS: std::ops::Range<f64> = 12.0..55.0;
 
+/// A part is offered again once it has grown by this factor.
+const GROWN: f64 = 1.4;
+
 /// A connected part above a threshold.
 #[derive(Debug, Clone, Copy)]
 pub struct Part {
@@ -40,8 +43,7 @@ struct Sums {
     offered: f64,
 }
 
-/// The parts that could be a ventricle, from the highest threshold down. A part is offered
-/// again after it has grown by a fifth.
+/// The parts that could be a ventricle, from the highest threshold down.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -61,11 +63,7 @@ pub fn parts(coarse: &Coarse, monitor: &Monitor) -> Result<Vec<Part>, Cancelled>
         for here in begin..end {
             let at = order[here] as usize;
             let (i, j, k) = (at % nx, at / nx % ny, at / (nx * ny));
-            let position = Vec3::new(
-                i as f64 * coarse.spacing[0],
-                j as f64 * coarse.spacing[1],
-                k as f64 * coarse.spacing[2],
-            );
+            let position = coarse.position([i, j, k]);
             sums.push(Sums {
                 count: 1.0,
                 position,
@@ -102,7 +100,7 @@ pub fn parts(coarse: &Coarse, monitor: &Monitor) -> Result<Vec<Part>, Cancelled>
         roots.retain(|&r| parent[r as usize] == r);
         for &r in &roots {
             let s = &mut sums[r as usize];
-            if !VOLUMES.contains(&(s.count * voxel)) || s.count < 1.2 * s.offered {
+            if !VOLUMES.contains(&(s.count * voxel)) || s.count < GROWN * s.offered {
                 continue;
             }
             let centroid = s.position / s.count;

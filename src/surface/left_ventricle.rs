@@ -19,12 +19,20 @@
 //! score says how sure the search is.
 
 use super::coarse::Coarse;
+use rayon::prelude::*;
+
 use super::component_tree::{Part, parts};
+use super::survey::Survey;
 use crate::geometry::Vec3;
 use crate::progress::{Cancelled, Monitor};
+use crate::volume::Volume;
 
 /// Number of directions that are looked into.
 const DIRECTIONS: usize = 96;
+/// Blocks in which rays are cast, mm: the wall must be resolved.
+const RAY_BLOCK: f64 = 4.0;
+/// Blocks in which parts are formed, mm: they only say where to look.
+const PART_BLOCK: f64 = 7.0;
 /// Step along a ray, mm.
 const STEP: f64 = 3.0;
 /// Samples along a ray: up to 66 mm.
@@ -44,26 +52,18 @@ pub struct Ventricle {
     pub seen: Vec<bool>,
     /// Typical brightness of the wall (upper quartile of the rays' peaks).
     pub level: f64,
-    /// 0..1: how much like a ventricle it looks. Below [`PLAUSIBLE`] nothing was found.
+    /// 0..1: how much like a ventricle it looks. Below [`PLAUSIBLE`] it is none.
     pub score: f64,
 }
 
 /// Score from which on a part counts as a ventricle.
-pub const PLAUSIBLE: f64 = 0.12;
+///
+/// Of 114 distorted copies of the simulated patients every heart scored 0.23 or more, and of
+/// scans with the heart painted over none above 0.19.
+pub const PLAUSIBLE: f64 = 0.2;
 
-impl Ventricle {
-    /// The direction of the table nearest to `offset`.
-    pub fn direction(&self, table: &[Vec3], offset: &Vec3) -> usize {
-        let mut best = (f64::NEG_INFINITY, 0);
-        for (index, d) in table.iter().enumerate() {
-            let along = d.dot(offset);
-            if along > best.0 {
-                best = (along, index);
-            }
-        }
-        best.1
-    }
-}
+/// Score below which the user is told to look.
+pub const DOUBTFUL: f64 = 0.35;
 
 /// Evenly spread unit vectors (Fibonacci lattice).
 pub fn directions() -> Vec<Vec3> {
@@ -83,21 +83,89 @@ pub fn directions() -> Vec<Vec3> {
 ///
 /// # Errors
 /// [`Cancelled`].
-pub fn find(coarse: &Coarse, monitor: &Monitor) -> Result<Option<Ventricle>, Cancelled> {
-    if !(coarse.maximum > 0.0) {
+pub fn find(
+    volume: &Volume,
+    survey: &Survey,
+    monitor: &Monitor,
+) -> Result<Option<Ventricle>, Cancelled> {
+    let has_nan = survey.not_finite > 0;
+    let blocks = Coarse::new(volume, PART_BLOCK, survey.minimum, has_nan);
+    if !(blocks.maximum > 0.0) {
         return Ok(None);
     }
+    let parts = parts(&blocks, monitor)?;
+    let grid = Coarse::new(volume, RAY_BLOCK, survey.minimum, has_nan);
     let table = directions();
+    let candidates: Vec<Option<Ventricle>> = parts
+        .par_iter()
+        .map(|part| {
+            monitor.check()?;
+            Ok(judge(&grid, &table, part))
+        })
+        .collect::<Result<_, Cancelled>>()?;
     let mut best: Option<Ventricle> = None;
-    for part in parts(coarse, monitor)? {
-        monitor.check()?;
-        if let Some(candidate) = judge(coarse, &table, &part)
-            && best.as_ref().is_none_or(|b| candidate.score > b.score)
-        {
+    for candidate in candidates.into_iter().flatten() {
+        if best.as_ref().is_none_or(|b| candidate.score > b.score) {
             best = Some(candidate);
         }
     }
     Ok(best)
+}
+
+/// Finds the direction nearest to an offset in constant time, by a cube whose faces are
+/// divided into cells.
+#[derive(Debug, Clone)]
+pub struct Compass {
+    cells: Vec<u8>,
+}
+
+impl Compass {
+    /// Cells along the side of a face: about 5 degrees each, a quarter of the directions'
+    /// spacing.
+    const SIDE: usize = 18;
+
+    /// The compass of [`directions`].
+    pub fn new() -> Self {
+        let table = directions();
+        let side = Self::SIDE;
+        let cells = (0..6 * side * side)
+            .map(|cell| {
+                let (face, u, v) = (cell / (side * side), cell / side % side, cell % side);
+                let coordinate = |c: usize| (2.0 * c as f64 + 1.0) / side as f64 - 1.0;
+                let axis = face / 2;
+                let mut offset = Vec3::zeros();
+                offset[axis] = if face % 2 == 0 { 1.0 } else { -1.0 };
+                offset[(axis + 1) % 3] = coordinate(u);
+                offset[(axis + 2) % 3] = coordinate(v);
+                let along = |n: &usize| table[*n].dot(&offset);
+                let best = (0..DIRECTIONS).max_by(|a, b| along(a).total_cmp(&along(b)));
+                best.unwrap_or(0) as u8
+            })
+            .collect();
+        Self { cells }
+    }
+
+    /// The number of the direction nearest to `offset` (to within a cell).
+    pub fn nearest(&self, offset: &Vec3) -> usize {
+        let axis = offset.iamax();
+        let height = offset[axis].abs();
+        if height == 0.0 {
+            return 0;
+        }
+        let face = 2 * axis + usize::from(offset[axis] < 0.0);
+        let cell = |r: usize| {
+            let c = (offset[r % 3] / height + 1.0) / 2.0 * Self::SIDE as f64;
+            (c as usize).min(Self::SIDE - 1)
+        };
+        let at = (face * Self::SIDE + cell(axis + 1)) * Self::SIDE + cell(axis + 2);
+        usize::from(self.cells[at])
+    }
+}
+
+impl Default for Compass {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 /// What one ray met.
@@ -114,28 +182,26 @@ struct Wall {
 }
 
 fn look(coarse: &Coarse, centre: &Vec3, direction: &Vec3, level: f64) -> Wall {
-    let mut values = [0.0; SAMPLES + BEHIND];
-    for (n, value) in values.iter_mut().enumerate() {
-        *value = coarse.at_mm(&(centre + direction * (STEP * n as f64)));
-    }
-    let mut darkest = values[0].min(values[1]);
+    let value = |n: usize| coarse.at_mm(&(centre + direction * (STEP * n as f64)));
+    // Five samples in a row: v is the middle one.
+    let mut window = [value(0), value(1), value(2), value(3), 0.0];
+    let mut darkest = window[0].min(window[1]);
     for n in 2..SAMPLES {
-        let v = values[n];
-        let is_peak = v >= 0.7 * level
-            && v >= values[n - 1]
-            && v >= values[n + 1]
-            && v >= values[n - 2]
-            && v >= values[n + 2];
+        window[4] = value(n + 2);
+        let v = window[2];
+        let is_peak = v >= 0.7 * level && window.iter().all(|other| v >= *other);
         if is_peak && darkest <= 0.8 * v {
-            let behind = values[n..n + BEHIND].iter().copied().fold(v, f64::min);
+            let limit = 0.7 * v;
+            let ends = (n + 1..n + BEHIND).any(|m| value(m) <= limit);
             return Wall {
                 distance: STEP * n as f64,
                 peak: v,
-                weight: if behind <= 0.7 * v { 1.0 } else { 0.4 },
+                weight: if ends { 1.0 } else { 0.4 },
                 cavity: darkest / v,
             };
         }
         darkest = darkest.min(v);
+        window.rotate_left(1);
     }
     Wall::default()
 }
@@ -170,7 +236,9 @@ fn judge(coarse: &Coarse, table: &[Vec3], part: &Part) -> Option<Ventricle> {
             .iter()
             .map(|d| look(coarse, &centre, d, part.level))
             .collect();
-        let candidate = rate(coarse, table, centre, &walls);
+        let Some(candidate) = rate(coarse, table, centre, &walls) else {
+            break;
+        };
         if best.as_ref().is_none_or(|b| candidate.score > b.score) {
             best = Some(candidate);
         }
@@ -186,7 +254,11 @@ fn judge(coarse: &Coarse, table: &[Vec3], part: &Part) -> Option<Ventricle> {
         if !(12.0..55.0).contains(&radius) || (fitted - part.centroid).norm() > 45.0 {
             break;
         }
+        let moved = (fitted - centre).norm();
         centre = fitted;
+        if moved < 1.0 {
+            break;
+        }
     }
     best
 }
@@ -196,17 +268,11 @@ fn near(value: f64, best: f64, width: f64) -> f64 {
     (-((value / best).ln() / width).powi(2)).exp()
 }
 
-fn rate(coarse: &Coarse, table: &[Vec3], centre: Vec3, walls: &[Wall]) -> Ventricle {
+/// Scores a centre, or `None` where fewer than a quarter of the rays meet a wall.
+fn rate(coarse: &Coarse, table: &[Vec3], centre: Vec3, walls: &[Wall]) -> Option<Ventricle> {
     let hits: Vec<&Wall> = walls.iter().filter(|w| w.weight > 0.0).collect();
-    let mut ventricle = Ventricle {
-        centre,
-        distances: Vec::new(),
-        seen: Vec::new(),
-        level: 0.0,
-        score: 0.0,
-    };
     if hits.len() < DIRECTIONS / 4 {
-        return ventricle;
+        return None;
     }
     let mut distances: Vec<f64> = hits.iter().map(|w| w.distance).collect();
     distances.sort_by(f64::total_cmp);
@@ -221,12 +287,11 @@ fn rate(coarse: &Coarse, table: &[Vec3], centre: Vec3, walls: &[Wall]) -> Ventri
             && w.peak > 0.35 * bright
             && w.peak < 2.5 * bright
     };
-    ventricle.level = bright;
-    ventricle.seen = walls.iter().map(belongs).collect();
+    let seen: Vec<bool> = walls.iter().map(belongs).collect();
     let kept: Vec<&Wall> = walls.iter().filter(|w| belongs(w)).collect();
     let n = kept.len() as f64;
     if n < DIRECTIONS as f64 / 4.0 {
-        return ventricle;
+        return None;
     }
     let mean = kept.iter().map(|w| w.distance).sum::<f64>() / n;
     let variance = kept
@@ -240,7 +305,7 @@ fn rate(coarse: &Coarse, table: &[Vec3], centre: Vec3, walls: &[Wall]) -> Ventri
     let missing = DIRECTIONS as f64 - n;
     let open: Vec3 = table
         .iter()
-        .zip(&ventricle.seen)
+        .zip(&seen)
         .filter(|(_, seen)| !**seen)
         .map(|(d, _)| *d)
         .sum();
@@ -250,15 +315,20 @@ fn rate(coarse: &Coarse, table: &[Vec3], centre: Vec3, walls: &[Wall]) -> Ventri
         0.7
     };
     let off_centre = (centre - coarse.middle()).norm() / coarse.half_extent();
-    ventricle.score = coverage
+    let score = coverage
         * evenness
         * (0.4 + 0.6 * together)
         * near(mean, 28.0, 0.6)
         * contrast.clamp(0.0, 0.7)
         / 0.7
         * (-off_centre * off_centre).exp();
-    ventricle.distances = fill(table, walls, &ventricle.seen, mean);
-    ventricle
+    Some(Ventricle {
+        centre,
+        distances: fill(table, walls, &seen, mean),
+        seen,
+        level: bright,
+        score,
+    })
 }
 
 /// Distances in every direction: the median of the seen ones within 40 degrees.

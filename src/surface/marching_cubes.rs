@@ -118,9 +118,10 @@ pub fn marching_cubes(
         pieces.push((k, v, t));
     }
     let turn = frame.is_left_handed();
+    let placement = Placement::new(labels, samples, iso, frame);
     pieces.into_par_iter().try_for_each(|(k, v, t)| {
         if !v.is_empty() {
-            write_vertices(labels, samples, iso, frame, k, v);
+            write_vertices(labels, &places[rows * k..], &placement, k, v);
         }
         if !t.is_empty() {
             write_triangles(labels, &places[rows * k..], k, cases, turn, t);
@@ -222,21 +223,21 @@ fn places(slabs: &[(Vec<RowCount>, usize)], rows: usize) -> Vec<Place> {
     places
 }
 
-/// Places the vertices on edges that begin in plane `k`.
+/// Places the vertices on edges that begin in plane `k`; `places` begins with plane k's rows.
 fn write_vertices(
     labels: &Labels,
-    samples: &Samples,
-    iso: f32,
-    frame: &VoxelToPatient,
+    places: &[Place],
+    placement: &Placement,
     k: usize,
     out: &mut [Vec3],
 ) {
     let [rows, _] = labels.rows();
     let empty = vec![0; labels.words()];
-    let mut out = out.iter_mut();
-    for j in 0..rows {
+    let first = places[0].vertices[0];
+    for j in (0..rows).filter(|&j| places[j].vertices[0] < places[j].end) {
         let four = four_rows(labels, j, k, &empty);
         for axis in 0..3 {
+            let mut at = (places[j].vertices[axis] - first) as usize;
             for w in 0..labels.words() {
                 let here = four[0][w];
                 let there = match axis {
@@ -246,54 +247,79 @@ fn write_vertices(
                 };
                 for bit in set_bits(here ^ there) {
                     let begin = [64 * w + bit, j, k];
-                    let t = parameter(labels, samples, iso, begin, axis, here >> bit & 1 == 1);
-                    // The border shifts labels by one voxel against the volume.
-                    let mut index =
-                        Vec3::from_fn(|r, _| (begin[r] + labels.origin[r]) as f64 - 1.0);
-                    index[axis] += f64::from(t);
-                    if let Some(vertex) = out.next() {
-                        *vertex = frame.to_patient(&index);
-                    }
+                    out[at] = placement.vertex(begin, axis, here >> bit & 1 == 1);
+                    at += 1;
                 }
             }
         }
     }
 }
 
-/// Where the surface crosses the edge that begins at `begin` (border included), 0..1.
-fn parameter(
-    labels: &Labels,
-    samples: &Samples,
+/// All that places a vertex on its edge.
+struct Placement<'a> {
+    samples: &'a Samples<'a>,
     iso: f32,
-    begin: [usize; 3],
-    axis: usize,
-    begin_is_inside: bool,
-) -> f32 {
-    let value = |mut p: [usize; 3], step: usize| {
-        p[axis] += step;
-        let index = [0, 1, 2].map(|r| (p[r] + labels.origin[r]).wrapping_sub(1));
-        if (0..3).any(|r| index[r] >= samples.shape[r]) {
-            return samples.beyond;
-        }
-        let value =
-            samples.values[index[0] + samples.shape[0] * (index[1] + samples.shape[1] * index[2])];
-        if value.is_nan() {
-            samples.beyond
-        } else {
-            value
-        }
-    };
-    let (f0, f1) = (value(begin, 0), value(begin, 1));
-    let (inside, outside) = if begin_is_inside { (f0, f1) } else { (f1, f0) };
-    if inside >= iso && outside < iso {
-        // In f64: the difference of two large f32 may overflow.
-        let t = (f64::from(iso) - f64::from(f0)) / (f64::from(f1) - f64::from(f0));
-        // An infinite sample leaves no ratio; the middle is as good as any place.
-        if t.is_finite() {
-            return (t as f32).clamp(CLAMP, 1.0 - CLAMP);
+    /// Steps along i, j, k and the place of the border's first voxel, mm.
+    steps: [Vec3; 3],
+    origin: Vec3,
+    /// First voxel of the labels' box; the border's first voxel lies one before.
+    first: [usize; 3],
+}
+
+impl<'a> Placement<'a> {
+    fn new(labels: &Labels, samples: &'a Samples, iso: f32, frame: &VoxelToPatient) -> Self {
+        let corner = Vec3::from_fn(|r, _| labels.origin[r] as f64 - 1.0);
+        Self {
+            samples,
+            iso,
+            steps: [0, 1, 2].map(|r| frame.linear().column(r).into_owned()),
+            origin: frame.to_patient(&corner),
+            first: labels.origin,
         }
     }
-    0.5
+
+    /// The vertex on the edge along `axis` that begins at `begin` (border included).
+    fn vertex(&self, begin: [usize; 3], axis: usize, begin_is_inside: bool) -> Vec3 {
+        let t = f64::from(self.parameter(begin, axis, begin_is_inside));
+        let [i, j, k] = begin.map(|x| x as f64);
+        let [x, y, z] = &self.steps;
+        self.origin + x * i + y * j + z * k + self.steps[axis] * t
+    }
+
+    /// Where the surface crosses the edge, 0..1.
+    fn parameter(&self, begin: [usize; 3], axis: usize, begin_is_inside: bool) -> f32 {
+        let (f0, f1) = self.ends(begin, axis);
+        let (inside, outside) = if begin_is_inside { (f0, f1) } else { (f1, f0) };
+        if inside >= self.iso && outside < self.iso {
+            // In f64: the difference of two large f32 may overflow.
+            let f0 = f64::from(f0);
+            let t = (f64::from(self.iso) - f0) / (f64::from(f1) - f0);
+            // An infinite sample leaves no ratio; the middle is as good as any place.
+            if t.is_finite() {
+                return (t as f32).clamp(CLAMP, 1.0 - CLAMP);
+            }
+        }
+        0.5
+    }
+
+    /// The samples at both ends of an edge.
+    fn ends(&self, begin: [usize; 3], axis: usize) -> (f32, f32) {
+        let [nx, ny, nz] = self.samples.shape;
+        // Before the first sample this wraps round and is out of every range.
+        let [i, j, k] = [0, 1, 2].map(|r| (begin[r] + self.first[r]).wrapping_sub(1));
+        let mut next = [i, j, k];
+        next[axis] = next[axis].wrapping_add(1);
+        let value = |[i, j, k]: [usize; 3]| {
+            if i < nx && j < ny && k < nz {
+                let value = self.samples.values[i + nx * (j + ny * k)];
+                if !value.is_nan() {
+                    return value;
+                }
+            }
+            self.samples.beyond
+        };
+        (value([i, j, k]), value(next))
+    }
 }
 
 /// Running vertex numbers along the four rows of a line of cells.

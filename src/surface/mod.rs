@@ -40,7 +40,7 @@ use crate::volume::Volume;
 
 use components::Components;
 use labels::Labels;
-use left_ventricle::PLAUSIBLE;
+use left_ventricle::{DOUBTFUL, PLAUSIBLE};
 use marching_cubes::{MarchingCubesError, Samples};
 use survey::Survey;
 
@@ -369,6 +369,8 @@ impl From<MarchingCubesError> for SurfaceError {
 const WORKING_PASSES: usize = 15;
 /// Passes that take the rest of the staircase off a mask's surface.
 const MASK_PASSES: usize = 10;
+/// Enclosed voids from which on the cavity counts as closed, ml.
+const CLOSED_ML: f64 = 2.0;
 /// Share of the region's voxels from which a change of topology is warned of.
 const MUCH: f64 = 0.02;
 
@@ -761,26 +763,31 @@ fn find_ventricle(
     facts: &mut SurfaceFacts,
     monitor: &Monitor,
 ) -> Result<Option<Labels>, SurfaceError> {
-    let coarse = coarse::Coarse::new(volume, survey.minimum, survey.not_finite > 0);
-    let found = left_ventricle::find(&coarse, monitor)?;
-    let Some(mut ventricle) = found.filter(|v| v.score >= PLAUSIBLE) else {
+    let found = left_ventricle::find(volume, survey, monitor)?;
+    let Some(ventricle) = found.filter(|v| v.score >= PLAUSIBLE) else {
         facts.warnings.push(
             "no left ventricle was recognised; the largest connected part was taken instead".into(),
         );
         return Ok(None);
     };
-    // Blocks of several voxels have their centre behind their first voxel's.
-    let fine = volume.frame.spacing();
-    for r in 0..3 {
-        ventricle.centre[r] += (coarse.factor[r] as f64 - 1.0) / 2.0 * fine[r];
-    }
     facts.ventricle_score = Some(ventricle.score);
+    if ventricle.score < DOUBTFUL {
+        facts.warnings.push(format!(
+            "the left ventricle was recognised with little certainty (score {:.2} of 1): look whether the region is right, or give a box or a seed",
+            ventricle.score
+        ));
+    }
     let wall = region::Wall::new(volume, &ventricle);
-    let iso = iso_value(parameters.iso, wall.reference, survey)?;
-    note_iso(facts, iso, wall.reference);
-    let Some(region) = wall.region(iso, monitor)? else {
-        return Err(no_surface(iso, survey));
+    let asked = iso_value(parameters.iso, wall.reference, survey)?;
+    let Some(region) = wall.region(asked, monitor)? else {
+        return Err(no_surface(asked, survey));
     };
+    let (iso, region) = if parameters.iso == IsoLevel::Auto {
+        move_iso(volume, &wall, asked, region, facts, monitor)?
+    } else {
+        (asked, region)
+    };
+    note_iso(facts, iso, wall.reference);
     facts.otsu = Some(f64::from(otsu_in_box(
         volume,
         region.labels.origin,
@@ -804,6 +811,43 @@ fn find_ventricle(
     Ok(Some(region.labels))
 }
 
+/// Moves the automatic iso-value where half the reference tears the wall (down to 0.35) or
+/// closes the cavity (up to 0.6), and says so. Where that does not help it stays.
+fn move_iso(
+    volume: &Volume,
+    wall: &region::Wall,
+    iso: f32,
+    region: region::Region,
+    facts: &mut SurfaceFacts,
+    monitor: &Monitor,
+) -> Result<(f32, region::Region), SurfaceError> {
+    let enclosed_ml =
+        |r: &region::Region| r.enclosed_voxels() as f64 * volume.frame.voxel_volume() / 1000.0;
+    let (fractions, why): (&[f32], _) = if region.is_torn() {
+        (&[0.45, 0.4, 0.35], "the wall falls into pieces")
+    } else if enclosed_ml(&region) > CLOSED_ML {
+        (&[0.55, 0.6], "the cavity closes at the base")
+    } else {
+        return Ok((iso, region));
+    };
+    for &fraction in fractions {
+        let level = fraction * wall.reference;
+        if let Some(moved) = wall.region(level, monitor)?
+            && !moved.is_torn()
+            && enclosed_ml(&moved) <= CLOSED_ML
+        {
+            facts.warnings.push(format!(
+                "at half the reference intensity {why}; the iso-value was moved to {fraction} of it"
+            ));
+            return Ok((level, moved));
+        }
+    }
+    facts.warnings.push(format!(
+        "at half the reference intensity {why}, and at no iso-value near by does it not"
+    ));
+    Ok((iso, region))
+}
+
 /// 98th percentile of the voxels above 0.3 of the box's maximum.
 fn reference_in_box(
     volume: &Volume,
@@ -811,7 +855,8 @@ fn reference_in_box(
     extent: [usize; 3],
     survey: &Survey,
 ) -> f32 {
-    let highest = values_in_box(volume, origin, extent)
+    let values = || rows_in_box(volume, origin, extent).flatten().copied();
+    let highest = values()
         .filter(|v| v.is_finite())
         .fold(survey.minimum, f32::max);
     let floor = if highest > 0.0 {
@@ -826,7 +871,7 @@ fn reference_in_box(
         return highest;
     }
     let mut histogram = vec![0u64; BINS];
-    for v in values_in_box(volume, origin, extent).filter(|v| v.is_finite() && *v > floor) {
+    for v in values().filter(|v| v.is_finite() && *v > floor) {
         let bin = ((f64::from(v) - f64::from(floor)) / width * BINS as f64) as usize;
         histogram[bin.min(BINS - 1)] += 1;
     }
@@ -843,22 +888,22 @@ fn reference_in_box(
 
 fn otsu_in_box(volume: &Volume, origin: [usize; 3], extent: [usize; 3], survey: &Survey) -> f32 {
     survey::otsu(
-        values_in_box(volume, origin, extent),
+        rows_in_box(volume, origin, extent),
         survey.minimum,
         survey.maximum,
     )
 }
 
-fn values_in_box(
+fn rows_in_box(
     volume: &Volume,
     origin: [usize; 3],
     extent: [usize; 3],
-) -> impl Iterator<Item = f32> + '_ {
+) -> impl Iterator<Item = &[f32]> {
     let [nx, ny, _] = volume.shape;
-    (0..extent[1] * extent[2]).flat_map(move |row| {
+    (0..extent[1] * extent[2]).map(move |row| {
         let (j, k) = (row % extent[1] + origin[1], row / extent[1] + origin[2]);
         let start = origin[0] + nx * (j + ny * k);
-        volume.voxels[start..start + extent[0]].iter().copied()
+        &volume.voxels[start..start + extent[0]]
     })
 }
 

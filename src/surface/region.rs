@@ -15,7 +15,7 @@ use std::collections::BinaryHeap;
 
 use super::components::Components;
 use super::labels::Labels;
-use super::left_ventricle::{Ventricle, directions};
+use super::left_ventricle::{Compass, Ventricle};
 use crate::geometry::Vec3;
 use crate::progress::{Cancelled, Monitor};
 use crate::volume::Volume;
@@ -32,7 +32,8 @@ const WALL: f64 = 12.0;
 pub struct Wall<'a> {
     volume: &'a Volume,
     ventricle: &'a Ventricle,
-    table: Vec<Vec3>,
+    compass: Compass,
+    spacing: [f64; 3],
     origin: [usize; 3],
     extent: [usize; 3],
     /// The intensity that fractions refer to.
@@ -48,8 +49,22 @@ pub struct Region {
     pub cut_voxels: usize,
     /// Area of the cut, mm².
     pub cut_area: f64,
-    /// Voxels of the wall above the iso-value that are not connected to the rest.
+    /// Voxels of the wall's core above the iso-value.
+    pub core_voxels: usize,
+    /// Those of them that are not connected to the rest.
     pub loose_voxels: usize,
+}
+
+impl Region {
+    /// Whether the wall falls into pieces: more than 15 % of it is not connected to the rest.
+    pub fn is_torn(&self) -> bool {
+        100 * self.loose_voxels > 15 * self.core_voxels
+    }
+
+    /// Voxels of the cavities that the region encloses.
+    pub fn enclosed_voxels(&self) -> usize {
+        Components::of_outside(&self.labels).sizes[1..].iter().sum()
+    }
 }
 
 /// Where a voxel lies against the wall.
@@ -78,7 +93,8 @@ impl<'a> Wall<'a> {
         let mut wall = Self {
             volume,
             ventricle,
-            table: directions(),
+            compass: Compass::new(),
+            spacing,
             origin,
             extent,
             reference: 0.0,
@@ -95,11 +111,10 @@ impl<'a> Wall<'a> {
     /// Distance from the wall's middle along the ray through voxel `p` of the box, mm
     /// (negative towards the cavity), and whether the wall was seen there.
     fn depth(&self, p: [usize; 3]) -> (f64, bool) {
-        let spacing = self.volume.frame.spacing();
         let offset = Vec3::from_fn(|r, _| {
-            (p[r] + self.origin[r]) as f64 * spacing[r] - self.ventricle.centre[r]
+            (p[r] + self.origin[r]) as f64 * self.spacing[r] - self.ventricle.centre[r]
         });
-        let n = self.ventricle.direction(&self.table, &offset);
+        let n = self.compass.nearest(&offset);
         (
             offset.norm() - self.ventricle.distances[n],
             self.ventricle.seen[n],
@@ -163,13 +178,14 @@ impl<'a> Wall<'a> {
         if core[chosen] == 0 {
             return Ok(None);
         }
-        let loose_voxels = core.iter().sum::<usize>() - core[chosen];
+        let core_voxels = core.iter().sum::<usize>();
         components.paint(&mut labels, false, |c| c != chosen);
         let mut region = Region {
             labels,
             cut_voxels: 0,
             cut_area: 0.0,
-            loose_voxels,
+            core_voxels,
+            loose_voxels: core_voxels - core[chosen],
         };
         if beyond[chosen] > 0 {
             self.cut(&mut region, &zones);
@@ -223,7 +239,7 @@ impl<'a> Wall<'a> {
                 }
             }
         }
-        let spacing = self.volume.frame.spacing();
+        let spacing = self.spacing;
         for &(p, _) in zones {
             if owner[index(p)] != THEIRS {
                 continue;

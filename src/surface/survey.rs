@@ -92,14 +92,18 @@ fn label_map(volume: &Volume) -> Option<BTreeMap<i64, usize>> {
     (labelled > 0 && piecewise && !everything).then_some(counts)
 }
 
-/// Otsu's threshold of the values (IEEE SMC 1979), 256 bins between minimum and maximum.
-pub fn otsu(values: impl Iterator<Item = f32>, minimum: f32, maximum: f32) -> f32 {
+/// Otsu's threshold of the values in `rows` (IEEE SMC 1979), 256 bins between minimum and
+/// maximum.
+pub fn otsu<'a>(rows: impl Iterator<Item = &'a [f32]>, minimum: f32, maximum: f32) -> f32 {
     const BINS: usize = 256;
     let (low, width) = (f64::from(minimum), f64::from(maximum) - f64::from(minimum));
+    let scale = BINS as f64 / width;
     let mut histogram = [0u64; BINS];
-    for v in values.filter(|v| v.is_finite()) {
-        let bin = ((f64::from(v) - low) / width * BINS as f64) as usize;
-        histogram[bin.min(BINS - 1)] += 1;
+    for row in rows {
+        for v in row.iter().filter(|v| v.is_finite()) {
+            let bin = ((f64::from(*v) - low) * scale) as usize;
+            histogram[bin.min(BINS - 1)] += 1;
+        }
     }
     let total = histogram.iter().sum::<u64>() as f64;
     let weighted = |(bin, n): (usize, &u64)| bin as f64 * *n as f64;
@@ -164,8 +168,10 @@ mod tests {
 
     #[test]
     fn otsu_parts_two_heaps() {
-        let values = (0..1000).map(|n| if n % 4 == 0 { 9.0 } else { 1.0 } + (n % 10) as f32 * 0.05);
-        let level = otsu(values, 1.0, 9.45);
+        let values: Vec<f32> = (0..1000)
+            .map(|n| if n % 4 == 0 { 9.0 } else { 1.0 } + (n % 10) as f32 * 0.05)
+            .collect();
+        let level = otsu(values.chunks(100), 1.0, 9.45);
         assert!((1.45..=9.0).contains(&level), "{level}");
     }
 }

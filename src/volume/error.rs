@@ -21,9 +21,19 @@ pub enum VolumeError {
         /// The file's name.
         file: String,
         /// What it is.
-        format: &'static str,
+        format: String,
         /// How to make a readable file of it.
         fix: &'static str,
+    },
+    /// A DICOM image of the right kind that shows no slices.
+    #[error("{file} has the Image Type {image_type}: {reason}")]
+    NotSlices {
+        /// The file's name.
+        file: String,
+        /// Value 3 of Image Type (0008,0008).
+        image_type: String,
+        /// What it shows instead.
+        reason: &'static str,
     },
     /// Nothing known.
     #[error("{file} is no volume known here: it begins with {start}")]
@@ -145,6 +155,7 @@ impl VolumeError {
     pub fn field(&self) -> Option<&'static str> {
         match self {
             VolumeError::Field { field, .. } => Some(field),
+            VolumeError::NotSlices { .. } => Some("Image Type (0008,0008)"),
             VolumeError::FrameNeeded { .. } | VolumeError::FrameOutOfRange { .. } => Some("frame"),
             _ => None,
         }
@@ -155,8 +166,11 @@ impl VolumeError {
         match self {
             VolumeError::NoFile | VolumeError::Empty { .. } => "Send the volume's bytes.".into(),
             VolumeError::Unsupported { fix, .. } => (*fix).into(),
+            VolumeError::NotSlices { .. } => {
+                "Send the reconstructed slices (Image Type RECON TOMO or RECON GATED TOMO).".into()
+            }
             VolumeError::Unrecognised { .. } => {
-                "Send NIfTI-1 or NIfTI-2 (.nii, .nii.gz, or a .hdr/.img pair).".into()
+                "Send NIfTI (.nii, .nii.gz, or a .hdr/.img pair) or a multi-frame DICOM NM.".into()
             }
             VolumeError::Field { field, .. } => {
                 format!("Write the file anew with a valid {field}.")

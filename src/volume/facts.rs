@@ -13,6 +13,8 @@ pub enum Format {
     Nifti2,
     /// NIfTI-2, header and voxels in two files.
     Nifti2Pair,
+    /// DICOM Nuclear Medicine Image, all slices in one file.
+    DicomNm,
 }
 
 impl Format {
@@ -23,6 +25,7 @@ impl Format {
             Format::Nifti1Pair => "NIfTI-1 pair",
             Format::Nifti2 => "NIfTI-2",
             Format::Nifti2Pair => "NIfTI-2 pair",
+            Format::DicomNm => "DICOM NM",
         }
     }
 }
@@ -55,15 +58,21 @@ pub enum AffineSource {
     Qform,
     /// The spacing alone: orientation and origin are assumptions.
     Pixdim,
+    /// DICOM's Image Position and Orientation (Patient), of the detector or of the image.
+    ImagePosition,
+    /// DICOM without a position (or an orientation): the origin is an assumption.
+    UnknownOrigin,
 }
 
 impl AffineSource {
-    /// `sform`, `qform` or `pixdim`.
+    /// The name in answers: `sform`, `qform`, `pixdim`, `image-position`, `unknown-origin`.
     pub fn as_str(self) -> &'static str {
         match self {
             AffineSource::Sform => "sform",
             AffineSource::Qform => "qform",
             AffineSource::Pixdim => "pixdim",
+            AffineSource::ImagePosition => "image-position",
+            AffineSource::UnknownOrigin => "unknown-origin",
         }
     }
 }

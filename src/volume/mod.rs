@@ -7,9 +7,9 @@
 //! 1. `source`: opened, unpacked where gzipped (several members too), every byte counted
 //!    against the limits;
 //! 2. `recognise`: told by its content, never by its name;
-//! 3. [`nifti`]: header checked field by field, then the voxels decoded in chunks straight into
-//!    their final place;
-//! 4. `summary`: what values there are, and whether they look like labels.
+//! 3. [`nifti`] or `dicom`: header checked field by field;
+//! 4. `decode`: the voxels, in portions, straight into their final place;
+//! 5. `summary`: what values there are, and whether they look like labels.
 //!
 //! Guaranteed: a file gives the values and positions that its standard assigns to them, or an
 //! error naming field and value. No size that a file states is believed before the file has
@@ -17,9 +17,28 @@
 //! Not guaranteed: that the file's own statement about the patient is true. Contradictions
 //! inside a file are told as warnings.
 //!
-//! [`phantom`] makes volumes of known truth, [`nifti::write()`] puts volumes into files, and
-//! [`preview`] draws them.
+//! [`mod@phantom`] makes volumes of known truth, [`nifti::write()`] puts volumes into files, and
+//! [`mod@preview`] draws them.
+//!
+//! ```
+//! use ventriform::progress::Monitor;
+//! use ventriform::volume::nifti::{self, StoredType};
+//! use ventriform::volume::{self, PhantomParameters, ReadLimits, ReadOptions, VolumeFile};
+//!
+//! let quiet = Monitor::silent();
+//! let small = PhantomParameters { shape: [48; 3], spacing_mm: [4.5; 3], ..Default::default() };
+//! let made = volume::phantom(&small, &quiet)?;
+//! let bytes = nifti::write(&made.volume, StoredType::Float32, true)?;
+//!
+//! let file = VolumeFile::in_memory("lv.nii.gz", bytes);
+//! let reading = volume::read(&[file], &ReadOptions::default(), &ReadLimits::default(), &quiet)?;
+//! assert_eq!(reading.volume.voxels, made.volume.voxels);
+//! assert!(reading.facts.warnings.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
+mod decode;
+mod dicom;
 pub mod error;
 pub mod facts;
 pub mod nifti;

@@ -2,14 +2,15 @@
 
 use super::recognise::{Recognised, recognise};
 use super::source::VolumeFile;
-use super::{Volume, VolumeError, VolumeFacts, nifti};
+use super::{Volume, VolumeError, VolumeFacts, dicom, nifti};
 use crate::progress::Monitor;
 
 /// Which part of the file is wanted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ReadOptions {
-    /// The volume's number, from 0, in a file that holds several (dimensions beyond the third
-    /// count together, the fourth fastest). Default: none, which suits files of one volume.
+    /// The volume's number, from 0, in a file that holds several: NIfTI's dimensions beyond the
+    /// third, the fourth fastest; DICOM's gates, those of the first R-R interval first.
+    /// Default: none, which suits files of one volume.
     pub frame: Option<usize>,
 }
 
@@ -40,7 +41,8 @@ pub struct Reading {
     pub facts: VolumeFacts,
 }
 
-/// Reads one volume from `files`: one file, or a `.hdr` and its `.img` in any order.
+/// Reads one volume from `files`: one file, or a `.hdr` and its `.img` in any
+/// order.
 ///
 /// # Errors
 /// See [`VolumeError`]; in particular [`VolumeError::FrameNeeded`] where the file holds several
@@ -55,6 +57,7 @@ pub fn read(
         Recognised::Nifti { header, voxels } => {
             nifti::read(header, voxels, options, limits, monitor)
         }
+        Recognised::Dicom(file) => dicom::read(file, options, limits, monitor),
     }
 }
 
@@ -71,5 +74,16 @@ pub fn inspect(
 ) -> Result<VolumeFacts, VolumeError> {
     match recognise(files, limits)? {
         Recognised::Nifti { header, voxels } => nifti::inspect(header, voxels, limits, monitor),
+        Recognised::Dicom(file) => dicom::inspect(file, limits, monitor),
+    }
+}
+
+/// The frame asked for, or the only one.
+pub(super) fn choose_frame(asked: Option<usize>, frames: usize) -> Result<usize, VolumeError> {
+    match asked {
+        None if frames == 1 => Ok(0),
+        None => Err(VolumeError::FrameNeeded { frames }),
+        Some(frame) if frame < frames => Ok(frame),
+        Some(frame) => Err(VolumeError::FrameOutOfRange { frame, frames }),
     }
 }

@@ -3,7 +3,7 @@
 //! Names lie and get lost on the way through HTTP; the magic numbers of the formats do not.
 
 use super::source::{Source, VolumeFile};
-use super::{ReadLimits, VolumeError, nifti};
+use super::{ReadLimits, VolumeError, dicom, nifti};
 
 /// How many unpacked bytes are looked at.
 const LOOKED_AT: usize = 1024;
@@ -16,6 +16,8 @@ pub(super) enum Recognised<'a> {
         header: &'a VolumeFile,
         voxels: &'a VolumeFile,
     },
+    /// A DICOM file.
+    Dicom(&'a VolumeFile),
 }
 
 /// One file's kind.
@@ -23,6 +25,7 @@ pub(super) enum Recognised<'a> {
 enum Kind {
     NiftiSingle,
     NiftiHeader,
+    Dicom,
     Other,
 }
 
@@ -44,6 +47,7 @@ pub(super) fn recognise<'a>(
                     file: file.name().into(),
                 })
             }
+            (Kind::Dicom, _) => Ok(Recognised::Dicom(file)),
             (Kind::Other, start) => Err(refuse(file, &start)),
         },
         [a, b] => pair(a, b, limits),
@@ -58,8 +62,9 @@ fn pair<'a>(
     limits: &ReadLimits,
 ) -> Result<Recognised<'a>, VolumeError> {
     let (header, voxels) = match (look(a, limits)?, look(b, limits)?) {
-        ((Kind::NiftiHeader, _), (Kind::Other, _)) => (a, b),
-        ((Kind::Other, _), (Kind::NiftiHeader, _)) => (b, a),
+        // Voxels may look like anything.
+        ((Kind::NiftiHeader, _), (Kind::Other | Kind::Dicom, _)) => (a, b),
+        ((Kind::Other | Kind::Dicom, _), (Kind::NiftiHeader, _)) => (b, a),
         ((Kind::Other, start), (Kind::Other, _)) if is_analyze(&start) => {
             return Err(refuse(a, &start));
         }
@@ -88,6 +93,7 @@ fn look(file: &VolumeFile, limits: &ReadLimits) -> Result<(Kind, Vec<u8>), Volum
     let kind = match (start.get(344..348), start.get(4..8)) {
         (_, Some(b"n+2\0")) | (Some(b"n+1\0"), _) => Kind::NiftiSingle,
         (_, Some(b"ni2\0")) | (Some(b"ni1\0"), _) => Kind::NiftiHeader,
+        _ if dicom::is_dicom(&start) => Kind::Dicom,
         _ => Kind::Other,
     };
     Ok((kind, start))
@@ -104,7 +110,6 @@ fn refuse(file: &VolumeFile, start: &[u8]) -> VolumeError {
     const CONVERT: &str = "Convert it to NIfTI (.nii.gz).";
     const ANALYZE: &str = "Convert it to NIfTI: Analyze does not say where left and right are.";
     let known: &[(usize, &[u8], &'static str)] = &[
-        (128, b"DICM", "a DICOM file"),
         (0, b"CDF\x01", "a MINC 1 (netCDF) file"),
         (0, b"CDF\x02", "a MINC 1 (netCDF) file"),
         (0, b"\x89HDF\r\n", "an HDF5 file (MINC 2 is one)"),
@@ -137,7 +142,7 @@ fn refuse(file: &VolumeFile, start: &[u8]) -> VolumeError {
     if is_analyze(start) {
         return VolumeError::Unsupported {
             file: name,
-            format: "an Analyze 7.5 header (its magic is not NIfTI's)",
+            format: "an Analyze 7.5 header (its magic is not NIfTI's)".into(),
             fix: ANALYZE,
         };
     }
@@ -145,7 +150,7 @@ fn refuse(file: &VolumeFile, start: &[u8]) -> VolumeError {
         if start.get(*at..).is_some_and(|rest| rest.starts_with(magic)) {
             return VolumeError::Unsupported {
                 file: name,
-                format,
+                format: (*format).into(),
                 fix: CONVERT,
             };
         }

@@ -88,7 +88,7 @@ pub(super) struct Source {
 }
 
 enum Body {
-    Plain(Box<dyn ReadSeek>),
+    Plain(BufReader<Box<dyn ReadSeek>>),
     Gzip(Box<Members>),
 }
 
@@ -113,7 +113,7 @@ impl Source {
         reader.rewind().map_err(io)?;
         let body = match gzipped {
             true => Body::Gzip(Box::new(Members::new(reader))),
-            false => Body::Plain(reader),
+            false => Body::Plain(BufReader::with_capacity(PORTION, reader)),
         };
         Ok(Self {
             file: file.name.clone(),
@@ -128,6 +128,11 @@ impl Source {
     /// The file's name.
     pub(super) fn file(&self) -> &str {
         &self.file
+    }
+
+    /// How many bytes were given out or skipped.
+    pub(super) fn position(&self) -> u64 {
+        self.position
     }
 
     /// Whether the bytes are unpacked from gzip.
@@ -186,7 +191,8 @@ impl Source {
             return Err(self.beyond_limit(target));
         }
         if let Body::Plain(reader) = &mut self.body {
-            if let Err(e) = reader.seek(SeekFrom::Start(target)) {
+            // Within the buffer nothing is read again.
+            if let Err(e) = reader.seek_relative((target - self.position) as i64) {
                 return Err(self.failure(&e, 0));
             }
             self.position = target;
@@ -247,6 +253,13 @@ impl Source {
             },
             _ => VolumeError::Io { file, reason },
         }
+    }
+}
+
+/// For parsers that want a reader. Failures lose their kind on the way.
+impl Read for Source {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.fill(buffer).map_err(io::Error::other)
     }
 }
 

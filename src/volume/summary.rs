@@ -3,6 +3,7 @@
 //! Sums are taken in fixed portions whose results are added in order, so that the figures do
 //! not depend on the number of threads.
 
+use super::VolumeError;
 use super::facts::{IntensitySummary, LabelCount};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -26,6 +27,19 @@ pub fn summarise(voxels: &[f32], row: usize) -> IntensitySummary {
         true => None,
     };
     tally.summary(labels)
+}
+
+/// Refuses a volume without any number, and has a sentence for one that is all the same.
+pub(super) fn judge(
+    intensity: &IntensitySummary,
+    file: &str,
+) -> Result<Option<String>, VolumeError> {
+    if intensity.finite == 0 {
+        return Err(VolumeError::NoFiniteVoxel { file: file.into() });
+    }
+    let value = intensity.minimum;
+    let constant = value == intensity.maximum;
+    Ok(constant.then(|| format!("Every voxel has the value {value}: there is no object.")))
 }
 
 /// Running figures over one or more volumes.

@@ -300,6 +300,13 @@ pub fn fitness(report: &Report) -> String {
         [&forms.retiled, &forms.fitted, &forms.optimised].map(pick)
     };
     let driving = [fitness.retiled, fitness.fitted, fitness.optimised];
+    let other = if fitness.form == "robust" {
+        let hint = "1 is flat, equilateral and on the surface";
+        ("F, normalised form", hint, form(|f| f.normalised))
+    } else {
+        let hint = "higher is better; comparable between tools";
+        ("F, robust form", hint, form(|f| f.robust))
+    };
     let charts = [
         chart(
             &format!("Fitness F, {} form", fitness.form),
@@ -326,12 +333,7 @@ pub fn fitness(report: &Report) -> String {
             term(|t| t.d_mm),
             3,
         ),
-        chart(
-            "F, robust form",
-            "higher is better; comparable between tools",
-            form(|f| f.robust),
-            3,
-        ),
+        chart(other.0, other.1, other.2, 3),
     ]
     .concat();
     let weights = fitness.weights.map(|w| number(w, 2)).join(" : ");
@@ -439,8 +441,10 @@ pub fn particulars(report: &Report) -> String {
         .iter()
         .filter(|(_, value)| value.as_object().is_some_and(|map| !map.is_empty()))
         .map(|(title, value)| {
+            // Warnings stand at the top already.
             let rows: String = leaves(value)
                 .iter()
+                .filter(|(path, _)| path != "warnings")
                 .map(|(path, text)| {
                     format!(
                         r#"<tr><th scope="row">{}</th><td>{}</td></tr>"#,

@@ -3,10 +3,10 @@
 //! The two versions hold the same fields in other places and widths. [`Layout`] says where;
 //! everything after it knows no versions.
 
+use super::super::decode::{DataType, VoxelFormat};
 use super::super::facts::{ByteOrder, Format, LengthUnit};
 use super::super::source::Source;
 use super::super::{ReadLimits, VolumeError};
-use super::voxels::DataType;
 
 /// Where the fields of a version stand, in bytes from the start. In NIfTI-1 `dim` is of
 /// `i16`, codes are `i16` and reals `f32`; in NIfTI-2 they are `i64`, `i32` and `f64`.
@@ -200,9 +200,22 @@ impl Header {
         self.shape.iter().product()
     }
 
-    /// Bytes of one volume.
-    pub(super) fn frame_bytes(&self) -> u64 {
-        self.voxels() as u64 * self.data_type.size() as u64
+    /// How to decode them.
+    pub(super) fn voxel_format(&self) -> VoxelFormat {
+        VoxelFormat {
+            file: self.file.clone(),
+            shape: self.shape,
+            data_type: self.data_type,
+            byte_order: self.byte_order,
+            unused_bits: 0,
+            scaling: self.scaling,
+        }
+    }
+
+    /// First byte of volume number `frame`.
+    pub(super) fn frame_begin(&self, frame: usize) -> u64 {
+        let bytes = self.voxels() as u64 * self.data_type.size() as u64;
+        self.vox_offset + frame as u64 * bytes
     }
 
     /// Checks that the voxels may be read and can be there, before memory is taken for them.
@@ -234,6 +247,38 @@ impl Header {
             false => Ok(()),
         }
     }
+}
+
+/// The type with NIfTI's `code`, or the reason why it is not read.
+fn data_type(code: i16) -> Result<DataType, String> {
+    Ok(match code {
+        2 => DataType::U8,
+        4 => DataType::I16,
+        8 => DataType::I32,
+        16 => DataType::F32,
+        64 => DataType::F64,
+        256 => DataType::I8,
+        512 => DataType::U16,
+        768 => DataType::U32,
+        1024 => DataType::I64,
+        1280 => DataType::U64,
+        other => return Err(refusal(other)),
+    })
+}
+
+/// Why voxels of the type `code` are not read.
+fn refusal(code: i16) -> String {
+    let what = match code {
+        1 => "single bits are not read",
+        32 => "complex64 has two parts per voxel, and no telling which one is the uptake",
+        1792 => "complex128 has two parts per voxel, and no telling which one is the uptake",
+        2048 => "complex256 has two parts per voxel, and no telling which one is the uptake",
+        1536 => "float128 is not read: convert to float32",
+        128 => "RGB24 is a picture in colours, not a measurement",
+        2304 => "RGBA32 is a picture in colours, not a measurement",
+        _ => "no such data type in NIfTI",
+    };
+    what.into()
 }
 
 /// The raw bytes with their layout.
@@ -328,7 +373,7 @@ impl Fields<'_> {
     fn data_type(&self) -> Result<DataType, VolumeError> {
         let code = self.short(self.layout.datatype);
         let refuse = |reason: String| self.wrong("datatype", code, reason, self.layout.datatype);
-        let data_type = DataType::from_code(code).map_err(refuse)?;
+        let data_type = data_type(code).map_err(refuse)?;
         let bits = self.short(self.layout.bitpix);
         if i32::from(bits) != 8 * data_type.size() as i32 {
             let reason = format!(

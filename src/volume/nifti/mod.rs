@@ -2,14 +2,13 @@
 //!
 //! After the NIfTI-1.1 header file `nifti1.h` (NIfTI DFWG 2004) and `nifti2.h` (2011), whose
 //! field names are used throughout. `header` reads and checks the fields, `place` makes the
-//! affine of them, `voxels` decodes, [`mod@write`] is the way back.
+//! affine of them, [`mod@write`] is the way back.
 //!
 //! Colours and complex numbers are refused: there is no telling which of their parts is the
 //! uptake. So are CIFTI files, which hold matrices in a NIfTI-2 coat.
 
 mod header;
 mod place;
-mod voxels;
 pub mod write;
 
 #[cfg(test)]
@@ -19,9 +18,10 @@ pub use write::{StoredType, write};
 
 use self::header::Header;
 use self::place::{Placement, place};
-use self::voxels::FrameReader;
+use super::decode::VoxelReader;
+use super::read::choose_frame;
 use super::source::{Source, VolumeFile};
-use super::summary::{Tally, summarise};
+use super::summary::{Tally, judge, summarise};
 use super::{IntensitySummary, ReadLimits, ReadOptions, Reading, Volume, VolumeError, VolumeFacts};
 use crate::progress::{Monitor, Stage};
 
@@ -35,13 +35,15 @@ pub(super) fn read(
 ) -> Result<Reading, VolumeError> {
     let mut file = Opened::open(header_file, voxel_file, limits)?;
     let frame = choose_frame(options.frame, file.header.frames)?;
+    let header = &file.header;
     let mut voxels = Vec::new();
-    let mut reader = FrameReader::new(&file.header, &mut file.source)?;
-    reader.read(frame, &mut voxels, &mut |done| {
+    let mut reader = VoxelReader::new(header.voxel_format(), &mut file.source);
+    let begin = header.frame_begin(frame);
+    reader.append(begin, header.voxels(), &mut voxels, &mut |done| {
         monitor.report(Stage::Read, done)
     })?;
     let mut warnings = reader.warnings();
-    if frame + 1 == file.header.frames {
+    if frame + 1 == header.frames {
         warnings.extend(reader.finish()?);
     }
     let shape = file.header.shape;
@@ -70,11 +72,14 @@ pub(super) fn inspect(
         let only = ReadOptions { frame: Some(0) };
         return Ok(read(header_file, voxel_file, &only, limits, monitor)?.facts);
     }
+    let header = &file.header;
     let mut voxels = Vec::new();
     let mut tally = Tally::default();
-    let mut reader = FrameReader::new(&file.header, &mut file.source)?;
+    let mut reader = VoxelReader::new(header.voxel_format(), &mut file.source);
     for frame in 0..frames {
-        reader.read(frame, &mut voxels, &mut |done| {
+        voxels.clear();
+        let begin = header.frame_begin(frame);
+        reader.append(begin, header.voxels(), &mut voxels, &mut |done| {
             monitor.report(Stage::Read, (frame as f64 + done) / frames as f64)
         })?;
         tally.add(&voxels);
@@ -89,16 +94,6 @@ pub(super) fn check_header(file: &VolumeFile, limits: &ReadLimits) -> Result<(),
     let header = Header::read(&mut Source::open(file, limits.unpacked_bytes)?)?;
     place(&header)?;
     Ok(())
-}
-
-/// The frame asked for, or the only one.
-fn choose_frame(asked: Option<usize>, frames: usize) -> Result<usize, VolumeError> {
-    match asked {
-        None if frames == 1 => Ok(0),
-        None => Err(VolumeError::FrameNeeded { frames }),
-        Some(frame) if frame < frames => Ok(frame),
-        Some(frame) => Err(VolumeError::FrameOutOfRange { frame, frames }),
-    }
 }
 
 /// A file whose header was read and checked, open where its voxels are.
@@ -137,20 +132,10 @@ impl Opened {
         intensity: IntensitySummary,
         voxel_warnings: Vec<String>,
     ) -> Result<VolumeFacts, VolumeError> {
-        if intensity.finite == 0 {
-            return Err(VolumeError::NoFiniteVoxel {
-                file: self.header.file.clone(),
-            });
-        }
         let mut warnings = self.header.warnings.clone();
         warnings.extend(self.placement.warnings.iter().cloned());
         warnings.extend(voxel_warnings);
-        if intensity.minimum == intensity.maximum {
-            let value = intensity.minimum;
-            warnings.push(format!(
-                "Every voxel has the value {value}: there is no object."
-            ));
-        }
+        warnings.extend(judge(&intensity, &self.header.file)?);
         Ok(VolumeFacts {
             format: self.header.format(),
             byte_order: self.header.byte_order,
@@ -162,8 +147,9 @@ impl Opened {
             frame,
             shape: self.header.shape,
             spacing_mm: self.placement.frame.spacing(),
-            affine_lps: self.placement.frame.matrix(),
-            affine_ras: self.placement.frame.to_ras(),
+            // Added to 0, a negative zero loses its sign.
+            affine_lps: self.placement.frame.matrix().add_scalar(0.0),
+            affine_ras: self.placement.frame.to_ras().add_scalar(0.0),
             affine_source: self.placement.source,
             unit: self.header.unit,
             intensity,

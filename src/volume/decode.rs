@@ -1,9 +1,8 @@
 //! Decoding: stored numbers of any real type to `f32`, in portions, straight into place.
 
-use super::super::VolumeError;
-use super::super::facts::ByteOrder;
-use super::super::source::Source;
-use super::header::Header;
+use super::VolumeError;
+use super::facts::ByteOrder;
+use super::source::Source;
 use crate::progress::Cancelled;
 
 /// Voxels decoded at a time: a few milliseconds of unpacking, half a mebibyte at most.
@@ -32,23 +31,6 @@ pub(super) enum DataType {
 }
 
 impl DataType {
-    /// The type with NIfTI's `code`, or the reason why it is not read.
-    pub(super) fn from_code(code: i16) -> Result<Self, String> {
-        Ok(match code {
-            2 => Self::U8,
-            4 => Self::I16,
-            8 => Self::I32,
-            16 => Self::F32,
-            64 => Self::F64,
-            256 => Self::I8,
-            512 => Self::U16,
-            768 => Self::U32,
-            1024 => Self::I64,
-            1280 => Self::U64,
-            other => return Err(refusal(other)),
-        })
-    }
-
     /// Bytes of a voxel.
     pub(super) fn size(self) -> usize {
         match self {
@@ -76,75 +58,85 @@ impl DataType {
     }
 }
 
-/// Why voxels of the type `code` are not read.
-fn refusal(code: i16) -> String {
-    let what = match code {
-        1 => "single bits are not read",
-        32 => "complex64 has two parts per voxel, and no telling which one is the uptake",
-        1792 => "complex128 has two parts per voxel, and no telling which one is the uptake",
-        2048 => "complex256 has two parts per voxel, and no telling which one is the uptake",
-        1536 => "float128 is not read: convert to float32",
-        128 => "RGB24 is a picture in colours, not a measurement",
-        2304 => "RGBA32 is a picture in colours, not a measurement",
-        _ => "no such data type in NIfTI",
-    };
-    what.into()
+/// Everything that one needs to know to decode voxels.
+#[derive(Debug, Clone)]
+pub(super) struct VoxelFormat {
+    /// The file's name, for messages.
+    pub file: String,
+    /// Voxels along i, j, k, for messages.
+    pub shape: [usize; 3],
+    /// How a voxel is stored.
+    pub data_type: DataType,
+    /// Order of its bytes.
+    pub byte_order: ByteOrder,
+    /// Leading bits of an integer that are not part of its value; fewer than it has.
+    pub unused_bits: u32,
+    /// Slope and intercept to apply.
+    pub scaling: Option<(f64, f64)>,
 }
 
-/// Reads the volumes of a file, front to back.
-pub(super) struct FrameReader<'a> {
-    header: &'a Header,
+/// Reads the voxels of a file, front to back.
+pub(super) struct VoxelReader<'a> {
+    format: VoxelFormat,
     source: &'a mut Source,
     buffer: Vec<u8>,
     infinite: u64,
     inexact: bool,
 }
 
-impl<'a> FrameReader<'a> {
-    /// A reader for the voxels that `header` announces in `source`; sizes were checked.
-    pub(super) fn new(header: &'a Header, source: &'a mut Source) -> Result<Self, VolumeError> {
-        let portion = header.voxels().min(PORTION);
-        Ok(Self {
-            buffer: vec![0; portion * header.data_type.size()],
-            header,
+impl<'a> VoxelReader<'a> {
+    /// A reader for the voxels in `source`, which holds as many as will be asked for.
+    pub(super) fn new(format: VoxelFormat, source: &'a mut Source) -> Self {
+        Self {
+            format,
             source,
+            buffer: Vec::new(),
             infinite: 0,
             inexact: false,
-        })
+        }
     }
 
-    /// Fills `voxels` with volume number `frame`, which lies behind all that were read before.
-    pub(super) fn read(
+    /// Appends `count` voxels, which begin at byte `begin` behind all that were read before,
+    /// to `voxels`. `report` hears the share of `count` that is done.
+    pub(super) fn append(
         &mut self,
-        frame: usize,
+        begin: u64,
+        count: usize,
         voxels: &mut Vec<f32>,
         report: &mut dyn FnMut(f64) -> Result<(), Cancelled>,
     ) -> Result<(), VolumeError> {
-        let header = self.header;
-        let count = header.voxels();
-        voxels.clear();
         voxels
             .try_reserve_exact(count)
             .map_err(|_| VolumeError::Memory {
                 bytes: 4 * count as u64,
             })?;
-        let begin = header.vox_offset + frame as u64 * header.frame_bytes();
         self.source.skip_to(begin)?;
-        let end = begin + header.frame_bytes();
-        while voxels.len() < count {
-            report(voxels.len() as f64 / count as f64)?;
-            let portion = (count - voxels.len()).min(PORTION);
-            let bytes = &mut self.buffer[..portion * header.data_type.size()];
+        let size = self.format.data_type.size();
+        let end = begin + count as u64 * size as u64;
+        let mut buffer = std::mem::take(&mut self.buffer);
+        buffer.resize(count.min(PORTION) * size, 0);
+        let mut done = 0;
+        while done < count {
+            report(done as f64 / count as f64)?;
+            let portion = (count - done).min(PORTION);
+            let bytes = &mut buffer[..portion * size];
             self.source.fill_all(bytes, end)?;
             let start = voxels.len();
-            decode(bytes, header, voxels);
-            self.settle(voxels, start)?;
+            decode(bytes, &self.format, voxels);
+            self.settle(bytes, voxels, start)?;
+            done += portion;
         }
+        self.buffer = buffer;
         Ok(report(1.0)?)
     }
 
     /// Looks for values that `f32` cannot hold.
-    fn settle(&mut self, voxels: &mut [f32], start: usize) -> Result<(), VolumeError> {
+    fn settle(
+        &mut self,
+        bytes: &[u8],
+        voxels: &mut [f32],
+        start: usize,
+    ) -> Result<(), VolumeError> {
         let (mut infinite, mut large) = (false, false);
         for v in &voxels[start..] {
             // Without their sign bit, floats are ordered as their bits are.
@@ -152,22 +144,26 @@ impl<'a> FrameReader<'a> {
             infinite |= size == INFINITY;
             large |= size > EXACT && size < INFINITY;
         }
-        self.inexact |= large && self.header.data_type != DataType::F32;
+        self.inexact |= large && self.format.data_type != DataType::F32;
         match infinite {
-            true => self.settle_infinite(voxels, start),
+            true => self.settle_infinite(bytes, voxels, start),
             false => Ok(()),
         }
     }
 
     /// Makes infinities NaN, and refuses those that the file does not hold: numbers too large.
-    fn settle_infinite(&mut self, voxels: &mut [f32], start: usize) -> Result<(), VolumeError> {
-        let header = self.header;
-        let stored = self.buffer.chunks_exact(header.data_type.size());
+    fn settle_infinite(
+        &mut self,
+        bytes: &[u8],
+        voxels: &mut [f32],
+        start: usize,
+    ) -> Result<(), VolumeError> {
+        let stored = bytes.chunks_exact(self.format.data_type.size());
         for ((n, v), bytes) in (start..).zip(&mut voxels[start..]).zip(stored) {
             if v.is_infinite() {
-                let value = exact(bytes, header);
+                let value = exact(bytes, &self.format);
                 if value.is_finite() {
-                    return Err(overflow(header, n, value));
+                    return Err(overflow(&self.format, n, value));
                 }
                 *v = f32::NAN;
                 self.infinite += 1;
@@ -186,7 +182,7 @@ impl<'a> FrameReader<'a> {
             ));
         }
         if self.inexact {
-            let name = self.header.data_type.name();
+            let name = self.format.data_type.name();
             warnings.push(format!(
                 "Some {name} values exceed 2^24 and were rounded to 24 binary digits."
             ));
@@ -201,25 +197,41 @@ impl<'a> FrameReader<'a> {
     }
 }
 
-fn overflow(header: &Header, index: usize, value: f64) -> VolumeError {
-    let [nx, ny, _] = header.shape;
+fn overflow(format: &VoxelFormat, index: usize, value: f64) -> VolumeError {
+    let [nx, ny, _] = format.shape;
     VolumeError::Overflow {
-        file: header.file.clone(),
+        file: format.file.clone(),
         voxel: [index % nx, index / nx % ny, index / nx / ny],
         value,
     }
 }
 
-/// A number that NIfTI stores.
+/// A stored number.
 trait Stored: Copy {
     /// Appends `take` of each number in `bytes` to `out`.
     fn each<O>(bytes: &[u8], order: ByteOrder, out: &mut Vec<O>, take: impl Fn(Self) -> O);
+    /// Without its leading `unused` bits; those of a signed number repeat its sign.
+    fn trim(self, unused: u32) -> Self;
     fn single(self) -> f32;
     fn double(self) -> f64;
 }
 
+macro_rules! trim {
+    (f32, $v:expr, $unused:expr) => {{
+        let _ = $unused;
+        $v
+    }};
+    (f64, $v:expr, $unused:expr) => {{
+        let _ = $unused;
+        $v
+    }};
+    ($t:ident, $v:expr, $unused:expr) => {
+        ($v << $unused) >> $unused
+    };
+}
+
 macro_rules! stored {
-    ($($t:ty),*) => {$(
+    ($($t:ident),*) => {$(
         impl Stored for $t {
             fn each<O>(bytes: &[u8], order: ByteOrder, out: &mut Vec<O>, take: impl Fn(Self) -> O) {
                 let (numbers, _) = bytes.as_chunks::<{ size_of::<$t>() }>();
@@ -232,6 +244,7 @@ macro_rules! stored {
                     }
                 }
             }
+            fn trim(self, unused: u32) -> Self { trim!($t, self, unused) }
             fn single(self) -> f32 { self as f32 }
             fn double(self) -> f64 { self as f64 }
         }
@@ -289,22 +302,29 @@ macro_rules! with_type {
 
 /// Appends the numbers in `bytes` to `voxels`, slope and intercept applied in double precision
 /// as nibabel does.
-fn decode(bytes: &[u8], header: &Header, voxels: &mut Vec<f32>) {
-    let order = header.byte_order;
-    with_type!(header.data_type, T => match header.scaling {
+fn decode(bytes: &[u8], format: &VoxelFormat, voxels: &mut Vec<f32>) {
+    let (order, unused) = (format.byte_order, format.unused_bits);
+    let scaling = match unused {
+        0 => format.scaling,
+        _ => Some(format.scaling.unwrap_or((1.0, 0.0))),
+    };
+    with_type!(format.data_type, T => match scaling {
         None => T::each(bytes, order, voxels, |v| v.single()),
         Some((slope, inter)) => {
-            T::each(bytes, order, voxels, |v| (v.double() * slope + inter) as f32);
+            let scale = |v: f64| (v * slope + inter) as f32;
+            T::each(bytes, order, voxels, |v| scale(v.trim(unused).double()));
         }
     });
 }
 
 /// The first number in `bytes` in double precision, which tells large from infinite.
-fn exact(bytes: &[u8], header: &Header) -> f64 {
-    let (slope, inter) = header.scaling.unwrap_or((1.0, 0.0));
+fn exact(bytes: &[u8], format: &VoxelFormat) -> f64 {
+    let (slope, inter) = format.scaling.unwrap_or((1.0, 0.0));
+    let unused = format.unused_bits;
     let mut value = Vec::with_capacity(1);
-    with_type!(header.data_type, T => {
-        T::each(bytes, header.byte_order, &mut value, |v| v.double() * slope + inter);
+    with_type!(format.data_type, T => {
+        let scale = |v: f64| v * slope + inter;
+        T::each(bytes, format.byte_order, &mut value, |v| scale(v.trim(unused).double()));
     });
     value.first().copied().unwrap_or(f64::NAN)
 }

@@ -2,15 +2,16 @@
 
 use rayon::prelude::*;
 
-use super::Reference;
-use super::connectivity::Connectivity;
+use super::Model;
 use crate::geometry::bvh::Bvh;
 use crate::geometry::{Vec3, triangle};
 use crate::mesh::adjacency::previous;
+use crate::optimise::Reference;
+use crate::optimise::connectivity::Connectivity;
 
 /// The closest point must lie on a triangle that faces the same way by at least this cosine:
 /// else it belongs to the opposite side of a thin wall.
-const LEAST_FACING: f64 = 0.2;
+pub const LEAST_FACING: f64 = 0.2;
 
 /// Triangles that a walk may cross; one that is still going then has met a fold.
 const LONGEST_WALK: usize = 64;
@@ -66,34 +67,44 @@ pub fn spread(reference: &Reference, count: usize) -> Vec<Sample> {
 }
 
 /// Finds every sample's partner among all triangles that face the same way.
-pub fn find_partners(samples: &mut [Sample], vertices: &[Vec3], triangles: &[[u32; 3]]) {
+pub fn find_partners(model: &mut Model) {
+    let (vertices, triangles) = (&model.vertices, model.connectivity.triangles());
     let bvh = Bvh::new(vertices, triangles);
     let normals: Vec<Vec3> = triangles
         .iter()
         .map(|t| unit_normal(&t.map(|v| vertices[v as usize])))
         .collect();
-    samples.par_iter_mut().with_min_len(256).for_each(|sample| {
-        let faces = |t: u32| normals[t as usize].dot(&sample.normal) > LEAST_FACING;
-        if let Some(found) = bvh.closest_where(&sample.point, faces) {
-            sample.triangle = found.triangle;
-            sample.barycentric = found.barycentric;
-            sample.admitted = true;
-        } else {
-            sample.admitted = false;
-        }
-    });
+    model
+        .samples
+        .par_iter_mut()
+        .with_min_len(256)
+        .for_each(|sample| {
+            let faces = |t: u32| normals[t as usize].dot(&sample.normal) > LEAST_FACING;
+            if let Some(found) = bvh.closest_where(&sample.point, faces) {
+                sample.triangle = found.triangle;
+                sample.barycentric = found.barycentric;
+                sample.admitted = true;
+            } else {
+                sample.admitted = false;
+            }
+        });
 }
 
-/// Follows every sample's partner over `connectivity` to the nearest place that a walk
+/// Follows every sample's partner over the mesh to the nearest place that a walk
 /// downhill from its old triangle leads to.
-pub fn follow_partners(samples: &mut [Sample], vertices: &[Vec3], connectivity: &Connectivity) {
-    samples.par_iter_mut().with_min_len(256).for_each(|sample| {
-        let (t, b) = walk(vertices, connectivity, &sample.point, sample.triangle);
-        let corners = connectivity.triangles()[t as usize].map(|v| vertices[v as usize]);
-        sample.triangle = t;
-        sample.barycentric = b;
-        sample.admitted = unit_normal(&corners).dot(&sample.normal) > LEAST_FACING;
-    });
+pub fn follow_partners(model: &mut Model) {
+    let (vertices, connectivity) = (&model.vertices, &model.connectivity);
+    model
+        .samples
+        .par_iter_mut()
+        .with_min_len(256)
+        .for_each(|sample| {
+            let (t, b) = walk(vertices, connectivity, &sample.point, sample.triangle);
+            let corners = connectivity.triangles()[t as usize].map(|v| vertices[v as usize]);
+            sample.triangle = t;
+            sample.barycentric = b;
+            sample.admitted = unit_normal(&corners).dot(&sample.normal) > LEAST_FACING;
+        });
 }
 
 /// The triangle and barycentric coordinates where the distance to `p` has a local minimum

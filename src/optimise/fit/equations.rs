@@ -2,14 +2,15 @@
 //!
 //! Unknowns are one displacement (3 numbers) for each of N vertices. Every term of the fit
 //! couples the corners of one triangle only, so the matrix has one 3×3 block on the diagonal
-//! for each vertex and one off it for each edge of the mesh. It is solved by conjugate
+//! for each vertex and one off it for each edge of the mesh; one further row, over all
+//! vertices at once, is kept apart as a rank-one update. It is solved by conjugate
 //! gradients with the inverted diagonal blocks as preconditioner. All sums run in a fixed
 //! order.
 
 use nalgebra::Matrix3;
 
-use super::connectivity::Connectivity;
 use crate::geometry::Vec3;
+use crate::optimise::connectivity::Connectivity;
 
 /// A symmetric positive semidefinite system A x = g over 3-vectors at vertices.
 #[derive(Debug, Clone)]
@@ -19,6 +20,8 @@ pub struct NormalEquations {
     off_diagonal: Vec<(u32, u32, Matrix3<f64>)>,
     right: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
+    /// The row over all vertices: its coefficients and weight.
+    global: Option<(Vec<Vec3>, f64)>,
     /// For every half-edge its edge's place in `off_diagonal`.
     edge_of: Vec<u32>,
 }
@@ -39,6 +42,7 @@ impl NormalEquations {
             diagonal: vec![Matrix3::zeros(); vertices],
             off_diagonal,
             right: vec![Vec3::zeros(); vertices],
+            global: None,
             triangles: connectivity.triangles().to_vec(),
             edge_of,
         }
@@ -72,6 +76,14 @@ impl NormalEquations {
     pub fn add_anchor(&mut self, v: u32, r: &Vec3, weight: f64) {
         self.diagonal[v as usize] += Matrix3::identity() * weight;
         self.right[v as usize] += r * weight;
+    }
+
+    /// Sets the one row weight·(Σ_v c_v·x_v − r)² that couples all vertices.
+    pub fn set_global(&mut self, coefficients: Vec<Vec3>, r: f64, weight: f64) {
+        for (right, c) in self.right.iter_mut().zip(&coefficients) {
+            *right += c * (r * weight);
+        }
+        self.global = Some((coefficients, weight));
     }
 
     fn add_blocks(&mut self, t: u32, block: impl Fn(usize, usize) -> Matrix3<f64>) {
@@ -130,6 +142,12 @@ impl NormalEquations {
         for (i, j, block) in &self.off_diagonal {
             y[*i as usize] += block * x[*j as usize];
             y[*j as usize] += block.tr_mul(&x[*i as usize]);
+        }
+        if let Some((coefficients, weight)) = &self.global {
+            let along = weight * dot(coefficients, x);
+            for (y, c) in y.iter_mut().zip(coefficients) {
+                *y += c * along;
+            }
         }
         y
     }
@@ -200,6 +218,12 @@ mod tests {
                 rows.push((row, r[c] * 0.05f64.sqrt()));
             }
         }
+        let coefficients: Vec<Vec3> = (0..n).map(|_| Vec3::new(draw(), draw(), draw())).collect();
+        let row = coefficients
+            .iter()
+            .flat_map(|c| c.iter().map(|x| x * 0.3f64.sqrt()));
+        rows.push((row.collect(), 2.0 * 0.3f64.sqrt()));
+        equations.set_global(coefficients, 2.0, 0.3);
         let a = DMatrix::from_row_iterator(
             rows.len(),
             3 * n,
