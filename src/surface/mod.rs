@@ -349,7 +349,7 @@ pub fn extract(
 ) -> Result<Surface, SurfaceError> {
     monitor.report(Stage::Surface, 0.0)?;
     check_parameters(volume, parameters)?;
-    let survey = survey::survey(volume);
+    let survey = survey::survey(volume, monitor)?;
     let mut facts = SurfaceFacts::default();
     let mut object = select(volume, parameters, &survey, &mut facts, monitor)?;
     monitor.report(Stage::Surface, 0.5)?;
