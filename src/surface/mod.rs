@@ -549,7 +549,7 @@ fn select_label<'a>(
     let smoothed = masks::smooth(&mask, parameters.mask_smoothing);
     if smoothed.sigma < parameters.mask_smoothing {
         facts.warnings.push(format!(
-            "the mask is thin: smoothed with {} instead of {} voxels to keep its shape",
+            "thin parts of the mask would be lost: smoothed with {} instead of {} voxels",
             smoothed.sigma, parameters.mask_smoothing
         ));
     }
