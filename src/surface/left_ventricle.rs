@@ -38,6 +38,8 @@ const RAY_BLOCK: f64 = 4.0;
 const PART_BLOCK: f64 = 7.0;
 /// Spacing of the lattice that is searched when no part looks like a ventricle, mm.
 const LATTICE: f64 = 12.0;
+/// Points of the lattice that are judged in full.
+const LATTICE_BEST: usize = 200;
 /// Step along a ray, mm.
 const STEP: f64 = 3.0;
 /// Samples along a ray: up to 66 mm.
@@ -138,13 +140,14 @@ fn best_of(
     Ok(best)
 }
 
-/// Points of a lattice of [`LATTICE`] mm from which at least half of every fourth ray meets a
-/// wall.
+/// The [`LATTICE_BEST`] points of a lattice of [`LATTICE`] mm from which most of every fourth
+/// ray meet a wall, at least half of them.
 fn lattice(grid: &Coarse, table: &[Vec3]) -> Vec<Part> {
     let size = Vec3::from_fn(|r, _| grid.shape[r] as f64 * grid.spacing[r]);
     let steps = [0, 1, 2].map(|r| (size[r] / LATTICE) as usize + 1);
+    let floor = 0.08 * f64::from(grid.maximum);
     let points: Vec<usize> = (0..steps.iter().product()).collect();
-    points
+    let mut hit: Vec<(usize, Part)> = points
         .par_iter()
         .filter_map(|&n| {
             let index = [
@@ -159,14 +162,20 @@ fn lattice(grid: &Coarse, table: &[Vec3]) -> Vec<Part> {
                 return None;
             }
             let part = Part {
-                level: 1.3 * here,
+                level: (1.3 * here).max(floor),
                 centroid,
             };
             let rays = table.iter().step_by(4);
-            let hits = rays.filter(|d| look(grid, &centroid, d, part.level).weight == 1.0);
-            (8 * hits.count() >= DIRECTIONS).then_some(part)
+            let hits = rays
+                .filter(|d| look(grid, &centroid, d, part.level).weight == 1.0)
+                .count();
+            (8 * hits >= DIRECTIONS).then_some((hits, part))
         })
-        .collect()
+        .collect();
+    // Stable: of equals the first of the lattice.
+    hit.sort_by_key(|(hits, _)| std::cmp::Reverse(*hits));
+    hit.truncate(LATTICE_BEST);
+    hit.into_iter().map(|(_, part)| part).collect()
 }
 
 /// Finds the direction nearest to an offset in constant time, by a cube whose faces are
