@@ -81,7 +81,7 @@ pub struct OptimiseParameters {
 /// Parameters of the least-squares fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitParameters {
-    /// Rounds, 0..=200; 0 leaves the vertices on the surface, as the paper does. Default 20.
+    /// Rounds, 0..=200; 0 leaves the vertices on the surface, as the paper does. Default 14.
     pub rounds: usize,
     /// Weight of triangle shape against squared distance, (0, 10]. Default 0.05.
     pub shape_weight: f64,
@@ -95,9 +95,9 @@ pub struct FitParameters {
     /// Lowers the largest distance at the cost of the mean. Default 0.
     pub peak_weight: f64,
     /// Weight of staying put, a share of the distances' weight spread over the vertices,
-    /// (0, 1]. Default 0.01.
+    /// (0, 1]. Default 0.003.
     pub damping: f64,
-    /// Samples of the surface for each of the model's triangles, 4..=200. Default 20.
+    /// Samples of the surface for each of the model's triangles, 4..=200. Default 12.
     pub samples_per_triangle: usize,
     /// How many flips the fit looks ahead, 0..=4, to move irregular vertices together until they
     /// cancel; each more costs several times as much. Default 3.
@@ -110,13 +110,13 @@ pub struct FitParameters {
 impl Default for FitParameters {
     fn default() -> Self {
         Self {
-            rounds: 20,
+            rounds: 14,
             shape_weight: 0.05,
             worst_weight: 20.0,
             free_size: 0.9,
             peak_weight: 0.0,
-            damping: 0.01,
-            samples_per_triangle: 20,
+            damping: 0.003,
+            samples_per_triangle: 12,
             glide: 3,
             midpoint_weight: 1.0,
         }
