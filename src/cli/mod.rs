@@ -1,9 +1,12 @@
 //! The `ventriform` command: arguments in, exit status out.
 
 mod bar;
+mod demo;
 mod generate;
+mod healthcheck;
 mod model_args;
 mod phantom;
+mod serve;
 
 pub use bar::{Bar, overall};
 pub use model_args::ModelArgs;
@@ -27,8 +30,11 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Serve(Box<serve::ServeArgs>),
+    Demo(demo::DemoArgs),
     Generate(Box<generate::GenerateArgs>),
     Phantom(phantom::PhantomArgs),
+    Healthcheck(healthcheck::HealthcheckArgs),
     /// Prints a completion script for a shell
     #[command(after_help = "Example: ventriform completions bash > ventriform.bash")]
     Completions {
@@ -40,8 +46,11 @@ enum Command {
 /// Runs the command that the process's arguments name.
 pub fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
+        Command::Serve(args) => serve::run(&args),
+        Command::Demo(args) => demo::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Phantom(args) => phantom::run(&args),
+        Command::Healthcheck(args) => healthcheck::run(&args),
         Command::Completions { shell } => {
             clap_complete::generate(
                 shell,
