@@ -3,7 +3,6 @@
 mod bar;
 mod demo;
 mod generate;
-mod healthcheck;
 mod model_args;
 mod phantom;
 mod serve;
@@ -30,11 +29,11 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Serve(Box<serve::ServeArgs>),
     Demo(demo::DemoArgs),
     Generate(Box<generate::GenerateArgs>),
+    Serve(Box<serve::ServeArgs>),
     Phantom(phantom::PhantomArgs),
-    Healthcheck(healthcheck::HealthcheckArgs),
+    Healthcheck(Box<serve::HealthcheckArgs>),
     /// Prints a completion script for a shell
     #[command(after_help = "Example: ventriform completions bash > ventriform.bash")]
     Completions {
@@ -46,11 +45,11 @@ enum Command {
 /// Runs the command that the process's arguments name.
 pub fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
-        Command::Serve(args) => serve::run(&args),
-        Command::Demo(args) => demo::run(&args),
         Command::Generate(args) => generate::run(&args),
+        Command::Demo(args) => demo::run(&args),
+        Command::Serve(args) => serve::run(&args),
         Command::Phantom(args) => phantom::run(&args),
-        Command::Healthcheck(args) => healthcheck::run(&args),
+        Command::Healthcheck(args) => serve::check_health(&args),
         Command::Completions { shell } => {
             clap_complete::generate(
                 shell,

@@ -8,8 +8,8 @@ mod answers;
 mod inputs;
 
 pub use answers::{
-    DownloadAnswers, EventsAnswer, FileAnswer, FileProblems, ListProblems, LookupProblems, MeshAnswer,
-    ReportAnswer, UploadProblems,
+    DownloadAnswers, EventsAnswer, FileAnswer, FileProblems, ListProblems, LookupProblems,
+    MeshAnswer, ReportAnswer, UploadProblems,
 };
 pub use inputs::{
     ConditionalHeaders, EventHeader, FileName, IdempotencyHeader, JobRequest, ModelParameters,
