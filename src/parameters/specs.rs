@@ -331,14 +331,14 @@ pub const SPECS: &[ParameterSpec] = &[
     ParameterSpec {
         name: "fitness",
         kind: Kind::Choice(&["raw", "normalised", "robust"]),
-        default: "robust",
+        default: "normalised",
         summary: "Form of the fitness that drives the flips: the paper's raw reciprocals, each term \
                   between 0 and 1, or reciprocals floored at 1 degree and 0.01 mm",
         read: |d, v| {
             d.optimise.fitness = match v.text() {
                 "raw" => FitnessForm::Raw,
-                "normalised" => FitnessForm::Normalised,
-                _ => FitnessForm::Robust,
+                "robust" => FitnessForm::Robust,
+                _ => FitnessForm::Normalised,
             };
             Ok(())
         },
