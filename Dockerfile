@@ -4,11 +4,13 @@
 FROM rust:1-bookworm AS build
 WORKDIR /build
 COPY Cargo.toml Cargo.lock ./
-RUN mkdir -p src benches \
+# Not built, but named by the manifest.
+COPY benches benches
+RUN mkdir src \
  && echo 'fn main() {}' > src/main.rs \
  && touch src/lib.rs \
  && cargo build --release --locked --bin ventriform \
- && rm -rf src benches
+ && rm -rf src
 COPY src src
 COPY README.md ./
 # cargo goes by modification times: the sources must be newer than the stand-ins.

@@ -9,9 +9,9 @@ use super::app::App;
 use super::jobs::{describe, find};
 use super::openapi::LookupProblems;
 use super::problem::{Answer, Problem};
-use super::request::{query_pairs, refuse_unknown};
+use super::request::{Path, query_pairs, refuse_unknown};
 use crate::jobs;
-use axum::extract::{Path, RawQuery, State};
+use axum::extract::{RawQuery, State};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
@@ -60,7 +60,7 @@ fn last_event_id(headers: &HeaderMap) -> Answer<i64> {
         .to_str()
         .ok()
         .and_then(|text| text.trim().parse().ok());
-    number.ok_or_else(|| {
+    number.filter(|revision| *revision >= 0).ok_or_else(|| {
         Problem::bad_request("invalid-header", "`Last-Event-ID` is no whole number.")
             .at("Last-Event-ID")
             .fix("Send the id of the event seen last, as it is.")

@@ -232,6 +232,13 @@ impl IntoParams for ConditionalHeaders {
     }
 }
 
+/// Names of a model's files.
+pub fn file_names() -> Vec<String> {
+    let meshes = Format::ALL.map(|format| format!("mesh.{}", format.extension()));
+    let reports = ["report.json", "report.html"].map(str::to_owned);
+    meshes.into_iter().chain(reports).collect()
+}
+
 /// A model's files.
 pub struct FileName;
 
@@ -243,12 +250,10 @@ impl ToSchema for FileName {
 
 impl PartialSchema for FileName {
     fn schema() -> RefOr<Schema> {
-        let meshes = Format::ALL.map(|format| format!("mesh.{}", format.extension()));
-        let reports = ["report.json", "report.html"].map(str::to_owned);
         Schema::from(
             ObjectBuilder::new()
                 .schema_type(Type::String)
-                .enum_values(Some(meshes.into_iter().chain(reports))),
+                .enum_values(Some(file_names())),
         )
         .into()
     }

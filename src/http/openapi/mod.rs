@@ -13,7 +13,7 @@ pub use answers::{
 };
 pub use inputs::{
     ConditionalHeaders, EventHeader, FileName, IdempotencyHeader, JobRequest, ModelParameters,
-    ModelQuery, PageParameters, UploadForm,
+    ModelQuery, PageParameters, UploadForm, file_names,
 };
 
 use utoipa::OpenApi;
