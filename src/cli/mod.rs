@@ -1,9 +1,11 @@
 //! The `ventriform` command: arguments in, exit status out.
 
 mod bar;
+mod demo;
 mod generate;
 mod model_args;
 mod phantom;
+mod serve;
 
 pub use bar::{Bar, overall};
 pub use model_args::ModelArgs;
@@ -27,8 +29,11 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Demo(demo::DemoArgs),
     Generate(Box<generate::GenerateArgs>),
+    Serve(Box<serve::ServeArgs>),
     Phantom(phantom::PhantomArgs),
+    Healthcheck(Box<serve::HealthcheckArgs>),
     /// Prints a completion script for a shell
     #[command(after_help = "Example: ventriform completions bash > ventriform.bash")]
     Completions {
@@ -41,7 +46,10 @@ enum Command {
 pub fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Generate(args) => generate::run(&args),
+        Command::Demo(args) => demo::run(&args),
+        Command::Serve(args) => serve::run(&args),
         Command::Phantom(args) => phantom::run(&args),
+        Command::Healthcheck(args) => serve::check_health(&args),
         Command::Completions { shell } => {
             clap_complete::generate(
                 shell,

@@ -30,9 +30,9 @@ const KEEP_ALIVE: Duration = Duration::from_secs(15);
 /// final state. Resumes after `Last-Event-ID`.
 #[utoipa::path(get, path = "/v1/jobs/{id}/events", tag = "jobs",
     params(("id" = String, Path, description = "The job's id"),
-        ("Last-Event-ID" = Option<i64>, Header, description = "Revision seen last")),
+        super::openapi::EventHeader),
     responses(
-        (status = 200, description = "The changes", body = String, content_type = "text/event-stream"),
+        super::openapi::EventsAnswer,
         (status = 204, description = "The final state was seen already"),
         LookupProblems))]
 pub async fn follow_job(
@@ -56,7 +56,10 @@ fn last_event_id(headers: &HeaderMap) -> Answer<i64> {
     let Some(value) = headers.get("last-event-id") else {
         return Ok(0);
     };
-    let number = value.to_str().ok().and_then(|text| text.trim().parse().ok());
+    let number = value
+        .to_str()
+        .ok()
+        .and_then(|text| text.trim().parse().ok());
     number.ok_or_else(|| {
         Problem::bad_request("invalid-header", "`Last-Event-ID` is no whole number.")
             .at("Last-Event-ID")
