@@ -1,5 +1,7 @@
 //! The whole way from a file to a model, on simulated scans.
 
+#![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
+
 use std::sync::OnceLock;
 use ventriform::export::{self, Format};
 use ventriform::mesh::{intersections, topology};

@@ -30,9 +30,9 @@ const KEEP_ALIVE: Duration = Duration::from_secs(15);
 /// final state. Resumes after `Last-Event-ID`.
 #[utoipa::path(get, path = "/v1/jobs/{id}/events", tag = "jobs",
     params(("id" = String, Path, description = "The job's id"),
-        ("Last-Event-ID" = Option<i64>, Header, description = "Revision seen last")),
+        super::openapi::EventHeader),
     responses(
-        (status = 200, description = "The changes", body = String, content_type = "text/event-stream"),
+        super::openapi::EventsAnswer,
         (status = 204, description = "The final state was seen already"),
         LookupProblems))]
 pub async fn follow_job(

@@ -273,7 +273,7 @@ pub const SPECS: &[ParameterSpec] = &[
     ParameterSpec {
         name: "relaxation_iterations",
         kind: Kind::Integer { min: 0, max: 1000 },
-        default: "110",
+        default: "80",
         summary: "Most rounds of centroidal relaxation (method refined)",
         read: |d, v| {
             d.retile.relaxation_iterations = v.usize();
