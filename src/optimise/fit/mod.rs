@@ -84,8 +84,9 @@ pub fn fit(
     for round in 0..parameters.rounds {
         let fraction = round as f64 / (parameters.rounds + 1) as f64;
         monitor.report(Stage::Optimise, fraction)?;
-        let step = terms::displacement(&model);
+        let step = terms::displacement(&model, monitor)?;
         shortened += usize::from(advance(&mut model.vertices, &model.connectivity, &step));
+        monitor.check()?;
         follow_partners(&mut model);
         if round % 2 == 1 && round + 1 < parameters.rounds {
             // Early, so that enough rounds are left to even the triangles out.
@@ -93,6 +94,7 @@ pub fn fit(
                 flips += polish::glide(&mut model, parameters.glide, monitor)?;
             }
             flips += polish::flip(&mut model);
+            monitor.check()?;
             follow_partners(&mut model);
         }
     }
