@@ -44,9 +44,10 @@ fn fitness(normalised: f64) -> FitnessSummary {
 /// The report on `model`, as if it had come out of the pipeline.
 fn report(model: &TriMesh) -> Report {
     let surface = surface();
+    let reference = Reference::new(&surface);
     let measures = measure(
         model,
-        &Reference::new(&surface),
+        &reference,
         &MeasureParameters::default(),
         &Monitor::silent(),
     )
@@ -61,6 +62,7 @@ fn report(model: &TriMesh) -> Report {
         retiled: fitness(0.5),
         fitted: fitness(0.6),
         optimised: fitness(0.625),
+        lengths: reference.lengths(model.triangles.len()),
         facts: OptimiseFacts::default(),
     };
     Report::new(ReportInput {

@@ -123,7 +123,8 @@ impl<'a> Configurations<'a> {
 
     /// Means of fitness, in all forms, and of its terms.
     pub fn summary(&self, weights: [f64; 4]) -> FitnessSummary {
-        let form = |form, weights| Fitness::new(form, weights, self.reference.spacing);
+        let lengths = self.reference.lengths(self.connectivity.triangles().len());
+        let form = |form, weights| Fitness::new(form, weights, lengths);
         let term = |pick: fn(&Terms) -> f64| {
             let sum: f64 = self
                 .connectivity

@@ -28,6 +28,15 @@ pub struct Terms {
     pub d: f64,
 }
 
+/// The lengths that distances are held against, mm.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Lengths {
+    /// Smallest voxel spacing.
+    pub voxel: f64,
+    /// Edge of the equilateral triangles that would cover S, as many as the mesh has.
+    pub edge: f64,
+}
+
 /// Numerators and floors of the four terms, in the units of [`Terms`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scales {
@@ -38,19 +47,21 @@ pub struct Scales {
 }
 
 impl Scales {
-    /// The scales of `form` for voxels of `spacing` mm.
-    pub fn new(form: FitnessForm, spacing: f64) -> Self {
+    /// The scales of `form`.
+    pub fn new(form: FitnessForm, lengths: Lengths) -> Self {
         let degree = 1f64.to_radians();
         match form {
             // Angles in radians, D in voxels, no term above 20: the paper's reciprocals.
             FitnessForm::Raw => Self {
-                numerator: [1.0, 1.0, 1.0, spacing],
-                floor: [0.05, 0.05, 1.0, 0.05 * spacing],
+                numerator: [1.0, 1.0, 1.0, lengths.voxel],
+                floor: [0.05, 0.05, 1.0, 0.05 * lengths.voxel],
             },
-            // Flat within 10 degrees and within a quarter of a voxel counts as perfect: 1.
+            // Flat within 10 degrees and as close as a hundredth of an edge counts as perfect: 1.
+            // A chord of a curve of curvature k strays by k/8 of its squared length: measured
+            // in voxels, a finer mesh would be perfect before it is close.
             FitnessForm::Normalised => Self {
-                numerator: [10.0 * degree, 10.0 * degree, 1.0, 0.25 * spacing],
-                floor: [10.0 * degree, 10.0 * degree, 1.0, 0.25 * spacing],
+                numerator: [10.0 * degree, 10.0 * degree, 1.0, 0.01 * lengths.edge],
+                floor: [10.0 * degree, 10.0 * degree, 1.0, 0.01 * lengths.edge],
             },
             // Angles in degrees, D in mm: comparable between tools and voxel sizes.
             FitnessForm::Robust => Self {
@@ -69,10 +80,10 @@ pub struct Fitness {
 }
 
 impl Fitness {
-    /// `form` with `weights` w1..w4 (not negative, not all zero), D measured in voxels of
-    /// `spacing` mm where the form says so.
-    pub fn new(form: FitnessForm, weights: [f64; 4], spacing: f64) -> Self {
-        let scales = Scales::new(form, spacing);
+    /// `form` with `weights` w1..w4 (not negative, not all zero), D measured against `lengths`
+    /// where the form says so.
+    pub fn new(form: FitnessForm, weights: [f64; 4], lengths: Lengths) -> Self {
+        let scales = Scales::new(form, lengths);
         let sum: f64 = weights.iter().sum();
         let weighted = [0, 1, 2, 3].map(|i| weights[i] / sum * scales.numerator[i]);
         Self {
@@ -94,16 +105,21 @@ impl Fitness {
 mod tests {
     use super::*;
 
+    const LENGTHS: Lengths = Lengths {
+        voxel: 2.0,
+        edge: 12.0,
+    };
+
     #[test]
     fn a_perfect_configuration_rates_one_in_the_normalised_form() {
-        let fitness = Fitness::new(FitnessForm::Normalised, [1.0, 2.0, 3.0, 4.0], 3.2);
+        let fitness = Fitness::new(FitnessForm::Normalised, [1.0, 2.0, 3.0, 4.0], LENGTHS);
         let perfect = Terms {
             c: 1.0,
             ..Terms::default()
         };
         assert!((fitness.of(&perfect) - 1.0).abs() < 1e-15);
-        let worse = Terms { d: 1.6, ..perfect };
-        // D is twice as far as its quarter-voxel scale... 1.6 mm = half a voxel.
+        // Twice as far as a hundredth of an edge of 12 mm.
+        let worse = Terms { d: 0.24, ..perfect };
         assert!((fitness.of(&worse) - (0.6 + 0.4 / 2.0)).abs() < 1e-15);
     }
 
@@ -115,16 +131,16 @@ mod tests {
             c: 1.25,
             d: 0.5,
         };
-        let raw = Fitness::new(FitnessForm::Raw, [1.0; 4], 2.0).of(&terms);
+        let raw = Fitness::new(FitnessForm::Raw, [1.0; 4], LENGTHS).of(&terms);
         assert!((raw - (5.0 + 2.0 + 0.8 + 4.0) / 4.0).abs() < 1e-12);
-        let robust = Fitness::new(FitnessForm::Robust, [1.0; 4], 2.0).of(&terms);
+        let robust = Fitness::new(FitnessForm::Robust, [1.0; 4], LENGTHS).of(&terms);
         let expected = 1.0 / 0.2f64.to_degrees() + 1.0 / 0.5f64.to_degrees() + 0.8 + 2.0;
         assert!((robust - expected / 4.0).abs() < 1e-12);
         let flat = Terms {
             c: 1.0,
             ..Terms::default()
         };
-        let capped = Fitness::new(FitnessForm::Raw, [1.0; 4], 2.0).of(&flat);
+        let capped = Fitness::new(FitnessForm::Raw, [1.0; 4], LENGTHS).of(&flat);
         assert!((capped - (20.0 + 20.0 + 1.0 + 20.0) / 4.0).abs() < 1e-12);
     }
 }

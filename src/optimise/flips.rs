@@ -283,11 +283,17 @@ fn fingerprint(connectivity: &Connectivity) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::fitness::Lengths;
     use super::*;
     use crate::mesh::{TriMesh, shapes};
     use crate::optimise::connectivity::Quad;
     use crate::optimise::{FitnessForm, Reference, configurations};
     use crate::surface::{Surface, SurfaceFacts};
+
+    const LENGTHS: Lengths = Lengths {
+        voxel: 2.0,
+        edge: 12.0,
+    };
 
     fn reference(mesh: TriMesh, spacing: f64) -> Reference {
         Reference::new(&Surface {
@@ -343,7 +349,7 @@ mod tests {
 
     fn rules(form: FitnessForm, gain: Gain, guard: f64) -> FlipRules {
         FlipRules {
-            fitness: Fitness::new(form, [1.0; 4], 2.0),
+            fitness: Fitness::new(form, [1.0; 4], LENGTHS),
             gain,
             guard,
         }
@@ -357,7 +363,7 @@ mod tests {
             let state = configurations(&mesh, &reference).unwrap();
             let edges = mesh.triangles.len() as f64 * 1.5;
             for form in [FitnessForm::Raw, FitnessForm::Normalised] {
-                let fitness = Fitness::new(form, [1.0, 2.0, 0.5, 1.0], 2.0);
+                let fitness = Fitness::new(form, [1.0, 2.0, 0.5, 1.0], LENGTHS);
                 let before = state.mean(&fitness) * edges;
                 for h in state.connectivity().edges().step_by(3) {
                     let found = state.candidate(h, &fitness, Gain::Total, 0.0, -1e9);
@@ -547,7 +553,7 @@ mod tests {
         let (mut loose, mut guarded) = (0, 0);
         for (mesh, reference) in cases() {
             let state = configurations(&mesh, &reference).unwrap();
-            let fitness = Fitness::new(FitnessForm::Robust, [0.0, 0.0, 0.0, 1.0], 2.0);
+            let fitness = Fitness::new(FitnessForm::Robust, [0.0, 0.0, 0.0, 1.0], LENGTHS);
             let square = |corners: &[u32]| {
                 let sum: Vec3 = corners.iter().map(|&v| mesh.vertices[v as usize]).sum();
                 let middle = sum / corners.len() as f64;

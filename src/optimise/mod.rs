@@ -29,7 +29,7 @@ mod legality;
 
 use configurations::Configurations;
 use connectivity::Connectivity;
-use fitness::Fitness;
+use fitness::{Fitness, Lengths};
 use flips::FlipRules;
 
 use crate::geometry::Vec3;
@@ -169,6 +169,17 @@ impl Reference {
     }
 }
 
+impl Reference {
+    /// What the distances of a mesh of so many triangles are held against.
+    pub fn lengths(&self, triangles: usize) -> Lengths {
+        let each = self.mesh.area() / triangles.max(1) as f64;
+        Lengths {
+            voxel: self.spacing,
+            edge: (4.0 * each / 3f64.sqrt()).sqrt(),
+        }
+    }
+}
+
 /// Mean fitness over all edges, in the form that drove the flips and in both forms.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct FitnessSummary {
@@ -199,6 +210,8 @@ pub struct Optimised {
     pub fitted: FitnessSummary,
     /// Fitness of the mesh that goes out.
     pub optimised: FitnessSummary,
+    /// What distances were held against.
+    pub lengths: Lengths,
     /// What was done.
     pub facts: OptimiseFacts,
 }
@@ -285,7 +298,7 @@ pub fn optimise(
     let fitted = state.summary(parameters.weights);
 
     let rules = FlipRules {
-        fitness: parameters.fitness(reference),
+        fitness: parameters.fitness(reference.lengths(tiled.mesh.triangles.len())),
         gain: parameters.gain,
         guard: parameters.guard,
     };
@@ -305,13 +318,14 @@ pub fn optimise(
         retiled,
         fitted,
         optimised,
+        lengths: reference.lengths(tiled.mesh.triangles.len()),
         facts,
     })
 }
 
 /// The fitted mesh, or the one that came in where the fit would lower the mean fitness in the
 /// form that drives *and* in the robust one. One alone may fall for reasons that are no fault:
-/// the normalised form is blind to distances below a quarter of a voxel and sees only that a
+/// the normalised form is blind to distances below a hundredth of an edge and sees only that a
 /// close fit to a noisy surface is less flat; the robust one takes a start whose vertices lie
 /// on a flat part of the surface for perfect there.
 fn fit_if_better(
@@ -335,9 +349,10 @@ fn fit_if_better(
     )?;
     facts.fit_rounds = moved.rounds;
     let state = configurations(&moved.mesh, reference)?;
-    let robust = Fitness::new(FitnessForm::Robust, [1.0; 4], reference.spacing);
+    let lengths = reference.lengths(tiled.mesh.triangles.len());
+    let robust = Fitness::new(FitnessForm::Robust, [1.0; 4], lengths);
     let falls = |fitness: &Fitness| state.mean(fitness) < start.mean(fitness);
-    if falls(&parameters.fitness(reference)) && falls(&robust) {
+    if falls(&parameters.fitness(lengths)) && falls(&robust) {
         let warning = "the least-squares fit would have lowered the fitness and was not used";
         facts.warnings.push(warning.to_owned());
         return Ok(tiled.mesh.clone());
@@ -356,8 +371,8 @@ fn configurations<'a>(
 }
 
 impl OptimiseParameters {
-    fn fitness(&self, reference: &Reference) -> Fitness {
-        Fitness::new(self.fitness, self.weights, reference.spacing)
+    fn fitness(&self, lengths: Lengths) -> Fitness {
+        Fitness::new(self.fitness, self.weights, lengths)
     }
 
     /// Refuses what no stage could work with.

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 use super::{Forms, SurfaceSection};
 use crate::mesh::topology;
-use crate::optimise::fitness::Scales;
+use crate::optimise::fitness::{Lengths, Scales};
 use crate::optimise::{Ended, FitnessForm, FitnessSummary, OptimiseFacts, Optimised};
 use crate::retile::{RetileFacts, Tiled};
 use crate::surface::{Surface, SurfaceFacts, VolumeKind};
@@ -127,7 +127,7 @@ pub fn forms(summary: &&FitnessSummary) -> Forms {
 }
 
 /// Numerators and floors of A, B (radians), C and D (mm) in every form.
-pub fn scales(spacing: f64) -> Map<String, Value> {
+pub fn scales(lengths: Lengths) -> Map<String, Value> {
     [
         FitnessForm::Raw,
         FitnessForm::Normalised,
@@ -135,7 +135,7 @@ pub fn scales(spacing: f64) -> Map<String, Value> {
     ]
     .into_iter()
     .map(|form| {
-        let scales = Scales::new(form, spacing);
+        let scales = Scales::new(form, lengths);
         let value = json!({ "numerator": scales.numerator, "floor": scales.floor });
         (form_name(form).to_owned(), value)
     })

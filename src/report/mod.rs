@@ -197,7 +197,6 @@ impl Report {
         let surface = facts::surface(input.surface);
         let mut warnings = facts::warnings(input.surface, input.tiled, input.optimised);
         warnings.extend(doubts(&measures.mesh, &surface, input.tiled));
-        let spacing = input.surface.spacing;
         Self {
             software: Software {
                 name: env!("CARGO_PKG_NAME"),
@@ -217,7 +216,7 @@ impl Report {
             shape: measures.shape,
             smoothness: measures.smoothness,
             distance: measures.distance,
-            fitness: Fitness::new(input.optimised, input.optimise_parameters, spacing),
+            fitness: Fitness::new(input.optimised, input.optimise_parameters),
             timings_ms: timings(input.timings_ms),
             warnings,
         }
@@ -323,7 +322,7 @@ fn timings(stages: Vec<(String, f64)>) -> Map<String, Value> {
 }
 
 impl Fitness {
-    fn new(optimised: &Optimised, parameters: &OptimiseParameters, spacing: f64) -> Self {
+    fn new(optimised: &Optimised, parameters: &OptimiseParameters) -> Self {
         let stages = Stages {
             retiled: &optimised.retiled,
             fitted: &optimised.fitted,
@@ -337,7 +336,7 @@ impl Fitness {
             optimised: driving.optimised,
             gain_percent: 100.0 * (driving.optimised / driving.retiled - 1.0),
             weights: parameters.weights,
-            scales: facts::scales(spacing),
+            scales: facts::scales(optimised.lengths),
             forms: stages.map(facts::forms),
             terms: stages.map(Terms::of),
         }
