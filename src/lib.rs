@@ -28,6 +28,8 @@ pub mod retile;
 
 pub mod optimise;
 
+pub mod deform;
+
 pub mod report;
 
 pub mod export;
