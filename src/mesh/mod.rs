@@ -5,6 +5,7 @@
 //! [`adjacency`] walks it.
 
 pub mod adjacency;
+pub mod intersections;
 pub mod shapes;
 pub mod topology;
 

@@ -2,6 +2,8 @@
 //!
 //! STUB: the owner of this folder writes the module page.
 
+pub mod tessellate;
+
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Monitor};

@@ -1,0 +1,384 @@
+//! Do two triangles meet? Decided exactly.
+//!
+//! Every decision is the sign of a determinant from Shewchuk's adaptive predicates (1997), so
+//! the answer is that of the corners' stored coordinates, not of rounded constructions. No
+//! position is special: coplanar, touching and degenerate triangles (a segment, a point) are
+//! treated as the closed sets that they are.
+
+use robust::{Coord, Coord3D, orient2d, orient3d};
+
+use crate::geometry::Vec3;
+use crate::geometry::bvh::Aabb;
+
+/// Whether the closed triangles `s` and `t` meet in more than the vertices and edges that
+/// they share.
+///
+/// `s_ids` and `t_ids` are the corners' vertex indices; equal indices mean a shared vertex.
+/// - nothing shared: any common point counts, touching too;
+/// - a shared vertex: any common point besides it;
+/// - a shared edge: one triangle folded onto the other;
+/// - all three shared: always.
+pub fn triangles_intersect(s_ids: [u32; 3], s: &[Vec3; 3], t_ids: [u32; 3], t: &[Vec3; 3]) -> bool {
+    let from_s = [0, 1, 2].map(|i| t_ids.contains(&s_ids[i]));
+    match from_s.iter().filter(|shared| **shared).count() {
+        0 => closed_triangles_meet(s, t),
+        1 => {
+            let i = from_s.iter().position(|shared| *shared).unwrap_or(0);
+            let j = t_ids.iter().position(|v| *v == s_ids[i]).unwrap_or(0);
+            meet_beyond_vertex(&turned(s, i), &turned(t, j))
+        }
+        2 => {
+            // The corner that is not shared comes first.
+            let i = from_s.iter().position(|shared| !*shared).unwrap_or(0);
+            let j = (0..3).find(|&j| !s_ids.contains(&t_ids[j])).unwrap_or(0);
+            let [a, u, v] = turned(s, i);
+            meet_beyond_edge(&u, &v, &a, &t[j])
+        }
+        _ => true,
+    }
+}
+
+fn turned(t: &[Vec3; 3], first: usize) -> [Vec3; 3] {
+    [0, 1, 2].map(|k| t[(first + k) % 3])
+}
+
+/// Nothing shared. If two triangles meet, an edge of one meets the other.
+fn closed_triangles_meet(s: &[Vec3; 3], t: &[Vec3; 3]) -> bool {
+    if beside(s, t) || beside(t, s) {
+        return false;
+    }
+    (0..3).any(|k| {
+        let l = (k + 1) % 3;
+        segment_meets_triangle(&s[k], &s[l], t) || segment_meets_triangle(&t[k], &t[l], s)
+    })
+}
+
+/// Whether `t` lies strictly on one side of the plane of `s`.
+fn beside(s: &[Vec3; 3], t: &[Vec3; 3]) -> bool {
+    let first = side(s, &t[0]);
+    first != 0 && side(s, &t[1]) == first && side(s, &t[2]) == first
+}
+
+/// The first corners are the shared vertex. Two convex sets that share it and another point
+/// share the segment between; prolonged, it leaves one of the triangles through the edge
+/// opposite to the vertex.
+fn meet_beyond_vertex(s: &[Vec3; 3], t: &[Vec3; 3]) -> bool {
+    let apart = |s: &[Vec3; 3], t: &[Vec3; 3]| {
+        let first = side(s, &t[1]);
+        first != 0 && side(s, &t[2]) == first
+    };
+    if apart(s, t) || apart(t, s) {
+        return false;
+    }
+    opposite_edge_meets(s, t) || opposite_edge_meets(t, s)
+}
+
+fn opposite_edge_meets(s: &[Vec3; 3], t: &[Vec3; 3]) -> bool {
+    let [v, a, b] = s;
+    if is_collinear(s) {
+        // The edge may run through the vertex: only the ends are beyond it.
+        return [a, b]
+            .iter()
+            .any(|end| *end != v && segment_meets_triangle(end, end, t));
+    }
+    segment_meets_triangle(a, b, t)
+}
+
+/// The triangles `u v a` and `u v b`: they meet beyond `u v` only where they are coplanar
+/// with `a` and `b` on the same side.
+fn meet_beyond_edge(u: &Vec3, v: &Vec3, a: &Vec3, b: &Vec3) -> bool {
+    if side(&[*u, *v, *a], b) != 0 {
+        return false;
+    }
+    for axis in 0..3 {
+        let (at_a, at_b) = (turn(axis, u, v, a), turn(axis, u, v, b));
+        if at_a != 0 || at_b != 0 {
+            return at_a == at_b;
+        }
+    }
+    // Both are segments. On one line they share more than the edge where their boxes do.
+    if !is_collinear(&[*u, *a, *b]) {
+        return false;
+    }
+    let (s, t, edge) = (Aabb::of([u, v, a]), Aabb::of([u, v, b]), Aabb::of([u, v]));
+    s.min.sup(&t.min) != edge.min || s.max.inf(&t.max) != edge.max
+}
+
+/// Closed segment (also a point) against closed triangle (also a segment or a point).
+fn segment_meets_triangle(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
+    let (at_p, at_q) = (side(t, p), side(t, q));
+    if at_p * at_q > 0 {
+        return false;
+    }
+    if at_p == 0 && at_q == 0 {
+        return flat_segment_meets_triangle(p, q, t);
+    }
+    let [a, b, c] = t;
+    let first = side(&[*p, *q, *a], b);
+    let second = side(&[*p, *q, *b], c);
+    if first * second < 0 {
+        return false;
+    }
+    let third = side(&[*p, *q, *c], a);
+    first * third >= 0 && second * third >= 0
+}
+
+/// The segment lies in the triangle's plane, or the triangle has none.
+fn flat_segment_meets_triangle(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
+    let [a, b, c] = t;
+    let edges = [(a, b), (b, c), (c, a)];
+    if edges.iter().any(|(r, s)| segments_meet(p, q, r, s)) {
+        return true;
+    }
+    // No edge is met: the segment lies inside or outside as a whole.
+    (0..3).any(|axis| {
+        let orientation = turn(axis, a, b, c);
+        orientation != 0
+            && edges
+                .iter()
+                .all(|(r, s)| turn(axis, r, s, p) == orientation)
+    })
+}
+
+/// Two closed segments.
+fn segments_meet(p: &Vec3, q: &Vec3, r: &Vec3, s: &Vec3) -> bool {
+    if side(&[*p, *q, *r], s) != 0 {
+        return false;
+    }
+    for axis in 0..3 {
+        let (of_r, of_s) = (turn(axis, p, q, r), turn(axis, p, q, s));
+        let (of_p, of_q) = (turn(axis, r, s, p), turn(axis, r, s, q));
+        // A triple that turns shows that the projection keeps the common plane a plane.
+        if [of_r, of_s, of_p, of_q].iter().any(|turn| *turn != 0) {
+            return of_r * of_s <= 0 && of_p * of_q <= 0;
+        }
+    }
+    Aabb::of([p, q]).overlaps(&Aabb::of([r, s]))
+}
+
+fn is_collinear([a, b, c]: &[Vec3; 3]) -> bool {
+    (0..3).all(|axis| turn(axis, a, b, c) == 0)
+}
+
+/// On which side of the plane of `t` the point lies: -1, 0 or 1; 0 where `t` has no plane.
+fn side(t: &[Vec3; 3], p: &Vec3) -> i8 {
+    let [a, b, c, d] = [&t[0], &t[1], &t[2], p].map(|p| Coord3D {
+        x: p.x,
+        y: p.y,
+        z: p.z,
+    });
+    sign(orient3d(a, b, c, d))
+}
+
+/// How `a b c` turns in the projection along `axis`: -1, 0 or 1.
+fn turn(axis: usize, a: &Vec3, b: &Vec3, c: &Vec3) -> i8 {
+    let [a, b, c] = [a, b, c].map(|p| Coord {
+        x: p[(axis + 1) % 3],
+        y: p[(axis + 2) % 3],
+    });
+    sign(orient2d(a, b, c))
+}
+
+fn sign(x: f64) -> i8 {
+    i8::from(x > 0.0) - i8::from(x < 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::random::{Purpose, stream};
+    use rand::RngExt;
+
+    /// Exact fractions, for the truth.
+    #[derive(Clone, Copy, PartialEq, Debug)]
+    struct Fraction(i128, i128);
+
+    impl Fraction {
+        fn new(n: i128, d: i128) -> Self {
+            let (mut a, mut b) = (n.abs(), d.abs());
+            while b != 0 {
+                (a, b) = (b, a % b);
+            }
+            let scale = a.max(1) * d.signum();
+            Self(n / scale, d / scale)
+        }
+        fn sub(self, o: Self) -> Self {
+            Self::new(self.0 * o.1 - o.0 * self.1, self.1 * o.1)
+        }
+        fn mul(self, o: Self) -> Self {
+            Self::new(self.0 * o.0, self.1 * o.1)
+        }
+        fn div(self, o: Self) -> Self {
+            Self::new(self.0 * o.1, self.1 * o.0)
+        }
+    }
+
+    type Corners = [[i32; 3]; 3];
+
+    /// The unique solution of the 5 equations in the chosen columns, by Gauss-Jordan.
+    fn solve(columns: &[[i32; 5]]) -> Option<Vec<Fraction>> {
+        let n = columns.len();
+        let right = [0, 0, 0, 1, 1];
+        let mut m: Vec<Vec<Fraction>> = (0..5)
+            .map(|r| {
+                let left = columns.iter().map(|c| c[r]);
+                let row = left.chain([right[r]]);
+                row.map(|x| Fraction::new(i128::from(x), 1)).collect()
+            })
+            .collect();
+        for c in 0..n {
+            let pivot = (c..5).find(|&r| m[r][c].0 != 0)?;
+            m.swap(c, pivot);
+            for r in 0..5 {
+                if r != c && m[r][c].0 != 0 {
+                    let factor = m[r][c].div(m[c][c]);
+                    for k in c..=n {
+                        m[r][k] = m[r][k].sub(factor.mul(m[c][k]));
+                    }
+                }
+            }
+        }
+        let consistent = (n..5).all(|r| m[r][n].0 == 0);
+        consistent.then(|| (0..n).map(|c| m[c][n].div(m[c][c])).collect())
+    }
+
+    /// The truth by linear programming over the fractions: the common points of two triangles
+    /// are the images of {λ, μ >= 0, Σλ = Σμ = 1, Σλs = Σμt}; the vertices of that polytope are
+    /// its basic solutions, and the common set is the hull of their images.
+    fn common_hull(s: &Corners, t: &Corners) -> Vec<[Fraction; 3]> {
+        let columns: Vec<[i32; 5]> = (0..6)
+            .map(|k| match k {
+                0..3 => [s[k][0], s[k][1], s[k][2], 1, 0],
+                _ => [-t[k - 3][0], -t[k - 3][1], -t[k - 3][2], 0, 1],
+            })
+            .collect();
+        let mut hull = Vec::new();
+        for subset in 1u32..64 {
+            let chosen: Vec<usize> = (0..6).filter(|k| subset >> k & 1 == 1).collect();
+            if chosen.len() > 5 {
+                continue;
+            }
+            let picked: Vec<[i32; 5]> = chosen.iter().map(|&k| columns[k]).collect();
+            let Some(x) = solve(&picked) else { continue };
+            if x.iter().all(|x| x.0 >= 0) {
+                hull.push([0, 1, 2].map(|axis| {
+                    let mut sum = Fraction::new(0, 1);
+                    for (&k, &x) in chosen.iter().zip(&x).filter(|(k, _)| **k < 3) {
+                        let term = x.mul(Fraction::new(i128::from(-s[k][axis]), 1));
+                        sum = sum.sub(term);
+                    }
+                    sum
+                }));
+            }
+        }
+        hull
+    }
+
+    fn on_segment(x: &[Fraction; 3], u: &[i32; 3], v: &[i32; 3]) -> bool {
+        let whole = |n: i32| Fraction::new(i128::from(n), 1);
+        let along: Vec<Option<Fraction>> = (0..3)
+            .filter_map(|k| {
+                let offset = x[k].sub(whole(u[k]));
+                match v[k] - u[k] {
+                    0 if offset.0 == 0 => None,
+                    0 => Some(None),
+                    step => Some(Some(offset.div(whole(step)))),
+                }
+            })
+            .collect();
+        let Some(first) = along.first() else {
+            return true;
+        };
+        along.iter().all(|a| a == first)
+            && first.is_some_and(|f| f.0 >= 0 && f.sub(whole(1)).0 <= 0)
+    }
+
+    fn truth(s_ids: [u32; 3], s: &Corners, t_ids: [u32; 3], t: &Corners) -> bool {
+        let shared: Vec<[i32; 3]> = (0..3)
+            .filter(|&k| t_ids.contains(&s_ids[k]))
+            .map(|k| s[k])
+            .collect();
+        common_hull(s, t).iter().any(|x| match shared[..] {
+            [] => true,
+            [v] => !on_segment(x, &v, &v),
+            [u, v] => !on_segment(x, &u, &v),
+            _ => true,
+        })
+    }
+
+    #[test]
+    fn agrees_with_exact_linear_programming_on_integer_triangles() {
+        let mut rng = stream(1, Purpose::Measure);
+        let mut seen = [[0; 2]; 3];
+        for round in 0..9000 {
+            // Small ranges make coplanar, touching and degenerate pairs frequent.
+            let reach = [1, 2, 3, 8][round % 4];
+            let flat = round % 5 == 0;
+            let mut points = [[0i32; 3]; 6];
+            for p in &mut points {
+                for axis in 0..3 {
+                    let fixed = flat && axis == round % 3;
+                    p[axis] = if fixed {
+                        1
+                    } else {
+                        rng.random_range(-reach..=reach)
+                    };
+                }
+            }
+            let shared = round % 3;
+            let s_ids = [0, 1, 2];
+            let mut t_ids = match shared {
+                0 => [3, 4, 5],
+                1 => [3, 1, 5],
+                _ => [2, 4, 0],
+            };
+            t_ids.rotate_left(round % 7 % 3);
+            let of = |ids: [u32; 3]| ids.map(|v| points[v as usize]);
+            let real = |c: Corners| c.map(|p| Vec3::from(p.map(f64::from)));
+            let (s, t) = (of(s_ids), of(t_ids));
+            let expected = truth(s_ids, &s, t_ids, &t);
+            seen[shared][usize::from(expected)] += 1;
+            let found = triangles_intersect(s_ids, &real(s), t_ids, &real(t));
+            assert_eq!(found, expected, "{s:?} {t:?} {t_ids:?}");
+            let found = triangles_intersect(t_ids, &real(t), s_ids, &real(s));
+            assert_eq!(found, expected, "{s:?} {t:?} {t_ids:?} exchanged");
+        }
+        // The sample must hold both answers for every kind of pair.
+        assert!(seen.iter().flatten().all(|count| *count > 60), "{seen:?}");
+    }
+
+    #[test]
+    fn decides_where_rounded_arithmetic_cannot() {
+        // 1 - 2·third is exact for the double nearest to 1/3, so the tip lies in the plane
+        // x + y + z = 1, and its neighbours one unit in the last place above and below it.
+        let t = [Vec3::x(), Vec3::y(), Vec3::z()];
+        let third = 1.0f64 / 3.0;
+        let flat = 1.0 - 2.0 * third;
+        for (z, expected) in [
+            (flat.next_down(), true),
+            (flat, true),
+            (flat.next_up(), false),
+        ] {
+            let spike = [
+                Vec3::new(third, third, z),
+                Vec3::new(2.0, 2.0, 2.0),
+                Vec3::new(3.0, 2.0, 2.0),
+            ];
+            assert_eq!(
+                triangles_intersect([0, 1, 2], &t, [3, 4, 5], &spike),
+                expected
+            );
+        }
+    }
+
+    #[test]
+    fn all_shared_is_an_intersection() {
+        let t = [Vec3::x(), Vec3::y(), Vec3::z()];
+        assert!(triangles_intersect(
+            [0, 1, 2],
+            &t,
+            [2, 1, 0],
+            &[t[2], t[1], t[0]]
+        ));
+    }
+}

@@ -1,0 +1,169 @@
+//! Step one: the mutual tessellation, which has the old vertices and the points.
+//!
+//! Every triangle that carries points is triangulated in its own plane with its three sides
+//! as constraints. No side is split, so neighbours fit and the surface stays the same set of
+//! points; only its triangles become smaller.
+
+use rayon::prelude::*;
+
+use super::TessellateError;
+use super::planar::{PlanarError, constrained_delaunay};
+use crate::geometry::{Vec2, Vec3};
+use crate::retile::SurfacePoint;
+
+/// Smallest barycentric coordinate with which a point enters its triangle's plane: keeps it
+/// off the sides, where rounding could put it on the wrong one.
+const SMALLEST_SHARE: f64 = 1e-6;
+
+/// Triangles flatter than this (height over longest side) are laid out as equilateral ones:
+/// in their own frame rounding would decide.
+const FLATTEST: f64 = 1e-6;
+
+/// The triangles over points (numbered first) and old vertices (numbered behind them).
+pub(super) fn mutual_tessellation(
+    vertices: &[Vec3],
+    triangles: &[[u32; 3]],
+    points: &[SurfacePoint],
+) -> Result<Vec<[u32; 3]>, TessellateError> {
+    let mut carried: Vec<(u32, u32)> = (0..).zip(points).map(|(i, p)| (p.triangle, i)).collect();
+    carried.sort_unstable();
+    let behind = |v: u32| v + points.len() as u32;
+    let mut loaded = vec![false; triangles.len()];
+    for &(t, _) in &carried {
+        loaded[t as usize] = true;
+    }
+    let plain = (0..triangles.len()).filter(|&t| !loaded[t]);
+    let mut all: Vec<[u32; 3]> = plain.map(|t| triangles[t].map(behind)).collect();
+    let groups: Vec<&[(u32, u32)]> = carried.chunk_by(|p, q| p.0 == q.0).collect();
+    let split: Vec<Result<Vec<[u32; 3]>, TessellateError>> = groups
+        .into_par_iter()
+        .map(|group| {
+            let triangle = triangles[group[0].0 as usize];
+            let corners = triangle.map(|v| vertices[v as usize]);
+            let ids: Vec<u32> = group.iter().map(|p| p.1).collect();
+            split_triangle(&corners, &ids, points).map(|parts| {
+                let id = |number: u32| match number {
+                    0..3 => behind(triangle[number as usize]),
+                    _ => ids[number as usize - 3],
+                };
+                parts.into_iter().map(|part| part.map(id)).collect()
+            })
+        })
+        .collect();
+    for parts in split {
+        all.extend(parts?);
+    }
+    Ok(all)
+}
+
+/// The parts of one triangle: 0, 1, 2 are its corners, 3.. the points `ids`.
+fn split_triangle(
+    corners: &[Vec3; 3],
+    ids: &[u32],
+    points: &[SurfacePoint],
+) -> Result<Vec<[u32; 3]>, TessellateError> {
+    let attempt = |frame: [Vec2; 3]| {
+        let mut places = frame.to_vec();
+        places.extend(ids.iter().map(|&id| {
+            let shares = points[id as usize]
+                .barycentric
+                .map(|x| x.max(SMALLEST_SHARE));
+            let [u, v, w] = shares.map(|x| x / shares.iter().sum::<f64>());
+            frame[0] * u + frame[1] * v + frame[2] * w
+        }));
+        constrained_delaunay(&places, 3)
+    };
+    let own = own_frame(corners).map(attempt);
+    match own.unwrap_or(Err(PlanarError::NotSimple)) {
+        Err(PlanarError::NotSimple) => attempt(equilateral()),
+        done => done,
+    }
+    .map_err(|error| match error {
+        PlanarError::Coincident([i, j]) if i >= 3 => TessellateError::CoincidentPoints {
+            points: [ids[i as usize - 3], ids[j as usize - 3]],
+        },
+        // In the equilateral frame every point lies well inside.
+        _ => TessellateError::UnusablePoint { point: ids[0] },
+    })
+}
+
+/// The triangle laid into the plane isometrically but for scale, `None` where it is too flat.
+fn own_frame([a, b, c]: &[Vec3; 3]) -> Option<[Vec2; 3]> {
+    let (ab, ac) = (b - a, c - a);
+    let longest = ab.norm().max(ac.norm()).max((c - b).norm());
+    let base = ab.norm();
+    let doubled_area = ab.cross(&ac).norm();
+    if !(doubled_area > FLATTEST * longest * longest) || !(base > FLATTEST * longest) {
+        return None;
+    }
+    let along = ab.dot(&ac) / base;
+    Some([
+        Vec2::zeros(),
+        Vec2::new(base / longest, 0.0),
+        Vec2::new(along / longest, doubled_area / base / longest),
+    ])
+}
+
+fn equilateral() -> [Vec2; 3] {
+    [[0.0, 0.0], [1.0, 0.0], [0.5, 3f64.sqrt() / 2.0]].map(Vec2::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::samples::scattered;
+    use super::*;
+    use crate::mesh::{TriMesh, shapes, topology};
+
+    #[test]
+    fn keeps_the_surface_and_its_topology() {
+        for (mesh, n) in [
+            (shapes::icosphere(10.0, 0), 500),
+            (shapes::torus(9.0, 3.0, 20, 10), 100),
+            (shapes::cup(60.0, 30.0, 8.0, 24), 40),
+        ] {
+            let before = topology::check(&mesh).unwrap();
+            let points = scattered(&mesh, n, 7);
+            let triangles = mutual_tessellation(&mesh.vertices, &mesh.triangles, &points).unwrap();
+            let mut vertices: Vec<Vec3> = points
+                .iter()
+                .map(|p| p.position(&mesh.vertices, &mesh.triangles))
+                .collect();
+            vertices.extend(&mesh.vertices);
+            let finer = TriMesh {
+                vertices,
+                triangles,
+            };
+            let after = topology::check(&finer).unwrap();
+            assert_eq!(after.euler_characteristic, before.euler_characteristic);
+            assert_eq!(after.vertices, before.vertices + n);
+            assert!((finer.area() / mesh.area() - 1.0).abs() < 1e-12);
+            assert!((finer.volume() / mesh.volume() - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn points_in_one_place_are_named() {
+        let mesh = shapes::tetrahedron(1.0);
+        let point = |w: f64| SurfacePoint {
+            triangle: 2,
+            barycentric: [0.5, 0.5 - w, w],
+        };
+        let points = [point(0.1), point(0.3), point(0.2), point(0.3)];
+        assert_eq!(
+            mutual_tessellation(&mesh.vertices, &mesh.triangles, &points),
+            Err(TessellateError::CoincidentPoints { points: [1, 3] })
+        );
+    }
+
+    #[test]
+    fn slivers_and_points_on_sides_are_carried() {
+        let vertices = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.0, 0.0]].map(Vec3::from);
+        let points =
+            [[0.0, 0.5, 0.5], [1.0, 0.0, 0.0], [0.2, 0.3, 0.5]].map(|barycentric| SurfacePoint {
+                triangle: 0,
+                barycentric,
+            });
+        let parts = mutual_tessellation(&vertices, &[[0, 1, 2]], &points).unwrap();
+        assert_eq!(parts.len(), 7);
+    }
+}

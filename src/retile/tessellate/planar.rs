@@ -1,0 +1,146 @@
+//! Constrained Delaunay triangulation of a simple polygon with points inside, by `spade`.
+
+use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
+
+use crate::geometry::Vec2;
+
+/// Why there is no triangulation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum PlanarError {
+    /// Two of the points have the same position.
+    Coincident([u32; 2]),
+    /// The polygon touches or crosses itself, runs clockwise, or a point is not inside.
+    NotSimple,
+}
+
+/// A point that knows its number, so that results are read by number, never by coordinates.
+struct Site {
+    position: Point2<f64>,
+    number: u32,
+}
+
+impl HasPosition for Site {
+    type Scalar = f64;
+
+    fn position(&self) -> Point2<f64> {
+        self.position
+    }
+}
+
+/// Triangulates the polygon of the first `corners` points (counter-clockwise) with the other
+/// points in its inside: counter-clockwise triples of numbers that index `points`.
+///
+/// The predicates are exact, so the answer is a triangulation of exactly the polygon:
+/// `corners - 2 + 2 * inner` triangles, or an error.
+pub(super) fn constrained_delaunay(
+    points: &[Vec2],
+    corners: usize,
+) -> Result<Vec<[u32; 3]>, PlanarError> {
+    let mut delaunay = ConstrainedDelaunayTriangulation::<Site>::new();
+    let mut handles = Vec::with_capacity(points.len());
+    for (number, p) in (0..).zip(points) {
+        // Spade refuses numbers that are closer to zero than this without being it.
+        let [x, y] = [p.x, p.y].map(|x| if x.abs() < 1e-40 { 0.0 } else { x });
+        let position = Point2::new(x, y);
+        let handle = delaunay
+            .insert(Site { position, number })
+            .map_err(|_| PlanarError::NotSimple)?;
+        if handle.index() < handles.len() {
+            let earlier = handles.iter().position(|h| *h == handle).unwrap_or(0);
+            return Err(PlanarError::Coincident([earlier as u32, number]));
+        }
+        handles.push(handle);
+    }
+    for k in 0..corners {
+        let side = delaunay.try_add_constraint(handles[k], handles[(k + 1) % corners]);
+        if side.len() != 1 {
+            return Err(PlanarError::NotSimple);
+        }
+    }
+    let triangles: Vec<[u32; 3]> = delaunay
+        .inner_faces()
+        .map(|face| face.vertices().map(|v| v.data().number))
+        .filter(|t| is_inside(t, corners))
+        .collect();
+    if triangles.len() + 2 == corners + 2 * (points.len() - corners) {
+        Ok(triangles)
+    } else {
+        Err(PlanarError::NotSimple)
+    }
+}
+
+/// The triangles outside of the polygon, in the pockets of its hull, have corners of the
+/// polygon only, and see them in the opposite order.
+fn is_inside(&[a, b, c]: &[u32; 3], corners: usize) -> bool {
+    let ascents = [a < b, b < c, c < a];
+    let in_order = ascents.iter().filter(|up| **up).count() == 2;
+    in_order || [a, b, c].iter().any(|v| *v as usize >= corners)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::random::{Purpose, stream};
+    use rand::RngExt;
+
+    fn doubled_area([a, b, c]: [Vec2; 3]) -> f64 {
+        (b - a).perp(&(c - a))
+    }
+
+    #[test]
+    fn covers_star_shaped_polygons_exactly_once() {
+        let mut rng = stream(1, Purpose::Measure);
+        for corners in 3..40 {
+            let mut points: Vec<Vec2> = (0..corners)
+                .map(|k| {
+                    let angle = std::f64::consts::TAU * k as f64 / corners as f64;
+                    Vec2::new(angle.cos(), angle.sin()) * rng.random_range(0.3..1.0)
+                })
+                .collect();
+            for _ in 0..corners {
+                points.push(Vec2::new(rng.random(), rng.random()) * 0.05);
+            }
+            let triangles = constrained_delaunay(&points, corners).unwrap();
+            let areas: Vec<f64> = triangles
+                .iter()
+                .map(|t| doubled_area(t.map(|v| points[v as usize])))
+                .collect();
+            assert!(areas.iter().all(|a| *a > 0.0));
+            let polygon: f64 = (0..corners)
+                .map(|k| points[k].perp(&points[(k + 1) % corners]))
+                .sum();
+            assert!((areas.iter().sum::<f64>() - polygon).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn says_what_is_wrong() {
+        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from);
+        let twisted = [square[0], square[2], square[1], square[3]];
+        assert_eq!(
+            constrained_delaunay(&twisted, 4),
+            Err(PlanarError::NotSimple)
+        );
+        let clockwise = [square[3], square[2], square[1], square[0]];
+        assert_eq!(
+            constrained_delaunay(&clockwise, 4),
+            Err(PlanarError::NotSimple)
+        );
+        let touching = [
+            square[0],
+            square[1],
+            square[2],
+            Vec2::new(0.5, 0.0),
+            square[3],
+        ];
+        assert_eq!(
+            constrained_delaunay(&touching, 5),
+            Err(PlanarError::NotSimple)
+        );
+        let twice = [square[0], square[1], square[2], square[3], square[1]];
+        assert_eq!(
+            constrained_delaunay(&twice, 4),
+            Err(PlanarError::Coincident([1, 4]))
+        );
+    }
+}

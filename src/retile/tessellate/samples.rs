@@ -1,0 +1,108 @@
+//! Surfaces and points for the tests of this folder.
+
+use rand::RngExt;
+
+use crate::geometry::Vec3;
+use crate::geometry::random::{Purpose, stream};
+use crate::mesh::{TriMesh, shapes};
+use crate::retile::SurfacePoint;
+
+/// `n` points spread evenly by area, inside of their triangles.
+pub(super) fn scattered(mesh: &TriMesh, n: usize, seed: u64) -> Vec<SurfacePoint> {
+    let mut rng = stream(seed, Purpose::Placement);
+    let mut reached = 0.0;
+    let sums: Vec<f64> = (0..mesh.triangles.len())
+        .map(|t| {
+            reached += mesh.area_normal(t).norm();
+            reached
+        })
+        .collect();
+    (0..n)
+        .map(|_| {
+            let at = rng.random_range(0.0..reached);
+            let triangle = sums.partition_point(|s| *s <= at).min(sums.len() - 1) as u32;
+            let (r, s): (f64, f64) = (rng.random::<f64>().sqrt(), rng.random());
+            let inner = [1.0 - r, r * (1.0 - s), r * s];
+            SurfacePoint {
+                triangle,
+                // A little towards the middle: never on a side.
+                barycentric: inner.map(|x| 0.998 * x + 0.002 / 3.0),
+            }
+        })
+        .collect()
+}
+
+/// Meshes side by side as one.
+pub(super) fn together(parts: &[TriMesh]) -> TriMesh {
+    let mut all = TriMesh::default();
+    for part in parts {
+        let first = all.vertices.len() as u32;
+        all.vertices.extend(&part.vertices);
+        all.triangles
+            .extend(part.triangles.iter().map(|t| t.map(|v| v + first)));
+    }
+    all
+}
+
+/// Genus 2: two tori side by side, joined by a triangular tube.
+pub(super) fn double_torus() -> TriMesh {
+    let (left, mut right) = (
+        shapes::torus(20.0, 8.0, 36, 20),
+        shapes::torus(20.0, 8.0, 36, 20),
+    );
+    for v in &mut right.vertices {
+        v.x += 58.0;
+    }
+    let vertices_left = left.vertices.len() as u32;
+    // The outermost quadrilateral of each: at angle 0, and at half a turn.
+    let (door_left, door_right) = (0, 2 * 20 * 18);
+    let a = left.triangles[door_left];
+    let b = right.triangles[door_right].map(|v| v + vertices_left);
+    let mut mesh = together(&[left.clone(), right]);
+    mesh.triangles.remove(left.triangles.len() + door_right);
+    mesh.triangles.remove(door_left);
+    // The doors face each other, hence run in opposite ways; of three ways to join them the
+    // least twisted one.
+    let at = |v: u32| mesh.vertices[v as usize];
+    let ways = [0, 1, 2].map(|turn| [0, 1, 2].map(|k| b[(turn + 3 - k) % 3]));
+    let twist = |way: &[u32; 3]| -> f64 { (0..3).map(|k| (at(a[k]) - at(way[k])).norm()).sum() };
+    let b = ways
+        .into_iter()
+        .min_by(|s, t| twist(s).total_cmp(&twist(t)))
+        .unwrap();
+    for k in 0..3 {
+        let l = (k + 1) % 3;
+        mesh.triangles
+            .extend([[a[k], a[l], b[l]], [a[k], b[l], b[k]]]);
+    }
+    mesh
+}
+
+/// Every vertex moved by up to `reach` mm along each axis.
+pub(super) fn jittered(mesh: &TriMesh, reach: f64, seed: u64) -> TriMesh {
+    let mut rng = stream(seed, Purpose::PhantomShape);
+    let mut moved = mesh.clone();
+    for v in &mut moved.vertices {
+        *v += Vec3::from_fn(|_, _| rng.random_range(-reach..reach));
+    }
+    moved
+}
+
+/// Scaled along the axes.
+pub(super) fn squeezed(mesh: &TriMesh, scales: [f64; 3]) -> TriMesh {
+    let mut changed = mesh.clone();
+    for v in &mut changed.vertices {
+        v.component_mul_assign(&Vec3::from(scales));
+    }
+    changed
+}
+
+#[test]
+fn the_samples_are_what_they_are_called() {
+    use crate::mesh::{intersections::self_intersections, topology};
+    let census = topology::check(&double_torus()).unwrap();
+    assert_eq!((census.genus(), census.components), (2, 1));
+    assert!(self_intersections(&double_torus()).is_empty());
+    let rough = jittered(&shapes::icosphere(30.0, 3), 0.8, 0);
+    assert!(self_intersections(&rough).is_empty());
+}
