@@ -32,6 +32,8 @@ pub mod deform;
 
 pub mod report;
 
+pub mod evaluate;
+
 pub mod export;
 
 pub mod parameters;

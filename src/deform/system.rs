@@ -52,6 +52,11 @@ impl BlockMatrix {
         &mut self.block[slot]
     }
 
+    /// Takes over the values of a matrix with the same pattern.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.block.copy_from_slice(&other.block);
+    }
+
     /// Adds `weight` times the identity between two nodes as a spring does: + on the two
     /// diagonal blocks, - on the two others.
     pub fn add_spring(&mut self, a: u32, b: u32, weight: f64) {
