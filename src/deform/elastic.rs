@@ -43,10 +43,10 @@ pub struct Stiffness {
 impl Default for Stiffness {
     fn default() -> Self {
         Self {
-            spring: 10.0,
-            torsion: 40.0,
-            body: 20.0,
-            thickness: 0.3,
+            spring: 5.0,
+            torsion: 15.0,
+            body: 12.0,
+            thickness: 0.1,
         }
     }
 }

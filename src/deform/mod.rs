@@ -36,6 +36,10 @@ pub struct DeformParameters {
     pub reach: f64,
     /// Gaussian blur of the image, mm. Default 2.5.
     pub blur: f64,
+    /// The reader's edge against the steepest slope, inner and outer, mm outward.
+    pub shift: [f64; 2],
+    /// Exponent of the sensors' weights.
+    pub contrast: f64,
     /// How the model moves.
     pub motion: Motion,
 }
@@ -48,11 +52,13 @@ impl Default for DeformParameters {
             sensor: SensorKind::Gradient,
             reach: 10.0,
             blur: 2.5,
+            shift: [-0.6, 0.25],
+            contrast: 1.0,
             motion: Motion {
                 mass: 0.5,
                 damping: 1.0,
                 time_step: 1.0,
-                last_reach: 5.0,
+                last_reach: 7.0,
                 narrowing: 0.85,
                 tolerance: 0.03,
                 max_iterations: 60,
@@ -97,6 +103,12 @@ pub fn fit(
         reach: parameters.reach,
         level: 0.5 * localisation.wall,
         ceiling: 1.6 * localisation.wall,
+        contrast: parameters.contrast,
+        shift: sensors::Shift {
+            inner: parameters.shift[0],
+            outer: parameters.shift[1],
+            axis: [cup.base(), cup.base() + cup.axis * (0.6 * cup.length)],
+        },
     };
     let aligned = align::align(
         &posed,

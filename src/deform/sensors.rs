@@ -45,6 +45,42 @@ pub struct Look {
     pub level: f64,
     /// Value above which the image is cut off before its slope is taken.
     pub ceiling: f64,
+    /// Exponent of the weight: below 1 faint edges count more.
+    pub contrast: f64,
+    /// What is added to the offsets.
+    pub shift: Shift,
+}
+
+/// The edge that a reader draws, against the steepest slope of the blurred image, mm
+/// outward. Blur moves the steepest slope of a curved edge towards the centre of curvature:
+/// into the cavity on the inner side, into the wall on the outer one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shift {
+    /// Where the surface faces the long axis.
+    pub inner: f64,
+    /// Where it faces away from it.
+    pub outer: f64,
+    /// Two ends of the axis that the surface is said to face.
+    pub axis: [Vec3; 2],
+}
+
+impl Shift {
+    fn at(&self, place: &Vec3, normal: &Vec3) -> f64 {
+        let along = self.axis[1] - self.axis[0];
+        let length = along.norm_squared();
+        let share = if length > 0.0 {
+            ((place - self.axis[0]).dot(&along) / length).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        let towards = self.axis[0] + along * share - place;
+        let facing = normal.dot(&towards) / towards.norm().max(f64::MIN_POSITIVE);
+        if facing > 0.0 {
+            self.inner * facing
+        } else {
+            -self.outer * facing
+        }
+    }
 }
 
 /// One sensor's answer.
@@ -106,6 +142,7 @@ pub fn read(mesh: &TriMesh, field: &Field, look: &Look) -> Vec<Reading> {
                 .try_normalize(0.0)
                 .unwrap_or_else(Vec3::zeros);
             let (offset, score) = profile.look(field, &place, &normal);
+            let offset = offset + look.shift.at(&place, &normal);
             scores.push(score);
             readings.push(Reading {
                 place,
@@ -120,7 +157,7 @@ pub fn read(mesh: &TriMesh, field: &Field, look: &Look) -> Vec<Reading> {
     let strong = scores[scores.len() * 9 / 10];
     for r in &mut readings {
         r.weight = if strong > 0.0 {
-            (r.weight / strong).min(1.0)
+            (r.weight / strong).min(1.0).powf(look.contrast)
         } else {
             0.0
         };
@@ -133,7 +170,7 @@ struct Profile {
     look: Look,
     half: usize,
     values: Vec<f64>,
-    scores: Vec<f64>,
+    slopes: Vec<f64>,
 }
 
 impl Profile {
@@ -142,7 +179,7 @@ impl Profile {
             look: *look,
             half: (look.reach / STEP).ceil().max(1.0) as usize,
             values: Vec::new(),
-            scores: Vec::new(),
+            slopes: Vec::new(),
         }
     }
 
@@ -160,24 +197,30 @@ impl Profile {
             return self.crossing(reach);
         }
         let spread = 2.0 * (self.look.reach / 2.0).powi(2);
-        self.scores.clear();
-        self.scores.extend((0..=2 * self.half).map(|s| {
+        self.slopes.clear();
+        self.slopes.extend((0..=2 * self.half).map(|s| {
             let slope = (self.values[s] - self.values[s + 2 * HALF]) / (2.0 * HALF as f64 * STEP);
-            let slope = match self.look.kind {
+            match self.look.kind {
                 SensorKind::Unsigned => slope.abs(),
                 _ => slope.max(0.0),
-            };
-            let t = (s as f64 - self.half as f64) * STEP;
-            slope * (-t * t / spread).exp()
+            }
         }));
+        let score = |s: usize| {
+            let t = (s as f64 - self.half as f64) * STEP;
+            self.slopes[s] * (-t * t / spread).exp()
+        };
         let mut best = 0;
-        for s in 1..self.scores.len() {
-            if self.scores[s] > self.scores[best] {
+        for s in 1..self.slopes.len() {
+            if score(s) > score(best) {
                 best = s;
             }
         }
-        let offset = best as f64 - self.half as f64 + parabola(&self.scores, best);
-        (offset * STEP, self.scores[best])
+        let seen = score(best);
+        // The Gaussian has chosen the hill, but it also pulls the summit towards the sensor:
+        // climb on the slope itself.
+        let top = climb(&self.slopes, best);
+        let offset = top as f64 - self.half as f64 + parabola(&self.slopes, top);
+        (offset * STEP, seen)
     }
 
     /// The nearest outward fall through the level.
@@ -198,6 +241,25 @@ impl Profile {
             t * STEP,
             slope / STEP * (-t * STEP * t * STEP / spread).exp(),
         )
+    }
+}
+
+/// The local maximum above `start`.
+fn climb(values: &[f64], start: usize) -> usize {
+    let mut top = start;
+    loop {
+        let right = (top + 1).min(values.len() - 1);
+        let left = top.saturating_sub(1);
+        let next = if values[right] > values[left] {
+            right
+        } else {
+            left
+        };
+        if values[next] > values[top] {
+            top = next;
+        } else {
+            return top;
+        }
     }
 }
 
