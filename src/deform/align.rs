@@ -97,8 +97,6 @@ impl Basis {
             matrix += row * row.transpose() * weight;
             rhs += row * (weight * r.offset);
         }
-        matrix
-            .cholesky()
-            .map_or_else(Row::zeros, |c| c.solve(&rhs))
+        matrix.cholesky().map_or_else(Row::zeros, |c| c.solve(&rhs))
     }
 }

@@ -65,9 +65,9 @@ const OUTSIDE: f64 = 0.25;
 /// The samples outside lie this far from the middle of the wall, mm.
 const CLEARANCE: f64 = 17.0;
 
-impl Pattern {
+impl Default for Pattern {
     /// Lays the samples out.
-    pub fn new() -> Self {
+    fn default() -> Self {
         let mut samples = Vec::new();
         for (row, &(along, across, count)) in MIDDLE.iter().enumerate() {
             let at = Sample {
@@ -162,8 +162,8 @@ impl Cup {
             let along = s.along * self.length + s.outward * s.tilt.1;
             let across = s.across * self.length * self.breadth + s.outward * s.tilt.0;
             let (sin, cos) = s.angle.sin_cos();
-            let value =
-                field.at_index(&(centre + axis * along + e1 * (across * cos) + e2 * (across * sin)));
+            let value = field
+                .at_index(&(centre + axis * along + e1 * (across * cos) + e2 * (across * sin)));
             scratch.push(value);
             if s.expected == 1.0 {
                 wall += s.weight * value;

@@ -50,20 +50,35 @@ impl StopReason {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     /// Mass of the whole model against a sensor force of 1 per mm, in units of dt². Default
-    /// 0.5.
+    /// 0.1.
     pub mass: f64,
     /// Damping, 1/dt. Default 1.
     pub damping: f64,
     /// Step length. Default 1.
     pub time_step: f64,
-    /// Reach of the sensors at the end, mm. Default 5.
+    /// Reach of the sensors at the end, mm. Default 6.
     pub last_reach: f64,
     /// Factor of the reach from step to step. Default 0.85.
     pub narrowing: f64,
-    /// Largest move of a node that counts as rest, mm.
+    /// Largest move of a node that counts as rest, mm. Default 0.04, a hundredth of a
+    /// usual voxel.
     pub tolerance: f64,
     /// Limit of steps. Default 100.
     pub max_iterations: usize,
+}
+
+impl Default for Motion {
+    fn default() -> Self {
+        Self {
+            mass: 0.1,
+            damping: 1.0,
+            time_step: 1.0,
+            last_reach: 6.0,
+            narrowing: 0.85,
+            tolerance: 0.04,
+            max_iterations: 100,
+        }
+    }
 }
 
 /// How the motion went.
@@ -77,7 +92,7 @@ pub struct Moved {
     pub iterations: usize,
     /// Largest move in the last step, mm.
     pub last_move: f64,
-    /// Energy (elastic and sensors) after each step, mm².
+    /// Energy (elastic, sensors, motion) before each step, mm².
     pub energy: Vec<f64>,
     /// What the sensors see at the end.
     pub readings: Vec<Reading>,
@@ -96,6 +111,7 @@ pub fn run(
     monitor: &Monitor,
 ) -> Result<Moved, Cancelled> {
     let mut state = State::new(start, body, motion);
+    let mut memory = Memory::default();
     let mut reach = look.reach;
     let mut energies: Vec<f64> = Vec::new();
     let mut lowest = (f64::INFINITY, 0);
@@ -103,15 +119,17 @@ pub fn run(
     let mut last_move = f64::INFINITY;
     for _ in 0..motion.max_iterations {
         monitor.check()?;
-        let readings = sensors::read(&state.mesh, field, &Look { reach, ..*look });
-        let energy = body.energy(&state.mesh.vertices) + sensor_energy(&readings);
+        let mut readings = sensors::read(&state.mesh, field, &Look { reach, ..*look });
+        let settled = reach <= motion.last_reach;
+        memory.mix(&mut readings, settled);
+        let energy =
+            body.energy(&state.mesh.vertices) + sensor_energy(&readings) + state.kinetic_energy();
         energies.push(energy);
         let Some(farthest) = state.step(body, motion, &readings) else {
             reason = StopReason::Diverged;
             break;
         };
         last_move = farthest;
-        let settled = reach <= motion.last_reach;
         reach = (reach * motion.narrowing).max(motion.last_reach);
         if settled && farthest < motion.tolerance {
             reason = StopReason::Converged;
@@ -134,6 +152,31 @@ pub fn run(
         energy: energies,
         readings,
     })
+}
+
+/// What the sensors have said so far. Noise lets some of them waver between two edges for
+/// ever; once the reach has come to its end, each new answer therefore counts less than the
+/// one before it (1, 1/2, 1/3, ...: the mean of all answers), and the model can come to rest.
+#[derive(Default)]
+struct Memory {
+    answers: Vec<(Vec3, f64)>,
+    count: usize,
+}
+
+impl Memory {
+    fn mix(&mut self, readings: &mut [Reading], settled: bool) {
+        self.count = if settled { self.count + 1 } else { 1 };
+        let share = 1.0 / self.count as f64;
+        if self.answers.is_empty() {
+            self.answers = vec![(Vec3::zeros(), 0.0); readings.len()];
+        }
+        for (r, (edge, weight)) in readings.iter_mut().zip(&mut self.answers) {
+            *edge += (r.place + r.normal * r.offset - *edge) * share;
+            *weight += (r.weight - *weight) * share;
+            r.offset = r.normal.dot(&(*edge - r.place));
+            r.weight = *weight;
+        }
+    }
 }
 
 fn sensor_energy(readings: &[Reading]) -> f64 {
@@ -179,6 +222,11 @@ impl State {
             slots,
             origin: start.vertices.clone(),
         }
+    }
+
+    fn kinetic_energy(&self) -> f64 {
+        let pairs = self.velocity.iter().zip(&self.masses);
+        pairs.map(|(v, m)| 0.5 * m * v.norm_squared()).sum()
     }
 
     /// One step; the largest move, or `None` (and no step) where it leads nowhere sound.

@@ -30,13 +30,13 @@ use crate::mesh::TriMesh;
 /// Stiffness of each kind of force.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stiffness {
-    /// k_s, mm². Default 10.
+    /// k_s, mm². Default 5.
     pub spring: f64,
-    /// k_t, mm². Default 40.
+    /// k_t, mm². Default 15.
     pub torsion: f64,
-    /// k_b, mm². Default 20.
+    /// k_b, mm². Default 12.
     pub body: f64,
-    /// k_w. Default 0.3.
+    /// k_w. Default 0.1.
     pub thickness: f64,
 }
 
@@ -47,6 +47,18 @@ impl Default for Stiffness {
             torsion: 15.0,
             body: 12.0,
             thickness: 0.1,
+        }
+    }
+}
+
+impl Stiffness {
+    /// Everything `factor` times as stiff.
+    pub fn times(self, factor: f64) -> Self {
+        Self {
+            spring: self.spring * factor,
+            torsion: self.torsion * factor,
+            body: self.body * factor,
+            thickness: self.thickness * factor,
         }
     }
 }
@@ -108,11 +120,6 @@ impl Elastic {
         self.edges.iter().copied().chain(struts)
     }
 
-    /// Multiplies the struts' stiffness.
-    pub fn stiffen_struts(&mut self, factor: f64) {
-        self.stiffness.thickness *= factor;
-    }
-
     /// The constant matrix of the quadratic form.
     pub fn add_matrix(&self, matrix: &mut BlockMatrix) {
         let k = self.stiffness;
@@ -167,6 +174,20 @@ impl Elastic {
             energy += 0.5 * k.thickness * strut.share * ((b - a).norm() - length).powi(2);
         }
         energy
+    }
+
+    /// Mean squared strain of the edges against directions turned as a whole.
+    pub fn strain(&self, positions: &[Vec3]) -> f64 {
+        let body = self.body_frame(positions);
+        let squared: f64 = self
+            .edges
+            .iter()
+            .zip(&self.directions)
+            .map(|([a, b], d)| {
+                (positions[*b as usize] - positions[*a as usize] - body * d).norm_squared()
+            })
+            .sum();
+        squared * self.unit
     }
 
     /// The force on every node: the negative gradient of the energy.

@@ -116,7 +116,7 @@ pub fn localise(
     if places.is_empty() {
         return Err(LocaliseError::HintOutside);
     }
-    let pattern = Pattern::new();
+    let pattern = Pattern::default();
     let search = Search {
         field: &field,
         pattern: &pattern,
@@ -140,7 +140,7 @@ pub fn localise(
 
 /// Moves `cup` to the nearest best agreement with `field`.
 pub fn refine(field: &Field, cup: &Cup) -> Localisation {
-    let pattern = Pattern::new();
+    let pattern = Pattern::default();
     let search = Search {
         field,
         pattern: &pattern,
@@ -374,9 +374,7 @@ const REACH: f64 = 33.0 + 17.0;
 impl Padded {
     fn new(field: &Field) -> Self {
         let inner = field.shape();
-        let margin = [0, 1, 2].map(|a| {
-            (REACH / field.spacing()[a] * 1.5).ceil() as usize + 1
-        });
+        let margin = [0, 1, 2].map(|a| (REACH / field.spacing()[a] * 1.5).ceil() as usize + 1);
         let shape = [0, 1, 2].map(|a| inner[a] + 2 * margin[a]);
         let clamped = |x: usize, a: usize| x.saturating_sub(margin[a]).min(inner[a] - 1);
         let mut values = Vec::with_capacity(shape.iter().product());

@@ -45,8 +45,6 @@ pub struct Look {
     pub level: f64,
     /// Value above which the image is cut off before its slope is taken.
     pub ceiling: f64,
-    /// Exponent of the weight: below 1 faint edges count more.
-    pub contrast: f64,
     /// What is added to the offsets.
     pub shift: Shift,
 }
@@ -157,7 +155,7 @@ pub fn read(mesh: &TriMesh, field: &Field, look: &Look) -> Vec<Reading> {
     let strong = scores[scores.len() * 9 / 10];
     for r in &mut readings {
         r.weight = if strong > 0.0 {
-            (r.weight / strong).min(1.0).powf(look.contrast)
+            (r.weight / strong).min(1.0)
         } else {
             0.0
         };

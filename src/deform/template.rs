@@ -148,7 +148,11 @@ fn cup_of(mesh: &TriMesh, monitor: &Monitor) -> Result<Cup, TemplateError> {
     let mask = voxelise(mesh, shape, &frame);
     let picture = Volume {
         shape,
-        voxels: mask.voxels.iter().map(|v| f32::from(u8::from(*v))).collect(),
+        voxels: mask
+            .voxels
+            .iter()
+            .map(|v| f32::from(u8::from(*v)))
+            .collect(),
         frame,
         integral: false,
     };
@@ -190,10 +194,8 @@ impl Pose {
                     std::f64::consts::PI,
                 )
             });
-        let about = nalgebra::Rotation3::from_axis_angle(
-            &nalgebra::Unit::new_normalize(to.axis),
-            roll,
-        );
+        let about =
+            nalgebra::Rotation3::from_axis_angle(&nalgebra::Unit::new_normalize(to.axis), roll);
         Self {
             from: *from,
             to: *to,

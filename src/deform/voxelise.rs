@@ -205,7 +205,10 @@ mod tests {
     #[test]
     fn a_mesh_beyond_the_grid_is_cut_off() {
         let mut mesh = shapes::icosphere(60.0, 2);
-        assert_eq!(voxelise(&mesh, [40, 41, 42], &frame()).count(), 40 * 41 * 42);
+        assert_eq!(
+            voxelise(&mesh, [40, 41, 42], &frame()).count(),
+            40 * 41 * 42
+        );
         mesh.vertices.iter_mut().for_each(|p| p.x += 500.0);
         assert_eq!(voxelise(&mesh, [40, 41, 42], &frame()).count(), 0);
     }

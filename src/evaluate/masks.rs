@@ -98,13 +98,12 @@ fn contour_distances(a: &Mask, b: &Mask, spacing: [f64; 3]) -> ContourDistances 
         (d[0].iter().sum::<f64>() + d[1].iter().sum::<f64>()) / (d[0].len() + d[1].len()) as f64
     };
     let mut mm = distances(spacing);
-    let result = ContourDistances {
+    ContourDistances {
         mean_voxels: mean(&distances([1.0; 3])),
         mean_mm: mean(&mm),
         hausdorff_mm: mm.iter().flatten().fold(0.0, |a, b| a.max(*b)),
         hausdorff95_mm: mm.iter_mut().map(|d| quantile(d, 0.95)).fold(0.0, f64::max),
-    };
-    result
+    }
 }
 
 /// The q-quantile by linear interpolation between order statistics.
@@ -242,8 +241,7 @@ mod tests {
     #[test]
     fn two_cubes_one_voxel_apart_by_hand() {
         // Cubes of 3³ voxels, the second moved by one voxel along i. Common 2·9 = 18, union
-        // 36. All but the centre voxel are contour: 26 each. 17 contour voxels of A also
-        // are contour voxels of B, or 26 - 9 = 17 lie in B of which one is B's centre.
+        // 36. All but the centre voxel are contour: 26 each.
         let a = mask([9, 9, 9], |i, j, k| {
             (3..6).contains(&i) && (3..6).contains(&j) && (3..6).contains(&k)
         });
@@ -254,8 +252,8 @@ mod tests {
         assert_eq!(m.jaccard, 0.5);
         assert!((m.dice - 36.0 / 54.0).abs() < 1e-15);
         let c = m.contours.unwrap();
-        // Nine voxels of A's outer face lie one voxel from B, one voxel of A coincides with
-        // B's centre (one from its contour); the other way round likewise.
+        // The nine voxels of A's outer face lie one voxel from B's contour, and so does the one
+        // voxel of A's contour that is B's centre; the rest is common. Likewise for B.
         assert!((c.mean_voxels - 20.0 / 52.0).abs() < 1e-12);
         assert!((c.mean_mm - 40.0 / 52.0).abs() < 1e-12);
         assert_eq!((c.hausdorff_mm, c.hausdorff95_mm), (2.0, 2.0));
