@@ -157,7 +157,7 @@ impl Cup {
         let centre = field.to_index(&self.centre);
         let (axis, e1, e2) = (field.step(&self.axis), field.step(&e1), field.step(&e2));
         scratch.clear();
-        let (mut wall, mut wall_weight) = (0.0, 0.0);
+        let (mut wall, mut cavity) = (Mean::default(), Mean::default());
         for s in &pattern.0 {
             let along = s.along * self.length + s.outward * s.tilt.1;
             let across = s.across * self.length * self.breadth + s.outward * s.tilt.0;
@@ -166,11 +166,12 @@ impl Cup {
                 .at_index(&(centre + axis * along + e1 * (across * cos) + e2 * (across * sin)));
             scratch.push(value);
             if s.expected == 1.0 {
-                wall += s.weight * value;
-                wall_weight += s.weight;
+                wall.add(s.weight, value);
+            } else if s.expected == CAVITY {
+                cavity.add(s.weight, value);
             }
         }
-        let wall = wall / wall_weight;
+        let wall = wall.value();
         let cap = 1.3 * wall;
         let mut m = Moments::default();
         for (s, value) in pattern.0.iter().zip(scratch.iter()) {
@@ -179,7 +180,26 @@ impl Cup {
         Match {
             correlation: m.correlation(),
             wall,
+            hollowness: 1.0 - cavity.value() / wall,
         }
+    }
+}
+
+/// A weighted mean on the way.
+#[derive(Default)]
+struct Mean {
+    sum: f64,
+    weight: f64,
+}
+
+impl Mean {
+    fn add(&mut self, weight: f64, value: f64) {
+        self.sum += weight * value;
+        self.weight += weight;
+    }
+
+    fn value(&self) -> f64 {
+        self.sum / self.weight
     }
 }
 
@@ -190,6 +210,8 @@ pub struct Match {
     pub correlation: f64,
     /// Mean value along the middle of the wall.
     pub wall: f64,
+    /// How much darker the cavity is than the wall: 0 for a solid body, 1 for an empty one.
+    pub hollowness: f64,
 }
 
 /// Running weighted sums of two variables.

@@ -39,6 +39,8 @@ pub struct Localisation {
     pub correlation: f64,
     /// Mean value of the wall's middle in the image's unit.
     pub wall: f64,
+    /// How much darker the cavity is than the wall, 0..=1.
+    pub hollowness: f64,
     /// The best correlation at a place more than 25 mm away, if there was a candidate.
     pub runner_up: Option<f64>,
     /// 0 (a guess) to 1.
@@ -53,8 +55,9 @@ pub enum LocaliseError {
     Blank,
     /// No place looks like a ventricle.
     #[error(
-        "no heart found: the best candidate, at {centre:?} mm (LPS), correlates {correlation:.2} \
-         with a ventricle's wall; at least {needed:.2} is needed. Give a centre to overrule"
+        "no heart found: the best candidate, at {centre:.0?} mm (LPS), correlates \
+         {correlation:.2} with a ventricle's wall ({needed:.2} is needed) and is hollow by \
+         {hollowness:.2} (0.1 is needed). Give a centre to overrule"
     )]
     NoHeart {
         /// Best candidate's centre, LPS mm.
@@ -63,6 +66,8 @@ pub enum LocaliseError {
         correlation: f64,
         /// The least correlation that is believed.
         needed: f64,
+        /// 1 - cavity / wall.
+        hollowness: f64,
     },
     /// The hints leave no place to search.
     #[error("the hinted centre or region lies outside the volume")]
@@ -93,6 +98,8 @@ const STARTS: usize = 40;
 const DISTINCT: f64 = 25.0;
 /// Below this correlation nothing is called a heart.
 const NEEDED: f64 = 0.45;
+/// Below this hollowness a body counts as solid.
+const SOLID: f64 = 0.1;
 
 /// Searches `volume` for the left ventricle.
 ///
@@ -157,6 +164,7 @@ struct Scored {
     score: f64,
     correlation: f64,
     wall: f64,
+    hollowness: f64,
 }
 
 struct Search<'a> {
@@ -172,6 +180,9 @@ impl Search<'_> {
         let length = ((cup.length / USUAL_LENGTH.0).ln() / USUAL_LENGTH.1).powi(2);
         let breadth = (cup.breadth.ln() / 0.15).powi(2);
         let mut score = found.correlation - 0.015 * (length + breadth);
+        // A solid body also stands out from its surroundings; a ventricle is hollow. NaN
+        // (nothing there) is no body at all.
+        score -= 1.5 * (SOLID - found.hollowness.max(-1.0)).max(0.0);
         match &self.hints.axis {
             Some(axis) => {
                 let cos = cup.axis.dot(axis) / axis.norm();
@@ -190,6 +201,7 @@ impl Search<'_> {
             score,
             correlation: found.correlation,
             wall: found.wall,
+            hollowness: found.hollowness,
         }
     }
 
@@ -239,11 +251,12 @@ impl Search<'_> {
         let Some(best) = found.first() else {
             return Err(LocaliseError::HintOutside);
         };
-        if best.correlation < NEEDED && self.hints.centre.is_none() {
+        if (best.correlation < NEEDED || best.hollowness < SOLID) && self.hints.centre.is_none() {
             return Err(LocaliseError::NoHeart {
                 centre: best.cup.centre.into(),
                 correlation: best.correlation,
                 needed: NEEDED,
+                hollowness: best.hollowness,
             });
         }
         let elsewhere = found
@@ -259,6 +272,7 @@ impl Search<'_> {
             cup: best.cup,
             correlation: best.correlation,
             wall: best.wall,
+            hollowness: best.hollowness,
             runner_up: elsewhere.map(|e| e.correlation),
             confidence: quality * (0.4 + 0.6 * margin),
         }
