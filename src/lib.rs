@@ -30,6 +30,8 @@ pub mod optimise;
 
 pub mod deform;
 
+pub mod polar;
+
 pub mod report;
 
 pub mod evaluate;

@@ -1,5 +1,8 @@
 //! The spring-mass fit against shapes whose answer is known.
 
+// Helpers of a test state their expectations by panicking, as tests do.
+#![allow(clippy::unwrap_used)]
+
 use nalgebra::Rotation3;
 use ventriform::deform::dynamics::{self, Motion, StopReason};
 use ventriform::deform::elastic::{Elastic, Stiffness, struts};
