@@ -40,3 +40,11 @@ pub mod export;
 
 pub mod parameters;
 pub mod pipeline;
+
+pub mod cli;
+
+pub mod jobs;
+
+pub mod store;
+
+pub mod config;

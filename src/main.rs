@@ -1,3 +1,7 @@
 //! The `ventriform` command.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    ventriform::cli::main()
+}

@@ -1,3 +1,201 @@
 //! A volume's way through every stage.
 //!
-//! STUB.
+//! [`generate`] reads, surfaces, re-tiles, optimises and measures: the stage calls in order,
+//! nothing else. The stages guarantee what they hand on; the last look is
+//! [`Report::is_sound`], and a model that is not sound is an error, never a result.
+
+use crate::export::Metadata;
+use crate::mesh::TriMesh;
+use crate::optimise::{self, OptimiseError, Reference};
+use crate::parameters::ModelParameters;
+use crate::progress::{Cancelled, Monitor, Stage};
+use crate::report::{self, MeasureParameters, Report, ReportInput};
+use crate::retile::{self, RetileError};
+use crate::surface::{self, SurfaceError};
+use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeFile};
+
+/// A finished model.
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// Exactly N vertices, LPS millimetres, closed, facing outward.
+    pub mesh: TriMesh,
+    /// The iso-surface that it stands for.
+    pub reference: TriMesh,
+    /// What it is worth.
+    pub report: Report,
+}
+
+impl Model {
+    /// What a mesh file says of the model besides the mesh.
+    pub fn metadata(&self) -> Metadata {
+        Metadata {
+            quality: self.report.quality_summary(),
+            ..Metadata::new("Left ventricle")
+        }
+    }
+
+    /// The report as a self-contained page.
+    pub fn report_html(&self) -> String {
+        report::html(&self.report, &self.mesh, Some(&self.reference))
+    }
+}
+
+/// Which stage failed, and why.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PipelineError {
+    /// The files hold no usable volume.
+    #[error(transparent)]
+    Volume(VolumeError),
+    /// The volume has no usable surface.
+    #[error(transparent)]
+    Surface(SurfaceError),
+    /// The surface cannot be re-tiled as asked.
+    #[error(transparent)]
+    Retile(RetileError),
+    /// The mesh cannot be optimised.
+    #[error(transparent)]
+    Optimise(OptimiseError),
+    /// The model broke a promise; it is withheld.
+    #[error("the model is not sound: {}", doubts.join(" "))]
+    Unsound {
+        /// What is wrong with it, in sentences.
+        doubts: Vec<String>,
+    },
+    /// The caller asked for an end.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl PipelineError {
+    /// Whether the work ended because it was asked to, in whichever stage.
+    pub fn is_cancelled(&self) -> bool {
+        matches!(
+            self,
+            PipelineError::Cancelled(_)
+                | PipelineError::Volume(VolumeError::Cancelled(_))
+                | PipelineError::Surface(SurfaceError::Cancelled(_))
+                | PipelineError::Retile(RetileError::Cancelled(_))
+                | PipelineError::Optimise(OptimiseError::Cancelled(_))
+        )
+    }
+
+    /// The parameter, or the field of the file, that the error is about.
+    pub fn field(&self) -> Option<&'static str> {
+        match self {
+            PipelineError::Volume(e) => e.field(),
+            PipelineError::Surface(e) => e.field(),
+            PipelineError::Retile(RetileError::Cancelled(_)) => None,
+            PipelineError::Retile(_) => Some("points"),
+            _ => None,
+        }
+    }
+
+    /// What the caller can do about it.
+    pub fn fix(&self) -> String {
+        match self {
+            PipelineError::Volume(e) => e.fix(),
+            PipelineError::Surface(e) => e.fix(),
+            PipelineError::Retile(e) => e.fix(),
+            PipelineError::Optimise(_) | PipelineError::Unsound { .. } => {
+                "Try another `seed`, more `points`, or `topology=genus0`.".into()
+            }
+            PipelineError::Cancelled(_) => "Ask again if the result is still wanted.".into(),
+        }
+    }
+}
+
+/// Makes a model of the volume in `files`.
+///
+/// # Errors
+/// See [`PipelineError`].
+pub fn generate(
+    files: &[VolumeFile],
+    parameters: &ModelParameters,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Model, PipelineError> {
+    let start = monitor.now_ms();
+    let options = ReadOptions {
+        frame: parameters.frame,
+    };
+    let reading = volume::read(files, &options, limits, monitor).map_err(PipelineError::Volume)?;
+    let read_ms = monitor.now_ms() - start;
+    from_reading(&reading, parameters, read_ms, monitor)
+}
+
+/// Makes a model of a volume in memory; `read_ms` is what reading took, for the report.
+///
+/// # Errors
+/// See [`PipelineError`].
+pub fn from_reading(
+    reading: &Reading,
+    parameters: &ModelParameters,
+    read_ms: f64,
+    monitor: &Monitor,
+) -> Result<Model, PipelineError> {
+    let mut laps = Laps::new(read_ms, monitor);
+    let surface = surface::extract(&reading.volume, &parameters.surface, monitor)
+        .map_err(PipelineError::Surface)?;
+    laps.end(Stage::Surface);
+    let tiled =
+        retile::retile(&surface, &parameters.retile, monitor).map_err(PipelineError::Retile)?;
+    laps.end(Stage::Retile);
+    let reference = Reference::new(&surface);
+    let optimised = optimise::optimise(&tiled, &reference, &parameters.optimise, monitor)
+        .map_err(PipelineError::Optimise)?;
+    laps.end(Stage::Optimise);
+    let measures = report::measure(
+        &optimised.mesh,
+        &reference,
+        &MeasureParameters::default(),
+        monitor,
+    )?;
+    laps.end(Stage::Report);
+    let mut report = Report::new(ReportInput {
+        input: report::input(&reading.facts),
+        parameters: parameters.to_json(),
+        surface: &surface,
+        tiled: &tiled,
+        optimised: &optimised,
+        optimise_parameters: &parameters.optimise,
+        measures,
+        timings_ms: laps.times,
+    });
+    if !report.is_sound() {
+        return Err(PipelineError::Unsound {
+            doubts: report.warnings,
+        });
+    }
+    report
+        .warnings
+        .splice(0..0, reading.facts.warnings.iter().cloned());
+    Ok(Model {
+        mesh: optimised.mesh,
+        reference: surface.mesh,
+        report,
+    })
+}
+
+/// Times of the stages by the observer's clock.
+struct Laps<'a, 'b> {
+    monitor: &'a Monitor<'b>,
+    last: f64,
+    times: Vec<(String, f64)>,
+}
+
+impl<'a, 'b> Laps<'a, 'b> {
+    fn new(read_ms: f64, monitor: &'a Monitor<'b>) -> Self {
+        Self {
+            monitor,
+            last: monitor.now_ms(),
+            times: vec![(Stage::Read.as_str().to_owned(), read_ms)],
+        }
+    }
+
+    fn end(&mut self, stage: Stage) {
+        let now = self.monitor.now_ms();
+        self.times
+            .push((stage.as_str().to_owned(), now - self.last));
+        self.last = now;
+    }
+}

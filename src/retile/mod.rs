@@ -2,6 +2,11 @@
 //!
 //! STUB: the owner of this folder writes the module page.
 
+mod cells;
+mod dual;
+mod refined;
+mod samples;
+mod sizing;
 pub mod tessellate;
 
 use crate::geometry::Vec3;
@@ -120,14 +125,30 @@ pub enum RetileError {
     },
 }
 
+impl RetileError {
+    /// What the caller can do about it.
+    pub fn fix(&self) -> String {
+        match self {
+            RetileError::Cancelled(_) => "Ask again if the result is still wanted.".into(),
+            RetileError::TooFewPoints { needed, .. } => {
+                format!("Set `points` to {needed} or more, or `topology` to genus0.")
+            }
+            RetileError::TooManyPoints { limit, .. } => {
+                format!("Set `points` to {limit} or fewer.")
+            }
+        }
+    }
+}
+
 /// Re-tiles `surface`.
 ///
 /// # Errors
 /// See [`RetileError`].
 pub fn retile(
-    _surface: &Surface,
-    _parameters: &RetileParameters,
-    _monitor: &Monitor,
+    surface: &Surface,
+    parameters: &RetileParameters,
+    monitor: &Monitor,
 ) -> Result<Tiled, RetileError> {
-    Err(RetileError::Cancelled(Cancelled))
+    monitor.report(crate::progress::Stage::Retile, 0.0)?;
+    refined::retile(surface, parameters, monitor)
 }

@@ -1,6 +1,46 @@
 //! A reconstructed volume: voxels and the map that puts them into the patient.
 //!
-//! STUB: the owner of this folder writes the module page.
+//! In go files as a scanner, a workstation or a colleague wrote them; out come voxel values as
+//! `f32`, an invertible map from voxel indices to LPS millimetres, and the [`VolumeFacts`] that
+//! tell a person what was understood of the file. The way of a file:
+//!
+//! 1. `source`: opened, unpacked where gzipped (several members too), every byte counted
+//!    against the limits;
+//! 2. `recognise`: told by its content, never by its name;
+//! 3. [`nifti`] or `dicom`: header checked field by field;
+//! 4. `decode`: the voxels, in portions, straight into their final place;
+//! 5. `summary`: what values there are, and whether they look like labels.
+//!
+//! Guaranteed: a file gives the values and positions that its standard assigns to them, or an
+//! error naming field and value. No size that a file states is believed before the file has
+//! shown that it can hold it; memory beyond the voxels themselves stays under a mebibyte.
+//! Not guaranteed: that the file's own statement about the patient is true. Contradictions
+//! inside a file are told as warnings.
+//!
+//! [`phantom`] makes volumes of known truth, [`nifti::write()`] puts volumes into files, and
+//! [`preview`] draws them.
+
+mod decode;
+mod dicom;
+pub mod error;
+pub mod facts;
+pub mod nifti;
+pub mod phantom;
+pub mod preview;
+mod read;
+mod recognise;
+mod source;
+mod summary;
+
+pub use error::VolumeError;
+pub use facts::{
+    AffineSource, ByteOrder, Format, IntensitySummary, LabelCount, LengthUnit, VolumeFacts,
+};
+pub use phantom::{Phantom, PhantomParameters, phantom};
+pub use preview::{GrayImage, preview, preview_png};
+pub use read::{ReadLimits, ReadOptions, Reading, inspect, read};
+pub use source::VolumeFile;
+pub use summary::summarise;
 
 use crate::geometry::frame::VoxelToPatient;
 
@@ -12,12 +52,11 @@ pub struct Volume {
     /// Number of voxels along i, j, k; each at least 1.
     pub shape: [usize; 3],
     /// The values, `shape[0] * shape[1] * shape[2]` of them, slope and intercept applied.
-    /// May hold NaN where the file does.
+    /// Never infinite; NaN where the file has no number.
     pub voxels: Vec<f32>,
     /// Voxel index to LPS millimetres.
     pub frame: VoxelToPatient,
-    /// Whether the file's data type was an integer one and no slope made fractions of it: a
-    /// candidate for a label map.
+    /// Whether every value that is a number is a whole one: a candidate for a label map.
     pub integral: bool,
 }
 

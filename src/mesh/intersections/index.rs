@@ -1,8 +1,8 @@
 //! Triangles that change, and the question whether one more would pierce them.
 
 use super::pair::triangles_intersect;
-use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
+use crate::geometry::{Vec3, triangle};
 
 /// Most cells of the grid along one axis: bounds the memory of odd shapes.
 const MOST_CELLS: f64 = 128.0;
@@ -63,7 +63,7 @@ impl IntersectionIndex {
     pub fn set(&mut self, t: u32, ids: [u32; 3], corners: [Vec3; 3]) {
         self.remove(t);
         let aabb = Aabb::of(&corners);
-        for cell in self.covered(&aabb) {
+        for cell in self.covered(&corners, &aabb) {
             self.cells[cell].push(t);
         }
         if self.entries.len() <= t as usize {
@@ -77,7 +77,7 @@ impl IntersectionIndex {
         let Some(entry) = self.entries.get_mut(t as usize).and_then(Option::take) else {
             return;
         };
-        for cell in self.covered(&entry.aabb) {
+        for cell in self.covered(&entry.corners, &entry.aabb) {
             self.cells[cell].retain(|other| *other != t);
         }
     }
@@ -88,37 +88,81 @@ impl IntersectionIndex {
         self.first_pierced(ids, corners, except).is_some()
     }
 
-    /// A triangle that one with these vertices would meet, as [`pierces`](Self::pierces); which
-    /// one of several is left open, but the same for the same history.
+    /// The lowest numbered triangle that makes [`pierces`](Self::pierces) true.
     pub fn first_pierced(&self, ids: [u32; 3], corners: &[Vec3; 3], except: &[u32]) -> Option<u32> {
         let aabb = Aabb::of(corners);
-        self.covered(&aabb)
-            .flat_map(|cell| &self.cells[cell])
-            .copied()
-            .find(|t| {
-                self.entries[*t as usize].as_ref().is_some_and(|entry| {
-                    entry.aabb.overlaps(&aabb)
-                        && !except.contains(t)
-                        && triangles_intersect(ids, corners, entry.ids, &entry.corners)
+        let mut near: Vec<u32> = Vec::with_capacity(64);
+        for cell in self.covered(corners, &aabb) {
+            near.extend(self.cells[cell].iter().filter(|t| {
+                self.entries[**t as usize]
+                    .as_ref()
+                    .is_some_and(|entry| entry.aabb.overlaps(&aabb))
+            }));
+        }
+        near.sort_unstable();
+        near.dedup();
+        near.into_iter().find(|t| {
+            !except.contains(t)
+                && self.entries[*t as usize].as_ref().is_some_and(|entry| {
+                    triangles_intersect(ids, corners, entry.ids, &entry.corners)
                 })
-            })
+        })
     }
 
-    /// The cells that a box touches. Everything outside of the grid belongs to its border.
-    fn covered(&self, aabb: &Aabb) -> impl Iterator<Item = usize> + use<> {
+    /// The cells that a triangle may touch: those that its box touches, without those that
+    /// lie beside its plane. Everything outside of the grid belongs to the grid's border.
+    fn covered(&self, corners: &[Vec3; 3], aabb: &Aabb) -> impl Iterator<Item = usize> + use<> {
+        let (low, high) = (self.place(&aabb.min), self.place(&aabb.max));
+        let plane = self.plane(corners, low, high);
         let shape = self.shape;
-        let place = |p: &Vec3| {
-            [0, 1, 2].map(|axis| {
-                let place = ((p[axis] - self.origin[axis]) / self.cell).max(0.0) as usize;
-                place.min(shape[axis] - 1)
-            })
-        };
-        let (low, high) = (place(&aabb.min), place(&aabb.max));
         (low[2]..=high[2]).flat_map(move |k| {
             (low[1]..=high[1]).flat_map(move |j| {
-                (low[0]..=high[0]).map(move |i| (k * shape[1] + j) * shape[0] + i)
+                (low[0]..=high[0])
+                    .filter(move |&i| plane.is_none_or(|plane| plane.touches([i, j, k])))
+                    .map(move |i| (k * shape[1] + j) * shape[0] + i)
             })
         })
+    }
+
+    fn place(&self, p: &Vec3) -> [usize; 3] {
+        [0, 1, 2].map(|axis| {
+            let place = ((p[axis] - self.origin[axis]) / self.cell).max(0.0) as usize;
+            place.min(self.shape[axis] - 1)
+        })
+    }
+
+    /// The triangle's plane in units of cells, where asking it pays and no cell of the border
+    /// is concerned, which stands for more than its own box.
+    fn plane(&self, corners: &[Vec3; 3], low: [usize; 3], high: [usize; 3]) -> Option<Plane> {
+        let inside = (0..3).all(|axis| low[axis] > 0 && high[axis] + 1 < self.shape[axis]);
+        let cells: usize = (0..3).map(|axis| high[axis] - low[axis] + 1).product();
+        if !inside || cells < 12 {
+            return None;
+        }
+        let [a, b, c] = corners;
+        let normal = triangle::area_normal(a, b, c).try_normalize(0.0)?;
+        Some(Plane {
+            normal,
+            // Centres of cells lie half a cell from their lowest corner.
+            offset: normal.dot(&((a - self.origin) / self.cell - Vec3::repeat(0.5))),
+            // Rounding of the normal and the offset stays far below the hundredth.
+            reach: normal.abs().sum() / 2.0 + 0.01,
+        })
+    }
+}
+
+/// A plane among the cells of a grid.
+#[derive(Debug, Clone, Copy)]
+struct Plane {
+    normal: Vec3,
+    offset: f64,
+    reach: f64,
+}
+
+impl Plane {
+    fn touches(&self, cell: [usize; 3]) -> bool {
+        let centre = Vec3::from(cell.map(|x| x as f64));
+        (self.normal.dot(&centre) - self.offset).abs() <= self.reach
     }
 }
 

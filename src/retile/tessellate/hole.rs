@@ -6,7 +6,7 @@
 //! dynamic programme over the ring takes the best of all triangulations in space (after
 //! Barequet & Sharir 1995), with the forbidden chords and triangles left out.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::patchwork::{Patchwork, Star};
 use super::planar::constrained_delaunay;
@@ -31,19 +31,31 @@ const LEAST_FACING: f64 = 0.05;
 const SHARPEST_FOLD: f64 = -0.5;
 
 /// Longest ring for the dynamic programme, which takes the third power of it.
-const LONGEST_RING: usize = 48;
+const LONGEST_RING: usize = 32;
 
 /// Most times that the programme is run again without the triangles that pierced something.
 const MOST_RETRIES: usize = 24;
 
-/// The triangles that close the hole of `star` under `demand`, or `None`.
-pub(super) fn close(mesh: &Patchwork, star: &Star, demand: Demand) -> Option<Vec<[u32; 3]>> {
+/// Why a hole stays open: nothing around it, and these triangles. As long as neither changes,
+/// another try fails as well.
+#[derive(Debug)]
+pub(super) struct Blocked {
+    /// One triangle that each pierced proposal met.
+    pub(super) by: Vec<u32>,
+}
+
+/// The triangles that close the hole of `star` under `demand`.
+pub(super) fn close(
+    mesh: &Patchwork,
+    star: &Star,
+    demand: Demand,
+) -> Result<Vec<[u32; 3]>, Blocked> {
     let hole = Hole::new(mesh, star, demand);
     if let Some(flat) = hole.flat_triangulation()
         && hole.admits_all(&flat)
-        && hole.offender(&flat).is_none()
+        && hole.offenders(&flat, &mut BTreeMap::new()).is_empty()
     {
-        return Some(hole.named(&flat));
+        return Ok(hole.named(&flat));
     }
     hole.best_triangulation()
 }
@@ -114,7 +126,7 @@ impl<'a> Hole<'a> {
             self.admits_chord(i, k)
                 && self.admits_chord(k, j)
                 && self.admits_chord(i, j)
-                && self.cost(i, k, j).is_some()
+                && self.cost(i, k, j, Demand::Smooth).is_some()
         })
     }
 
@@ -128,12 +140,12 @@ impl<'a> Hole<'a> {
 
     /// What the triangle i < k < j costs: shape, and how far it turns from the star and the
     /// triangles outside. `None` where the demand forbids it.
-    fn cost(&self, i: usize, k: usize, j: usize) -> Option<f64> {
+    fn cost(&self, i: usize, k: usize, j: usize, demand: Demand) -> Option<f64> {
         let [a, b, c] = [i, k, j].map(|m| self.corners[m]);
         let n = triangle::area_normal(&a, &b, &c);
         let size = n.norm();
         if !(size > 0.0) {
-            return (self.demand == Demand::Topology).then_some(1e3);
+            return (demand == Demand::Topology).then_some(1e3);
         }
         let n = n / size;
         let facing = n.dot(&self.normal);
@@ -150,62 +162,76 @@ impl<'a> Hole<'a> {
             sharpest = sharpest.min(fold);
             turned += 1.0 - fold;
         }
-        if self.demand == Demand::Smooth && (facing < LEAST_FACING || sharpest < SHARPEST_FOLD) {
+        if demand == Demand::Smooth && (facing < LEAST_FACING || sharpest < SHARPEST_FOLD) {
             return None;
         }
         Some(1.0 / triangle::radius_ratio(&a, &b, &c).max(0.05) + 2.0 * turned)
     }
 
-    /// A triangle of the proposal that pierces the mesh or another one of the proposal.
-    fn offender(&self, triangles: &[[u32; 3]]) -> Option<[u32; 3]> {
+    /// The triangles of the proposal that pierce the mesh or an earlier one of the proposal.
+    /// `pierced` remembers what the mesh answered.
+    fn offenders(
+        &self,
+        triangles: &[[u32; 3]],
+        pierced: &mut BTreeMap<[u32; 3], Option<u32>>,
+    ) -> Vec<[u32; 3]> {
         let named = self.named(triangles);
-        // Three neighbours and a fourth vertex: closing the hole would glue two triangles
-        // back to back.
-        let [a, b, c] = named[0];
-        if named.len() == 1
-            && self
-                .mesh
-                .triangle_along(b, a)
-                .is_some_and(|(_, third)| third == c)
-        {
-            return Some(triangles[0]);
+        if self.closes_a_tetrahedron(&named) {
+            return triangles.to_vec();
         }
         if self.demand == Demand::Topology {
-            return None;
+            return Vec::new();
         }
-        let meets_another = |k: usize| {
+        let meets_earlier = |k: usize| {
+            let corners = self.mesh.corners(named[k]);
             named[..k].iter().any(|other| {
-                triangles_intersect(
-                    named[k],
-                    &self.mesh.corners(named[k]),
-                    *other,
-                    &self.mesh.corners(*other),
-                )
+                triangles_intersect(named[k], &corners, *other, &self.mesh.corners(*other))
             })
         };
         (0..named.len())
-            .find(|&k| self.mesh.pierces(named[k], &self.star.triangles) || meets_another(k))
+            .filter(|&k| {
+                pierced
+                    .entry(triangles[k])
+                    .or_insert_with(|| self.mesh.first_pierced(named[k], &self.star.triangles))
+                    .is_some()
+                    || meets_earlier(k)
+            })
             .map(|k| triangles[k])
+            .collect()
+    }
+
+    /// Three neighbours and one vertex more, and that is the whole component: closing the hole
+    /// would glue two triangles back to back.
+    fn closes_a_tetrahedron(&self, named: &[[u32; 3]]) -> bool {
+        let [[a, b, c]] = *named else { return false };
+        self.mesh
+            .triangle_along(b, a)
+            .is_some_and(|(_, third)| third == c)
     }
 
     /// The cheapest triangulation in space that pierces nothing.
-    fn best_triangulation(&self) -> Option<Vec<[u32; 3]>> {
+    fn best_triangulation(&self) -> Result<Vec<[u32; 3]>, Blocked> {
         if self.corners.len() > LONGEST_RING {
-            return None;
+            return Err(Blocked { by: Vec::new() });
         }
-        let mut forbidden = BTreeSet::new();
+        let (mut forbidden, mut pierced) = (BTreeSet::new(), BTreeMap::new());
         let table = self.cost_table();
         for _ in 0..MOST_RETRIES {
-            let triangles = cheapest(self.corners.len(), |i, k, j| {
+            let cheapest = cheapest(self.corners.len(), |i, k, j| {
                 let t = [i, k, j].map(|m| m as u32);
                 table[self.place(i, k, j)].filter(|_| !forbidden.contains(&t))
-            })?;
-            match self.offender(&triangles) {
-                None => return Some(self.named(&triangles)),
-                Some(t) => forbidden.insert(t),
-            };
+            });
+            let Some(triangles) = cheapest else { break };
+            let offenders = self.offenders(&triangles, &mut pierced);
+            if offenders.is_empty() {
+                return Ok(self.named(&triangles));
+            }
+            forbidden.extend(offenders);
         }
-        None
+        let mut by: Vec<u32> = pierced.into_values().flatten().collect();
+        by.sort_unstable();
+        by.dedup();
+        Err(Blocked { by })
     }
 
     fn place(&self, i: usize, k: usize, j: usize) -> usize {
@@ -225,7 +251,7 @@ impl<'a> Hole<'a> {
             for k in i + 1..m {
                 for j in k + 1..m {
                     if chord[i * m + k] && chord[k * m + j] && chord[i * m + j] {
-                        table[self.place(i, k, j)] = self.cost(i, k, j);
+                        table[self.place(i, k, j)] = self.cost(i, k, j, self.demand);
                     }
                 }
             }

@@ -14,6 +14,10 @@ pub(super) struct Patchwork {
     /// Triangles at each vertex, in no order.
     incident: Vec<Vec<u32>>,
     index: IntersectionIndex,
+    /// Number of changes so far; the last one at each vertex and of each triangle.
+    clock: u64,
+    changed: Vec<u64>,
+    replaced: Vec<u64>,
 }
 
 /// The triangles around a vertex.
@@ -35,6 +39,9 @@ impl Patchwork {
         }
         let index = IntersectionIndex::new(&positions, &triangles, cell);
         Self {
+            changed: vec![0; positions.len()],
+            replaced: vec![0; triangles.len()],
+            clock: 0,
             positions,
             triangles,
             incident,
@@ -57,6 +64,21 @@ impl Patchwork {
 
     pub(super) fn triangle(&self, t: u32) -> [u32; 3] {
         self.triangles[t as usize]
+    }
+
+    /// Number of changes so far.
+    pub(super) fn clock(&self) -> u64 {
+        self.clock
+    }
+
+    /// The number of the last change at `v`.
+    pub(super) fn changed(&self, v: u32) -> u64 {
+        self.changed[v as usize]
+    }
+
+    /// The number of the last change of triangle `t`.
+    pub(super) fn replaced(&self, t: u32) -> u64 {
+        self.replaced[t as usize]
     }
 
     /// The triangles that there are.
@@ -123,22 +145,30 @@ impl Patchwork {
         star
     }
 
-    /// Whether the triangle would meet any other but `except` beyond shared corners and sides.
-    pub(super) fn pierces(&self, triangle: [u32; 3], except: &[u32]) -> bool {
+    /// A triangle, not of `except`, that this one would meet beyond shared corners and sides.
+    pub(super) fn first_pierced(&self, triangle: [u32; 3], except: &[u32]) -> Option<u32> {
         self.index
-            .pierces(triangle, &self.corners(triangle), except)
+            .first_pierced(triangle, &self.corners(triangle), except)
+    }
+
+    /// Whether there is one.
+    pub(super) fn pierces(&self, triangle: [u32; 3], except: &[u32]) -> bool {
+        self.first_pierced(triangle, except).is_some()
     }
 
     /// Puts `new` in the place of the triangles `old`; both cover the same hole. Not more new
     /// ones than old ones.
     pub(super) fn replace(&mut self, old: &[u32], new: &[[u32; 3]]) {
         debug_assert!(new.len() <= old.len());
+        self.clock += 1;
         for &t in old {
             for v in self.triangles[t as usize] {
+                self.changed[v as usize] = self.clock;
                 self.incident[v as usize].retain(|other| *other != t);
             }
         }
         for (k, &t) in old.iter().enumerate() {
+            self.replaced[t as usize] = self.clock;
             if let Some(&triangle) = new.get(k) {
                 self.triangles[t as usize] = triangle;
                 for v in triangle {

@@ -28,7 +28,8 @@ pub(super) fn end_self_intersections(
                 .then(|| {
                     [(a, b), (b, c), (c, a)]
                         .into_iter()
-                        .find_map(|(v, w)| Flip::new(mesh, v, w, Demand::Embedded))
+                        .filter_map(|(v, w)| Flip::new(mesh, v, w, Demand::Embedded))
+                        .find(|flip| !flip.pierces(mesh))
                 })
                 .flatten();
             if let Some(flip) = flip {

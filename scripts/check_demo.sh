@@ -1,0 +1,9 @@
+#!/usr/bin/env bash
+# Runs the demo to its end in a scratch folder and looks at what it leaves.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+out=$(mktemp -d)
+trap 'rm -rf "$out"' EXIT
+cargo run --quiet -- demo --exit --listen 127.0.0.1:0 --output "$out"
+[ "$(head -c 4 "$out/lv.glb")" = glTF ]
+grep -q '</html>' "$out/report.html"

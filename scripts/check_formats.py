@@ -1,0 +1,115 @@
+"""Reads exported meshes by trimesh and by VTK and compares them with the JSON beside them.
+
+usage: check_formats.py DIR
+
+Vertices must come back in the same order (STL has none: there the set of places and the
+triangles over it), equal to the last bit of the precision that format and reader keep.
+"""
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import trimesh
+import vtk
+from vtk.util.numpy_support import vtk_to_numpy
+
+# glTF world (metres, Y up) from LPS millimetres.
+WORLD = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1000]]) / 1000
+
+
+def by_trimesh(path):
+    """Vertices and triangles as stored; for glTF also the node's matrix."""
+    if path.suffix in (".glb", ".gltf"):
+        scene = trimesh.load(path, process=False)
+        (name,) = scene.graph.nodes_geometry
+        matrix, geometry = scene.graph[name]
+        mesh = scene.geometry[geometry]
+        return mesh.vertices, mesh.faces, matrix
+    mesh = trimesh.load(path, process=False, maintain_order=True)
+    return mesh.vertices, mesh.faces, None
+
+
+READERS = {
+    ".stl": vtk.vtkSTLReader,
+    ".ply": vtk.vtkPLYReader,
+    ".obj": vtk.vtkOBJReader,
+    ".vtp": vtk.vtkXMLPolyDataReader,
+}
+
+
+def by_vtk(path):
+    reader = READERS[path.suffix]()
+    reader.SetFileName(str(path))
+    reader.Update()
+    poly = reader.GetOutput()
+    vertices = vtk_to_numpy(poly.GetPoints().GetData())
+    triangles = vtk_to_numpy(poly.GetPolys().GetConnectivityArray()).reshape(-1, 3)
+    return vertices, triangles, None
+
+
+def places(vertices, triangles):
+    """A triangle soup over its distinct vertices, in an order of their own."""
+    distinct, index = np.unique(vertices, axis=0, return_inverse=True)
+    triangles = index.ravel()[triangles]
+    first = triangles.argmin(axis=1)
+    turned = np.stack([np.roll(t, -k) for t, k in zip(triangles, first)])
+    return distinct, turned[np.lexsort(turned.T[::-1])]
+
+
+def compare(name, reader, expected, got):
+    """The first difference as text, or None."""
+    vertices, triangles = expected
+    found, faces, matrix = got
+    found, faces = np.asarray(found), np.asarray(faces, np.int64)
+    if reader == "vtk" and name.endswith((".ply", ".obj")):
+        found = found.astype(np.float32)  # these readers keep single precision
+    single = name.endswith((".stl", ".glb", ".gltf")) or found.dtype == np.float32
+    if single:
+        vertices = vertices.astype(np.float32)
+    if name.endswith(".stl"):
+        vertices, triangles = places(vertices, triangles)
+        found, faces = places(found.astype(np.float32), faces)
+    if found.shape != vertices.shape:
+        return f"{len(found)} vertices instead of {len(vertices)}"
+    if not np.array_equal(found.astype(np.float64), vertices.astype(np.float64)):
+        worst = np.abs(found.astype(np.float64) - vertices.astype(np.float64)).max()
+        return f"vertices differ by up to {worst:.3g} mm"
+    if not np.array_equal(faces, triangles):
+        return "triangles differ"
+    if matrix is not None and not np.allclose(matrix, WORLD, rtol=0, atol=1e-15):
+        return f"the node's matrix is {matrix.tolist()}"
+    return None
+
+
+def check(path, expected):
+    ways = [("trimesh", by_trimesh)] if path.suffix != ".vtp" else []
+    ways += [("vtk", by_vtk)] if path.suffix in READERS else []
+    passed = True
+    for reader, read in ways:
+        difference = compare(path.name, reader, expected, read(path))
+        print(f"{path.name}: {reader}: {difference or 'identical'}")
+        passed &= difference is None
+    return passed
+
+
+def main(folder):
+    passed = failed = 0
+    for original in sorted(Path(folder).glob("*.json")):
+        document = json.loads(original.read_text())
+        if "vertices" not in document:
+            continue  # a report, not a mesh
+        assert document["frame"] == "LPS" and document["unit"] == "mm", original.name
+        expected = np.array(document["vertices"]), np.array(document["triangles"])
+        for suffix in (".glb", ".gltf", ".stl", ".ply", ".obj", ".vtp"):
+            path = original.with_suffix(suffix)
+            if path.exists() and check(path, expected):
+                passed += 1
+            elif path.exists():
+                failed += 1
+    print(f"formats: {passed} passed, {failed} failed")
+    return 0 if passed and not failed else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

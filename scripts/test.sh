@@ -1,0 +1,88 @@
+#!/usr/bin/env bash
+# Installs what the tests need and passes them all. The last line counts:
+#   N passed, N failed, N skipped
+#
+#   scripts/test.sh            everything
+#   scripts/test.sh --quick    without the outside judges (trimesh, vtk, glTF validator, schemathesis)
+set -uo pipefail
+cd "$(dirname "$0")/.."
+
+quick=${1:-}
+tools=$PWD/target/test-tools
+log=$PWD/target/test-log.txt
+mkdir -p "$tools"
+: >"$log"
+passed=0 failed=0 skipped=0
+
+say() { printf '\n== %s\n' "$*"; }
+
+# check NAME COMMAND...: one counted check.
+check() {
+  local name=$1
+  shift
+  say "$name"
+  if "$@"; then
+    passed=$((passed + 1)) && echo "ok: $name"
+  else
+    failed=$((failed + 1)) && echo "FAILED: $name"
+  fi
+}
+
+finish() {
+  echo
+  echo "$passed passed, $failed failed, $skipped skipped"
+  [ "$failed" -eq 0 ] && [ "$passed" -gt 0 ]
+  exit
+}
+
+# --- what the machine needs -------------------------------------------------------------
+as_root() { if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo "$@"; fi; }
+
+need() { # need COMMAND PACKAGE...: installs the packages where the command is missing
+  command -v "$1" >/dev/null 2>&1 && return
+  shift
+  as_root apt-get update -qq && as_root apt-get install -y -qq --no-install-recommends "$@"
+}
+
+install_judges() {
+  need node nodejs npm
+  need npm npm
+  python3 -c 'import ensurepip, venv' 2>/dev/null || need no-such-command python3 python3-venv python3-pip
+  if [ ! -e "$tools/python.done" ]; then
+    python3 -m venv "$tools/python" &&
+      "$tools/python/bin/pip" install -q -r scripts/requirements.txt &&
+      touch "$tools/python.done"
+  fi
+  [ -e "$tools/node_modules/gltf-validator" ] ||
+    npm install --silent --no-fund --no-audit --prefix "$tools" gltf-validator@2.0.0-dev.3.10
+}
+
+need cc build-essential
+command -v cargo >/dev/null || { echo "cargo is missing: install Rust 1.95 or newer"; failed=1; finish; }
+
+# --- the project's own tests ------------------------------------------------------------
+check "format" cargo fmt --check
+check "clippy" cargo clippy --quiet --all-targets -- -D warnings
+check "documentation" env RUSTDOCFLAGS="-D warnings" cargo doc --quiet --no-deps
+
+say "cargo test"
+cargo test --no-fail-fast -- --show-output 2>&1 | tee "$log"
+cargo_status=${PIPESTATUS[0]}
+read -r p f i < <(awk '/^test result:/ { p += $4; f += $6; i += $8 } END { print p + 0, f + 0, i + 0 }' "$log")
+# A test that lacks its data says `SKIPPED: why` and returns; the harness counts it as passed.
+s=$(grep -c '^SKIPPED: ' "$log")
+passed=$((passed + p - s)) failed=$((failed + f)) skipped=$((skipped + i + s))
+if [ "$cargo_status" -ne 0 ] && [ "$f" -eq 0 ]; then failed=$((failed + 1)); fi
+
+# --- outside judges ---------------------------------------------------------------------
+if [ "$quick" = --quick ]; then finish; fi
+if install_judges; then
+  export PYTHON=$tools/python/bin/python NODE_PATH=$tools/node_modules
+  check "formats read back by trimesh, vtk and the glTF validator" scripts/check_formats.sh
+  check "schemathesis against the running service" scripts/check_api.sh
+else
+  echo "the outside judges could not be installed"
+  failed=$((failed + 1))
+fi
+check "the demo runs through" scripts/check_demo.sh
+finish

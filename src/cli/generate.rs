@@ -1,0 +1,116 @@
+//! `ventriform generate`: the service's pipeline with no server.
+
+use super::{Bar, ModelArgs};
+use crate::export::{self, Format};
+use crate::pipeline::{self, Model};
+use crate::progress::{CancelToken, Monitor};
+use crate::report::Report;
+use crate::volume::{ReadLimits, VolumeFile};
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+/// Makes a surface model from a volume.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  ventriform generate spect.nii.gz -o lv.glb
+  ventriform generate spect.nii.gz -o lv.stl -o lv.json --points 200 --report report.html
+  ventriform generate organs.nii.gz -o liver.ply --label 1 --adaptive 0.25
+  ventriform generate pair.hdr pair.img -o lv.vtp --iso 50%")]
+pub struct GenerateArgs {
+    /// The volume: NIfTI (.nii, .nii.gz, or a .hdr and .img pair) or DICOM NM
+    #[arg(value_name = "IN", required = true, num_args = 1..=2)]
+    input: Vec<PathBuf>,
+    /// Where the model goes; format by extension: glb, gltf, stl, ply, obj, vtp, json
+    /// (repeatable)
+    #[arg(short, long = "output", value_name = "OUT", required = true)]
+    output: Vec<PathBuf>,
+    /// Where the quality report goes; format by extension: json, html (repeatable)
+    #[arg(long, value_name = "FILE")]
+    report: Vec<PathBuf>,
+    /// Print nothing but errors
+    #[arg(short, long)]
+    quiet: bool,
+    #[command(flatten)]
+    model: ModelArgs,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// What the pipeline or the file system says; nothing is written unless the model succeeded.
+pub fn run(args: &GenerateArgs) -> Result<()> {
+    let formats = output_formats(&args.output)?;
+    check_report_names(&args.report)?;
+    let parameters = args
+        .model
+        .parameters()
+        .map_err(|e| anyhow::anyhow!("{e}. {}", e.fix))?;
+    let files: Vec<VolumeFile> = args.input.iter().map(VolumeFile::at).collect();
+    let bar = Bar::start();
+    let monitor = Monitor::new(&bar, CancelToken::new());
+    let made = pipeline::generate(&files, &parameters, &ReadLimits::default(), &monitor);
+    bar.finish();
+    let model = made?;
+    for (path, format) in args.output.iter().zip(formats) {
+        let bytes = export::encode(format, &model.mesh, &model.metadata())?;
+        write(path, &bytes)?;
+    }
+    for path in &args.report {
+        write(path, report_text(path, &model).as_bytes())?;
+    }
+    if !args.quiet {
+        print_summary(&model.report);
+    }
+    Ok(())
+}
+
+fn output_formats(outputs: &[PathBuf]) -> Result<Vec<Format>> {
+    outputs
+        .iter()
+        .map(|path| {
+            Format::from_extension(&extension(path)).with_context(|| {
+                format!(
+                    "{}: the extension names no format; use glb, gltf, stl, ply, obj, vtp or json",
+                    path.display()
+                )
+            })
+        })
+        .collect()
+}
+
+fn check_report_names(reports: &[PathBuf]) -> Result<()> {
+    for path in reports {
+        if !matches!(extension(path).as_str(), "json" | "html") {
+            bail!("{}: a report is .json or .html", path.display());
+        }
+    }
+    Ok(())
+}
+
+fn report_text(path: &Path, model: &Model) -> String {
+    match extension(path).as_str() {
+        "html" => model.report_html(),
+        _ => model.report.to_json_text(),
+    }
+}
+
+fn extension(path: &Path) -> String {
+    path.extension()
+        .map(|e| e.to_string_lossy().to_lowercase())
+        .unwrap_or_default()
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// The figures a person looks at first, and every warning, on standard error.
+pub fn print_summary(report: &Report) {
+    for line in report.headlines() {
+        eprintln!("{line}");
+    }
+    for warning in &report.warnings {
+        eprintln!("warning: {warning}");
+    }
+}

@@ -1,0 +1,62 @@
+//! The `ventriform` command: arguments in, exit status out.
+
+mod bar;
+mod generate;
+mod model_args;
+mod phantom;
+
+pub use bar::{Bar, overall};
+pub use model_args::ModelArgs;
+
+use clap::{CommandFactory, Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Surface models of the left ventricle from cardiac SPECT.
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    after_help = "Start with:
+  ventriform demo                            the main job on a simulated scan
+  ventriform generate scan.nii.gz -o lv.glb  a model of your own volume
+  ventriform serve --data-dir data           the HTTP service"
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Generate(Box<generate::GenerateArgs>),
+    Phantom(phantom::PhantomArgs),
+    /// Prints a completion script for a shell
+    #[command(after_help = "Example: ventriform completions bash > ventriform.bash")]
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+}
+
+/// Runs the command that the process's arguments name.
+pub fn main() -> ExitCode {
+    let outcome = match Cli::parse().command {
+        Command::Generate(args) => generate::run(&args),
+        Command::Phantom(args) => phantom::run(&args),
+        Command::Completions { shell } => {
+            clap_complete::generate(
+                shell,
+                &mut Cli::command(),
+                env!("CARGO_PKG_NAME"),
+                &mut std::io::stdout(),
+            );
+            Ok(())
+        }
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! `ventriform phantom`: a simulated scan with its truth.
+
+use crate::progress::{CancelToken, Monitor};
+use crate::volume::Volume;
+use crate::volume::nifti::{self, StoredType};
+use crate::volume::phantom::{Defect, PhantomParameters, phantom};
+use anyhow::{Context, Result};
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+use super::Bar;
+
+/// Writes a simulated SPECT volume, the true mask of the wall, and the parameters.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  ventriform phantom -o phantom --spacing 2 --seed 7 --defect 8:0.7
+writes phantom/spect.nii.gz, phantom/lv_truth.nii.gz and phantom/params.json")]
+pub struct PhantomArgs {
+    /// The folder to write to (made where missing)
+    #[arg(short, long = "output", value_name = "DIR", default_value = "phantom")]
+    output: PathBuf,
+    /// Voxels along each axis
+    #[arg(long, value_name = "N", default_value_t = 128)]
+    size: usize,
+    /// Distance of the voxels' centres in millimetres
+    #[arg(long, value_name = "MM", default_value_t = 3.2)]
+    spacing: f64,
+    /// Counting noise: standard deviation over mean in healthy wall, 0 for none
+    #[arg(long, value_name = "X", default_value_t = 0.05)]
+    noise: f64,
+    /// Uptake of the liver against healthy wall; above 1 it outshines the heart
+    #[arg(long, value_name = "X", default_value_t = 0.5)]
+    liver: f64,
+    /// A perfusion defect: AHA segment 1 to 17 and severity 0 to 1 (repeatable)
+    #[arg(long, value_name = "SEGMENT:SEVERITY", value_parser = parse_defect)]
+    defect: Vec<Defect>,
+    /// Seed of shape and noise
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+fn parse_defect(text: &str) -> Result<Defect, String> {
+    let parts = text.split_once(':');
+    parts
+        .and_then(|(segment, severity)| {
+            Some(Defect {
+                segment: segment.parse().ok()?,
+                severity: severity.parse().ok()?,
+            })
+        })
+        .ok_or_else(|| "a defect is SEGMENT:SEVERITY, for example 8:0.7".into())
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Where a parameter is out of range or the folder cannot be written.
+pub fn run(args: &PhantomArgs) -> Result<()> {
+    let parameters = PhantomParameters {
+        shape: [args.size; 3],
+        spacing_mm: [args.spacing; 3],
+        noise: args.noise,
+        liver: args.liver,
+        defects: args.defect.clone(),
+        seed: args.seed,
+        ..PhantomParameters::default()
+    };
+    let bar = Bar::start();
+    let made = phantom(&parameters, &Monitor::new(&bar, CancelToken::new()));
+    bar.finish();
+    let made = made?;
+    std::fs::create_dir_all(&args.output)
+        .with_context(|| format!("cannot make {}", args.output.display()))?;
+    let at = |name: &str| args.output.join(name);
+    write_volume(&at("spect.nii.gz"), &made.volume, StoredType::Int16)?;
+    write_volume(&at("lv_truth.nii.gz"), &made.truth, StoredType::Uint8)?;
+    let text = serde_json::to_string_pretty(&made.parameters)?;
+    write(&at("params.json"), text.as_bytes())?;
+    eprintln!(
+        "Written: spect.nii.gz, lv_truth.nii.gz and params.json in {}",
+        args.output.display()
+    );
+    Ok(())
+}
+
+fn write_volume(path: &Path, volume: &Volume, stored: StoredType) -> Result<()> {
+    write(path, &nifti::write(volume, stored, true)?)
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+}

@@ -1,0 +1,154 @@
+//! glTF 2.0: one node, one mesh, one buffer.
+//!
+//! The vertices stay patient millimetres, so that a program that reads the accessor has
+//! medical coordinates. The node's matrix alone leads to glTF's world, metres with Y up, in
+//! which the patient stands upright and looks along +Z:
+//!
+//! ```text
+//! X = L / 1000,   Y = S / 1000,   Z = -P / 1000
+//! ```
+//!
+//! Buffer: positions (f32), normals (f32), indices (u16 where they fit, else u32).
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::{Value, json};
+
+use super::{ExportError, FRAME, Metadata, UNIT, single};
+use crate::mesh::TriMesh;
+
+/// Columns of LPS millimetres to glTF metres.
+const PATIENT_TO_WORLD: [f64; 16] = [
+    0.001, 0.0, 0.0, 0.0, //
+    0.0, 0.0, -0.001, 0.0, //
+    0.0, 0.001, 0.0, 0.0, //
+    0.0, 0.0, 0.0, 1.0,
+];
+
+// The specification's numbers for component types and buffer targets.
+const UNSIGNED_SHORT: u32 = 5123;
+const UNSIGNED_INT: u32 = 5125;
+const FLOAT: u32 = 5126;
+const ARRAY_BUFFER: u32 = 34962;
+const ELEMENT_ARRAY_BUFFER: u32 = 34963;
+
+/// A glTF file with its buffer embedded.
+///
+/// # Errors
+/// [`ExportError::NotFinite`], [`ExportError::Inseparable`]: see [`single`].
+pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Result<Vec<u8>, ExportError> {
+    let (mut document, buffer) = document(mesh, metadata)?;
+    let uri = format!(
+        "data:application/octet-stream;base64,{}",
+        STANDARD.encode(buffer)
+    );
+    document["buffers"][0]["uri"] = uri.into();
+    Ok(document.to_string().into_bytes())
+}
+
+/// The JSON document, its buffer without a URI, and the buffer, a multiple of 4 bytes long.
+///
+/// # Errors
+/// [`ExportError::NotFinite`], [`ExportError::Inseparable`]: see [`single`].
+pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>), ExportError> {
+    let positions = single::positions(&mesh.vertices)?;
+    let normals = single::normals(&mesh.vertex_normals());
+    // 65535 restarts a primitive, so it is no index.
+    let narrow = positions.len() <= 65535;
+
+    let mut buffer = Vec::with_capacity(24 * positions.len() + 12 * mesh.triangles.len());
+    buffer.extend(positions.iter().flatten().flat_map(|x| x.to_le_bytes()));
+    buffer.extend(normals.iter().flatten().flat_map(|x| x.to_le_bytes()));
+    for &v in mesh.triangles.iter().flatten() {
+        if narrow {
+            buffer.extend((v as u16).to_le_bytes());
+        } else {
+            buffer.extend(v.to_le_bytes());
+        }
+    }
+    let indices_end = buffer.len();
+    buffer.resize(indices_end.next_multiple_of(4), 0);
+
+    let name = if metadata.title.is_empty() {
+        "model"
+    } else {
+        &metadata.title
+    };
+    let vertex_bytes = 12 * positions.len();
+    let (min, max) = extent(&positions);
+    let document = json!({
+        "asset": {
+            "version": "2.0",
+            "generator": metadata.software,
+            "extras": metadata.to_object(),
+        },
+        "scene": 0,
+        "scenes": [{ "name": name, "nodes": [0] }],
+        "nodes": [{ "name": name, "mesh": 0, "matrix": PATIENT_TO_WORLD }],
+        "meshes": [{
+            "name": name,
+            "primitives": [{
+                "attributes": { "POSITION": 0, "NORMAL": 1 },
+                "indices": 2,
+                "material": 0,
+            }],
+            "extras": {
+                "frame": FRAME,
+                "unit": UNIT,
+                "frame_of_reference_uid": metadata.frame_of_reference_uid,
+            },
+        }],
+        "materials": [{
+            "name": "myocardium",
+            "pbrMetallicRoughness": {
+                "baseColorFactor": [0.64, 0.13, 0.11, 1.0],
+                "metallicFactor": 0.0,
+                "roughnessFactor": 0.55,
+            },
+        }],
+        "accessors": [
+            {
+                "bufferView": 0, "componentType": FLOAT, "type": "VEC3",
+                "count": positions.len(), "min": min, "max": max,
+            },
+            {
+                "bufferView": 1, "componentType": FLOAT, "type": "VEC3",
+                "count": normals.len(),
+            },
+            {
+                "bufferView": 2, "type": "SCALAR",
+                "componentType": if narrow { UNSIGNED_SHORT } else { UNSIGNED_INT },
+                "count": 3 * mesh.triangles.len(),
+            },
+        ],
+        "bufferViews": [
+            {
+                "buffer": 0, "target": ARRAY_BUFFER,
+                "byteOffset": 0, "byteLength": vertex_bytes,
+            },
+            {
+                "buffer": 0, "target": ARRAY_BUFFER,
+                "byteOffset": vertex_bytes, "byteLength": vertex_bytes,
+            },
+            {
+                "buffer": 0, "target": ELEMENT_ARRAY_BUFFER,
+                "byteOffset": 2 * vertex_bytes, "byteLength": indices_end - 2 * vertex_bytes,
+            },
+        ],
+        "buffers": [{ "byteLength": buffer.len() }],
+    });
+    Ok((document, buffer))
+}
+
+/// Smallest and largest coordinates. Widened to `f64`, whose decimals name an `f32` exactly.
+fn extent(positions: &[[f32; 3]]) -> ([f64; 3], [f64; 3]) {
+    let mut min = [f32::INFINITY; 3];
+    let mut max = [f32::NEG_INFINITY; 3];
+    for p in positions {
+        for r in 0..3 {
+            min[r] = min[r].min(p[r]);
+            max[r] = max[r].max(p[r]);
+        }
+    }
+    (min.map(f64::from), max.map(f64::from))
+}

@@ -1,0 +1,30 @@
+//! Plain JSON: every coordinate as the shortest decimal that reads back the same.
+
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use super::Metadata;
+use crate::geometry::Vec3;
+use crate::mesh::TriMesh;
+
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    metadata: Map<String, Value>,
+    vertices: Vec<[f64; 3]>,
+    triangles: &'a [[u32; 3]],
+    normals: Vec<[f64; 3]>,
+}
+
+/// A JSON file with `frame`, `unit`, what is known of the origin, `vertices`, `triangles`
+/// and `normals`.
+pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Vec<u8> {
+    let rows = |vectors: &[Vec3]| vectors.iter().map(|&v| v.into()).collect();
+    let document = Document {
+        metadata: metadata.to_object(),
+        vertices: rows(&mesh.vertices),
+        triangles: &mesh.triangles,
+        normals: rows(&mesh.vertex_normals()),
+    };
+    serde_json::to_vec(&document).expect("numbers and text keys always serialise")
+}

@@ -1,0 +1,46 @@
+//! Binary little-endian PLY with positions and normals in double precision.
+
+use super::{ExportError, Format, Metadata, UNIT};
+use crate::mesh::TriMesh;
+
+/// A PLY file.
+///
+/// # Errors
+/// [`ExportError::TooLarge`] beyond 2³¹ vertices: readers expect signed indices.
+pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Result<Vec<u8>, ExportError> {
+    if i32::try_from(mesh.vertices.len()).is_err() {
+        return Err(ExportError::TooLarge {
+            format: Format::Ply.extension(),
+        });
+    }
+    let mut bytes = header(mesh, metadata).into_bytes();
+    bytes.reserve(48 * mesh.vertices.len() + 13 * mesh.triangles.len());
+    for (position, normal) in mesh.vertices.iter().zip(mesh.vertex_normals()) {
+        let numbers = position.iter().chain(normal.iter());
+        bytes.extend(numbers.flat_map(|x| x.to_le_bytes()));
+    }
+    for t in &mesh.triangles {
+        bytes.push(3);
+        bytes.extend(t.iter().flat_map(|v| v.to_le_bytes()));
+    }
+    Ok(bytes)
+}
+
+fn header(mesh: &TriMesh, metadata: &Metadata) -> String {
+    let mut lines = vec![
+        "ply".to_owned(),
+        "format binary_little_endian 1.0".to_owned(),
+    ];
+    lines.extend(metadata.comments().iter().map(|c| format!("comment {c}")));
+    lines.push(format!(
+        "comment coordinates are {UNIT}, x to the left, y to posterior, z to superior"
+    ));
+    lines.push(format!("element vertex {}", mesh.vertices.len()));
+    for name in ["x", "y", "z", "nx", "ny", "nz"] {
+        lines.push(format!("property double {name}"));
+    }
+    lines.push(format!("element face {}", mesh.triangles.len()));
+    lines.push("property list uchar int vertex_indices".to_owned());
+    lines.push("end_header\n".to_owned());
+    lines.join("\n")
+}

@@ -1,0 +1,84 @@
+//! VTK XML PolyData with inline base64: positions and normals in double precision.
+//!
+//! Each array is the number of its bytes (`UInt64`) and the bytes, encoded as one piece.
+//! Texts are field data; VTK wants them as ASCII codes with a closing 0.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+
+use super::{FRAME, Metadata, UNIT};
+use crate::geometry::Vec3;
+use crate::mesh::TriMesh;
+
+/// A VTP file.
+pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Vec<u8> {
+    let count = mesh.triangles.len() as i64;
+    let connectivity = mesh.triangles.iter().flatten().map(|&v| i64::from(v));
+    let offsets = (1..=count).map(|t| 3 * t);
+    let xml = format!(
+        r#"<?xml version="1.0"?>
+<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
+<PolyData>
+<FieldData>
+{fields}</FieldData>
+<Piece NumberOfPoints="{points}" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="{count}">
+<PointData Normals="Normals">
+<DataArray type="Float64" Name="Normals" NumberOfComponents="3" format="binary">{normals}</DataArray>
+</PointData>
+<CellData></CellData>
+<Points>
+<DataArray type="Float64" Name="Points" NumberOfComponents="3" format="binary">{positions}</DataArray>
+</Points>
+<Polys>
+<DataArray type="Int64" Name="connectivity" format="binary">{connectivity}</DataArray>
+<DataArray type="Int64" Name="offsets" format="binary">{offsets}</DataArray>
+</Polys>
+</Piece>
+</PolyData>
+</VTKFile>
+"#,
+        fields = fields(metadata),
+        points = mesh.vertices.len(),
+        normals = vectors(&mesh.vertex_normals()),
+        positions = vectors(&mesh.vertices),
+        connectivity = array(connectivity.flat_map(i64::to_le_bytes).collect()),
+        offsets = array(offsets.flat_map(i64::to_le_bytes).collect()),
+    );
+    xml.into_bytes()
+}
+
+fn fields(metadata: &Metadata) -> String {
+    let mut fields = vec![
+        ("SPACE".to_owned(), FRAME.to_owned()),
+        ("UNIT".to_owned(), UNIT.to_owned()),
+    ];
+    for (key, value) in metadata.identity() {
+        fields.push((key.to_owned(), value.to_owned()));
+    }
+    if !metadata.quality.is_empty() {
+        let quality = serde_json::Value::from(metadata.quality.clone());
+        fields.push(("quality".to_owned(), quality.to_string()));
+    }
+    fields
+        .iter()
+        .map(|(name, text)| field(name, text))
+        .collect()
+}
+
+fn field(name: &str, text: &str) -> String {
+    let codes: String = text.bytes().map(|b| format!("{b} ")).collect();
+    format!(
+        "<Array type=\"String\" Name=\"{name}\" NumberOfTuples=\"1\" format=\"ascii\">{codes}0</Array>\n"
+    )
+}
+
+fn vectors(vectors: &[Vec3]) -> String {
+    let numbers = vectors.iter().flat_map(|v| [v.x, v.y, v.z]);
+    array(numbers.flat_map(f64::to_le_bytes).collect())
+}
+
+fn array(bytes: Vec<u8>) -> String {
+    let mut sized = (bytes.len() as u64).to_le_bytes().to_vec();
+    sized.extend(bytes);
+    STANDARD.encode(sized)
+}

@@ -1,0 +1,127 @@
+//! `/v1/jobs/{id}/events`: a job's changes as they happen, as server-sent events.
+//!
+//! Each event is the whole job and its id is the job's revision, so missing one loses
+//! nothing: whoever comes back with `Last-Event-ID` gets the newest state, if it is newer, and
+//! what follows. The last event shows a final state, then the stream ends. A client that
+//! reconnects after that gets 204, which tells an `EventSource` to stay away.
+
+use super::app::App;
+use super::jobs::{describe, find};
+use super::openapi::LookupProblems;
+use super::problem::{Answer, Problem};
+use super::request::{query_pairs, refuse_unknown};
+use crate::jobs;
+use axum::extract::{Path, RawQuery, State};
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::sse::{Event, KeepAlive, Sse};
+use axum::response::{IntoResponse, Response};
+use futures::Stream;
+use std::convert::Infallible;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::sync::broadcast::Receiver;
+use tokio::sync::broadcast::error::RecvError;
+
+const KEEP_ALIVE: Duration = Duration::from_secs(15);
+
+/// Follow a job
+///
+/// Server-sent events named `job`: the whole job at each change, its revision as id, until its
+/// final state. Resumes after `Last-Event-ID`.
+#[utoipa::path(get, path = "/v1/jobs/{id}/events", tag = "jobs",
+    params(("id" = String, Path, description = "The job's id"),
+        ("Last-Event-ID" = Option<i64>, Header, description = "Revision seen last")),
+    responses(
+        (status = 200, description = "The changes", body = String, content_type = "text/event-stream"),
+        (status = 204, description = "The final state was seen already"),
+        LookupProblems))]
+pub async fn follow_job(
+    State(app): State<App>,
+    Path(id): Path<String>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+) -> Answer {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let seen = last_event_id(&headers)?;
+    // Listening begins before looking, so that no change falls in between.
+    let changes = app.queue.changes();
+    let job = find(&app, &id).await?;
+    if job.state.is_final() && job.revision <= seen {
+        return Ok(StatusCode::NO_CONTENT.into_response());
+    }
+    Ok(stream(app, job, seen, changes))
+}
+
+fn last_event_id(headers: &HeaderMap) -> Answer<i64> {
+    let Some(value) = headers.get("last-event-id") else {
+        return Ok(0);
+    };
+    let number = value.to_str().ok().and_then(|text| text.trim().parse().ok());
+    number.ok_or_else(|| {
+        Problem::bad_request("invalid-header", "`Last-Event-ID` is no whole number.")
+            .at("Last-Event-ID")
+            .fix("Send the id of the event seen last, as it is.")
+    })
+}
+
+fn stream(app: App, job: jobs::Job, seen: i64, changes: Receiver<Arc<jobs::Job>>) -> Response {
+    let follower = Follower {
+        id: job.id.clone(),
+        next: Some(job),
+        app,
+        seen,
+        changes,
+    };
+    Sse::new(follower.events())
+        .keep_alive(KeepAlive::new().interval(KEEP_ALIVE))
+        .into_response()
+}
+
+struct Follower {
+    app: App,
+    id: String,
+    next: Option<jobs::Job>,
+    seen: i64,
+    changes: Receiver<Arc<jobs::Job>>,
+}
+
+impl Follower {
+    fn events(self) -> impl Stream<Item = Result<Event, Infallible>> {
+        futures::stream::unfold(Some(self), |follower| async move {
+            let mut follower = follower?;
+            let job = follower.newer().await?;
+            follower.seen = job.revision;
+            let last = job.state.is_final();
+            let event = Event::default().event("job").id(job.revision.to_string());
+            let wire = describe(&follower.app, job).await.ok()?;
+            let event = event.json_data(wire).ok()?;
+            Some((Ok(event), (!last).then_some(follower)))
+        })
+    }
+
+    /// The next state newer than the one seen; `None` when the job is gone or the service
+    /// ends.
+    async fn newer(&mut self) -> Option<jobs::Job> {
+        loop {
+            if let Some(job) = self.next.take()
+                && job.revision > self.seen
+            {
+                return Some(job);
+            }
+            self.next = tokio::select! {
+                change = self.changes.recv() => match change {
+                    Ok(job) if job.id == self.id => Some((*job).clone()),
+                    Ok(_) => None,
+                    // Too slow for the channel: the table knows.
+                    Err(RecvError::Lagged(_)) => Some(self.look().await?),
+                    Err(RecvError::Closed) => return None,
+                },
+                () = self.app.closing.cancelled() => return None,
+            };
+        }
+    }
+
+    async fn look(&self) -> Option<jobs::Job> {
+        self.app.queue.jobs.job(&self.id).await.ok().flatten()
+    }
+}

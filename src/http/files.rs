@@ -1,0 +1,154 @@
+//! Downloads: immutable files with strong validators, in whole or in part.
+
+use super::app::App;
+use super::problem::{Answer, Problem};
+use crate::jobs::{Model, ModelFile};
+use axum::body::Body;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use std::ops::Range;
+
+/// Results never change under their name; only the one who asked may keep them.
+const CACHE_CONTROL: &str = "private, max-age=31536000, immutable";
+
+/// Answers with a model's file, or the part of it that `Range` asks for, or 304.
+pub async fn send(app: &App, model: &Model, file: &ModelFile, headers: &HeaderMap) -> Answer {
+    let etag = format!("\"{}\"", file.sha256);
+    if matches_any(headers, &header::IF_NONE_MATCH, &etag) {
+        return Ok((
+            StatusCode::NOT_MODIFIED,
+            [(header::ETAG, etag), (header::CACHE_CONTROL, CACHE_CONTROL.into())],
+        )
+            .into_response());
+    }
+    let range = wanted_range(headers, &etag, file.bytes)?;
+    let (status, span) = match &range {
+        Some(range) => (StatusCode::PARTIAL_CONTENT, range.clone()),
+        None => (StatusCode::OK, 0..file.bytes),
+    };
+    let length = span.end - span.start;
+    let content = app
+        .queue
+        .blobs
+        .read(&model.id, &file.name, span.clone())
+        .await?;
+    let mut response = (
+        status,
+        [
+            (header::CONTENT_TYPE, file.media_type.clone()),
+            (header::CONTENT_LENGTH, length.to_string()),
+            (header::ETAG, etag),
+            (header::CACHE_CONTROL, CACHE_CONTROL.into()),
+            (header::ACCEPT_RANGES, "bytes".into()),
+            (header::CONTENT_LOCATION, path(model, file)),
+            (
+                header::CONTENT_DISPOSITION,
+                format!("inline; filename=\"{}-{}\"", model.id, file.name),
+            ),
+        ],
+        Body::from_stream(content),
+    )
+        .into_response();
+    if range.is_some()
+        && let Ok(value) = HeaderValue::from_str(&format!(
+            "bytes {}-{}/{}",
+            span.start,
+            span.end - 1,
+            file.bytes
+        ))
+    {
+        response.headers_mut().insert(header::CONTENT_RANGE, value);
+    }
+    Ok(response)
+}
+
+/// Where a model's file is found.
+pub fn path(model: &Model, file: &ModelFile) -> String {
+    format!("/v1/models/{}/{}", model.id, file.name)
+}
+
+fn matches_any(headers: &HeaderMap, name: &HeaderName, etag: &str) -> bool {
+    headers
+        .get_all(name)
+        .iter()
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split(','))
+        .map(|tag| tag.trim())
+        .any(|tag| tag == "*" || tag.strip_prefix("W/").unwrap_or(tag) == etag)
+}
+
+/// The bytes that `Range` asks for, end exclusive. Several ranges, other units and ranges
+/// under an `If-Range` that no longer holds mean the whole file, as RFC 9110 allows.
+fn wanted_range(headers: &HeaderMap, etag: &str, length: u64) -> Answer<Option<Range<u64>>> {
+    let text = |name: HeaderName| headers.get(name).and_then(|value| value.to_str().ok());
+    let Some(spec) = text(header::RANGE).and_then(|range| range.strip_prefix("bytes=")) else {
+        return Ok(None);
+    };
+    if text(header::IF_RANGE).is_some_and(|tag| tag != etag) {
+        return Ok(None);
+    }
+    match parse_range(spec.trim(), length) {
+        Parsed::Whole => Ok(None),
+        Parsed::Part(range) => Ok(Some(range)),
+        Parsed::Outside => Err(Problem::new(
+            StatusCode::RANGE_NOT_SATISFIABLE,
+            "range-not-satisfiable",
+            format!("The file has {length} bytes."),
+        )
+        .at("Range")
+        .header(header::CONTENT_RANGE, format!("bytes */{length}"))),
+    }
+}
+
+#[derive(Debug, PartialEq)]
+enum Parsed {
+    Whole,
+    Part(Range<u64>),
+    Outside,
+}
+
+fn parse_range(spec: &str, length: u64) -> Parsed {
+    let Some((first, last)) = spec.split_once('-') else {
+        return Parsed::Whole;
+    };
+    match (first.parse::<u64>(), last.parse::<u64>()) {
+        (Ok(first), Ok(last)) if first <= last && first < length => {
+            Parsed::Part(first..length.min(last.saturating_add(1)))
+        }
+        (Ok(first), Err(_)) if last.is_empty() && first < length => Parsed::Part(first..length),
+        (Err(_), Ok(count)) if first.is_empty() && count > 0 && length > 0 => {
+            Parsed::Part(length.saturating_sub(count)..length)
+        }
+        (Ok(first), Ok(last)) if first > last => Parsed::Whole,
+        (Ok(_), Ok(_)) => Parsed::Outside,
+        (Ok(_), Err(_)) if last.is_empty() => Parsed::Outside,
+        (Err(_), Ok(_)) if first.is_empty() => Parsed::Outside,
+        _ => Parsed::Whole,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_read_as_rfc_9110_writes_them() {
+        for (spec, parsed) in [
+            ("0-99", Parsed::Part(0..100)),
+            ("90-1000", Parsed::Part(90..100)),
+            ("50-", Parsed::Part(50..100)),
+            ("-10", Parsed::Part(90..100)),
+            ("-1000", Parsed::Part(0..100)),
+            ("0-0", Parsed::Part(0..1)),
+            ("100-", Parsed::Outside),
+            ("100-200", Parsed::Outside),
+            ("-0", Parsed::Outside),
+            ("5-4", Parsed::Whole),
+            ("0-1,5-6", Parsed::Whole),
+            ("x-y", Parsed::Whole),
+            ("", Parsed::Whole),
+        ] {
+            assert_eq!(parse_range(spec, 100), parsed, "{spec}");
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! `Idempotency-Key` (draft-ietf-httpapi-idempotency-key-header-07).
+
+use super::problem::{Answer, Problem};
+use crate::jobs::{Idempotency, content_id};
+use axum::http::HeaderMap;
+use serde_json::{Map, Value};
+
+/// The header's name.
+pub const HEADER: &str = "idempotency-key";
+
+const LONGEST: usize = 255;
+
+/// The key, if there is one. The draft's quoted form and a bare token mean the same.
+pub fn key(headers: &HeaderMap) -> Answer<Option<String>> {
+    let Some(value) = headers.get(HEADER) else {
+        return Ok(None);
+    };
+    let key = value.to_str().unwrap_or_default().trim().trim_matches('"');
+    if key.is_empty() || key.len() > LONGEST {
+        return Err(Problem::bad_request(
+            "invalid-idempotency-key",
+            format!("The key is no text of 1 to {LONGEST} visible ASCII characters."),
+        )
+        .at("Idempotency-Key")
+        .fix("Send a random UUID."));
+    }
+    Ok(Some(key.to_owned()))
+}
+
+/// The key together with what it stands for.
+pub fn promise(
+    key: Option<String>,
+    kind: &str,
+    volume: &str,
+    parameters: &Map<String, Value>,
+) -> Option<Idempotency> {
+    let parameters = Value::Object(parameters.clone()).to_string();
+    Some(Idempotency {
+        key: key?,
+        fingerprint: content_id("", [kind, volume, &parameters].map(str::as_bytes)),
+    })
+}

@@ -1,0 +1,64 @@
+//! `limit` and `cursor` of lists, and what a list answers.
+
+use super::problem::{Answer, Problem};
+use super::request::{query_pairs, refuse_unknown};
+use crate::jobs::{Page, PageRequest};
+use base64::Engine as _;
+use base64::engine::general_purpose::URL_SAFE_NO_PAD;
+
+/// Entries of a page where nobody asks.
+const USUAL: u32 = 20;
+/// Most entries of a page.
+const MOST: u32 = 100;
+
+/// What a list was asked for: the page, and the values of the list's `own` parameters.
+pub fn list_query<const N: usize>(
+    query: Option<&str>,
+    own: [&'static str; N],
+) -> Answer<(PageRequest, [Option<String>; N])> {
+    let pairs = query_pairs(query);
+    let known: Vec<&str> = ["limit", "cursor"].into_iter().chain(own).collect();
+    refuse_unknown(&pairs, &known)?;
+    let value = |name: &str| {
+        pairs
+            .iter()
+            .find(|(n, _)| n == name)
+            .map(|(_, value)| value.clone())
+    };
+    let page = PageRequest {
+        before: value("cursor").map(|c| parse_cursor(&c)).transpose()?,
+        limit: value("limit").map_or(Ok(USUAL), |l| parse_limit(&l))?,
+    };
+    Ok((page, own.map(value)))
+}
+
+fn parse_limit(text: &str) -> Answer<u32> {
+    match text.parse() {
+        Ok(limit @ 1..=MOST) => Ok(limit),
+        _ => Err(Problem::bad_request(
+            "invalid-parameter",
+            format!("`limit` is no whole number from 1 to {MOST}."),
+        )
+        .at("limit")
+        .fix(format!("Give a whole number from 1 to {MOST}."))),
+    }
+}
+
+fn parse_cursor(text: &str) -> Answer<i64> {
+    URL_SAFE_NO_PAD
+        .decode(text)
+        .ok()
+        .and_then(|bytes| String::from_utf8(bytes).ok())
+        .and_then(|text| text.strip_prefix("before:")?.parse().ok())
+        .ok_or_else(|| {
+            Problem::bad_request("invalid-parameter", "`cursor` was not given out by this service.")
+                .at("cursor")
+                .fix("Take `next_cursor` of the page before, as it is.")
+        })
+}
+
+/// The cursor of the page that follows.
+pub fn next_cursor<T>(page: &Page<T>) -> Option<String> {
+    page.next
+        .map(|sequence| URL_SAFE_NO_PAD.encode(format!("before:{sequence}")))
+}

@@ -1,0 +1,246 @@
+//! `/v1/volumes`: what was uploaded.
+
+use super::app::App;
+use super::openapi::{ListProblems, LookupProblems, UploadProblems};
+use super::pagination::{list_query, next_cursor};
+use super::problem::{Answer, Problem};
+use super::request::{query_pairs, refuse_unknown, unknown};
+use super::upload;
+use super::wire::{missing, rfc3339};
+use crate::jobs::{self, Deleted};
+use axum::Json;
+use axum::extract::{Path, RawQuery, Request, State};
+use axum::http::{StatusCode, header};
+use axum::response::IntoResponse;
+use serde::Serialize;
+use utoipa::ToSchema;
+
+/// A stored volume: the facts of its header.
+#[derive(Serialize, ToSchema)]
+pub struct Volume {
+    /// From the SHA-256 of the content: the same everywhere.
+    #[schema(example = "vol_9f86d081884c7d659a2feaa0c55ad015")]
+    id: String,
+    /// When it was stored (RFC 3339).
+    #[schema(format = DateTime)]
+    created_at: String,
+    /// Bytes of all its files.
+    bytes: u64,
+    /// Number of its files.
+    files: usize,
+    /// File format.
+    #[schema(example = "NIfTI-1")]
+    format: String,
+    /// Voxels along each axis; the fourth are frames.
+    shape: Vec<usize>,
+    /// Voxel spacing along the first three axes, millimetres.
+    spacing_mm: [f64; 3],
+    /// Voxel index to millimetres in the patient frame LPS, row by row.
+    affine: [[f64; 4]; 4],
+    /// The frame of `affine`.
+    #[schema(example = "LPS")]
+    frame: String,
+    /// Data type in the file.
+    #[schema(example = "int16")]
+    dtype: String,
+    /// The voxel values, slope and intercept applied.
+    intensity: Option<Intensity>,
+    /// What is odd about the file but does not keep it from use.
+    warnings: Vec<String>,
+    /// Where to go from here.
+    links: VolumeLinks,
+}
+
+/// A summary of voxel values.
+#[derive(Serialize, ToSchema)]
+struct Intensity {
+    /// Smallest finite value.
+    min: f64,
+    /// Largest finite value.
+    max: f64,
+    /// Mean of the finite values.
+    mean: f64,
+    /// Voxels that are no finite number.
+    not_finite: u64,
+}
+
+/// Paths of one volume.
+#[derive(Serialize, ToSchema)]
+#[schema(as = VolumeLinks)]
+struct VolumeLinks {
+    /// This volume.
+    #[serde(rename = "self")]
+    itself: String,
+    /// Three middle slices as PNG.
+    preview: String,
+}
+
+/// A page of volumes.
+#[derive(Serialize, ToSchema)]
+pub struct VolumeList {
+    /// The volumes, newest first.
+    volumes: Vec<Volume>,
+    /// `cursor` of the next page; absent on the last.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    next_cursor: Option<String>,
+}
+
+impl From<jobs::Volume> for Volume {
+    fn from(volume: jobs::Volume) -> Self {
+        let itself = format!("/v1/volumes/{}", volume.id);
+        let facts = volume.facts;
+        Self {
+            created_at: rfc3339(volume.created_at),
+            bytes: volume.bytes,
+            files: volume.files.len(),
+            format: facts.format,
+            shape: facts.shape,
+            spacing_mm: facts.spacing_mm,
+            affine: facts.affine,
+            frame: "LPS".into(),
+            dtype: facts.dtype,
+            intensity: facts.intensity.map(|i| Intensity {
+                min: i.min,
+                max: i.max,
+                mean: i.mean,
+                not_finite: i.not_finite,
+            }),
+            warnings: facts.warnings,
+            links: VolumeLinks {
+                preview: format!("{itself}/preview.png"),
+                itself,
+            },
+            id: volume.id,
+        }
+    }
+}
+
+/// Upload a volume
+///
+/// The body is the file itself, or a form whose file parts make up one volume (a `.hdr`/`.img`
+/// pair, a DICOM series). The same bytes again give the same id.
+#[utoipa::path(post, path = "/v1/volumes", tag = "volumes",
+    request_body(content(
+        (Vec<u8> = "application/octet-stream"),
+        (Vec<u8> = "application/gzip"),
+        (Vec<u8> = "application/dicom"),
+        (Vec<u8> = "application/nifti"),
+        (super::openapi::UploadForm = "multipart/form-data"),
+    )),
+    responses(
+        (status = 201, description = "Stored", body = Volume,
+            headers(("Location" = String, description = "The volume's path"))),
+        (status = 200, description = "Known already", body = Volume,
+            headers(("Location" = String, description = "The volume's path"))),
+        UploadProblems,
+    ))]
+pub async fn create_volume(
+    State(app): State<App>,
+    RawQuery(query): RawQuery,
+    request: Request,
+) -> Answer {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let upload = upload::receive(&app, request).await?;
+    if let Some((name, _)) = upload.fields.first() {
+        return Err(unknown("form field", name, &[]));
+    }
+    let (volume, new) = upload.store(&app).await?;
+    let status = if new { StatusCode::CREATED } else { StatusCode::OK };
+    let location = [(header::LOCATION, format!("/v1/volumes/{}", volume.id))];
+    Ok((status, location, Json(Volume::from(volume))).into_response())
+}
+
+/// List volumes
+#[utoipa::path(get, path = "/v1/volumes", tag = "volumes",
+    params(super::openapi::PageParameters),
+    responses((status = 200, description = "A page, newest first", body = VolumeList), ListProblems))]
+pub async fn list_volumes(
+    State(app): State<App>,
+    RawQuery(query): RawQuery,
+) -> Answer<Json<VolumeList>> {
+    let (page, []) = list_query(query.as_deref(), [])?;
+    let page = app.queue.catalogue.volumes(page).await?;
+    Ok(Json(VolumeList {
+        next_cursor: next_cursor(&page),
+        volumes: page.items.into_iter().map(Volume::from).collect(),
+    }))
+}
+
+/// Facts of a volume
+#[utoipa::path(get, path = "/v1/volumes/{id}", tag = "volumes",
+    params(("id" = String, Path, description = "The volume's id")),
+    responses((status = 200, description = "The volume", body = Volume), LookupProblems))]
+pub async fn get_volume(
+    State(app): State<App>,
+    Path(id): Path<String>,
+    RawQuery(query): RawQuery,
+) -> Answer<Json<Volume>> {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    Ok(Json(find(&app, &id).await?.into()))
+}
+
+/// Look at a volume
+///
+/// Three orthogonal middle slices, side by side.
+#[utoipa::path(get, path = "/v1/volumes/{id}/preview.png", tag = "volumes",
+    params(("id" = String, Path, description = "The volume's id")),
+    responses((status = 200, description = "The slices", body = Vec<u8>, content_type = "image/png"),
+        LookupProblems))]
+pub async fn preview_volume(
+    State(app): State<App>,
+    Path(id): Path<String>,
+    RawQuery(query): RawQuery,
+) -> Answer {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let volume = find(&app, &id).await?;
+    let paths = app.queue.blobs.paths(&volume.id, &volume.files);
+    let _permit = app.inspections.acquire().await.map_err(Problem::internal)?;
+    let reader = app.engine.reader.clone();
+    let png = tokio::task::spawn_blocking(move || reader.preview(&paths))
+        .await
+        .map_err(Problem::internal)?
+        .map_err(Problem::internal)?;
+    let headers = [
+        (header::CONTENT_TYPE, "image/png"),
+        (header::CACHE_CONTROL, "private, max-age=3600"),
+    ];
+    Ok((headers, png).into_response())
+}
+
+/// Erase a volume
+///
+/// Refused while a job that has not ended needs it.
+#[utoipa::path(delete, path = "/v1/volumes/{id}", tag = "volumes",
+    params(("id" = String, Path, description = "The volume's id")),
+    responses((status = 204, description = "Erased"),
+        (status = 409, description = "A job needs it", body = super::problem::ProblemBody,
+            content_type = "application/problem+json"),
+        LookupProblems))]
+pub async fn delete_volume(
+    State(app): State<App>,
+    Path(id): Path<String>,
+    RawQuery(query): RawQuery,
+) -> Answer {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    if !id.starts_with(jobs::VOLUME) {
+        return Err(Problem::not_found("volume", &id));
+    }
+    match app.queue.erase(&id).await? {
+        Deleted::Done => Ok(StatusCode::NO_CONTENT.into_response()),
+        Deleted::Unknown => Err(missing(&*app.queue.catalogue, "volume", &id).await),
+        Deleted::InUse => Err(Problem::new(
+            StatusCode::CONFLICT,
+            "in-use",
+            "A job that has not ended needs this volume.",
+        )
+        .fix("Wait for the job or DELETE it first; GET /v1/jobs?state=queued shows them.")),
+    }
+}
+
+async fn find(app: &App, id: &str) -> Answer<jobs::Volume> {
+    match app.queue.catalogue.volume(id).await? {
+        Some(volume) => Ok(volume),
+        None => Err(missing(&*app.queue.catalogue, "volume", id).await),
+    }
+}
+

@@ -1,0 +1,28 @@
+//! Shapes that several resources share.
+
+use super::problem::Problem;
+use crate::jobs::{Catalogue, Timestamp};
+use time::OffsetDateTime;
+use time::format_description::well_known::Rfc3339;
+
+/// A time as RFC 3339 in UTC, with milliseconds.
+pub fn rfc3339(at: Timestamp) -> String {
+    OffsetDateTime::from_unix_timestamp_nanos(i128::from(at) * 1_000_000)
+        .ok()
+        .and_then(|time| time.format(&Rfc3339).ok())
+        .unwrap_or_default()
+}
+
+/// 410 for what was erased, 404 for what never was.
+pub async fn missing(catalogue: &dyn Catalogue, what: &str, id: &str) -> Problem {
+    match catalogue.erased_at(id).await {
+        Ok(None) => Problem::not_found(what, id),
+        Ok(Some(at)) => Problem::new(
+            axum::http::StatusCode::GONE,
+            "gone",
+            format!("The {what} `{id}` was erased at {}.", rfc3339(at)),
+        )
+        .fix("The same volume and parameters make it again."),
+        Err(error) => error.into(),
+    }
+}

@@ -1,0 +1,116 @@
+//! What the service asks of the domain: to look at a volume, and to do work on it.
+
+use super::{Failure, VolumeFacts};
+use crate::progress::{Cancelled, Monitor};
+use serde_json::{Map, Value};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Looks at volumes. Called on blocking threads.
+pub trait VolumeReader: Send + Sync + 'static {
+    /// Reads and checks the files of one volume.
+    ///
+    /// # Errors
+    /// Why the files are no volume that can be used.
+    fn inspect(&self, files: &[PathBuf]) -> Result<VolumeFacts, Failure>;
+
+    /// Three orthogonal middle slices as a PNG.
+    ///
+    /// # Errors
+    /// As [`VolumeReader::inspect`].
+    fn preview(&self, files: &[PathBuf]) -> Result<Vec<u8>, Failure>;
+}
+
+/// One kind of work. Called on a worker's threads.
+pub trait Work: Send + Sync + 'static {
+    /// The kind's name in jobs: `model`.
+    fn kind(&self) -> &'static str;
+
+    /// Checks parameters given as text and writes every default out.
+    ///
+    /// # Errors
+    /// The first parameter that cannot be used.
+    fn parameters_from_text(
+        &self,
+        pairs: &[(String, String)],
+    ) -> Result<Map<String, Value>, Failure>;
+
+    /// Checks parameters given as JSON and writes every default out.
+    ///
+    /// # Errors
+    /// The first parameter that cannot be used.
+    fn parameters_from_json(
+        &self,
+        object: &Map<String, Value>,
+    ) -> Result<Map<String, Value>, Failure>;
+
+    /// Does the work. Reports progress, and looks at the token at least every 50 ms.
+    ///
+    /// # Errors
+    /// [`WorkError::Cancelled`] if the token was raised, else the reason.
+    fn run(&self, input: &Input, monitor: &Monitor<'_>) -> Result<Output, WorkError>;
+}
+
+/// What a job works on.
+#[derive(Debug, Clone)]
+pub struct Input {
+    /// The volume's id, for the result to name.
+    pub volume: String,
+    /// The volume's files.
+    pub files: Vec<PathBuf>,
+    /// Parameters as the same [`Work`] wrote them out.
+    pub parameters: Map<String, Value>,
+}
+
+/// What a job made.
+#[derive(Debug, Clone, Default)]
+pub struct Output {
+    /// Counts and main figures.
+    pub summary: Map<String, Value>,
+    /// The downloads.
+    pub files: Vec<OutputFile>,
+}
+
+/// One download.
+#[derive(Debug, Clone)]
+pub struct OutputFile {
+    /// Its name: `mesh.glb`, `report.json` ...
+    pub name: &'static str,
+    /// Its `Content-Type`.
+    pub media_type: &'static str,
+    /// Its content.
+    pub bytes: Vec<u8>,
+}
+
+/// Why work made nothing.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum WorkError {
+    /// The token was raised.
+    #[error("cancelled")]
+    Cancelled,
+    /// A reason for the caller.
+    #[error(transparent)]
+    Failed(#[from] Failure),
+}
+
+impl From<Cancelled> for WorkError {
+    fn from(_: Cancelled) -> Self {
+        WorkError::Cancelled
+    }
+}
+
+/// All that the service can do with volumes.
+#[derive(Clone)]
+pub struct Engine {
+    /// Looks at volumes.
+    pub reader: Arc<dyn VolumeReader>,
+    /// The kinds of work.
+    pub works: Vec<Arc<dyn Work>>,
+}
+
+impl Engine {
+    /// The work of that kind.
+    pub fn work(&self, kind: &str) -> Option<&Arc<dyn Work>> {
+        self.works.iter().find(|work| work.kind() == kind)
+    }
+}

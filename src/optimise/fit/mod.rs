@@ -1,0 +1,251 @@
+//! Moves the vertices off the reference surface S so that the whole model lies closest to it.
+//!
+//! A model whose vertices stand on S cuts every bulge off and loses volume. Here the vertices
+//! may leave S. Each round solves one sparse least-squares problem for their displacements:
+//!
+//! 1. distance: every sample of S is drawn to its partner on the model along S's normal;
+//! 2. the model's own edge midpoints and triangle centres are drawn to S alike;
+//! 3. shape: every triangle is drawn to the equilateral triangle that fits it best, within
+//!    its own plane;
+//! 4. volume: the whole is to enclose what S encloses;
+//! 5. damping: a little weight on staying put.
+//!
+//! After every second round edges are flipped where that betters shapes and valences.
+//!
+//! Guaranteed: no triangle turns over in a round and none comes to pierce another; where a
+//! step would do so, the vertices concerned make half of it, or less, or none.
+
+mod advance;
+mod equations;
+mod polish;
+mod samples;
+mod terms;
+
+use advance::advance;
+use samples::{Sample, find_partners, follow_partners, spread};
+
+use super::connectivity::Connectivity;
+use super::{FitParameters, Reference};
+use crate::geometry::Vec3;
+use crate::mesh::TriMesh;
+use crate::progress::{Cancelled, Monitor, Stage};
+
+/// The mesh on its way, and what it is drawn to.
+struct Model<'a> {
+    vertices: Vec<Vec3>,
+    connectivity: Connectivity,
+    samples: Vec<Sample>,
+    sizing: &'a [f64],
+    reference: &'a Reference,
+    /// That of the reference, mm³.
+    volume: f64,
+    parameters: &'a FitParameters,
+}
+
+/// The fitted mesh.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// Moved vertices, flipped triangles.
+    pub mesh: TriMesh,
+    /// Rounds run.
+    pub rounds: usize,
+    /// Edges flipped on the way.
+    pub flips: usize,
+    /// Steps that had to be shortened.
+    pub shortened: usize,
+}
+
+/// Fits the mesh of `connectivity` with vertices at `start` to `reference`; `sizing` is the
+/// wanted relative spacing at each vertex.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn fit(
+    start: &[Vec3],
+    connectivity: Connectivity,
+    sizing: &[f64],
+    reference: &Reference,
+    parameters: &FitParameters,
+    monitor: &Monitor,
+) -> Result<Fitted, Cancelled> {
+    let count = parameters.samples_per_triangle * connectivity.triangles().len();
+    let mut model = Model {
+        vertices: start.to_vec(),
+        connectivity,
+        samples: spread(reference, count),
+        sizing,
+        reference,
+        volume: reference.mesh.volume(),
+        parameters,
+    };
+    find_partners(&mut model);
+    let (mut flips, mut shortened) = (0, 0);
+    for round in 0..parameters.rounds {
+        let fraction = round as f64 / (parameters.rounds + 1) as f64;
+        monitor.report(Stage::Optimise, fraction)?;
+        let step = terms::displacement(&model);
+        shortened += usize::from(advance(&mut model.vertices, &model.connectivity, &step));
+        follow_partners(&mut model);
+        if round % 2 == 1 && round + 1 < parameters.rounds {
+            flips += polish::flip(&mut model);
+            follow_partners(&mut model);
+        }
+    }
+    Ok(Fitted {
+        mesh: TriMesh {
+            vertices: model.vertices,
+            triangles: model.connectivity.into_triangles(),
+        },
+        rounds: parameters.rounds,
+        flips,
+        shortened,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::intersections::self_intersections;
+    use crate::mesh::shapes;
+    use crate::surface::{Surface, SurfaceFacts};
+
+    fn reference(mesh: TriMesh) -> Reference {
+        Reference::new(&Surface {
+            working: mesh.vertices.clone(),
+            mesh,
+            spacing: 2.0,
+            facts: SurfaceFacts::default(),
+        })
+    }
+
+    fn fitted(start: &TriMesh, reference: &Reference, parameters: &FitParameters) -> Fitted {
+        let n = start.vertices.len();
+        let connectivity = Connectivity::new(n, start.triangles.clone()).unwrap();
+        let monitor = Monitor::silent();
+        let sizing = vec![1.0; n];
+        fit(
+            &start.vertices,
+            connectivity,
+            &sizing,
+            reference,
+            parameters,
+            &monitor,
+        )
+        .unwrap()
+    }
+
+    fn stretched(mut mesh: TriMesh, axes: [f64; 3]) -> TriMesh {
+        for v in &mut mesh.vertices {
+            v.component_mul_assign(&Vec3::from(axes));
+        }
+        mesh
+    }
+
+    #[test]
+    fn spheres_and_ellipsoids_get_their_volume_back() {
+        for axes in [[1.0, 1.0, 1.0], [1.0, 1.3, 0.8]] {
+            let reference = reference(stretched(shapes::icosphere(30.0, 5), axes));
+            let start = stretched(shapes::icosphere(30.0, 2), axes);
+            let exact = reference.mesh.volume();
+            assert!(start.volume() / exact < 0.98);
+            let found = fitted(&start, &reference, &FitParameters::default());
+            let error = found.mesh.volume() / exact - 1.0;
+            assert!(error.abs() < 1e-3, "{error}");
+        }
+    }
+
+    #[test]
+    fn the_fitted_mesh_lies_closer_to_the_surface_than_one_with_vertices_on_it() {
+        let reference = reference(shapes::cup(60.0, 30.0, 10.0, 90));
+        let start = shapes::cup(60.0, 30.0, 10.0, 16);
+        let found = fitted(&start, &reference, &FitParameters::default());
+        let (parameters, sizing) = (FitParameters::default(), Vec::new());
+        let mean_distance = |mesh: &TriMesh| {
+            let model = model(mesh, &reference, &parameters, &sizing);
+            let distance = |s: &Sample| {
+                let ids = mesh.triangles[s.triangle as usize];
+                let place: Vec3 = (0..3)
+                    .map(|k| mesh.vertices[ids[k] as usize] * s.barycentric[k])
+                    .sum();
+                (place - s.point).norm()
+            };
+            model.samples.iter().map(distance).sum::<f64>() / model.samples.len() as f64
+        };
+        let (before, after) = (mean_distance(&start), mean_distance(&found.mesh));
+        assert!(after < 0.5 * before, "{before} {after}");
+    }
+
+    /// Walls much thinner than the triangles are long: the sheets must stay apart.
+    #[test]
+    fn thin_shells_are_not_pierced() {
+        for wall in [1.5, 3.0, 6.0] {
+            let reference = reference(shapes::cup(60.0, 30.0, wall, 90));
+            let start = shapes::cup(60.0, 30.0, wall, 14);
+            let known = self_intersections(&start);
+            let parameters = FitParameters::default();
+            let found = fitted(&start, &reference, &parameters);
+            let pairs = self_intersections(&found.mesh);
+            assert!(pairs.len() <= known.len(), "wall {wall}: {pairs:?}");
+            crate::mesh::topology::check(&found.mesh).unwrap();
+            for t in 0..found.mesh.triangles.len() {
+                let [a, b, c] = found.mesh.corners(t);
+                let nearest = reference.bvh.closest(&((a + b + c) / 3.0)).unwrap();
+                let distance = nearest.squared_distance.sqrt();
+                assert!(distance < 4.0, "wall {wall}: {t} is {distance} mm off");
+            }
+        }
+    }
+
+    #[test]
+    fn a_step_through_the_opposite_wall_is_shortened() {
+        let mesh = shapes::cup(60.0, 30.0, 4.0, 24);
+        let n = mesh.vertices.len();
+        let connectivity = Connectivity::new(n, mesh.triangles.clone()).unwrap();
+        let mut vertices = mesh.vertices.clone();
+        let mut step = vec![Vec3::zeros(); n];
+        // The outer apex jumps 20 mm up, through the cavity's floor.
+        step[0].z = 20.0;
+        assert!(advance(&mut vertices, &connectivity, &step));
+        assert!(vertices[0].z - mesh.vertices[0].z < 4.0);
+        let moved = TriMesh {
+            vertices,
+            triangles: mesh.triangles,
+        };
+        assert!(self_intersections(&moved).is_empty());
+    }
+
+    fn model<'a>(
+        mesh: &TriMesh,
+        reference: &'a Reference,
+        parameters: &'a FitParameters,
+        sizing: &'a [f64],
+    ) -> Model<'a> {
+        let mut model = Model {
+            vertices: mesh.vertices.clone(),
+            connectivity: Connectivity::new(mesh.vertices.len(), mesh.triangles.clone()).unwrap(),
+            samples: spread(reference, 5000),
+            sizing,
+            reference,
+            volume: reference.mesh.volume(),
+            parameters,
+        };
+        find_partners(&mut model);
+        model
+    }
+
+    #[test]
+    fn polishing_flips_mend_a_disturbed_sphere() {
+        let reference = reference(shapes::icosphere(30.0, 4));
+        let mesh = shapes::icosphere(30.0, 2);
+        let n = mesh.vertices.len();
+        let (parameters, sizing) = (FitParameters::default(), vec![1.0; n]);
+        let mut model = model(&mesh, &reference, &parameters, &sizing);
+        for h in [10, 100, 200, 300, 400] {
+            model.connectivity.flip(h);
+        }
+        follow_partners(&mut model);
+        assert_eq!(polish::flip(&mut model), 5);
+        let valences = (0..n as u32).map(|v| model.connectivity.valence(v));
+        assert_eq!(valences.filter(|&v| v == 5).count(), 12);
+    }
+}

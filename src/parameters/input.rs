@@ -1,0 +1,106 @@
+//! One value, text or JSON, held against its [`Kind`].
+
+use super::Kind;
+use serde_json::Value;
+
+/// A value as a user gave it.
+#[derive(Debug, Clone, Copy)]
+pub enum Input<'a> {
+    /// From a query string or a command line.
+    Text(&'a str),
+    /// From a JSON document.
+    Json(&'a Value),
+}
+
+/// A value of the right type and within its range.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Checked {
+    Integer(u64),
+    Number(f64),
+    Integers(Vec<i64>),
+    Text(String),
+}
+
+impl Input<'_> {
+    /// Checks type and range.
+    pub(super) fn check(&self, kind: &Kind) -> Result<Checked, String> {
+        match *kind {
+            Kind::Integer { min, max } => {
+                let n = self
+                    .as_u64()
+                    .ok_or(format!("{self} is not a whole number"))?;
+                if n < min || n > max {
+                    return Err(format!("{n} is out of range"));
+                }
+                Ok(Checked::Integer(n))
+            }
+            Kind::Number { min, max } => {
+                let x = self.as_f64().ok_or(format!("{self} is not a number"))?;
+                if !(min..=max).contains(&x) {
+                    return Err(format!("{x} is out of range"));
+                }
+                Ok(Checked::Number(x))
+            }
+            Kind::Choice(words) => match self.as_text() {
+                Some(word) if words.contains(&word) => Ok(Checked::Text(word.into())),
+                _ => Err(format!("{self} is none of the choices")),
+            },
+            Kind::Integers { count } => match self.as_integers() {
+                Some(list) if list.len() == count => Ok(Checked::Integers(list)),
+                Some(list) => Err(format!("{} numbers where {count} belong", list.len())),
+                None => Err(format!("{self} is not a list of whole numbers")),
+            },
+            Kind::Text { .. } => self
+                .as_text()
+                .map(|t| Checked::Text(t.into()))
+                .ok_or(format!("{self} is not a text")),
+        }
+    }
+
+    fn as_u64(&self) -> Option<u64> {
+        match self {
+            Input::Text(t) => t.parse().ok(),
+            Input::Json(v) => v.as_u64(),
+        }
+    }
+
+    fn as_f64(&self) -> Option<f64> {
+        match self {
+            Input::Text(t) => t.parse().ok().filter(|x: &f64| x.is_finite()),
+            Input::Json(v) => v.as_f64(),
+        }
+    }
+
+    fn as_text(&self) -> Option<&str> {
+        match self {
+            Input::Text(t) => Some(t),
+            Input::Json(v) => v.as_str(),
+        }
+    }
+
+    fn as_integers(&self) -> Option<Vec<i64>> {
+        match self {
+            Input::Json(Value::Array(list)) => list.iter().map(Value::as_i64).collect(),
+            Input::Json(Value::Number(n)) => n.as_i64().map(|n| vec![n]),
+            _ => self
+                .as_text()?
+                .split(',')
+                .map(|part| part.trim().parse().ok())
+                .collect(),
+        }
+    }
+}
+
+impl std::fmt::Display for Input<'_> {
+    /// The value as given, cut to a length that fits a message.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let text = match self {
+            Input::Text(t) => format!("`{t}`"),
+            Input::Json(v) => format!("`{v}`"),
+        };
+        match text.char_indices().nth(60) {
+            Some((end, _)) => write!(f, "{}...`", &text[..end]),
+            None => f.write_str(&text),
+        }
+    }
+}

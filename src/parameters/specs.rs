@@ -1,0 +1,456 @@
+//! The table of parameters.
+
+use super::input::Checked;
+use super::{Kind, ParameterSpec};
+use crate::optimise::{FitnessForm, Gain};
+use crate::retile::Method;
+use crate::surface::{IsoLevel, Isolate, TopologyMode};
+use serde_json::{Value, json};
+
+/// A row for one of the four weights.
+macro_rules! weight_spec {
+    ($name:literal, $index:literal, $summary:literal) => {
+        ParameterSpec {
+            name: $name,
+            kind: Kind::Number {
+                min: 0.0,
+                max: 1000.0,
+            },
+            default: "1",
+            summary: $summary,
+            read: |d, v| {
+                d.optimise.weights[$index] = v.f64();
+                Ok(())
+            },
+            write: |p| json!(p.optimise.weights[$index]),
+        }
+    };
+}
+
+/// A row for one number of the fit.
+macro_rules! fit_spec {
+    ($name:literal, $field:ident, $min:literal..=$max:literal, $default:literal, $summary:literal) => {
+        ParameterSpec {
+            name: $name,
+            kind: Kind::Number {
+                min: $min,
+                max: $max,
+            },
+            default: $default,
+            summary: $summary,
+            read: |d, v| {
+                d.optimise.fit.$field = v.f64();
+                Ok(())
+            },
+            write: |p| json!(p.optimise.fit.$field),
+        }
+    };
+}
+
+/// Every parameter of a model, in the order in which the stages use them.
+pub const SPECS: &[ParameterSpec] = &[
+    ParameterSpec {
+        name: "points",
+        kind: Kind::Integer {
+            min: 12,
+            max: 50_000,
+        },
+        default: "150",
+        summary: "Number of points of the model",
+        read: |d, v| {
+            d.retile.points = v.usize();
+            Ok(())
+        },
+        write: |p| json!(p.retile.points),
+    },
+    ParameterSpec {
+        name: "seed",
+        kind: Kind::Integer {
+            min: 0,
+            max: u64::MAX,
+        },
+        default: "1",
+        summary: "Seed of every random choice; same seed, same bytes",
+        read: |d, v| {
+            d.retile.seed = v.u64();
+            Ok(())
+        },
+        write: |p| json!(p.retile.seed),
+    },
+    ParameterSpec {
+        name: "frame",
+        kind: Kind::Integer {
+            min: 0,
+            max: 1_000_000,
+        },
+        default: "",
+        summary: "Which frame of a 4-D volume, counted from 0",
+        read: |d, v| {
+            d.frame = Some(v.usize());
+            Ok(())
+        },
+        write: |p| json!(p.frame),
+    },
+    ParameterSpec {
+        name: "iso",
+        kind: Kind::Text {
+            pattern: r"^(auto|[0-9.]+%|absolute:[-+0-9.eE]+)$",
+            example: "auto, 50% (of the ventricle's maximum) or absolute:0.47",
+        },
+        default: "auto",
+        summary: "Where the surface lies: auto, a share of the ventricle's maximum (50%), or an \
+                  intensity (absolute:0.47)",
+        read: |d, v| {
+            d.surface.iso = parse_iso(v.text())?;
+            Ok(())
+        },
+        write: |p| {
+            json!(match p.surface.iso {
+                IsoLevel::Auto => "auto".to_owned(),
+                IsoLevel::Fraction(f) => format!("{}%", f * 100.0),
+                IsoLevel::Absolute(x) => format!("absolute:{x}"),
+            })
+        },
+    },
+    ParameterSpec {
+        name: "isolate",
+        kind: Kind::Choice(&["auto", "none", "largest"]),
+        default: "",
+        summary: "Which part is the object: auto (the left ventricle, or the label map's \
+                  label), none (all above the iso-value) or the largest component",
+        read: |d, v| {
+            let isolate = match v.text() {
+                "none" => Isolate::None,
+                "largest" => Isolate::Largest,
+                _ => Isolate::Auto,
+            };
+            d.set_isolate("isolate", isolate);
+            Ok(())
+        },
+        write: |p| match p.surface.isolate {
+            Isolate::Auto => json!("auto"),
+            Isolate::None => json!("none"),
+            Isolate::Largest => json!("largest"),
+            _ => Value::Null,
+        },
+    },
+    ParameterSpec {
+        name: "box",
+        kind: Kind::Integers { count: 6 },
+        default: "",
+        summary: "Look for the object inside this box of voxels only: i0,j0,k0,i1,j1,k1, \
+                  counted from 0, both corners included",
+        read: |d, v| {
+            let list = v.indices()?;
+            let (first, last) = ([list[0], list[1], list[2]], [list[3], list[4], list[5]]);
+            if (0..3).any(|axis| first[axis] > last[axis]) {
+                return Err("the first corner lies beyond the last one".into());
+            }
+            d.set_isolate("box", Isolate::Box(first, last));
+            Ok(())
+        },
+        write: |p| match p.surface.isolate {
+            Isolate::Box([a, b, c], [d, e, f]) => json!([a, b, c, d, e, f]),
+            _ => Value::Null,
+        },
+    },
+    ParameterSpec {
+        name: "seed_point",
+        kind: Kind::Integers { count: 3 },
+        default: "",
+        summary: "Voxel i,j,k (counted from 0) that belongs to the object",
+        read: |d, v| {
+            let list = v.indices()?;
+            d.set_isolate("seed_point", Isolate::Seed([list[0], list[1], list[2]]));
+            Ok(())
+        },
+        write: |p| match p.surface.isolate {
+            Isolate::Seed(voxel) => json!(voxel),
+            _ => Value::Null,
+        },
+    },
+    ParameterSpec {
+        name: "label",
+        kind: Kind::Integers { count: 1 },
+        default: "",
+        summary: "Value of the object's voxels in a label map",
+        read: |d, v| {
+            d.set_isolate("label", Isolate::Label(v.integers()[0]));
+            Ok(())
+        },
+        write: |p| match p.surface.isolate {
+            Isolate::Label(label) => json!(label),
+            _ => Value::Null,
+        },
+    },
+    ParameterSpec {
+        name: "topology",
+        kind: Kind::Choice(&["genus0", "keep"]),
+        default: "genus0",
+        summary: "genus0 removes handles, cavities and further components; keep leaves them",
+        read: |d, v| {
+            d.surface.topology = match v.text() {
+                "keep" => TopologyMode::Keep,
+                _ => TopologyMode::Genus0,
+            };
+            Ok(())
+        },
+        write: |p| {
+            json!(match p.surface.topology {
+                TopologyMode::Genus0 => "genus0",
+                TopologyMode::Keep => "keep",
+            })
+        },
+    },
+    ParameterSpec {
+        name: "mask_smoothing",
+        kind: Kind::Number { min: 0.0, max: 3.0 },
+        default: "0.8",
+        summary: "Gaussian sigma in voxels that smooths label maps before surfacing",
+        read: |d, v| {
+            d.surface.mask_smoothing = v.f64();
+            Ok(())
+        },
+        write: |p| json!(p.surface.mask_smoothing),
+    },
+    ParameterSpec {
+        name: "method",
+        kind: Kind::Choice(&["paper", "refined"]),
+        default: "refined",
+        summary: "paper: repulsion and mutual tessellation on the surface; refined: centroidal \
+                  points, their dual and a least-squares fit",
+        read: |d, v| {
+            d.retile.method = match v.text() {
+                "paper" => Method::Paper,
+                _ => Method::Refined,
+            };
+            Ok(())
+        },
+        write: |p| {
+            json!(match p.retile.method {
+                Method::Paper => "paper",
+                Method::Refined => "refined",
+            })
+        },
+    },
+    ParameterSpec {
+        name: "adaptive",
+        kind: Kind::Number { min: 0.0, max: 1.0 },
+        default: "0",
+        summary: "Denser points where the surface bends: spacing falls as curvature^-adaptive; \
+                  0 is even, 0.25 a good choice",
+        read: |d, v| {
+            d.retile.adaptive = v.f64();
+            Ok(())
+        },
+        write: |p| json!(p.retile.adaptive),
+    },
+    ParameterSpec {
+        name: "repulsion_iterations",
+        kind: Kind::Integer { min: 0, max: 1000 },
+        default: "40",
+        summary: "Rounds of geodesic repulsion",
+        read: |d, v| {
+            d.retile.repulsion_iterations = v.usize();
+            Ok(())
+        },
+        write: |p| json!(p.retile.repulsion_iterations),
+    },
+    ParameterSpec {
+        name: "repulsion_strength",
+        kind: Kind::Number {
+            min: 0.001,
+            max: 1.0,
+        },
+        default: "0.15",
+        summary: "Share of an overlap that one round of repulsion moves",
+        read: |d, v| {
+            d.retile.repulsion_strength = v.f64();
+            Ok(())
+        },
+        write: |p| json!(p.retile.repulsion_strength),
+    },
+    ParameterSpec {
+        name: "relaxation_iterations",
+        kind: Kind::Integer { min: 0, max: 1000 },
+        default: "110",
+        summary: "Most rounds of centroidal relaxation (method refined)",
+        read: |d, v| {
+            d.retile.relaxation_iterations = v.usize();
+            Ok(())
+        },
+        write: |p| json!(p.retile.relaxation_iterations),
+    },
+    ParameterSpec {
+        name: "fit_rounds",
+        kind: Kind::Integer { min: 0, max: 200 },
+        default: "",
+        summary: "Rounds of the least-squares fit; 0 leaves the points on the surface (default \
+                  20 for refined, 0 for paper)",
+        read: |d, v| {
+            d.fit_rounds = Some(v.usize());
+            Ok(())
+        },
+        write: |p| json!(p.optimise.fit.rounds),
+    },
+    fit_spec!(
+        "fit_shape_weight",
+        shape_weight,
+        0.0001..=10.0,
+        "0.05",
+        "Weight of triangle shape against squared distance in the fit"
+    ),
+    fit_spec!(
+        "fit_worst_weight",
+        worst_weight,
+        0.0..=100.0,
+        "20",
+        "How much more a misshapen triangle counts in the fit"
+    ),
+    fit_spec!(
+        "fit_free_size",
+        free_size,
+        0.0..=1.0,
+        "1",
+        "How far the fit lets triangles choose their own size"
+    ),
+    fit_spec!(
+        "fit_peak_weight",
+        peak_weight,
+        0.0..=10.0,
+        "0",
+        "How much more a distant sample counts in the fit: lowers the largest distance"
+    ),
+    fit_spec!(
+        "fit_midpoint_weight",
+        midpoint_weight,
+        0.0..=10.0,
+        "1",
+        "Weight of the model's own edge midpoints in the fit"
+    ),
+    ParameterSpec {
+        name: "fitness",
+        kind: Kind::Choice(&["raw", "normalised", "robust"]),
+        default: "normalised",
+        summary: "Form of the fitness that drives the flips: the paper's raw reciprocals, each term \
+                  between 0 and 1, or reciprocals floored at 1 degree and 0.01 mm",
+        read: |d, v| {
+            d.optimise.fitness = match v.text() {
+                "raw" => FitnessForm::Raw,
+                "robust" => FitnessForm::Robust,
+                _ => FitnessForm::Normalised,
+            };
+            Ok(())
+        },
+        write: |p| {
+            json!(match p.optimise.fitness {
+                FitnessForm::Raw => "raw",
+                FitnessForm::Normalised => "normalised",
+                FitnessForm::Robust => "robust",
+            })
+        },
+    },
+    weight_spec!(
+        "w1",
+        0,
+        "Weight of smoothness between an edge's two triangles"
+    ),
+    weight_spec!(
+        "w2",
+        1,
+        "Weight of smoothness to the neighbouring triangles"
+    ),
+    weight_spec!("w3", 2, "Weight of the triangles' aspect ratio"),
+    weight_spec!("w4", 3, "Weight of the distance to the original surface"),
+    ParameterSpec {
+        name: "gain",
+        kind: Kind::Choice(&["local", "total"]),
+        default: "total",
+        summary: "What a flip must raise: the pair's own fitness (the paper) or the mesh's",
+        read: |d, v| {
+            d.optimise.gain = match v.text() {
+                "local" => Gain::Local,
+                _ => Gain::Total,
+            };
+            Ok(())
+        },
+        write: |p| {
+            json!(match p.optimise.gain {
+                Gain::Local => "local",
+                Gain::Total => "total",
+            })
+        },
+    },
+    ParameterSpec {
+        name: "guard",
+        kind: Kind::Number { min: 0.0, max: 1.0 },
+        default: "0.9",
+        summary: "Radius ratio 2r/R below which a flip may not make a triangle, unless it \
+                  replaces one as bad; 0 lets slivers pass",
+        read: |d, v| {
+            d.optimise.guard = v.f64();
+            Ok(())
+        },
+        write: |p| json!(p.optimise.guard),
+    },
+];
+
+fn parse_iso(text: &str) -> Result<IsoLevel, String> {
+    let finite = |t: &str| t.parse::<f64>().ok().filter(|x| x.is_finite());
+    if text == "auto" {
+        return Ok(IsoLevel::Auto);
+    }
+    if let Some(value) = text.strip_prefix("absolute:").and_then(finite) {
+        return Ok(IsoLevel::Absolute(value));
+    }
+    match text.strip_suffix('%').and_then(finite) {
+        Some(percent) if percent > 0.0 && percent < 100.0 => {
+            Ok(IsoLevel::Fraction(percent / 100.0))
+        }
+        Some(percent) => Err(format!("{percent} % does not lie between 0 % and 100 %")),
+        None => Err(format!("`{text}` is none of the three forms")),
+    }
+}
+
+/// [`super::Input::check`] has already matched the value with the row's [`Kind`], so each
+/// getter meets its own variant.
+impl Checked {
+    fn u64(&self) -> u64 {
+        match self {
+            Checked::Integer(n) => *n,
+            _ => unreachable!("checked against Kind::Integer"),
+        }
+    }
+
+    fn usize(&self) -> usize {
+        usize::try_from(self.u64()).unwrap_or(usize::MAX)
+    }
+
+    fn f64(&self) -> f64 {
+        match self {
+            Checked::Number(x) => *x,
+            _ => unreachable!("checked against Kind::Number"),
+        }
+    }
+
+    fn text(&self) -> &str {
+        match self {
+            Checked::Text(t) => t,
+            _ => unreachable!("checked against Kind::Text or Kind::Choice"),
+        }
+    }
+
+    fn integers(&self) -> &[i64] {
+        match self {
+            Checked::Integers(list) => list,
+            _ => unreachable!("checked against Kind::Integers"),
+        }
+    }
+
+    fn indices(&self) -> Result<Vec<usize>, String> {
+        self.integers()
+            .iter()
+            .map(|&n| usize::try_from(n).map_err(|_| format!("{n} is not a voxel index")))
+            .collect()
+    }
+}

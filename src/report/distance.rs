@@ -1,0 +1,356 @@
+//! Two-sided distances between a model and the surface it was made from.
+//!
+//! Each side is sampled evenly by area, and every sample looks for the closest point of the
+//! other side, as Metro does (Cignoni, Rocchini, Scopigno 1998): means and percentiles.
+//!
+//! Samples miss the largest distance. [`farthest`] bounds it from both sides instead: no
+//! point of a triangle is farther from the other side than the triangle's farthest corner is
+//! from any one triangle of the other side; nor than its centroid is, plus the way to the
+//! centroid. Triangles whose bound exceeds the best distance found are cut in four and looked
+//! at again, until [`TOLERANCE`] is reached. Where a mesh is too large for that, samples and
+//! some vertices have to do, and the bound is absent.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::summary::Summary;
+use crate::geometry::bvh::{Bvh, Closest};
+use crate::geometry::{Vec3, triangle};
+use crate::mesh::TriMesh;
+use crate::optimise::Reference;
+use crate::progress::{Cancelled, Monitor};
+
+/// Queries between two looks at the cancel token, some 10 ms of work.
+const CHUNK: usize = 8192;
+/// How far the largest distance may lie above the one reported, as a share of it.
+const TOLERANCE: f64 = 0.01;
+/// Most queries for a largest distance, in units of the even samples.
+const MOST_REFINED: usize = 40;
+
+/// How far model and surface lie apart.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Distance {
+    /// Mean of the two directions' means, mm.
+    pub mean_mm: f64,
+    /// Root mean square over both directions, mm.
+    pub rms_mm: f64,
+    /// The larger of the two directions' 95th percentiles, mm.
+    pub hd95_mm: f64,
+    /// The largest distance of either direction (Hausdorff), mm: one that was found.
+    pub hausdorff_mm: f64,
+    /// What the largest distance surely does not exceed, mm; absent for very large meshes.
+    pub hausdorff_at_most_mm: Option<f64>,
+    /// The mean in units of the smallest voxel spacing.
+    pub mean_voxels: f64,
+    /// The Hausdorff distance in the same unit.
+    pub hausdorff_voxels: f64,
+    /// The smallest voxel spacing, mm.
+    pub voxel_mm: f64,
+    /// From points of the model to the surface.
+    pub model_to_surface: Direction,
+    /// From points of the surface to the model.
+    pub surface_to_model: Direction,
+    /// Volume enclosed by the model, millilitres.
+    pub volume_ml: f64,
+    /// Volume enclosed by the surface, millilitres.
+    pub surface_volume_ml: f64,
+    /// How much more volume the model encloses than the surface, percent.
+    pub volume_error_percent: f64,
+    /// How much more area the model has than the surface, percent.
+    pub area_error_percent: f64,
+}
+
+/// Distances of one side's points to the other side.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Direction {
+    /// Even samples taken.
+    pub samples: usize,
+    /// Mean over the even samples, mm.
+    pub mean_mm: f64,
+    /// Root mean square over the even samples, mm.
+    pub rms_mm: f64,
+    /// 95th percentile over the even samples, mm.
+    pub p95_mm: f64,
+    /// Largest found anywhere, mm.
+    pub max_mm: f64,
+    /// What the largest surely does not exceed, mm; absent for very large meshes.
+    pub max_at_most_mm: Option<f64>,
+}
+
+/// Measures `model` against `reference` with `samples` even samples on each side.
+///
+/// # Errors
+/// [`Cancelled`] where the monitor says so.
+pub fn distance(
+    model: &TriMesh,
+    reference: &Reference,
+    samples: usize,
+    monitor: &Monitor,
+) -> Result<Distance, Cancelled> {
+    let surface = &reference.mesh;
+    let model_tree = Bvh::new(&model.vertices, &model.triangles);
+    let there = Direction::between(model, surface, &reference.bvh, samples, monitor)?;
+    let back = Direction::between(surface, model, &model_tree, samples, monitor)?;
+
+    let mean_mm = f64::midpoint(there.mean_mm, back.mean_mm);
+    let hausdorff_mm = there.max_mm.max(back.max_mm);
+    let (volume, surface_volume) = (model.volume(), surface.volume());
+    let percent = |ours: f64, theirs: f64| 100.0 * (ours.abs() - theirs.abs()) / theirs.abs();
+    Ok(Distance {
+        mean_mm,
+        rms_mm: f64::midpoint(there.rms_mm.powi(2), back.rms_mm.powi(2)).sqrt(),
+        hd95_mm: there.p95_mm.max(back.p95_mm),
+        hausdorff_mm,
+        hausdorff_at_most_mm: (there.max_at_most_mm.zip(back.max_at_most_mm))
+            .map(|(a, b)| a.max(b)),
+        mean_voxels: mean_mm / reference.spacing,
+        hausdorff_voxels: hausdorff_mm / reference.spacing,
+        voxel_mm: reference.spacing,
+        model_to_surface: there,
+        surface_to_model: back,
+        volume_ml: volume / 1000.0,
+        surface_volume_ml: surface_volume / 1000.0,
+        volume_error_percent: percent(volume, surface_volume),
+        area_error_percent: percent(model.area(), surface.area()),
+    })
+}
+
+impl Direction {
+    fn between(
+        from: &TriMesh,
+        to: &TriMesh,
+        tree: &Bvh,
+        samples: usize,
+        monitor: &Monitor,
+    ) -> Result<Self, Cancelled> {
+        let even = Summary::of(&distances(&even_samples(from, samples), tree, monitor)?);
+        let budget = MOST_REFINED * samples;
+        let (max_mm, max_at_most_mm) = if from.vertices.len() <= budget {
+            farthest(from, (to, tree), even.max, budget, monitor)?
+        } else {
+            let some = distances(&some_vertices(from, samples), tree, monitor)?;
+            (Summary::of(&some).max.max(even.max), None)
+        };
+        Ok(Self {
+            samples,
+            mean_mm: even.mean,
+            rms_mm: even.rms,
+            p95_mm: even.p95,
+            max_mm,
+            max_at_most_mm,
+        })
+    }
+}
+
+/// The largest distance of any point of `from` to `to`: one that was found, at least
+/// `found`, and a bound that holds, if `budget` queries reach one within [`TOLERANCE`].
+fn farthest(
+    from: &TriMesh,
+    (to, tree): (&TriMesh, &Bvh),
+    found: f64,
+    budget: usize,
+    monitor: &Monitor,
+) -> Result<(f64, Option<f64>), Cancelled> {
+    let corners = closest_points(&from.vertices, tree, monitor)?;
+    let distance = |c: &Closest| c.squared_distance.sqrt();
+    let mut best = corners.iter().map(distance).fold(found, f64::max);
+    let mut spent = corners.len();
+    let limit = |best: f64| best * (1.0 + TOLERANCE) + f64::EPSILON;
+    let mut cells: Vec<[Vec3; 3]> = (0..from.triangles.len())
+        .filter(|&t| bound_by_corners(from, t, &corners, to) > limit(best))
+        .flat_map(|t| quarters(&from.corners(t)))
+        .collect();
+    while !cells.is_empty() {
+        spent += cells.len();
+        if spent > budget {
+            return Ok((best, None));
+        }
+        let centroids: Vec<Vec3> = cells.iter().map(|[a, b, c]| (a + b + c) / 3.0).collect();
+        let closest = closest_points(&centroids, tree, monitor)?;
+        best = closest.iter().map(distance).fold(best, f64::max);
+        cells = (cells.iter().zip(&centroids).zip(&closest))
+            .filter(|((cell, centroid), closest)| {
+                let around = distance(closest) + farthest_corner(cell, |p| (p - *centroid).norm());
+                let triangle = to.corners(closest.triangle as usize);
+                let to_one = farthest_corner(cell, |p| distance_to(p, &triangle));
+                around.min(to_one) > limit(best)
+            })
+            .flat_map(|((cell, _), _)| quarters(cell))
+            .collect();
+    }
+    Ok((best, Some(best * (1.0 + TOLERANCE))))
+}
+
+/// A bound for the distance of triangle `t`'s points, from what is closest to its corners.
+/// The distance to one fixed triangle is convex, so that it is largest at a corner.
+fn bound_by_corners(from: &TriMesh, t: usize, closest: &[Closest], to: &TriMesh) -> f64 {
+    let known = from.triangles[t].map(|v| closest[v as usize]);
+    if known.iter().all(|c| c.triangle == known[0].triangle) {
+        let squared = known.iter().map(|c| c.squared_distance);
+        return squared.fold(0.0, f64::max).sqrt();
+    }
+    let cell = from.corners(t);
+    let bounds = known.iter().map(|c| {
+        let triangle = to.corners(c.triangle as usize);
+        farthest_corner(&cell, |p| distance_to(p, &triangle))
+    });
+    bounds.fold(f64::INFINITY, f64::min)
+}
+
+fn farthest_corner(cell: &[Vec3; 3], distance: impl Fn(&Vec3) -> f64) -> f64 {
+    cell.iter().map(distance).fold(0.0, f64::max)
+}
+
+fn distance_to(p: &Vec3, [a, b, c]: &[Vec3; 3]) -> f64 {
+    let [u, v, w] = triangle::closest_barycentric(p, a, b, c);
+    (a * u + b * v + c * w - p).norm()
+}
+
+/// The triangle cut at the middles of its sides.
+fn quarters([a, b, c]: &[Vec3; 3]) -> [[Vec3; 3]; 4] {
+    let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(p, q)| (p + q) / 2.0);
+    [[*a, ab, ca], [ab, *b, bc], [ca, bc, *c], [ab, bc, ca]]
+}
+
+/// The distance from each point to the closest point of `to`, in the points' order.
+fn distances(points: &[Vec3], to: &Bvh, monitor: &Monitor) -> Result<Vec<f64>, Cancelled> {
+    let closest = closest_points(points, to, monitor)?;
+    Ok(closest.iter().map(|c| c.squared_distance.sqrt()).collect())
+}
+
+/// The closest point of `to` for each point, in the points' order; none where `to` is empty.
+fn closest_points(points: &[Vec3], to: &Bvh, monitor: &Monitor) -> Result<Vec<Closest>, Cancelled> {
+    let mut closest = Vec::with_capacity(points.len());
+    for chunk in points.chunks(CHUNK) {
+        monitor.check()?;
+        // One task takes some hundred queries, so that handing out costs nothing.
+        let found = chunk.par_iter().with_min_len(256);
+        closest.par_extend(found.filter_map(|p| to.closest(p)));
+    }
+    Ok(closest)
+}
+
+/// `count` points spread evenly over the area: one in each of `count` equal shares of it, in
+/// the triangles' order, at the places of a two-dimensional Kronecker sequence (Roberts'
+/// R2). Even without random numbers, and the same every time.
+fn even_samples(mesh: &TriMesh, count: usize) -> Vec<Vec3> {
+    // 1/g and 1/g² for the real root g of x³ = x + 1.
+    const STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
+    let total = mesh.area();
+    if !(total > 0.0) {
+        return Vec::new();
+    }
+    let mut points = Vec::with_capacity(count);
+    let mut covered = 0.0;
+    for t in 0..mesh.triangles.len() {
+        covered += mesh.area_normal(t).norm() / 2.0 / total;
+        let [a, b, c] = mesh.corners(t);
+        while points.len() < count && (points.len() as f64 + 0.5) / (count as f64) < covered {
+            let [u, v] = STEP.map(|s| (0.5 + s * points.len() as f64).fract());
+            let (u, v) = if u + v > 1.0 {
+                (1.0 - u, 1.0 - v)
+            } else {
+                (u, v)
+            };
+            points.push(a + (b - a) * u + (c - a) * v);
+        }
+    }
+    points
+}
+
+/// Every vertex, or every k-th where there are more than `limit`.
+fn some_vertices(mesh: &TriMesh, limit: usize) -> Vec<Vec3> {
+    let stride = mesh.vertices.len().div_ceil(limit.max(1)).max(1);
+    mesh.vertices.iter().step_by(stride).copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+    use crate::surface::{Surface, SurfaceFacts};
+
+    fn reference(mesh: TriMesh) -> Reference {
+        Reference::new(&Surface {
+            working: mesh.vertices.clone(),
+            mesh,
+            spacing: 2.0,
+            facts: SurfaceFacts::default(),
+        })
+    }
+
+    #[test]
+    fn concentric_spheres_lie_their_radii_apart() {
+        let outer = reference(shapes::icosphere(32.0, 5));
+        let inner = shapes::icosphere(30.0, 5);
+        let d = distance(&inner, &outer, 3000, &Monitor::silent()).unwrap();
+        for found in [d.mean_mm, d.rms_mm, d.hd95_mm, d.hausdorff_mm] {
+            assert!((found - 2.0).abs() < 0.02, "{d:?}");
+        }
+        assert!((d.mean_voxels - d.mean_mm / 2.0).abs() < 1e-12);
+        let expected = 100.0 * ((30f64 / 32.0).powi(3) - 1.0);
+        assert!((d.volume_error_percent - expected).abs() < 1e-9);
+        assert!((d.area_error_percent - 100.0 * ((30f64 / 32.0).powi(2) - 1.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_mesh_lies_on_itself() {
+        let cup = shapes::cup(80.0, 32.0, 10.0, 30);
+        let d = distance(&cup, &reference(cup.clone()), 2000, &Monitor::silent()).unwrap();
+        assert!(d.hausdorff_mm < 1e-6);
+        assert!(d.hausdorff_at_most_mm.is_some_and(|h| h < 1e-6));
+        assert_eq!(d.volume_error_percent, 0.0);
+    }
+
+    #[test]
+    fn a_spike_shows_in_the_hausdorff_distance_alone() {
+        let sphere = shapes::icosphere(30.0, 4);
+        let mut spiky = sphere.clone();
+        spiky.vertices[0] *= 1.2;
+        let d = distance(&spiky, &reference(sphere), 2000, &Monitor::silent()).unwrap();
+        assert!((d.hausdorff_mm - 6.0).abs() < 0.1, "{d:?}");
+        assert!(d.mean_mm < 0.05 && d.hd95_mm < 0.05);
+    }
+
+    #[test]
+    fn the_largest_distance_is_enclosed_where_samples_miss_it() {
+        let surface = shapes::cup(80.0, 32.0, 10.0, 60);
+        let model = shapes::cup(80.0, 32.0, 10.0, 9);
+        let tree = Bvh::new(&surface.vertices, &surface.triangles);
+        let dense = distances(&even_samples(&model, 300_000), &tree, &Monitor::silent()).unwrap();
+        let dense = Summary::of(&dense).max;
+        let d = distance(&model, &reference(surface), 2000, &Monitor::silent()).unwrap();
+        let (found, at_most) = (d.model_to_surface.max_mm, d.model_to_surface.max_at_most_mm);
+        assert!(
+            found >= 0.99 * dense && at_most.unwrap() >= dense,
+            "{d:?} {dense}"
+        );
+        assert!((at_most.unwrap() - 1.01 * found).abs() < 1e-9);
+    }
+
+    #[test]
+    fn samples_are_even_in_area() {
+        let mesh = shapes::cup(80.0, 32.0, 10.0, 30);
+        let points = even_samples(&mesh, 5000);
+        assert_eq!(points.len(), 5000);
+        // The area below every level agrees with the share of points below it.
+        for level in [-70.0, -50.0, -25.0, -5.0] {
+            let share = points.iter().filter(|p| p.z < level).count() as f64 / 5000.0;
+            let area: f64 = (0..mesh.triangles.len())
+                .filter(|&t| mesh.corners(t).iter().map(|p| p.z).sum::<f64>() / 3.0 < level)
+                .map(|t| mesh.area_normal(t).norm() / 2.0)
+                .sum();
+            assert!((share - area / mesh.area()).abs() < 0.02, "{level} {share}");
+        }
+    }
+
+    #[test]
+    fn cancelling_ends_it() {
+        let token = crate::progress::CancelToken::new();
+        token.cancel();
+        let monitor = Monitor::new(&crate::progress::Silent, token);
+        let mesh = shapes::icosphere(30.0, 2);
+        let result = distance(&mesh, &reference(mesh.clone()), 100, &monitor);
+        assert_eq!(result, Err(Cancelled));
+    }
+}

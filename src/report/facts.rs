@@ -1,0 +1,143 @@
+//! The stages' facts by the names of the report.
+//!
+//! The one place that knows both: a field that a stage adds to its facts appears in the
+//! report by one line here.
+
+use serde_json::{Map, Value, json};
+
+use super::{Forms, SurfaceSection};
+use crate::mesh::topology;
+use crate::optimise::fitness::Scales;
+use crate::optimise::{Ended, FitnessForm, FitnessSummary, OptimiseFacts, Optimised};
+use crate::retile::{RetileFacts, Tiled};
+use crate::surface::{Surface, SurfaceFacts, VolumeKind};
+
+fn object(value: Value) -> Map<String, Value> {
+    match value {
+        Value::Object(map) => map,
+        _ => Map::new(),
+    }
+}
+
+pub fn surface(surface: &Surface) -> SurfaceSection {
+    let mesh = &surface.mesh;
+    // S is a closed manifold by its type's promise: 3F = 2E.
+    let edges = 3 * mesh.triangles.len() / 2;
+    let components = topology::components(mesh.vertices.len(), &mesh.triangles);
+    SurfaceSection {
+        iso_value: surface.facts.iso_value,
+        vertices: mesh.vertices.len(),
+        triangles: mesh.triangles.len(),
+        euler_characteristic: mesh.vertices.len() as i64 - edges as i64
+            + mesh.triangles.len() as i64,
+        components: components.iter().max().map_or(0, |m| *m as usize + 1),
+        volume_ml: mesh.volume() / 1000.0,
+        area_mm2: mesh.area(),
+        voxel_mm: surface.spacing,
+        facts: surface_facts(&surface.facts),
+    }
+}
+
+fn surface_facts(facts: &SurfaceFacts) -> Map<String, Value> {
+    object(json!({
+        "genus": facts.genus,
+        "iso_fraction": facts.iso_fraction,
+        "reference_intensity": facts.reference,
+        "otsu": facts.otsu,
+        "intensity_range": facts.range,
+        "kind": match facts.kind {
+            VolumeKind::Intensity => "intensity",
+            VolumeKind::Mask => "mask",
+            VolumeKind::Labels => "labels",
+        },
+        "label": facts.label,
+        "ventricle_score": facts.ventricle_score,
+        "region_ml": facts.region_ml,
+        "touches_border": facts.touches_border,
+        "not_finite_voxels": facts.not_finite,
+        "neighbour_voxels_cut": facts.neighbour_voxels_cut,
+        "neighbour_cut_mm2": facts.neighbour_cut_mm2,
+        "components_before": facts.components_before,
+        "cavities_before": facts.cavities_before,
+        "handles_before": facts.handles_before,
+        "voxels_dropped": facts.voxels_dropped,
+        "voxels_cut": facts.voxels_cut,
+        "voxels_filled": facts.voxels_filled,
+    }))
+}
+
+pub fn retile(facts: &RetileFacts) -> Map<String, Value> {
+    object(json!({
+        "repulsion_rounds": facts.repulsion_rounds,
+        "relaxation_rounds": facts.relaxation_rounds,
+        "attempts": facts.attempts,
+    }))
+}
+
+pub fn optimise(facts: &OptimiseFacts) -> Map<String, Value> {
+    object(json!({
+        "flips": facts.flips,
+        "sweeps": facts.sweeps,
+        "ended": match facts.ended {
+            Ended::NoFlipGains => "no_flip_gains",
+            Ended::Cycle => "cycle",
+            Ended::SweepLimit => "sweep_limit",
+        },
+        "fit_rounds": facts.fit_rounds,
+        "fit_flips": facts.fit_flips,
+        "fit_shortened": facts.fit_shortened,
+        "self_intersections_before": facts.self_intersections_before,
+    }))
+}
+
+pub fn warnings(surface: &Surface, tiled: &Tiled, optimised: &Optimised) -> Vec<String> {
+    [
+        &surface.facts.warnings,
+        &tiled.facts.warnings,
+        &optimised.facts.warnings,
+    ]
+    .into_iter()
+    .flatten()
+    .cloned()
+    .collect()
+}
+
+pub fn form_name(form: FitnessForm) -> &'static str {
+    match form {
+        FitnessForm::Raw => "raw",
+        FitnessForm::Normalised => "normalised",
+        FitnessForm::Robust => "robust",
+    }
+}
+
+pub fn driving_form(summary: &FitnessSummary, form: FitnessForm) -> f64 {
+    match form {
+        FitnessForm::Raw => summary.raw,
+        FitnessForm::Normalised => summary.normalised,
+        FitnessForm::Robust => summary.robust,
+    }
+}
+
+pub fn forms(summary: &&FitnessSummary) -> Forms {
+    Forms {
+        raw: summary.raw,
+        normalised: summary.normalised,
+        robust: summary.robust,
+    }
+}
+
+/// Numerators and floors of A, B (radians), C and D (mm) in every form.
+pub fn scales(spacing: f64) -> Map<String, Value> {
+    [
+        FitnessForm::Raw,
+        FitnessForm::Normalised,
+        FitnessForm::Robust,
+    ]
+    .into_iter()
+    .map(|form| {
+        let scales = Scales::new(form, spacing);
+        let value = json!({ "numerator": scales.numerator, "floor": scales.floor });
+        (form_name(form).to_owned(), value)
+    })
+    .collect()
+}

@@ -1,0 +1,296 @@
+//! A small rasteriser: triangles seen along an axis, through a depth buffer, into a PNG.
+//!
+//! Orthographic, flat-shaded, with the triangles' edges drawn in. Rendered at
+//! [`SUPERSAMPLING`] times the size and averaged, so that outlines are smooth; the
+//! background is transparent, so that the picture suits light and dark pages.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+
+use crate::geometry::Vec3;
+
+/// Rows and columns of rendered pixels for each of the picture's.
+const SUPERSAMPLING: usize = 2;
+/// Share of the picture's side that the object may take.
+const FILL: f64 = 0.88;
+
+/// A colour: red, green, blue, 0..=1, as shown on a screen.
+pub type Colour = [f64; 3];
+
+/// A direction to look from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// What a physician calls it.
+    pub name: &'static str,
+    /// Patient direction (LPS) that points right in the picture.
+    pub right: Vec3,
+    /// Patient direction that points up in the picture.
+    pub up: Vec3,
+    /// Letters at the picture's right, top, left and bottom.
+    pub letters: [char; 4],
+}
+
+impl View {
+    /// The three views of a report.
+    pub const ALL: [View; 3] = [
+        View {
+            name: "Anterior",
+            right: Vec3::new(1.0, 0.0, 0.0),
+            up: Vec3::new(0.0, 0.0, 1.0),
+            letters: ['L', 'S', 'R', 'I'],
+        },
+        View {
+            name: "Left lateral",
+            right: Vec3::new(0.0, 1.0, 0.0),
+            up: Vec3::new(0.0, 0.0, 1.0),
+            letters: ['P', 'S', 'A', 'I'],
+        },
+        View {
+            name: "Superior",
+            right: Vec3::new(-1.0, 0.0, 0.0),
+            up: Vec3::new(0.0, -1.0, 0.0),
+            letters: ['R', 'A', 'L', 'P'],
+        },
+    ];
+
+    /// From the object to the eye.
+    pub fn toward(&self) -> Vec3 {
+        self.right.cross(&self.up)
+    }
+}
+
+/// A triangle to draw.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Facet {
+    /// Corners, LPS mm, counter-clockwise seen from outside.
+    pub corners: [Vec3; 3],
+    /// Colour before shading.
+    pub colour: Colour,
+    /// Corners of the triangle whose sides are drawn where this one meets them: itself, or
+    /// the whole one that it is a part of.
+    pub outline: [Vec3; 3],
+}
+
+/// A square picture under work.
+struct Canvas {
+    side: usize,
+    depth: Vec<f64>,
+    pixels: Vec<Option<Colour>>,
+}
+
+/// How to draw.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Style {
+    /// What comes to the picture's middle, LPS mm.
+    pub centre: Vec3,
+    /// How far the object reaches from there to any side, mm.
+    pub reach: f64,
+    /// Rows and columns of the picture, pixels.
+    pub side: usize,
+    /// Width of lines, pixels.
+    pub line: f64,
+    /// Light from everywhere, 0..=1; the rest comes from lamps. Colours that mean something
+    /// want more of it than those of a material.
+    pub ambient: f64,
+}
+
+/// Draws `facets` from `view`.
+pub fn png(facets: &[Facet], view: &View, style: &Style) -> Vec<u8> {
+    let side = style.side;
+    let fine = side * SUPERSAMPLING;
+    let mut canvas = Canvas {
+        side: fine,
+        depth: vec![f64::NEG_INFINITY; fine * fine],
+        pixels: vec![None; fine * fine],
+    };
+    let scale = FILL * fine as f64 / 2.0 / style.reach.max(f64::MIN_POSITIVE);
+    let middle = fine as f64 / 2.0;
+    let toward = view.toward();
+    for facet in facets {
+        let [a, b, c] = &facet.corners;
+        let Some(normal) = (b - a).cross(&(c - a)).try_normalize(0.0) else {
+            continue;
+        };
+        if normal.dot(&toward) <= 0.0 {
+            continue;
+        }
+        // x right, y down, z toward the eye.
+        let project = |p: Vec3| {
+            let p = (p - style.centre) * scale;
+            Vec3::new(
+                middle + p.dot(&view.right),
+                middle - p.dot(&view.up),
+                p.dot(&toward),
+            )
+        };
+        let seen = facet.corners.map(project);
+        let outline = facet.outline.map(project);
+        let local = Vec3::new(
+            normal.dot(&view.right),
+            normal.dot(&view.up),
+            normal.dot(&toward),
+        );
+        let colour = shade(facet.colour, &local, style.ambient);
+        canvas.fill(&seen, colour, &outline, style.line * SUPERSAMPLING as f64);
+    }
+    canvas.encode(side)
+}
+
+/// Lambert's law under a key light from the upper left and a weak one from the lower right,
+/// over some light from everywhere. `normal`: x right, y up, z toward the eye.
+fn shade(colour: Colour, normal: &Vec3, ambient: f64) -> Colour {
+    let key = normal.dot(&Vec3::new(-0.45, 0.6, 0.66)).max(0.0);
+    let fill = normal.dot(&Vec3::new(0.7, -0.4, 0.59)).max(0.0);
+    let light = ambient + (1.0 - ambient) * (0.94 * key + 0.24 * fill);
+    colour.map(|c| (c * light).clamp(0.0, 1.0))
+}
+
+impl Canvas {
+    fn fill(&mut self, [a, b, c]: &[Vec3; 3], colour: Colour, outline: &[Vec3; 3], width: f64) {
+        let doubled_area = cross(a, b, c);
+        if doubled_area == 0.0 {
+            return;
+        }
+        let dark = colour.map(|c| 0.42 * c);
+        let columns = self.span([a.x, b.x, c.x]);
+        for row in self.span([a.y, b.y, c.y]) {
+            for column in columns.clone() {
+                let p = Vec3::new(column as f64 + 0.5, row as f64 + 0.5, 0.0);
+                // Twice the areas over the sides ab, bc, ca.
+                let over = [cross(a, b, &p), cross(b, c, &p), cross(c, a, &p)];
+                if over.iter().any(|&w| w * doubled_area < 0.0) {
+                    continue;
+                }
+                let depth = (a.z * over[1] + b.z * over[2] + c.z * over[0]) / doubled_area;
+                let at = row * self.side + column;
+                if depth > self.depth[at] {
+                    self.depth[at] = depth;
+                    let on_line = near_side(&p, outline, width / 2.0);
+                    self.pixels[at] = Some(if on_line { dark } else { colour });
+                }
+            }
+        }
+    }
+
+    fn span(&self, ends: [f64; 3]) -> std::ops::Range<usize> {
+        let limit = self.side as f64;
+        let min = ends.iter().fold(limit, |m, x| m.min(*x)).floor();
+        let max = ends.iter().fold(0.0f64, |m, x| m.max(*x)).ceil();
+        min.clamp(0.0, limit) as usize..max.clamp(0.0, limit) as usize
+    }
+
+    /// Averages the fine pixels and writes an RGBA PNG of `side` pixels.
+    fn encode(&self, side: usize) -> Vec<u8> {
+        let mut rgba = Vec::with_capacity(4 * side * side);
+        for row in 0..side {
+            for column in 0..side {
+                let mut sum = [0.0; 3];
+                let mut covered = 0.0;
+                for k in 0..SUPERSAMPLING * SUPERSAMPLING {
+                    let y = row * SUPERSAMPLING + k / SUPERSAMPLING;
+                    let x = column * SUPERSAMPLING + k % SUPERSAMPLING;
+                    if let Some(colour) = self.pixels[y * self.side + x] {
+                        covered += 1.0;
+                        (0..3).for_each(|r| sum[r] += colour[r]);
+                    }
+                }
+                let byte = |x: f64| (255.0 * x).round() as u8;
+                rgba.extend(sum.map(|s| byte(s / f64::max(covered, 1.0))));
+                rgba.push(byte(covered / (SUPERSAMPLING * SUPERSAMPLING) as f64));
+            }
+        }
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, side as u32, side as u32);
+        encoder.set_color(png::ColorType::Rgba);
+        encoder.set_depth(png::BitDepth::Eight);
+        let written = encoder
+            .write_header()
+            .and_then(|mut writer| writer.write_image_data(&rgba));
+        debug_assert!(written.is_ok(), "a Vec takes all that is written");
+        bytes
+    }
+}
+
+/// Twice the signed area of a triangle in the picture.
+fn cross(p: &Vec3, q: &Vec3, r: &Vec3) -> f64 {
+    (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x)
+}
+
+/// Whether `p`, inside of the triangle, lies within `distance` of one of its sides.
+fn near_side(p: &Vec3, [a, b, c]: &[Vec3; 3], distance: f64) -> bool {
+    [(a, b), (b, c), (c, a)].iter().any(|(q, r)| {
+        let length = (r.x - q.x).hypot(r.y - q.y);
+        cross(q, r, p).abs() < distance * length
+    })
+}
+
+/// A PNG as a `data:` URI.
+pub fn data_uri(png: &[u8]) -> String {
+    format!("data:image/png;base64,{}", STANDARD.encode(png))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{TriMesh, shapes};
+
+    fn facets(mesh: &TriMesh) -> Vec<Facet> {
+        (0..mesh.triangles.len())
+            .map(|t| Facet {
+                corners: mesh.corners(t),
+                colour: [1.0; 3],
+                outline: mesh.corners(t),
+            })
+            .collect()
+    }
+
+    fn alpha(png_bytes: &[u8]) -> (usize, Vec<u8>) {
+        let mut reader = png::Decoder::new(std::io::Cursor::new(png_bytes))
+            .read_info()
+            .unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        let alpha = pixels.iter().skip(3).step_by(4).copied().collect();
+        (info.width as usize, alpha)
+    }
+
+    #[test]
+    fn a_sphere_covers_its_disc_without_gaps() {
+        let mesh = shapes::icosphere(10.0, 4);
+        let style = Style {
+            centre: Vec3::zeros(),
+            reach: 10.0,
+            side: 100,
+            line: 1.0,
+            ambient: 0.3,
+        };
+        let picture = png(&facets(&mesh), &View::ALL[0], &style);
+        let (side, alpha) = alpha(&picture);
+        let share = alpha.iter().map(|&a| f64::from(a)).sum::<f64>() / 255.0 / (side * side) as f64;
+        let disc = std::f64::consts::PI * (FILL / 2.0).powi(2);
+        assert!((share / disc - 1.0).abs() < 0.01, "{share} {disc}");
+    }
+
+    #[test]
+    fn every_view_is_right_handed_and_named_by_its_letters() {
+        let direction = |letter| match letter {
+            'L' => Vec3::x(),
+            'R' => -Vec3::x(),
+            'P' => Vec3::y(),
+            'A' => -Vec3::y(),
+            'S' => Vec3::z(),
+            _ => -Vec3::z(),
+        };
+        for view in View::ALL {
+            let [right, top, left, bottom] = view.letters.map(direction);
+            assert_eq!((right, top), (view.right, view.up));
+            assert_eq!((left, bottom), (-view.right, -view.up));
+            let expected = match view.name {
+                "Anterior" => 'A',
+                "Left lateral" => 'L',
+                _ => 'S',
+            };
+            assert_eq!(view.toward(), direction(expected));
+        }
+    }
+}

@@ -1,0 +1,460 @@
+//! The page's sections, from the verdict to the particulars.
+
+use serde_json::{Value, json};
+
+use super::charts;
+use super::raster::View;
+use super::text::{escape, leaves, number, signed};
+use super::views::{self, Pictures};
+use crate::geometry::Vec3;
+use crate::geometry::bvh::Aabb;
+use crate::mesh::TriMesh;
+use crate::report::Report;
+use crate::report::distance::Direction;
+use crate::report::elements::Shape;
+use crate::report::summary::Summary;
+
+/// Most triangles that a browser turns smoothly.
+const MOST_TURNED: usize = 20_000;
+
+/// One line on where the model comes from.
+pub fn origin(report: &Report) -> String {
+    let name = ["name", "file", "title", "id"]
+        .iter()
+        .find_map(|key| report.input.get(key)?.as_str());
+    let seed = report.parameters.get("seed").and_then(Value::as_u64);
+    [
+        name.map(|n| format!("Volume {n}")),
+        Some(format!("iso-value {}", number(report.surface.iso_value, 3))),
+        seed.map(|s| format!("seed {s}")),
+        Some(format!("ventriform {}", report.software.version)),
+    ]
+    .into_iter()
+    .flatten()
+    .collect::<Vec<_>>()
+    .join(" · ")
+}
+
+/// What is promised of every model, each with whether it holds.
+fn checks(report: &Report) -> Vec<(bool, String)> {
+    let mesh = &report.mesh;
+    let surface = &report.surface;
+    let wanted = report.parameters.get("points").and_then(Value::as_u64);
+    let exact = wanted.map(|n| {
+        let text = format!("Exactly {n} points, as asked for");
+        (n == mesh.vertices as u64, text)
+    });
+    let kind = match (mesh.components, mesh.euler_characteristic) {
+        (1, 2) => "one piece without handles, like a ball".to_owned(),
+        (components, euler) => format!("pieces: {components}, Euler characteristic: {euler}"),
+    };
+    let same = mesh.components == surface.components
+        && mesh.euler_characteristic == surface.euler_characteristic;
+    let gain = report.fitness.gain_percent;
+    let mut checks: Vec<(bool, String)> = exact.into_iter().collect();
+    checks.extend([
+        (mesh.closed, "Closed: the surface has no hole".to_owned()),
+        (
+            mesh.edge_manifold && mesh.vertex_manifold,
+            "Manifold: two triangles at every edge, one fan at every point".to_owned(),
+        ),
+        (
+            mesh.oriented && mesh.outward,
+            "Every triangle faces outward".to_owned(),
+        ),
+        (
+            mesh.self_intersections == 0,
+            match mesh.self_intersections {
+                0 => "No two triangles cut through each other (exact test)".to_owned(),
+                n => format!("{n} pairs of triangles cut through each other"),
+            },
+        ),
+        (same, format!("The topology of the image's surface: {kind}")),
+        (gain >= 0.0, improvement(gain)),
+    ]);
+    checks
+}
+
+fn improvement(gain_percent: f64) -> String {
+    let amount = number(gain_percent.abs(), 1);
+    let verb = if gain_percent < 0.0 {
+        "lowered"
+    } else {
+        "raised"
+    };
+    format!("Optimisation {verb} the fitness by {amount}\u{a0}%")
+}
+
+/// Whether the model is sound, and each promise by itself.
+pub fn verdict(report: &Report) -> String {
+    let checks = checks(report);
+    let failed = checks.iter().filter(|(holds, _)| !holds).count();
+    let (class, sign, headline) = match failed {
+        0 => ("", "✓", "The model keeps every promise.".to_owned()),
+        n => (
+            " bad",
+            "✗",
+            format!("{n} of {} promises are broken.", checks.len()),
+        ),
+    };
+    let items: String = checks
+        .iter()
+        .map(|(holds, text)| {
+            let class = if *holds { "" } else { r#" class="no""# };
+            let spoken = if *holds { "yes" } else { "no" };
+            format!(
+                r#"<li{class} aria-label="{spoken}: {0}">{0}</li>"#,
+                escape(text)
+            )
+        })
+        .collect();
+    format!(
+        r#"<section class="verdict{class}"><div class="sign" aria-hidden="true">{sign}</div><div><h2>{headline}</h2><ul class="checks">{items}</ul></div></section>"#
+    )
+}
+
+/// The headline figures.
+pub fn figures(report: &Report) -> String {
+    let distance = &report.distance;
+    let total = report.timings_ms.get("total").and_then(Value::as_f64);
+    let figure = |value: String, unit: &str, label: String| {
+        format!(
+            r#"<div class="figure"><b>{value} <small>{unit}</small></b><span>{}</span></div>"#,
+            escape(&label)
+        )
+    };
+    let mut figures = vec![
+        figure(
+            report.mesh.vertices.to_string(),
+            "points",
+            format!("joined to {} triangles", report.mesh.triangles),
+        ),
+        figure(
+            number(report.shape.radius_ratio.mean, 3),
+            "of 1",
+            format!(
+                "mean shape of triangles (2r/R); worst {}",
+                number(report.shape.radius_ratio.min, 3)
+            ),
+        ),
+        figure(
+            number(distance.mean_mm, 2),
+            "mm",
+            format!(
+                "mean distance to the image's surface, {} voxel",
+                number(distance.mean_voxels, 2)
+            ),
+        ),
+        figure(
+            number(distance.hausdorff_mm, 2),
+            "mm",
+            format!(
+                "largest distance (Hausdorff); 95\u{a0}% within {}\u{a0}mm",
+                number(distance.hd95_mm, 2)
+            ),
+        ),
+        figure(
+            number(distance.volume_ml, 1),
+            "ml",
+            format!(
+                "wall volume, {}\u{a0}% against the surface",
+                signed(distance.volume_error_percent, 2)
+            ),
+        ),
+        figure(
+            number(report.smoothness.dihedral_deg.mean, 1),
+            "degrees",
+            "mean bend between neighbouring triangles".to_owned(),
+        ),
+        figure(
+            signed(report.fitness.gain_percent, 1),
+            "%",
+            "fitness gained by optimisation".to_owned(),
+        ),
+    ];
+    if let Some(total) = total.filter(|t| *t > 0.0) {
+        let label = "from voxels to the measured model".to_owned();
+        figures.push(figure(number(total, 0), "ms", label));
+    }
+    format!(r#"<div class="figures">{}</div>"#, figures.concat())
+}
+
+/// What the user should know; nothing where there is nothing.
+pub fn warnings(report: &Report) -> String {
+    if report.warnings.is_empty() {
+        return String::new();
+    }
+    let items: String = report
+        .warnings
+        .iter()
+        .map(|w| format!("<li>{}</li>", escape(w)))
+        .collect();
+    format!(r#"<section><h2>Please note</h2><ul class="warnings">{items}</ul></section>"#)
+}
+
+/// The model from three sides, and one to turn.
+pub fn model(mesh: &TriMesh) -> String {
+    let turning = if mesh.triangles.len() <= MOST_TURNED {
+        turnable(mesh)
+    } else {
+        String::new()
+    };
+    format!(
+        r#"<section><h2>The model</h2><p class="hint">Every triangle as it is. Letters: L left, R right, A anterior, P posterior, S superior, I inferior side of the patient.</p><div class="row four">{}{turning}</div></section>"#,
+        shown(&views::plain(mesh), "The model")
+    )
+}
+
+fn shown(pictures: &Pictures, what: &str) -> String {
+    View::ALL
+        .iter()
+        .zip(pictures)
+        .map(|(view, uri)| {
+            let [east, north, west, south] = view.letters;
+            let name = view.name;
+            let marks = format!(
+                r#"<i class="east" aria-hidden="true">{east}</i><i class="north" aria-hidden="true">{north}</i><i class="west" aria-hidden="true">{west}</i><i class="south" aria-hidden="true">{south}</i>"#
+            );
+            format!(
+                r#"<figure><div class="view"><img src="{uri}" alt="{what}, {} view" width="500" height="500">{marks}</div><figcaption>{name}</figcaption></figure>"#,
+                name.to_lowercase()
+            )
+        })
+        .collect()
+}
+
+/// A canvas for the script, and the mesh about its centre, rounded to 0.01 mm.
+fn turnable(mesh: &TriMesh) -> String {
+    let aabb = Aabb::of(&mesh.vertices);
+    let centre = (aabb.min + aabb.max) / 2.0;
+    let about = |v: &Vec3| ((v - centre) * 100.0).map(f64::round) / 100.0;
+    let vertices: Vec<f64> = mesh
+        .vertices
+        .iter()
+        .flat_map(|v| <[f64; 3]>::from(about(v)))
+        .collect();
+    let triangles: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
+    // Numbers only: nothing in it can end the script element.
+    let data = json!({ "vertices": vertices, "triangles": triangles });
+    format!(
+        r#"<figure id="turnable" hidden><div class="view"><canvas id="turn" tabindex="0" role="img" aria-label="The model to turn by dragging or by the arrow keys"></canvas></div><figcaption>Drag to turn</figcaption></figure><script type="application/json" id="mesh">{data}</script>"#
+    )
+}
+
+/// The model coloured by its distance to the surface.
+pub fn closeness(report: &Report, mesh: &TriMesh, reference: &TriMesh) -> String {
+    let (pictures, full) = views::by_distance(mesh, reference);
+    let stops: String = (0..=10)
+        .map(|i| {
+            let [r, g, b] = views::diverging(f64::from(i) / 5.0 - 1.0).map(|c| (255.0 * c) as u8);
+            format!(
+                r#"<stop offset="{}%" stop-color="rgb({r},{g},{b})"/>"#,
+                10 * i
+            )
+        })
+        .collect();
+    let rows: String = [
+        ("Model to surface", &report.distance.model_to_surface),
+        ("Surface to model", &report.distance.surface_to_model),
+    ]
+    .iter()
+    .map(|(name, direction)| direction_row(name, direction))
+    .collect();
+    format!(
+        r#"<section><h2>How close the model is</h2><p class="hint">Distance from the model to the surface that Marching Cubes found in the image. Blue lies inside of that surface, red outside.</p><div class="row">{pictures}</div><div class="scale" role="img" aria-label="Colours from {full} mm inside to {full} mm outside"><span>−{full} mm</span><svg viewBox="0 0 100 10" preserveAspectRatio="none"><defs><linearGradient id="ramp">{stops}</linearGradient></defs><rect width="100" height="10" fill="url(#ramp)"/></svg><span>+{full} mm</span></div><div class="scroll"><table><thead><tr><th scope="col">Distances, mm</th><th scope="col" class="n">mean</th><th scope="col" class="n">RMS</th><th scope="col" class="n">95 %</th><th scope="col" class="n">largest</th><th scope="col" class="n">surely below</th><th scope="col" class="n">samples</th></tr></thead><tbody>{rows}</tbody></table></div></section>"#,
+        pictures = shown(&pictures, "The model coloured by distance"),
+    )
+}
+
+fn direction_row(name: &str, direction: &Direction) -> String {
+    let cells: String = [
+        direction.mean_mm,
+        direction.rms_mm,
+        direction.p95_mm,
+        direction.max_mm,
+        direction.max_at_most_mm.unwrap_or(f64::NAN),
+    ]
+    .iter()
+    .map(|x| format!(r#"<td class="n">{}</td>"#, number(*x, 3)))
+    .collect();
+    let samples = direction.samples;
+    format!(r#"<tr><th scope="row">{name}</th>{cells}<td class="n">{samples}</td></tr>"#)
+}
+
+/// The paper's fitness and its terms after each stage.
+pub fn fitness(report: &Report) -> String {
+    let fitness = &report.fitness;
+    let terms = &fitness.terms;
+    let chart = |title: &str, hint: &str, [a, b, c]: [f64; 3], decimals: usize| {
+        let stages = [("re-tiled", a), ("fitted", b), ("optimised", c)];
+        format!(
+            r#"<figure><h3>{title}</h3><p class="hint">{hint}</p>{}</figure>"#,
+            charts::bars(title, &stages, decimals)
+        )
+    };
+    let term = |pick: fn(&crate::report::Terms) -> f64| {
+        [&terms.retiled, &terms.fitted, &terms.optimised].map(pick)
+    };
+    let forms = &fitness.forms;
+    let form = |pick: fn(&crate::report::Forms) -> f64| {
+        [&forms.retiled, &forms.fitted, &forms.optimised].map(pick)
+    };
+    let driving = [fitness.retiled, fitness.fitted, fitness.optimised];
+    let other = if fitness.form == "robust" {
+        let hint = "1 is flat, equilateral and on the surface";
+        ("F, normalised form", hint, form(|f| f.normalised))
+    } else {
+        let hint = "higher is better; comparable between tools";
+        ("F, robust form", hint, form(|f| f.robust))
+    };
+    let charts = [
+        chart(
+            &format!("Fitness F, {} form", fitness.form),
+            "higher is better; this one drove the flips",
+            driving,
+            4,
+        ),
+        chart(
+            "A: bend at the edge",
+            "degrees; lower is smoother",
+            term(|t| t.a_deg),
+            2,
+        ),
+        chart(
+            "B: bend to the neighbours",
+            "degrees; lower is smoother",
+            term(|t| t.b_deg),
+            2,
+        ),
+        chart("C: shape, R/(2r)", "1 is equilateral", term(|t| t.c), 4),
+        chart(
+            "D: edge to surface",
+            "mm; lower is closer",
+            term(|t| t.d_mm),
+            3,
+        ),
+        chart(other.0, other.1, other.2, 3),
+    ]
+    .concat();
+    let weights = fitness.weights.map(|w| number(w, 2)).join(" : ");
+    format!(
+        r#"<section><h2>Fitness before and after</h2><p class="hint">Mean over all edges of the four-term fitness; weights A : B : C : D = {weights}. Gain from re-tiled to optimised: {} %.</p><div class="row">{charts}</div></section>"#,
+        signed(fitness.gain_percent, 2)
+    )
+}
+
+/// Histograms before and after optimisation.
+pub fn distributions(report: &Report) -> String {
+    let histograms = &report.histograms;
+    let charts: String = [
+        (
+            &histograms.radius_ratio,
+            "radius ratio 2r/R of each triangle",
+        ),
+        (
+            &histograms.min_angle_deg,
+            "smallest angle of each triangle, degrees",
+        ),
+        (&histograms.edge_length_mm, "edge length, mm"),
+        (&histograms.dihedral_deg, "bend between neighbours, degrees"),
+        (&histograms.valence, "edges at each point"),
+    ]
+    .iter()
+    .map(|(histogram, quantity)| {
+        format!(
+            "<figure>{}</figure>",
+            charts::histogram(histogram, quantity)
+        )
+    })
+    .collect();
+    format!(
+        r#"<section><h2>Distributions before and after optimisation</h2><p class="legend"><span class="key-before">re-tiled</span><span class="key-after">optimised</span></p><div class="row">{charts}</div></section>"#
+    )
+}
+
+/// The measures of shape and smoothness as a table.
+pub fn measures(report: &Report) -> String {
+    let before = (&report.retile.shape, &report.retile.smoothness.dihedral_deg);
+    let after = (&report.shape, &report.smoothness.dihedral_deg);
+    type Pick = fn(&Shape) -> &Summary;
+    let quantities: [(&str, Pick, usize); 5] = [
+        ("Radius ratio 2r/R", |s| &s.radius_ratio, 3),
+        ("Smallest angle, degrees", |s| &s.min_angle_deg, 1),
+        ("Largest angle, degrees", |s| &s.max_angle_deg, 1),
+        ("Edge length, mm", |s| &s.edge_length_mm, 2),
+        ("Triangle area, mm²", |s| &s.area_mm2, 1),
+    ];
+    let mut rows = String::new();
+    for (name, pick, decimals) in quantities {
+        rows += &summary_rows(name, pick(before.0), pick(after.0), decimals);
+    }
+    rows += &summary_rows("Bend between neighbours, degrees", before.1, after.1, 1);
+    let share = |s: &Shape| {
+        let percent = |x: f64| number(100.0 * x, 1);
+        let valence = &s.valence;
+        format!(
+            "{} % / {} %",
+            percent(valence.share_6),
+            percent(valence.share_5_to_7)
+        )
+    };
+    format!(
+        r#"<section><h2>Shape and smoothness in figures</h2><div class="scroll"><table><thead><tr><th scope="col">Quantity</th><th scope="col">mesh</th><th scope="col" class="n">mean</th><th scope="col" class="n">variation</th><th scope="col" class="n">smallest</th><th scope="col" class="n">5 %</th><th scope="col" class="n">95 %</th><th scope="col" class="n">largest</th></tr></thead><tbody>{rows}</tbody></table></div><p class="hint">Variation: standard deviation over mean. Points with six edges / with five to seven: re-tiled {}, optimised {}.</p></section>"#,
+        share(before.0),
+        share(after.0)
+    )
+}
+
+fn summary_rows(name: &str, before: &Summary, after: &Summary, decimals: usize) -> String {
+    let cells = |s: &Summary| -> String {
+        [
+            number(s.mean, decimals),
+            format!("{} %", number(100.0 * s.cv, 1)),
+            number(s.min, decimals),
+            number(s.p5, decimals),
+            number(s.p95, decimals),
+            number(s.max, decimals),
+        ]
+        .iter()
+        .map(|x| format!(r#"<td class="n">{x}</td>"#))
+        .collect()
+    };
+    format!(
+        r#"<tr><th scope="rowgroup" rowspan="2">{name}</th><td>re-tiled</td>{}</tr><tr><td>optimised</td>{}</tr>"#,
+        cells(before),
+        cells(after)
+    )
+}
+
+/// Everything else, by its name in the JSON report.
+pub fn particulars(report: &Report) -> String {
+    let surface = serde_json::to_value(&report.surface).unwrap_or_default();
+    let tables = [
+        ("Parameters", report.parameters.clone()),
+        ("Input", report.input.clone()),
+        ("Surface", surface),
+        ("Re-tiling", report.retile.facts.clone().into()),
+        ("Optimisation", report.optimise.clone().into()),
+        ("Milliseconds", report.timings_ms.clone().into()),
+    ];
+    let tables: String = tables
+        .iter()
+        .filter(|(_, value)| value.as_object().is_some_and(|map| !map.is_empty()))
+        .map(|(title, value)| {
+            let rows: String = leaves(value)
+                .iter()
+                .map(|(path, text)| {
+                    format!(
+                        r#"<tr><th scope="row">{}</th><td>{}</td></tr>"#,
+                        escape(path),
+                        escape(text)
+                    )
+                })
+                .collect();
+            format!("<div><h3>{title}</h3><table><tbody>{rows}</tbody></table></div>")
+        })
+        .collect();
+    format!(
+        r#"<section><details open><summary>Particulars</summary><div class="row">{tables}</div></details></section>"#
+    )
+}

@@ -1,0 +1,323 @@
+//! The refined route: centroidal cells and their dual.
+//!
+//! 1. [`samples`](super::samples): the working surface, fine enough for N cells;
+//! 2. N samples at random, as dense as [`sizing`](super::sizing) wants them;
+//! 3. [`cells`](super::cells): relaxed until each site is the centroid of its cell;
+//! 4. [`dual`](super::dual): one triangle where three cells meet;
+//! 5. each vertex goes to the point of its own cell's part of S closest to the cell's centroid.
+//!
+//! Where a cell is too large for the shape of the surface (it runs round a handle, or the
+//! two sides of a thin wall would touch), the least loaded site elsewhere is transplanted
+//! there and the cells settle again; N never changes.
+
+use super::cells::Cells;
+use super::samples::Samples;
+use super::{RetileError, RetileFacts, RetileParameters, Tiled, dual, sizing};
+use crate::geometry::random::{Purpose, stream};
+use crate::geometry::{Vec3, triangle};
+use crate::mesh::intersections::self_intersections;
+use crate::mesh::{TriMesh, topology};
+use crate::progress::{Monitor, Stage};
+use crate::surface::Surface;
+use rand::RngExt;
+
+/// Samples that a cell has at least: fewer make ragged cells, more only cost time.
+const SAMPLES_PER_CELL: usize = 40;
+/// Rounds that let the cells settle after a transplantation.
+const SETTLING_ROUNDS: usize = 20;
+/// Transplantations before giving up on a start.
+const REPAIRS: usize = 24;
+/// Random starts before giving up on N.
+const STARTS: u64 = 3;
+/// Largest multiple of N that is tried to tell which N would do.
+const NEEDED_FACTOR: usize = 64;
+
+/// Re-tiles `surface` by centroidal cells.
+pub(super) fn retile(
+    surface: &Surface,
+    parameters: &RetileParameters,
+    monitor: &Monitor,
+) -> Result<Tiled, RetileError> {
+    let points = parameters.points;
+    let least = least_points(surface);
+    if points < least {
+        return Err(RetileError::TooFewPoints {
+            points,
+            needed: needed_points(surface, parameters, least, monitor)?,
+        });
+    }
+    let job = Job::new(surface, parameters, points);
+    let mut facts = RetileFacts::default();
+    for start in 0..STARTS {
+        if let Some((mesh, sizing)) = job.attempt(start, &mut facts, monitor)? {
+            return Ok(Tiled {
+                mesh,
+                sizing,
+                facts,
+            });
+        }
+    }
+    Err(RetileError::TooFewPoints {
+        points,
+        needed: needed_points(surface, parameters, points + 1, monitor)?,
+    })
+}
+
+/// The fewest vertices of any triangulation with the surface's components and handles.
+fn least_points(surface: &Surface) -> usize {
+    let facts = component_facts(surface);
+    facts.iter().map(|&(_, euler)| heawood(euler)).sum()
+}
+
+/// Heawood's bound for a closed orientable surface, attained but for genus 2, which takes one
+/// vertex more (Jungerman and Ringel 1980).
+fn heawood(euler: i64) -> usize {
+    match euler {
+        -2 => 10,
+        e => ((7.0 + (49.0 - 24.0 * e as f64).sqrt()) / 2.0).ceil() as usize,
+    }
+}
+
+/// Area and Euler characteristic of each component.
+fn component_facts(surface: &Surface) -> Vec<(f64, i64)> {
+    let mesh = &surface.mesh;
+    let components = topology::components(mesh.vertices.len(), &mesh.triangles);
+    let count = components.iter().max().map_or(0, |m| *m as usize + 1);
+    let mut facts = vec![(0.0, 0i64); count];
+    for &c in &components {
+        facts[c as usize].1 += 1;
+    }
+    let mut triangles = vec![0i64; count];
+    for (t, corners) in mesh.triangles.iter().enumerate() {
+        let c = components[corners[0] as usize] as usize;
+        triangles[c] += 1;
+        facts[c].0 += mesh.area_normal(t).norm() / 2.0;
+    }
+    for (fact, triangles) in facts.iter_mut().zip(triangles) {
+        // V - E + F with 2E = 3F.
+        fact.1 -= triangles / 2;
+    }
+    facts
+}
+
+/// A number of points that carries the topology, found by trying; at least `from`.
+fn needed_points(
+    surface: &Surface,
+    parameters: &RetileParameters,
+    from: usize,
+    monitor: &Monitor,
+) -> Result<usize, RetileError> {
+    let mut points = from;
+    while points < from * NEEDED_FACTOR {
+        let quick = RetileParameters {
+            relaxation_iterations: SETTLING_ROUNDS,
+            ..parameters.clone()
+        };
+        let job = Job::new(surface, &quick, points);
+        let mut ignored = RetileFacts::default();
+        if job.attempt(0, &mut ignored, monitor)?.is_some() {
+            break;
+        }
+        points += points / 2 + 1;
+    }
+    Ok(points)
+}
+
+/// What every attempt shares.
+struct Job<'a> {
+    surface: &'a Surface,
+    parameters: &'a RetileParameters,
+    points: usize,
+    samples: Samples,
+    /// Relative spacing wanted at every sample.
+    spacing: Vec<f64>,
+    /// Area times density: h^-4 makes centroidal cells as large as h² (Du et al. 1999).
+    weights: Vec<f64>,
+}
+
+impl<'a> Job<'a> {
+    fn new(surface: &'a Surface, parameters: &'a RetileParameters, points: usize) -> Self {
+        let samples = Samples::new(
+            &surface.mesh.vertices,
+            &surface.working,
+            &surface.mesh.triangles,
+            points * SAMPLES_PER_CELL,
+        );
+        let spacing = sizing::spacing(&samples, parameters.adaptive);
+        let weights = (samples.area.iter().zip(&spacing))
+            .map(|(area, h)| area * h.powi(-4))
+            .collect();
+        Self {
+            surface,
+            parameters,
+            points,
+            samples,
+            spacing,
+            weights,
+        }
+    }
+
+    /// One random start with its repairs: mesh and sizing, or `None` where the topology did
+    /// not come out.
+    fn attempt(
+        &self,
+        start: u64,
+        facts: &mut RetileFacts,
+        monitor: &Monitor,
+    ) -> Result<Option<(TriMesh, Vec<f64>)>, RetileError> {
+        let seeds = self.seeds(start);
+        let mut cells = Cells::grow(&self.samples, &seeds);
+        let rounds = self.parameters.relaxation_iterations;
+        monitor.report(Stage::Retile, 0.1)?;
+        facts.relaxation_rounds += cells.relax(&self.samples, &self.weights, rounds, monitor)?;
+        let mut moved = Vec::new();
+        for repair in 0..=REPAIRS {
+            facts.attempts += 1;
+            monitor.report(Stage::Retile, 0.8)?;
+            cells.tidy(&self.samples);
+            let crowded = match dual::triangulate(&self.samples, &cells.labels, self.points) {
+                Err(offence) => offence.sites,
+                Ok(triangles) => {
+                    let mesh = TriMesh {
+                        vertices: self.vertices(&cells),
+                        triangles,
+                    };
+                    let crossing = self_intersections(&mesh);
+                    let Some([first, _]) = crossing.first() else {
+                        return Ok(Some((mesh, self.sizing(&cells))));
+                    };
+                    mesh.triangles[*first as usize].to_vec()
+                }
+            };
+            let Some(&crowded) = crowded.get(repair % crowded.len().max(1)) else {
+                return Ok(None);
+            };
+            let Some(site) = self.least_loaded(&cells, crowded, &moved) else {
+                return Ok(None);
+            };
+            moved.push(site);
+            cells.transplant(&self.samples, site, crowded);
+            facts.relaxation_rounds +=
+                cells.relax(&self.samples, &self.weights, SETTLING_ROUNDS, monitor)?;
+        }
+        Ok(None)
+    }
+
+    /// Distinct random samples, each component getting its share but at least as many as its
+    /// topology needs.
+    fn seeds(&self, start: u64) -> Vec<u32> {
+        let mut random = stream(
+            self.parameters.seed ^ start.rotate_left(32),
+            Purpose::Placement,
+        );
+        let components = topology::components(self.samples.len(), &self.samples.triangles);
+        let quotas = self.quotas(&components);
+        let mut seeds = Vec::with_capacity(self.points);
+        for (component, quota) in (0u32..).zip(quotas) {
+            let mut members: Vec<u32> = (0..self.samples.len() as u32)
+                .filter(|&v| components[v as usize] == component)
+                .collect();
+            // Weighted sampling without replacement (Efraimidis and Spirakis 2006).
+            let mut keyed: Vec<(f64, u32)> = members
+                .drain(..)
+                .map(|v| {
+                    let (area, h) = (self.samples.area[v as usize], self.spacing[v as usize]);
+                    let uniform: f64 = 1.0 - random.random::<f64>();
+                    (uniform.ln() / (area / (h * h)).max(f64::MIN_POSITIVE), v)
+                })
+                .collect();
+            keyed.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            seeds.extend(keyed.iter().take(quota).map(|(_, v)| *v));
+        }
+        seeds
+    }
+
+    /// Points of each component: by area/h², at least what its topology needs.
+    fn quotas(&self, components: &[u32]) -> Vec<usize> {
+        let facts = component_facts(self.surface);
+        if facts.len() == 1 {
+            return vec![self.points];
+        }
+        let mut load = vec![0.0; facts.len()];
+        for (v, &c) in components.iter().enumerate() {
+            load[c as usize] += self.samples.area[v] / self.spacing[v].powi(2);
+        }
+        let total: f64 = load.iter().sum();
+        let mut quotas: Vec<usize> = facts
+            .iter()
+            .zip(&load)
+            .map(|(&(_, euler), load)| {
+                let share = (load / total * self.points as f64) as usize;
+                share.max(heawood(euler))
+            })
+            .collect();
+        // Rounding and minima are settled with the component that is farthest from its share.
+        loop {
+            let sum: usize = quotas.iter().sum();
+            let surplus = |c: usize| quotas[c] as f64 - load[c] / total * self.points as f64;
+            let order = |a: &usize, b: &usize| surplus(*a).total_cmp(&surplus(*b));
+            match sum.cmp(&self.points) {
+                std::cmp::Ordering::Equal => return quotas,
+                std::cmp::Ordering::Less => {
+                    let c = (0..quotas.len()).min_by(order).expect("a component");
+                    quotas[c] += 1;
+                }
+                std::cmp::Ordering::Greater => {
+                    let c = (0..quotas.len())
+                        .filter(|&c| quotas[c] > heawood(facts[c].1))
+                        .max_by(order)
+                        .expect("more points than minima");
+                    quotas[c] -= 1;
+                }
+            }
+        }
+    }
+
+    /// The site with the lightest cell that was not moved before.
+    fn least_loaded(&self, cells: &Cells, crowded: u32, moved: &[u32]) -> Option<u32> {
+        let mut load = vec![0.0; self.points];
+        for (&site, weight) in cells.labels.iter().zip(&self.weights) {
+            load[site as usize] += weight;
+        }
+        (0..self.points as u32)
+            .filter(|site| *site != crowded && !moved.contains(site))
+            .min_by(|a, b| load[*a as usize].total_cmp(&load[*b as usize]))
+    }
+
+    /// For every site the point of its cell's part of S closest to the cell's centroid on S.
+    fn vertices(&self, cells: &Cells) -> Vec<Vec3> {
+        let positions = &self.samples.surface;
+        let centroids = cells.centroids(positions, &self.weights);
+        let mut best = vec![(f64::INFINITY, Vec3::zeros()); self.points];
+        for t in &self.samples.triangles {
+            let [a, b, c] = t.map(|v| positions[v as usize]);
+            let labels = t.map(|v| cells.labels[v as usize]);
+            for k in 0..3 {
+                if labels[..k].contains(&labels[k]) {
+                    continue;
+                }
+                let centroid = &centroids[labels[k] as usize];
+                let [u, v, w] = triangle::closest_barycentric(centroid, &a, &b, &c);
+                let point = a * u + b * v + c * w;
+                let distance = (point - centroid).norm_squared();
+                let slot = &mut best[labels[k] as usize];
+                if distance < slot.0 {
+                    *slot = (distance, point);
+                }
+            }
+        }
+        best.into_iter().map(|(_, point)| point).collect()
+    }
+
+    /// Mean wanted spacing of every cell.
+    fn sizing(&self, cells: &Cells) -> Vec<f64> {
+        let mut sums = vec![(0.0, 0u32); self.points];
+        for (&site, h) in cells.labels.iter().zip(&self.spacing) {
+            sums[site as usize].0 += h;
+            sums[site as usize].1 += 1;
+        }
+        sums.into_iter()
+            .map(|(sum, count)| sum / f64::from(count.max(1)))
+            .collect()
+    }
+}

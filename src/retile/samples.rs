@@ -1,0 +1,143 @@
+//! The working surface as weighted samples: fine enough to carry N cells.
+//!
+//! The vertices of the surface, after as many midpoint subdivisions as N asks for, each with
+//! the area round it. Subdivision changes neither S nor W: every new vertex lies in the
+//! middle of an edge of both.
+
+use crate::geometry::Vec3;
+use crate::geometry::triangle::area_normal;
+
+/// Vertices with neighbours and weights.
+#[derive(Debug, Clone)]
+pub(super) struct Samples {
+    /// Positions on W, mm.
+    pub working: Vec<Vec3>,
+    /// Positions on S, mm.
+    pub surface: Vec<Vec3>,
+    /// Triangles over the vertices.
+    pub triangles: Vec<[u32; 3]>,
+    /// A third of the area of the triangles round each vertex on W, mm².
+    pub area: Vec<f64>,
+    first: Vec<u32>,
+    neighbours: Vec<u32>,
+}
+
+impl Samples {
+    /// Samples of the surface with at least `wanted` vertices, but not more than one
+    /// subdivision beyond that.
+    pub fn new(surface: &[Vec3], working: &[Vec3], triangles: &[[u32; 3]], wanted: usize) -> Self {
+        let mut samples = Self::of(surface.to_vec(), working.to_vec(), triangles.to_vec());
+        while samples.len() < wanted {
+            samples = samples.subdivided();
+        }
+        samples
+    }
+
+    fn of(surface: Vec<Vec3>, working: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
+        let (first, neighbours) = neighbours(working.len(), &triangles);
+        let mut area = vec![0.0; working.len()];
+        for t in &triangles {
+            let [a, b, c] = t.map(|v| &working[v as usize]);
+            let third = area_normal(a, b, c).norm() / 6.0;
+            for v in t {
+                area[*v as usize] += third;
+            }
+        }
+        Self {
+            working,
+            surface,
+            triangles,
+            area,
+            first,
+            neighbours,
+        }
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.working.len()
+    }
+
+    /// The neighbours of `v`, each once.
+    pub fn around(&self, v: usize) -> &[u32] {
+        &self.neighbours[self.first[v] as usize..self.first[v + 1] as usize]
+    }
+
+    /// Every triangle cut in four.
+    fn subdivided(&self) -> Self {
+        let old = self.len() as u32;
+        // An edge is named by the half-edge that leaves its lower vertex; its middle gets the
+        // next free number in that order.
+        let mut middle = vec![0u32; self.neighbours.len()];
+        let (mut surface, mut working) = (self.surface.clone(), self.working.clone());
+        for a in 0..old {
+            for h in self.first[a as usize]..self.first[a as usize + 1] {
+                let b = self.neighbours[h as usize];
+                if a < b {
+                    middle[h as usize] = working.len() as u32;
+                    working.push((self.working[a as usize] + self.working[b as usize]) / 2.0);
+                    surface.push((self.surface[a as usize] + self.surface[b as usize]) / 2.0);
+                }
+            }
+        }
+        let between = |a: u32, b: u32| {
+            let (low, high) = (a.min(b), a.max(b));
+            let start = self.first[low as usize] as usize;
+            let place = self.around(low as usize).iter().position(|&v| v == high);
+            middle[start + place.expect("a triangle's edge joins neighbours")]
+        };
+        let triangles = self
+            .triangles
+            .iter()
+            .flat_map(|&[a, b, c]| {
+                let (ab, bc, ca) = (between(a, b), between(b, c), between(c, a));
+                [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+            })
+            .collect();
+        Self::of(surface, working, triangles)
+    }
+}
+
+/// Neighbour lists in one array: those of `v` stand at `first[v]..first[v + 1]`. In a closed
+/// oriented manifold the half-edges that leave a vertex name each neighbour once.
+fn neighbours(vertices: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<u32>) {
+    let mut first = vec![0u32; vertices + 1];
+    for &v in triangles.iter().flatten() {
+        first[v as usize + 1] += 1;
+    }
+    for v in 0..vertices {
+        first[v + 1] += first[v];
+    }
+    let mut next = first.clone();
+    let mut neighbours = vec![0; 3 * triangles.len()];
+    for t in triangles {
+        for k in 0..3 {
+            let slot = &mut next[t[k] as usize];
+            neighbours[*slot as usize] = t[(k + 1) % 3];
+            *slot += 1;
+        }
+    }
+    (first, neighbours)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{TriMesh, shapes, topology};
+
+    #[test]
+    fn subdivision_keeps_area_and_topology() {
+        let mesh = shapes::torus(9.0, 3.0, 14, 9);
+        let coarse = Samples::new(&mesh.vertices, &mesh.vertices, &mesh.triangles, 0);
+        let fine = Samples::new(&mesh.vertices, &mesh.vertices, &mesh.triangles, 1000);
+        assert!(fine.len() >= 1000 && coarse.len() == mesh.vertices.len());
+        let as_mesh = TriMesh {
+            vertices: fine.surface.clone(),
+            triangles: fine.triangles.clone(),
+        };
+        assert_eq!(topology::check(&as_mesh).unwrap().euler_characteristic, 0);
+        let (a, b): (f64, f64) = (coarse.area.iter().sum(), fine.area.iter().sum());
+        assert!((a - b).abs() < 1e-9 * a);
+        assert!((a - mesh.area()).abs() < 1e-9 * a);
+    }
+}

@@ -1,0 +1,322 @@
+//! The queue's table in SQLite. Every change is one statement, or one transaction that
+//! begins by writing.
+
+use super::rows::{self, JobRow, to_json};
+use super::sqlite::SqliteStore;
+use crate::jobs::{
+    Deleted, Failure, Filed, Interrupted, Job, JobStore, Lease, Load, NewJob, Outcome, Page,
+    PageRequest, State, StoreError, Timestamp, JOB, random_id,
+};
+use async_trait::async_trait;
+use sqlx::Row;
+
+type Result<T> = std::result::Result<T, StoreError>;
+
+/// Durations of this many jobs are averaged for the estimate.
+const JOBS_AVERAGED: i64 = 20;
+
+#[async_trait]
+impl JobStore for SqliteStore {
+    async fn file(&self, job: &NewJob, queue_limit: usize, now: Timestamp) -> Result<Filed> {
+        if let Some(earlier) = self.earlier(job).await? {
+            return Ok(earlier);
+        }
+        let id = random_id(JOB);
+        let key = job.idempotency.as_ref();
+        let inserted: Option<JobRow> = sqlx::query_as(
+            "INSERT INTO jobs (id, kind, volume, parameters, created_at, idempotency_key, fingerprint)
+             SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7
+             WHERE (SELECT count(*) FROM jobs WHERE state = 'queued') < ?8
+               AND EXISTS (SELECT 1 FROM volumes WHERE id = ?3)
+             ON CONFLICT (idempotency_key) DO NOTHING
+             RETURNING *",
+        )
+        .bind(&id)
+        .bind(&job.kind)
+        .bind(&job.volume)
+        .bind(to_json(&job.parameters)?)
+        .bind(now)
+        .bind(key.map(|k| &k.key))
+        .bind(key.map(|k| &k.fingerprint))
+        .bind(i64::try_from(queue_limit).unwrap_or(i64::MAX))
+        .fetch_optional(&self.writer)
+        .await?;
+        if let Some(row) = inserted {
+            return Ok(Filed::New(row.try_into()?));
+        }
+        // Another request with the same key may have come in between.
+        if let Some(earlier) = self.earlier(job).await? {
+            return Ok(earlier);
+        }
+        let volume = sqlx::query("SELECT 1 FROM volumes WHERE id = ?")
+            .bind(&job.volume)
+            .fetch_optional(&self.readers)
+            .await?;
+        Ok(match volume {
+            Some(_) => Filed::QueueFull,
+            None => Filed::NoVolume,
+        })
+    }
+
+    async fn job(&self, id: &str) -> Result<Option<Job>> {
+        let row: Option<JobRow> = sqlx::query_as("SELECT * FROM jobs WHERE id = ?")
+            .bind(id)
+            .fetch_optional(&self.readers)
+            .await?;
+        row.map(Job::try_from).transpose()
+    }
+
+    async fn jobs(&self, state: Option<State>, page: PageRequest) -> Result<Page<Job>> {
+        let rows: Vec<JobRow> = sqlx::query_as(
+            "SELECT * FROM jobs
+             WHERE (?1 IS NULL OR state = ?1) AND (?2 IS NULL OR sequence < ?2)
+             ORDER BY sequence DESC LIMIT ?3",
+        )
+        .bind(state.map(State::as_str))
+        .bind(page.before)
+        .bind(i64::from(page.limit) + 1)
+        .fetch_all(&self.readers)
+        .await?;
+        Ok(Page::cut(rows::all(rows)?, page.limit, |job: &Job| {
+            job.sequence
+        }))
+    }
+
+    async fn ahead_of(&self, job: &Job) -> Result<u64> {
+        let row = sqlx::query(
+            "SELECT count(*) FROM jobs WHERE state = 'queued' AND sequence < ?",
+        )
+        .bind(job.sequence)
+        .fetch_one(&self.readers)
+        .await?;
+        Ok(u64::try_from(row.get::<i64, _>(0)).unwrap_or(0))
+    }
+
+    async fn load(&self) -> Result<Load> {
+        let row = sqlx::query(
+            "SELECT (SELECT count(*) FROM jobs WHERE state = 'queued'),
+                    (SELECT count(*) FROM jobs WHERE state = 'running'),
+                    (SELECT avg(finished_at - started_at) FROM
+                        (SELECT finished_at, started_at FROM jobs WHERE state = 'succeeded'
+                         ORDER BY sequence DESC LIMIT ?))",
+        )
+        .bind(JOBS_AVERAGED)
+        .fetch_one(&self.readers)
+        .await?;
+        let count = |column: usize| u64::try_from(row.get::<i64, _>(column)).unwrap_or(0);
+        Ok(Load {
+            queued: count(0),
+            running: count(1),
+            mean_duration_ms: row.get(2),
+        })
+    }
+
+    async fn claim(
+        &self,
+        token: &str,
+        attempt_limit: u32,
+        now: Timestamp,
+        until: Timestamp,
+    ) -> Result<Option<Job>> {
+        let row: Option<JobRow> = sqlx::query_as(
+            "UPDATE jobs SET state = 'running', attempts = attempts + 1, lease_token = ?1,
+                    lease_expires_at = ?2, started_at = ?3, stage = NULL, progress = 0,
+                    revision = revision + 1
+             WHERE sequence = (
+                 SELECT sequence FROM jobs
+                 WHERE (state = 'queued' OR (state = 'running' AND lease_expires_at <= ?3))
+                   AND attempts < ?4 AND NOT cancel_requested
+                 ORDER BY sequence LIMIT 1)
+             RETURNING *",
+        )
+        .bind(token)
+        .bind(until)
+        .bind(now)
+        .bind(attempt_limit)
+        .fetch_optional(&self.writer)
+        .await?;
+        row.map(Job::try_from).transpose()
+    }
+
+    async fn heartbeat(&self, lease: &Lease, until: Timestamp) -> Result<Option<bool>> {
+        let row = sqlx::query(
+            "UPDATE jobs SET lease_expires_at = ?
+             WHERE id = ? AND lease_token = ? AND state = 'running'
+             RETURNING cancel_requested",
+        )
+        .bind(until)
+        .bind(&lease.job)
+        .bind(&lease.token)
+        .fetch_optional(&self.writer)
+        .await?;
+        Ok(row.map(|row| row.get(0)))
+    }
+
+    async fn progress(&self, lease: &Lease, stage: &str, progress: f64) -> Result<Option<Job>> {
+        let row: Option<JobRow> = sqlx::query_as(
+            "UPDATE jobs SET stage = ?, progress = max(progress, ?), revision = revision + 1
+             WHERE id = ? AND lease_token = ? AND state = 'running'
+             RETURNING *",
+        )
+        .bind(stage)
+        .bind(progress)
+        .bind(&lease.job)
+        .bind(&lease.token)
+        .fetch_optional(&self.writer)
+        .await?;
+        row.map(Job::try_from).transpose()
+    }
+
+    async fn finish(
+        &self,
+        lease: &Lease,
+        outcome: &Outcome,
+        now: Timestamp,
+    ) -> Result<Option<Job>> {
+        let (state, failure, model) = match outcome {
+            Outcome::Succeeded(model) => (State::Succeeded, None, Some(model)),
+            Outcome::Failed(failure) => (State::Failed, Some(to_json(failure)?), None),
+            Outcome::Cancelled => (State::Cancelled, None, None),
+        };
+        let mut transaction = self.writer.begin().await?;
+        let row: Option<JobRow> = sqlx::query_as(
+            "UPDATE jobs SET state = ?1, failure = ?2, result = ?3, finished_at = ?4,
+                    progress = CASE ?1 WHEN 'succeeded' THEN 1 ELSE progress END,
+                    lease_token = NULL, lease_expires_at = NULL, revision = revision + 1
+             WHERE id = ?5 AND lease_token = ?6 AND state = 'running'
+             RETURNING *",
+        )
+        .bind(state.as_str())
+        .bind(failure)
+        .bind(model.map(|m| &m.id))
+        .bind(now)
+        .bind(&lease.job)
+        .bind(&lease.token)
+        .fetch_optional(&mut *transaction)
+        .await?;
+        let Some(row) = row else {
+            return Ok(None);
+        };
+        if let Some(model) = model {
+            super::sqlite_catalogue::insert_model(&mut transaction, model).await?;
+        }
+        transaction.commit().await?;
+        Ok(Some(row.try_into()?))
+    }
+
+    async fn hand_back(&self, lease: &Lease) -> Result<Option<Job>> {
+        let row: Option<JobRow> = sqlx::query_as(
+            "UPDATE jobs SET state = 'queued', attempts = attempts - 1, stage = NULL,
+                    progress = 0, started_at = NULL, lease_token = NULL,
+                    lease_expires_at = NULL, revision = revision + 1
+             WHERE id = ? AND lease_token = ? AND state = 'running'
+             RETURNING *",
+        )
+        .bind(&lease.job)
+        .bind(&lease.token)
+        .fetch_optional(&self.writer)
+        .await?;
+        row.map(Job::try_from).transpose()
+    }
+
+    async fn release_all(&self) -> Result<u64> {
+        let done = sqlx::query(
+            "UPDATE jobs SET state = 'queued', stage = NULL, progress = 0, lease_token = NULL,
+                    lease_expires_at = NULL, revision = revision + 1
+             WHERE state = 'running'",
+        )
+        .execute(&self.writer)
+        .await?;
+        Ok(done.rows_affected())
+    }
+
+    async fn bury(
+        &self,
+        attempt_limit: u32,
+        reason: &Failure,
+        now: Timestamp,
+    ) -> Result<Vec<Job>> {
+        let rows: Vec<JobRow> = sqlx::query_as(
+            "UPDATE jobs SET
+                    state = CASE WHEN cancel_requested THEN 'cancelled' ELSE 'failed' END,
+                    failure = CASE WHEN cancel_requested THEN NULL ELSE ?1 END,
+                    finished_at = ?2, lease_token = NULL, lease_expires_at = NULL,
+                    revision = revision + 1
+             WHERE (state = 'queued' OR (state = 'running' AND lease_expires_at <= ?2))
+               AND (attempts >= ?3 OR cancel_requested)
+             RETURNING *",
+        )
+        .bind(to_json(reason)?)
+        .bind(now)
+        .bind(attempt_limit)
+        .fetch_all(&self.writer)
+        .await?;
+        rows::all(rows)
+    }
+
+    async fn interrupt(&self, id: &str, now: Timestamp) -> Result<Interrupted> {
+        let row: Option<JobRow> = sqlx::query_as(
+            "UPDATE jobs SET cancel_requested = 1, revision = revision + 1,
+                    finished_at = CASE state WHEN 'queued' THEN ?1 ELSE finished_at END,
+                    state = CASE state WHEN 'queued' THEN 'cancelled' ELSE state END
+             WHERE id = ?2 AND state IN ('queued', 'running')
+             RETURNING *",
+        )
+        .bind(now)
+        .bind(id)
+        .fetch_optional(&self.writer)
+        .await?;
+        if let Some(row) = row {
+            let job = Job::try_from(row)?;
+            return Ok(match job.state {
+                State::Cancelled => Interrupted::Cancelled(job),
+                _ => Interrupted::Asked(job),
+            });
+        }
+        Ok(self
+            .job(id)
+            .await?
+            .map_or(Interrupted::Unknown, Interrupted::Finished))
+    }
+
+    async fn delete_job(&self, id: &str, now: Timestamp) -> Result<Deleted> {
+        let mut transaction = self.writer.begin().await?;
+        let done = sqlx::query(
+            "DELETE FROM jobs WHERE id = ? AND state NOT IN ('queued', 'running')",
+        )
+        .bind(id)
+        .execute(&mut *transaction)
+        .await?;
+        if done.rows_affected() == 0 {
+            drop(transaction);
+            return Ok(match self.job(id).await? {
+                Some(_) => Deleted::InUse,
+                None => Deleted::Unknown,
+            });
+        }
+        super::sqlite_catalogue::bury(&mut transaction, id, now).await?;
+        transaction.commit().await?;
+        Ok(Deleted::Done)
+    }
+}
+
+impl SqliteStore {
+    /// What the job's idempotency key stands for already.
+    async fn earlier(&self, job: &NewJob) -> Result<Option<Filed>> {
+        let Some(key) = &job.idempotency else {
+            return Ok(None);
+        };
+        let row: Option<JobRow> = sqlx::query_as("SELECT * FROM jobs WHERE idempotency_key = ?")
+            .bind(&key.key)
+            .fetch_optional(&self.readers)
+            .await?;
+        row.map(|row| {
+            Ok(if row.fingerprint.as_ref() == Some(&key.fingerprint) {
+                Filed::Same(row.try_into()?)
+            } else {
+                Filed::KeyReused
+            })
+        })
+        .transpose()
+    }
+}

@@ -1,0 +1,177 @@
+//! One look over a volume: range, missing values, label map or not.
+
+use std::collections::BTreeMap;
+
+use crate::volume::Volume;
+
+/// More distinct values than this are intensities.
+const MOST_LABELS: usize = 256;
+/// Share of labelled voxels whose next voxel along i carries the same label: a label map is
+/// made of pieces, a picture with few counts is not.
+const PIECEWISE: f64 = 0.5;
+
+/// What a volume holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Survey {
+    /// Smallest value that is not NaN or infinite; 0 where there is none.
+    pub minimum: f32,
+    /// Largest value that is not NaN or infinite; 0 where there is none.
+    pub maximum: f32,
+    /// Voxels that are NaN or infinite.
+    pub not_finite: usize,
+    /// Number of voxels that are finite.
+    pub finite: usize,
+    /// Voxel counts of the labels other than 0, if this is a label map.
+    pub labels: Option<BTreeMap<i64, usize>>,
+}
+
+/// Looks at every voxel once.
+pub fn survey(volume: &Volume) -> Survey {
+    let (mut minimum, mut maximum) = (f32::INFINITY, f32::NEG_INFINITY);
+    let mut not_finite = 0;
+    for chunk in volume.voxels.chunks(1 << 12) {
+        // Comparisons with NaN are false: these two loops vectorise and skip it.
+        let (mut low, mut high, mut sum) = (f32::INFINITY, f32::NEG_INFINITY, 0.0);
+        for &v in chunk {
+            low = if v < low { v } else { low };
+            high = if v > high { v } else { high };
+            sum += v * 0.0;
+        }
+        if sum != 0.0 {
+            (low, high) = (f32::INFINITY, f32::NEG_INFINITY);
+            for &v in chunk {
+                if v.is_finite() {
+                    low = low.min(v);
+                    high = high.max(v);
+                } else {
+                    not_finite += 1;
+                }
+            }
+        }
+        minimum = minimum.min(low);
+        maximum = maximum.max(high);
+    }
+    let finite = volume.voxels.len() - not_finite;
+    if finite == 0 {
+        (minimum, maximum) = (0.0, 0.0);
+    }
+    Survey {
+        minimum,
+        maximum,
+        not_finite,
+        finite,
+        labels: label_map(volume),
+    }
+}
+
+/// Counts the labels, or `None` as soon as a value shows that these are intensities.
+fn label_map(volume: &Volume) -> Option<BTreeMap<i64, usize>> {
+    let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
+    let (mut labelled, mut same) = (0usize, 0usize);
+    for row in volume.voxels.chunks(volume.shape[0]) {
+        for run in row.chunk_by(|a, b| a == b) {
+            let value = run[0];
+            if value == 0.0 {
+                continue;
+            }
+            if value.fract() != 0.0 || !(value.abs() < 16_777_216.0) {
+                return None;
+            }
+            *counts.entry(value as i64).or_default() += run.len();
+            labelled += run.len();
+            same += run.len() - 1;
+            let grainy = labelled > 1000 && (same as f64) < 0.25 * labelled as f64;
+            if counts.len() > MOST_LABELS || grainy {
+                return None;
+            }
+        }
+    }
+    // A constant volume is no map of anything.
+    let everything = labelled == volume.voxels.len() && counts.len() == 1;
+    let piecewise = counts.len() <= 1 || same as f64 >= PIECEWISE * labelled as f64;
+    (labelled > 0 && piecewise && !everything).then_some(counts)
+}
+
+/// Otsu's threshold of the values in `rows` (IEEE SMC 1979), 256 bins between minimum and
+/// maximum.
+pub fn otsu<'a>(rows: impl Iterator<Item = &'a [f32]>, minimum: f32, maximum: f32) -> f32 {
+    const BINS: usize = 256;
+    let (low, width) = (f64::from(minimum), f64::from(maximum) - f64::from(minimum));
+    let scale = BINS as f64 / width;
+    let mut histogram = [0u64; BINS];
+    for row in rows {
+        for v in row.iter().filter(|v| v.is_finite()) {
+            let bin = ((f64::from(*v) - low) * scale) as usize;
+            histogram[bin.min(BINS - 1)] += 1;
+        }
+    }
+    let total = histogram.iter().sum::<u64>() as f64;
+    let weighted = |(bin, n): (usize, &u64)| bin as f64 * *n as f64;
+    let all: f64 = histogram.iter().enumerate().map(weighted).sum();
+    let (mut below, mut sum) = (0.0, 0.0);
+    let mut best = (f64::NEG_INFINITY, 0);
+    for bin in 0..BINS {
+        below += histogram[bin] as f64;
+        sum += bin as f64 * histogram[bin] as f64;
+        let above = total - below;
+        if below > 0.0 && above > 0.0 {
+            let between = below * above * (sum / below - (all - sum) / above).powi(2);
+            if between > best.0 {
+                best = (between, bin);
+            }
+        }
+    }
+    (low + (best.1 as f64 + 1.0) / BINS as f64 * width) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Vec3;
+    use crate::geometry::frame::VoxelToPatient;
+
+    fn volume(shape: [usize; 3], value: impl Fn(usize) -> f32) -> Volume {
+        Volume {
+            shape,
+            voxels: (0..shape.iter().product()).map(value).collect(),
+            frame: VoxelToPatient::centred(shape, [1.0; 3], Vec3::zeros()).unwrap(),
+            integral: true,
+        }
+    }
+
+    #[test]
+    fn label_maps_are_told_from_counts() {
+        let map = volume([20, 4, 2], |n| ((n / 10) % 3) as f32);
+        let labels = survey(&map).labels.unwrap();
+        assert_eq!(labels.keys().copied().collect::<Vec<_>>(), [1, 2]);
+        let labelled = map.voxels.iter().filter(|v| **v > 0.0).count();
+        assert_eq!(labels.values().sum::<usize>(), labelled);
+        let counts = volume([40, 40, 2], |n| ((n * 7919) % 23) as f32);
+        assert_eq!(survey(&counts).labels, None);
+        assert_eq!(survey(&volume([20, 4, 2], |n| n as f32 * 0.5)).labels, None);
+        assert_eq!(survey(&volume([20, 4, 2], |_| 3.0)).labels, None);
+    }
+
+    #[test]
+    fn range_skips_what_is_not_finite() {
+        let odd = volume([50, 10, 10], |n| match n {
+            7 => f32::NAN,
+            4500 => f32::INFINITY,
+            n => 0.5 - n as f32,
+        });
+        let seen = survey(&odd);
+        assert_eq!(
+            (seen.minimum, seen.maximum, seen.not_finite),
+            (-4998.5, 0.5, 2)
+        );
+    }
+
+    #[test]
+    fn otsu_parts_two_heaps() {
+        let values: Vec<f32> = (0..1000)
+            .map(|n| if n % 4 == 0 { 9.0 } else { 1.0 } + (n % 10) as f32 * 0.05)
+            .collect();
+        let level = otsu(values.chunks(100), 1.0, 9.45);
+        assert!((1.45..=9.0).contains(&level), "{level}");
+    }
+}

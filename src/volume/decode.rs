@@ -1,0 +1,330 @@
+//! Decoding: stored numbers of any real type to `f32`, in portions, straight into place.
+
+use super::VolumeError;
+use super::facts::ByteOrder;
+use super::source::Source;
+use crate::progress::Cancelled;
+
+/// Voxels decoded at a time: a few milliseconds of unpacking, half a mebibyte at most.
+const PORTION: usize = 1 << 16;
+
+/// Whole numbers beyond this are not all representable as `f32`; as its bits.
+const EXACT: u32 = 16_777_216_f32.to_bits();
+/// The bits of infinity.
+const INFINITY: u32 = f32::INFINITY.to_bits();
+/// The bit of the sign.
+const SIGN: u32 = 1 << 31;
+
+/// How a voxel is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum DataType {
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
+    U64,
+    I64,
+    F32,
+    F64,
+}
+
+impl DataType {
+    /// Bytes of a voxel.
+    pub(super) fn size(self) -> usize {
+        match self {
+            Self::U8 | Self::I8 => 1,
+            Self::U16 | Self::I16 => 2,
+            Self::U32 | Self::I32 | Self::F32 => 4,
+            Self::U64 | Self::I64 | Self::F64 => 8,
+        }
+    }
+
+    /// The usual name.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::U8 => "uint8",
+            Self::I8 => "int8",
+            Self::U16 => "uint16",
+            Self::I16 => "int16",
+            Self::U32 => "uint32",
+            Self::I32 => "int32",
+            Self::U64 => "uint64",
+            Self::I64 => "int64",
+            Self::F32 => "float32",
+            Self::F64 => "float64",
+        }
+    }
+}
+
+/// Everything that one needs to know to decode voxels.
+#[derive(Debug, Clone)]
+pub(super) struct VoxelFormat {
+    /// The file's name, for messages.
+    pub file: String,
+    /// Voxels along i, j, k, for messages.
+    pub shape: [usize; 3],
+    /// How a voxel is stored.
+    pub data_type: DataType,
+    /// Order of its bytes.
+    pub byte_order: ByteOrder,
+    /// Leading bits of an integer that are not part of its value; fewer than it has.
+    pub unused_bits: u32,
+    /// Slope and intercept to apply.
+    pub scaling: Option<(f64, f64)>,
+}
+
+/// Reads the voxels of a file, front to back.
+pub(super) struct VoxelReader<'a> {
+    format: VoxelFormat,
+    source: &'a mut Source,
+    buffer: Vec<u8>,
+    infinite: u64,
+    inexact: bool,
+}
+
+impl<'a> VoxelReader<'a> {
+    /// A reader for the voxels in `source`, which holds as many as will be asked for.
+    pub(super) fn new(format: VoxelFormat, source: &'a mut Source) -> Self {
+        Self {
+            format,
+            source,
+            buffer: Vec::new(),
+            infinite: 0,
+            inexact: false,
+        }
+    }
+
+    /// Appends `count` voxels, which begin at byte `begin` behind all that were read before,
+    /// to `voxels`. `report` hears the share of `count` that is done.
+    pub(super) fn append(
+        &mut self,
+        begin: u64,
+        count: usize,
+        voxels: &mut Vec<f32>,
+        report: &mut dyn FnMut(f64) -> Result<(), Cancelled>,
+    ) -> Result<(), VolumeError> {
+        voxels
+            .try_reserve_exact(count)
+            .map_err(|_| VolumeError::Memory {
+                bytes: 4 * count as u64,
+            })?;
+        self.source.skip_to(begin)?;
+        let size = self.format.data_type.size();
+        let end = begin + count as u64 * size as u64;
+        let mut buffer = std::mem::take(&mut self.buffer);
+        buffer.resize(count.min(PORTION) * size, 0);
+        let mut done = 0;
+        while done < count {
+            report(done as f64 / count as f64)?;
+            let portion = (count - done).min(PORTION);
+            let bytes = &mut buffer[..portion * size];
+            self.source.fill_all(bytes, end)?;
+            let start = voxels.len();
+            decode(bytes, &self.format, voxels);
+            self.settle(bytes, voxels, start)?;
+            done += portion;
+        }
+        self.buffer = buffer;
+        Ok(report(1.0)?)
+    }
+
+    /// Looks for values that `f32` cannot hold.
+    fn settle(
+        &mut self,
+        bytes: &[u8],
+        voxels: &mut [f32],
+        start: usize,
+    ) -> Result<(), VolumeError> {
+        let (mut infinite, mut large) = (false, false);
+        for v in &voxels[start..] {
+            // Without their sign bit, floats are ordered as their bits are.
+            let size = v.to_bits() & !SIGN;
+            infinite |= size == INFINITY;
+            large |= size > EXACT && size < INFINITY;
+        }
+        self.inexact |= large && self.format.data_type != DataType::F32;
+        match infinite {
+            true => self.settle_infinite(bytes, voxels, start),
+            false => Ok(()),
+        }
+    }
+
+    /// Makes infinities NaN, and refuses those that the file does not hold: numbers too large.
+    fn settle_infinite(
+        &mut self,
+        bytes: &[u8],
+        voxels: &mut [f32],
+        start: usize,
+    ) -> Result<(), VolumeError> {
+        let stored = bytes.chunks_exact(self.format.data_type.size());
+        for ((n, v), bytes) in (start..).zip(&mut voxels[start..]).zip(stored) {
+            if v.is_infinite() {
+                let value = exact(bytes, &self.format);
+                if value.is_finite() {
+                    return Err(overflow(&self.format, n, value));
+                }
+                *v = f32::NAN;
+                self.infinite += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// What happened to the values.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if self.infinite > 0 {
+            let n = self.infinite;
+            warnings.push(format!(
+                "{n} voxels are infinite and were taken as missing (NaN)."
+            ));
+        }
+        if self.inexact {
+            let name = self.format.data_type.name();
+            warnings.push(format!(
+                "Some {name} values exceed 2^24 and were rounded to 24 binary digits."
+            ));
+        }
+        warnings
+    }
+
+    /// Looks at what follows the last volume.
+    pub(super) fn finish(&mut self) -> Result<Option<String>, VolumeError> {
+        let left_over = self.source.finish()?;
+        Ok(left_over.then(|| "Bytes that follow the last voxel were left aside.".into()))
+    }
+}
+
+fn overflow(format: &VoxelFormat, index: usize, value: f64) -> VolumeError {
+    let [nx, ny, _] = format.shape;
+    VolumeError::Overflow {
+        file: format.file.clone(),
+        voxel: [index % nx, index / nx % ny, index / nx / ny],
+        value,
+    }
+}
+
+/// A stored number.
+trait Stored: Copy {
+    /// Appends `take` of each number in `bytes` to `out`.
+    fn each<O>(bytes: &[u8], order: ByteOrder, out: &mut Vec<O>, take: impl Fn(Self) -> O);
+    /// Without its leading `unused` bits; those of a signed number repeat its sign.
+    fn trim(self, unused: u32) -> Self;
+    fn single(self) -> f32;
+    fn double(self) -> f64;
+}
+
+macro_rules! trim {
+    (f32, $v:expr, $unused:expr) => {{
+        let _ = $unused;
+        $v
+    }};
+    (f64, $v:expr, $unused:expr) => {{
+        let _ = $unused;
+        $v
+    }};
+    ($t:ident, $v:expr, $unused:expr) => {
+        ($v << $unused) >> $unused
+    };
+}
+
+macro_rules! stored {
+    ($($t:ident),*) => {$(
+        impl Stored for $t {
+            fn each<O>(bytes: &[u8], order: ByteOrder, out: &mut Vec<O>, take: impl Fn(Self) -> O) {
+                let (numbers, _) = bytes.as_chunks::<{ size_of::<$t>() }>();
+                match order {
+                    ByteOrder::Little => {
+                        out.extend(numbers.iter().map(|b| take(<$t>::from_le_bytes(*b))));
+                    }
+                    ByteOrder::Big => {
+                        out.extend(numbers.iter().map(|b| take(<$t>::from_be_bytes(*b))));
+                    }
+                }
+            }
+            fn trim(self, unused: u32) -> Self { trim!($t, self, unused) }
+            fn single(self) -> f32 { self as f32 }
+            fn double(self) -> f64 { self as f64 }
+        }
+    )*};
+}
+stored!(u8, i8, u16, i16, u32, i32, u64, i64, f32, f64);
+
+/// Evaluates `$body` with `$t` standing for the Rust type of `$data_type`.
+macro_rules! with_type {
+    ($data_type:expr, $t:ident => $body:expr) => {
+        match $data_type {
+            DataType::U8 => {
+                type $t = u8;
+                $body
+            }
+            DataType::I8 => {
+                type $t = i8;
+                $body
+            }
+            DataType::U16 => {
+                type $t = u16;
+                $body
+            }
+            DataType::I16 => {
+                type $t = i16;
+                $body
+            }
+            DataType::U32 => {
+                type $t = u32;
+                $body
+            }
+            DataType::I32 => {
+                type $t = i32;
+                $body
+            }
+            DataType::U64 => {
+                type $t = u64;
+                $body
+            }
+            DataType::I64 => {
+                type $t = i64;
+                $body
+            }
+            DataType::F32 => {
+                type $t = f32;
+                $body
+            }
+            DataType::F64 => {
+                type $t = f64;
+                $body
+            }
+        }
+    };
+}
+
+/// Appends the numbers in `bytes` to `voxels`, slope and intercept applied in double precision
+/// as nibabel does.
+fn decode(bytes: &[u8], format: &VoxelFormat, voxels: &mut Vec<f32>) {
+    let (order, unused) = (format.byte_order, format.unused_bits);
+    let scaling = match unused {
+        0 => format.scaling,
+        _ => Some(format.scaling.unwrap_or((1.0, 0.0))),
+    };
+    with_type!(format.data_type, T => match scaling {
+        None => T::each(bytes, order, voxels, |v| v.single()),
+        Some((slope, inter)) => {
+            let scale = |v: f64| (v * slope + inter) as f32;
+            T::each(bytes, order, voxels, |v| scale(v.trim(unused).double()));
+        }
+    });
+}
+
+/// The first number in `bytes` in double precision, which tells large from infinite.
+fn exact(bytes: &[u8], format: &VoxelFormat) -> f64 {
+    let (slope, inter) = format.scaling.unwrap_or((1.0, 0.0));
+    let unused = format.unused_bits;
+    let mut value = Vec::with_capacity(1);
+    with_type!(format.data_type, T => {
+        let scale = |v: f64| v * slope + inter;
+        T::each(bytes, format.byte_order, &mut value, |v| scale(v.trim(unused).double()));
+    });
+    value.first().copied().unwrap_or(f64::NAN)
+}

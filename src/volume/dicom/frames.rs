@@ -1,0 +1,177 @@
+//! Which stored frame is which slice of which gate.
+//!
+//! PS3.3 C.8.4.8: the Frame Increment Pointer names vectors with one number per stored frame,
+//! counted from 1. The order of the frames in the file means nothing by itself.
+
+use super::super::VolumeError;
+use super::scan::{
+    Attribute, Attributes, FRAME_POINTER, IMAGE_TYPE, MODALITY, NUMBER_OF_FRAMES,
+    RR_INTERVAL_VECTOR, SLICE_VECTOR, SOP_CLASS, TIME_SLOT_VECTOR,
+};
+
+/// SOP class of the multi-frame Nuclear Medicine Image.
+const NM_IMAGE: &str = "1.2.840.10008.5.1.4.1.1.20";
+
+/// Refuses everything but reconstructed NM slices. Returns whether they are gated.
+pub(super) fn check_kind(attributes: &Attributes) -> Result<bool, VolumeError> {
+    let sop_class = attributes.texts(SOP_CLASS);
+    let sop_class = sop_class.first().map_or("missing", String::as_str);
+    if sop_class != NM_IMAGE {
+        let modality = attributes.texts(MODALITY).join("\\");
+        return Err(attributes.wrong(
+            SOP_CLASS.name,
+            sop_class,
+            format!(
+                "only the Nuclear Medicine Image ({NM_IMAGE}) is read (modality: {})",
+                if modality.is_empty() {
+                    "none"
+                } else {
+                    &modality
+                }
+            ),
+        ));
+    }
+    let image_type = attributes.texts(IMAGE_TYPE);
+    let shown = image_type.get(2).map_or("", String::as_str);
+    let refuse = |reason| {
+        Err(VolumeError::NotSlices {
+            file: attributes.file.clone(),
+            image_type: shown.to_owned(),
+            reason,
+        })
+    };
+    match shown {
+        "RECON TOMO" => Ok(false),
+        "RECON GATED TOMO" => Ok(true),
+        "TOMO" | "GATED TOMO" => {
+            refuse("its frames are projections from round the patient, not slices")
+        }
+        "STATIC" | "DYNAMIC" | "GATED" | "WHOLE BODY" => {
+            refuse("its frames are planar pictures, not slices")
+        }
+        _ => refuse("only RECON TOMO and RECON GATED TOMO are known to be slices"),
+    }
+}
+
+/// For each gate its slices, as numbers of stored frames from 0.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct FrameOrder {
+    slices: usize,
+    stored: Vec<usize>,
+}
+
+impl FrameOrder {
+    /// Reads the vectors of `attributes`.
+    pub(super) fn of(
+        attributes: &Attributes,
+        gated: bool,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self, VolumeError> {
+        let frames = number_of_frames(attributes)?;
+        let vectors: &[Attribute] = match gated {
+            true => &[RR_INTERVAL_VECTOR, TIME_SLOT_VECTOR, SLICE_VECTOR],
+            false => &[SLICE_VECTOR],
+        };
+        check_pointer(attributes, vectors)?;
+        if !gated && attributes.shorts(SLICE_VECTOR).is_empty() {
+            warnings.push(
+                "There is no Slice Vector: frames are taken as slices in their stored order."
+                    .into(),
+            );
+            return Ok(Self {
+                slices: frames,
+                stored: (0..frames).collect(),
+            });
+        }
+        // One index over all vectors, the slice fastest.
+        let mut index = vec![0; frames];
+        let mut cells = 1_usize;
+        let mut slices = 1;
+        for &vector in vectors {
+            let numbers = numbers(attributes, vector, frames)?;
+            slices = usize::from(numbers.iter().copied().max().unwrap_or(1));
+            cells = cells.saturating_mul(slices);
+            for (index, number) in index.iter_mut().zip(numbers) {
+                *index = *index * slices + usize::from(number) - 1;
+            }
+        }
+        let mut stored = vec![None; if cells == frames { cells } else { 0 }];
+        for (frame, &cell) in index.iter().enumerate() {
+            if let Some(place @ None) = stored.get_mut(cell) {
+                *place = Some(frame);
+            }
+        }
+        let complete: Option<Vec<usize>> = stored.into_iter().collect();
+        match complete.filter(|all| all.len() == frames) {
+            Some(stored) => Ok(Self { slices, stored }),
+            None => Err(attributes.wrong(
+                SLICE_VECTOR.name,
+                &format!("{:?}", attributes.shorts(SLICE_VECTOR)),
+                format!("the {frames} frames must be every slice of every gate, each once"),
+            )),
+        }
+    }
+
+    /// How many slices a gate has.
+    pub(super) fn slices(&self) -> usize {
+        self.slices
+    }
+
+    /// How many gates there are; 1 without gating.
+    pub(super) fn gates(&self) -> usize {
+        self.stored.len() / self.slices
+    }
+
+    /// The stored frames of a gate, from the first slice to the last.
+    pub(super) fn slices_of(&self, gate: usize) -> &[usize] {
+        &self.stored[gate * self.slices..(gate + 1) * self.slices]
+    }
+}
+
+fn number_of_frames(attributes: &Attributes) -> Result<usize, VolumeError> {
+    let Some([frames]) = attributes.decimals(NUMBER_OF_FRAMES)? else {
+        return Err(attributes.missing(NUMBER_OF_FRAMES));
+    };
+    // The vectors have a 16-bit number for each frame, in an element of at most a mebibyte.
+    match frames.fract() == 0.0 && (1.0..=524_288.0).contains(&frames) {
+        true => Ok(frames as usize),
+        false => Err(attributes.wrong(
+            NUMBER_OF_FRAMES.name,
+            &frames.to_string(),
+            "a whole number from 1 to 524288 expected".into(),
+        )),
+    }
+}
+
+/// The pointer, where there is one, must name the vectors of such an image.
+fn check_pointer(attributes: &Attributes, vectors: &[Attribute]) -> Result<(), VolumeError> {
+    let pointer = attributes.shorts(FRAME_POINTER);
+    let named: Vec<[u16; 2]> = vectors.iter().map(|v| v.pointer()).collect();
+    let (stated, _) = pointer.as_chunks::<2>();
+    if stated.is_empty() || stated == named {
+        return Ok(());
+    }
+    let write = |tags: &[[u16; 2]]| {
+        let tags = tags.iter().map(|[g, e]| format!("({g:04X},{e:04X})"));
+        tags.collect::<Vec<_>>().join(" ")
+    };
+    let reason = format!("{} expected", write(&named));
+    Err(attributes.wrong(FRAME_POINTER.name, &write(stated), reason))
+}
+
+/// The numbers of `vector`, one for each frame, from 1.
+fn numbers(
+    attributes: &Attributes,
+    vector: Attribute,
+    frames: usize,
+) -> Result<Vec<u16>, VolumeError> {
+    let numbers = attributes.shorts(vector);
+    if numbers.is_empty() {
+        return Err(attributes.missing(vector));
+    }
+    if numbers.len() != frames || numbers.contains(&0) {
+        let reason = format!("{frames} numbers from 1 expected");
+        return Err(attributes.wrong(vector.name, &format!("{numbers:?}"), reason));
+    }
+    Ok(numbers)
+}

@@ -1,0 +1,201 @@
+//! The affine of a header: sform over qform over pixdim.
+//!
+//! `nifti1.h`, "METHOD 1..3". The order is that of the standard's reference library and of
+//! nibabel. Where sform and qform are both given and disagree, the sform is taken and the
+//! distance between the two told. Where neither is given, the standard leaves the orientation
+//! open; nibabel's convention is followed (left-handed storage, i to the patient's left, the
+//! array's centre at the origin), with a warning.
+
+use super::super::VolumeError;
+use super::super::facts::AffineSource;
+use super::header::Header;
+use crate::geometry::Vec3;
+use crate::geometry::frame::VoxelToPatient;
+use nalgebra::{Matrix4, Vector4};
+
+/// Disagreement of sform and qform beyond this share of a voxel is told.
+const TOLERANCE: f64 = 0.1;
+
+/// `b^2 + c^2 + d^2` may exceed 1 by rounding, no more.
+const QUATERNION_SLACK: f64 = 1e-3;
+
+/// Where the voxels are.
+#[derive(Debug, Clone)]
+pub(super) struct Placement {
+    /// Index to LPS millimetres.
+    pub frame: VoxelToPatient,
+    /// Which fields it was made of.
+    pub source: AffineSource,
+    /// Assumptions and contradictions.
+    pub warnings: Vec<String>,
+}
+
+/// Places the header's volume in the patient.
+pub(super) fn place(header: &Header) -> Result<Placement, VolumeError> {
+    let mut warnings = Vec::new();
+    let (ras, source) = if header.sform_code > 0 {
+        let sform = sform(header)?;
+        if header.qform_code > 0 {
+            warnings.extend(disagreement(header, &sform));
+        }
+        (sform, AffineSource::Sform)
+    } else if header.qform_code > 0 {
+        (qform(header)?, AffineSource::Qform)
+    } else {
+        warnings.push(
+            "Neither sform nor qform says how the patient lies: i is taken to run to the left, \
+             j to the front, k to the head, and the array's centre as the origin."
+                .into(),
+        );
+        (from_spacing(header)?, AffineSource::Pixdim)
+    };
+    let scale = header.unit.in_millimetres();
+    let millimetres = Matrix4::from_diagonal(&Vector4::new(scale, scale, scale, 1.0)) * ras;
+    if scale != 1.0 {
+        let unit = header.unit.as_str();
+        warnings.push(format!(
+            "Lengths are given in {unit} and were converted to mm."
+        ));
+    }
+    let frame = VoxelToPatient::from_ras(&millimetres).map_err(|_| {
+        let value = format!("{:?}", header.srow);
+        let reason = "the affine must be finite and invertible";
+        wrong(header, "srow_x/y/z", value, reason)
+    })?;
+    warnings.extend(implausible(&frame));
+    Ok(Placement {
+        frame,
+        source,
+        warnings,
+    })
+}
+
+fn wrong(header: &Header, field: &'static str, value: impl ToString, reason: &str) -> VolumeError {
+    VolumeError::Field {
+        file: header.file.clone(),
+        field,
+        value: value.to_string(),
+        reason: reason.into(),
+        byte: None,
+    }
+}
+
+fn sform(header: &Header) -> Result<Matrix4<f64>, VolumeError> {
+    const NAMES: [&str; 3] = ["srow_x", "srow_y", "srow_z"];
+    for (row, name) in header.srow.iter().zip(NAMES) {
+        if row.iter().any(|v| !v.is_finite()) {
+            let reason = "must be four finite numbers";
+            return Err(wrong(header, name, format!("{row:?}"), reason));
+        }
+    }
+    let s = &header.srow;
+    Ok(Matrix4::from_fn(|r, c| match r {
+        3 => f64::from(u8::from(c == 3)),
+        _ => s[r][c],
+    }))
+}
+
+/// Rotation by the unit quaternion, columns scaled by the spacing, k turned by qfac.
+fn qform(header: &Header) -> Result<Matrix4<f64>, VolumeError> {
+    let [b, c, d] = header.quatern;
+    let length = b * b + c * c + d * d;
+    if !length.is_finite() || length > 1.0 + QUATERNION_SLACK {
+        let value = format!("({b}, {c}, {d})");
+        let reason = "the squares of quatern_b, _c, _d must add up to at most 1";
+        return Err(wrong(header, "quatern_b/c/d", value, reason));
+    }
+    // Half turns come out as a slightly negative a^2: then b, c, d are the whole quaternion.
+    let (a, norm) = match 1.0 - length {
+        rest if rest < 1e-7 => (0.0, length.sqrt()),
+        rest => (rest.sqrt(), 1.0),
+    };
+    let (b, c, d) = (b / norm, c / norm, d / norm);
+    let [dx, dy, dz] = spacing(header)?;
+    let dz = if header.pixdim[0] < 0.0 { -dz } else { dz };
+    for (value, name) in header
+        .qoffset
+        .iter()
+        .zip(["qoffset_x", "qoffset_y", "qoffset_z"])
+    {
+        if !value.is_finite() {
+            return Err(wrong(header, name, value, "must be a finite number"));
+        }
+    }
+    let [x, y, z] = header.qoffset;
+    #[rustfmt::skip]
+    let affine = Matrix4::new(
+        (a*a + b*b - c*c - d*d) * dx, 2.0 * (b*c - a*d) * dy, 2.0 * (b*d + a*c) * dz, x,
+        2.0 * (b*c + a*d) * dx, (a*a + c*c - b*b - d*d) * dy, 2.0 * (c*d - a*b) * dz, y,
+        2.0 * (b*d - a*c) * dx, 2.0 * (c*d + a*b) * dy, (a*a + d*d - b*b - c*c) * dz, z,
+        0.0, 0.0, 0.0, 1.0,
+    );
+    Ok(affine)
+}
+
+fn from_spacing(header: &Header) -> Result<Matrix4<f64>, VolumeError> {
+    let spacing = spacing(header)?;
+    let signs = [-1.0, 1.0, 1.0];
+    let mut affine = Matrix4::identity();
+    for axis in 0..3 {
+        let step = signs[axis] * spacing[axis];
+        affine[(axis, axis)] = step;
+        affine[(axis, 3)] = -step * (header.shape[axis] as f64 - 1.0) / 2.0;
+    }
+    Ok(affine)
+}
+
+/// The absolute spacing, as the reference library takes it. A dimension that the file does not
+/// have needs none.
+fn spacing(header: &Header) -> Result<[f64; 3], VolumeError> {
+    const NAMES: [&str; 3] = ["pixdim[1]", "pixdim[2]", "pixdim[3]"];
+    let mut spacing = [1.0; 3];
+    for axis in 0..header.dim.len().min(3) {
+        let stated = header.pixdim[axis + 1].abs();
+        match stated.is_finite() && stated > 0.0 {
+            true => spacing[axis] = stated,
+            false if stated == 0.0 && header.shape[axis] == 1 => {}
+            false => {
+                let value = header.pixdim[axis + 1];
+                let reason = "the spacing must be a positive number";
+                return Err(wrong(header, NAMES[axis], value, reason));
+            }
+        }
+    }
+    Ok(spacing)
+}
+
+/// A sentence if the qform puts some corner of the volume elsewhere than `sform` does.
+fn disagreement(header: &Header, sform: &Matrix4<f64>) -> Option<String> {
+    let qform = match qform(header) {
+        Ok(qform) => qform,
+        Err(e) => return Some(format!("The sform was taken; the qform cannot be: {e}.")),
+    };
+    let corner = |c: usize| {
+        let at = |axis: usize| match (c >> axis) & 1 {
+            0 => 0.0,
+            _ => header.shape[axis] as f64 - 1.0,
+        };
+        Vector4::new(at(0), at(1), at(2), 1.0)
+    };
+    let apart = (0..8).map(|c| ((sform - qform) * corner(c)).norm());
+    let apart = apart.fold(0.0, f64::max);
+    let voxel = (0..3).map(|c| sform.fixed_view::<3, 1>(0, c).norm());
+    let voxel = voxel.fold(f64::INFINITY, f64::min);
+    (apart > TOLERANCE * voxel).then(|| {
+        let apart = apart * header.unit.in_millimetres();
+        format!("sform and qform put voxels up to {apart:.4} mm apart: the sform was taken.")
+    })
+}
+
+/// A sentence if the voxels have a size that no scanner makes.
+fn implausible(frame: &VoxelToPatient) -> Option<String> {
+    let [x, y, z] = frame.spacing();
+    let odd = |s: f64| !(0.05..=50.0).contains(&s);
+    (odd(x) || odd(y) || odd(z)).then(|| {
+        let size = Vec3::new(x, y, z).map(|s| (s * 1e4).round() / 1e4);
+        format!(
+            "Voxels of {} x {} x {} mm are implausible: is the unit of length right?",
+            size.x, size.y, size.z
+        )
+    })
+}

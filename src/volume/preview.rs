@@ -1,0 +1,297 @@
+//! A picture of a volume for a person: its three middle slices, side by side.
+//!
+//! From left to right an axial, a coronal and a sagittal slice through the array's middle, each
+//! in true proportions. Oblique volumes are shown along the array axes that come nearest to the
+//! patient's. The sides are radiology's: the patient's right is on the left of the axial and the
+//! coronal picture; front is up in the axial one and to the left in the sagittal one; the head
+//! is up in both upright ones. Grey runs from 0 (or the smallest value, where that is negative)
+//! to the 99.5th percentile of the shown slices, so that one hot voxel does not darken the rest.
+
+use super::Volume;
+use crate::geometry::frame::VoxelToPatient;
+
+/// Length of the longest side of a slice in pixels.
+const LONGEST_SIDE: usize = 256;
+
+/// Black columns between the slices.
+const GAP: usize = 4;
+
+/// Share of the shown pixels that are not saturated.
+const PERCENTILE: f64 = 0.995;
+
+/// A picture in shades of grey, row by row from the top left.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GrayImage {
+    /// Pixels in a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// 0 black ... 255 white, `width * height` of them.
+    pub pixels: Vec<u8>,
+}
+
+/// Draws the three middle slices of `volume`; at most 776 x 256 pixels.
+pub fn preview(volume: &Volume) -> GrayImage {
+    let axes = PatientAxes::of(volume);
+    // Columns run to the patient's left or back, rows to the back or feet.
+    let views = [
+        (axes.x, axes.y),
+        (axes.x, axes.z.reversed()),
+        (axes.y, axes.z.reversed()),
+    ];
+    let longest = [axes.x, axes.y, axes.z].map(|a| a.extent_mm);
+    let longest = longest.into_iter().fold(0.0, f64::max);
+    let slices = views.map(|(right, down)| slice(volume, right, down, longest));
+    let white = window(&slices);
+    assemble(&slices, white)
+}
+
+/// [`preview`] as a PNG file.
+pub fn preview_png(volume: &Volume) -> Vec<u8> {
+    let image = preview(volume);
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, image.width as u32, image.height as u32);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder
+        .write_header()
+        .and_then(|mut writer| writer.write_image_data(&image.pixels))
+        .expect("the picture has as many pixels as it says, and memory does not fail");
+    bytes
+}
+
+/// An array axis, walked in a direction of the patient.
+#[derive(Debug, Clone, Copy)]
+struct Axis {
+    array: usize,
+    size: usize,
+    backwards: bool,
+    extent_mm: f64,
+}
+
+impl Axis {
+    fn reversed(self) -> Self {
+        Self {
+            backwards: !self.backwards,
+            ..self
+        }
+    }
+
+    /// The (fractional) index at `fraction` of the way.
+    fn index(self, fraction: f64) -> f64 {
+        let along = if self.backwards {
+            1.0 - fraction
+        } else {
+            fraction
+        };
+        (along * self.size as f64 - 0.5).clamp(0.0, self.size as f64 - 1.0)
+    }
+}
+
+/// The array axes nearest to the patient's x (left), y (back), z (head).
+struct PatientAxes {
+    x: Axis,
+    y: Axis,
+    z: Axis,
+}
+
+impl PatientAxes {
+    fn of(volume: &Volume) -> Self {
+        const ORDERS: [[usize; 3]; 6] = [
+            [0, 1, 2],
+            [0, 2, 1],
+            [1, 0, 2],
+            [1, 2, 0],
+            [2, 0, 1],
+            [2, 1, 0],
+        ];
+        let cosine = |patient, array| direction_cosine(&volume.frame, patient, array);
+        let fit = |order: &[usize; 3]| -> f64 { (0..3).map(|p| cosine(p, order[p]).abs()).sum() };
+        // The first of equals wins, so that the choice is always the same.
+        let best = ORDERS.iter().fold(&ORDERS[0], |best, order| {
+            if fit(order) > fit(best) { order } else { best }
+        });
+        let spacing = volume.frame.spacing();
+        let axis = |patient: usize| Axis {
+            array: best[patient],
+            size: volume.shape[best[patient]],
+            backwards: cosine(patient, best[patient]) < 0.0,
+            extent_mm: volume.shape[best[patient]] as f64 * spacing[best[patient]],
+        };
+        Self {
+            x: axis(0),
+            y: axis(1),
+            z: axis(2),
+        }
+    }
+}
+
+fn direction_cosine(frame: &VoxelToPatient, patient: usize, array: usize) -> f64 {
+    frame.linear()[(patient, array)] / frame.spacing()[array]
+}
+
+/// A resampled slice in the volume's values.
+struct Slice {
+    width: usize,
+    height: usize,
+    values: Vec<f32>,
+}
+
+/// The middle slice whose columns run along `right` and rows along `down`.
+fn slice(volume: &Volume, right: Axis, down: Axis, longest_mm: f64) -> Slice {
+    let pixels = |a: Axis| {
+        let length = (a.extent_mm / longest_mm * LONGEST_SIDE as f64).round();
+        (length as usize).clamp(1, LONGEST_SIDE)
+    };
+    let (width, height) = (pixels(right), pixels(down));
+    let mut index = volume.shape.map(|n| (n - 1) / 2);
+    let mut values = Vec::with_capacity(width * height);
+    for row in 0..height {
+        let v = down.index((row as f64 + 0.5) / height as f64);
+        for column in 0..width {
+            let u = right.index((column as f64 + 0.5) / width as f64);
+            values.push(bilinear(
+                volume,
+                &mut index,
+                (right.array, u),
+                (down.array, v),
+            ));
+        }
+    }
+    Slice {
+        width,
+        height,
+        values,
+    }
+}
+
+/// The value between four voxels of the plane of axes `a` and `b` through `index`; a missing
+/// one counts as 0.
+fn bilinear(volume: &Volume, index: &mut [usize; 3], a: (usize, f64), b: (usize, f64)) -> f32 {
+    let mut value = 0.0;
+    for (da, db) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+        let mut weight = 1.0;
+        for ((axis, at), step) in [(a, da), (b, db)] {
+            let share = at - at.floor();
+            weight *= if step == 0 { 1.0 - share } else { share };
+            index[axis] = (at as usize + step).min(volume.shape[axis] - 1);
+        }
+        let voxel = volume.at(index[0], index[1], index[2]);
+        if weight > 0.0 && !voxel.is_nan() {
+            value += weight * f64::from(voxel);
+        }
+    }
+    value as f32
+}
+
+/// The values that become black and white.
+fn window(slices: &[Slice]) -> (f32, f32) {
+    let mut values: Vec<f32> = slices
+        .iter()
+        .flat_map(|s| s.values.iter().copied())
+        .collect();
+    let rank = ((values.len() - 1) as f64 * PERCENTILE) as usize;
+    let (below, &mut high, above) = values.select_nth_unstable_by(rank, f32::total_cmp);
+    let low = below.iter().copied().fold(0.0, f32::min);
+    let highest = above.iter().copied().fold(high, f32::max);
+    // A small bright thing on nothing: the percentile is background.
+    let white = if high > low { high } else { highest };
+    (low, white)
+}
+
+fn assemble(slices: &[Slice], (low, high): (f32, f32)) -> GrayImage {
+    let width = slices.iter().map(|s| s.width).sum::<usize>() + GAP * (slices.len() - 1);
+    let height = slices.iter().map(|s| s.height).max().unwrap_or(1);
+    let mut pixels = vec![0; width * height];
+    let mut left = 0;
+    for s in slices {
+        let top = (height - s.height) / 2;
+        for (row, values) in s.values.chunks(s.width).enumerate() {
+            let start = (top + row) * width + left;
+            for (pixel, value) in pixels[start..start + s.width].iter_mut().zip(values) {
+                let share = (value - low) / (high - low);
+                *pixel = (255.0 * share).round() as u8;
+            }
+        }
+        left += s.width + GAP;
+    }
+    GrayImage {
+        width,
+        height,
+        pixels,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Vec3;
+    use nalgebra::Matrix3;
+
+    /// One bright voxel at `bright` in 9 x 9 x 9 stored by `linear`.
+    fn dot(linear: Matrix3<f64>, bright: [usize; 3]) -> Volume {
+        let mut voxels = vec![0.0; 729];
+        voxels[bright[0] + 9 * (bright[1] + 9 * bright[2])] = 1.0;
+        Volume {
+            shape: [9; 3],
+            voxels,
+            frame: VoxelToPatient::new(linear, Vec3::zeros()).unwrap(),
+            integral: true,
+        }
+    }
+
+    /// Whether the brightest pixel of panel `n` lies right of its middle, and below it.
+    fn side(image: &GrayImage, n: usize) -> (bool, bool) {
+        let panel = LONGEST_SIDE + GAP;
+        let inside = |i: usize| (n * panel..n * panel + LONGEST_SIDE).contains(&(i % image.width));
+        let pixels = image.pixels.iter().enumerate().filter(|(i, _)| inside(*i));
+        let (i, _) = pixels.max_by_key(|(_, p)| **p).unwrap();
+        (
+            i % image.width - n * panel > LONGEST_SIDE / 2,
+            i / image.width > LONGEST_SIDE / 2,
+        )
+    }
+
+    #[test]
+    fn left_back_and_head_are_where_radiology_puts_them() {
+        let stored_lps = Matrix3::identity();
+        let stored_ras = Matrix3::from_diagonal(&Vec3::new(-1.0, -1.0, 1.0));
+        // Left in the axial and the coronal slice, back in the sagittal and the axial one,
+        // head in the coronal one.
+        for (linear, low, high) in [(stored_lps, 4, 8), (stored_ras, 4, 0)] {
+            let left = preview(&dot(linear, [high, low, 4]));
+            assert!(side(&left, 0).0 && side(&left, 1).0);
+            let back = preview(&dot(linear, [low, high, 4]));
+            assert!(side(&back, 0).1 && side(&back, 2).0);
+            let head = preview(&dot(linear, [low, low, 8]));
+            assert!(!side(&head, 1).1 && !side(&head, 2).1);
+        }
+    }
+
+    #[test]
+    fn permuted_axes_are_found() {
+        // i to the head, j to the left, k to the back.
+        let linear = Matrix3::new(0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0);
+        let left = preview(&dot(linear, [4, 8, 4]));
+        assert!(side(&left, 0).0 && side(&left, 1).0);
+        let head = preview(&dot(linear, [8, 4, 4]));
+        assert!(!side(&head, 1).1);
+    }
+
+    #[test]
+    fn proportions_are_those_of_the_patient() {
+        let volume = Volume {
+            shape: [10, 20, 5],
+            voxels: vec![f32::NAN; 1000],
+            frame: VoxelToPatient::centred([10, 20, 5], [4.0, 1.0, 8.0], Vec3::zeros()).unwrap(),
+            integral: false,
+        };
+        let image = preview(&volume);
+        assert_eq!(
+            (image.width, image.height),
+            (256 + 256 + 128 + 2 * GAP, 256)
+        );
+        assert!(image.pixels.iter().all(|&p| p == 0));
+        assert!(preview_png(&volume).starts_with(b"\x89PNG"));
+    }
+}

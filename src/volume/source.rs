@@ -1,0 +1,336 @@
+//! Bytes of a file, unpacked on the way and counted.
+//!
+//! A gzipped file may consist of several members one after the other (RFC 1952, 2.2); they
+//! read as one stream. Whatever follows the last member is not part of it, as for `gzip -d`.
+
+use super::VolumeError;
+use flate2::bufread::GzDecoder;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Cursor, ErrorKind, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Packed bytes are read in portions of this size.
+const PORTION: usize = 128 * 1024;
+
+/// No deflate stream unpacks to more than this many times its size (zlib's technical details:
+/// 1032:1 in the limit).
+const GREATEST_RATIO: u64 = 1032;
+
+/// A file to read, under the name that its sender gave it. The name serves messages alone.
+#[derive(Debug, Clone)]
+pub struct VolumeFile {
+    name: String,
+    content: Content,
+}
+
+#[derive(Debug, Clone)]
+enum Content {
+    Path(PathBuf),
+    Memory(Arc<[u8]>),
+}
+
+impl VolumeFile {
+    /// The file at `path`, known by its own name.
+    pub fn at(path: impl AsRef<Path>) -> Self {
+        let path = path.as_ref();
+        let name = path.file_name().unwrap_or(path.as_os_str());
+        Self::named(name.to_string_lossy(), path)
+    }
+
+    /// The file at `path`, known as `name` (an upload that is stored under a key).
+    pub fn named(name: impl Into<String>, path: impl AsRef<Path>) -> Self {
+        Self {
+            name: name.into(),
+            content: Content::Path(path.as_ref().to_path_buf()),
+        }
+    }
+
+    /// Bytes that never were a file.
+    pub fn in_memory(name: impl Into<String>, bytes: impl Into<Arc<[u8]>>) -> Self {
+        Self {
+            name: name.into(),
+            content: Content::Memory(bytes.into()),
+        }
+    }
+
+    /// The file at `path`, together with its other half where it is one of a `.hdr`/`.img`
+    /// pair (either of them perhaps gzipped) and the other lies beside it.
+    pub fn with_other_half(path: impl AsRef<Path>) -> Vec<Self> {
+        let path = path.as_ref();
+        let mut files = vec![Self::at(path)];
+        let name = path.to_string_lossy();
+        let bare = name.strip_suffix(".gz").unwrap_or(&name);
+        for (this, other) in [(".hdr", ".img"), (".img", ".hdr")] {
+            let Some(stem) = bare.strip_suffix(this) else {
+                continue;
+            };
+            let others = [format!("{stem}{other}"), format!("{stem}{other}.gz")];
+            files.extend(others.iter().find(|o| Path::new(o).is_file()).map(Self::at));
+        }
+        files
+    }
+
+    /// The name for messages.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+}
+
+/// An open file's unpacked bytes, front to back.
+pub(super) struct Source {
+    file: String,
+    body: Body,
+    stored: u64,
+    position: u64,
+    limit: u64,
+    cut_off: bool,
+}
+
+enum Body {
+    Plain(BufReader<Box<dyn ReadSeek>>),
+    Gzip(Box<Members>),
+}
+
+trait ReadSeek: Read + Seek {}
+impl<T: Read + Seek> ReadSeek for T {}
+
+impl Source {
+    /// Opens `file`; at most `limit` unpacked bytes will be given out.
+    pub(super) fn open(file: &VolumeFile, limit: u64) -> Result<Self, VolumeError> {
+        let io = |e: io::Error| VolumeError::Io {
+            file: file.name.clone(),
+            reason: e.to_string(),
+        };
+        let mut reader: Box<dyn ReadSeek> = match &file.content {
+            Content::Path(path) => Box::new(File::open(path).map_err(io)?),
+            Content::Memory(bytes) => Box::new(Cursor::new(Arc::clone(bytes))),
+        };
+        let stored = reader.seek(SeekFrom::End(0)).map_err(io)?;
+        reader.rewind().map_err(io)?;
+        let mut mark = [0; 2];
+        let gzipped = stored >= 2 && reader.read_exact(&mut mark).is_ok() && mark == GZIP;
+        reader.rewind().map_err(io)?;
+        let body = match gzipped {
+            true => Body::Gzip(Box::new(Members::new(reader))),
+            false => Body::Plain(BufReader::with_capacity(PORTION, reader)),
+        };
+        Ok(Self {
+            file: file.name.clone(),
+            body,
+            stored,
+            position: 0,
+            limit,
+            cut_off: false,
+        })
+    }
+
+    /// The file's name.
+    pub(super) fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// How many bytes were given out or skipped.
+    pub(super) fn position(&self) -> u64 {
+        self.position
+    }
+
+    /// Whether the bytes are unpacked from gzip.
+    pub(super) fn is_gzip(&self) -> bool {
+        matches!(self.body, Body::Gzip(_))
+    }
+
+    /// How many unpacked bytes there can be at most.
+    pub(super) fn capacity(&self) -> u64 {
+        match self.body {
+            Body::Plain(_) => self.stored,
+            Body::Gzip(_) => self.stored.saturating_mul(GREATEST_RATIO),
+        }
+    }
+
+    /// Fills `buffer` as far as the file reaches and says how far that was.
+    pub(super) fn fill(&mut self, buffer: &mut [u8]) -> Result<usize, VolumeError> {
+        let mut filled = 0;
+        while filled < buffer.len() {
+            let part = &mut buffer[filled..];
+            let got = match &mut self.body {
+                Body::Plain(reader) => reader.read(part),
+                Body::Gzip(members) => members.read(part),
+            };
+            match got {
+                Ok(0) => break,
+                Ok(n) => filled += n,
+                Err(e) if e.kind() == ErrorKind::Interrupted => {}
+                // Packed data that stop in the midst are a file that was cut off.
+                Err(e) if e.kind() == ErrorKind::UnexpectedEof && self.is_gzip() => {
+                    self.cut_off = true;
+                    break;
+                }
+                Err(e) => return Err(self.failure(&e, filled)),
+            }
+        }
+        self.position += filled as u64;
+        match self.position > self.limit {
+            true => Err(self.beyond_limit(self.position)),
+            false => Ok(filled),
+        }
+    }
+
+    /// Fills `buffer` wholly, as a part of the `needed` bytes that the header promises.
+    pub(super) fn fill_all(&mut self, buffer: &mut [u8], needed: u64) -> Result<(), VolumeError> {
+        match self.fill(buffer)? == buffer.len() {
+            true => Ok(()),
+            false => Err(self.truncated(needed, self.position)),
+        }
+    }
+
+    /// Goes forward to byte `target` of the unpacked file.
+    pub(super) fn skip_to(&mut self, target: u64) -> Result<(), VolumeError> {
+        debug_assert!(target >= self.position, "a stream goes forward only");
+        if target > self.limit {
+            return Err(self.beyond_limit(target));
+        }
+        if let Body::Plain(reader) = &mut self.body {
+            // Within the buffer nothing is read again.
+            if let Err(e) = reader.seek_relative((target - self.position) as i64) {
+                return Err(self.failure(&e, 0));
+            }
+            self.position = target;
+            return Ok(());
+        }
+        let mut scratch = vec![0; PORTION];
+        while self.position < target {
+            let part = (target - self.position).min(PORTION as u64) as usize;
+            self.fill_all(&mut scratch[..part], target)?;
+        }
+        Ok(())
+    }
+
+    /// Looks past the last byte that is wanted, so that a gzip member's checksum gets checked.
+    /// Returns whether bytes were left over. Reads at most a portion: who appends a bomb shall
+    /// not have it unpacked.
+    pub(super) fn finish(&mut self) -> Result<bool, VolumeError> {
+        let mut rest = vec![0; PORTION];
+        self.limit = u64::MAX;
+        let left_over = self.fill(&mut rest)? > 0;
+        match self.cut_off {
+            true => Err(VolumeError::Corrupt {
+                file: self.file.clone(),
+                byte: self.position,
+                reason: "the packed data end before their checksum".into(),
+            }),
+            false => Ok(left_over),
+        }
+    }
+
+    /// The error for a file that ends too early.
+    pub(super) fn truncated(&self, needed: u64, found: u64) -> VolumeError {
+        VolumeError::Truncated {
+            file: self.file.clone(),
+            needed,
+            found,
+        }
+    }
+
+    /// The error for more bytes than the limit allows.
+    pub(super) fn beyond_limit(&self, asked: u64) -> VolumeError {
+        VolumeError::TooLarge {
+            file: self.file.clone(),
+            what: "unpacked bytes",
+            asked,
+            limit: self.limit,
+        }
+    }
+
+    fn failure(&self, e: &io::Error, filled: usize) -> VolumeError {
+        let file = self.file.clone();
+        let reason = e.to_string();
+        match e.kind() {
+            ErrorKind::InvalidInput | ErrorKind::InvalidData => VolumeError::Corrupt {
+                file,
+                byte: self.position + filled as u64,
+                reason,
+            },
+            _ => VolumeError::Io { file, reason },
+        }
+    }
+}
+
+/// For parsers that want a reader. Failures lose their kind on the way.
+impl Read for Source {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.fill(buffer).map_err(io::Error::other)
+    }
+}
+
+/// First two bytes of a gzip member.
+const GZIP: [u8; 2] = [0x1f, 0x8b];
+
+/// Gzip members, one after the other. (`MultiGzDecoder` of flate2 takes padding after the last
+/// member for a damaged one.)
+struct Members(Option<GzDecoder<BufReader<Box<dyn ReadSeek>>>>);
+
+impl Members {
+    fn new(packed: Box<dyn ReadSeek>) -> Self {
+        Self(Some(GzDecoder::new(BufReader::with_capacity(
+            PORTION, packed,
+        ))))
+    }
+
+    /// Steps to the member after the one that has ended.
+    fn next(ended: GzDecoder<BufReader<Box<dyn ReadSeek>>>) -> io::Result<Self> {
+        let mut packed = ended.into_inner();
+        // The reader may hold a single byte of what follows; one is enough to tell padding,
+        // and a member that starts right and goes on wrong is an error worth telling.
+        let follows = packed.fill_buf()?.first() == Some(&GZIP[0]);
+        Ok(Self(follows.then(|| GzDecoder::new(packed))))
+    }
+}
+
+impl Read for Members {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        while let Some(member) = &mut self.0 {
+            match member.read(buffer)? {
+                0 if !buffer.is_empty() => {
+                    let Some(ended) = self.0.take() else { break };
+                    *self = Members::next(ended)?;
+                }
+                n => return Ok(n),
+            }
+        }
+        Ok(0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_other_half_lies_beside() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("a.hdr"), b"header").unwrap();
+        std::fs::write(at("a.img.gz"), b"image").unwrap();
+        let names = |path: PathBuf| {
+            let files = VolumeFile::with_other_half(path);
+            files
+                .iter()
+                .map(|f| f.name().to_owned())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(names(at("a.hdr")), ["a.hdr", "a.img.gz"]);
+        assert_eq!(names(at("a.img.gz")), ["a.img.gz", "a.hdr"]);
+        assert_eq!(names(at("b.nii.gz")), ["b.nii.gz"]);
+        assert_eq!(names(at("b.hdr")), ["b.hdr"]);
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let missing = VolumeFile::named("upload.nii", "/nowhere/at/all");
+        assert!(matches!(
+            Source::open(&missing, 10),
+            Err(VolumeError::Io { file, .. }) if file == "upload.nii"
+        ));
+    }
+}

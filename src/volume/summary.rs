@@ -1,0 +1,264 @@
+//! What values a volume holds, and whether they look like labels.
+//!
+//! Sums are taken in fixed portions whose results are added in order, so that the figures do
+//! not depend on the number of threads.
+
+use super::VolumeError;
+use super::facts::{IntensitySummary, LabelCount};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// Voxels summed together before the sums are added.
+const PORTION: usize = 1 << 16;
+
+/// More different values than this are no label map.
+const MOST_LABELS: usize = 256;
+
+/// Least share of labelled voxels whose neighbour along i carries the same label. Organs at
+/// coarse voxels have 0.7 and more, counts above noise below 0.2.
+const LEAST_COHERENCE: f64 = 0.5;
+
+/// Summarises `voxels`, which lie in rows of `row` along i.
+pub fn summarise(voxels: &[f32], row: usize) -> IntensitySummary {
+    let mut tally = Tally::default();
+    tally.add(voxels);
+    let labels = match tally.fractional {
+        false => labels(voxels, row),
+        true => None,
+    };
+    tally.summary(labels)
+}
+
+/// Refuses a volume without any number, and has a sentence for one that is all the same.
+pub(super) fn judge(
+    intensity: &IntensitySummary,
+    file: &str,
+) -> Result<Option<String>, VolumeError> {
+    if intensity.finite == 0 {
+        return Err(VolumeError::NoFiniteVoxel { file: file.into() });
+    }
+    let value = intensity.minimum;
+    let constant = value == intensity.maximum;
+    Ok(constant.then(|| format!("Every voxel has the value {value}: there is no object.")))
+}
+
+/// Running figures over one or more volumes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tally {
+    minimum: f32,
+    maximum: f32,
+    sum: f64,
+    finite: u64,
+    missing: u64,
+    fractional: bool,
+}
+
+impl Default for Tally {
+    fn default() -> Self {
+        Self {
+            minimum: f32::INFINITY,
+            maximum: f32::NEG_INFINITY,
+            sum: 0.0,
+            finite: 0,
+            missing: 0,
+            fractional: false,
+        }
+    }
+}
+
+impl Tally {
+    /// Takes in a volume.
+    pub(super) fn add(&mut self, voxels: &[f32]) {
+        let portions: Vec<Tally> = voxels.par_chunks(PORTION).map(Tally::of).collect();
+        for portion in portions {
+            self.merge(&portion);
+        }
+    }
+
+    /// The figures of one portion, in lanes that a vector unit can hold.
+    fn of(portion: &[f32]) -> Self {
+        let (groups, rest) = portion.as_chunks::<LANES>();
+        let mut lanes = Lanes::new();
+        for group in groups {
+            lanes.add(group);
+        }
+        // What is left over is filled up with voxels that count for nothing.
+        let mut last = [f32::NAN; LANES];
+        last[..rest.len()].copy_from_slice(rest);
+        lanes.add(&last);
+        let padding = (LANES - rest.len()) as u64;
+        let missing = lanes.missing.iter().map(|&n| u64::from(n)).sum::<u64>() - padding;
+        Self {
+            minimum: lanes.minimum.into_iter().fold(f32::INFINITY, f32::min),
+            maximum: lanes.maximum.into_iter().fold(f32::NEG_INFINITY, f32::max),
+            sum: lanes.sum.iter().sum(),
+            finite: portion.len() as u64 - missing,
+            missing,
+            fractional: lanes.fractional.contains(&true),
+        }
+    }
+
+    fn merge(&mut self, other: &Tally) {
+        self.minimum = self.minimum.min(other.minimum);
+        self.maximum = self.maximum.max(other.maximum);
+        self.sum += other.sum;
+        self.finite += other.finite;
+        self.missing += other.missing;
+        self.fractional |= other.fractional;
+    }
+
+    /// The figures so far. Without any number they are all zero.
+    pub(super) fn summary(&self, labels: Option<Vec<LabelCount>>) -> IntensitySummary {
+        let any = self.finite > 0;
+        IntensitySummary {
+            minimum: if any { self.minimum } else { 0.0 },
+            maximum: if any { self.maximum } else { 0.0 },
+            mean: self.sum / self.finite.max(1) as f64,
+            sum: self.sum,
+            finite: self.finite,
+            missing: self.missing,
+            integral: any && !self.fractional,
+            labels,
+        }
+    }
+}
+
+/// Values taken side by side.
+const LANES: usize = 8;
+
+/// From here on every `f32` is whole.
+const WHOLE: f32 = 8_388_608.0;
+
+/// Figures of every eighth voxel.
+struct Lanes {
+    minimum: [f32; LANES],
+    maximum: [f32; LANES],
+    sum: [f64; LANES],
+    missing: [u32; LANES],
+    fractional: [bool; LANES],
+}
+
+impl Lanes {
+    fn new() -> Self {
+        Self {
+            minimum: [f32::INFINITY; LANES],
+            maximum: [f32::NEG_INFINITY; LANES],
+            sum: [0.0; LANES],
+            missing: [0; LANES],
+            fractional: [false; LANES],
+        }
+    }
+
+    /// Without branches: comparisons with NaN are false.
+    #[inline]
+    fn add(&mut self, group: &[f32; LANES]) {
+        for l in 0..LANES {
+            let v = group[l];
+            let nan = v.is_nan();
+            self.missing[l] += u32::from(nan);
+            self.minimum[l] = if v < self.minimum[l] {
+                v
+            } else {
+                self.minimum[l]
+            };
+            self.maximum[l] = if v > self.maximum[l] {
+                v
+            } else {
+                self.maximum[l]
+            };
+            self.sum[l] += f64::from(if nan { 0.0 } else { v });
+            // Added to 2^23, a number loses its fraction to rounding.
+            let size = v.abs();
+            let whole = (size + WHOLE) - WHOLE == size || size >= WHOLE;
+            self.fractional[l] |= !(whole | nan);
+        }
+    }
+}
+
+/// The labels of `voxels`, if they look like ones: whole values, few of them, neighbours alike.
+fn labels(voxels: &[f32], row: usize) -> Option<Vec<LabelCount>> {
+    let mut counts: BTreeMap<i64, u64> = BTreeMap::new();
+    let (mut labelled, mut alike) = (0_u64, 0_u64);
+    for line in voxels.chunks(row.max(1)) {
+        let mut previous = 0;
+        for run in line.chunk_by(|a, b| a == b) {
+            let length = run.len() as u64;
+            let label = run[0] as i64;
+            if label == 0 || run[0].is_nan() {
+                previous = 0;
+                continue;
+            }
+            *counts.entry(label).or_default() += length;
+            if counts.len() > MOST_LABELS {
+                return None;
+            }
+            labelled += length;
+            // A voxel at a label's outer edge has nothing to agree with: only neighbours that
+            // are labelled too can speak against a label map.
+            alike += length - u64::from(previous != 0);
+            previous = label;
+        }
+    }
+    let coherent = alike as f64 >= LEAST_COHERENCE * labelled as f64;
+    (labelled > 0 && coherent).then(|| {
+        let count = |(label, voxels)| LabelCount { label, voxels };
+        counts.into_iter().map(count).collect()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_are_those_of_the_definition() {
+        let s = summarise(&[1.0, f32::NAN, -2.0, 4.5], 4);
+        assert_eq!((s.minimum, s.maximum, s.sum), (-2.0, 4.5, 3.5));
+        assert_eq!((s.finite, s.missing, s.mean), (3, 1, 3.5 / 3.0));
+        assert!(!s.integral && s.labels.is_none());
+    }
+
+    #[test]
+    fn portions_add_up() {
+        let n = 3 * PORTION + 17;
+        let voxels: Vec<f32> = (0..n).map(|i| (i % 7) as f32).collect();
+        let sum: f64 = voxels.iter().map(|&v| f64::from(v)).sum();
+        let s = summarise(&voxels, 128);
+        assert_eq!((s.sum, s.minimum, s.maximum), (sum, 0.0, 6.0));
+        assert_eq!((s.finite, s.missing, s.integral), (n as u64, 0, true));
+    }
+
+    #[test]
+    fn blocks_are_labels_and_counts_are_not() {
+        let organ = |i: usize| {
+            if i % 20 < 8 {
+                1.0 + (i / 100) as f32
+            } else {
+                0.0
+            }
+        };
+        let blocks: Vec<f32> = (0..400).map(organ).collect();
+        let labels = summarise(&blocks, 20).labels.unwrap();
+        assert_eq!(labels.len(), 4);
+        assert_eq!((labels[0].label, labels[0].voxels), (1, 40));
+        let counts: Vec<f32> = (0..400).map(|i| (i * 37 % 41) as f32).collect();
+        assert!(summarise(&counts, 20).labels.is_none());
+    }
+
+    #[test]
+    fn whole_numbers_are_told_at_every_size() {
+        for whole in [0.0, -3.0, 4_194_305.0, 8_388_607.0, 16_777_213.0, -1e30] {
+            assert!(summarise(&[whole], 1).integral, "{whole}");
+        }
+        for part in [0.5, -1e-30, 4_194_304.5, 8_388_606.5] {
+            assert!(!summarise(&[part], 1).integral, "{part}");
+        }
+    }
+
+    #[test]
+    fn a_volume_without_numbers_has_no_values() {
+        let s = summarise(&[f32::NAN; 5], 5);
+        assert_eq!((s.finite, s.missing, s.mean), (0, 5, 0.0));
+        assert!(!s.integral && s.labels.is_none());
+    }
+}

@@ -1,0 +1,331 @@
+//! Every format, read back by a reader of the test's own, gives the mesh that was written.
+//!
+//! The files stay in `target/tmp/formats/`, where `scripts/check_formats.sh` shows them to
+//! the programs that people use: Khronos' validator, trimesh and VTK.
+
+// A test's helpers state their expectations by panicking, as the test does.
+#![allow(clippy::unwrap_used)]
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use serde_json::{Value, json};
+use ventriform::export::{ExportError, Format, Metadata, encode};
+use ventriform::geometry::Vec3;
+use ventriform::mesh::{TriMesh, shapes};
+
+/// A cup where a heart lies, with coordinates that no short decimal names.
+fn cup() -> TriMesh {
+    let mut mesh = shapes::cup(80.0, 32.0, 10.0, 17);
+    let turn = nalgebra::Rotation3::from_euler_angles(0.3, -0.7, 0.2);
+    for v in &mut mesh.vertices {
+        *v = turn * *v + Vec3::new(-31.7, 143.9, -612.3);
+    }
+    mesh
+}
+
+fn metadata() -> Metadata {
+    let mut metadata = Metadata::new("Left ventricle, ½ \"test\"\nend_header");
+    metadata.volume_id = Some("vol_3f5a".to_owned());
+    metadata.frame_of_reference_uid = Some("1.2.826.0.1.3680043.10.1".to_owned());
+    metadata.quality.insert("vertices".into(), json!(150));
+    metadata.quality.insert("hausdorff_mm".into(), json!(2.75));
+    metadata
+}
+
+fn bytes(format: Format) -> Vec<u8> {
+    encode(format, &cup(), &metadata()).unwrap()
+}
+
+fn floats(bytes: &[u8]) -> Vec<f32> {
+    let words = bytes.chunks_exact(4);
+    words
+        .map(|w| f32::from_le_bytes(w.try_into().unwrap()))
+        .collect()
+}
+
+fn doubles(bytes: &[u8]) -> Vec<f64> {
+    let words = bytes.chunks_exact(8);
+    words
+        .map(|w| f64::from_le_bytes(w.try_into().unwrap()))
+        .collect()
+}
+
+fn flat(vectors: &[Vec3]) -> Vec<f64> {
+    vectors.iter().flat_map(|v| [v.x, v.y, v.z]).collect()
+}
+
+fn rounded(vectors: &[Vec3]) -> Vec<f32> {
+    flat(vectors).iter().map(|&x| x as f32).collect()
+}
+
+fn decode_base64(text: &str) -> Vec<u8> {
+    use base64::Engine;
+    base64::engine::general_purpose::STANDARD
+        .decode(text)
+        .unwrap()
+}
+
+/// The JSON and the binary chunk of a GLB file.
+fn chunks(glb: &[u8]) -> (Value, &[u8]) {
+    let word = |at: usize| u32::from_le_bytes(glb[at..at + 4].try_into().unwrap()) as usize;
+    assert_eq!((&glb[..4], word(4), word(8)), (&b"glTF"[..], 2, glb.len()));
+    let json_bytes = word(12);
+    assert_eq!(&glb[16..20], b"JSON");
+    let binary = 20 + json_bytes;
+    assert_eq!(&glb[binary + 4..binary + 8], b"BIN\0");
+    assert_eq!(binary + 8 + word(binary), glb.len());
+    assert!(json_bytes % 4 == 0 && word(binary) % 4 == 0);
+    let document = serde_json::from_slice(&glb[20..binary]).unwrap();
+    (document, &glb[binary + 8..])
+}
+
+#[test]
+fn all_formats_are_left_for_the_other_readers() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("formats");
+    std::fs::create_dir_all(&folder).unwrap();
+    for format in Format::ALL {
+        let path = folder.join(format!("model.{}", format.extension()));
+        std::fs::write(path, bytes(format)).unwrap();
+        assert_eq!(bytes(format), bytes(format), "{format:?} varies");
+    }
+}
+
+#[test]
+fn names_lead_back_to_the_format() {
+    for format in Format::ALL {
+        assert_eq!(Format::from_extension(format.extension()), Some(format));
+        assert_eq!(Format::from_media_type(format.media_type()), Some(format));
+    }
+    assert_eq!(Format::from_extension(".GLB"), Some(Format::Glb));
+    assert_eq!(
+        Format::from_media_type("Model/STL; q=0.8"),
+        Some(Format::Stl)
+    );
+    assert_eq!(Format::from_extension("dcm"), None);
+    assert_eq!(Format::from_media_type("*/*"), None);
+}
+
+#[test]
+fn glb_holds_every_vertex_once_in_patient_millimetres() {
+    let mesh = cup();
+    let glb = bytes(Format::Glb);
+    let (document, buffer) = chunks(&glb);
+    let n = mesh.vertices.len();
+    assert_eq!(floats(&buffer[..12 * n]), rounded(&mesh.vertices));
+    assert_eq!(
+        floats(&buffer[12 * n..24 * n]),
+        rounded(&mesh.vertex_normals())
+    );
+    let indices: Vec<u32> = buffer[24 * n..]
+        .chunks_exact(2)
+        .map(|w| u32::from(u16::from_le_bytes([w[0], w[1]])))
+        .collect();
+    let expected: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
+    assert_eq!(indices[..expected.len()], expected);
+
+    let accessors = &document["accessors"];
+    assert_eq!(accessors[0]["count"], n);
+    for r in 0..3 {
+        let column = || mesh.vertices.iter().map(|v| f64::from(v[r] as f32));
+        let min = column().fold(f64::INFINITY, f64::min);
+        let max = column().fold(f64::NEG_INFINITY, f64::max);
+        // serde_json may read the last bit of a decimal wrong; as f32 it is right again.
+        let single = |x: &Value| f64::from(x.as_f64().unwrap() as f32);
+        assert_eq!(single(&accessors[0]["min"][r]), min);
+        assert_eq!(single(&accessors[0]["max"][r]), max);
+    }
+    let extras = &document["asset"]["extras"];
+    assert_eq!(
+        (&extras["frame"], &extras["unit"]),
+        (&json!("LPS"), &json!("mm"))
+    );
+    assert_eq!(extras["volume"], "vol_3f5a");
+    assert_eq!(extras["frame_of_reference_uid"], "1.2.826.0.1.3680043.10.1");
+    assert_eq!(extras["quality"]["hausdorff_mm"], 2.75);
+}
+
+#[test]
+fn the_one_node_stands_the_patient_upright_in_metres() {
+    let glb = bytes(Format::Glb);
+    let (document, _) = chunks(&glb);
+    assert_eq!(document["nodes"].as_array().unwrap().len(), 1);
+    let columns: Vec<f64> = serde_json::from_value(document["nodes"][0]["matrix"].clone()).unwrap();
+    let map = nalgebra::Matrix4::from_column_slice(&columns);
+    let place = |lps: [f64; 3]| (map * Vec3::from(lps).push(1.0)).xyz();
+    let left_side = place([1000.0, 0.0, 0.0]);
+    let face = place([0.0, -1000.0, 0.0]);
+    let head = place([0.0, 0.0, 1000.0]);
+    assert_eq!(left_side, Vec3::x());
+    assert_eq!(face, Vec3::z());
+    assert_eq!(head, Vec3::y());
+}
+
+#[test]
+fn gltf_is_the_same_model_with_its_buffer_embedded() {
+    let glb = bytes(Format::Glb);
+    let (mut expected, buffer) = chunks(&glb);
+    let document: Value = serde_json::from_slice(&bytes(Format::Gltf)).unwrap();
+    let uri = document["buffers"][0]["uri"].as_str().unwrap();
+    let (head, data) = uri.split_once(',').unwrap();
+    assert_eq!(head, "data:application/octet-stream;base64");
+    assert_eq!(decode_base64(data), buffer);
+    expected["buffers"][0]["uri"] = uri.into();
+    assert_eq!(document, expected);
+}
+
+#[test]
+fn more_than_65535_vertices_take_wide_indices() {
+    let mesh = shapes::torus(60.0, 20.0, 400, 170);
+    assert_eq!(mesh.vertices.len(), 68_000);
+    let glb = encode(Format::Glb, &mesh, &metadata()).unwrap();
+    let (document, buffer) = chunks(&glb);
+    assert_eq!(document["accessors"][2]["componentType"], 5125);
+    let last = u32::from_le_bytes(buffer[buffer.len() - 4..].try_into().unwrap());
+    assert_eq!(last, mesh.triangles.last().unwrap()[2]);
+}
+
+#[test]
+fn stl_holds_every_triangle_and_its_normal() {
+    let mesh = cup();
+    let stl = bytes(Format::Stl);
+    assert!(stl.starts_with(b"SPACE=LPS UNIT=mm"));
+    assert_eq!(stl.len(), 84 + 50 * mesh.triangles.len());
+    assert_eq!(stl[80..84], (mesh.triangles.len() as u32).to_le_bytes());
+    for (t, record) in stl[84..].chunks_exact(50).enumerate() {
+        let numbers = floats(&record[..48]);
+        assert_eq!(numbers[3..], rounded(&mesh.corners(t)));
+        let normal = Vec3::from_fn(|r, _| f64::from(numbers[r]));
+        assert!((normal - mesh.area_normal(t).normalize()).norm() < 1e-4);
+    }
+}
+
+#[test]
+fn ply_keeps_double_precision() {
+    let mesh = cup();
+    let ply = bytes(Format::Ply);
+    let end = b"\nend_header\n";
+    let body = ply.windows(end.len()).position(|w| w == end).unwrap() + end.len();
+    let header = std::str::from_utf8(&ply[..body]).unwrap();
+    assert!(header.contains("comment SPACE=LPS UNIT=mm\n"));
+    assert!(header.contains(&format!("element vertex {}\n", mesh.vertices.len())));
+    let (vertices, faces) = ply[body..].split_at(48 * mesh.vertices.len());
+    let rows: Vec<f64> = (mesh.vertices.iter())
+        .zip(mesh.vertex_normals())
+        .flat_map(|(p, n)| flat(&[*p, n]))
+        .collect();
+    assert_eq!(doubles(vertices), rows);
+    assert_eq!(faces.len(), 13 * mesh.triangles.len());
+    for (face, t) in faces.chunks_exact(13).zip(&mesh.triangles) {
+        let indices: Vec<u8> = t.iter().flat_map(|v| v.to_le_bytes()).collect();
+        assert_eq!((face[0], &face[1..]), (3, &indices[..]));
+    }
+}
+
+#[test]
+fn obj_keeps_double_precision() {
+    let mesh = cup();
+    let obj = String::from_utf8(bytes(Format::Obj)).unwrap();
+    let numbers = |key: &str| -> Vec<f64> {
+        (obj.lines().filter_map(|l| l.strip_prefix(key)))
+            .flat_map(|l| l.split(' ').map(|x| x.parse::<f64>().unwrap()))
+            .collect()
+    };
+    assert_eq!(numbers("v "), flat(&mesh.vertices));
+    assert_eq!(numbers("vn "), flat(&mesh.vertex_normals()));
+    let faces: Vec<u32> = (obj.lines().filter_map(|l| l.strip_prefix("f ")))
+        .flat_map(|l| l.split(' '))
+        .map(|corner| {
+            let (v, n) = corner.split_once("//").unwrap();
+            assert_eq!(v, n);
+            v.parse::<u32>().unwrap() - 1
+        })
+        .collect();
+    assert_eq!(faces.as_chunks::<3>().0, mesh.triangles);
+    assert!(obj.starts_with("# SPACE=LPS UNIT=mm\n"));
+}
+
+#[test]
+fn vtp_keeps_double_precision() {
+    let mesh = cup();
+    let vtp = String::from_utf8(bytes(Format::Vtp)).unwrap();
+    let array = |name: &str| {
+        let start = vtp.find(&format!("Name=\"{name}\"")).unwrap();
+        let open = start + vtp[start..].find('>').unwrap() + 1;
+        let close = open + vtp[open..].find('<').unwrap();
+        let bytes = decode_base64(&vtp[open..close]);
+        let (size, data) = bytes.split_at(8);
+        assert_eq!(size, (data.len() as u64).to_le_bytes());
+        data.to_vec()
+    };
+    assert_eq!(doubles(&array("Points")), flat(&mesh.vertices));
+    assert_eq!(doubles(&array("Normals")), flat(&mesh.vertex_normals()));
+    let connectivity: Vec<u8> = (mesh.triangles.iter().flatten())
+        .flat_map(|&v| u64::from(v).to_le_bytes())
+        .collect();
+    assert_eq!(array("connectivity"), connectivity);
+    assert!(vtp.contains("Name=\"SPACE\" NumberOfTuples=\"1\" format=\"ascii\">76 80 83 0<"));
+}
+
+#[test]
+fn json_keeps_double_precision_and_names_its_frame() {
+    let mesh = cup();
+    let text = String::from_utf8(bytes(Format::Json)).unwrap();
+    let document: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(document["frame"], "LPS");
+    assert_eq!(document["unit"], "mm");
+    // serde_json may read the last bit of a decimal wrong, so this reads the text itself.
+    let numbers = |key: &str| -> Vec<f64> {
+        let rows = &text[text.find(&format!("\"{key}\":[[")).unwrap() + key.len() + 5..];
+        let rows = &rows[..rows.find("]]").unwrap()];
+        rows.split("],[")
+            .flat_map(|row| row.split(','))
+            .map(|x| x.parse().unwrap())
+            .collect()
+    };
+    assert_eq!(numbers("vertices"), flat(&mesh.vertices));
+    assert_eq!(numbers("normals"), flat(&mesh.vertex_normals()));
+    let triangles: Vec<[u32; 3]> = serde_json::from_value(document["triangles"].clone()).unwrap();
+    assert_eq!(triangles, mesh.triangles);
+}
+
+#[test]
+fn vertices_joined_by_rounding_stay_apart_in_single_precision() {
+    let mut mesh = cup();
+    // Two vertices of one edge, a nanometre apart at half a metre's distance.
+    let [a, b, _] = mesh.triangles[40].map(|v| v as usize);
+    mesh.vertices[b] = mesh.vertices[a] + Vec3::new(0.0, 0.0, 1e-6);
+    let stl = encode(Format::Stl, &mesh, &metadata()).unwrap();
+    let places: BTreeSet<Vec<u32>> = stl[84..]
+        .chunks_exact(50)
+        .flat_map(|record| {
+            let numbers = floats(&record[12..48]);
+            let corners = numbers.chunks_exact(3);
+            corners
+                .map(|c| c.iter().map(|x| x.to_bits()).collect())
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    assert_eq!(places.len(), mesh.vertices.len());
+}
+
+#[test]
+fn what_is_no_mesh_is_refused_with_its_place() {
+    let mesh = cup();
+    for format in Format::ALL {
+        let refuse = |change: &dyn Fn(&mut TriMesh)| {
+            let mut broken = mesh.clone();
+            change(&mut broken);
+            encode(format, &broken, &metadata()).unwrap_err()
+        };
+        assert_eq!(refuse(&|m| m.triangles.clear()), ExportError::Empty);
+        assert_eq!(
+            refuse(&|m| m.vertices[7].y = f64::NAN),
+            ExportError::NotFinite { vertex: 7 }
+        );
+        assert_eq!(
+            refuse(&|m| m.triangles[3][1] = 60_000),
+            ExportError::IndexOutOfRange { triangle: 3 }
+        );
+    }
+}

@@ -1,0 +1,253 @@
+//! The report's stable names and the page's promises, on a model made without the pipeline.
+
+// A test's helpers state their expectations by panicking, as the test does.
+#![allow(clippy::unwrap_used)]
+// Stages may say more of themselves without a change here.
+#![allow(clippy::needless_update)]
+
+use base64::Engine;
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+use ventriform::geometry::Vec3;
+use ventriform::mesh::{TriMesh, shapes};
+use ventriform::optimise::{
+    FitnessForm, FitnessSummary, OptimiseFacts, OptimiseParameters, Optimised, Reference,
+};
+use ventriform::progress::Monitor;
+use ventriform::report::{MeasureParameters, Report, ReportInput, html, measure};
+use ventriform::retile::{RetileFacts, Tiled};
+use ventriform::surface::{Surface, SurfaceFacts};
+
+const HOSTILE: &str = "</script><img src=x onerror=alert(1)>\"'&";
+
+fn surface() -> Surface {
+    let mesh = shapes::cup(80.0, 32.0, 10.0, 48);
+    Surface {
+        working: mesh.vertices.clone(),
+        mesh,
+        spacing: 2.0,
+        facts: SurfaceFacts {
+            iso_value: 0.47,
+            warnings: vec![format!("A warning {HOSTILE}")],
+            ..SurfaceFacts::default()
+        },
+    }
+}
+
+fn fitness(normalised: f64) -> FitnessSummary {
+    FitnessSummary {
+        normalised,
+        ..FitnessSummary::default()
+    }
+}
+
+/// The report on `model`, as if it had come out of the pipeline.
+fn report(model: &TriMesh) -> Report {
+    let surface = surface();
+    let measures = measure(
+        model,
+        &Reference::new(&surface),
+        &MeasureParameters::default(),
+        &Monitor::silent(),
+    )
+    .unwrap();
+    let tiled = Tiled {
+        mesh: model.clone(),
+        sizing: vec![1.0; model.vertices.len()],
+        facts: RetileFacts::default(),
+    };
+    let optimised = Optimised {
+        mesh: model.clone(),
+        retiled: fitness(0.5),
+        fitted: fitness(0.6),
+        optimised: fitness(0.625),
+        facts: OptimiseFacts::default(),
+    };
+    Report::new(ReportInput {
+        input: json!({ "name": HOSTILE }),
+        parameters: json!({ "points": model.vertices.len(), "seed": 1 }),
+        surface: &surface,
+        tiled: &tiled,
+        optimised: &optimised,
+        optimise_parameters: &OptimiseParameters {
+            fitness: FitnessForm::Normalised,
+            ..OptimiseParameters::default()
+        },
+        measures,
+        timings_ms: vec![("surface".to_owned(), 12.0), ("retile".to_owned(), 30.5)],
+    })
+}
+
+fn model() -> TriMesh {
+    shapes::cup(80.0, 32.0, 10.0, 12)
+}
+
+#[test]
+fn the_names_that_others_rely_on_are_there() {
+    let model = model();
+    let value = serde_json::to_value(report(&model)).unwrap();
+    let at = |path: &str| {
+        let pointer = format!("/{}", path.replace('.', "/"));
+        value
+            .pointer(&pointer)
+            .unwrap_or_else(|| panic!("no {path}"))
+    };
+    assert_eq!(at("surface.iso_value"), 0.47);
+    assert_eq!(at("surface.euler_characteristic"), 2);
+    assert_eq!(at("mesh.vertices"), model.vertices.len());
+    assert_eq!(at("mesh.euler_characteristic"), 2);
+    assert_eq!(at("mesh.self_intersections"), 0);
+    assert_eq!(at("fitness.retiled"), 0.5);
+    assert_eq!(at("fitness.optimised"), 0.625);
+    assert_eq!(at("fitness.gain_percent"), 25.0);
+    assert_eq!(
+        at("timings_ms"),
+        &json!({ "surface": 12.0, "retile": 30.5, "total": 42.5 })
+    );
+    assert_eq!(at("software.name"), "ventriform");
+    assert_eq!(at("parameters.points"), model.vertices.len());
+    for path in [
+        "shape.radius_ratio.mean",
+        "shape.min_angle_deg.min",
+        "shape.valence.counts.6",
+        "shape.edge_length_mm.cv",
+        "smoothness.dihedral_deg.mean",
+        "distance.mean_mm",
+        "distance.rms_mm",
+        "distance.hausdorff_mm",
+        "distance.volume_error_percent",
+        "histograms.radius_ratio.optimised",
+    ] {
+        assert!(!at(path).is_null(), "{path} is null");
+    }
+}
+
+#[test]
+fn a_model_that_breaks_its_promises_is_told_so() {
+    let sound = report(&model());
+    assert!(sound.is_sound());
+    let mut open = model();
+    open.triangles.pop();
+    let open = report(&open);
+    assert!(!open.is_sound());
+    assert!(
+        open.warnings
+            .iter()
+            .any(|w| w.contains("no closed manifold"))
+    );
+
+    // A vertex of the outer wall drawn through the inner one.
+    let mut crossed = model();
+    let far = (0..crossed.vertices.len())
+        .max_by(|&a, &b| crossed.vertices[a].x.total_cmp(&crossed.vertices[b].x))
+        .unwrap();
+    crossed.vertices[far].x = 0.0;
+    let crossed = report(&crossed);
+    assert!(crossed.mesh.self_intersections > 0 && !crossed.is_sound());
+    let page = html(&crossed, &model(), None);
+    assert!(page.contains("promises are broken"));
+}
+
+#[test]
+fn the_page_fetches_nothing_and_lets_no_text_become_markup() {
+    let model = model();
+    let page = html(&report(&model), &model, Some(&surface().mesh));
+    for outside in ["http:", "https:", "src=\"/", "url(h", "@import", "<link"] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+    assert!(!page.contains("<img src=x"));
+    assert!(page.contains("&lt;/script&gt;&lt;img"));
+    for view in ["anterior", "left lateral", "superior"] {
+        assert_eq!(
+            page.matches(&format!(", {view} view\"")).count(),
+            2,
+            "{view}"
+        );
+    }
+}
+
+#[test]
+fn the_policy_allows_the_pages_own_style_and_script_alone() {
+    let model = model();
+    let page = html(&report(&model), &model, None);
+    let policy = ventriform::report::html::content_security_policy();
+    assert!(page.contains(&policy) && policy.starts_with("default-src 'none'"));
+    let between = |open: &str, close: &str| {
+        let from = page.rfind(open).unwrap() + open.len();
+        &page[from..from + page[from..].find(close).unwrap()]
+    };
+    for text in [
+        between("<style>", "</style>"),
+        between("<script>", "</script>"),
+    ] {
+        let digest = Sha256::digest(text.as_bytes());
+        let hash = base64::engine::general_purpose::STANDARD.encode(digest);
+        assert!(policy.contains(&format!("'sha256-{hash}'")));
+    }
+    // Neither inline handlers nor style attributes would run under it.
+    assert!(!page.contains(" style=\"") && !page.contains(" onclick="));
+}
+
+#[test]
+fn the_turning_view_holds_the_model() {
+    let model = model();
+    let page = html(&report(&model), &model, None);
+    let open = "<script type=\"application/json\" id=\"mesh\">";
+    let from = page.find(open).unwrap() + open.len();
+    let data = &page[from..from + page[from..].find("</script>").unwrap()];
+    let data: Value = serde_json::from_str(data).unwrap();
+    assert_eq!(
+        data["vertices"].as_array().unwrap().len(),
+        3 * model.vertices.len()
+    );
+    let triangles: Vec<u32> = serde_json::from_value(data["triangles"].clone()).unwrap();
+    assert_eq!(triangles.as_chunks::<3>().0, model.triangles);
+}
+
+#[test]
+fn measures_do_not_depend_on_the_number_of_threads() {
+    let model = model();
+    let with_threads = |n| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(n)
+            .build()
+            .unwrap();
+        pool.install(|| {
+            let report = report(&model);
+            let page = html(&report, &model, Some(&surface().mesh));
+            (serde_json::to_string(&report).unwrap(), page)
+        })
+    };
+    assert_eq!(with_threads(1), with_threads(5));
+}
+
+#[test]
+fn a_shifted_model_is_measured_the_same() {
+    let shift = Vec3::new(-250.0, 120.0, 900.0);
+    let mut surface = surface();
+    let near = measure(
+        &model(),
+        &Reference::new(&surface),
+        &MeasureParameters::default(),
+        &Monitor::silent(),
+    )
+    .unwrap();
+    let mut moved = model();
+    moved.vertices.iter_mut().for_each(|v| *v += shift);
+    surface.mesh.vertices.iter_mut().for_each(|v| *v += shift);
+    let far = measure(
+        &moved,
+        &Reference::new(&surface),
+        &MeasureParameters::default(),
+        &Monitor::silent(),
+    )
+    .unwrap();
+    for (a, b) in [
+        (near.distance.mean_mm, far.distance.mean_mm),
+        (near.distance.hausdorff_mm, far.distance.hausdorff_mm),
+        (near.mesh.volume_ml, far.mesh.volume_ml),
+        (near.shape.radius_ratio.min, far.shape.radius_ratio.min),
+    ] {
+        assert!((a / b - 1.0).abs() < 1e-3, "{a} {b}");
+    }
+}
