@@ -36,6 +36,8 @@ pub mod report;
 
 pub mod evaluate;
 
+pub mod segmentation;
+
 pub mod export;
 
 pub mod parameters;

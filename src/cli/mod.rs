@@ -2,8 +2,10 @@
 
 mod bar;
 mod generate;
+mod measure;
 mod model_args;
 mod phantom;
+mod segment;
 
 pub use bar::{Bar, overall};
 pub use model_args::ModelArgs;
@@ -28,6 +30,8 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Generate(Box<generate::GenerateArgs>),
+    Segment(Box<segment::SegmentArgs>),
+    Measure(measure::MeasureArgs),
     Phantom(phantom::PhantomArgs),
     /// Prints a completion script for a shell
     #[command(after_help = "Example: ventriform completions bash > ventriform.bash")]
@@ -41,6 +45,8 @@ enum Command {
 pub fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Generate(args) => generate::run(&args),
+        Command::Segment(args) => segment::run(&args),
+        Command::Measure(args) => measure::run(&args),
         Command::Phantom(args) => phantom::run(&args),
         Command::Completions { shell } => {
             clap_complete::generate(

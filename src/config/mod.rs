@@ -276,7 +276,9 @@ fn read_file(path: &Path) -> Result<BTreeMap<String, String>, ConfigError> {
         reason,
     };
     let text = std::fs::read_to_string(path).map_err(|e| unreadable(e.to_string()))?;
-    let table: toml::Table = text.parse().map_err(|e: toml::de::Error| unreadable(e.to_string()))?;
+    let table: toml::Table = text
+        .parse()
+        .map_err(|e: toml::de::Error| unreadable(e.to_string()))?;
     table
         .into_iter()
         .map(|(key, value)| {
@@ -326,7 +328,9 @@ macro_rules! shown_by_display {
     )+};
 }
 
-shown_by_display!(SocketAddr, Count, Span, Size, Retention, LogFormat, String, usize, u32, u64);
+shown_by_display!(
+    SocketAddr, Count, Span, Size, Retention, LogFormat, String, usize, u32, u64
+);
 
 #[cfg(test)]
 mod tests {

@@ -205,7 +205,15 @@ mod tests {
 
     #[test]
     fn nonsense_is_refused() {
-        for text in ["", "10", "s", "-1s", "1.5h", "10 parsecs", "99999999999999999999s"] {
+        for text in [
+            "",
+            "10",
+            "s",
+            "-1s",
+            "1.5h",
+            "10 parsecs",
+            "99999999999999999999s",
+        ] {
             assert!(text.parse::<Span>().is_err(), "{text}");
         }
         assert!("18446744073709551615GiB".parse::<Size>().is_err());

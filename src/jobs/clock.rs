@@ -20,7 +20,9 @@ impl Clock for SystemClock {
     fn now(&self) -> Timestamp {
         SystemTime::now()
             .duration_since(UNIX_EPOCH)
-            .map_or(0, |since| Timestamp::try_from(since.as_millis()).unwrap_or(Timestamp::MAX))
+            .map_or(0, |since| {
+                Timestamp::try_from(since.as_millis()).unwrap_or(Timestamp::MAX)
+            })
     }
 }
 

@@ -9,8 +9,8 @@ use super::{
 use crate::progress::{CancelToken, Monitor, Observer, Stage};
 use sha2::{Digest, Sha256};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 use tokio::sync::{mpsc, oneshot};
 use tokio_util::sync::CancellationToken;
@@ -207,7 +207,9 @@ impl Runner {
             if let (None, Some(reason)) = (stop, stop_now.or(asked)) {
                 stop = Some(reason);
                 cancel.cancel();
-                patience.as_mut().reset(tokio::time::Instant::now() + STOP_PATIENCE);
+                patience
+                    .as_mut()
+                    .reset(tokio::time::Instant::now() + STOP_PATIENCE);
             }
         }
         (None, stop)

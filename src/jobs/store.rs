@@ -1,8 +1,6 @@
 //! What the queue and the catalogue need of a database, by intent.
 
-use super::{
-    Failure, Filed, Job, Model, NewJob, Page, PageRequest, State, Timestamp, Volume,
-};
+use super::{Failure, Filed, Job, Model, NewJob, Page, PageRequest, State, Timestamp, Volume};
 use async_trait::async_trait;
 
 /// The database could not do its part: full, locked, gone, damaged.
@@ -118,8 +116,7 @@ pub trait JobStore: Send + Sync + 'static {
 
     /// Fails, with `reason`, jobs that nobody holds and that have had `attempt_limit`
     /// attempts; cancels those whose end was asked for.
-    async fn bury(&self, attempt_limit: u32, reason: &Failure, now: Timestamp)
-    -> Result<Vec<Job>>;
+    async fn bury(&self, attempt_limit: u32, reason: &Failure, now: Timestamp) -> Result<Vec<Job>>;
 
     /// Ends a waiting job, asks a running one to end.
     async fn interrupt(&self, id: &str, now: Timestamp) -> Result<Interrupted>;

@@ -73,7 +73,12 @@ fn publish_blocking(staged: &Staged, place: &Path) -> std::io::Result<()> {
     sync(staged.folder())?;
     match std::fs::rename(staged.folder(), place) {
         // The same content is there already, whole.
-        Err(error) if matches!(error.kind(), ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists) => {
+        Err(error)
+            if matches!(
+                error.kind(),
+                ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists
+            ) =>
+        {
             return Ok(());
         }
         other => other?,

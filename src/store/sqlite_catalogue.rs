@@ -2,9 +2,7 @@
 
 use super::rows::{self, ModelRow, VolumeRow, to_json};
 use super::sqlite::SqliteStore;
-use crate::jobs::{
-    Catalogue, Deleted, Model, Page, PageRequest, StoreError, Timestamp, Volume,
-};
+use crate::jobs::{Catalogue, Deleted, Model, Page, PageRequest, StoreError, Timestamp, Volume};
 use async_trait::async_trait;
 use sqlx::{Row, SqliteConnection};
 

@@ -4,8 +4,8 @@
 use super::rows::{self, JobRow, to_json};
 use super::sqlite::SqliteStore;
 use crate::jobs::{
-    Deleted, Failure, Filed, Interrupted, Job, JobStore, Lease, Load, NewJob, Outcome, Page,
-    PageRequest, State, StoreError, Timestamp, JOB, random_id,
+    Deleted, Failure, Filed, Interrupted, JOB, Job, JobStore, Lease, Load, NewJob, Outcome, Page,
+    PageRequest, State, StoreError, Timestamp, random_id,
 };
 use async_trait::async_trait;
 use sqlx::Row;
@@ -83,12 +83,10 @@ impl JobStore for SqliteStore {
     }
 
     async fn ahead_of(&self, job: &Job) -> Result<u64> {
-        let row = sqlx::query(
-            "SELECT count(*) FROM jobs WHERE state = 'queued' AND sequence < ?",
-        )
-        .bind(job.sequence)
-        .fetch_one(&self.readers)
-        .await?;
+        let row = sqlx::query("SELECT count(*) FROM jobs WHERE state = 'queued' AND sequence < ?")
+            .bind(job.sequence)
+            .fetch_one(&self.readers)
+            .await?;
         Ok(u64::try_from(row.get::<i64, _>(0)).unwrap_or(0))
     }
 
@@ -230,12 +228,7 @@ impl JobStore for SqliteStore {
         Ok(done.rows_affected())
     }
 
-    async fn bury(
-        &self,
-        attempt_limit: u32,
-        reason: &Failure,
-        now: Timestamp,
-    ) -> Result<Vec<Job>> {
+    async fn bury(&self, attempt_limit: u32, reason: &Failure, now: Timestamp) -> Result<Vec<Job>> {
         let rows: Vec<JobRow> = sqlx::query_as(
             "UPDATE jobs SET
                     state = CASE WHEN cancel_requested THEN 'cancelled' ELSE 'failed' END,
@@ -281,12 +274,11 @@ impl JobStore for SqliteStore {
 
     async fn delete_job(&self, id: &str, now: Timestamp) -> Result<Deleted> {
         let mut transaction = self.writer.begin().await?;
-        let done = sqlx::query(
-            "DELETE FROM jobs WHERE id = ? AND state NOT IN ('queued', 'running')",
-        )
-        .bind(id)
-        .execute(&mut *transaction)
-        .await?;
+        let done =
+            sqlx::query("DELETE FROM jobs WHERE id = ? AND state NOT IN ('queued', 'running')")
+                .bind(id)
+                .execute(&mut *transaction)
+                .await?;
         if done.rows_affected() == 0 {
             drop(transaction);
             return Ok(match self.job(id).await? {
