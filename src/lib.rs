@@ -43,10 +43,12 @@ pub mod export;
 pub mod parameters;
 pub mod pipeline;
 
-pub mod cli;
-
 pub mod jobs;
 
 pub mod store;
 
 pub mod config;
+
+pub mod http;
+
+pub mod cli;

@@ -109,7 +109,7 @@ async fn demonstrate(args: &DemoArgs, data_dir: &Path) -> Result<()> {
     let service = serve::start_local(args.listen, data_dir).await?;
     let remote = Remote {
         client: Client::new(),
-        base: service.url(),
+        base: format!("http://{}", service.address()),
     };
     println!("The service listens on {}", remote.base);
 
@@ -142,11 +142,13 @@ async fn demonstrate(args: &DemoArgs, data_dir: &Path) -> Result<()> {
         args.output.join("report.html").display()
     );
     if args.exit {
-        return service.stop().await;
+        service.stop().await?;
+        return Ok(());
     }
     print_next_steps(&remote.base, model);
     tokio::signal::ctrl_c().await?;
-    service.stop().await
+    service.stop().await?;
+    Ok(())
 }
 
 /// The embedded default input: a phantom, as the bytes of a .nii.gz file.

@@ -1,11 +1,13 @@
 //! The `ventriform` command: arguments in, exit status out.
 
 mod bar;
+mod demo;
 mod generate;
 mod measure;
 mod model_args;
 mod phantom;
 mod segment;
+mod serve;
 
 pub use bar::{Bar, overall};
 pub use model_args::ModelArgs;
@@ -29,10 +31,13 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Demo(demo::DemoArgs),
     Generate(Box<generate::GenerateArgs>),
     Segment(Box<segment::SegmentArgs>),
     Measure(measure::MeasureArgs),
+    Serve(Box<serve::ServeArgs>),
     Phantom(phantom::PhantomArgs),
+    Healthcheck(Box<serve::HealthcheckArgs>),
     /// Prints a completion script for a shell
     #[command(after_help = "Example: ventriform completions bash > ventriform.bash")]
     Completions {
@@ -47,7 +52,10 @@ pub fn main() -> ExitCode {
         Command::Generate(args) => generate::run(&args),
         Command::Segment(args) => segment::run(&args),
         Command::Measure(args) => measure::run(&args),
+        Command::Demo(args) => demo::run(&args),
+        Command::Serve(args) => serve::run(&args),
         Command::Phantom(args) => phantom::run(&args),
+        Command::Healthcheck(args) => serve::check_health(&args),
         Command::Completions { shell } => {
             clap_complete::generate(
                 shell,

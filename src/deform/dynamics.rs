@@ -8,7 +8,8 @@
 //! (M/dt² + g M/dt + K + J^T W J) x' = (M/dt² + g M/dt) x + M v/dt + targets
 //! ```
 //!
-//! Sensors look anew before every step; their reach falls step by step from far to near.
+//! Sensors look anew before every step; their reach falls step by step from far to near, and
+//! then their answers are averaged until they are certain.
 //! The implicit step is stable for any dt, so the motion ends because it has converged, or
 //! because the limit of steps is reached, and the result says which.
 
@@ -119,9 +120,14 @@ pub fn run(
     let mut last_move = f64::INFINITY;
     for _ in 0..motion.max_iterations {
         monitor.check()?;
-        let mut readings = sensors::read(&state.mesh, field, &Look { reach, ..*look });
         let settled = reach <= motion.last_reach;
-        memory.mix(&mut readings, settled);
+        if !memory.is_certain() {
+            memory.hear(
+                sensors::read(&state.mesh, field, &Look { reach, ..*look }),
+                settled,
+            );
+        }
+        let readings = memory.readings(&state.mesh);
         let energy =
             body.energy(&state.mesh.vertices) + sensor_energy(&readings) + state.kinetic_energy();
         energies.push(energy);
@@ -156,26 +162,57 @@ pub fn run(
 
 /// What the sensors have said so far. Noise lets some of them waver between two edges for
 /// ever; once the reach has come to its end, each new answer therefore counts less than the
-/// one before it (1, 1/2, 1/3, ...: the mean of all answers), and the model can come to rest.
+/// one before it (1, 1/2, 1/3, ...: the mean of all answers), and after [`ANSWERS`] of them
+/// the edges are known and the model comes to rest on them.
 #[derive(Default)]
 struct Memory {
-    answers: Vec<(Vec3, f64)>,
+    answers: Vec<Reading>,
+    /// Mean edge point of each answer.
+    edges: Vec<Vec3>,
     count: usize,
 }
 
+/// Answers after which nothing new is to be learnt. Twice as many change the cohort's mean
+/// Jaccard by less than 0.0005.
+const ANSWERS: usize = 12;
+
 impl Memory {
-    fn mix(&mut self, readings: &mut [Reading], settled: bool) {
+    fn is_certain(&self) -> bool {
+        self.count >= ANSWERS
+    }
+
+    fn hear(&mut self, mut readings: Vec<Reading>, settled: bool) {
         self.count = if settled { self.count + 1 } else { 1 };
         let share = 1.0 / self.count as f64;
         if self.answers.is_empty() {
-            self.answers = vec![(Vec3::zeros(), 0.0); readings.len()];
+            self.answers.clone_from(&readings);
+            self.edges = vec![Vec3::zeros(); readings.len()];
         }
-        for (r, (edge, weight)) in readings.iter_mut().zip(&mut self.answers) {
-            *edge += (r.place + r.normal * r.offset - *edge) * share;
-            *weight += (r.weight - *weight) * share;
-            r.offset = r.normal.dot(&(*edge - r.place));
-            r.weight = *weight;
+        for (i, r) in readings.iter_mut().enumerate() {
+            self.edges[i] += (r.place + r.normal * r.offset - self.edges[i]) * share;
+            let before = self.answers[i].weight;
+            r.weight = before + (r.weight - before) * share;
         }
+        self.answers = readings;
+    }
+
+    /// The answers as seen from where the model is now.
+    fn readings(&self, mesh: &TriMesh) -> Vec<Reading> {
+        let weights = sensors::barycentric();
+        let place = |i: usize| {
+            let corners = mesh.corners(i / PER_TRIANGLE);
+            let w = weights[i % PER_TRIANGLE];
+            corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2]
+        };
+        let seen = |(i, r): (usize, &Reading)| {
+            let place = place(i);
+            Reading {
+                place,
+                offset: r.normal.dot(&(self.edges[i] - place)),
+                ..*r
+            }
+        };
+        self.answers.iter().enumerate().map(seen).collect()
     }
 }
 

@@ -16,7 +16,7 @@
 //! `SPACE=LPS` is the phrase by which 3D Slicer knows the frame of STL, PLY and OBJ files.
 //!
 //! Guaranteed: same mesh and metadata, same bytes; vertices stay distinct in single precision
-//! (see [`single`]). Not looked at: whether the mesh is a manifold; that is
+//! (see `single.rs`). Not looked at: whether the mesh is a manifold; that is
 //! [`crate::mesh::topology`]'s business.
 
 mod glb;

@@ -56,7 +56,10 @@ fn last_event_id(headers: &HeaderMap) -> Answer<i64> {
     let Some(value) = headers.get("last-event-id") else {
         return Ok(0);
     };
-    let number = value.to_str().ok().and_then(|text| text.trim().parse().ok());
+    let number = value
+        .to_str()
+        .ok()
+        .and_then(|text| text.trim().parse().ok());
     number.ok_or_else(|| {
         Problem::bad_request("invalid-header", "`Last-Event-ID` is no whole number.")
             .at("Last-Event-ID")

@@ -5,7 +5,7 @@ use super::problem::{Answer, Problem};
 use crate::jobs::{Model, ModelFile};
 use axum::body::Body;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
-use axum::response::{IntoResponse, Response};
+use axum::response::IntoResponse;
 use std::ops::Range;
 
 /// Results never change under their name; only the one who asked may keep them.
@@ -17,7 +17,10 @@ pub async fn send(app: &App, model: &Model, file: &ModelFile, headers: &HeaderMa
     if matches_any(headers, &header::IF_NONE_MATCH, &etag) {
         return Ok((
             StatusCode::NOT_MODIFIED,
-            [(header::ETAG, etag), (header::CACHE_CONTROL, CACHE_CONTROL.into())],
+            [
+                (header::ETAG, etag),
+                (header::CACHE_CONTROL, CACHE_CONTROL.into()),
+            ],
         )
             .into_response());
     }

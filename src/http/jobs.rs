@@ -218,8 +218,11 @@ fn read_job(app: &App, object: &Map<String, Value>, key: Option<String>) -> Answ
     let kind = text(object, "kind")?.unwrap_or("model");
     let Some(work) = app.engine.work(kind) else {
         let kinds: Vec<_> = app.engine.works.iter().map(|w| w.kind()).collect();
-        return Err(wrong("kind", format!("There is no kind of job `{}`.", shorten(kind)))
-            .fix(format!("Known kinds: {}.", kinds.join(", "))));
+        return Err(wrong(
+            "kind",
+            format!("There is no kind of job `{}`.", shorten(kind)),
+        )
+        .fix(format!("Known kinds: {}.", kinds.join(", "))));
     };
     let volume = text(object, "volume")?
         .ok_or_else(|| wrong("volume", "`volume` is missing.").fix("Give the id of a volume."))?;
@@ -317,10 +320,7 @@ pub async fn accepted(app: &App, job: jobs::Job) -> Answer {
     params(super::openapi::PageParameters,
         ("state" = Option<State_>, Query, description = "Only jobs of this state")),
     responses((status = 200, description = "A page, newest first", body = JobList), ListProblems))]
-pub async fn list_jobs(
-    State(app): State<App>,
-    RawQuery(query): RawQuery,
-) -> Answer<Json<JobList>> {
+pub async fn list_jobs(State(app): State<App>, RawQuery(query): RawQuery) -> Answer<Json<JobList>> {
     let (page, [state]) = list_query(query.as_deref(), ["state"])?;
     let state = state.map(|name| parse_state(&name)).transpose()?;
     let page = app.queue.jobs.jobs(state, page).await?;
@@ -358,7 +358,10 @@ pub async fn get_job(
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let job = find(&app, &id).await?;
     let mut headers = HeaderMap::new();
-    headers.insert(header::CACHE_CONTROL, header::HeaderValue::from_static("no-store"));
+    headers.insert(
+        header::CACHE_CONTROL,
+        header::HeaderValue::from_static("no-store"),
+    );
     if !job.state.is_final() {
         headers.insert(header::RETRY_AFTER, header::HeaderValue::from_static("1"));
     }

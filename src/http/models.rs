@@ -7,6 +7,7 @@ use super::problem::{Answer, Problem};
 use super::request::{query_pairs, refuse_unknown};
 use super::wire::{missing, rfc3339};
 use super::{files, idempotency, jobs as jobs_api, negotiate, upload};
+use crate::export::Format;
 use crate::jobs::{self, Deleted, ModelFile, NewJob, State as JobState};
 use axum::Json;
 use axum::extract::{Path, RawQuery, Request, State};
@@ -139,10 +140,10 @@ impl From<jobs::Model> for Model {
         (Vec<u8> = "application/nifti"),
         (super::openapi::UploadForm = "multipart/form-data"),
     )),
-    params(super::openapi::IdempotencyHeader,
+    params(super::openapi::ModelQuery, super::openapi::IdempotencyHeader,
         ("Prefer" = Option<String>, Header, description = "`wait=SECONDS`: how long to wait for the mesh")),
     responses(
-        (status = 200, description = "The mesh", body = super::openapi::MeshContent),
+        super::openapi::MeshAnswer,
         (status = 202, description = "Accepted", body = jobs_api::Job, headers(
             ("Location" = String, description = "The job's path"),
             ("Retry-After" = u64, description = "Seconds after which to look again"))),
@@ -279,7 +280,7 @@ pub async fn delete_model(
     params(("id" = String, Path, description = "The model's id"),
         super::openapi::ConditionalHeaders),
     responses(
-        (status = 200, description = "The mesh", body = super::openapi::MeshContent),
+        super::openapi::MeshAnswer,
         super::openapi::DownloadAnswers, LookupProblems))]
 pub async fn get_mesh(
     State(app): State<App>,
@@ -304,8 +305,7 @@ pub async fn get_mesh(
     params(("id" = String, Path, description = "The model's id"),
         super::openapi::ConditionalHeaders),
     responses(
-        (status = 200, description = "The report", content(
-            (serde_json::Value = "application/json"), (String = "text/html"))),
+        super::openapi::ReportAnswer,
         super::openapi::DownloadAnswers, LookupProblems))]
 pub async fn get_report(
     State(app): State<App>,
@@ -330,7 +330,7 @@ pub async fn get_report(
         ("file" = super::openapi::FileName, Path, description = "The file's name"),
         super::openapi::ConditionalHeaders),
     responses(
-        (status = 200, description = "The file", body = super::openapi::FileContent),
+        super::openapi::FileAnswer,
         super::openapi::DownloadAnswers, LookupProblems))]
 pub async fn get_file(
     State(app): State<App>,
@@ -351,7 +351,10 @@ async fn send_named(app: &App, model: &jobs::Model, name: &str, headers: &Header
             Err(Problem::new(
                 StatusCode::NOT_FOUND,
                 "not-found",
-                format!("This model has no file `{}`.", super::problem::shorten(name)),
+                format!(
+                    "This model has no file `{}`.",
+                    super::problem::shorten(name)
+                ),
             )
             .fix(format!("It has {}.", names.join(", "))))
         }
@@ -367,10 +370,7 @@ async fn find(app: &App, id: &str) -> Answer<jobs::Model> {
 
 /// Media types of meshes, the usual one first.
 fn mesh_types() -> Vec<&'static str> {
-    super::openapi::MESH_FORMATS
-        .iter()
-        .map(|(_, media_type)| *media_type)
-        .collect()
+    Format::ALL.map(Format::media_type).to_vec()
 }
 
 fn mesh_for<'a>(model: &'a jobs::Model, headers: &HeaderMap) -> Answer<&'a ModelFile> {

@@ -93,7 +93,10 @@ mod tests {
     }
 
     fn chosen(accept: &str) -> Option<usize> {
-        best_offer(&headers("accept", accept), &["model/stl", "application/json"])
+        best_offer(
+            &headers("accept", accept),
+            &["model/stl", "application/json"],
+        )
     }
 
     #[test]

@@ -51,9 +51,12 @@ fn parse_cursor(text: &str) -> Answer<i64> {
         .and_then(|bytes| String::from_utf8(bytes).ok())
         .and_then(|text| text.strip_prefix("before:")?.parse().ok())
         .ok_or_else(|| {
-            Problem::bad_request("invalid-parameter", "`cursor` was not given out by this service.")
-                .at("cursor")
-                .fix("Take `next_cursor` of the page before, as it is.")
+            Problem::bad_request(
+                "invalid-parameter",
+                "`cursor` was not given out by this service.",
+            )
+            .at("cursor")
+            .fix("Take `next_cursor` of the page before, as it is.")
         })
 }
 

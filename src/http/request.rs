@@ -77,7 +77,10 @@ pub async fn json_object(app: &App, request: Request) -> Answer<Map<String, Valu
             return Err(Problem::new(
                 StatusCode::UNSUPPORTED_MEDIA_TYPE,
                 "unsupported-media-type",
-                format!("A body of type `{}` is not understood here.", shorten(other)),
+                format!(
+                    "A body of type `{}` is not understood here.",
+                    shorten(other)
+                ),
             )
             .at("Content-Type")
             .fix("Send application/json."));

@@ -73,7 +73,10 @@ pub async fn receive(app: &App, request: Request) -> Answer<Upload> {
             return Err(Problem::new(
                 StatusCode::UNSUPPORTED_MEDIA_TYPE,
                 "unsupported-media-type",
-                format!("A body of type `{}` is not understood here.", shorten(other)),
+                format!(
+                    "A body of type `{}` is not understood here.",
+                    shorten(other)
+                ),
             )
             .at("Content-Type")
             .fix(format!(
@@ -83,8 +86,10 @@ pub async fn receive(app: &App, request: Request) -> Answer<Upload> {
         }
     }
     match upload.files.iter().map(|f| f.bytes).sum() {
-        0u64 => Err(Problem::bad_request("empty-body", "The body holds no file.")
-            .fix("Send the volume as the body: curl --data-binary @volume.nii.gz ...")),
+        0u64 => Err(
+            Problem::bad_request("empty-body", "The body holds no file.")
+                .fix("Send the volume as the body: curl --data-binary @volume.nii.gz ..."),
+        ),
         _ => Ok(upload),
     }
 }
@@ -126,10 +131,12 @@ async fn receive_form(
 ) -> Answer<()> {
     let (parts, body) = request.into_parts();
     let body = Body::from_stream(guard.watch(body));
-    let malformed = |guard: &Guard, what: String| match guard.recorded() {
+    let malformed = |guard: &Guard, what: String| {
+        match guard.recorded() {
         Some(problem) => problem,
         None => Problem::bad_request("malformed-form", format!("The form cannot be read: {what}."))
             .fix("Send multipart/form-data with the volume as a file part: curl -F file=@volume.nii.gz ..."),
+    }
     };
     let mut form = Multipart::from_request(Request::from_parts(parts, body), app)
         .await
@@ -143,9 +150,12 @@ async fn receive_form(
         guard.seen();
         let name = field.name().unwrap_or_default().to_owned();
         if field.file_name().is_none() && field.content_type().is_none() {
-            let text = text_field(field, &guard)
-                .await
-                .ok_or_else(|| malformed(&guard, format!("the field `{}` is too long or no text", shorten(&name))))?;
+            let text = text_field(field, &guard).await.ok_or_else(|| {
+                malformed(
+                    &guard,
+                    format!("the field `{}` is too long or no text", shorten(&name)),
+                )
+            })?;
             upload.fields.push((name, text));
             if upload.fields.len() > FIELDS {
                 return Err(malformed(&guard, format!("more than {FIELDS} fields")));
@@ -172,7 +182,10 @@ async fn receive_form(
     }
 }
 
-async fn text_field(mut field: axum::extract::multipart::Field<'_>, guard: &Guard) -> Option<String> {
+async fn text_field(
+    mut field: axum::extract::multipart::Field<'_>,
+    guard: &Guard,
+) -> Option<String> {
     let mut bytes = Vec::new();
     while let Some(piece) = field.chunk().await.ok()? {
         guard.seen();
@@ -248,7 +261,8 @@ impl Upload {
     /// 413 or 422 if the files are no volume that can be used.
     pub async fn store(mut self, app: &App) -> Answer<(Volume, bool)> {
         // The order of parts carries no meaning, so it must not change the id.
-        self.files.sort_by(|a, b| (a.kind, a.digest).cmp(&(b.kind, b.digest)));
+        self.files
+            .sort_by(|a, b| (a.kind, a.digest).cmp(&(b.kind, b.digest)));
         let id = self.volume_id();
         if let Some(known) = app.queue.catalogue.volume(&id).await? {
             return Ok((known, false));
@@ -337,7 +351,10 @@ impl Guard {
     }
 
     /// The body's pieces, until a limit is met.
-    fn watch(&self, body: Body) -> impl Stream<Item = Result<Bytes, CutShort>> + Unpin + Send + use<> {
+    fn watch(
+        &self,
+        body: Body,
+    ) -> impl Stream<Item = Result<Bytes, CutShort>> + Unpin + Send + use<> {
         let guard = self.clone();
         let deadline = Instant::now() + self.app.settings.upload_time_limit.0;
         let pieces = body.into_data_stream();

@@ -31,8 +31,12 @@ pub struct Volume {
     /// File format.
     #[schema(example = "NIfTI-1")]
     format: String,
-    /// Voxels along each axis; the fourth are frames.
-    shape: Vec<usize>,
+    /// Whether it came gzipped.
+    compressed: bool,
+    /// Voxels along i, j, k of one frame.
+    shape: [usize; 3],
+    /// How many volumes of that shape the file holds; of several, `frame` chooses one.
+    frames: usize,
     /// Voxel spacing along the first three axes, millimetres.
     spacing_mm: [f64; 3],
     /// Voxel index to millimetres in the patient frame LPS, row by row.
@@ -40,11 +44,16 @@ pub struct Volume {
     /// The frame of `affine`.
     #[schema(example = "LPS")]
     frame: String,
+    /// What the affine was taken from.
+    #[schema(example = "sform")]
+    affine_source: String,
     /// Data type in the file.
     #[schema(example = "int16")]
     dtype: String,
     /// The voxel values, slope and intercept applied.
-    intensity: Option<Intensity>,
+    intensity: Intensity,
+    /// The labels, rising, where the volume looks like a label map.
+    labels: Option<Vec<i64>>,
     /// What is odd about the file but does not keep it from use.
     warnings: Vec<String>,
     /// Where to go from here.
@@ -94,17 +103,21 @@ impl From<jobs::Volume> for Volume {
             bytes: volume.bytes,
             files: volume.files.len(),
             format: facts.format,
+            compressed: facts.compressed,
             shape: facts.shape,
+            frames: facts.frames,
             spacing_mm: facts.spacing_mm,
             affine: facts.affine,
             frame: "LPS".into(),
+            affine_source: facts.affine_source,
             dtype: facts.dtype,
-            intensity: facts.intensity.map(|i| Intensity {
-                min: i.min,
-                max: i.max,
-                mean: i.mean,
-                not_finite: i.not_finite,
-            }),
+            intensity: Intensity {
+                min: facts.intensity.min,
+                max: facts.intensity.max,
+                mean: facts.intensity.mean,
+                not_finite: facts.intensity.not_finite,
+            },
+            labels: facts.labels,
             warnings: facts.warnings,
             links: VolumeLinks {
                 preview: format!("{itself}/preview.png"),
@@ -145,7 +158,11 @@ pub async fn create_volume(
         return Err(unknown("form field", name, &[]));
     }
     let (volume, new) = upload.store(&app).await?;
-    let status = if new { StatusCode::CREATED } else { StatusCode::OK };
+    let status = if new {
+        StatusCode::CREATED
+    } else {
+        StatusCode::OK
+    };
     let location = [(header::LOCATION, format!("/v1/volumes/{}", volume.id))];
     Ok((status, location, Json(Volume::from(volume))).into_response())
 }
@@ -243,4 +260,3 @@ async fn find(app: &App, id: &str) -> Answer<jobs::Volume> {
         None => Err(missing(&*app.queue.catalogue, "volume", id).await),
     }
 }
-

@@ -25,16 +25,24 @@ pub struct Volume {
 pub struct VolumeFacts {
     /// `NIfTI-1`, `NIfTI-2` ...
     pub format: String,
-    /// Voxels along each axis; the fourth are frames.
-    pub shape: Vec<usize>,
+    /// Whether it came gzipped.
+    pub compressed: bool,
+    /// Voxels along i, j, k of one frame.
+    pub shape: [usize; 3],
+    /// How many volumes of that shape the file holds.
+    pub frames: usize,
     /// Voxel spacing along the first three axes, mm.
     pub spacing_mm: [f64; 3],
     /// Voxel index to millimetres in the patient frame LPS, row by row.
     pub affine: [[f64; 4]; 4],
+    /// What the affine was taken from: `sform`, `qform`, `pixdim`.
+    pub affine_source: String,
     /// The file's data type, such as `int16`.
     pub dtype: String,
-    /// The values, where they were looked at.
-    pub intensity: Option<Intensity>,
+    /// The values.
+    pub intensity: Intensity,
+    /// The labels, rising, where the volume looks like a label map.
+    pub labels: Option<Vec<i64>>,
     /// What is odd about the file but does not keep it from use.
     pub warnings: Vec<String>,
 }

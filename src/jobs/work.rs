@@ -1,7 +1,8 @@
 //! What the service asks of the domain: to look at a volume, and to do work on it.
 
-use super::{Failure, VolumeFacts};
+use super::{Failure, Generation, Reader, VolumeFacts};
 use crate::progress::{Cancelled, Monitor};
+use crate::volume::ReadLimits;
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -109,6 +110,14 @@ pub struct Engine {
 }
 
 impl Engine {
+    /// The real one, within `limits`.
+    pub fn new(limits: ReadLimits) -> Self {
+        Self {
+            reader: Arc::new(Reader { limits }),
+            works: vec![Arc::new(Generation { limits })],
+        }
+    }
+
     /// The work of that kind.
     pub fn work(&self, kind: &str) -> Option<&Arc<dyn Work>> {
         self.works.iter().find(|work| work.kind() == kind)

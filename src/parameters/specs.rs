@@ -311,7 +311,7 @@ pub const SPECS: &[ParameterSpec] = &[
         "fit_free_size",
         free_size,
         0.0..=1.0,
-        "1",
+        "0.9",
         "How far the fit lets triangles choose their own size"
     ),
     fit_spec!(
@@ -331,14 +331,14 @@ pub const SPECS: &[ParameterSpec] = &[
     ParameterSpec {
         name: "fitness",
         kind: Kind::Choice(&["raw", "normalised", "robust"]),
-        default: "normalised",
+        default: "robust",
         summary: "Form of the fitness that drives the flips: the paper's raw reciprocals, each term \
                   between 0 and 1, or reciprocals floored at 1 degree and 0.01 mm",
         read: |d, v| {
             d.optimise.fitness = match v.text() {
                 "raw" => FitnessForm::Raw,
-                "robust" => FitnessForm::Robust,
-                _ => FitnessForm::Normalised,
+                "normalised" => FitnessForm::Normalised,
+                _ => FitnessForm::Robust,
             };
             Ok(())
         },

@@ -3,12 +3,12 @@
 //! Each side is sampled evenly by area, and every sample looks for the closest point of the
 //! other side, as Metro does (Cignoni, Rocchini, Scopigno 1998): means and percentiles.
 //!
-//! Samples miss the largest distance. [`farthest`] bounds it from both sides instead: no
+//! Samples miss the largest distance. `farthest` bounds it from both sides instead: no
 //! point of a triangle is farther from the other side than the triangle's farthest corner is
 //! from any one triangle of the other side; nor than its centroid is, plus the way to the
 //! centroid. Triangles whose bound exceeds the best distance found are cut in four and looked
-//! at again, until [`TOLERANCE`] is reached. Where a mesh is too large for that, samples and
-//! some vertices have to do, and the bound is absent.
+//! at again, until none can exceed it by more than 1 %. Where a mesh is too large for that,
+//! samples and some vertices have to do, and the bound is absent.
 
 use rayon::prelude::*;
 use serde::Serialize;

@@ -1,18 +1,55 @@
 //! Exactly N evenly spread points on the surface, joined to triangles.
 //!
-//! STUB: the owner of this folder writes the module page.
+//! In: a closed surface S with its smoothed twin W. Out: a closed mesh with exactly N vertices
+//! that lie on S, of S's topology. After Turk, "Re-Tiling Polygonal Surfaces", SIGGRAPH 1992
+//! (doi:10.1145/133994.134008), in two ways:
+//!
+//! [`Method::Paper`]
+//! 1. [`placement`]: random points, uniform by area.
+//! 2. [`repulsion`]: they push each other apart along the surface (geodesics: [`log_map`],
+//!    straight moves: [`trace`]).
+//! 3. [`tessellate`]: mutual tessellation by constrained Delaunay, old vertices removed.
+//!
+//! [`Method::Refined`]
+//! 1. [`samples`]: the surface's vertices, cut finely enough for N cells.
+//! 2. [`cells`]: centroidal cells of samples, grown from random ones.
+//! 3. [`dual`]: a triangle where three cells meet; where that does not carry the topology or
+//!    pierces itself, [`refined`] transplants points and tries again.
+//!
+//! [`sizing`] makes the points denser where the surface bends, in both ways. Lengths are
+//! taken on W, since noise and voxel steps make S longer than it is; a point (triangle and
+//! barycentric coordinates) lies on both.
+//!
+//! **Guaranteed** for what is returned: exactly N vertices, closed, edge- and vertex-manifold,
+//! outward, components and Euler characteristic of S, no self-intersection (checked exactly).
+//! **Not** guaranteed: that N points can carry every surface; [`RetileError::TooFewPoints`]
+//! says how many would do. The same input gives the same bytes on any number of threads.
 
 mod cells;
+mod domain;
 mod dual;
+mod log_map;
+mod paper;
+mod placement;
+mod quotas;
 mod refined;
+mod repulsion;
 mod samples;
 mod sizing;
 pub mod tessellate;
+mod trace;
 
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
-use crate::progress::{Cancelled, Monitor};
+use crate::mesh::topology::Defect;
+use crate::progress::{Cancelled, Monitor, Stage};
 use crate::surface::Surface;
+
+/// Fewest points a model may have: an icosahedron's.
+pub const LEAST_POINTS: usize = 12;
+
+/// Most points a model may have.
+pub const MOST_POINTS: usize = 50_000;
 
 /// Which route makes the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +73,7 @@ pub struct RetileParameters {
     /// Curvature-adaptive density: spacing ∝ curvature^-γ, γ in 0..=1. Default 0 (even
     /// spacing); 0.25 is a good choice where the surface bends.
     pub adaptive: f64,
-    /// Rounds of geodesic repulsion, 0..=1000. Default 40.
+    /// Rounds of geodesic repulsion ([`Method::Paper`]), 0..=1000. Default 40.
     pub repulsion_iterations: usize,
     /// Share of the overlap that one round of repulsion moves, (0, 1]. Default 0.15 (Turk).
     pub repulsion_strength: f64,
@@ -107,6 +144,12 @@ pub enum RetileError {
     /// Asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+    /// The surface is not a closed manifold.
+    #[error("the surface is not a closed manifold: {0}")]
+    OpenSurface(#[from] Defect),
+    /// The surface has no area, or a coordinate that is not finite.
+    #[error("the surface has no finite, positive area")]
+    NoArea,
     /// N points cannot carry the surface's handles and components.
     #[error("{points} points cannot carry the surface's topology; about {needed} would")]
     TooFewPoints {
@@ -123,6 +166,28 @@ pub enum RetileError {
         /// Most points possible.
         limit: usize,
     },
+    /// The triangles pierce each other whatever is tried: the wall is too thin for N points.
+    #[error(
+        "with {points} points the mesh pierces itself near ({:.1}, {:.1}, {:.1}) mm (LPS); \
+         the wall is too thin there: use more points",
+        place[0], place[1], place[2]
+    )]
+    SelfIntersecting {
+        /// Points asked for.
+        points: usize,
+        /// Where, LPS mm.
+        place: [f64; 3],
+    },
+    /// A parameter is out of its range.
+    #[error("{name} is {value}, outside {range}")]
+    BadParameter {
+        /// The field of [`RetileParameters`].
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        range: &'static str,
+    },
 }
 
 impl RetileError {
@@ -135,6 +200,15 @@ impl RetileError {
             }
             RetileError::TooManyPoints { limit, .. } => {
                 format!("Set `points` to {limit} or fewer.")
+            }
+            RetileError::OpenSurface(_) | RetileError::NoArea => {
+                "Give a closed surface of finite size.".into()
+            }
+            RetileError::SelfIntersecting { points, .. } => {
+                format!("Set `points` to more than {points}, or choose another `seed`.")
+            }
+            RetileError::BadParameter { name, range, .. } => {
+                format!("Set `{name}` to a value in {range}.")
             }
         }
     }
@@ -149,6 +223,48 @@ pub fn retile(
     parameters: &RetileParameters,
     monitor: &Monitor,
 ) -> Result<Tiled, RetileError> {
-    monitor.report(crate::progress::Stage::Retile, 0.0)?;
-    refined::retile(surface, parameters, monitor)
+    validate(parameters)?;
+    monitor.report(Stage::Retile, 0.0)?;
+    let area = surface.mesh.area();
+    if !(area > 0.0 && area.is_finite()) {
+        return Err(RetileError::NoArea);
+    }
+    let tiled = match parameters.method {
+        Method::Paper => paper::retile(surface, parameters, monitor),
+        Method::Refined => refined::retile(surface, parameters, monitor),
+    }?;
+    monitor.report(Stage::Retile, 1.0)?;
+    Ok(tiled)
+}
+
+fn validate(parameters: &RetileParameters) -> Result<(), RetileError> {
+    let bad = |name, value, range| Err(RetileError::BadParameter { name, value, range });
+    let p = parameters;
+    if p.points < LEAST_POINTS {
+        return Err(RetileError::TooFewPoints {
+            points: p.points,
+            needed: LEAST_POINTS,
+        });
+    }
+    if p.points > MOST_POINTS {
+        return Err(RetileError::TooManyPoints {
+            points: p.points,
+            limit: MOST_POINTS,
+        });
+    }
+    if !(0.0..=1.0).contains(&p.adaptive) {
+        return bad("adaptive", p.adaptive, "0..=1");
+    }
+    if !(p.repulsion_strength > 0.0 && p.repulsion_strength <= 1.0) {
+        return bad("repulsion_strength", p.repulsion_strength, "(0, 1]");
+    }
+    if p.repulsion_iterations > 1000 {
+        let value = p.repulsion_iterations as f64;
+        return bad("repulsion_iterations", value, "0..=1000");
+    }
+    if p.relaxation_iterations > 1000 {
+        let value = p.relaxation_iterations as f64;
+        return bad("relaxation_iterations", value, "0..=1000");
+    }
+    Ok(())
 }

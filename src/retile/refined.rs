@@ -12,7 +12,7 @@
 
 use super::cells::Cells;
 use super::samples::Samples;
-use super::{RetileError, RetileFacts, RetileParameters, Tiled, dual, sizing};
+use super::{RetileError, RetileFacts, RetileParameters, Tiled, dual, quotas, sizing};
 use crate::geometry::random::{Purpose, stream};
 use crate::geometry::{Vec3, triangle};
 use crate::mesh::intersections::self_intersections;
@@ -39,7 +39,7 @@ pub(super) fn retile(
     monitor: &Monitor,
 ) -> Result<Tiled, RetileError> {
     let points = parameters.points;
-    let least = least_points(surface);
+    let least = quotas::least_points(&surface.mesh);
     if points < least {
         return Err(RetileError::TooFewPoints {
             points,
@@ -61,43 +61,6 @@ pub(super) fn retile(
         points,
         needed: needed_points(surface, parameters, points + 1, monitor)?,
     })
-}
-
-/// The fewest vertices of any triangulation with the surface's components and handles.
-fn least_points(surface: &Surface) -> usize {
-    let facts = component_facts(surface);
-    facts.iter().map(|&(_, euler)| heawood(euler)).sum()
-}
-
-/// Heawood's bound for a closed orientable surface, attained but for genus 2, which takes one
-/// vertex more (Jungerman and Ringel 1980).
-fn heawood(euler: i64) -> usize {
-    match euler {
-        -2 => 10,
-        e => ((7.0 + (49.0 - 24.0 * e as f64).sqrt()) / 2.0).ceil() as usize,
-    }
-}
-
-/// Area and Euler characteristic of each component.
-fn component_facts(surface: &Surface) -> Vec<(f64, i64)> {
-    let mesh = &surface.mesh;
-    let components = topology::components(mesh.vertices.len(), &mesh.triangles);
-    let count = components.iter().max().map_or(0, |m| *m as usize + 1);
-    let mut facts = vec![(0.0, 0i64); count];
-    for &c in &components {
-        facts[c as usize].1 += 1;
-    }
-    let mut triangles = vec![0i64; count];
-    for (t, corners) in mesh.triangles.iter().enumerate() {
-        let c = components[corners[0] as usize] as usize;
-        triangles[c] += 1;
-        facts[c].0 += mesh.area_normal(t).norm() / 2.0;
-    }
-    for (fact, triangles) in facts.iter_mut().zip(triangles) {
-        // V - E + F with 2E = 3F.
-        fact.1 -= triangles / 2;
-    }
-    facts
 }
 
 /// A number of points that carries the topology, found by trying; at least `from`.
@@ -211,7 +174,13 @@ impl<'a> Job<'a> {
             Purpose::Placement,
         );
         let components = topology::components(self.samples.len(), &self.samples.triangles);
-        let quotas = self.quotas(&components);
+        let mut load = Vec::new();
+        for (v, &c) in components.iter().enumerate() {
+            let c = c as usize;
+            load.resize(load.len().max(c + 1), 0.0);
+            load[c] += self.samples.area[v] / self.spacing[v].powi(2);
+        }
+        let quotas = quotas::share(&self.surface.mesh, &load, self.points);
         let mut seeds = Vec::with_capacity(self.points);
         for (component, quota) in (0u32..).zip(quotas) {
             let mut members: Vec<u32> = (0..self.samples.len() as u32)
@@ -230,47 +199,6 @@ impl<'a> Job<'a> {
             seeds.extend(keyed.iter().take(quota).map(|(_, v)| *v));
         }
         seeds
-    }
-
-    /// Points of each component: by area/h², at least what its topology needs.
-    fn quotas(&self, components: &[u32]) -> Vec<usize> {
-        let facts = component_facts(self.surface);
-        if facts.len() == 1 {
-            return vec![self.points];
-        }
-        let mut load = vec![0.0; facts.len()];
-        for (v, &c) in components.iter().enumerate() {
-            load[c as usize] += self.samples.area[v] / self.spacing[v].powi(2);
-        }
-        let total: f64 = load.iter().sum();
-        let mut quotas: Vec<usize> = facts
-            .iter()
-            .zip(&load)
-            .map(|(&(_, euler), load)| {
-                let share = (load / total * self.points as f64) as usize;
-                share.max(heawood(euler))
-            })
-            .collect();
-        // Rounding and minima are settled with the component that is farthest from its share.
-        loop {
-            let sum: usize = quotas.iter().sum();
-            let surplus = |c: usize| quotas[c] as f64 - load[c] / total * self.points as f64;
-            let order = |a: &usize, b: &usize| surplus(*a).total_cmp(&surplus(*b));
-            match sum.cmp(&self.points) {
-                std::cmp::Ordering::Equal => return quotas,
-                std::cmp::Ordering::Less => {
-                    let c = (0..quotas.len()).min_by(order).expect("a component");
-                    quotas[c] += 1;
-                }
-                std::cmp::Ordering::Greater => {
-                    let c = (0..quotas.len())
-                        .filter(|&c| quotas[c] > heawood(facts[c].1))
-                        .max_by(order)
-                        .expect("more points than minima");
-                    quotas[c] -= 1;
-                }
-            }
-        }
     }
 
     /// The site with the lightest cell that was not moved before.

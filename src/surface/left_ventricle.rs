@@ -52,12 +52,18 @@ pub struct Ventricle {
     pub seen: Vec<bool>,
     /// Typical brightness of the wall (upper quartile of the rays' peaks).
     pub level: f64,
-    /// 0..1: how much like a ventricle it looks. Below [`PLAUSIBLE`] nothing was found.
+    /// 0..1: how much like a ventricle it looks. Below [`PLAUSIBLE`] it is none.
     pub score: f64,
 }
 
 /// Score from which on a part counts as a ventricle.
-pub const PLAUSIBLE: f64 = 0.12;
+///
+/// Of 114 distorted copies of the simulated patients every heart scored 0.23 or more, and of
+/// scans with the heart painted over none above 0.19.
+pub const PLAUSIBLE: f64 = 0.2;
+
+/// Score below which the user is told to look.
+pub const DOUBTFUL: f64 = 0.35;
 
 /// Evenly spread unit vectors (Fibonacci lattice).
 pub fn directions() -> Vec<Vec3> {
@@ -230,7 +236,9 @@ fn judge(coarse: &Coarse, table: &[Vec3], part: &Part) -> Option<Ventricle> {
             .iter()
             .map(|d| look(coarse, &centre, d, part.level))
             .collect();
-        let candidate = rate(coarse, table, centre, &walls);
+        let Some(candidate) = rate(coarse, table, centre, &walls) else {
+            break;
+        };
         if best.as_ref().is_none_or(|b| candidate.score > b.score) {
             best = Some(candidate);
         }
@@ -260,17 +268,11 @@ fn near(value: f64, best: f64, width: f64) -> f64 {
     (-((value / best).ln() / width).powi(2)).exp()
 }
 
-fn rate(coarse: &Coarse, table: &[Vec3], centre: Vec3, walls: &[Wall]) -> Ventricle {
+/// Scores a centre, or `None` where fewer than a quarter of the rays meet a wall.
+fn rate(coarse: &Coarse, table: &[Vec3], centre: Vec3, walls: &[Wall]) -> Option<Ventricle> {
     let hits: Vec<&Wall> = walls.iter().filter(|w| w.weight > 0.0).collect();
-    let mut ventricle = Ventricle {
-        centre,
-        distances: Vec::new(),
-        seen: Vec::new(),
-        level: 0.0,
-        score: 0.0,
-    };
     if hits.len() < DIRECTIONS / 4 {
-        return ventricle;
+        return None;
     }
     let mut distances: Vec<f64> = hits.iter().map(|w| w.distance).collect();
     distances.sort_by(f64::total_cmp);
@@ -285,12 +287,11 @@ fn rate(coarse: &Coarse, table: &[Vec3], centre: Vec3, walls: &[Wall]) -> Ventri
             && w.peak > 0.35 * bright
             && w.peak < 2.5 * bright
     };
-    ventricle.level = bright;
-    ventricle.seen = walls.iter().map(belongs).collect();
+    let seen: Vec<bool> = walls.iter().map(belongs).collect();
     let kept: Vec<&Wall> = walls.iter().filter(|w| belongs(w)).collect();
     let n = kept.len() as f64;
     if n < DIRECTIONS as f64 / 4.0 {
-        return ventricle;
+        return None;
     }
     let mean = kept.iter().map(|w| w.distance).sum::<f64>() / n;
     let variance = kept
@@ -304,7 +305,7 @@ fn rate(coarse: &Coarse, table: &[Vec3], centre: Vec3, walls: &[Wall]) -> Ventri
     let missing = DIRECTIONS as f64 - n;
     let open: Vec3 = table
         .iter()
-        .zip(&ventricle.seen)
+        .zip(&seen)
         .filter(|(_, seen)| !**seen)
         .map(|(d, _)| *d)
         .sum();
@@ -314,15 +315,20 @@ fn rate(coarse: &Coarse, table: &[Vec3], centre: Vec3, walls: &[Wall]) -> Ventri
         0.7
     };
     let off_centre = (centre - coarse.middle()).norm() / coarse.half_extent();
-    ventricle.score = coverage
+    let score = coverage
         * evenness
         * (0.4 + 0.6 * together)
         * near(mean, 28.0, 0.6)
         * contrast.clamp(0.0, 0.7)
         / 0.7
         * (-off_centre * off_centre).exp();
-    ventricle.distances = fill(table, walls, &ventricle.seen, mean);
-    ventricle
+    Some(Ventricle {
+        centre,
+        distances: fill(table, walls, &seen, mean),
+        seen,
+        level: bright,
+        score,
+    })
 }
 
 /// Distances in every direction: the median of the seen ones within 40 degrees.

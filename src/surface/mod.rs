@@ -40,7 +40,7 @@ use crate::volume::Volume;
 
 use components::Components;
 use labels::Labels;
-use left_ventricle::PLAUSIBLE;
+use left_ventricle::{DOUBTFUL, PLAUSIBLE};
 use marching_cubes::{MarchingCubesError, Samples};
 use survey::Survey;
 
@@ -369,6 +369,8 @@ impl From<MarchingCubesError> for SurfaceError {
 const WORKING_PASSES: usize = 15;
 /// Passes that take the rest of the staircase off a mask's surface.
 const MASK_PASSES: usize = 10;
+/// Enclosed voids from which on the cavity counts as closed, ml.
+const CLOSED_ML: f64 = 2.0;
 /// Share of the region's voxels from which a change of topology is warned of.
 const MUCH: f64 = 0.02;
 
@@ -769,12 +771,23 @@ fn find_ventricle(
         return Ok(None);
     };
     facts.ventricle_score = Some(ventricle.score);
+    if ventricle.score < DOUBTFUL {
+        facts.warnings.push(format!(
+            "the left ventricle was recognised with little certainty (score {:.2} of 1): look whether the region is right, or give a box or a seed",
+            ventricle.score
+        ));
+    }
     let wall = region::Wall::new(volume, &ventricle);
-    let iso = iso_value(parameters.iso, wall.reference, survey)?;
-    note_iso(facts, iso, wall.reference);
-    let Some(region) = wall.region(iso, monitor)? else {
-        return Err(no_surface(iso, survey));
+    let asked = iso_value(parameters.iso, wall.reference, survey)?;
+    let Some(region) = wall.region(asked, monitor)? else {
+        return Err(no_surface(asked, survey));
     };
+    let (iso, region) = if parameters.iso == IsoLevel::Auto {
+        move_iso(volume, &wall, asked, region, facts, monitor)?
+    } else {
+        (asked, region)
+    };
+    note_iso(facts, iso, wall.reference);
     facts.otsu = Some(f64::from(otsu_in_box(
         volume,
         region.labels.origin,
@@ -796,6 +809,43 @@ fn find_ventricle(
         ));
     }
     Ok(Some(region.labels))
+}
+
+/// Moves the automatic iso-value where half the reference tears the wall (down to 0.35) or
+/// closes the cavity (up to 0.6), and says so. Where that does not help it stays.
+fn move_iso(
+    volume: &Volume,
+    wall: &region::Wall,
+    iso: f32,
+    region: region::Region,
+    facts: &mut SurfaceFacts,
+    monitor: &Monitor,
+) -> Result<(f32, region::Region), SurfaceError> {
+    let enclosed_ml =
+        |r: &region::Region| r.enclosed_voxels() as f64 * volume.frame.voxel_volume() / 1000.0;
+    let (fractions, why): (&[f32], _) = if region.is_torn() {
+        (&[0.45, 0.4, 0.35], "the wall falls into pieces")
+    } else if enclosed_ml(&region) > CLOSED_ML {
+        (&[0.55, 0.6], "the cavity closes at the base")
+    } else {
+        return Ok((iso, region));
+    };
+    for &fraction in fractions {
+        let level = fraction * wall.reference;
+        if let Some(moved) = wall.region(level, monitor)?
+            && !moved.is_torn()
+            && enclosed_ml(&moved) <= CLOSED_ML
+        {
+            facts.warnings.push(format!(
+                "at half the reference intensity {why}; the iso-value was moved to {fraction} of it"
+            ));
+            return Ok((level, moved));
+        }
+    }
+    facts.warnings.push(format!(
+        "at half the reference intensity {why}, and at no iso-value near by does it not"
+    ));
+    Ok((iso, region))
 }
 
 /// 98th percentile of the voxels above 0.3 of the box's maximum.

@@ -49,8 +49,22 @@ pub struct Region {
     pub cut_voxels: usize,
     /// Area of the cut, mm².
     pub cut_area: f64,
-    /// Voxels of the wall above the iso-value that are not connected to the rest.
+    /// Voxels of the wall's core above the iso-value.
+    pub core_voxels: usize,
+    /// Those of them that are not connected to the rest.
     pub loose_voxels: usize,
+}
+
+impl Region {
+    /// Whether the wall falls into pieces: more than 15 % of it is not connected to the rest.
+    pub fn is_torn(&self) -> bool {
+        100 * self.loose_voxels > 15 * self.core_voxels
+    }
+
+    /// Voxels of the cavities that the region encloses.
+    pub fn enclosed_voxels(&self) -> usize {
+        Components::of_outside(&self.labels).sizes[1..].iter().sum()
+    }
 }
 
 /// Where a voxel lies against the wall.
@@ -164,13 +178,14 @@ impl<'a> Wall<'a> {
         if core[chosen] == 0 {
             return Ok(None);
         }
-        let loose_voxels = core.iter().sum::<usize>() - core[chosen];
+        let core_voxels = core.iter().sum::<usize>();
         components.paint(&mut labels, false, |c| c != chosen);
         let mut region = Region {
             labels,
             cut_voxels: 0,
             cut_area: 0.0,
-            loose_voxels,
+            core_voxels,
+            loose_voxels: core_voxels - core[chosen],
         };
         if beyond[chosen] > 0 {
             self.cut(&mut region, &zones);

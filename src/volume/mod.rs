@@ -17,8 +17,25 @@
 //! Not guaranteed: that the file's own statement about the patient is true. Contradictions
 //! inside a file are told as warnings.
 //!
-//! [`phantom`] makes volumes of known truth, [`nifti::write()`] puts volumes into files, and
-//! [`preview`] draws them.
+//! [`mod@phantom`] makes volumes of known truth, [`nifti::write()`] puts volumes into files, and
+//! [`mod@preview`] draws them.
+//!
+//! ```
+//! use ventriform::progress::Monitor;
+//! use ventriform::volume::nifti::{self, StoredType};
+//! use ventriform::volume::{self, PhantomParameters, ReadLimits, ReadOptions, VolumeFile};
+//!
+//! let quiet = Monitor::silent();
+//! let small = PhantomParameters { shape: [48; 3], spacing_mm: [4.5; 3], ..Default::default() };
+//! let made = volume::phantom(&small, &quiet)?;
+//! let bytes = nifti::write(&made.volume, StoredType::Float32, true)?;
+//!
+//! let file = VolumeFile::in_memory("lv.nii.gz", bytes);
+//! let reading = volume::read(&[file], &ReadOptions::default(), &ReadLimits::default(), &quiet)?;
+//! assert_eq!(reading.volume.voxels, made.volume.voxels);
+//! assert!(reading.facts.warnings.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod decode;
 mod dicom;

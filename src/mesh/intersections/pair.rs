@@ -127,32 +127,49 @@ fn segment_meets_triangle(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
 fn flat_segment_meets_triangle(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
     let [a, b, c] = t;
     let edges = [(a, b), (b, c), (c, a)];
-    if edges.iter().any(|(r, s)| segments_meet(p, q, r, s)) {
-        return true;
-    }
-    // No edge is met: the segment lies inside or outside as a whole.
-    (0..3).any(|axis| {
-        let orientation = turn(axis, a, b, c);
-        orientation != 0
-            && edges
-                .iter()
-                .all(|(r, s)| turn(axis, r, s, p) == orientation)
-    })
+    let Some((axis, orientation)) = projection(t) else {
+        return edges.iter().any(|(r, s)| segments_meet(p, q, r, s));
+    };
+    // Where no edge is met, the segment lies inside or outside as a whole.
+    edges.iter().any(|(r, s)| {
+        coplanar_segments_meet(axis, p, q, r, s).unwrap_or_else(|| boxes_meet(p, q, r, s))
+    }) || edges
+        .iter()
+        .all(|(r, s)| turn(axis, r, s, p) == orientation)
 }
 
-/// Two closed segments.
+/// An axis along which the triangle's projection is not flat, and how it turns there; the
+/// widest projection is looked at first, for it is decided fastest.
+fn projection([a, b, c]: &[Vec3; 3]) -> Option<(usize, i8)> {
+    let widest = (b - a).cross(&(c - a)).iamax();
+    (0..3)
+        .map(|k| (widest + k) % 3)
+        .map(|axis| (axis, turn(axis, a, b, c)))
+        .find(|(_, turn)| *turn != 0)
+}
+
+/// Two closed segments anywhere.
 fn segments_meet(p: &Vec3, q: &Vec3, r: &Vec3, s: &Vec3) -> bool {
-    if side(&[*p, *q, *r], s) != 0 {
-        return false;
+    side(&[*p, *q, *r], s) == 0
+        && (0..3)
+            .find_map(|axis| coplanar_segments_meet(axis, p, q, r, s))
+            .unwrap_or_else(|| boxes_meet(p, q, r, s))
+}
+
+/// Two closed coplanar segments, seen along `axis`; `None` where they look collinear.
+fn coplanar_segments_meet(axis: usize, p: &Vec3, q: &Vec3, r: &Vec3, s: &Vec3) -> Option<bool> {
+    let (of_r, of_s) = (turn(axis, p, q, r), turn(axis, p, q, s));
+    if of_r * of_s > 0 {
+        return Some(false);
     }
-    for axis in 0..3 {
-        let (of_r, of_s) = (turn(axis, p, q, r), turn(axis, p, q, s));
-        let (of_p, of_q) = (turn(axis, r, s, p), turn(axis, r, s, q));
-        // A triple that turns shows that the projection keeps the common plane a plane.
-        if [of_r, of_s, of_p, of_q].iter().any(|turn| *turn != 0) {
-            return of_r * of_s <= 0 && of_p * of_q <= 0;
-        }
-    }
+    let (of_p, of_q) = (turn(axis, r, s, p), turn(axis, r, s, q));
+    // A triple that turns shows that the projection keeps the common plane a plane.
+    let seen = [of_r, of_s, of_p, of_q].iter().any(|turn| *turn != 0);
+    seen.then_some(of_p * of_q <= 0)
+}
+
+/// Decides for collinear segments.
+fn boxes_meet(p: &Vec3, q: &Vec3, r: &Vec3, s: &Vec3) -> bool {
     Aabb::of([p, q]).overlaps(&Aabb::of([r, s]))
 }
 

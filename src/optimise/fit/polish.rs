@@ -7,8 +7,11 @@ use super::Model;
 use crate::geometry::triangle;
 use crate::optimise::{flips, legality};
 
-/// Weight of Σ (valence - 6)² against Σ R/(2r).
-const VALENCE_WEIGHT: f64 = 0.05;
+/// Weight of Σ (valence - 6)² against Σ R/(2r). So much that a flip for the valences may cost
+/// shape: the following rounds mend the shape, while irregular vertices would stay for good. At
+/// N = 1000 1 instead of 0.05 raised the share of valence 6 from 66 to 78 % and the mean 2r/R
+/// from .978 to .983.
+const VALENCE_WEIGHT: f64 = 1.0;
 
 /// Passes over all edges in one call.
 const MOST_PASSES: usize = 4;
@@ -19,7 +22,7 @@ const LEAST_RADIUS_RATIO: f64 = 1e-12;
 /// Gains below this are rounding.
 const LEAST_GAIN: f64 = 1e-9;
 
-/// Flips edges, in order, wherever that lowers Σ R/(2r) + 0.05 Σ (valence - 6)² and is legal,
+/// Flips edges, in order, wherever that lowers Σ R/(2r) + Σ (valence - 6)² and is legal,
 /// until a pass finds none. Returns the number of flips.
 pub fn flip(model: &mut Model) -> usize {
     let mut index = flips::intersection_index(&model.vertices, &model.connectivity);

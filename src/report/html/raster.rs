@@ -124,14 +124,14 @@ pub fn png(facets: &[Facet], view: &View, style: &Style) -> Vec<u8> {
             )
         };
         let seen = facet.corners.map(project);
-        let outline = facet.outline.map(project);
+        let sides = Sides::new(&facet.outline.map(project));
         let local = Vec3::new(
             normal.dot(&view.right),
             normal.dot(&view.up),
             normal.dot(&toward),
         );
         let colour = shade(facet.colour, &local, style.ambient);
-        canvas.fill(&seen, colour, &outline, style.line * SUPERSAMPLING as f64);
+        canvas.fill(&seen, colour, &sides, style.line * SUPERSAMPLING as f64);
     }
     canvas.encode(side)
 }
@@ -146,7 +146,7 @@ fn shade(colour: Colour, normal: &Vec3, ambient: f64) -> Colour {
 }
 
 impl Canvas {
-    fn fill(&mut self, [a, b, c]: &[Vec3; 3], colour: Colour, outline: &[Vec3; 3], width: f64) {
+    fn fill(&mut self, [a, b, c]: &[Vec3; 3], colour: Colour, sides: &Sides, width: f64) {
         let doubled_area = cross(a, b, c);
         if doubled_area == 0.0 {
             return;
@@ -165,7 +165,7 @@ impl Canvas {
                 let at = row * self.side + column;
                 if depth > self.depth[at] {
                     self.depth[at] = depth;
-                    let on_line = near_side(&p, outline, width / 2.0);
+                    let on_line = sides.distance(&p) < width / 2.0;
                     self.pixels[at] = Some(if on_line { dark } else { colour });
                 }
             }
@@ -216,12 +216,25 @@ fn cross(p: &Vec3, q: &Vec3, r: &Vec3) -> f64 {
     (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x)
 }
 
-/// Whether `p`, inside of the triangle, lies within `distance` of one of its sides.
-fn near_side(p: &Vec3, [a, b, c]: &[Vec3; 3], distance: f64) -> bool {
-    [(a, b), (b, c), (c, a)].iter().any(|(q, r)| {
-        let length = (r.x - q.x).hypot(r.y - q.y);
-        cross(q, r, p).abs() < distance * length
-    })
+/// The sides of a triangle in the picture as lines: for each the two factors and the offset
+/// that give a point's signed distance.
+struct Sides([[f64; 3]; 3]);
+
+impl Sides {
+    fn new([a, b, c]: &[Vec3; 3]) -> Self {
+        Self([(a, b), (b, c), (c, a)].map(|(p, q)| {
+            let along = (q - p).xy();
+            let length = along.norm().max(f64::MIN_POSITIVE);
+            let (x, y) = (-along.y / length, along.x / length);
+            [x, y, -(x * p.x + y * p.y)]
+        }))
+    }
+
+    /// Distance of a point in the triangle to its nearest side.
+    fn distance(&self, p: &Vec3) -> f64 {
+        let to = |[x, y, offset]: [f64; 3]| (x * p.x + y * p.y + offset).abs();
+        to(self.0[0]).min(to(self.0[1])).min(to(self.0[2]))
+    }
 }
 
 /// A PNG as a `data:` URI.

@@ -441,8 +441,10 @@ pub fn particulars(report: &Report) -> String {
         .iter()
         .filter(|(_, value)| value.as_object().is_some_and(|map| !map.is_empty()))
         .map(|(title, value)| {
+            // Warnings stand at the top already.
             let rows: String = leaves(value)
                 .iter()
+                .filter(|(path, _)| path != "warnings")
                 .map(|(path, text)| {
                     format!(
                         r#"<tr><th scope="row">{}</th><td>{}</td></tr>"#,

@@ -262,8 +262,10 @@ fn verify(mesh: TriMesh, surface: &Census) -> Result<TriMesh, TessellateError> {
 mod tests {
     use super::samples::{double_torus, jittered, scattered, squeezed, together};
     use super::*;
+    use crate::geometry::random::{Purpose, stream};
     use crate::mesh::shapes;
     use crate::progress::{CancelToken, Silent};
+    use rand::RngExt;
 
     fn tile(surface: &TriMesh, n: usize, seed: u64) -> Result<TriMesh, TessellateError> {
         let points = scattered(surface, n, seed);
@@ -275,29 +277,26 @@ mod tests {
         )
     }
 
-    /// Tiles and demands every guarantee.
-    fn check(surface: &TriMesh, n: usize, seed: u64) -> TriMesh {
-        let points = scattered(surface, n, seed);
-        let mesh = tessellate(
-            &surface.vertices,
-            &surface.triangles,
-            &points,
-            &Monitor::silent(),
-        )
-        .unwrap();
-        let expected: Vec<Vec3> = points
+    fn demand_guarantees(surface: &TriMesh, n: usize, seed: u64, mesh: &TriMesh) {
+        let expected: Vec<Vec3> = scattered(surface, n, seed)
             .iter()
             .map(|p| p.position(&surface.vertices, &surface.triangles))
             .collect();
         assert_eq!(mesh.vertices, expected);
         let (before, after) = (
             topology::check(surface).unwrap(),
-            topology::check(&mesh).unwrap(),
+            topology::check(mesh).unwrap(),
         );
         assert_eq!(after.euler_characteristic, before.euler_characteristic);
         assert_eq!(after.components, before.components);
         assert_eq!(mesh.volume() > 0.0, surface.volume() > 0.0);
-        assert_eq!(self_intersections(&mesh), Vec::<[u32; 2]>::new());
+        assert_eq!(self_intersections(mesh), Vec::<[u32; 2]>::new());
+    }
+
+    /// Tiles and demands every guarantee.
+    fn check(surface: &TriMesh, n: usize, seed: u64) -> TriMesh {
+        let mesh = tile(surface, n, seed).unwrap();
+        demand_guarantees(surface, n, seed, &mesh);
         mesh
     }
 
@@ -352,6 +351,40 @@ mod tests {
                 seed,
             );
         }
+    }
+
+    #[test]
+    fn hundreds_of_random_surfaces_keep_every_guarantee() {
+        let mut rng = stream(1, Purpose::PhantomShape);
+        let mut refused = 0;
+        for seed in 0..240 {
+            let base = match seed % 4 {
+                0 => shapes::icosphere(30.0, 2),
+                1 => shapes::torus(30.0, rng.random_range(6.0..20.0), 24, 12),
+                2 => shapes::cup(70.0, 33.0, rng.random_range(3.0..15.0), 20),
+                _ => together(&[
+                    shapes::torus(30.0, 9.0, 18, 9),
+                    shapes::icosphere(rng.random_range(3.0..18.0), 1),
+                ]),
+            };
+            let scales = [(); 3].map(|()| rng.random_range(0.4..1.6));
+            let surface = jittered(&squeezed(&base, scales), 0.3, seed);
+            if !self_intersections(&surface).is_empty() {
+                continue;
+            }
+            let n = rng.random_range(40..160);
+            match tile(&surface, n, seed) {
+                Ok(mesh) => demand_guarantees(&surface, n, seed, &mesh),
+                // Points are scattered blindly: the small sphere may go without.
+                Err(TessellateError::TooFewPoints { .. }) => {}
+                Err(TessellateError::SelfIntersecting { .. } | TessellateError::Stuck { .. }) => {
+                    refused += 1;
+                }
+                Err(other) => panic!("seed {seed}: {other}"),
+            }
+        }
+        // Nor are there always points where walls are thin and tubes narrow.
+        assert!(refused < 30, "{refused}");
     }
 
     #[test]

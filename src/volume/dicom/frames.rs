@@ -5,12 +5,16 @@
 
 use super::super::VolumeError;
 use super::scan::{
-    Attribute, Attributes, FRAME_POINTER, IMAGE_TYPE, MODALITY, NUMBER_OF_FRAMES,
-    RR_INTERVAL_VECTOR, SLICE_VECTOR, SOP_CLASS, TIME_SLOT_VECTOR,
+    Attribute, Attributes, DETECTOR_VECTOR, ENERGY_WINDOW_VECTOR, FRAME_POINTER, IMAGE_TYPE,
+    MODALITY, NUMBER_OF_FRAMES, ROTATION_VECTOR, RR_INTERVAL_VECTOR, SLICE_VECTOR, SOP_CLASS,
+    TIME_SLOT_VECTOR, clip,
 };
 
 /// SOP class of the multi-frame Nuclear Medicine Image.
 const NM_IMAGE: &str = "1.2.840.10008.5.1.4.1.1.20";
+
+/// Vectors that may be named too where they hold nothing but 1.
+const IDLE_VECTORS: [Attribute; 3] = [ENERGY_WINDOW_VECTOR, DETECTOR_VECTOR, ROTATION_VECTOR];
 
 /// Refuses everything but reconstructed NM slices. Returns whether they are gated.
 pub(super) fn check_kind(attributes: &Attributes) -> Result<bool, VolumeError> {
@@ -23,10 +27,9 @@ pub(super) fn check_kind(attributes: &Attributes) -> Result<bool, VolumeError> {
             sop_class,
             format!(
                 "only the Nuclear Medicine Image ({NM_IMAGE}) is read (modality: {})",
-                if modality.is_empty() {
-                    "none"
-                } else {
-                    &modality
+                match modality.is_empty() {
+                    true => "none".into(),
+                    false => clip(&modality),
                 }
             ),
         ));
@@ -36,7 +39,7 @@ pub(super) fn check_kind(attributes: &Attributes) -> Result<bool, VolumeError> {
     let refuse = |reason| {
         Err(VolumeError::NotSlices {
             file: attributes.file.clone(),
-            image_type: shown.to_owned(),
+            image_type: clip(shown),
             reason,
         })
     };
@@ -143,20 +146,25 @@ fn number_of_frames(attributes: &Attributes) -> Result<usize, VolumeError> {
     }
 }
 
-/// The pointer, where there is one, must name the vectors of such an image.
+/// The pointer, where there is one, must name the vectors of such an image. Vectors that some
+/// writers name besides do no harm as long as they tell nothing apart.
 fn check_pointer(attributes: &Attributes, vectors: &[Attribute]) -> Result<(), VolumeError> {
     let pointer = attributes.shorts(FRAME_POINTER);
-    let named: Vec<[u16; 2]> = vectors.iter().map(|v| v.pointer()).collect();
     let (stated, _) = pointer.as_chunks::<2>();
-    if stated.is_empty() || stated == named {
+    let idle = |tag: &[u16; 2]| {
+        let vector = IDLE_VECTORS.iter().find(|v| v.pointer() == *tag);
+        vector.is_some_and(|v| attributes.shorts(*v).iter().all(|&n| n == 1))
+    };
+    let counting = stated.iter().filter(|tag| !idle(tag));
+    let named = vectors.iter().map(|v| v.pointer());
+    if stated.is_empty() || counting.copied().eq(named.clone()) {
         return Ok(());
     }
-    let write = |tags: &[[u16; 2]]| {
-        let tags = tags.iter().map(|[g, e]| format!("({g:04X},{e:04X})"));
-        tags.collect::<Vec<_>>().join(" ")
-    };
-    let reason = format!("{} expected", write(&named));
-    Err(attributes.wrong(FRAME_POINTER.name, &write(stated), reason))
+    let write = |[g, e]: [u16; 2]| format!("({g:04X},{e:04X})");
+    let stated: Vec<_> = stated.iter().copied().map(write).collect();
+    let named: Vec<_> = named.map(write).collect();
+    let reason = format!("{} expected", named.join(" "));
+    Err(attributes.wrong(FRAME_POINTER.name, &stated.join(" "), reason))
 }
 
 /// The numbers of `vector`, one for each frame, from 1.

@@ -73,6 +73,9 @@ attributes! {
     RESCALE_SLOPE = None, 0x0028, 0x1053, "Rescale Slope (0028,1053)";
     RR_INTERVAL_VECTOR = None, 0x0054, 0x0060, "R-R Interval Vector (0054,0060)";
     TIME_SLOT_VECTOR = None, 0x0054, 0x0070, "Time Slot Vector (0054,0070)";
+    ENERGY_WINDOW_VECTOR = None, 0x0054, 0x0010, "Energy Window Vector (0054,0010)";
+    DETECTOR_VECTOR = None, 0x0054, 0x0020, "Detector Vector (0054,0020)";
+    ROTATION_VECTOR = None, 0x0054, 0x0050, "Rotation Vector (0054,0050)";
     SLICE_VECTOR = None, 0x0054, 0x0080, "Slice Vector (0054,0080)";
     DETECTOR_POSITION = DETECTOR, 0x0020, 0x0032, "Image Position (Patient) (0020,0032)";
     DETECTOR_ORIENTATION = DETECTOR, 0x0020, 0x0037, "Image Orientation (Patient) (0020,0037)";
@@ -274,6 +277,15 @@ impl Walk {
     }
 }
 
+/// The beginning of `text`, fit for a message.
+pub(super) fn clip(text: &str) -> String {
+    const LONGEST: usize = 100;
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
 /// The attributes that were there, as bytes.
 #[derive(Debug)]
 pub(super) struct Attributes {
@@ -283,12 +295,12 @@ pub(super) struct Attributes {
 }
 
 impl Attributes {
-    /// The error for a value that cannot be.
+    /// The error for a value that cannot be. Long values are cut: they come from outside.
     pub(super) fn wrong(&self, field: &'static str, value: &str, reason: String) -> VolumeError {
         VolumeError::Field {
             file: self.file.clone(),
             field,
-            value: value.into(),
+            value: clip(value),
             reason,
             byte: None,
         }

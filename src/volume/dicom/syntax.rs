@@ -6,6 +6,7 @@
 
 use super::super::source::{Source, VolumeFile};
 use super::super::{ReadLimits, VolumeError};
+use super::scan::clip;
 use dicom_encoding::transfer_syntax::{TransferSyntax, TransferSyntaxIndex};
 use dicom_transfer_syntax_registry::TransferSyntaxRegistry;
 
@@ -92,9 +93,12 @@ fn known(uid: &str, file: &VolumeFile) -> Result<&'static TransferSyntax, Volume
     match TransferSyntaxRegistry.get(uid) {
         Some(syntax) if syntax.is_codec_free() && uid != DEFLATED => Ok(syntax),
         Some(syntax) => Err(refuse(format!("a DICOM file in {} ({uid})", syntax.name()))),
-        None => Err(refuse(format!(
-            "a DICOM file in an unknown transfer syntax ({uid:?})"
-        ))),
+        None => {
+            let uid = clip(uid);
+            Err(refuse(format!(
+                "a DICOM file in an unknown transfer syntax ({uid})"
+            )))
+        }
     }
 }
 

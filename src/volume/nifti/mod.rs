@@ -147,8 +147,9 @@ impl Opened {
             frame,
             shape: self.header.shape,
             spacing_mm: self.placement.frame.spacing(),
-            affine_lps: self.placement.frame.matrix(),
-            affine_ras: self.placement.frame.to_ras(),
+            // Added to 0, a negative zero loses its sign.
+            affine_lps: self.placement.frame.matrix().add_scalar(0.0),
+            affine_ras: self.placement.frame.to_ras().add_scalar(0.0),
             affine_source: self.placement.source,
             unit: self.header.unit,
             intensity,

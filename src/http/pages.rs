@@ -1,0 +1,61 @@
+//! `GET /`: a page for people, a few commands for curl.
+
+use super::negotiate;
+use axum::http::{HeaderMap, HeaderValue, header};
+use axum::response::{Html, IntoResponse, Response};
+
+const PAGE: &str = include_str!("page.html");
+
+/// The page's own script and style, and requests to its own service; nothing from elsewhere.
+const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; \
+    style-src 'unsafe-inline'; img-src 'self'; connect-src 'self'; form-action 'none'; \
+    base-uri 'none'; frame-ancestors 'none'";
+
+/// The page where the client prefers HTML, else text.
+pub async fn welcome(headers: HeaderMap) -> Response {
+    let mut response = match negotiate::best_offer(&headers, &["text/plain", "text/html"]) {
+        Some(1) => Html(PAGE).into_response(),
+        _ => commands(&base_url(&headers)).into_response(),
+    };
+    let headers = response.headers_mut();
+    headers.insert(
+        header::CONTENT_SECURITY_POLICY,
+        HeaderValue::from_static(CONTENT_SECURITY_POLICY),
+    );
+    headers.insert(header::VARY, HeaderValue::from_static("accept"));
+    response
+}
+
+/// The address by which the client found us.
+fn base_url(headers: &HeaderMap) -> String {
+    let host = headers
+        .get(header::HOST)
+        .and_then(|value| value.to_str().ok())
+        .filter(|host| {
+            host.bytes()
+                .all(|b| b.is_ascii_alphanumeric() || b"-.:[]_".contains(&b))
+        })
+        .unwrap_or("127.0.0.1:8080");
+    format!("http://{host}")
+}
+
+fn commands(url: &str) -> String {
+    format!(
+        "ventriform {version}: surface models of the left ventricle from cardiac SPECT
+
+a model of 150 points, as GLB:
+  curl -fsS --data-binary @spect.nii.gz -H 'Prefer: wait=60' -H 'Accept: model/gltf-binary' '{url}/v1/models?points=150' -o lv.glb
+the same in the background; the answer names the job:
+  curl -fsS --data-binary @spect.nii.gz '{url}/v1/models?points=150'
+how far the jobs are:
+  curl -fsS '{url}/v1/jobs'
+what was made:
+  curl -fsS '{url}/v1/models'
+a model's quality, for a person:
+  curl -fsS '{url}/v1/models/ID/report.html' -o report.html
+
+all of it: {url}/docs, {url}/openapi.json
+",
+        version = env!("CARGO_PKG_VERSION"),
+    )
+}

@@ -1,0 +1,148 @@
+//! The work of kind `model`: [`crate::pipeline`] from files to every download.
+
+use super::reader::{refusal, sentence, volume_files};
+use super::{Failure, Fault, Input, Output, OutputFile, Work, WorkError};
+use crate::export::{self, Format};
+use crate::parameters::{ModelParameters, ParameterError};
+use crate::pipeline::{self, Model, PipelineError};
+use crate::progress::{Monitor, Stage};
+use crate::surface::SurfaceError;
+use crate::volume::ReadLimits;
+use serde_json::{Map, Value, json};
+
+/// Makes models.
+#[derive(Debug, Clone, Copy)]
+pub struct Generation {
+    /// What a volume may cost.
+    pub limits: ReadLimits,
+}
+
+impl Work for Generation {
+    fn kind(&self) -> &'static str {
+        "model"
+    }
+
+    fn parameters_from_text(
+        &self,
+        pairs: &[(String, String)],
+    ) -> Result<Map<String, Value>, Failure> {
+        let pairs = pairs
+            .iter()
+            .map(|(name, text)| (name.as_str(), text.as_str()));
+        written_out(ModelParameters::from_pairs(pairs))
+    }
+
+    fn parameters_from_json(
+        &self,
+        object: &Map<String, Value>,
+    ) -> Result<Map<String, Value>, Failure> {
+        written_out(ModelParameters::from_json(object))
+    }
+
+    fn run(&self, input: &Input, monitor: &Monitor<'_>) -> Result<Output, WorkError> {
+        let parameters = ModelParameters::from_json(&input.parameters).map_err(unusable)?;
+        let files = volume_files(&input.files);
+        let model = pipeline::generate(&files, &parameters, &self.limits, monitor)
+            .map_err(|error| explain(&error))?;
+        Ok(Output {
+            files: downloads(&model, input, monitor)?,
+            summary: summary(&model),
+        })
+    }
+}
+
+fn written_out(
+    parameters: Result<ModelParameters, ParameterError>,
+) -> Result<Map<String, Value>, Failure> {
+    match parameters.map_err(unusable)?.to_json() {
+        Value::Object(object) => Ok(object),
+        _ => Ok(Map::new()),
+    }
+}
+
+fn unusable(error: ParameterError) -> Failure {
+    Failure::new(
+        Fault::Request,
+        "invalid-parameter",
+        format!("`{}`: {}.", error.field, error.message),
+    )
+    .at(error.field)
+    .fix(error.fix)
+}
+
+fn explain(error: &PipelineError) -> WorkError {
+    if error.is_cancelled() {
+        return WorkError::Cancelled;
+    }
+    let (fault, code) = match error {
+        PipelineError::Volume(volume) => return refusal(volume).into(),
+        PipelineError::Surface(SurfaceError::NoSurface { .. }) => (Fault::Content, "no-surface"),
+        PipelineError::Surface(_) => (Fault::Content, "unusable-surface"),
+        PipelineError::Retile(_) => (Fault::Request, "unsuitable-points"),
+        PipelineError::Optimise(_) => (Fault::Content, "not-optimised"),
+        PipelineError::Unsound { .. } => (Fault::Content, "unsound-model"),
+        PipelineError::Cancelled(_) => return WorkError::Cancelled,
+    };
+    let failure = Failure::new(fault, code, sentence(error)).fix(error.fix());
+    WorkError::Failed(match error.field() {
+        Some(field) => failure.at(field),
+        None => failure,
+    })
+}
+
+fn summary(model: &Model) -> Map<String, Value> {
+    let counts = [
+        ("vertices", json!(model.mesh.vertices.len())),
+        ("triangles", json!(model.mesh.triangles.len())),
+    ];
+    counts
+        .into_iter()
+        .map(|(name, count)| (name.to_owned(), count))
+        .chain(model.report.quality_summary())
+        .collect()
+}
+
+fn downloads(
+    model: &Model,
+    input: &Input,
+    monitor: &Monitor<'_>,
+) -> Result<Vec<OutputFile>, WorkError> {
+    let mut metadata = model.metadata();
+    metadata.volume_id = Some(input.volume.clone());
+    let mut files = Vec::new();
+    for (done, format) in Format::ALL.into_iter().enumerate() {
+        monitor.report(Stage::Export, done as f64 / 8.0)?;
+        let bytes = export::encode(format, &model.mesh, &metadata).map_err(|error| {
+            Failure::new(Fault::Content, "not-exportable", sentence(&error)).at(format.extension())
+        })?;
+        files.push(OutputFile {
+            name: mesh_name(format),
+            media_type: format.media_type(),
+            bytes,
+        });
+    }
+    files.push(OutputFile {
+        name: "report.json",
+        media_type: "application/json",
+        bytes: model.report.to_json_text().into_bytes(),
+    });
+    files.push(OutputFile {
+        name: "report.html",
+        media_type: "text/html; charset=utf-8",
+        bytes: model.report_html().into_bytes(),
+    });
+    monitor.report(Stage::Export, 1.0)?;
+    Ok(files)
+}
+
+fn mesh_name(format: Format) -> &'static str {
+    match format {
+        Format::Glb => "mesh.glb",
+        Format::Gltf => "mesh.gltf",
+        Format::Stl => "mesh.stl",
+        Format::Ply => "mesh.ply",
+        Format::Obj => "mesh.obj",
+        Format::Vtp => "mesh.vtp",
+        Format::Json => "mesh.json",
+    }
+}

@@ -1,0 +1,86 @@
+//! Random points on the surface: the paper's first step.
+//!
+//! A triangle is drawn with probability proportional to its area times the wanted density, a
+//! place in it uniformly. Every component gets its share ([`quotas`]) of the points.
+
+use rand::RngExt;
+
+use super::domain::Domain;
+use super::trace::inset;
+use super::{SurfacePoint, quotas};
+use crate::geometry::random::{self, Purpose};
+use crate::geometry::triangle::area_normal;
+use crate::mesh::TriMesh;
+use crate::mesh::topology::components;
+
+/// Draws exactly `count` points, as dense as the relative `spacing` at every vertex wants.
+/// `count` is at least [`quotas::least_points`] of `mesh`, whose connectivity the domain has.
+pub(crate) fn place(
+    mesh: &TriMesh,
+    domain: &Domain,
+    spacing: &[f64],
+    count: usize,
+    seed: u64,
+) -> Vec<SurfacePoint> {
+    let component_of = components(domain.vertices.len(), &domain.triangles);
+    let number = component_of.iter().max().map_or(0, |c| *c as usize + 1);
+    // Triangles of each component with the running sum of area / h².
+    let mut running: Vec<Vec<(f64, u32)>> = vec![Vec::new(); number];
+    for (t, corners) in (0u32..).zip(&domain.triangles) {
+        let list = &mut running[component_of[corners[0] as usize] as usize];
+        let before = list.last().map_or(0.0, |l| l.0);
+        let [a, b, c] = corners.map(|v| domain.vertices[v as usize]);
+        let h = corners.iter().map(|v| spacing[*v as usize]).sum::<f64>() / 3.0;
+        list.push((before + area_normal(&a, &b, &c).norm() / (h * h), t));
+    }
+    let load: Vec<f64> = (running.iter())
+        .map(|list| list.last().map_or(0.0, |l| l.0))
+        .collect();
+    let mut random = random::stream(seed, Purpose::Placement);
+    let mut points = Vec::with_capacity(count);
+    for (list, n) in running.iter().zip(quotas::share(mesh, &load, count)) {
+        let total = list.last().map_or(0.0, |l| l.0);
+        for _ in 0..n {
+            let drawn = random.random::<f64>() * total;
+            let slot = list.partition_point(|l| l.0 <= drawn).min(list.len() - 1);
+            let root = random.random::<f64>().sqrt();
+            let along = random.random::<f64>();
+            points.push(SurfacePoint {
+                triangle: list[slot].1,
+                barycentric: inset([1.0 - root, root * (1.0 - along), root * along]),
+            });
+        }
+    }
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    #[test]
+    fn points_fall_evenly_and_never_on_edges() {
+        let mesh = shapes::icosphere(10.0, 3);
+        let domain = Domain::new(mesh.vertices.clone(), mesh.triangles.clone()).unwrap();
+        let even = vec![1.0; mesh.vertices.len()];
+        let draw = |seed| place(&mesh, &domain, &even, 4000, seed);
+        let points = draw(7);
+        assert_eq!(points.len(), 4000);
+        let mut octants = [0usize; 8];
+        for p in &points {
+            assert!(p.barycentric.iter().all(|b| *b > 1e-4));
+            assert!((p.barycentric.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            let x = p.position(&mesh.vertices, &mesh.triangles);
+            let bit = |v: f64| usize::from(v > 0.0);
+            octants[bit(x.x) + 2 * bit(x.y) + 4 * bit(x.z)] += 1;
+        }
+        // Binomial: 500 expected, standard deviation 21.
+        assert!(
+            octants.iter().all(|n| (400..600).contains(n)),
+            "{octants:?}"
+        );
+        assert_eq!(points, draw(7));
+        assert_ne!(points, draw(8));
+    }
+}

@@ -1,0 +1,93 @@
+//! How many points each component of the surface gets.
+//!
+//! In proportion to its area over the square of the wanted spacing, but never fewer than any
+//! triangulation of its genus has.
+
+use std::cmp::Ordering;
+
+use crate::mesh::{TriMesh, topology};
+
+/// The fewest vertices of any triangulation with the mesh's components and handles.
+pub(super) fn least_points(mesh: &TriMesh) -> usize {
+    characteristics(mesh).into_iter().map(heawood).sum()
+}
+
+/// Heawood's bound for a closed orientable surface, attained but for genus 2, which takes one
+/// vertex more (Jungerman and Ringel 1980).
+fn heawood(euler: i64) -> usize {
+    match euler {
+        -2 => 10,
+        e => ((7.0 + (49.0 - 24.0 * e as f64).sqrt()) / 2.0).ceil() as usize,
+    }
+}
+
+/// Euler characteristic of each component.
+fn characteristics(mesh: &TriMesh) -> Vec<i64> {
+    let components = topology::components(mesh.vertices.len(), &mesh.triangles);
+    let count = components.iter().max().map_or(0, |m| *m as usize + 1);
+    // V - E + F with 2E = 3F, doubled.
+    let mut doubled = vec![0i64; count];
+    for &c in &components {
+        doubled[c as usize] += 2;
+    }
+    for corners in &mesh.triangles {
+        doubled[components[corners[0] as usize] as usize] -= 1;
+    }
+    doubled.into_iter().map(|d| d / 2).collect()
+}
+
+/// Shares `points` among the components by `load`, each with what its topology needs; the sum
+/// is `points`, which must be at least [`least_points`].
+pub(super) fn share(mesh: &TriMesh, load: &[f64], points: usize) -> Vec<usize> {
+    let least: Vec<usize> = characteristics(mesh).into_iter().map(heawood).collect();
+    let total: f64 = load.iter().sum();
+    let fair: Vec<f64> = load.iter().map(|l| l / total * points as f64).collect();
+    let mut quotas: Vec<usize> = (least.iter().zip(&fair))
+        .map(|(least, fair)| (*fair as usize).max(*least))
+        .collect();
+    // Rounding and minima are settled with the component that is farthest from its share.
+    loop {
+        let sum: usize = quotas.iter().sum();
+        let surplus = |c: usize| quotas[c] as f64 - fair[c];
+        let order = |a: &usize, b: &usize| surplus(*a).total_cmp(&surplus(*b));
+        match sum.cmp(&points) {
+            Ordering::Equal => return quotas,
+            Ordering::Less => {
+                let c = (0..quotas.len()).min_by(order).expect("a component");
+                quotas[c] += 1;
+            }
+            Ordering::Greater => {
+                let c = (0..quotas.len())
+                    .filter(|&c| quotas[c] > least[c])
+                    .max_by(order)
+                    .expect("more points than minima");
+                quotas[c] -= 1;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    fn with_torus(mut mesh: TriMesh) -> TriMesh {
+        let torus = shapes::torus(90.0, 30.0, 12, 7);
+        let first = mesh.vertices.len() as u32;
+        mesh.vertices.extend(torus.vertices);
+        let moved = torus.triangles.iter().map(|t| t.map(|v| v + first));
+        mesh.triangles.extend(moved);
+        mesh
+    }
+
+    #[test]
+    fn every_component_gets_its_share_and_what_it_needs() {
+        let mesh = with_torus(shapes::icosphere(1.0, 0));
+        assert_eq!(least_points(&mesh), 4 + 7);
+        assert_eq!(share(&mesh, &[3.0, 1.0], 40), vec![30, 10]);
+        assert_eq!(share(&mesh, &[3.0, 1.0], 16), vec![9, 7]);
+        assert_eq!(share(&mesh, &[0.001, 1000.0], 50), vec![4, 46]);
+        assert_eq!(share(&mesh, &[1.0, 1.0], 11), vec![4, 7]);
+    }
+}

@@ -1,0 +1,159 @@
+//! Points that push each other apart on the surface, after Turk (1992).
+//!
+//! Every point looks round itself within r = 2√(A/N) along the surface. A neighbour at
+//! geodesic distance d < r pushes it by k (r - d), away along the geodesic's direction at the
+//! point. All points move at once, straight on over the surface, at most r/2. Here k falls
+//! linearly to a tenth over the rounds: with a constant k the points keep trembling by a
+//! tenth of their spacing.
+//!
+//! Why along the surface: r exceeds the thickness of a ventricle's wall, and points of the
+//! opposite side must not push.
+
+use rayon::prelude::*;
+
+use super::domain::Domain;
+use super::log_map::LogMap;
+use super::trace::walk;
+use super::{RetileParameters, SurfacePoint};
+use crate::geometry::Vec2;
+use crate::progress::Cancelled;
+
+/// Share of k that is taken off by the last round.
+const ANNEALED: f64 = 0.9;
+
+/// Largest move in one round, as a share of the radius.
+const LONGEST_MOVE: f64 = 0.5;
+
+const NONE: u32 = u32::MAX;
+
+/// Relaxes `points` in place, for the relative `spacing` at every vertex; `tick` is told the share done and may cancel.
+pub(crate) fn repel(
+    domain: &Domain,
+    spacing: &[f64],
+    points: &mut Vec<SurfacePoint>,
+    parameters: &RetileParameters,
+    tick: impl Fn(f64) -> Result<(), Cancelled> + Sync,
+) -> Result<(), Cancelled> {
+    let rounds = parameters.repulsion_iterations;
+    let radius = 2.0 * (domain.area / points.len() as f64).sqrt();
+    for round in 0..rounds {
+        let share = round as f64 / rounds as f64;
+        let strength = parameters.repulsion_strength * (1.0 - ANNEALED * share);
+        let neighbourhood = Neighbourhood::new(domain, spacing, points, radius);
+        *points = (0..points.len())
+            .into_par_iter()
+            .map_init(
+                || LogMap::new(domain.vertices.len()),
+                |map, p| {
+                    tick(share)?;
+                    let step = neighbourhood.push(map, p, strength);
+                    Ok(walk(domain, &points[p], step).0)
+                },
+            )
+            .collect::<Result<_, Cancelled>>()?;
+    }
+    Ok(())
+}
+
+/// The points with their radii, listed by triangle.
+struct Neighbourhood<'a> {
+    domain: &'a Domain,
+    points: &'a [SurfacePoint],
+    radii: Vec<f64>,
+    largest: f64,
+    first: Vec<u32>,
+    next: Vec<u32>,
+}
+
+impl<'a> Neighbourhood<'a> {
+    fn new(domain: &'a Domain, spacing: &[f64], points: &'a [SurfacePoint], radius: f64) -> Self {
+        let radii: Vec<f64> = points
+            .iter()
+            .map(|p| radius * domain.interpolate(spacing, p))
+            .collect();
+        let mut first = vec![NONE; domain.triangles.len()];
+        let mut next = vec![NONE; points.len()];
+        for (i, p) in points.iter().enumerate().rev() {
+            next[i] = first[p.triangle as usize];
+            first[p.triangle as usize] = i as u32;
+        }
+        let largest = radii.iter().copied().fold(0.0, f64::max);
+        Self {
+            domain,
+            points,
+            radii,
+            largest,
+            first,
+            next,
+        }
+    }
+
+    /// The move of point `p`, in the frame of its triangle.
+    fn push(&self, map: &mut LogMap, p: usize, strength: f64) -> Vec2 {
+        let own = &self.points[p];
+        let reach = (self.radii[p] + self.largest) / 2.0;
+        map.spread(self.domain, own, reach * 1.05);
+        let mut step = Vec2::zeros();
+        let mut add = |q: u32, towards: Vec2| {
+            let distance = towards.norm();
+            let range = (self.radii[p] + self.radii[q as usize]) / 2.0;
+            if q as usize != p && distance > 0.0 && distance < range {
+                step -= towards * (strength * (range - distance) / distance);
+            }
+        };
+        let flat = self.domain.flat(own.triangle);
+        let here = combine(&flat, own.barycentric);
+        for q in self.on_triangle(own.triangle) {
+            add(
+                q,
+                combine(&flat, self.points[q as usize].barycentric) - here,
+            );
+        }
+        for &v in map.visited() {
+            if map.reach(v).is_none() {
+                continue;
+            }
+            for h in self
+                .domain
+                .adjacency
+                .around(self.domain.outgoing[v as usize])
+            {
+                let t = h / 3;
+                let corners = self.domain.triangles[t as usize];
+                let ours = corners.iter().all(|c| *c >= v) && t != own.triangle;
+                if !ours || self.first[t as usize] == NONE {
+                    continue;
+                }
+                let [Some(a), Some(b), Some(c)] = corners.map(|c| map.reach(c)) else {
+                    continue;
+                };
+                let vectors = [a.vector, b.vector, c.vector];
+                for q in self.on_triangle(t) {
+                    add(q, combine(&vectors, self.points[q as usize].barycentric));
+                }
+            }
+        }
+        let longest = LONGEST_MOVE * self.radii[p];
+        let length = step.norm();
+        if length > longest {
+            step *= longest / length;
+        }
+        step
+    }
+
+    fn on_triangle(&self, t: u32) -> impl Iterator<Item = u32> + '_ {
+        let mut q = self.first[t as usize];
+        std::iter::from_fn(move || {
+            let this = q;
+            if this == NONE {
+                return None;
+            }
+            q = self.next[this as usize];
+            Some(this)
+        })
+    }
+}
+
+fn combine(corners: &[Vec2; 3], [u, v, w]: [f64; 3]) -> Vec2 {
+    corners[0] * u + corners[1] * v + corners[2] * w
+}

@@ -1,0 +1,1 @@
+//! Settings over the command line: see `src/config` for the rest.

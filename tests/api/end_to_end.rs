@@ -1,0 +1,1 @@
+//! The real work, from file to mesh.

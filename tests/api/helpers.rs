@@ -1,0 +1,342 @@
+//! A service of its own for each test, and the work it pretends to do.
+
+use reqwest::{Client, RequestBuilder, Response, StatusCode};
+use serde_json::{Map, Value, json};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+use ventriform::config::Settings;
+use ventriform::export::{self, Format, Metadata};
+use ventriform::http::{Running, start};
+use ventriform::jobs::{
+    Engine, Failure, Fault, Generation, Input, Intensity, Output, OutputFile, VolumeFacts,
+    VolumeReader, Work, WorkError,
+};
+use ventriform::mesh::shapes::icosphere;
+use ventriform::progress::{Monitor, Stage};
+use ventriform::volume::ReadLimits;
+
+/// How long a test waits for what must happen.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// A running service and a client.
+pub struct TestApp {
+    pub client: Client,
+    pub url: String,
+    pub running: Option<Running>,
+    pub data: Arc<TempDir>,
+}
+
+impl TestApp {
+    /// A service with the stand-in for the work.
+    pub async fn start() -> Self {
+        Self::with(|_| {}).await
+    }
+
+    /// The same with other settings.
+    pub async fn with(change: impl FnOnce(&mut Settings)) -> Self {
+        let data = Arc::new(tempfile::tempdir().unwrap());
+        Self::on(data, fake_engine(), change).await
+    }
+
+    /// A service on a data folder that may have been used before.
+    pub async fn on(
+        data: Arc<TempDir>,
+        engine: Engine,
+        change: impl FnOnce(&mut Settings),
+    ) -> Self {
+        let mut settings = Settings {
+            data_dir: data.path().to_owned(),
+            shutdown_grace: "5s".parse().unwrap(),
+            workers: "2".parse().unwrap(),
+            threads: "1".parse().unwrap(),
+            ..Settings::default()
+        };
+        change(&mut settings);
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        let running = start(settings, engine, listener).await.unwrap();
+        Self {
+            client: Client::new(),
+            url: format!("http://{}", running.address()),
+            running: Some(running),
+            data,
+        }
+    }
+
+    /// Ends the service in order; its data stays.
+    pub async fn stop(mut self) -> Arc<TempDir> {
+        self.running.take().unwrap().stop().await.unwrap();
+        self.data.clone()
+    }
+
+    pub fn get(&self, path: &str) -> RequestBuilder {
+        self.client.get(format!("{}{path}", self.url))
+    }
+
+    pub fn post(&self, path: &str) -> RequestBuilder {
+        self.client.post(format!("{}{path}", self.url))
+    }
+
+    pub fn delete(&self, path: &str) -> RequestBuilder {
+        self.client.delete(format!("{}{path}", self.url))
+    }
+
+    /// The JSON under a path.
+    pub async fn json(&self, path: &str) -> Value {
+        let answer = self.get(path).send().await.unwrap();
+        assert_eq!(answer.status(), StatusCode::OK, "{path}");
+        answer.json().await.unwrap()
+    }
+
+    /// Stores a volume; its id.
+    pub async fn volume(&self, words: &str) -> String {
+        let answer = self
+            .post("/v1/volumes")
+            .body(volume(words))
+            .send()
+            .await
+            .unwrap();
+        assert!(
+            answer.status().is_success(),
+            "{}",
+            answer.text().await.unwrap()
+        );
+        let volume: Value = answer.json().await.unwrap();
+        text(&volume["id"])
+    }
+
+    /// Files a job by the one-line call; the job.
+    pub async fn file(&self, words: &str) -> Value {
+        let answer = self
+            .post("/v1/models")
+            .body(volume(words))
+            .send()
+            .await
+            .unwrap();
+        assert_eq!(answer.status(), StatusCode::ACCEPTED);
+        answer.json().await.unwrap()
+    }
+
+    /// Waits until a job is in one of the states; the job.
+    pub async fn until(&self, job: &Value, states: &[&str]) -> Value {
+        let path = text(&job["links"]["self"]);
+        let deadline = Instant::now() + PATIENCE;
+        loop {
+            let job = self.json(&path).await;
+            if states.contains(&job["state"].as_str().unwrap()) {
+                return job;
+            }
+            assert!(Instant::now() < deadline, "still {job}");
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    }
+
+    /// Files a job and sees it to its end.
+    pub async fn finished(&self, words: &str) -> Value {
+        let job = self.file(words).await;
+        self.until(&job, &["succeeded", "failed", "cancelled"])
+            .await
+    }
+
+    /// A model that was made.
+    pub async fn model(&self, words: &str) -> Value {
+        let job = self.finished(words).await;
+        assert_eq!(job["state"], "succeeded", "{job}");
+        self.json(&text(&job["links"]["model"])).await
+    }
+
+    /// Names of everything below the data folder's shelves and staging.
+    pub fn stored(&self) -> Vec<String> {
+        let mut names = Vec::new();
+        for shelf in ["staging", "volumes", "models"] {
+            for entry in std::fs::read_dir(self.data.path().join(shelf)).unwrap() {
+                names.push(entry.unwrap().file_name().into_string().unwrap());
+            }
+        }
+        names.sort();
+        names
+    }
+}
+
+/// The text of a JSON string.
+pub fn text(value: &Value) -> String {
+    value
+        .as_str()
+        .unwrap_or_else(|| panic!("{value}"))
+        .to_owned()
+}
+
+/// Checks that an answer is a whole problem object of that status and kind; the object.
+pub async fn problem(answer: Response, status: u16, code: &str) -> Value {
+    assert_eq!(answer.status().as_u16(), status);
+    let media_type = answer.headers()["content-type"].to_str().unwrap();
+    assert_eq!(media_type, "application/problem+json");
+    assert!(answer.headers().contains_key("x-request-id"));
+    let body: Value = answer.json().await.unwrap();
+    assert_eq!(body["status"], status, "{body}");
+    assert_eq!(
+        body["type"],
+        format!("urn:ventriform:problem:{code}"),
+        "{body}"
+    );
+    assert!(!text(&body["title"]).is_empty());
+    assert!(!text(&body["detail"]).is_empty());
+    body
+}
+
+/// A file that the stand-in takes for a volume. Its first word says what the work shall do:
+/// `sphere`, `slow`, `stubborn`, `panic`, `fail`, `abort`.
+pub fn volume(words: &str) -> Vec<u8> {
+    format!("VOLUME {words}").into_bytes()
+}
+
+/// The stand-in.
+pub fn fake_engine() -> Engine {
+    Engine {
+        reader: Arc::new(FakeReader),
+        works: vec![Arc::new(FakeWork)],
+    }
+}
+
+struct FakeReader;
+
+fn words(files: &[PathBuf]) -> Result<String, Failure> {
+    let content = std::fs::read(&files[0]).unwrap();
+    match content.strip_prefix(b"VOLUME ") {
+        Some(words) => Ok(String::from_utf8_lossy(&words[..words.len().min(64)]).into_owned()),
+        None => Err(
+            Failure::new(Fault::Content, "unrecognised-format", "No volume.").fix("Send a volume."),
+        ),
+    }
+}
+
+impl VolumeReader for FakeReader {
+    fn inspect(&self, files: &[PathBuf]) -> Result<VolumeFacts, Failure> {
+        words(files)?;
+        let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
+        Ok(VolumeFacts {
+            format: "words".into(),
+            compressed: false,
+            shape: [1, 2, 3],
+            frames: 1,
+            spacing_mm: [1.0; 3],
+            affine: [
+                [1.0, 0.0, 0.0, 0.0],
+                [0.0, 1.0, 0.0, 0.0],
+                [0.0, 0.0, 1.0, 0.0],
+                [0.0, 0.0, 0.0, 1.0],
+            ],
+            affine_source: "sform".into(),
+            dtype: "int16".into(),
+            intensity: Intensity {
+                min: 0.0,
+                max: 1.0,
+                mean: 0.5,
+                not_finite: 0,
+            },
+            labels: None,
+            warnings: files.iter().map(|path| name(path)).collect(),
+        })
+    }
+
+    fn preview(&self, files: &[PathBuf]) -> Result<Vec<u8>, Failure> {
+        words(files)?;
+        Ok(b"\x89PNG\r\n\x1a\n".to_vec())
+    }
+}
+
+struct FakeWork;
+
+impl Work for FakeWork {
+    fn kind(&self) -> &'static str {
+        "model"
+    }
+
+    fn parameters_from_text(
+        &self,
+        pairs: &[(String, String)],
+    ) -> Result<Map<String, Value>, Failure> {
+        real().parameters_from_text(pairs)
+    }
+
+    fn parameters_from_json(
+        &self,
+        object: &Map<String, Value>,
+    ) -> Result<Map<String, Value>, Failure> {
+        real().parameters_from_json(object)
+    }
+
+    fn run(&self, input: &Input, monitor: &Monitor<'_>) -> Result<Output, WorkError> {
+        let words = words(&input.files)?;
+        match words.split(' ').next().unwrap() {
+            "slow" => work_for(Duration::from_secs(30), monitor)?,
+            "brief" => work_for(Duration::from_millis(300), monitor)?,
+            "stubborn" => std::thread::sleep(Duration::from_secs(2)),
+            "panic" => panic!("as told"),
+            "fail" => {
+                return Err(
+                    Failure::new(Fault::Content, "no-surface", "There is no surface.")
+                        .at("iso")
+                        .fix("Choose another iso-value.")
+                        .into(),
+                );
+            }
+            _ => {}
+        }
+        Ok(sphere())
+    }
+}
+
+fn work_for(time: Duration, monitor: &Monitor<'_>) -> Result<(), WorkError> {
+    let started = Instant::now();
+    while started.elapsed() < time {
+        let fraction = started.elapsed().as_secs_f64() / time.as_secs_f64();
+        monitor.report(Stage::Retile, fraction)?;
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    Ok(())
+}
+
+fn real() -> Generation {
+    Generation {
+        limits: ReadLimits::default(),
+    }
+}
+
+fn sphere() -> Output {
+    let mesh = icosphere(30.0, 1);
+    let encoded = |format| export::encode(format, &mesh, &Metadata::new("sphere")).unwrap();
+    let names = [
+        "mesh.glb",
+        "mesh.gltf",
+        "mesh.stl",
+        "mesh.ply",
+        "mesh.obj",
+        "mesh.vtp",
+        "mesh.json",
+    ];
+    let mut files: Vec<OutputFile> = names
+        .into_iter()
+        .zip(Format::ALL)
+        .map(|(name, format)| OutputFile {
+            name,
+            media_type: format.media_type(),
+            bytes: encoded(format),
+        })
+        .collect();
+    files.push(OutputFile {
+        name: "report.json",
+        media_type: "application/json",
+        bytes: json!({"mesh": {"vertices": 42}}).to_string().into_bytes(),
+    });
+    files.push(OutputFile {
+        name: "report.html",
+        media_type: "text/html; charset=utf-8",
+        bytes: b"<!doctype html><title>report</title>".to_vec(),
+    });
+    Output {
+        summary: [("vertices".to_owned(), json!(42))].into_iter().collect(),
+        files,
+    }
+}

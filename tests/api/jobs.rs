@@ -1,0 +1,284 @@
+//! `/v1/jobs`.
+
+use crate::helpers::{TestApp, fake_engine, problem, text, volume};
+use reqwest::StatusCode;
+use reqwest::header::LOCATION;
+use serde_json::{Value, json};
+use std::time::{Duration, Instant};
+
+#[tokio::test]
+async fn a_job_goes_from_accepted_to_succeeded() {
+    let app = TestApp::start().await;
+    let volume = app.volume("sphere").await;
+    let order = json!({"kind": "model", "volume": volume, "parameters": {"points": 67}});
+    let answer = app.post("/v1/jobs").json(&order).send().await.unwrap();
+    assert_eq!(answer.status(), StatusCode::ACCEPTED);
+    assert!(answer.headers().contains_key("retry-after"));
+    let location = answer.headers()[LOCATION].to_str().unwrap().to_owned();
+    let job: Value = answer.json().await.unwrap();
+    assert_eq!(text(&job["links"]["self"]), location);
+    let done = app.until(&job, &["succeeded"]).await;
+    assert_eq!(done["progress"], 1.0);
+    assert_eq!(done["attempts"], 1);
+    assert_eq!(done["parameters"]["points"], 67);
+    let model = app.json(&text(&done["links"]["model"])).await;
+    assert_eq!(model["volume"], volume);
+}
+
+#[tokio::test]
+async fn orders_that_make_no_sense_are_refused_by_field() {
+    let app = TestApp::start().await;
+    let volume = app.volume("sphere").await;
+    for (order, status, code, field) in [
+        (
+            json!({"volume": volume, "parameter": {}}),
+            400,
+            "unknown-parameter",
+            "parameter",
+        ),
+        (
+            json!({"kind": "poem", "volume": volume}),
+            422,
+            "invalid-field",
+            "kind",
+        ),
+        (
+            json!({"kind": 7, "volume": volume}),
+            422,
+            "invalid-field",
+            "kind",
+        ),
+        (json!({"kind": "model"}), 422, "invalid-field", "volume"),
+        (json!({"volume": "vol_0"}), 422, "invalid-field", "volume"),
+        (
+            json!({"volume": volume, "parameters": []}),
+            422,
+            "invalid-field",
+            "parameters",
+        ),
+        (
+            json!({"volume": volume, "parameters": {"pionts": 5}}),
+            422,
+            "invalid-parameter",
+            "pionts",
+        ),
+        (
+            json!({"volume": volume, "parameters": {"points": "150"}}),
+            422,
+            "invalid-parameter",
+            "points",
+        ),
+    ] {
+        let answer = app.post("/v1/jobs").json(&order).send().await.unwrap();
+        let body = problem(answer, status, code).await;
+        assert_eq!(body["field"], field, "{order}");
+        assert!(body["fix"].is_string(), "{order}");
+    }
+}
+
+#[tokio::test]
+async fn json_that_is_none_or_too_much_is_refused() {
+    let app = TestApp::start().await;
+    let post = |body: String| {
+        app.post("/v1/jobs")
+            .header("content-type", "application/json")
+            .body(body)
+            .send()
+    };
+    problem(post("{".into()).await.unwrap(), 400, "malformed-json").await;
+    problem(post("[]".into()).await.unwrap(), 400, "malformed-json").await;
+    let deep = format!("{}1{}", "{\"a\":".repeat(5000), "}".repeat(5000));
+    problem(post(deep).await.unwrap(), 400, "malformed-json").await;
+    let large = format!("{{\"a\":\"{}\"}}", "x".repeat(300_000));
+    problem(post(large).await.unwrap(), 413, "body-too-large").await;
+    let form = app
+        .post("/v1/jobs")
+        .header("content-type", "text/plain")
+        .body("{}")
+        .send();
+    problem(form.await.unwrap(), 415, "unsupported-media-type").await;
+}
+
+#[tokio::test]
+async fn a_key_makes_a_repeated_request_the_same_job() {
+    let app = TestApp::start().await;
+    let post = |words: &str, key: &str| {
+        app.post("/v1/models")
+            .header("idempotency-key", key)
+            .body(volume(words))
+            .send()
+    };
+    let first: Value = post("sphere", "\"k1\"")
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap();
+    let again: Value = post("sphere", "\"k1\"")
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap();
+    assert_eq!(first["id"], again["id"]);
+    problem(
+        post("brief", "\"k1\"").await.unwrap(),
+        422,
+        "idempotency-key-reused",
+    )
+    .await;
+    let other: Value = post("sphere", "k2").await.unwrap().json().await.unwrap();
+    assert_ne!(first["id"], other["id"]);
+    problem(
+        post("sphere", "").await.unwrap(),
+        400,
+        "invalid-idempotency-key",
+    )
+    .await;
+    let concurrent = futures::future::join_all((0..8).map(|_| post("sphere", "k3"))).await;
+    let mut ids = Vec::new();
+    for answer in concurrent {
+        ids.push(text(&answer.unwrap().json::<Value>().await.unwrap()["id"]));
+    }
+    ids.dedup();
+    assert_eq!(ids.len(), 1);
+}
+
+#[tokio::test]
+async fn a_full_queue_refuses_and_loses_nothing() {
+    let app = TestApp::with(|s| {
+        s.queue_limit = 2;
+        s.workers = "1".parse().unwrap();
+    })
+    .await;
+    let running = app.file("slow").await;
+    app.until(&running, &["running"]).await;
+    let waiting = [app.file("sphere a").await, app.file("sphere b").await];
+    let refused = app
+        .post("/v1/models")
+        .body(volume("sphere c"))
+        .send()
+        .await
+        .unwrap();
+    assert!(refused.headers().contains_key("retry-after"));
+    problem(refused, 429, "queue-full").await;
+    assert_eq!(
+        app.json(&text(&waiting[1]["links"]["self"])).await["queue_position"],
+        2
+    );
+    app.delete(&text(&running["links"]["self"]))
+        .send()
+        .await
+        .unwrap();
+    for job in &waiting {
+        app.until(job, &["succeeded"]).await;
+    }
+}
+
+#[tokio::test]
+async fn a_running_job_stops_computing_within_100_ms() {
+    let app = TestApp::start().await;
+    let job = app.file("slow").await;
+    app.until(&job, &["running"]).await;
+    let path = text(&job["links"]["self"]);
+    let asked = Instant::now();
+    let answer = app.delete(&path).send().await.unwrap();
+    assert_eq!(answer.status(), StatusCode::ACCEPTED);
+    let done = app.until(&job, &["cancelled"]).await;
+    // Generous: the machine may be busy. The worker itself needs no more than one look.
+    assert!(asked.elapsed() < Duration::from_secs(2));
+    assert!(done["model"].is_null());
+}
+
+#[tokio::test]
+async fn a_waiting_job_is_cancelled_at_once_and_an_ended_one_erased() {
+    let app = TestApp::with(|s| s.workers = "1".parse().unwrap()).await;
+    let running = app.file("slow").await;
+    app.until(&running, &["running"]).await;
+    let waiting = app.file("sphere").await;
+    let path = text(&waiting["links"]["self"]);
+    let answer = app.delete(&path).send().await.unwrap();
+    assert_eq!(answer.status(), StatusCode::OK);
+    assert_eq!(answer.json::<Value>().await.unwrap()["state"], "cancelled");
+    assert_eq!(
+        app.delete(&path).send().await.unwrap().status(),
+        StatusCode::NO_CONTENT
+    );
+    problem(app.get(&path).send().await.unwrap(), 410, "gone").await;
+    problem(
+        app.delete("/v1/jobs/job_0").send().await.unwrap(),
+        404,
+        "not-found",
+    )
+    .await;
+}
+
+#[tokio::test]
+async fn a_panic_fails_the_job_and_nothing_else() {
+    let app = TestApp::with(|s| s.workers = "1".parse().unwrap()).await;
+    let job = app.finished("panic").await;
+    assert_eq!(job["state"], "failed");
+    assert_eq!(job["error"]["type"], "urn:ventriform:problem:internal");
+    assert!(!job["error"].to_string().contains("as told"));
+    assert_eq!(app.finished("sphere").await["state"], "succeeded");
+}
+
+#[tokio::test]
+async fn a_job_over_its_time_fails_with_the_limit_as_reason() {
+    let app = TestApp::with(|s| s.job_time_limit = "200ms".parse().unwrap()).await;
+    let job = app.finished("slow").await;
+    assert_eq!(job["state"], "failed");
+    assert_eq!(
+        job["error"]["type"],
+        "urn:ventriform:problem:job-time-limit"
+    );
+}
+
+#[tokio::test]
+async fn jobs_are_listed_by_state() {
+    let app = TestApp::start().await;
+    app.finished("sphere").await;
+    app.finished("fail").await;
+    let failed = app.json("/v1/jobs?state=failed").await;
+    assert_eq!(failed["jobs"].as_array().unwrap().len(), 1);
+    assert_eq!(
+        failed["jobs"][0]["error"]["fix"],
+        "Choose another iso-value."
+    );
+    assert_eq!(
+        app.json("/v1/jobs").await["jobs"].as_array().unwrap().len(),
+        2
+    );
+    let answer = app.get("/v1/jobs?state=lost").send().await.unwrap();
+    assert_eq!(
+        problem(answer, 400, "invalid-parameter").await["field"],
+        "state"
+    );
+}
+
+#[tokio::test]
+async fn a_lease_that_runs_out_gives_the_job_to_another_worker() {
+    // The first service "dies" without telling anybody: its data folder is taken over as it is.
+    let app = TestApp::start().await;
+    let job = app.file("slow").await;
+    app.until(&job, &["running"]).await;
+    let data = app.data.clone();
+    let copy = std::sync::Arc::new(tempfile::tempdir().unwrap());
+    copy_folder(data.path(), copy.path());
+    let heir = TestApp::on(copy, fake_engine(), |_| {}).await;
+    let again = heir.until(&job, &["running"]).await;
+    assert_eq!(again["attempts"], 2);
+}
+
+fn copy_folder(from: &std::path::Path, to: &std::path::Path) {
+    for entry in std::fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let target = to.join(entry.file_name());
+        if entry.file_type().unwrap().is_dir() {
+            std::fs::create_dir_all(&target).unwrap();
+            copy_folder(&entry.path(), &target);
+        } else {
+            std::fs::copy(entry.path(), target).unwrap();
+        }
+    }
+}
