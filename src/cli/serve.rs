@@ -75,7 +75,10 @@ pub fn check_health(args: &HealthcheckArgs) -> Result<()> {
     }
     Runtime::new()?.block_on(async {
         let client = reqwest::Client::builder().timeout(HEALTH_TIMEOUT).build()?;
-        let answer = client.get(format!("http://{address}/readyz")).send().await?;
+        let answer = client
+            .get(format!("http://{address}/readyz"))
+            .send()
+            .await?;
         if !answer.status().is_success() {
             bail!("{} answers {}", address, answer.status());
         }

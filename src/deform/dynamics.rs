@@ -189,7 +189,8 @@ impl Memory {
             self.edges = vec![Vec3::zeros(); readings.len()];
         }
         for (i, r) in readings.iter_mut().enumerate() {
-            self.edges[i] += (r.place + r.normal * r.offset - self.edges[i]) * share;
+            let edge = &mut self.edges[i];
+            *edge += (r.place + r.normal * r.offset - *edge) * share;
             let before = self.answers[i].weight;
             r.weight = before + (r.weight - before) * share;
         }
