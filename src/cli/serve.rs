@@ -3,6 +3,7 @@
 use crate::config::{Flags, LogFormat, Settings};
 use crate::http::{self, Running};
 use crate::jobs::Engine;
+use crate::volume::ReadLimits;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::net::{SocketAddr, TcpListener};
@@ -51,8 +52,9 @@ pub fn run(args: &ServeArgs) -> Result<()> {
     start_log(&settings)?;
     let listener = bind(settings.listen)?;
     let address = listener.local_addr()?;
+    let engine = engine(&settings);
     Runtime::new()?.block_on(async {
-        let running = http::start(settings, Engine::real_for_limits(), listener).await?;
+        let running = http::start(settings, engine, listener).await?;
         println!("Listening on http://{address} (documentation: http://{address}/docs)");
         shutdown_signal().await?;
         running.stop().await?;
@@ -96,8 +98,16 @@ pub async fn start_local(listen: SocketAddr, data_dir: &Path) -> Result<Running>
         data_dir: data_dir.to_owned(),
         ..Settings::default()
     };
+    let engine = engine(&settings);
     let listener = bind(listen)?;
-    Ok(http::start(settings, Engine::real_for_limits(), listener).await?)
+    Ok(http::start(settings, engine, listener).await?)
+}
+
+fn engine(settings: &Settings) -> Engine {
+    Engine::new(ReadLimits {
+        voxels: settings.voxel_limit,
+        unpacked_bytes: settings.decompressed_limit.0,
+    })
 }
 
 fn variable(name: &str) -> Option<String> {

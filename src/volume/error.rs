@@ -191,7 +191,8 @@ impl VolumeError {
                 "Send the .hdr and the .img together, or one .nii.".into()
             }
             VolumeError::NotOneVolume { .. } => {
-                "Send one file, or a .hdr with its .img, at a time.".into()
+                "Send one file, or a .hdr with its .img, at a time; DICOM as one multi-frame file."
+                    .into()
             }
             VolumeError::Overflow { .. } => "Scale the values to below 3.4e38.".into(),
             VolumeError::NoFiniteVoxel { .. } => {
