@@ -1,12 +1,14 @@
 //! A first fit by few parameters: the model as a whole is moved, turned, stretched along and
-//! across its axis, and made thicker or thinner until its sensors agree best.
+//! across its axis, made thicker or thinner, and its rim raised and tilted until its sensors
+//! agree best.
 //!
 //! Gauss-Newton on Σ share · weight · (n · (u(x) - offset n))², where u is a combination of
-//! nine fields: three shifts, three turns, two stretches and a shift along the normals. A
-//! weak pull to zero keeps directions that the image says nothing about where they were.
+//! twelve fields: three shifts, three turns, two stretches, a shift along the normals, and a
+//! rise and two tilts of the basal half. A weak pull to zero keeps directions that the image says nothing about where they were.
 
 use nalgebra::{SMatrix, SVector};
 
+use super::cup::perpendicular;
 use super::elastic::area_shares;
 use super::field::Field;
 use super::sensors::{self, Look, Reading};
@@ -14,7 +16,7 @@ use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Monitor};
 
-const FIELDS: usize = 9;
+const FIELDS: usize = 12;
 type Row = SVector<f64, FIELDS>;
 
 /// Rounds of Gauss-Newton.
@@ -41,6 +43,11 @@ pub fn align(
         let basis = Basis {
             axis: *axis,
             centre,
+            base: mesh
+                .vertices
+                .iter()
+                .map(|p| (p - centre).dot(axis))
+                .fold(0.0, f64::min),
         };
         let step = basis.solve(&readings);
         let normals = mesh.vertex_normals();
@@ -51,9 +58,15 @@ pub fn align(
     Ok(mesh)
 }
 
+/// Pull of the rim's rise and tilts to zero. From 0.02 to 0.1 the mean Jaccard over 60 fits
+/// (four models, 15 simulated patients) changes by 0.002; without any pull it is 0.003 lower.
+const RIM_PULL: f64 = 0.03;
+
 struct Basis {
     axis: Vec3,
     centre: Vec3,
+    /// Most basal position on the axis, mm from the centre (negative).
+    base: f64,
 }
 
 impl Basis {
@@ -63,6 +76,14 @@ impl Basis {
         // Turns and stretches are per 30 mm, so that every coefficient is about a shift of
         // the surface in millimetres.
         const ARM: f64 = 30.0;
+        // 0 at the centre and apical of it, 1 at the rim.
+        let basal = if self.base < -1.0 {
+            (r.dot(&self.axis) / self.base).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        let (e1, e2) = perpendicular(&self.axis);
+        let lift = self.axis * basal;
         [
             Vec3::x(),
             Vec3::y(),
@@ -73,6 +94,9 @@ impl Basis {
             along / ARM,
             (r - along) / ARM,
             *n,
+            lift,
+            lift * (r.dot(&e1) / ARM),
+            lift * (r.dot(&e2) / ARM),
         ]
     }
 
@@ -89,6 +113,9 @@ impl Basis {
         // Thickness and stretch across are nearly the same thing on the epicardium alone;
         // the thickness of the blurred wall varies less between patients than their size.
         matrix[(8, 8)] += 0.02;
+        for field in 9..FIELDS {
+            matrix[(field, field)] += RIM_PULL;
+        }
         let mut rhs = Row::zeros();
         for r in readings {
             let fields = self.fields(&r.place, &r.normal);

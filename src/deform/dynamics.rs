@@ -172,8 +172,7 @@ struct Memory {
     count: usize,
 }
 
-/// Answers after which nothing new is to be learnt. Twice as many change the cohort's mean
-/// Jaccard by less than 0.0005.
+/// Answers after which the mean is taken for certain.
 const ANSWERS: usize = 12;
 
 impl Memory {

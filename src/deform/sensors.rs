@@ -23,6 +23,10 @@ const STEP: f64 = 1.0;
 /// Half the distance between the readings of a difference quotient, in steps.
 const HALF: usize = 2;
 
+/// Sensors on the rim look this many times as far along their normals as the others: how far
+/// the wall reaches basally differs between patients more than its radius does.
+const RIM_REACH: f64 = 1.75;
+
 /// What a sensor looks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SensorKind {
@@ -63,6 +67,16 @@ pub struct Shift {
 }
 
 impl Shift {
+    /// Whether the surface there looks out of the base.
+    fn is_rim(&self, place: &Vec3, normal: &Vec3) -> bool {
+        let along = self.axis[1] - self.axis[0];
+        let length = along.norm();
+        length > 0.0
+            && normal.dot(&along) < -0.6 * length
+            && (place - self.axis[0]).dot(&along) < 0.5 * length * length
+    }
+
+    /// The shift of an edge seen there.
     fn at(&self, place: &Vec3, normal: &Vec3) -> f64 {
         let along = self.axis[1] - self.axis[0];
         let length = along.norm_squared();
@@ -128,6 +142,10 @@ pub fn read(mesh: &TriMesh, field: &Field, look: &Look) -> Vec<Reading> {
     let weights = barycentric();
     let total = mesh.area() * 2.0 * PER_TRIANGLE as f64;
     let mut profile = Profile::new(look);
+    let mut rim = Profile::new(&Look {
+        reach: look.reach * RIM_REACH,
+        ..*look
+    });
     let mut readings = Vec::with_capacity(mesh.triangles.len() * PER_TRIANGLE);
     let mut scores = Vec::with_capacity(readings.capacity());
     for (t, triangle) in mesh.triangles.iter().enumerate() {
@@ -139,7 +157,12 @@ pub fn read(mesh: &TriMesh, field: &Field, look: &Look) -> Vec<Reading> {
             let normal = (sides[0] * w[0] + sides[1] * w[1] + sides[2] * w[2])
                 .try_normalize(0.0)
                 .unwrap_or_else(Vec3::zeros);
-            let (offset, score) = profile.look(field, &place, &normal);
+            let eye = if look.shift.is_rim(&place, &normal) {
+                &mut rim
+            } else {
+                &mut profile
+            };
+            let (offset, score) = eye.look(field, &place, &normal);
             let offset = offset + look.shift.at(&place, &normal);
             scores.push(score);
             readings.push(Reading {
