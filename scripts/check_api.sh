@@ -1,5 +1,7 @@
 #!/usr/bin/env bash
 # Exercises the running service with schemathesis: no 500, no undocumented status or body.
+# One check is left out: arbitrary bytes are rarely a volume, and what was erased is 410, so
+# requests that satisfy the schema are rightly refused.
 # PYTHON names an interpreter that has schemathesis.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -16,5 +18,6 @@ for _ in $(seq 100); do
 done
 [ -n "$url" ] || { cat "$data/log"; exit 1; }
 "$(dirname "$python")/schemathesis" run "$url/openapi.json" --max-examples "${EXAMPLES:-15}" \
-  --workers 2 --seed 1 --suppress-health-check all --no-color
+  --workers 2 --seed 1 --suppress-health-check all \
+  --exclude-checks positive_data_acceptance --no-color
 kill -0 "$service"

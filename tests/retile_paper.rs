@@ -8,7 +8,7 @@ use ventriform::retile::{Method, RetileError, RetileParameters, Tiled, retile};
 use ventriform::surface::{Surface, from_mesh};
 
 fn surface(mesh: TriMesh) -> Surface {
-    from_mesh(mesh, 1.0).unwrap()
+    from_mesh(mesh, 1.0).expect("a closed shape")
 }
 
 fn paper(surface: &Surface, points: usize, seed: u64) -> Result<Tiled, RetileError> {
@@ -25,8 +25,8 @@ fn check(surface: &Surface, points: usize, tiled: &Tiled) {
     assert_eq!(tiled.mesh.vertices.len(), points);
     assert_eq!(tiled.sizing.len(), points);
     let (before, after) = (
-        topology::check(&surface.mesh).unwrap(),
-        topology::check(&tiled.mesh).unwrap(),
+        topology::check(&surface.mesh).expect("closed"),
+        topology::check(&tiled.mesh).expect("closed"),
     );
     assert_eq!(before.euler_characteristic, after.euler_characteristic);
     assert_eq!(before.components, after.components);

@@ -109,7 +109,7 @@ fn every_patients_ventricle_is_found() {
             2
         );
         let iso = surface.facts.iso_value as f32;
-        let seen = survey::survey(&volume);
+        let seen = survey::survey(&volume, &Monitor::silent()).unwrap();
         let found = left_ventricle::find(&volume, &seen, &Monitor::silent())
             .unwrap()
             .unwrap();

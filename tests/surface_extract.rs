@@ -327,6 +327,27 @@ fn hopeless_volumes_and_parameters_are_refused_by_name() {
 }
 
 #[test]
+fn thread_count_does_not_show() {
+    let scene = volume([64, 64, 56], [4.0; 3], |p| {
+        ventricle(p).max(liver(p)) + 0.05 + 0.03 * (p.x * 3.1 + p.y * 5.7 + p.z * 9.3).sin()
+    });
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| run(&scene, &SurfaceParameters::default()).unwrap())
+    };
+    let one = on(1);
+    for threads in [2, 7, 16] {
+        let many = on(threads);
+        assert_eq!(many.mesh, one.mesh);
+        assert_eq!(many.working, one.working);
+        assert_eq!(many.facts, one.facts);
+    }
+}
+
+#[test]
 fn tiny_and_long_volumes_do_not_panic() {
     for shape in [[3, 3, 3], [1, 1, 2], [1024, 3, 3], [3, 3, 200]] {
         let odd = volume(shape, [1.0, 10.0, 3.0], |p| {

@@ -141,8 +141,9 @@ settings! {
     threads: Count = "auto";
     /// Jobs that may wait; beyond it new ones are answered 429
     queue_limit: usize = "1000";
-    /// Starts of one job before it is given up: a job that brings the process down counts too
-    attempt_limit: u32 = "3";
+    /// Starts of one job before it is given up. A job that brings the process down looks like a
+    /// power cut: too few, and a bad day loses good jobs
+    attempt_limit: u32 = "10";
     /// Longest computation of one job
     job_time_limit: Span = "10m";
     /// How long a worker holds a job without a sign of life

@@ -9,9 +9,9 @@ use super::app::App;
 use super::jobs::{describe, find};
 use super::openapi::LookupProblems;
 use super::problem::{Answer, Problem};
-use super::request::{query_pairs, refuse_unknown};
+use super::request::{Path, query_pairs, refuse_unknown};
 use crate::jobs;
-use axum::extract::{Path, RawQuery, State};
+use axum::extract::{RawQuery, State};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
@@ -30,9 +30,9 @@ const KEEP_ALIVE: Duration = Duration::from_secs(15);
 /// final state. Resumes after `Last-Event-ID`.
 #[utoipa::path(get, path = "/v1/jobs/{id}/events", tag = "jobs",
     params(("id" = String, Path, description = "The job's id"),
-        ("Last-Event-ID" = Option<i64>, Header, description = "Revision seen last")),
+        super::openapi::EventHeader),
     responses(
-        (status = 200, description = "The changes", body = String, content_type = "text/event-stream"),
+        super::openapi::EventsAnswer,
         (status = 204, description = "The final state was seen already"),
         LookupProblems))]
 pub async fn follow_job(
@@ -60,7 +60,7 @@ fn last_event_id(headers: &HeaderMap) -> Answer<i64> {
         .to_str()
         .ok()
         .and_then(|text| text.trim().parse().ok());
-    number.ok_or_else(|| {
+    number.filter(|revision| *revision >= 0).ok_or_else(|| {
         Problem::bad_request("invalid-header", "`Last-Event-ID` is no whole number.")
             .at("Last-Event-ID")
             .fix("Send the id of the event seen last, as it is.")

@@ -4,12 +4,12 @@ use super::app::App;
 use super::openapi::{ListProblems, LookupProblems};
 use super::pagination::{list_query, next_cursor};
 use super::problem::{Answer, Problem, ProblemBody, shorten};
-use super::request::{self, query_pairs, refuse_unknown, unknown};
+use super::request::{self, Path, query_pairs, refuse_unknown, unknown};
 use super::wire::{missing, rfc3339};
 use super::{idempotency, problem};
 use crate::jobs::{self, Deleted, Filed, Interrupted, NewJob, State as JobState};
 use axum::Json;
-use axum::extract::{Path, RawQuery, Request, State};
+use axum::extract::{RawQuery, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
@@ -117,20 +117,6 @@ pub struct JobList {
     next_cursor: Option<String>,
 }
 
-/// A job to be filed.
-#[derive(ToSchema)]
-#[schema(as = JobRequest)]
-#[allow(dead_code, reason = "documents what `create_job` reads field by field")]
-pub struct JobRequest {
-    /// What kind of work it is.
-    #[schema(example = "model", default = "model")]
-    kind: Option<String>,
-    /// Id of the volume.
-    volume: String,
-    /// See the query parameters of `POST /v1/models`.
-    parameters: Option<super::openapi::ModelParameters>,
-}
-
 impl From<JobState> for State_ {
     fn from(state: JobState) -> Self {
         match state {
@@ -188,7 +174,7 @@ pub async fn describe(app: &App, job: jobs::Job) -> Answer<Job> {
 /// The job is on the disk before the answer is on its way. With an `Idempotency-Key`, the same
 /// request again gives the same job.
 #[utoipa::path(post, path = "/v1/jobs", tag = "jobs",
-    request_body(content = JobRequest, content_type = "application/json"),
+    request_body(content = super::openapi::JobRequest, content_type = "application/json"),
     params(super::openapi::IdempotencyHeader),
     responses(
         (status = 202, description = "Accepted", body = Job, headers(

@@ -3,14 +3,14 @@
 use super::app::App;
 use super::openapi::{FileProblems, ListProblems, LookupProblems, UploadProblems};
 use super::pagination::{list_query, next_cursor};
-use super::problem::{Answer, Problem};
-use super::request::{query_pairs, refuse_unknown};
+use super::problem::{Answer, Problem, shorten};
+use super::request::{Path, query_pairs, refuse_unknown};
 use super::wire::{missing, rfc3339};
 use super::{files, idempotency, jobs as jobs_api, negotiate, upload};
 use crate::export::Format;
 use crate::jobs::{self, Deleted, ModelFile, NewJob, State as JobState};
 use axum::Json;
-use axum::extract::{Path, RawQuery, Request, State};
+use axum::extract::{RawQuery, Request, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::IntoResponse;
 use serde::Serialize;
@@ -339,6 +339,9 @@ pub async fn get_file(
     headers: HeaderMap,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    if !super::openapi::file_names().contains(&name) {
+        return Err(no_such_file(&name, &super::openapi::file_names()));
+    }
     let model = find(&app, &id).await?;
     send_named(&app, &model, &name, &headers).await
 }
@@ -347,18 +350,19 @@ async fn send_named(app: &App, model: &jobs::Model, name: &str, headers: &Header
     match model.file(name) {
         Some(file) => files::send(app, model, file, headers).await,
         None => {
-            let names: Vec<_> = model.files.iter().map(|file| file.name.as_str()).collect();
-            Err(Problem::new(
-                StatusCode::NOT_FOUND,
-                "not-found",
-                format!(
-                    "This model has no file `{}`.",
-                    super::problem::shorten(name)
-                ),
-            )
-            .fix(format!("It has {}.", names.join(", "))))
+            let names: Vec<_> = model.files.iter().map(|file| file.name.clone()).collect();
+            Err(no_such_file(name, &names))
         }
     }
+}
+
+fn no_such_file(name: &str, names: &[String]) -> Problem {
+    Problem::new(
+        StatusCode::NOT_FOUND,
+        "not-found",
+        format!("A model has no file `{}`.", shorten(name)),
+    )
+    .fix(format!("It has {}.", names.join(", ")))
 }
 
 async fn find(app: &App, id: &str) -> Answer<jobs::Model> {

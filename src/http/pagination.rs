@@ -3,8 +3,6 @@
 use super::problem::{Answer, Problem};
 use super::request::{query_pairs, refuse_unknown};
 use crate::jobs::{Page, PageRequest};
-use base64::Engine as _;
-use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 
 /// Entries of a page where nobody asks.
 const USUAL: u32 = 20;
@@ -45,11 +43,9 @@ fn parse_limit(text: &str) -> Answer<u32> {
 }
 
 fn parse_cursor(text: &str) -> Answer<i64> {
-    URL_SAFE_NO_PAD
-        .decode(text)
+    text.parse()
         .ok()
-        .and_then(|bytes| String::from_utf8(bytes).ok())
-        .and_then(|text| text.strip_prefix("before:")?.parse().ok())
+        .filter(|sequence| *sequence > 0)
         .ok_or_else(|| {
             Problem::bad_request(
                 "invalid-parameter",
@@ -62,6 +58,5 @@ fn parse_cursor(text: &str) -> Answer<i64> {
 
 /// The cursor of the page that follows.
 pub fn next_cursor<T>(page: &Page<T>) -> Option<String> {
-    page.next
-        .map(|sequence| URL_SAFE_NO_PAD.encode(format!("before:{sequence}")))
+    page.next.map(|sequence| sequence.to_string())
 }

@@ -1,11 +1,35 @@
-//! Taking requests apart: query strings and JSON bodies, strictly.
+//! Taking requests apart: paths, query strings and JSON bodies, strictly.
 
 use super::app::App;
 use super::problem::{Answer, Problem, shorten};
 use crate::parameters::nearest;
-use axum::extract::Request;
+use axum::extract::{FromRequestParts, Request};
+use axum::http::request::Parts;
 use axum::http::{HeaderMap, StatusCode, header};
+use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
+
+/// Parts of the path. Like axum's own, but for refusing with a problem object.
+pub struct Path<T>(pub T);
+
+impl<S, T> FromRequestParts<S> for Path<T>
+where
+    S: Send + Sync,
+    T: DeserializeOwned + Send,
+{
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Answer<Self> {
+        match axum::extract::Path::from_request_parts(parts, state).await {
+            Ok(axum::extract::Path(path)) => Ok(Self(path)),
+            Err(error) => Err(Problem::bad_request(
+                "malformed-path",
+                format!("{}.", error.body_text()),
+            )
+            .fix("Take paths from `links`, as they are.")),
+        }
+    }
+}
 
 /// The pairs of a query string, decoded, in order.
 pub fn query_pairs(query: Option<&str>) -> Vec<(String, String)> {

@@ -1,7 +1,7 @@
 //! Shapes that several resources share.
 
 use super::problem::Problem;
-use crate::jobs::{Catalogue, Timestamp};
+use crate::jobs::{Catalogue, JOB, MODEL, Timestamp, VOLUME};
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
@@ -15,7 +15,13 @@ pub fn rfc3339(at: Timestamp) -> String {
 
 /// 410 for what was erased, 404 for what never was.
 pub async fn missing(catalogue: &dyn Catalogue, what: &str, id: &str) -> Problem {
+    let prefix = match what {
+        "volume" => VOLUME,
+        "model" => MODEL,
+        _ => JOB,
+    };
     match catalogue.erased_at(id).await {
+        _ if !id.starts_with(prefix) => Problem::not_found(what, id),
         Ok(None) => Problem::not_found(what, id),
         Ok(Some(at)) => Problem::new(
             axum::http::StatusCode::GONE,

@@ -53,9 +53,13 @@ impl VolumeReader for Reader {
     }
 }
 
-/// Files as the volume's readers take them. Their stored names say nothing of the sender.
+/// Files as the volume's readers take them. Their stored names say nothing to the sender,
+/// but for the two halves of a pair.
 pub(super) fn volume_files(paths: &[PathBuf]) -> Vec<VolumeFile> {
-    paths.iter().map(VolumeFile::at).collect()
+    match paths {
+        [path] => vec![VolumeFile::named("the file", path)],
+        _ => paths.iter().map(VolumeFile::at).collect(),
+    }
 }
 
 /// Why a volume was refused, for its sender.

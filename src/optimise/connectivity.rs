@@ -139,9 +139,14 @@ impl Connectivity {
         })
     }
 
+    /// The half-edge from the first vertex to the second, if an edge joins them.
+    pub fn halfedge(&self, [u, v]: [u32; 2]) -> Option<u32> {
+        self.around(u).find(|&h| self.target(h) == v)
+    }
+
     /// Whether an edge joins `u` and `v`.
     pub fn joined(&self, u: u32, v: u32) -> bool {
-        self.around(u).any(|h| self.target(h) == v)
+        self.halfedge([u, v]).is_some()
     }
 
     /// Whether flipping `h` keeps the mesh a simplicial manifold: the new edge must not exist

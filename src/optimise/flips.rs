@@ -285,6 +285,7 @@ fn fingerprint(connectivity: &Connectivity) -> u64 {
 mod tests {
     use super::*;
     use crate::mesh::{TriMesh, shapes};
+    use crate::optimise::connectivity::Quad;
     use crate::optimise::{FitnessForm, Reference, configurations};
     use crate::surface::{Surface, SurfaceFacts};
 
@@ -537,6 +538,33 @@ mod tests {
                 assert_eq!(canonical(&flipped.triangles), canonical(&good.triangles));
             }
         }
+    }
+
+    /// A flip whose new edge touches S in its middle, at the price of a valley beside it, is
+    /// good by term D alone but not under the guard.
+    #[test]
+    fn the_guard_refuses_flips_that_stray_from_the_surface() {
+        let (mut loose, mut guarded) = (0, 0);
+        for (mesh, reference) in cases() {
+            let state = configurations(&mesh, &reference).unwrap();
+            let fitness = Fitness::new(FitnessForm::Robust, [0.0, 0.0, 0.0, 1.0], 2.0);
+            let square = |corners: &[u32]| {
+                let sum: Vec3 = corners.iter().map(|&v| mesh.vertices[v as usize]).sum();
+                let middle = sum / corners.len() as f64;
+                reference.bvh.closest(&middle).unwrap().squared_distance
+            };
+            for h in state.connectivity().edges() {
+                let Quad { a, b, c, d } = state.connectivity().quad(h);
+                let judge = |guard| state.candidate(h, &fitness, Gain::Total, guard, LEAST_GAIN);
+                let old = square(&[a, b, c]) + square(&[b, a, d]) + square(&[a, b]);
+                let new = square(&[c, a, d]) + square(&[d, b, c]);
+                if new > old + 0.1 && judge(0.0).is_some() {
+                    loose += 1;
+                    guarded += usize::from(judge(1e-6).is_some());
+                }
+            }
+        }
+        assert!(loose > 0 && guarded == 0, "{loose} {guarded}");
     }
 
     #[test]

@@ -273,7 +273,7 @@ pub const SPECS: &[ParameterSpec] = &[
     ParameterSpec {
         name: "relaxation_iterations",
         kind: Kind::Integer { min: 0, max: 1000 },
-        default: "110",
+        default: "80",
         summary: "Most rounds of centroidal relaxation (method refined)",
         read: |d, v| {
             d.retile.relaxation_iterations = v.usize();
@@ -331,14 +331,14 @@ pub const SPECS: &[ParameterSpec] = &[
     ParameterSpec {
         name: "fitness",
         kind: Kind::Choice(&["raw", "normalised", "robust"]),
-        default: "robust",
+        default: "normalised",
         summary: "Form of the fitness that drives the flips: the paper's raw reciprocals, each term \
                   between 0 and 1, or reciprocals floored at 1 degree and 0.01 mm",
         read: |d, v| {
             d.optimise.fitness = match v.text() {
                 "raw" => FitnessForm::Raw,
-                "normalised" => FitnessForm::Normalised,
-                _ => FitnessForm::Robust,
+                "robust" => FitnessForm::Robust,
+                _ => FitnessForm::Normalised,
             };
             Ok(())
         },

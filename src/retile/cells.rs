@@ -2,26 +2,32 @@
 //!
 //! Lloyd's relaxation (Du, Faber and Gunzburger, SIAM Review 1999) on samples: every sample
 //! belongs to one site; a round lets each sample go over to a site that one of its
-//! *neighbours* belongs to, where that one is nearer, and then moves every site to (first:
-//! beyond) the centroid of its samples. Since a sample only ever follows a neighbour, cells
+//! *neighbours* belongs to, where that one is nearer, and then moves every site towards the
+//! [centroid](super::clipping) of its cell. Since a sample only ever follows a neighbour, cells
 //! spread along the surface and never jump through a thin wall, although distances are
 //! straight: within one cell the two differ by a few percent, and the fit that follows
 //! forgives far more. A round costs one look at every sample and no geodesic.
 //!
-//! Over-relaxation (1.7 of the way at first) saves rounds and ends in more regular
-//! arrangements. [`Cells::tidy`] makes every cell connected. Cells are never empty.
+//! Sites have momentum (Polyak's heavy ball). Lloyd's plain steps creep; momentum carries
+//! rows of cells past the little hollows in which these get stuck: on a noisy phantom 78 %
+//! instead of 74 % of 150 cells end with six neighbours (mean of eight seeds). [`Cells::tidy`] makes every cell connected. Cells are never empty.
 
+use super::clipping::Patches;
 use super::samples::Samples;
 use crate::geometry::Vec3;
 use crate::progress::{Cancelled, Monitor};
 use rayon::prelude::*;
 use std::collections::VecDeque;
 
-/// Share of the way to the centroid in the first rounds, and how many rounds in hundredths.
-const OVER_RELAXATION: f64 = 1.7;
-const OVER_RELAXED_SHARE: f64 = 0.6;
-/// Root mean square move, in spacings, below which relaxation has settled.
-const SETTLED: f64 = 1e-3;
+/// Share of the way to the centroid that a round adds to a site's velocity, and what it keeps
+/// of the velocity before. Stable for shares below 2 (1 + momentum); momentum 0.8 ends less
+/// regular after 80 rounds.
+const STEP: f64 = 1.5;
+const MOMENTUM: f64 = 0.9;
+/// Last rounds, without momentum: plain Lloyd steps calm the sites.
+const COOLING_ROUNDS: usize = 10;
+/// Root mean square way to the centroid, in spacings, below which relaxation has settled.
+const SETTLED: f64 = 2e-4;
 /// Samples that one task looks at.
 const CHUNK: usize = 4096;
 
@@ -60,21 +66,29 @@ impl Cells {
     ) -> Result<usize, Cancelled> {
         let area: f64 = samples.area.iter().sum();
         let settled = SETTLED * (area / self.sites.len() as f64).sqrt();
+        let patches = Patches::new(samples, weights);
         let mut following = self.labels.clone();
+        let mut velocities = vec![Vec3::zeros(); self.sites.len()];
         for round in 0..rounds {
             monitor.check()?;
             self.reassign(samples, &mut following);
             self.fill_empty_cells(samples, weights);
-            let centroids = self.centroids(&samples.working, weights);
-            let over = (round as f64) < OVER_RELAXED_SHARE * rounds as f64;
-            let step = if over { OVER_RELAXATION } else { 1.0 };
+            let centroids = patches.centroids(&self.labels, &self.sites);
+            let (momentum, step) = if round + COOLING_ROUNDS < rounds {
+                (MOMENTUM, STEP)
+            } else {
+                (0.0, 1.0)
+            };
             let mut squares = 0.0;
-            for (site, centroid) in self.sites.iter_mut().zip(&centroids) {
+            for (site, (centroid, velocity)) in
+                (self.sites.iter_mut()).zip(centroids.iter().zip(&mut velocities))
+            {
                 let way = centroid - *site;
                 squares += way.norm_squared();
-                *site += way * step;
+                *velocity = *velocity * momentum + way * step;
+                *site += *velocity;
             }
-            if !over && (squares / self.sites.len() as f64).sqrt() < settled {
+            if (squares / self.sites.len() as f64).sqrt() < settled {
                 return Ok(round + 1);
             }
         }

@@ -198,3 +198,138 @@ impl LogMap {
         self.queue.clear();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Vec3;
+    use crate::mesh::TriMesh;
+    use crate::mesh::shapes;
+
+    fn domain(mesh: TriMesh) -> Domain {
+        Domain::new(mesh.vertices, mesh.triangles).unwrap()
+    }
+
+    /// A tetrahedron of edge 20, flat but for its four corners, its faces cut into small ones.
+    fn flat_sided() -> Domain {
+        let mut mesh = shapes::tetrahedron(20.0);
+        for _ in 0..4 {
+            let old = mesh.clone();
+            let mut middles = std::collections::BTreeMap::new();
+            mesh.triangles.clear();
+            for [a, b, c] in old.triangles {
+                let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(p, q)| {
+                    *middles.entry((p.min(q), p.max(q))).or_insert_with(|| {
+                        let middle = mesh.vertices[p as usize] + mesh.vertices[q as usize];
+                        mesh.vertices.push(middle / 2.0);
+                        mesh.vertices.len() as u32 - 1
+                    })
+                });
+                let cut = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
+                mesh.triangles.extend(cut);
+            }
+        }
+        domain(mesh)
+    }
+
+    fn centre(triangle: u32) -> SurfacePoint {
+        SurfacePoint {
+            triangle,
+            barycentric: [0.3, 0.45, 0.25],
+        }
+    }
+
+    #[test]
+    fn distances_on_a_flat_side_are_straight_ones() {
+        let domain = flat_sided();
+        let mut map = LogMap::new(domain.vertices.len());
+        // 256 triangles on each side; those of side 0 are the first.
+        for t in [0, 37, 100, 200, 255] {
+            let source = centre(t);
+            let x = source.position(&domain.vertices, &domain.triangles);
+            map.spread(&domain, &source, 30.0);
+            for &v in domain.triangles[..256].iter().flatten() {
+                let exact = (domain.vertices[v as usize] - x).norm();
+                let found = map.reach(v).unwrap();
+                assert!((found.distance - exact).abs() < 1e-9 * exact);
+                assert!((found.vector.norm() - exact).abs() < 1e-9 * exact);
+            }
+        }
+    }
+
+    #[test]
+    fn distances_over_an_edge_are_those_of_the_unrolled_sides() {
+        let domain = flat_sided();
+        let mut map = LogMap::new(domain.vertices.len());
+        let source = SurfacePoint {
+            triangle: 255,
+            barycentric: [1.0 / 3.0; 3],
+        };
+        let x = source.position(&domain.vertices, &domain.triangles);
+        map.spread(&domain, &source, 14.0);
+        let original = shapes::tetrahedron(20.0);
+        let corners = original.corners(0);
+        let inward = original.area_normal(0).normalize();
+        let mut compared = 0;
+        for v in 0..domain.vertices.len() as u32 {
+            let p = domain.vertices[v as usize];
+            let height = (corners[0] - p).dot(&inward);
+            let Some(found) = map.reach(v) else { continue };
+            if height < 1e-9 {
+                continue;
+            }
+            // Rolled over each side's three edges, the nearest image counts.
+            let exact = (0..3)
+                .filter_map(|k| {
+                    let (a, b) = (corners[k], corners[(k + 1) % 3]);
+                    let along = (b - a).normalize();
+                    let outward = along.cross(&inward);
+                    let foot = a + along * (p - a).dot(&along);
+                    let face = original.triangles.iter().find(|t| {
+                        let has = |i: usize| t.contains(&original.triangles[0][i]);
+                        has(k) && has((k + 1) % 3) && !has((k + 2) % 3)
+                    })?;
+                    let [q, r, s] = face.map(|v| original.vertices[v as usize]);
+                    let off = (r - q).cross(&(s - q)).normalize().dot(&(p - q));
+                    (off.abs() < 1e-9).then(|| (foot + outward * (p - foot).norm() - x).norm())
+                })
+                .fold(f64::INFINITY, f64::min);
+            if exact.is_finite() {
+                compared += 1;
+                assert!(
+                    (found.distance - exact).abs() < 1e-6 * exact,
+                    "{v}: {} {exact}",
+                    found.distance
+                );
+            }
+        }
+        assert!(compared > 200, "{compared}");
+    }
+
+    #[test]
+    fn distances_on_a_sphere_are_arcs() {
+        let radius = 20.0;
+        let domain = domain(shapes::icosphere(radius, 5));
+        let mut map = LogMap::new(domain.vertices.len());
+        let (mut worst, mut sum, mut count) = (0.0f64, 0.0, 0);
+        for t in [0u32, 1234, 5000, 17_000] {
+            let source = centre(t);
+            let x = source
+                .position(&domain.vertices, &domain.triangles)
+                .normalize();
+            map.spread(&domain, &source, radius);
+            for v in 0..domain.vertices.len() as u32 {
+                let Some(found) = map.reach(v) else { continue };
+                let angle = Vec3::dot(&x, &domain.vertices[v as usize].normalize()).acos();
+                if angle * radius > 2.0 {
+                    let error = (found.distance / (angle * radius) - 1.0).abs();
+                    worst = worst.max(error);
+                    sum += error;
+                    count += 1;
+                }
+            }
+        }
+        let mean = sum / f64::from(count);
+        assert!(mean < 2e-3 && worst < 1e-2, "{mean} {worst}");
+    }
+}

@@ -26,6 +26,7 @@
 //! says how many would do. The same input gives the same bytes on any number of threads.
 
 mod cells;
+mod clipping;
 mod domain;
 mod dual;
 mod log_map;
@@ -77,7 +78,7 @@ pub struct RetileParameters {
     pub repulsion_iterations: usize,
     /// Share of the overlap that one round of repulsion moves, (0, 1]. Default 0.15 (Turk).
     pub repulsion_strength: f64,
-    /// Most rounds of centroidal relaxation ([`Method::Refined`]), 0..=1000. Default 110.
+    /// Most rounds of centroidal relaxation ([`Method::Refined`]), 0..=1000. Default 80.
     pub relaxation_iterations: usize,
 }
 
@@ -90,7 +91,7 @@ impl Default for RetileParameters {
             adaptive: 0.0,
             repulsion_iterations: 40,
             repulsion_strength: 0.15,
-            relaxation_iterations: 110,
+            relaxation_iterations: 80,
         }
     }
 }

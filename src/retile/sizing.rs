@@ -86,7 +86,8 @@ mod tests {
         let sphere = shapes::icosphere(20.0, 4);
         let samples = Samples::new(&sphere.vertices, &sphere.vertices, &sphere.triangles, 0);
         for k in curvedness(&samples) {
-            assert!((k * 20.0 - 1.0).abs() < 0.1, "{k}");
+            // At the twelve corners of valence 5 area normals and chords differ most.
+            assert!((k * 20.0 - 1.0).abs() < 0.07, "{k}");
         }
         let torus = shapes::torus(30.0, 12.0, 80, 40);
         let samples = Samples::new(&torus.vertices, &torus.vertices, &torus.triangles, 0);

@@ -99,9 +99,59 @@ fn barycentric(corners: &[Vec2; 3], p: &Vec2) -> [f64; 3] {
     [1.0 - v - w, v, w]
 }
 
-/// Barycentric coordinates pulled off the triangle's edges; positive, sum 1.
+/// Barycentric coordinates that are positive, sum to 1 and keep off the triangle's edges:
+/// those that come too near are pulled towards the centroid.
 pub(crate) fn inset(barycentric: [f64; 3]) -> [f64; 3] {
     let clipped = barycentric.map(|x| x.max(0.0));
     let sum: f64 = clipped.iter().sum();
-    clipped.map(|x| x / sum * (1.0 - INSET) + INSET / 3.0)
+    let scaled = clipped.map(|x| x / sum);
+    if scaled.iter().all(|x| *x >= INSET / 3.0) {
+        return scaled;
+    }
+    scaled.map(|x| x * (1.0 - INSET) + INSET / 3.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    fn domain(mesh: crate::mesh::TriMesh) -> Domain {
+        Domain::new(mesh.vertices, mesh.triangles).unwrap()
+    }
+
+    #[test]
+    fn walking_back_returns_to_the_start() {
+        let domain = domain(shapes::torus(9.0, 3.0, 40, 17));
+        for (n, angle) in [0.1, 0.9, 2.2, 3.3, 4.9, 6.0].into_iter().enumerate() {
+            let start = SurfacePoint {
+                triangle: 100 * n as u32,
+                barycentric: [0.2, 0.5, 0.3],
+            };
+            let step = Vec2::new(f64::cos(angle), f64::sin(angle)) * 7.0;
+            let (end, heading) = walk(&domain, &start, step);
+            let (back, heading) = walk(&domain, &end, -heading * 7.0);
+            // The far end may have been moved off an edge by a fraction of its triangle.
+            let position = |p: &SurfacePoint| p.position(&domain.vertices, &domain.triangles);
+            assert!((position(&back) - position(&start)).norm() < 5e-3, "{n}");
+            assert!((heading + step / 7.0).norm() < 5e-3 || back.triangle != start.triangle);
+        }
+    }
+
+    #[test]
+    fn every_geodesic_of_a_tetrahedron_closes() {
+        // A regular tetrahedron unrolls to the triangular lattice: going 2 edges along a
+        // side's direction leads back to the same place.
+        let domain = domain(shapes::tetrahedron(10.0));
+        let start = SurfacePoint {
+            triangle: 0,
+            barycentric: [0.5, 0.3, 0.2],
+        };
+        let (end, heading) = walk(&domain, &start, Vec2::new(20.0, 0.0));
+        assert_eq!(end.triangle, 0);
+        for k in 0..3 {
+            assert!((end.barycentric[k] - start.barycentric[k]).abs() < 1e-9);
+        }
+        assert!((heading - Vec2::x()).norm() < 1e-9);
+    }
 }

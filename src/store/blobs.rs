@@ -149,7 +149,7 @@ impl BlobStore for FileBlobs {
         let key = Key::from_iter([STAGING, "writable"]);
         let payload = PutPayload::from(Bytes::from_static(b"yes"));
         self.files.put(&key, payload).await.map_err(failed)?;
-        Ok(())
+        self.files.delete(&key).await.map_err(failed)
     }
 }
 

@@ -4,8 +4,8 @@
 //! voxels are enclosed as the mask has. On a known surface of 3.3 mm voxels this has half the
 //! error of the raw mask (0.083 against 0.166 voxel) and keeps the volume to -0.6 %, against
 //! -2.4 % at the fixed level one half. Walls thinner than the Gaussian would dissolve: where
-//! the smoothed object has other components or handles than the mask, or leaves more than a
-//! tenth of it, sigma is halved, down to the raw mask.
+//! the smoothed object leaves more than a tenth of the mask, or falls into another number of
+//! parts (crumbs of less than 1 % aside), sigma is halved, down to the raw mask.
 
 use super::components::Components;
 use super::labels::Labels;
@@ -27,10 +27,7 @@ pub struct Smoothed {
 
 /// Smooths `mask` with `sigma` voxels or less.
 pub fn smooth(mask: &Labels, sigma: f64) -> Smoothed {
-    let wanted = (
-        mask.euler_characteristic(),
-        Components::of_inside(mask).sizes.len(),
-    );
+    let wanted = parts(mask);
     let mut used = sigma;
     while used > 0.1 {
         let candidate = with_sigma(mask, used);
@@ -46,16 +43,19 @@ pub fn smooth(mask: &Labels, sigma: f64) -> Smoothed {
             .voxels()
             .filter(|p| labels.get([0, 1, 2].map(|r| p[r] + margin[r])))
             .count();
-        let seen = (
-            labels.euler_characteristic(),
-            Components::of_inside(&labels).sizes.len(),
-        );
-        if seen == wanted && 10 * kept >= 9 * mask.count() {
+        if parts(&labels) == wanted && 10 * kept >= 9 * mask.count() {
             return candidate;
         }
         used /= 2.0;
     }
     with_sigma(mask, 0.0)
+}
+
+/// Number of components that hold at least a hundredth of the voxels.
+fn parts(labels: &Labels) -> usize {
+    let sizes = Components::of_inside(labels).sizes;
+    let all: usize = sizes.iter().sum();
+    sizes.iter().filter(|&&size| 100 * size >= all).count()
 }
 
 fn with_sigma(mask: &Labels, sigma: f64) -> Smoothed {

@@ -395,7 +395,7 @@ pub fn extract(
 ) -> Result<Surface, SurfaceError> {
     monitor.report(Stage::Surface, 0.0)?;
     check_parameters(volume, parameters)?;
-    let survey = survey::survey(volume);
+    let survey = survey::survey(volume, monitor)?;
     let mut facts = SurfaceFacts::default();
     let mut object = select(volume, parameters, &survey, &mut facts, monitor)?;
     monitor.report(Stage::Surface, 0.5)?;
@@ -595,7 +595,7 @@ fn select_label<'a>(
     let smoothed = masks::smooth(&mask, parameters.mask_smoothing);
     if smoothed.sigma < parameters.mask_smoothing {
         facts.warnings.push(format!(
-            "the mask is thin: smoothed with {} instead of {} voxels to keep its shape",
+            "thin parts of the mask would be lost: smoothed with {} instead of {} voxels",
             smoothed.sigma, parameters.mask_smoothing
         ));
     }

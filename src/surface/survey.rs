@@ -2,6 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
+use crate::progress::{Cancelled, Monitor};
 use crate::volume::Volume;
 
 /// More distinct values than this are intensities.
@@ -26,18 +29,54 @@ pub struct Survey {
 }
 
 /// Looks at every voxel once.
-pub fn survey(volume: &Volume) -> Survey {
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn survey(volume: &Volume, monitor: &Monitor) -> Result<Survey, Cancelled> {
+    let parts: Vec<(f32, f32, usize)> = volume
+        .voxels
+        .par_chunks(1 << 18)
+        .map(|part| {
+            monitor.check()?;
+            Ok(range(part))
+        })
+        .collect::<Result<_, Cancelled>>()?;
+    let minimum = parts.iter().map(|p| p.0).fold(f32::INFINITY, f32::min);
+    let maximum = parts.iter().map(|p| p.1).fold(f32::NEG_INFINITY, f32::max);
+    let not_finite = parts.iter().map(|p| p.2).sum();
+    let finite = volume.voxels.len() - not_finite;
+    let (minimum, maximum) = if finite == 0 {
+        (0.0, 0.0)
+    } else {
+        (minimum, maximum)
+    };
+    Ok(Survey {
+        minimum,
+        maximum,
+        not_finite,
+        finite,
+        labels: label_map(volume, monitor)?,
+    })
+}
+
+/// Smallest and largest finite value, and how many are not finite.
+fn range(values: &[f32]) -> (f32, f32, usize) {
     let (mut minimum, mut maximum) = (f32::INFINITY, f32::NEG_INFINITY);
     let mut not_finite = 0;
-    for chunk in volume.voxels.chunks(1 << 12) {
-        // Comparisons with NaN are false: these two loops vectorise and skip it.
-        let (mut low, mut high, mut sum) = (f32::INFINITY, f32::NEG_INFINITY, 0.0);
+    for chunk in values.chunks(1 << 10) {
+        // Branchless, so that it vectorises; 0 · NaN and 0 · ∞ are NaN and stay.
+        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+        let mut sums = [0f32; 8];
+        for eight in chunk.chunks(8) {
+            for (sum, &v) in sums.iter_mut().zip(eight) {
+                *sum += v * 0.0;
+            }
+        }
         for &v in chunk {
             low = if v < low { v } else { low };
             high = if v > high { v } else { high };
-            sum += v * 0.0;
         }
-        if sum != 0.0 {
+        if sums.iter().any(|s| s.is_nan()) {
             (low, high) = (f32::INFINITY, f32::NEG_INFINITY);
             for &v in chunk {
                 if v.is_finite() {
@@ -51,45 +90,41 @@ pub fn survey(volume: &Volume) -> Survey {
         minimum = minimum.min(low);
         maximum = maximum.max(high);
     }
-    let finite = volume.voxels.len() - not_finite;
-    if finite == 0 {
-        (minimum, maximum) = (0.0, 0.0);
-    }
-    Survey {
-        minimum,
-        maximum,
-        not_finite,
-        finite,
-        labels: label_map(volume),
-    }
+    (minimum, maximum, not_finite)
 }
 
 /// Counts the labels, or `None` as soon as a value shows that these are intensities.
-fn label_map(volume: &Volume) -> Option<BTreeMap<i64, usize>> {
+fn label_map(
+    volume: &Volume,
+    monitor: &Monitor,
+) -> Result<Option<BTreeMap<i64, usize>>, Cancelled> {
     let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
     let (mut labelled, mut same) = (0usize, 0usize);
-    for row in volume.voxels.chunks(volume.shape[0]) {
+    for (index, row) in volume.voxels.chunks(volume.shape[0]).enumerate() {
+        if index.is_multiple_of(1024) {
+            monitor.check()?;
+        }
         for run in row.chunk_by(|a, b| a == b) {
             let value = run[0];
             if value == 0.0 {
                 continue;
             }
             if value.fract() != 0.0 || !(value.abs() < 16_777_216.0) {
-                return None;
+                return Ok(None);
             }
             *counts.entry(value as i64).or_default() += run.len();
             labelled += run.len();
             same += run.len() - 1;
             let grainy = labelled > 1000 && (same as f64) < 0.25 * labelled as f64;
             if counts.len() > MOST_LABELS || grainy {
-                return None;
+                return Ok(None);
             }
         }
     }
     // A constant volume is no map of anything.
     let everything = labelled == volume.voxels.len() && counts.len() == 1;
     let piecewise = counts.len() <= 1 || same as f64 >= PIECEWISE * labelled as f64;
-    (labelled > 0 && piecewise && !everything).then_some(counts)
+    Ok((labelled > 0 && piecewise && !everything).then_some(counts))
 }
 
 /// Otsu's threshold of the values in `rows` (IEEE SMC 1979), 256 bins between minimum and
@@ -142,14 +177,24 @@ mod tests {
     #[test]
     fn label_maps_are_told_from_counts() {
         let map = volume([20, 4, 2], |n| ((n / 10) % 3) as f32);
-        let labels = survey(&map).labels.unwrap();
+        let labels = survey(&map, &Monitor::silent()).unwrap().labels.unwrap();
         assert_eq!(labels.keys().copied().collect::<Vec<_>>(), [1, 2]);
         let labelled = map.voxels.iter().filter(|v| **v > 0.0).count();
         assert_eq!(labels.values().sum::<usize>(), labelled);
         let counts = volume([40, 40, 2], |n| ((n * 7919) % 23) as f32);
-        assert_eq!(survey(&counts).labels, None);
-        assert_eq!(survey(&volume([20, 4, 2], |n| n as f32 * 0.5)).labels, None);
-        assert_eq!(survey(&volume([20, 4, 2], |_| 3.0)).labels, None);
+        assert_eq!(survey(&counts, &Monitor::silent()).unwrap().labels, None);
+        assert_eq!(
+            survey(&volume([20, 4, 2], |n| n as f32 * 0.5), &Monitor::silent())
+                .unwrap()
+                .labels,
+            None
+        );
+        assert_eq!(
+            survey(&volume([20, 4, 2], |_| 3.0), &Monitor::silent())
+                .unwrap()
+                .labels,
+            None
+        );
     }
 
     #[test]
@@ -159,7 +204,7 @@ mod tests {
             4500 => f32::INFINITY,
             n => 0.5 - n as f32,
         });
-        let seen = survey(&odd);
+        let seen = survey(&odd, &Monitor::silent()).unwrap();
         assert_eq!(
             (seen.minimum, seen.maximum, seen.not_finite),
             (-4998.5, 0.5, 2)

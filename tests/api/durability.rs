@@ -1,1 +1,171 @@
-//! What survives a kill.
+//! What survives a kill: the real program, killed with no warning.
+
+use crate::helpers::{Service, fake_engine, scan, text};
+use serde_json::{Value, json};
+use std::time::Duration;
+use ventriform::jobs::{
+    Catalogue, Failure, Fault, Filed, Intensity, JobStore, Lease, NewJob, Outcome, State, Volume,
+    VolumeFacts,
+};
+use ventriform::store::Store;
+
+#[tokio::test]
+async fn every_accepted_job_ends_once_whenever_the_service_is_killed() {
+    let data = tempfile::tempdir().unwrap();
+    let mut accepted = Vec::new();
+    for round in 0..4u64 {
+        let service = Service::start(data.path(), &["--workers", "1"]).await;
+        for seed in 0..3 {
+            let path = format!("/v1/models?points=67&seed={}", round * 10 + seed);
+            let answer = service.post(&path).body(scan()).send().await.unwrap();
+            let job: Value = answer.json().await.unwrap();
+            accepted.push(text(&job["id"]));
+        }
+        tokio::time::sleep(Duration::from_millis(60 * round)).await;
+        service.kill();
+    }
+    let service = Service::start(data.path(), &[]).await;
+    for id in &accepted {
+        let job = service.ended(id).await;
+        assert_eq!(job["state"], "succeeded", "{job}");
+        let mesh = service.get(&format!("{}.json", text(&job["links"]["mesh"])));
+        let mesh: Value = mesh.send().await.unwrap().json().await.unwrap();
+        assert_eq!(mesh["vertices"].as_array().unwrap().len(), 67);
+    }
+    let all: Value = service
+        .get("/v1/jobs?limit=100")
+        .send()
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap();
+    assert_eq!(
+        all["jobs"].as_array().unwrap().len(),
+        accepted.len(),
+        "none twice"
+    );
+    let models: Value = service
+        .get("/v1/models?limit=100")
+        .send()
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap();
+    assert_eq!(models["models"].as_array().unwrap().len(), accepted.len());
+    let shelves = ["staging", "volumes", "models"];
+    let stored = shelves.map(|shelf| std::fs::read_dir(data.path().join(shelf)).unwrap().count());
+    assert_eq!(stored, [0, 1, accepted.len()], "no orphans");
+}
+
+#[tokio::test]
+async fn a_job_that_brings_the_process_down_is_given_up_after_its_attempts() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let rows = &store.rows;
+    let job = filed(&store).await;
+    for attempt in 1..=3 {
+        let claimed = rows.claim("token", 3, 0, 10).await.unwrap().unwrap();
+        assert_eq!(
+            (claimed.id.as_str(), claimed.attempts),
+            (job.as_str(), attempt)
+        );
+        assert_eq!(rows.release_all().await.unwrap(), 1);
+    }
+    assert!(rows.claim("token", 3, 0, 10).await.unwrap().is_none());
+    let reason = Failure::new(Fault::Service, "attempt-limit", "It never ends.");
+    let buried = rows.bury(3, &reason, 5).await.unwrap();
+    assert_eq!(buried[0].state, State::Failed);
+    assert_eq!(buried[0].failure.as_ref(), Some(&reason));
+}
+
+#[tokio::test]
+async fn a_worker_that_lost_its_lease_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let rows = &store.rows;
+    let job = filed(&store).await;
+    let lease = |token: &str| Lease {
+        job: job.clone(),
+        token: token.into(),
+    };
+    rows.claim("first", 3, 0, 10).await.unwrap().unwrap();
+    assert!(
+        rows.claim("second", 3, 9, 20).await.unwrap().is_none(),
+        "it is held"
+    );
+    rows.claim("second", 3, 10, 20).await.unwrap().unwrap();
+    assert_eq!(rows.heartbeat(&lease("first"), 99).await.unwrap(), None);
+    assert!(
+        rows.progress(&lease("first"), "read", 0.5)
+            .await
+            .unwrap()
+            .is_none()
+    );
+    assert!(rows.hand_back(&lease("first")).await.unwrap().is_none());
+    let cancelled = Outcome::Cancelled;
+    assert!(
+        rows.finish(&lease("first"), &cancelled, 11)
+            .await
+            .unwrap()
+            .is_none()
+    );
+    let ended = rows
+        .finish(&lease("second"), &cancelled, 12)
+        .await
+        .unwrap()
+        .unwrap();
+    assert_eq!((ended.state, ended.attempts), (State::Cancelled, 2));
+    assert!(
+        rows.finish(&lease("second"), &cancelled, 13)
+            .await
+            .unwrap()
+            .is_none(),
+        "once"
+    );
+}
+
+async fn filed(store: &Store) -> String {
+    let volume = Volume {
+        id: "vol_1".into(),
+        sequence: 0,
+        created_at: 0,
+        bytes: 1,
+        files: vec!["volume.nii".into()],
+        facts: VolumeFacts {
+            format: "words".into(),
+            compressed: false,
+            shape: [1; 3],
+            frames: 1,
+            spacing_mm: [1.0; 3],
+            affine: [[0.0; 4]; 4],
+            affine_source: "sform".into(),
+            dtype: "int16".into(),
+            intensity: Intensity {
+                min: 0.0,
+                max: 1.0,
+                mean: 0.5,
+                not_finite: 0,
+            },
+            labels: None,
+            warnings: Vec::new(),
+        },
+    };
+    store.rows.add_volume(&volume).await.unwrap();
+    let parameters = fake_engine()
+        .work("model")
+        .unwrap()
+        .parameters_from_json(json!({"points": 67}).as_object().unwrap())
+        .unwrap();
+    let order = NewJob {
+        kind: "model".into(),
+        volume: "vol_1".into(),
+        parameters,
+        idempotency: None,
+    };
+    match store.rows.file(&order, 10, 0).await.unwrap() {
+        Filed::New(job) => job.id,
+        other => panic!("{other:?}"),
+    }
+}

@@ -2,7 +2,9 @@
 
 use reqwest::{Client, RequestBuilder, Response, StatusCode};
 use serde_json::{Map, Value, json};
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
@@ -16,6 +18,8 @@ use ventriform::jobs::{
 use ventriform::mesh::shapes::icosphere;
 use ventriform::progress::{Monitor, Stage};
 use ventriform::volume::ReadLimits;
+use ventriform::volume::nifti::{self, StoredType};
+use ventriform::volume::phantom::{PhantomParameters, phantom};
 
 /// How long a test waits for what must happen.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -338,5 +342,103 @@ fn sphere() -> Output {
     Output {
         summary: [("vertices".to_owned(), json!(42))].into_iter().collect(),
         files,
+    }
+}
+
+/// A simulated scan as a `.nii.gz`, small enough to be quick and made once.
+pub fn scan() -> Vec<u8> {
+    static SCAN: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
+    SCAN.get_or_init(|| {
+        let parameters = PhantomParameters {
+            shape: [64; 3],
+            spacing_mm: [6.4; 3],
+            ..PhantomParameters::default()
+        };
+        let made = phantom(&parameters, &Monitor::silent()).unwrap();
+        nifti::write(&made.volume, StoredType::Int16, true).unwrap()
+    })
+    .clone()
+}
+
+/// The real program as a process of its own.
+pub struct Service {
+    process: Child,
+    client: Client,
+    url: String,
+}
+
+impl Service {
+    /// Starts it on a data folder and returns once it listens.
+    pub async fn start(data: &Path, arguments: &[&str]) -> Self {
+        let mut process = Command::new(env!("CARGO_BIN_EXE_ventriform"))
+            .args(["serve", "--listen", "127.0.0.1:0", "--data-dir"])
+            .arg(data)
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(process.stdout.take().unwrap())
+            .read_line(&mut line)
+            .unwrap();
+        let url = line
+            .split_whitespace()
+            .find(|word| word.starts_with("http://"))
+            .expect("it says where it listens");
+        Self {
+            process,
+            client: Client::new(),
+            url: url.to_owned(),
+        }
+    }
+
+    pub fn get(&self, path: &str) -> RequestBuilder {
+        self.client.get(format!("{}{path}", self.url))
+    }
+
+    pub fn post(&self, path: &str) -> RequestBuilder {
+        self.client.post(format!("{}{path}", self.url))
+    }
+
+    /// Ends it as a power cut would.
+    pub fn kill(mut self) {
+        self.process.kill().unwrap();
+        self.process.wait().unwrap();
+    }
+
+    /// Waits for the job's end; the job.
+    pub async fn ended(&self, id: &str) -> Value {
+        let deadline = Instant::now() + 3 * PATIENCE;
+        loop {
+            let job = self.get(&format!("/v1/jobs/{id}")).send().await.unwrap();
+            assert_eq!(job.status(), StatusCode::OK, "{id} was lost");
+            let job: Value = job.json().await.unwrap();
+            if job["finished_at"].is_string() {
+                return job;
+            }
+            assert!(Instant::now() < deadline, "still {job}");
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+    }
+
+    /// The most memory it ever held.
+    #[cfg(target_os = "linux")]
+    pub fn peak_memory_kib(&self) -> u64 {
+        let status =
+            std::fs::read_to_string(format!("/proc/{}/status", self.process.id())).unwrap();
+        let line = status
+            .lines()
+            .find(|line| line.starts_with("VmHWM:"))
+            .unwrap();
+        line.split_whitespace().nth(1).unwrap().parse().unwrap()
+    }
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        // It may be gone already.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
     }
 }

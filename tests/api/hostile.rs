@@ -1,1 +1,139 @@
-//! Clients that mean no good.
+//! Clients that mean no good, and clients that are merely broken.
+
+use crate::helpers::{TestApp, volume};
+use std::time::Duration;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+
+async fn connect(app: &TestApp) -> TcpStream {
+    TcpStream::connect(app.url.strip_prefix("http://").unwrap())
+        .await
+        .unwrap()
+}
+
+/// What the service says until it hangs up.
+async fn last_words(stream: &mut TcpStream) -> String {
+    let mut said = Vec::new();
+    let read = tokio::time::timeout(Duration::from_secs(10), stream.read_to_end(&mut said));
+    // A reset is a way to hang up, too.
+    let _ = read.await.expect("the service hangs up");
+    String::from_utf8_lossy(&said).into_owned()
+}
+
+#[tokio::test]
+async fn connections_that_say_nothing_or_half_a_head_are_closed() {
+    let app = TestApp::with(|s| s.header_timeout = "300ms".parse().unwrap()).await;
+    let mut silent = connect(&app).await;
+    let mut slow = connect(&app).await;
+    slow.write_all(b"GET /healthz HT").await.unwrap();
+    let mut idle = connect(&app).await;
+    idle.write_all(b"GET /healthz HTTP/1.1\r\nhost: x\r\n\r\n")
+        .await
+        .unwrap();
+    last_words(&mut silent).await;
+    last_words(&mut slow).await;
+    assert!(last_words(&mut idle).await.starts_with("HTTP/1.1 200"));
+    app.json("/healthz").await;
+}
+
+#[tokio::test]
+async fn connections_beyond_the_limit_are_closed_at_once() {
+    let app = TestApp::with(|s| s.connection_limit = 3).await;
+    let mut held = Vec::new();
+    for _ in 0..3 {
+        let mut stream = connect(&app).await;
+        stream.write_all(b"GET /healthz HT").await.unwrap();
+        held.push(stream);
+    }
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    assert_eq!(last_words(&mut connect(&app).await).await, "");
+    drop(held);
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    app.json("/healthz").await;
+}
+
+#[tokio::test]
+async fn an_upload_that_stalls_is_ended_and_leaves_nothing() {
+    let app = TestApp::with(|s| s.body_timeout = "200ms".parse().unwrap()).await;
+    let mut stream = connect(&app).await;
+    let head = "POST /v1/volumes HTTP/1.1\r\nhost: x\r\ncontent-length: 1000\r\n\r\nVOLUME ";
+    stream.write_all(head.as_bytes()).await.unwrap();
+    assert!(last_words(&mut stream).await.starts_with("HTTP/1.1 408"));
+    assert!(app.stored().is_empty());
+}
+
+#[tokio::test]
+async fn an_upload_that_breaks_off_leaves_nothing() {
+    let app = TestApp::start().await;
+    let mut stream = connect(&app).await;
+    let head = "POST /v1/volumes HTTP/1.1\r\nhost: x\r\ncontent-length: 1000\r\n\r\nVOLUME ";
+    stream.write_all(head.as_bytes()).await.unwrap();
+    drop(stream);
+    for _ in 0..100 {
+        if app.stored().is_empty() {
+            break;
+        }
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    assert!(app.stored().is_empty());
+    app.volume("sphere").await;
+}
+
+#[tokio::test]
+async fn a_form_of_endless_headers_is_cut_short() {
+    let app = TestApp::start().await;
+    let start = b"--B\r\ncontent-disposition: form-data; name=\"".to_vec();
+    let pieces = std::iter::once(start).chain((0..400).map(|_| vec![b'x'; 16 << 10]));
+    let pieces = futures::stream::iter(pieces.map(Ok::<_, std::io::Error>));
+    let answer = app
+        .post("/v1/volumes")
+        .header("content-type", "multipart/form-data; boundary=B")
+        .body(reqwest::Body::wrap_stream(pieces))
+        .send()
+        .await;
+    // The service may hang up while the client still sends.
+    if let Ok(answer) = answer {
+        assert_eq!(answer.status(), 400);
+    }
+    assert!(app.stored().is_empty());
+}
+
+#[tokio::test]
+async fn odd_requests_are_refused_without_harm() {
+    let app = TestApp::start().await;
+    for path in [
+        "/v1/jobs/%00",
+        "/v1/jobs/%ff%fe",
+        "/v1/models/..%2f..%2flock/mesh",
+        "/v1/volumes/%2e%2e",
+    ] {
+        let answer = app.get(path).send().await.unwrap();
+        assert!(
+            answer.status().is_client_error(),
+            "{path}: {}",
+            answer.status()
+        );
+        let media_type = answer.headers()["content-type"]
+            .to_str()
+            .unwrap()
+            .to_owned();
+        assert_eq!(media_type, "application/problem+json", "{path}");
+    }
+    for name in [
+        "prefer",
+        "accept",
+        "idempotency-key",
+        "if-none-match",
+        "range",
+        "x-request-id",
+    ] {
+        let odd = reqwest::header::HeaderValue::from_bytes(b"\xff\xfe;q=;;,=\"").unwrap();
+        let answer = app
+            .post("/v1/models")
+            .header(name, odd)
+            .body(volume("sphere"))
+            .send()
+            .await;
+        assert!(answer.unwrap().status().as_u16() < 500, "{name}");
+    }
+}

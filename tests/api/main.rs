@@ -4,6 +4,11 @@
 //! sphere at once, or does what the first word of the volume says, so that these tests are
 //! about the service and not about geometry.
 
+#![allow(
+    clippy::unwrap_used,
+    reason = "tests state their expectations by panicking"
+)]
+
 mod helpers;
 
 mod config;

@@ -115,6 +115,28 @@ impl IntoResponses for FileAnswer {
     }
 }
 
+/// 200 with a job's changes: what each event of the stream is.
+pub struct EventsAnswer;
+
+impl IntoResponses for EventsAnswer {
+    fn responses() -> Responses {
+        let text = || ObjectBuilder::new().schema_type(Type::String);
+        let job = text()
+            .content_media_type("application/json")
+            .content_schema(Some(Ref::from_schema_name("Job")));
+        let event = ObjectBuilder::new()
+            .property("id", text())
+            .property("event", text().enum_values(Some(["job"])))
+            .property("data", job)
+            .required("data");
+        let response = ResponseBuilder::new()
+            .description("The changes")
+            .content("text/event-stream", Content::new(Some(Schema::from(event))))
+            .build();
+        [("200".to_owned(), response.into())].into()
+    }
+}
+
 fn file_answer(description: &str, contents: BTreeMap<&'static str, Content>) -> Responses {
     let text = || HeaderBuilder::new().schema(Some(ObjectBuilder::new().schema_type(Type::String)));
     let mut response = ResponseBuilder::new()

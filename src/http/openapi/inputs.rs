@@ -9,7 +9,7 @@ use utoipa::openapi::schema::{
     AdditionalProperties, ArrayBuilder, KnownFormat, Object, ObjectBuilder, Schema, SchemaFormat,
     Type,
 };
-use utoipa::openapi::{RefOr, Required};
+use utoipa::openapi::{Ref, RefOr, Required};
 use utoipa::{IntoParams, PartialSchema, ToSchema};
 
 /// Parameters of a model as a JSON object.
@@ -117,7 +117,9 @@ impl IntoParams for PageParameters {
             .minimum(Some(1))
             .maximum(Some(100))
             .default(Some(json!(20)));
-        let cursor = ObjectBuilder::new().schema_type(Type::String);
+        let cursor = ObjectBuilder::new()
+            .schema_type(Type::String)
+            .pattern(Some("^[1-9][0-9]{0,17}$"));
         vec![
             query("limit", "Most entries of the page")
                 .schema(Some(Schema::from(limit)))
@@ -170,6 +172,53 @@ impl IntoParams for IdempotencyHeader {
     }
 }
 
+/// `Last-Event-ID`.
+pub struct EventHeader;
+
+impl IntoParams for EventHeader {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let mut revision = header("Last-Event-ID", "Revision of the job seen last");
+        let schema = ObjectBuilder::new()
+            .schema_type(Type::Integer)
+            .minimum(Some(0));
+        revision.schema = Some(Schema::from(schema).into());
+        vec![revision]
+    }
+}
+
+/// A job to be filed, as `create_job` reads it field by field.
+pub struct JobRequest;
+
+impl ToSchema for JobRequest {
+    fn name() -> Cow<'static, str> {
+        "JobRequest".into()
+    }
+
+    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
+        schemas.push((ModelParameters::name().into(), ModelParameters::schema()));
+    }
+}
+
+impl PartialSchema for JobRequest {
+    fn schema() -> RefOr<Schema> {
+        let text = || ObjectBuilder::new().schema_type(Type::String);
+        let kind = text()
+            .description(Some("What kind of work it is"))
+            .enum_values(Some(["model"]))
+            .default(Some(json!("model")));
+        let volume = text()
+            .description(Some("Id of the volume"))
+            .examples(["vol_9f86d081884c7d659a2feaa0c55ad015"]);
+        let object = ObjectBuilder::new()
+            .property("kind", Schema::from(kind))
+            .property("volume", Schema::from(volume))
+            .property("parameters", Ref::from_schema_name(ModelParameters::name()))
+            .required("volume")
+            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
+        Schema::from(object.build()).into()
+    }
+}
+
 /// `If-None-Match`, `Range`, `If-Range`.
 pub struct ConditionalHeaders;
 
@@ -183,6 +232,13 @@ impl IntoParams for ConditionalHeaders {
     }
 }
 
+/// Names of a model's files.
+pub fn file_names() -> Vec<String> {
+    let meshes = Format::ALL.map(|format| format!("mesh.{}", format.extension()));
+    let reports = ["report.json", "report.html"].map(str::to_owned);
+    meshes.into_iter().chain(reports).collect()
+}
+
 /// A model's files.
 pub struct FileName;
 
@@ -194,12 +250,10 @@ impl ToSchema for FileName {
 
 impl PartialSchema for FileName {
     fn schema() -> RefOr<Schema> {
-        let meshes = Format::ALL.map(|format| format!("mesh.{}", format.extension()));
-        let reports = ["report.json", "report.html"].map(str::to_owned);
         Schema::from(
             ObjectBuilder::new()
                 .schema_type(Type::String)
-                .enum_values(Some(meshes.into_iter().chain(reports))),
+                .enum_values(Some(file_names())),
         )
         .into()
     }
@@ -225,7 +279,8 @@ impl PartialSchema for UploadForm {
             ));
         let form = ObjectBuilder::new()
             .property("file", Schema::from(file))
-            .required("file");
+            .required("file")
+            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
         Schema::from(form).into()
     }
 }

@@ -8,12 +8,12 @@ mod answers;
 mod inputs;
 
 pub use answers::{
-    DownloadAnswers, FileAnswer, FileProblems, ListProblems, LookupProblems, MeshAnswer,
-    ReportAnswer, UploadProblems,
+    DownloadAnswers, EventsAnswer, FileAnswer, FileProblems, ListProblems, LookupProblems,
+    MeshAnswer, ReportAnswer, UploadProblems,
 };
 pub use inputs::{
-    ConditionalHeaders, FileName, IdempotencyHeader, ModelParameters, ModelQuery, PageParameters,
-    UploadForm,
+    ConditionalHeaders, EventHeader, FileName, IdempotencyHeader, JobRequest, ModelParameters,
+    ModelQuery, PageParameters, UploadForm, file_names,
 };
 
 use utoipa::OpenApi;

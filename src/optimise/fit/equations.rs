@@ -11,6 +11,7 @@ use nalgebra::Matrix3;
 
 use crate::geometry::Vec3;
 use crate::optimise::connectivity::Connectivity;
+use crate::progress::{Cancelled, Monitor};
 
 /// A symmetric positive semidefinite system A x = g over 3-vectors at vertices.
 #[derive(Debug, Clone)]
@@ -98,7 +99,15 @@ impl NormalEquations {
 
     /// The solution, to a residual of `tolerance` times the right-hand side's norm (in the
     /// preconditioner's metric), or after `most` steps.
-    pub fn solve(&self, tolerance: f64, most: usize) -> Vec<Vec3> {
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn solve(
+        &self,
+        tolerance: f64,
+        most: usize,
+        monitor: &Monitor,
+    ) -> Result<Vec<Vec3>, Cancelled> {
         let inverse: Vec<Matrix3<f64>> = self
             .diagonal
             .iter()
@@ -113,6 +122,7 @@ impl NormalEquations {
         let mut rz = dot(&residual, &z);
         let goal = tolerance * tolerance * rz;
         for _ in 0..most {
+            monitor.check()?;
             if !(rz > goal) {
                 break;
             }
@@ -134,7 +144,7 @@ impl NormalEquations {
                 direction[i] = z[i] + direction[i] * ratio;
             }
         }
-        x
+        Ok(x)
     }
 
     fn times(&self, x: &[Vec3]) -> Vec<Vec3> {
@@ -234,7 +244,7 @@ mod tests {
             .cholesky()
             .unwrap()
             .solve(&(a.transpose() * right));
-        let found = equations.solve(1e-12, 1000);
+        let found = equations.solve(1e-12, 1000, &Monitor::silent()).unwrap();
         for v in 0..n {
             for c in 0..3 {
                 assert!((found[v][c] - dense[3 * v + c]).abs() < 1e-9);

@@ -10,7 +10,8 @@
 //! 4. volume: the whole is to enclose what S encloses;
 //! 5. damping: a little weight on staying put.
 //!
-//! After every second round edges are flipped where that betters shapes and valences.
+//! After every second round edges are flipped where that betters shapes and valences; in the
+//! first half of the rounds irregular vertices are moved together until they cancel.
 //!
 //! Guaranteed: no triangle turns over in a round and none comes to pierce another; where a
 //! step would do so, the vertices concerned make half of it, or less, or none.
@@ -83,11 +84,17 @@ pub fn fit(
     for round in 0..parameters.rounds {
         let fraction = round as f64 / (parameters.rounds + 1) as f64;
         monitor.report(Stage::Optimise, fraction)?;
-        let step = terms::displacement(&model);
+        let step = terms::displacement(&model, monitor)?;
         shortened += usize::from(advance(&mut model.vertices, &model.connectivity, &step));
+        monitor.check()?;
         follow_partners(&mut model);
         if round % 2 == 1 && round + 1 < parameters.rounds {
+            // Early, so that enough rounds are left to even the triangles out.
+            if 2 * round < parameters.rounds {
+                flips += polish::glide(&mut model, parameters.glide, monitor)?;
+            }
             flips += polish::flip(&mut model);
+            monitor.check()?;
             follow_partners(&mut model);
         }
     }
@@ -244,8 +251,58 @@ mod tests {
             model.connectivity.flip(h);
         }
         follow_partners(&mut model);
-        assert_eq!(polish::flip(&mut model), 5);
-        let valences = (0..n as u32).map(|v| model.connectivity.valence(v));
-        assert_eq!(valences.filter(|&v| v == 5).count(), 12);
+        assert!(irregularity(&model.connectivity) > 12);
+        assert!(polish::flip(&mut model) >= 5);
+        assert_eq!(irregularity(&model.connectivity), 12);
+    }
+
+    /// Σ (valence - 6)²: 12 on a sphere whose only irregular vertices are twelve fives.
+    fn irregularity(connectivity: &Connectivity) -> u32 {
+        (0..)
+            .zip(connectivity.triangles().iter().flatten())
+            .map(|(h, _)| connectivity.valence(connectivity.origin(h)))
+            // Every vertex is met once for each triangle round it.
+            .map(|valence| 420 * valence.abs_diff(6).pow(2) / valence)
+            .sum::<u32>()
+            / 420
+    }
+
+    /// Two pairs of irregular vertices that have travelled apart: no single flip helps.
+    #[test]
+    fn gliding_brings_separated_irregular_vertices_together() {
+        let reference = reference(shapes::icosphere(30.0, 4));
+        let mesh = shapes::icosphere(30.0, 3);
+        let n = mesh.vertices.len();
+        let (parameters, sizing) = (FitParameters::default(), vec![1.0; n]);
+        let fresh = model(&mesh, &reference, &parameters, &sizing);
+        let after = |connectivity: &Connectivity, h: u32| {
+            let mut flipped = connectivity.clone();
+            let legal = flipped.can_flip(h)
+                && super::super::legality::replacement(&mesh.vertices, &flipped.quad(h), 0.0)
+                    .is_some();
+            legal.then(|| {
+                flipped.flip(h);
+                flipped
+            })
+        };
+        let stuck = |connectivity: &Connectivity| {
+            let now = irregularity(connectivity);
+            let mut flips = connectivity.edges().filter_map(|h| after(connectivity, h));
+            flips.all(|flipped| irregularity(&flipped) >= now)
+        };
+        let torn = fresh.connectivity.edges().find_map(|first| {
+            let pair = after(&fresh.connectivity, first)?;
+            let near = pair.around(pair.origin(first)).collect::<Vec<u32>>();
+            near.into_iter().find_map(|second| {
+                let apart = after(&pair, second)?;
+                (irregularity(&apart) == irregularity(&pair) && stuck(&apart)).then_some(apart)
+            })
+        });
+        let mut model = fresh;
+        model.connectivity = torn.unwrap();
+        follow_partners(&mut model);
+        assert!(irregularity(&model.connectivity) > 12);
+        polish::glide(&mut model, 3, &Monitor::silent()).unwrap();
+        assert_eq!(irregularity(&model.connectivity), 12);
     }
 }

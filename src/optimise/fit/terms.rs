@@ -7,6 +7,7 @@ use super::Model;
 use super::equations::NormalEquations;
 use super::samples::{LEAST_FACING, Sample};
 use crate::geometry::{Vec3, triangle};
+use crate::progress::{Cancelled, Monitor};
 
 /// How many times the mean square a squared distance may count as, where peaks weigh more.
 const PEAK_CAP: f64 = 20.0;
@@ -26,18 +27,23 @@ const NEAR: f64 = 0.2;
 const MOST_STEPS: usize = 200;
 
 /// The displacement of every vertex that one round asks for.
-pub fn displacement(model: &Model) -> Vec<Vec3> {
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn displacement(model: &Model, monitor: &Monitor) -> Result<Vec<Vec3>, Cancelled> {
     let vertices = model.vertices.len();
     let mut equations = NormalEquations::new(vertices, &model.connectivity);
     add_distances(&mut equations, model);
+    monitor.check()?;
     add_midpoints(&mut equations, model);
+    monitor.check()?;
     add_shapes(&mut equations, model);
     set_volume(&mut equations, model);
     let damping = model.parameters.damping / vertices as f64;
     for v in 0..vertices as u32 {
         equations.add_anchor(v, &Vec3::zeros(), damping);
     }
-    equations.solve(TOLERANCE, MOST_STEPS)
+    equations.solve(TOLERANCE, MOST_STEPS, monitor)
 }
 
 fn add_distances(equations: &mut NormalEquations, model: &Model) {

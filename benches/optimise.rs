@@ -1,0 +1,45 @@
+//! The fit and the flips on a ventricle-like cup, from the points that re-tiling hands them.
+
+use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
+use ventriform::mesh::shapes;
+use ventriform::optimise::{FitParameters, OptimiseParameters, Reference, optimise};
+use ventriform::progress::Monitor;
+use ventriform::retile::{RetileParameters, retile};
+use ventriform::surface::from_mesh;
+
+fn bench(criterion: &mut Criterion) {
+    let monitor = Monitor::silent();
+    // About as many triangles as Marching Cubes makes of a 128³ volume with 2 mm voxels.
+    let surface = from_mesh(shapes::cup(75.0, 32.0, 11.0, 110), 2.0).expect("a closed cup");
+    let reference = Reference::new(&surface);
+    let fitted = OptimiseParameters::default();
+    let flipped = OptimiseParameters {
+        fit: FitParameters {
+            rounds: 0,
+            ..FitParameters::default()
+        },
+        ..OptimiseParameters::default()
+    };
+    let mut group = criterion.benchmark_group("optimise");
+    group.sample_size(10);
+    for points in [67, 150, 300, 1000] {
+        let parameters = RetileParameters {
+            points,
+            ..RetileParameters::default()
+        };
+        let tiled = retile(&surface, &parameters, &monitor).expect("enough points");
+        for (name, parameters) in [("fit_and_flips", &fitted), ("flips", &flipped)] {
+            group.bench_function(BenchmarkId::new(name, points), |b| {
+                b.iter_batched(
+                    || &tiled,
+                    |tiled| optimise(tiled, &reference, parameters, &monitor),
+                    BatchSize::SmallInput,
+                );
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, bench);
+criterion_main!(benches);

@@ -1,0 +1,204 @@
+//! The refined route on many surfaces: exactly N points, closed, the surface's topology, no
+//! piercing; evenly spread; the same on any number of threads.
+
+use rand::RngExt;
+use ventriform::geometry::random::{Purpose, stream};
+use ventriform::geometry::{Vec3, triangle};
+use ventriform::mesh::intersections::self_intersections;
+use ventriform::mesh::{TriMesh, shapes, topology};
+use ventriform::progress::Monitor;
+use ventriform::retile::{RetileError, RetileParameters, Tiled, retile};
+use ventriform::surface::{Surface, from_mesh};
+
+fn surface(mesh: TriMesh) -> Surface {
+    from_mesh(mesh, 1.0).expect("a closed shape")
+}
+
+fn refined(surface: &Surface, points: usize, seed: u64) -> Result<Tiled, RetileError> {
+    let parameters = RetileParameters {
+        points,
+        seed,
+        ..RetileParameters::default()
+    };
+    retile(surface, &parameters, &Monitor::silent())
+}
+
+fn check(surface: &Surface, points: usize, tiled: &Tiled) {
+    assert_eq!(tiled.mesh.vertices.len(), points);
+    assert_eq!(tiled.sizing.len(), points);
+    let before = topology::check(&surface.mesh).expect("closed");
+    let after = topology::check(&tiled.mesh).expect("closed");
+    assert_eq!(before.euler_characteristic, after.euler_characteristic);
+    assert_eq!(before.components, after.components);
+    assert!(tiled.mesh.volume() > 0.0);
+    assert_eq!(self_intersections(&tiled.mesh), Vec::<[u32; 2]>::new());
+}
+
+fn radius_ratios(mesh: &TriMesh) -> (f64, f64) {
+    let ratios = (0..mesh.triangles.len()).map(|t| {
+        let [a, b, c] = mesh.corners(t);
+        triangle::radius_ratio(&a, &b, &c)
+    });
+    let (sum, least) = ratios.fold((0.0, 1.0f64), |(s, m), r| (s + r, m.min(r)));
+    (sum / mesh.triangles.len() as f64, least)
+}
+
+/// A shape drawn at random, stretched, bent and roughened.
+fn any_surface(seed: u64) -> Surface {
+    let mut random = stream(seed, Purpose::PhantomShape);
+    let mut draw = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
+    let mut mesh = match seed % 4 {
+        0 => shapes::icosphere(20.0, 3),
+        1 => shapes::torus(30.0, draw(6.0, 20.0), 48, 20),
+        2 => shapes::cup(draw(30.0, 80.0), 30.0, draw(4.0, 14.0), 36),
+        _ => shapes::icosphere(25.0, 4),
+    };
+    let stretch = Vec3::new(draw(0.5, 1.5), draw(0.5, 1.5), draw(0.5, 1.5));
+    let (bend, rough) = (draw(0.0, 0.01), draw(0.0, 0.3));
+    for v in &mut mesh.vertices {
+        v.component_mul_assign(&stretch);
+        v.x += bend * v.z * v.z;
+        *v += Vec3::new(
+            draw(-rough, rough),
+            draw(-rough, rough),
+            draw(-rough, rough),
+        );
+    }
+    surface(mesh)
+}
+
+#[test]
+fn any_surface_is_retiled_or_refused_with_a_number_that_does() {
+    let mut refused = 0;
+    for seed in 0..120 {
+        let surface = any_surface(seed);
+        let points = [12, 20, 35, 67, 150, 300][seed as usize % 6];
+        match refined(&surface, points, seed) {
+            Ok(tiled) => check(&surface, points, &tiled),
+            Err(RetileError::TooFewPoints { needed, .. }) => {
+                refused += 1;
+                assert!(needed > points);
+                check(
+                    &surface,
+                    needed,
+                    &refined(&surface, needed, seed).expect("enough"),
+                );
+            }
+            Err(error) => panic!("seed {seed}: {error}"),
+        }
+    }
+    assert!(refused <= 12, "{refused} of 120 refused");
+}
+
+#[test]
+fn twelve_points_on_a_sphere_are_an_icosahedron() {
+    let surface = surface(shapes::icosphere(20.0, 4));
+    let tiled = refined(&surface, 12, 1).expect("a sphere takes twelve points");
+    check(&surface, 12, &tiled);
+    let mut valence = [0; 12];
+    for v in tiled.mesh.triangles.iter().flatten() {
+        valence[*v as usize] += 1;
+    }
+    assert_eq!(valence, [5; 12]);
+    let (_, least) = radius_ratios(&tiled.mesh);
+    assert!(least > 0.99, "{least}");
+}
+
+#[test]
+fn triangles_are_nearly_equilateral() {
+    let surface = surface(shapes::cup(60.0, 30.0, 11.0, 64));
+    let tiled = refined(&surface, 150, 1).expect("a cup takes 150 points");
+    let (mean, least) = radius_ratios(&tiled.mesh);
+    assert!(mean > 0.955 && least > 0.6, "{mean} {least}");
+}
+
+#[test]
+fn curvature_draws_points_together() {
+    let surface = surface(shapes::cup(60.0, 30.0, 8.0, 64));
+    let parameters = RetileParameters {
+        points: 200,
+        adaptive: 0.5,
+        ..RetileParameters::default()
+    };
+    let tiled = retile(&surface, &parameters, &Monitor::silent()).expect("200 points");
+    check(&surface, 200, &tiled);
+    let rim = |mesh: &TriMesh| mesh.vertices.iter().filter(|v| v.z > -2.0).count();
+    let even = refined(&surface, 200, 1).expect("200 points");
+    assert!(rim(&tiled.mesh) > rim(&even.mesh) * 5 / 4);
+    assert!(tiled.sizing.iter().all(|h| (0.3..3.0).contains(h)));
+}
+
+#[test]
+fn more_points_than_the_surface_has_vertices() {
+    let surface = surface(shapes::icosphere(20.0, 2));
+    check(
+        &surface,
+        5000,
+        &refined(&surface, 5000, 1).expect("5000 points"),
+    );
+}
+
+#[test]
+fn several_components_share_the_points() {
+    let mut mesh = shapes::icosphere(20.0, 3);
+    let first = mesh.vertices.len() as u32;
+    let torus = shapes::torus(15.0, 5.0, 40, 20);
+    let far = Vec3::new(60.0, 0.0, 0.0);
+    mesh.vertices.extend(torus.vertices.iter().map(|v| v + far));
+    let moved = torus.triangles.iter().map(|t| t.map(|v| v + first));
+    mesh.triangles.extend(moved);
+    let surface = surface(mesh);
+    check(
+        &surface,
+        150,
+        &refined(&surface, 150, 1).expect("150 points"),
+    );
+}
+
+#[test]
+fn the_same_on_any_number_of_threads_and_other_for_another_seed() {
+    let surface = surface(shapes::cup(60.0, 30.0, 11.0, 80));
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads");
+        pool.install(|| refined(&surface, 400, 5).expect("400 points").mesh)
+    };
+    let one = on(1);
+    assert_eq!(one, on(2));
+    assert_eq!(one, on(16));
+    assert_ne!(one, refined(&surface, 400, 6).expect("400 points").mesh);
+}
+
+#[test]
+fn parameters_out_of_range_are_named() {
+    let surface = surface(shapes::icosphere(20.0, 3));
+    let with = |change: &dyn Fn(&mut RetileParameters)| {
+        let mut parameters = RetileParameters::default();
+        change(&mut parameters);
+        retile(&surface, &parameters, &Monitor::silent()).map(|t| t.facts.attempts)
+    };
+    assert!(matches!(
+        with(&|p| p.points = 11),
+        Err(RetileError::TooFewPoints { needed: 12, .. })
+    ));
+    assert!(matches!(
+        with(&|p| p.points = 50_001),
+        Err(RetileError::TooManyPoints { limit: 50_000, .. })
+    ));
+    assert!(matches!(
+        with(&|p| p.adaptive = f64::NAN),
+        Err(RetileError::BadParameter {
+            name: "adaptive",
+            ..
+        })
+    ));
+    assert!(matches!(
+        with(&|p| p.repulsion_strength = 0.0),
+        Err(RetileError::BadParameter {
+            name: "repulsion_strength",
+            ..
+        })
+    ));
+}
