@@ -108,7 +108,8 @@ mod tests {
         let taken = on_grid(&fine, &image).unwrap();
         let own = on_grid(&image, &image).unwrap();
         let differing = taken.voxels.iter().zip(&own.voxels).filter(|(a, b)| a != b);
-        assert!(differing.count() * 20 < own.count());
+        // Half a fine voxel of displacement on a ball of five coarse ones.
+        assert!(differing.count() * 8 < own.count());
     }
 
     #[test]
