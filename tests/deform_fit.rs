@@ -10,7 +10,7 @@ use ventriform::deform::field::Field;
 use ventriform::deform::localise::{Hints, LocaliseError};
 use ventriform::deform::sensors::{Look, SensorKind, Shift};
 use ventriform::deform::template::{Organ, Template, TemplateError};
-use ventriform::deform::voxelise::{Mask, voxelise};
+use ventriform::deform::voxelise::voxelise;
 use ventriform::deform::{DeformError, DeformParameters, fit};
 use ventriform::evaluate::masks::compare;
 use ventriform::geometry::Vec3;
@@ -260,9 +260,7 @@ fn no_heart_is_said_and_not_made_up() {
     ));
     let solid = picture(40, 3.0, |p| ball(p, &Vec3::zeros(), 40.0));
     match fit_to(&solid) {
-        Err(DeformError::Localise(LocaliseError::NoHeart { hollowness, .. })) => {
-            assert!(hollowness < 0.1);
-        }
+        Err(DeformError::Localise(LocaliseError::NoHeart { .. })) => {}
         other => panic!("{:?}", other.map(|f| f.localisation)),
     }
 }
@@ -312,5 +310,4 @@ fn a_cancelled_fit_ends() {
     let template = ventricle(cup(Vec3::zeros(), axis(), 1.0));
     let volume = picture(24, 0.0, |p| ball(p, &Vec3::zeros(), 20.0));
     assert!(fit(&volume, &template, &DeformParameters::default(), &monitor).is_err());
-    assert_eq!(Mask::empty([2, 2, 2]).count(), 0);
 }
