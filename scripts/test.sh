@@ -69,8 +69,8 @@ say "cargo test"
 cargo test --no-fail-fast -- --show-output 2>&1 | tee "$log"
 cargo_status=${PIPESTATUS[0]}
 read -r p f i < <(awk '/^test result:/ { p += $4; f += $6; i += $8 } END { print p + 0, f + 0, i + 0 }' "$log")
-# A test that lacks its data says `SKIPPED: why` and returns; the harness counts it as passed.
-s=$(grep -c '^SKIPPED: ' "$log")
+# A test that lacks its data says `skipped: why` and returns; the harness counts it as passed.
+s=$(grep -c '^skipped: ' "$log")
 passed=$((passed + p - s)) failed=$((failed + f)) skipped=$((skipped + i + s))
 if [ "$cargo_status" -ne 0 ] && [ "$f" -eq 0 ]; then failed=$((failed + 1)); fi
 

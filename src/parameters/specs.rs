@@ -286,7 +286,7 @@ pub const SPECS: &[ParameterSpec] = &[
         kind: Kind::Integer { min: 0, max: 200 },
         default: "",
         summary: "Rounds of the least-squares fit; 0 leaves the points on the surface (default \
-                  20 for refined, 0 for paper)",
+                  14 for refined, 0 for paper)",
         read: |d, v| {
             d.fit_rounds = Some(v.usize());
             Ok(())
@@ -328,6 +328,35 @@ pub const SPECS: &[ParameterSpec] = &[
         "1",
         "Weight of the model's own edge midpoints in the fit"
     ),
+    fit_spec!(
+        "fit_damping",
+        damping,
+        0.000001..=1.0,
+        "0.003",
+        "Weight of staying put in a round of the fit"
+    ),
+    ParameterSpec {
+        name: "fit_samples",
+        kind: Kind::Integer { min: 4, max: 200 },
+        default: "12",
+        summary: "Samples of the surface for each of the model's triangles in the fit",
+        read: |d, v| {
+            d.optimise.fit.samples_per_triangle = v.usize();
+            Ok(())
+        },
+        write: |p| json!(p.optimise.fit.samples_per_triangle),
+    },
+    ParameterSpec {
+        name: "fit_glide",
+        kind: Kind::Integer { min: 0, max: 4 },
+        default: "3",
+        summary: "How many flips the fit looks ahead to let irregular vertices cancel",
+        read: |d, v| {
+            d.optimise.fit.glide = v.usize();
+            Ok(())
+        },
+        write: |p| json!(p.optimise.fit.glide),
+    },
     ParameterSpec {
         name: "fitness",
         kind: Kind::Choice(&["raw", "normalised", "robust"]),

@@ -28,6 +28,11 @@ const SAMPLES_PER_CELL: usize = 20;
 const SETTLING_ROUNDS: usize = 20;
 /// Transplantations before giving up on a start.
 const REPAIRS: usize = 24;
+/// Sites that one repair moves at most.
+const TRANSPLANTS: usize = 4;
+/// Factor by which a repair raises the density round a crowded cell; spacing goes with its
+/// fourth root.
+const THICKENING: f64 = 3.0;
 /// Random starts before giving up on N.
 const STARTS: u64 = 3;
 /// Largest multiple of N that is tried to tell which N would do.
@@ -134,8 +139,9 @@ impl<'a> Job<'a> {
         let rounds = self.parameters.relaxation_iterations;
         monitor.report(Stage::Retile, 0.1)?;
         facts.relaxation_rounds += cells.relax(&self.samples, &self.weights, rounds, monitor)?;
+        let mut weights = self.weights.clone();
         let mut moved = Vec::new();
-        for repair in 0..=REPAIRS {
+        for _ in 0..=REPAIRS {
             facts.attempts += 1;
             monitor.report(Stage::Retile, 0.8)?;
             cells.tidy(&self.samples);
@@ -147,24 +153,51 @@ impl<'a> Job<'a> {
                         triangles,
                     };
                     let crossing = self_intersections(&mesh);
-                    let Some([first, _]) = crossing.first() else {
+                    if crossing.is_empty() {
                         return Ok(Some((mesh, self.sizing(&cells))));
-                    };
-                    mesh.triangles[*first as usize].to_vec()
+                    }
+                    sites_of(&mesh, &crossing)
                 }
             };
-            let Some(&crowded) = crowded.get(repair % crowded.len().max(1)) else {
+            if crowded.is_empty() {
                 return Ok(None);
-            };
-            let Some(site) = self.least_loaded(&cells, crowded, &moved) else {
-                return Ok(None);
-            };
-            moved.push(site);
-            cells.transplant(&self.samples, site, crowded);
+            }
+            self.thicken(&cells, &crowded, &mut weights);
+            for &site in crowded.iter().take(TRANSPLANTS) {
+                let Some(light) = self.least_loaded(&cells, &weights, &crowded, &moved) else {
+                    return Ok(None);
+                };
+                moved.push(light);
+                cells.transplant(&self.samples, light, site);
+            }
             facts.relaxation_rounds +=
-                cells.relax(&self.samples, &self.weights, SETTLING_ROUNDS, monitor)?;
+                cells.relax(&self.samples, &weights, SETTLING_ROUNDS, monitor)?;
+            moved.drain(..moved.len().saturating_sub(self.points / 4));
         }
         Ok(None)
+    }
+
+    /// Makes the density higher in the crowded cells and those around them, so that the sites
+    /// which move there stay there.
+    fn thicken(&self, cells: &Cells, crowded: &[u32], weights: &mut [f64]) {
+        let mut near = vec![false; self.points];
+        for &site in crowded {
+            near[site as usize] = true;
+        }
+        for v in 0..self.samples.len() {
+            let around = self.samples.around(v).iter();
+            if around
+                .clone()
+                .any(|&n| crowded.contains(&cells.labels[n as usize]))
+            {
+                near[cells.labels[v] as usize] = true;
+            }
+        }
+        for (weight, &site) in weights.iter_mut().zip(&cells.labels) {
+            if near[site as usize] {
+                *weight *= THICKENING;
+            }
+        }
     }
 
     /// Distinct random samples, each component getting its share but at least as many as its
@@ -202,14 +235,20 @@ impl<'a> Job<'a> {
         seeds
     }
 
-    /// The site with the lightest cell that was not moved before.
-    fn least_loaded(&self, cells: &Cells, crowded: u32, moved: &[u32]) -> Option<u32> {
+    /// The site with the lightest cell that is not crowded and was not moved lately.
+    fn least_loaded(
+        &self,
+        cells: &Cells,
+        weights: &[f64],
+        crowded: &[u32],
+        moved: &[u32],
+    ) -> Option<u32> {
         let mut load = vec![0.0; self.points];
-        for (&site, weight) in cells.labels.iter().zip(&self.weights) {
+        for (&site, weight) in cells.labels.iter().zip(weights) {
             load[site as usize] += weight;
         }
         (0..self.points as u32)
-            .filter(|site| *site != crowded && !moved.contains(site))
+            .filter(|site| !crowded.contains(site) && !moved.contains(site))
             .min_by(|a, b| load[*a as usize].total_cmp(&load[*b as usize]))
     }
 
@@ -249,4 +288,16 @@ impl<'a> Job<'a> {
             .map(|(sum, count)| sum / f64::from(count.max(1)))
             .collect()
     }
+}
+
+/// The sites whose triangles cross, each once, in order of their number.
+fn sites_of(mesh: &TriMesh, crossing: &[[u32; 2]]) -> Vec<u32> {
+    let corners = crossing
+        .iter()
+        .flatten()
+        .map(|&t| mesh.triangles[t as usize]);
+    let mut sites: Vec<u32> = corners.flatten().collect();
+    sites.sort_unstable();
+    sites.dedup();
+    sites
 }

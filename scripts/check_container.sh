@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# Builds the image, starts the service by docker compose and makes a model through it.
+# Opt-in: needs docker with compose. To reach the published port from elsewhere than the
+# engine's own network, set IN_ENGINE to a command prefix.
+#
+#   scripts/check_container.sh
+set -euo pipefail
+cd "$(dirname "$0")/.."
+out=$(mktemp -d)
+trap 'docker compose logs --tail 20 >&2 || true; docker compose down -v >/dev/null 2>&1 || true; rm -rf "$out"' EXIT
+url=http://127.0.0.1:8080
+
+docker compose up -d --build --wait
+cargo build --release --quiet
+target/release/ventriform phantom -o "$out" >/dev/null 2>&1
+# shellcheck disable=SC2086 # IN_ENGINE is a command with its arguments
+${IN_ENGINE:-} curl -fsS --data-binary @"$out/spect.nii.gz" -H 'Prefer: wait=60' \
+  -H 'Accept: model/gltf-binary' "$url/v1/models?points=150" -o "$out/lv.glb"
+[ "$(head -c 4 "$out/lv.glb")" = glTF ]
+
+# What was accepted survives the container.
+docker compose restart
+docker compose up -d --wait
+# shellcheck disable=SC2086
+${IN_ENGINE:-} curl -fsS "$url/v1/models" | grep -q mdl_
+
+id=$(docker compose ps -q ventriform)
+user=$(docker inspect -f '{{.Config.User}}' "$id")
+readonly_root=$(docker inspect -f '{{.HostConfig.ReadonlyRootfs}}' "$id")
+[ "$user" = 10001:10001 ] && [ "$readonly_root" = true ]
+docker image ls ventriform
+echo "ok: image built, model made, restarted, non-root, read-only root"
