@@ -372,8 +372,7 @@ impl Attempt {
                 break;
             }
         }
-        // The loop runs at least once, and its first attempt is always taken.
-        best.ok_or(Cancelled)
+        Ok(best.expect("the loop runs at least once and takes its first attempt"))
     }
 
     fn faults(&self) -> usize {
