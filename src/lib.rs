@@ -28,7 +28,15 @@ pub mod retile;
 
 pub mod optimise;
 
+pub mod deform;
+
+pub mod polar;
+
 pub mod report;
+
+pub mod evaluate;
+
+pub mod segmentation;
 
 pub mod export;
 

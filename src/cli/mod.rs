@@ -2,10 +2,14 @@
 
 mod bar;
 mod demo;
+mod evaluate;
 mod generate;
+mod measure;
 mod model_args;
 mod phantom;
+mod segment;
 mod serve;
+mod statistics;
 
 pub use bar::{Bar, overall};
 pub use model_args::ModelArgs;
@@ -31,6 +35,11 @@ struct Cli {
 enum Command {
     Demo(demo::DemoArgs),
     Generate(Box<generate::GenerateArgs>),
+    Segment(Box<segment::SegmentArgs>),
+    Measure(measure::MeasureArgs),
+    Evaluate(evaluate::EvaluateArgs),
+    Templates(evaluate::TemplatesArgs),
+    Statistics(statistics::StatisticsArgs),
     Serve(Box<serve::ServeArgs>),
     Phantom(phantom::PhantomArgs),
     Healthcheck(Box<serve::HealthcheckArgs>),
@@ -46,6 +55,11 @@ enum Command {
 pub fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Generate(args) => generate::run(&args),
+        Command::Segment(args) => segment::run(&args),
+        Command::Measure(args) => measure::run(&args),
+        Command::Evaluate(args) => evaluate::run(&args),
+        Command::Templates(args) => evaluate::run_templates(&args),
+        Command::Statistics(args) => statistics::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::run(&args),
         Command::Phantom(args) => phantom::run(&args),

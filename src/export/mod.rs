@@ -24,6 +24,7 @@ mod gltf;
 mod json;
 mod obj;
 mod ply;
+pub mod read_json;
 mod single;
 mod stl;
 mod vtp;

@@ -1,0 +1,49 @@
+//! One fit of a 150-point model on a 128³ volume: from voxels to mask, one core.
+
+use std::hint::black_box;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use ventriform::deform::template::{Organ, Template};
+use ventriform::deform::voxelise::voxelise;
+use ventriform::deform::{DeformParameters, fit, localise};
+use ventriform::parameters::ModelParameters;
+use ventriform::progress::Monitor;
+use ventriform::volume::phantom::{PhantomParameters, phantom};
+
+fn benchmarks(criterion: &mut Criterion) {
+    let monitor = Monitor::silent();
+    let patient = |seed| {
+        let parameters = PhantomParameters {
+            shape: [128; 3],
+            seed,
+            ..PhantomParameters::default()
+        };
+        phantom(&parameters, &monitor).expect("a phantom of the default kind")
+    };
+    let healthy = patient(1);
+    let volume = patient(2).volume;
+    let parameters = ModelParameters::from_pairs([("points", "150")]).expect("a known name");
+    let mut group = criterion.benchmark_group("deform");
+    group.sample_size(10);
+    let surface = ventriform::surface::extract(&healthy.truth, &parameters.surface, &monitor)
+        .expect("the phantom's mask has a surface");
+    let tiled = ventriform::retile::retile(&surface, &parameters.retile, &monitor)
+        .expect("150 points suit it");
+    let template = Template::new(tiled.mesh, Organ::LeftVentricle, &monitor)
+        .expect("the phantom is a ventricle");
+    let settings = DeformParameters::default();
+    group.bench_function("localise 128³", |b| {
+        b.iter(|| localise::localise(black_box(&volume), &settings.hints, &monitor));
+    });
+    group.bench_function("fit 150 points 128³", |b| {
+        b.iter(|| fit(black_box(&volume), &template, &settings, &monitor));
+    });
+    let fitted = fit(&volume, &template, &settings, &monitor).expect("the phantom has a heart");
+    group.bench_function("voxelise 128³", |b| {
+        b.iter(|| voxelise(black_box(&fitted.mesh), volume.shape, &volume.frame));
+    });
+    group.finish();
+}
+
+criterion_group!(benches, benchmarks);
+criterion_main!(benches);

@@ -1,0 +1,85 @@
+//! `ventriform statistics`: what a set of fits has in common.
+
+use crate::evaluate::statistics::{Statistics, statistics};
+use crate::export::{self, Format, Metadata};
+use crate::mesh::TriMesh;
+use anyhow::{Context, Result};
+use clap::Args;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Mean shape and principal modes of fits of one model.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  ventriform statistics p*/mesh.json -o statistics
+Writes mean.json, mode1_minus.json, mode1_plus.json (2 standard deviations), ... and
+statistics.json")]
+pub struct StatisticsArgs {
+    /// Fitted meshes, mesh.json of `segment`
+    #[arg(value_name = "MESH", required = true, num_args = 2..)]
+    meshes: Vec<PathBuf>,
+    /// The folder to write to (made where missing)
+    #[arg(short, long = "output", value_name = "DIR")]
+    output: PathBuf,
+    /// Modes to write as meshes
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    modes: usize,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Where a mesh cannot be read, or the meshes are no fits of one model.
+pub fn run(args: &StatisticsArgs) -> Result<()> {
+    let meshes: Vec<TriMesh> = args
+        .meshes
+        .iter()
+        .map(|path| {
+            let context = || format!("{}", path.display());
+            let bytes = std::fs::read(path).with_context(context)?;
+            export::read_json::decode(&bytes).with_context(context)
+        })
+        .collect::<Result<_>>()?;
+    let found = statistics(&meshes)?;
+    std::fs::create_dir_all(&args.output)
+        .with_context(|| format!("cannot make {}", args.output.display()))?;
+    write_mesh(&args.output, "mean", &found.mean)?;
+    for mode in 0..args.modes.min(found.modes.len()) {
+        for (sign, word) in [(-2.0, "minus"), (2.0, "plus")] {
+            let name = format!("mode{}_{word}", mode + 1);
+            write_mesh(&args.output, &name, &found.along(mode, sign))?;
+        }
+    }
+    write_summary(&args.output, &found)
+}
+
+fn write_mesh(folder: &Path, name: &str, mesh: &TriMesh) -> Result<()> {
+    let bytes = export::encode(Format::Json, mesh, &Metadata::new(name))?;
+    let path = folder.join(format!("{name}.json"));
+    std::fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))
+}
+
+fn write_summary(folder: &Path, found: &Statistics) -> Result<()> {
+    let mut so_far = 0.0;
+    let modes: Vec<_> = found
+        .modes
+        .iter()
+        .map(|mode| {
+            so_far += mode.variance;
+            json!({
+                "variance_mm2": mode.variance,
+                "share": mode.variance / found.total_variance,
+                "compactness": so_far / found.total_variance,
+                "scores": mode.scores,
+            })
+        })
+        .collect();
+    let summary = json!({
+        "nodes": found.mean.vertices.len(),
+        "total_variance_mm2": found.total_variance,
+        "modes": modes,
+    });
+    let path = folder.join("statistics.json");
+    std::fs::write(&path, serde_json::to_vec_pretty(&summary)?)
+        .with_context(|| format!("cannot write {}", path.display()))
+}

@@ -1,0 +1,129 @@
+//! A first fit by few parameters: the model as a whole is moved, turned, stretched along and
+//! across its axis, made thicker or thinner, and its rim raised and tilted until its sensors
+//! agree best.
+//!
+//! Gauss-Newton on Σ share · weight · (n · (u(x) - offset n))², where u is a combination of
+//! twelve fields: three shifts, three turns, two stretches, a shift along the normals, and a
+//! rise and two tilts of the basal half. A weak pull to zero keeps directions that the image says nothing about where they were.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::cup::perpendicular;
+use super::elastic::area_shares;
+use super::field::Field;
+use super::sensors::{self, Look, Reading};
+use crate::geometry::Vec3;
+use crate::mesh::TriMesh;
+use crate::progress::{Cancelled, Monitor};
+
+const FIELDS: usize = 12;
+type Row = SVector<f64, FIELDS>;
+
+/// Rounds of Gauss-Newton.
+const ROUNDS: usize = 12;
+
+/// Aligns `mesh` with the edges in `field`; `axis` is the long axis (any for other organs).
+/// The sensors' reach falls from `look.reach` to `last_reach` on the way.
+pub fn align(
+    mesh: &TriMesh,
+    axis: &Vec3,
+    field: &Field,
+    look: &Look,
+    last_reach: f64,
+    monitor: &Monitor,
+) -> Result<TriMesh, Cancelled> {
+    let mut mesh = mesh.clone();
+    let shares = area_shares(&mesh);
+    for round in 0..ROUNDS {
+        monitor.check()?;
+        let progress = round as f64 / (ROUNDS - 1) as f64;
+        let reach = look.reach * (last_reach / look.reach).powf(progress);
+        let readings = sensors::read(&mesh, field, &Look { reach, ..*look });
+        let centre: Vec3 = mesh.vertices.iter().zip(&shares).map(|(p, s)| p * *s).sum();
+        let basis = Basis {
+            axis: *axis,
+            centre,
+            base: mesh
+                .vertices
+                .iter()
+                .map(|p| (p - centre).dot(axis))
+                .fold(0.0, f64::min),
+        };
+        let step = basis.solve(&readings);
+        let normals = mesh.vertex_normals();
+        for (p, n) in mesh.vertices.iter_mut().zip(&normals) {
+            *p += basis.displacement(p, n, &step);
+        }
+    }
+    Ok(mesh)
+}
+
+/// Pull of the rim's rise and tilts to zero. From 0.02 to 0.1 the mean Jaccard over 60 fits
+/// (four models, 15 simulated patients) changes by 0.002; without any pull it is 0.003 lower.
+const RIM_PULL: f64 = 0.03;
+
+struct Basis {
+    axis: Vec3,
+    centre: Vec3,
+    /// Most basal position on the axis, mm from the centre (negative).
+    base: f64,
+}
+
+impl Basis {
+    fn fields(&self, p: &Vec3, n: &Vec3) -> [Vec3; FIELDS] {
+        let r = p - self.centre;
+        let along = self.axis * r.dot(&self.axis);
+        // Turns and stretches are per 30 mm, so that every coefficient is about a shift of
+        // the surface in millimetres.
+        const ARM: f64 = 30.0;
+        // 0 at the centre and apical of it, 1 at the rim.
+        let basal = if self.base < -1.0 {
+            (r.dot(&self.axis) / self.base).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        let (e1, e2) = perpendicular(&self.axis);
+        let lift = self.axis * basal;
+        [
+            Vec3::x(),
+            Vec3::y(),
+            Vec3::z(),
+            Vec3::x().cross(&r) / ARM,
+            Vec3::y().cross(&r) / ARM,
+            Vec3::z().cross(&r) / ARM,
+            along / ARM,
+            (r - along) / ARM,
+            *n,
+            lift,
+            lift * (r.dot(&e1) / ARM),
+            lift * (r.dot(&e2) / ARM),
+        ]
+    }
+
+    fn displacement(&self, p: &Vec3, n: &Vec3, step: &Row) -> Vec3 {
+        self.fields(p, n)
+            .iter()
+            .zip(step.iter())
+            .map(|(f, s)| f * *s)
+            .sum()
+    }
+
+    fn solve(&self, readings: &[Reading]) -> Row {
+        let mut matrix = SMatrix::<f64, FIELDS, FIELDS>::identity() * 0.005;
+        // Thickness and stretch across are nearly the same thing on the epicardium alone;
+        // the thickness of the blurred wall varies less between patients than their size.
+        matrix[(8, 8)] += 0.02;
+        for field in 9..FIELDS {
+            matrix[(field, field)] += RIM_PULL;
+        }
+        let mut rhs = Row::zeros();
+        for r in readings {
+            let fields = self.fields(&r.place, &r.normal);
+            let row = Row::from_fn(|i, _| fields[i].dot(&r.normal));
+            let weight = r.share * r.weight;
+            matrix += row * row.transpose() * weight;
+            rhs += row * (weight * r.offset);
+        }
+        matrix.cholesky().map_or_else(Row::zeros, |c| c.solve(&rhs))
+    }
+}

@@ -1,0 +1,227 @@
+//! The wall seen from its long axis: where rays from the cavity enter and leave it.
+//!
+//! Near the apex the rays start at one point (the focus) and fan out over a half sphere;
+//! basal of it they start on the axis and run across it. Rows follow each other at equal
+//! arc length from apex to base, columns at equal angles from the patient's lateral side
+//! (0 degrees) over anterior (90) and septal (180) to inferior (270).
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use super::cup::Cup;
+use super::elastic::rotation_of;
+use crate::geometry::{Vec3, triangle};
+use crate::mesh::TriMesh;
+
+/// Rows of rays, apex to base.
+pub const ROWS: usize = 32;
+/// Rays in a row.
+pub const COLUMNS: usize = 60;
+
+/// One ray and where it meets the wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    /// Start, LPS mm.
+    pub start: Vec3,
+    /// Unit direction.
+    pub direction: Vec3,
+    /// Distances at which the ray enters and leaves the wall, mm; `None` beyond the rim.
+    pub wall: Option<[f64; 2]>,
+}
+
+/// The wall as [`ROWS`] × [`COLUMNS`] rays, row by row, apex first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wall {
+    /// The rays.
+    pub rays: Vec<Ray>,
+    /// Distance of neighbouring rows along the wall, mm.
+    pub row_spacing: f64,
+    /// Axis position of the mean rim and of the outer apex, mm from the cup's centre.
+    pub extent: [f64; 2],
+    /// Cavity between the inner surface and the plane of the mean rim, ml.
+    pub cavity_ml: f64,
+    /// Mean thickness along the rays, mm.
+    pub thickness: f64,
+    /// Share of the basal half's rays that find no wall.
+    pub gaps: f64,
+}
+
+/// The patient's superior direction across `axis`: where the anterior wall lies. In the
+/// simulated hearts this is right within some degrees.
+pub fn anterior(axis: &Vec3) -> Vec3 {
+    let up = Vec3::z() - axis * axis.z;
+    up.try_normalize(1e-6)
+        .unwrap_or_else(|| super::cup::perpendicular(axis).0)
+}
+
+/// The place of `cup` after its model has moved from `before` to `after`: the similarity
+/// that takes the nodes best from one to the other.
+pub fn carried(cup: &Cup, before: &TriMesh, after: &TriMesh) -> Cup {
+    let n = before.vertices.len() as f64;
+    let mean = |m: &TriMesh| m.vertices.iter().sum::<Vec3>() / n;
+    let (from, to) = (mean(before), mean(after));
+    let (mut moment, mut spread) = (nalgebra::Matrix3::zeros(), 0.0);
+    for (p, q) in before.vertices.iter().zip(&after.vertices) {
+        moment += (q - to) * (p - from).transpose();
+        spread += (p - from).norm_squared();
+    }
+    let turn = rotation_of(&moment);
+    let scale = (turn.transpose() * moment).trace() / spread;
+    Cup {
+        centre: to + turn * (cup.centre - from) * scale,
+        axis: (turn * cup.axis).normalize(),
+        length: cup.length * scale,
+        breadth: cup.breadth,
+    }
+}
+
+impl Wall {
+    /// Looks at `mesh` from the axis of `cup`.
+    pub fn new(mesh: &TriMesh, cup: &Cup) -> Self {
+        let frame = Frame::new(mesh, cup);
+        let rays: Vec<Ray> = (0..ROWS * COLUMNS)
+            .map(|index| {
+                let (start, direction) = frame.ray(index / COLUMNS, index % COLUMNS);
+                Ray {
+                    start,
+                    direction,
+                    wall: crossing(mesh, &start, &direction),
+                }
+            })
+            .collect();
+        let met: Vec<[f64; 2]> = rays.iter().filter_map(|r| r.wall).collect();
+        let basal = &rays[ROWS / 2 * COLUMNS..];
+        Self {
+            cavity_ml: frame.cavity(&rays) / 1000.0,
+            thickness: met.iter().map(|w| w[1] - w[0]).sum::<f64>() / met.len().max(1) as f64,
+            gaps: basal.iter().filter(|r| r.wall.is_none()).count() as f64 / basal.len() as f64,
+            row_spacing: frame.row_spacing(),
+            extent: [frame.rim, frame.apex],
+            rays,
+        }
+    }
+}
+
+/// The axis with its marks, as distances from the cup's centre towards the apex.
+struct Frame {
+    centre: Vec3,
+    axis: Vec3,
+    lateral: Vec3,
+    anterior: Vec3,
+    rim: f64,
+    focus: f64,
+    apex: f64,
+}
+
+impl Frame {
+    fn new(mesh: &TriMesh, cup: &Cup) -> Self {
+        let anterior = anterior(&cup.axis);
+        let lateral = anterior.cross(&cup.axis);
+        let along = |p: &Vec3| (p - cup.centre).dot(&cup.axis);
+        let apex = mesh.vertices.iter().map(along).fold(f64::MIN, f64::max);
+        // The rim's height in each direction: the most basal node of every sector.
+        const SECTORS: usize = 12;
+        let mut heights = [f64::INFINITY; SECTORS];
+        let mut radius = 0.0;
+        for p in &mesh.vertices {
+            let r = p - cup.centre;
+            let angle = r.dot(&anterior).atan2(r.dot(&lateral)).rem_euclid(TAU);
+            let sector = ((angle / TAU * SECTORS as f64) as usize).min(SECTORS - 1);
+            heights[sector] = heights[sector].min(along(p));
+            radius += (r - cup.axis * along(p)).norm();
+        }
+        radius /= mesh.vertices.len() as f64;
+        let known: Vec<f64> = heights.iter().copied().filter(|h| h.is_finite()).collect();
+        let rim = known.iter().sum::<f64>() / known.len().max(1) as f64;
+        Self {
+            centre: cup.centre,
+            axis: cup.axis,
+            lateral,
+            anterior,
+            rim,
+            // A half sphere of the wall's mean radius touches the apex.
+            focus: (apex - radius).max(rim),
+            apex,
+        }
+    }
+
+    fn arc(&self) -> f64 {
+        FRAC_PI_2 * (self.apex - self.focus)
+    }
+
+    fn row_spacing(&self) -> f64 {
+        (self.arc() + self.focus - self.rim) / ROWS as f64
+    }
+
+    /// Start and direction of a ray; rows are looked at in their middle.
+    fn ray(&self, row: usize, column: usize) -> (Vec3, Vec3) {
+        let (sin, cos) = (TAU * (column as f64 + 0.5) / COLUMNS as f64).sin_cos();
+        let across = self.lateral * cos + self.anterior * sin;
+        let from_apex = (row as f64 + 0.5) * self.row_spacing();
+        let at = |along: f64| self.centre + self.axis * along;
+        if from_apex < self.arc() {
+            let (s, c) = (from_apex / (self.apex - self.focus)).sin_cos();
+            (at(self.focus), self.axis * c + across * s)
+        } else {
+            (at(self.focus - (from_apex - self.arc())), across)
+        }
+    }
+
+    /// Volume inside the inner surface, mm³. Where a ray finds no wall (a low rim), the
+    /// nearest one towards the apex stands in.
+    fn cavity(&self, rays: &[Ray]) -> f64 {
+        let mut inner = [0.0; COLUMNS];
+        let mut volume = 0.0;
+        let step = self.row_spacing();
+        for (index, ray) in rays.iter().enumerate() {
+            let (row, column) = (index / COLUMNS, index % COLUMNS);
+            if let Some([enters, _]) = ray.wall {
+                inner[column] = enters;
+            }
+            let r: f64 = inner[column];
+            let near = row as f64 * step;
+            let far = near + step;
+            let turn = TAU / COLUMNS as f64;
+            let angle = |arc: f64| arc.min(self.arc()) / (self.apex - self.focus).max(1e-9);
+            // The part of the row over the half sphere, then the part along the cylinder.
+            volume += r.powi(3) / 3.0 * turn * (angle(near).cos() - angle(far).cos());
+            let length = (far - near.max(self.arc())).max(0.0);
+            volume += r * r / 2.0 * turn * length;
+        }
+        volume
+    }
+}
+
+/// Where a ray first enters the wall and then leaves it.
+fn crossing(mesh: &TriMesh, start: &Vec3, direction: &Vec3) -> Option<[f64; 2]> {
+    let mut hits: Vec<(f64, bool)> = (0..mesh.triangles.len())
+        .filter_map(|t| {
+            let [a, b, c] = mesh.corners(t);
+            let distance = hit(start, direction, &a, &b, &c)?;
+            let enters = triangle::area_normal(&a, &b, &c).dot(direction) < 0.0;
+            Some((distance, enters))
+        })
+        .collect();
+    hits.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (enters, leaves) = match hits.first()? {
+        (_, true) => (hits[0].0, hits.iter().find(|h| !h.1)?.0),
+        // The axis itself runs through the wall here.
+        (leaves, false) => (0.0, *leaves),
+    };
+    Some([enters, leaves])
+}
+
+/// Distance along a ray to a triangle (Möller and Trumbore 1997).
+fn hit(start: &Vec3, direction: &Vec3, a: &Vec3, b: &Vec3, c: &Vec3) -> Option<f64> {
+    let (ab, ac) = (b - a, c - a);
+    let p = direction.cross(&ac);
+    let determinant = ab.dot(&p);
+    if determinant == 0.0 {
+        return None;
+    }
+    let s = start - a;
+    let u = s.dot(&p) / determinant;
+    let q = s.cross(&ab);
+    let v = direction.dot(&q) / determinant;
+    let t = ac.dot(&q) / determinant;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some(t)
+}

@@ -1,0 +1,316 @@
+//! The polar map: the wall's uptake laid flat, and its means over the AHA's 17 segments.
+//!
+//! Every ray of the fitted model's [`Wall`] gives one value: the largest and the mean value
+//! of the image between the inner and the outer surface, lengthened by
+//! [`PolarParameters::extension`] to both sides. Apex in the centre, base at the rim,
+//! anterior on top, septum on the left, as seen from the apex (Cerqueira et al., Circulation
+//! 2002). Rings by share of the way from apex to base: 17 within 0.25; 13 to 16 within 0.5;
+//! 7 to 12 within 0.75; 1 to 6 beyond.
+//!
+//! Means and extents weigh each ray with the piece of wall it stands for, not with pixels.
+//! The extent is the share of wall below a threshold of this patient's own reference (98th
+//! percentile). There is no normal database behind it: it is no TPD, no summed score and no
+//! diagnosis.
+
+mod draw;
+mod glyphs;
+
+pub use draw::{json, png, svg};
+
+use crate::deform::field::Field;
+use crate::deform::wall::{COLUMNS, ROWS, Ray, Wall};
+use crate::geometry::Vec3;
+use crate::geometry::bvh::Aabb;
+use crate::volume::Volume;
+
+/// Parameters of [`map`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PolarParameters {
+    /// Share of the reference below which wall counts as a defect, 0..=1. Default 0.6.
+    pub threshold: f64,
+    /// How far the samples go beyond the wall on both sides, mm, 0..=10. Default 3.
+    pub extension: f64,
+}
+
+impl Default for PolarParameters {
+    fn default() -> Self {
+        Self {
+            threshold: 0.6,
+            extension: 3.0,
+        }
+    }
+}
+
+/// A value along one ray.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pixel {
+    /// Largest value on the way through the wall.
+    pub max: f64,
+    /// Mean value on the way through the wall.
+    pub mean: f64,
+    /// Piece of wall that the ray stands for, mm².
+    pub area: f64,
+}
+
+/// One of the 17 segments.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Segment {
+    /// 1..=17.
+    pub number: usize,
+    /// Area-weighted mean of the pixels' maxima in per cent of the reference; `None` where no
+    /// ray met the wall.
+    pub mean_percent: Option<f64>,
+    /// Share of its area below the threshold, per cent.
+    pub extent_percent: f64,
+    /// Wall area, mm².
+    pub area: f64,
+}
+
+/// The map.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PolarMap {
+    /// [`ROWS`] × [`COLUMNS`] pixels, apex first; columns from lateral over anterior, septal
+    /// and inferior. `None` where there is no wall.
+    pub pixels: Vec<Option<Pixel>>,
+    /// 98th percentile of the pixels' maxima, image units: 100 per cent.
+    pub reference: f64,
+    /// Share of the reference below which wall counts as a defect.
+    pub threshold: f64,
+    /// The segments 1 to 17.
+    pub segments: [Segment; 17],
+    /// Share of the whole wall below the threshold, per cent.
+    pub extent_percent: f64,
+}
+
+/// Names of the segments 1 to 17.
+pub const NAMES: [&str; 17] = [
+    "basal anterior",
+    "basal anteroseptal",
+    "basal inferoseptal",
+    "basal inferior",
+    "basal inferolateral",
+    "basal anterolateral",
+    "mid anterior",
+    "mid anteroseptal",
+    "mid inferoseptal",
+    "mid inferior",
+    "mid inferolateral",
+    "mid anterolateral",
+    "apical anterior",
+    "apical septal",
+    "apical inferior",
+    "apical lateral",
+    "apex",
+];
+
+/// The coronary artery that usually feeds a segment.
+pub fn territory(segment: usize) -> &'static str {
+    match segment {
+        1 | 2 | 7 | 8 | 13 | 14 | 17 => "LAD",
+        3 | 4 | 9 | 10 | 15 => "RCA",
+        _ => "LCX",
+    }
+}
+
+/// The segment at `share` of the way from apex to base and `angle` degrees counter-clockwise
+/// from lateral.
+pub fn segment_at(share: f64, angle: f64) -> usize {
+    // Sixths are centred on anterior (90°), quarters likewise.
+    let sixth = ((angle - 60.0).rem_euclid(360.0) / 60.0) as usize % 6;
+    let quarter = ((angle - 45.0).rem_euclid(360.0) / 90.0) as usize % 4;
+    if share < 0.25 {
+        17
+    } else if share < 0.5 {
+        13 + quarter
+    } else if share < 0.75 {
+        7 + sixth
+    } else {
+        1 + sixth
+    }
+}
+
+/// The segment of a pixel.
+pub fn segment_of(row: usize, column: usize) -> usize {
+    let share = (row as f64 + 0.5) / ROWS as f64;
+    segment_at(share, 360.0 * (column as f64 + 0.5) / COLUMNS as f64)
+}
+
+/// Samples `volume` along the rays of `wall`.
+pub fn map(volume: &Volume, wall: &Wall, parameters: &PolarParameters) -> PolarMap {
+    let ends = wall.rays.iter().filter_map(|r| {
+        let reach = r.wall?[1] + parameters.extension;
+        Some(r.start + r.direction * reach)
+    });
+    let points: Vec<Vec3> = ends.chain(wall.rays.iter().map(|r| r.start)).collect();
+    let field = Field::new(volume, Some(&Aabb::of(&points)), 0.0);
+    let pixels: Vec<Option<Pixel>> = wall
+        .rays
+        .iter()
+        .map(|ray| pixel(&field, ray, wall.row_spacing, parameters.extension))
+        .collect();
+    let mut maxima: Vec<f64> = pixels.iter().flatten().map(|p| p.max).collect();
+    maxima.sort_by(f64::total_cmp);
+    let reference = maxima
+        .get((maxima.len() * 98 / 100).min(maxima.len().saturating_sub(1)))
+        .copied()
+        .unwrap_or(0.0);
+    let limit = parameters.threshold * reference;
+    let indexed = || (0..pixels.len()).filter_map(|i| Some((i, pixels[i]?)));
+    let segments = std::array::from_fn(|s| {
+        let own = indexed().filter(|(i, _)| segment_of(i / COLUMNS, i % COLUMNS) == s + 1);
+        summarise(s + 1, own.map(|(_, p)| p), reference, limit)
+    });
+    let all = summarise(0, indexed().map(|(_, p)| p), reference, limit);
+    PolarMap {
+        reference,
+        threshold: parameters.threshold,
+        segments,
+        extent_percent: all.extent_percent,
+        pixels,
+    }
+}
+
+fn pixel(field: &Field, ray: &Ray, row_spacing: f64, extension: f64) -> Option<Pixel> {
+    let [enters, leaves] = ray.wall?;
+    let from = (enters - extension).max(0.0);
+    let to = leaves + extension;
+    let steps = ((to - from).ceil() as usize).clamp(1, 200);
+    let (mut max, mut sum) = (f64::NEG_INFINITY, 0.0);
+    for step in 0..=steps {
+        let distance = from + (to - from) * step as f64 / steps as f64;
+        let value = field.at(&(ray.start + ray.direction * distance));
+        max = max.max(value);
+        sum += value;
+    }
+    let middle = f64::midpoint(enters, leaves);
+    Some(Pixel {
+        max,
+        mean: sum / (steps + 1) as f64,
+        area: row_spacing * middle * std::f64::consts::TAU / COLUMNS as f64,
+    })
+}
+
+fn summarise(
+    number: usize,
+    pixels: impl Iterator<Item = Pixel>,
+    reference: f64,
+    limit: f64,
+) -> Segment {
+    let (mut sum, mut area, mut low) = (0.0, 0.0, 0.0);
+    for p in pixels {
+        sum += p.area * p.max;
+        area += p.area;
+        if p.max < limit {
+            low += p.area;
+        }
+    }
+    Segment {
+        number,
+        mean_percent: (area > 0.0 && reference > 0.0).then(|| 100.0 * sum / area / reference),
+        extent_percent: if area > 0.0 { 100.0 * low / area } else { 0.0 },
+        area,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::deform::cup::Cup;
+    use crate::deform::voxelise::voxelise;
+    use crate::geometry::frame::VoxelToPatient;
+    use crate::mesh::shapes;
+
+    /// A cup of revolution about an axis that points forward, with its wall hot but for the
+    /// patient's left side, which has half the uptake.
+    fn scene() -> (Volume, Wall) {
+        let mut mesh = shapes::cup(60.0, 32.0, 12.0, 24);
+        // Apex from -z to -y (anterior).
+        for p in &mut mesh.vertices {
+            *p = Vec3::new(p.x, p.z, -p.y);
+        }
+        let frame = VoxelToPatient::centred([50; 3], [3.0; 3], Vec3::new(0.0, -25.0, 0.0)).unwrap();
+        let mask = voxelise(&mesh, [50; 3], &frame);
+        let voxels = (0..50 * 50 * 50)
+            .map(|v| {
+                let index = Vec3::from([v % 50, v / 50 % 50, v / 2500].map(|x| x as f64));
+                let left = frame.to_patient(&index).x > 0.0;
+                f32::from(u8::from(mask.voxels[v])) * if left { 50.0 } else { 100.0 }
+            })
+            .collect();
+        let volume = Volume {
+            shape: [50; 3],
+            voxels,
+            frame,
+            integral: false,
+        };
+        let cup = Cup {
+            centre: Vec3::new(0.0, -25.0, 0.0),
+            axis: -Vec3::y(),
+            length: 65.0,
+            breadth: 1.0,
+        };
+        (volume, Wall::new(&mesh, &cup))
+    }
+
+    #[test]
+    fn segments_are_where_the_heart_association_puts_them() {
+        let at = |share, angle| segment_at(share, angle);
+        assert_eq!([at(0.9, 90.0), at(0.9, 150.0), at(0.9, 210.0)], [1, 2, 3]);
+        assert_eq!([at(0.9, 270.0), at(0.9, 330.0), at(0.9, 30.0)], [4, 5, 6]);
+        assert_eq!([at(0.6, 90.0), at(0.6, 30.0)], [7, 12]);
+        let apical = [90.0, 180.0, 270.0, 0.0].map(|a| at(0.4, a));
+        assert_eq!(apical, [13, 14, 15, 16]);
+        assert_eq!(at(0.1, 123.0), 17);
+    }
+
+    #[test]
+    fn a_cold_left_side_shows_in_the_lateral_segments() {
+        let (volume, wall) = scene();
+        let map = map(&volume, &wall, &PolarParameters::default());
+        let mean = |s: usize| map.segments[s - 1].mean_percent.unwrap();
+        for lateral in [5, 6, 11, 12, 16] {
+            assert!(mean(lateral) < 65.0, "{lateral}: {}", mean(lateral));
+        }
+        for septal in [2, 3, 8, 9, 14] {
+            assert!(mean(septal) > 90.0, "{septal}: {}", mean(septal));
+        }
+        assert!(
+            (map.extent_percent - 50.0).abs() < 8.0,
+            "{}",
+            map.extent_percent
+        );
+        let areas: f64 = map.segments.iter().map(|s| s.area).sum();
+        let all: f64 = map.pixels.iter().flatten().map(|p| p.area).sum();
+        assert!((areas - all).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_cavity_has_the_volume_of_its_ellipsoid() {
+        let (_, wall) = scene();
+        // Half an ellipsoid 48 mm long with a radius of 20 mm, and the rim's upper half.
+        let half = 2.0 / 3.0 * std::f64::consts::PI * 48.0 * 400.0 / 1000.0;
+        let rim = 6.0 * std::f64::consts::PI * 400.0 / 1000.0;
+        assert!(
+            (wall.cavity_ml / (half + rim) - 1.0).abs() < 0.06,
+            "{}",
+            wall.cavity_ml
+        );
+        assert!((11.0..15.0).contains(&wall.thickness), "{}", wall.thickness);
+        assert_eq!(wall.gaps, 0.0);
+    }
+
+    #[test]
+    fn pictures_can_be_read_again() {
+        let (volume, wall) = scene();
+        let map = map(&volume, &wall, &PolarParameters::default());
+        let bytes = png(&map).unwrap();
+        let decoder = ::png::Decoder::new(std::io::Cursor::new(bytes));
+        let info = decoder.read_info().unwrap();
+        assert_eq!((info.info().width, info.info().height), (640, 640));
+        let text = svg(&map);
+        assert!(text.starts_with("<svg") && text.ends_with("</svg>\n"));
+        let value = json(&map);
+        assert_eq!(value["segments"].as_array().unwrap().len(), 17);
+        assert_eq!(value["segments"][16]["name"], "apex");
+    }
+}

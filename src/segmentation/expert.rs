@@ -1,0 +1,127 @@
+//! An expert's mask on the grid of the volume that it belongs to.
+
+use crate::deform::voxelise::Mask;
+use crate::geometry::Vec3;
+use crate::volume::Volume;
+
+/// The mask cannot be measured against.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ExpertError {
+    /// Nothing in it is above 0.5.
+    #[error("the expert's mask is empty")]
+    Empty,
+    /// It lies somewhere else than the volume.
+    #[error(
+        "only {inside} of the mask's {all} voxels lie inside the volume: its place in the \
+         patient is another one"
+    )]
+    Elsewhere {
+        /// Mask voxels inside the volume.
+        inside: usize,
+        /// All mask voxels.
+        all: usize,
+    },
+}
+
+/// `expert` (anything above 0.5) on the grid of `volume`: as it is where the grids agree
+/// within a hundredth of a voxel, else by the nearest voxel in the patient.
+///
+/// # Errors
+/// [`ExpertError`].
+pub fn on_grid(expert: &Volume, volume: &Volume) -> Result<Mask, ExpertError> {
+    let all = expert.voxels.iter().filter(|v| **v > 0.5).count();
+    if all == 0 {
+        return Err(ExpertError::Empty);
+    }
+    if same_grid(expert, volume) {
+        return Ok(Mask {
+            shape: expert.shape,
+            voxels: expert.voxels.iter().map(|v| *v > 0.5).collect(),
+        });
+    }
+    let inside = (0..expert.voxels.len())
+        .filter(|v| expert.voxels[*v] > 0.5 && contains(volume, &place(expert, *v)))
+        .count();
+    if inside * 100 < all * 99 {
+        return Err(ExpertError::Elsewhere { inside, all });
+    }
+    let mut mask = Mask::empty(volume.shape);
+    for (v, voxel) in mask.voxels.iter_mut().enumerate() {
+        *voxel = value_at(expert, &place(volume, v)) > 0.5;
+    }
+    Ok(mask)
+}
+
+/// The patient's point at a voxel's centre.
+fn place(volume: &Volume, v: usize) -> Vec3 {
+    let [nx, ny, _] = volume.shape;
+    let index = [v % nx, v / nx % ny, v / (nx * ny)];
+    volume
+        .frame
+        .to_patient(&Vec3::from(index.map(|x| x as f64)))
+}
+
+fn contains(volume: &Volume, p: &Vec3) -> bool {
+    let index = volume.frame.to_voxel(p);
+    (0..3).all(|a| index[a] > -0.5 && index[a] < volume.shape[a] as f64 - 0.5)
+}
+
+/// Value of the voxel that holds `p`, 0 outside.
+fn value_at(volume: &Volume, p: &Vec3) -> f32 {
+    if !contains(volume, p) {
+        return 0.0;
+    }
+    let index = volume.frame.to_voxel(p);
+    let [i, j, k] = [0, 1, 2].map(|a| index[a].round().max(0.0) as usize);
+    volume.at(i, j, k)
+}
+
+fn same_grid(a: &Volume, b: &Volume) -> bool {
+    let corner = Vec3::from(a.shape.map(|n| n as f64));
+    let near = |index: &Vec3| (b.frame.to_voxel(&a.frame.to_patient(index)) - index).norm() < 0.01;
+    a.shape == b.shape && near(&Vec3::zeros()) && near(&corner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::frame::VoxelToPatient;
+
+    fn volume(shape: [usize; 3], spacing: f64, centre: Vec3, radius: f64) -> Volume {
+        let frame = VoxelToPatient::centred(shape, [spacing; 3], centre).unwrap();
+        let mut volume = Volume {
+            shape,
+            voxels: vec![0.0; shape.iter().product()],
+            frame,
+            integral: true,
+        };
+        for v in 0..volume.voxels.len() {
+            volume.voxels[v] = f32::from(u8::from(place(&volume, v).norm() < radius));
+        }
+        volume
+    }
+
+    #[test]
+    fn a_mask_on_another_grid_is_taken_over_by_place() {
+        let image = volume([30; 3], 2.0, Vec3::zeros(), 10.0);
+        let fine = volume([50; 3], 1.0, Vec3::new(1.0, 0.5, 0.0), 10.0);
+        let taken = on_grid(&fine, &image).unwrap();
+        let own = on_grid(&image, &image).unwrap();
+        let differing = taken.voxels.iter().zip(&own.voxels).filter(|(a, b)| a != b);
+        // Half a fine voxel of displacement on a ball of five coarse ones.
+        assert!(differing.count() * 8 < own.count());
+    }
+
+    #[test]
+    fn empty_and_distant_masks_are_refused() {
+        let image = volume([30; 3], 2.0, Vec3::zeros(), 10.0);
+        let none = volume([30; 3], 2.0, Vec3::zeros(), 0.0);
+        assert_eq!(on_grid(&none, &image), Err(ExpertError::Empty));
+        let mut far = image.clone();
+        far.frame = VoxelToPatient::centred([30; 3], [2.0; 3], Vec3::new(400.0, 0.0, 0.0)).unwrap();
+        assert!(matches!(
+            on_grid(&far, &image),
+            Err(ExpertError::Elsewhere { inside: 0, .. })
+        ));
+    }
+}

@@ -1,0 +1,116 @@
+//! The segmentation's report.
+
+use serde_json::{Value, json};
+
+use super::Segmentation;
+use crate::evaluate::masks::Agreement;
+use crate::geometry::Vec3;
+use crate::polar;
+
+fn round(x: f64) -> f64 {
+    (1e4 * x).round() / 1e4
+}
+
+fn point(p: &Vec3) -> [f64; 3] {
+    [p.x, p.y, p.z].map(round)
+}
+
+/// Everything that is known of a segmentation, as JSON. Lengths are mm (LPS), volumes ml.
+pub fn report_json(segmentation: &Segmentation) -> Value {
+    let fit = &segmentation.fit;
+    let displacements: Vec<f64> = fit.displacements.iter().map(|d| round(d.norm())).collect();
+    let flags: Vec<Value> = fit
+        .flags
+        .iter()
+        .map(|f| json!({"code": f.code(), "reason": f.to_string()}))
+        .collect();
+    let candidates: Vec<Value> = segmentation
+        .candidates
+        .iter()
+        .map(|c| {
+            json!({
+                "template": c.name,
+                "merit": round(c.merit),
+                "active": round(c.active),
+                "strain": round(c.strain),
+                "residual_mm": round(c.residual),
+            })
+        })
+        .collect();
+    json!({
+        "template": segmentation.candidates[segmentation.chosen].name,
+        "candidates": candidates,
+        "localisation": fit.localisation.as_ref().map(|l| json!({
+            "centre": point(&l.cup.centre),
+            "axis": point(&l.cup.axis),
+            "length_mm": round(l.cup.length),
+            "correlation": round(l.correlation),
+            "runner_up": l.runner_up.map(round),
+            "hollowness": round(l.hollowness),
+            "confidence": round(l.confidence),
+        })),
+        "fit": {
+            "reason": fit.reason.as_str(),
+            "confidence": round(fit.confidence),
+            "iterations": fit.iterations,
+            "runs": fit.runs,
+            "residual_mm": round(fit.residual),
+            "active_sensors": round(fit.active),
+            "strain": round(fit.strain.sqrt()),
+            "energy": fit.energy.iter().map(|e| round(*e)).collect::<Vec<_>>(),
+            "self_intersections": fit.self_intersections,
+            "turned_triangles": fit.turned_triangles,
+            "long_axis": fit.cup.map(|c| json!({
+                "base": point(&c.base()),
+                "apex": point(&c.apex()),
+            })),
+            "scale": round(fit.scale),
+            "rotation": rows(fit),
+            "displacement_mm": displacements,
+        },
+        "volumes_ml": {
+            "wall": round(fit.wall_ml),
+            "cavity": fit.wall.as_ref().map(|w| round(w.cavity_ml)),
+        },
+        "wall_thickness_mm": fit.wall.as_ref().map(|w| round(w.thickness)),
+        "measures": segmentation.agreement.as_ref().map(agreement_json),
+        "polar": segmentation.polar.as_ref().map(summary),
+        "flags": flags,
+        "mask_rule": "a voxel belongs to the mask if its centre lies inside the surface",
+    })
+}
+
+fn rows(fit: &crate::deform::Fit) -> Vec<[f64; 3]> {
+    let m = fit.rotation.matrix();
+    (0..3)
+        .map(|r| [0, 1, 2].map(|c| round(m[(r, c)])))
+        .collect()
+}
+
+/// The polar map without its pixels, which have a file of their own.
+fn summary(map: &polar::PolarMap) -> Value {
+    let mut value = polar::json(map);
+    if let Some(object) = value.as_object_mut() {
+        object.remove("values_percent");
+    }
+    value
+}
+
+/// The measures of two masks as JSON; distances are `null` where a mask is empty.
+pub fn agreement_json(agreement: &Agreement) -> Value {
+    let c = agreement.contours;
+    let [volume, expert] = agreement.volumes_ml;
+    json!({
+        "jaccard": agreement.jaccard,
+        "contour_distance_voxels": c.map(|c| c.mean_voxels),
+        "contour_distance_mm": c.map(|c| c.mean_mm),
+        "dice": agreement.dice,
+        "hausdorff_mm": c.map(|c| c.hausdorff_mm),
+        "hausdorff95_mm": c.map(|c| c.hausdorff95_mm),
+        "volume_ml": round(volume),
+        "expert_volume_ml": round(expert),
+        "volume_difference_ml": round(volume - expert),
+        "volume_difference_percent":
+            (expert > 0.0).then(|| round(100.0 * (volume / expert - 1.0))),
+    })
+}

@@ -1,0 +1,96 @@
+//! The fit on simulated and clinical scans with automatic start.
+//!
+//! The scans lie beside the project; where they are absent, the tests say so.
+
+// Helpers of a test state their expectations by panicking, as tests do.
+#![allow(clippy::unwrap_used)]
+
+use std::path::{Path, PathBuf};
+
+use ventriform::deform::DeformParameters;
+use ventriform::deform::template::{Organ, Template};
+use ventriform::parameters::ModelParameters;
+use ventriform::pipeline;
+use ventriform::progress::Monitor;
+use ventriform::segmentation::{NamedTemplate, SegmentationParameters, segment};
+use ventriform::volume::{self, ReadLimits, ReadOptions, Reading, VolumeFile};
+
+fn data(path: &str) -> Option<PathBuf> {
+    let path = Path::new("../shared/data").join(path);
+    if path.exists() {
+        return Some(path);
+    }
+    eprintln!("skipped: {} is not there", path.display());
+    None
+}
+
+fn read(path: &Path) -> Reading {
+    volume::read(
+        &[VolumeFile::at(path)],
+        &ReadOptions::default(),
+        &ReadLimits::default(),
+        &Monitor::silent(),
+    )
+    .unwrap()
+}
+
+fn template(scan: &Path) -> NamedTemplate {
+    let parameters = ModelParameters::from_pairs([("points", "150")]).unwrap();
+    let model = pipeline::from_reading(&read(scan), &parameters, 0.0, &Monitor::silent()).unwrap();
+    NamedTemplate {
+        name: "t1".into(),
+        template: Template::new(model.mesh, Organ::LeftVentricle, &Monitor::silent()).unwrap(),
+    }
+}
+
+#[test]
+fn no_patient_of_the_cohort_is_lost() {
+    let Some(cohort) = data("cohort") else {
+        return;
+    };
+    let template = template(&cohort.join("t1/spect.nii.gz"));
+    // Three defects beside a hot liver; small; large with defects; gut twice as hot.
+    for case in ["p06", "p03", "p14", "p08"] {
+        let scan = read(&cohort.join(case).join("spect.nii.gz")).volume;
+        let expert = read(&cohort.join(case).join("lv_expert_img.nii.gz")).volume;
+        let made = segment(
+            &scan,
+            std::slice::from_ref(&template),
+            &SegmentationParameters::default(),
+            Some(&expert),
+            &Monitor::silent(),
+        )
+        .unwrap();
+        let agreement = made.agreement.unwrap();
+        assert!(agreement.jaccard > 0.7, "{case}: {agreement:?}");
+        assert_eq!(made.fit.self_intersections + made.fit.turned_triangles, 0);
+    }
+}
+
+#[test]
+fn an_expert_of_a_clinical_scan_agrees() {
+    let (Some(clinical), Some(cohort)) = (data("clinical"), data("cohort")) else {
+        return;
+    };
+    let name = "1.2.840.4267.32.118564058634314627767242469443335771432";
+    let scan = read(&clinical.join(format!("{name}.dcm"))).volume;
+    let expert = read(&clinical.join(format!("{name}_mask.nii.gz"))).volume;
+    let parameters = SegmentationParameters {
+        deform: DeformParameters {
+            margin: 2.5,
+            ..DeformParameters::default()
+        },
+        ..SegmentationParameters::default()
+    };
+    let template = template(&cohort.join("t1/spect.nii.gz"));
+    let made = segment(
+        &scan,
+        &[template],
+        &parameters,
+        Some(&expert),
+        &Monitor::silent(),
+    )
+    .unwrap();
+    let dice = made.agreement.unwrap().dice;
+    assert!(dice > 0.9, "{dice}");
+}
