@@ -63,7 +63,7 @@ command -v cargo >/dev/null || { echo "cargo is missing: install Rust 1.95 or ne
 # --- the project's own tests ------------------------------------------------------------
 check "format" cargo fmt --check
 check "clippy" cargo clippy --quiet --all-targets -- -D warnings
-check "documentation" env RUSTDOCFLAGS="-D warnings" cargo doc --quiet --no-deps
+check "documentation" env RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc --quiet --no-deps --document-private-items
 
 say "cargo test"
 cargo test --no-fail-fast -- --show-output 2>&1 | tee "$log"

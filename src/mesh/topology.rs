@@ -1,6 +1,6 @@
 //! Is it a closed manifold, and of which kind?
 //!
-//! [`census`] counts; [`check`] demands. A mesh passes when every edge belongs to exactly two
+//! [`check`] demands and counts. A mesh passes when every edge belongs to exactly two
 //! triangles that run through it in opposite directions, every vertex is used and has one
 //! single cycle of triangles around it, and no triangle occurs twice. Positions are not
 //! looked at: self-intersection is [`super::intersections`]' business.

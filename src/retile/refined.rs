@@ -1,9 +1,9 @@
 //! The refined route: centroidal cells and their dual.
 //!
 //! 1. [`samples`](super::samples): the working surface, fine enough for N cells;
-//! 2. N samples at random, as dense as [`sizing`](super::sizing) wants them;
+//! 2. N samples at random, as dense as [`sizing`] wants them;
 //! 3. [`cells`](super::cells): relaxed until each site is the centroid of its cell;
-//! 4. [`dual`](super::dual): one triangle where three cells meet;
+//! 4. [`dual`]: one triangle where three cells meet;
 //! 5. each vertex goes to the point of its own cell's part of S closest to the cell's centroid.
 //!
 //! Where a cell is too large for the shape of the surface (it runs round a handle, or the
@@ -153,6 +153,10 @@ impl<'a> Job<'a> {
                         triangles,
                     };
                     let crossing = self_intersections(&mesh);
+                    if crossing.is_empty() && mesh.volume() <= 0.0 {
+                        // So few points that the mesh came out inside out.
+                        return Ok(None);
+                    }
                     if crossing.is_empty() {
                         return Ok(Some((mesh, self.sizing(&cells))));
                     }

@@ -91,7 +91,7 @@ pub(super) struct Header {
     pub scaling: Option<(f64, f64)>,
     /// The unit of all lengths below.
     pub unit: LengthUnit,
-    /// `pixdim`, [0] being qfac.
+    /// `pixdim`, entry 0 being qfac.
     pub pixdim: [f64; 8],
     /// 0 where there is no qform.
     pub qform_code: i32,
