@@ -24,6 +24,20 @@ const MAY_USE: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "polar",
+        &["geometry", "mesh", "progress", "volume", "deform"],
+    ),
+    (
+        "evaluate",
+        &["geometry", "mesh", "progress", "volume", "deform"],
+    ),
+    (
+        "segmentation",
+        &[
+            "geometry", "mesh", "progress", "volume", "deform", "polar", "evaluate",
+        ],
+    ),
+    (
         "report",
         &[
             "geometry", "mesh", "progress", "volume", "surface", "retile", "optimise", "deform",
@@ -86,6 +100,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "cli",
         &[
+            "polar",
+            "evaluate",
+            "segmentation",
             "config",
             "http",
             "jobs",
