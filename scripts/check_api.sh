@@ -12,7 +12,7 @@ target/debug/ventriform serve --listen 127.0.0.1:0 --data-dir "$data" >"$data/lo
 service=$!
 trap 'kill $service 2>/dev/null; wait $service 2>/dev/null; rm -rf "$data"' EXIT
 for _ in $(seq 100); do
-  url=$(grep -om1 'http://127[0-9.:]*' "$data/log" || true)
+  url=$(grep -o 'http://127[0-9.:]*' "$data/log" | head -n 1 || true)
   [ -n "$url" ] && break
   sleep 0.1
 done
