@@ -1,5 +1,3 @@
-# syntax=docker/dockerfile:1
-
 # The build: dependencies first, so that a change of our sources does not compile them again.
 FROM rust:1-bookworm AS build
 WORKDIR /build

@@ -297,12 +297,26 @@ pub fn optimise(
     let state = configurations(&moved, reference)?;
     let fitted = state.summary(parameters.weights);
 
-    let rules = FlipRules {
+    let mut rules = FlipRules {
         fitness: parameters.fitness(reference.lengths(tiled.mesh.triangles.len())),
         gain: parameters.gain,
         guard: parameters.guard,
     };
-    let flipped = flips::sweep(state, &rules, monitor)?;
+    let mut flipped = flips::sweep(state, &rules, monitor)?;
+    let moves = moved.vertices != tiled.mesh.vertices;
+    for share in EASED_GUARDS {
+        if moves || flipped.flips > 0 || parameters.guard == 0.0 {
+            break;
+        }
+        rules.guard = parameters.guard * share;
+        flipped = flips::sweep(configurations(&moved, reference)?, &rules, monitor)?;
+    }
+    if rules.guard < parameters.guard && flipped.flips > 0 {
+        facts.warnings.push(format!(
+            "no flip gained under the guard of {}; it was eased to {:.2}",
+            parameters.guard, rules.guard
+        ));
+    }
     facts.flips = flipped.flips;
     facts.sweeps = flipped.sweeps;
     facts.ended = flipped.ended;
@@ -322,6 +336,10 @@ pub fn optimise(
         facts,
     })
 }
+
+/// Shares of the guard that are tried, in this order, where neither fit nor flips could better
+/// the mesh: on rugged surfaces every gain costs some shape.
+const EASED_GUARDS: [f64; 4] = [0.75, 0.5, 0.25, 0.0];
 
 /// The fitted mesh, or the one that came in where the fit would lower the mean fitness in the
 /// form that drives *and* in the robust one. One alone may fall for reasons that are no fault:
