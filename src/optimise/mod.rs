@@ -30,7 +30,7 @@ mod legality;
 use configurations::Configurations;
 use connectivity::Connectivity;
 use fitness::{Fitness, Lengths};
-use flips::FlipRules;
+use flips::{FlipRules, Flipped};
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Bvh;
@@ -297,25 +297,17 @@ pub fn optimise(
     let state = configurations(&moved, reference)?;
     let fitted = state.summary(parameters.weights);
 
-    let mut rules = FlipRules {
-        fitness: parameters.fitness(reference.lengths(tiled.mesh.triangles.len())),
+    let lengths = reference.lengths(tiled.mesh.triangles.len());
+    let rules = FlipRules {
+        fitness: parameters.fitness(lengths),
         gain: parameters.gain,
         guard: parameters.guard,
     };
     let mut flipped = flips::sweep(state, &rules, monitor)?;
-    let moves = moved.vertices != tiled.mesh.vertices;
-    for share in EASED_GUARDS {
-        if moves || flipped.flips > 0 || parameters.guard == 0.0 {
-            break;
-        }
-        rules.guard = parameters.guard * share;
-        flipped = flips::sweep(configurations(&moved, reference)?, &rules, monitor)?;
-    }
-    if rules.guard < parameters.guard && flipped.flips > 0 {
-        facts.warnings.push(format!(
-            "no flip gained under the guard of {}; it was eased to {:.2}",
-            parameters.guard, rules.guard
-        ));
+    let unmoved = moved.vertices == tiled.mesh.vertices;
+    if unmoved && flipped.flips == 0 && parameters.guard > 0.0 {
+        let eased = sweep_with_eased_guard(&moved, reference, rules, &mut facts, monitor)?;
+        flipped = eased.unwrap_or(flipped);
     }
     facts.flips = flipped.flips;
     facts.sweeps = flipped.sweeps;
@@ -332,7 +324,7 @@ pub fn optimise(
         retiled,
         fitted,
         optimised,
-        lengths: reference.lengths(tiled.mesh.triangles.len()),
+        lengths,
         facts,
     })
 }
@@ -340,6 +332,29 @@ pub fn optimise(
 /// Shares of the guard that are tried, in this order, where neither fit nor flips could better
 /// the mesh: on rugged surfaces every gain costs some shape.
 const EASED_GUARDS: [f64; 4] = [0.75, 0.5, 0.25, 0.0];
+
+/// The flips under the first eased guard under which there are any; `None` if under none.
+fn sweep_with_eased_guard(
+    mesh: &TriMesh,
+    reference: &Reference,
+    mut rules: FlipRules,
+    facts: &mut OptimiseFacts,
+    monitor: &Monitor,
+) -> Result<Option<Flipped>, OptimiseError> {
+    let asked = rules.guard;
+    for share in EASED_GUARDS {
+        rules.guard = asked * share;
+        let tried = flips::sweep(configurations(mesh, reference)?, &rules, monitor)?;
+        if tried.flips > 0 {
+            facts.warnings.push(format!(
+                "no flip gained under the guard of {asked}; it was eased to {:.2}",
+                rules.guard
+            ));
+            return Ok(Some(tried));
+        }
+    }
+    Ok(None)
+}
 
 /// The fitted mesh, or the one that came in where the fit would lower the mean fitness in the
 /// form that drives *and* in the robust one. One alone may fall for reasons that are no fault:

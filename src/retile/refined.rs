@@ -153,12 +153,10 @@ impl<'a> Job<'a> {
                         triangles,
                     };
                     let crossing = self_intersections(&mesh);
-                    if crossing.is_empty() && mesh.volume() <= 0.0 {
-                        // So few points that the mesh came out inside out.
-                        return Ok(None);
-                    }
                     if crossing.is_empty() {
-                        return Ok(Some((mesh, self.sizing(&cells))));
+                        // With very few points a mesh may come out inside out.
+                        let outward = mesh.volume() > 0.0;
+                        return Ok(outward.then(|| (mesh, self.sizing(&cells))));
                     }
                     sites_of(&mesh, &crossing)
                 }
@@ -184,16 +182,14 @@ impl<'a> Job<'a> {
     /// Makes the density higher in the crowded cells and those around them, so that the sites
     /// which move there stay there.
     fn thicken(&self, cells: &Cells, crowded: &[u32], weights: &mut [f64]) {
-        let mut near = vec![false; self.points];
+        let mut is_crowded = vec![false; self.points];
         for &site in crowded {
-            near[site as usize] = true;
+            is_crowded[site as usize] = true;
         }
+        let mut near = is_crowded.clone();
         for v in 0..self.samples.len() {
-            let around = self.samples.around(v).iter();
-            if around
-                .clone()
-                .any(|&n| crowded.contains(&cells.labels[n as usize]))
-            {
+            let mut around = self.samples.around(v).iter();
+            if around.any(|&n| is_crowded[cells.labels[n as usize] as usize]) {
                 near[cells.labels[v] as usize] = true;
             }
         }

@@ -235,20 +235,25 @@ fn pack_word(chunk: &[f32], level: f32) -> u64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn blob(extent: [usize; 3], inside: impl Fn([usize; 3]) -> bool) -> Labels {
+impl Labels {
+    /// A shape to test with: `extent` voxels from the origin, those that `inside` names.
+    pub fn of_shape(extent: [usize; 3], inside: impl Fn([usize; 3]) -> bool) -> Self {
         let mut labels = Labels::empty([0; 3], extent);
-        for k in 0..extent[2] {
-            for j in 0..extent[1] {
-                for i in 0..extent[0] {
-                    labels.set([i, j, k], inside([i, j, k]));
-                }
-            }
+        for n in 0..extent.iter().product::<usize>() {
+            let p = [
+                n % extent[0],
+                n / extent[0] % extent[1],
+                n / extent[0] / extent[1],
+            ];
+            labels.set(p, inside(p));
         }
         labels
     }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
 
     #[test]
     fn threshold_equals_one_comparison_for_each_voxel() {
@@ -256,7 +261,7 @@ mod tests {
             let shape = [nx, 3, 2];
             let values: Vec<f32> = (0..nx * 6).map(|n| ((n * 7919) % 13) as f32).collect();
             let labels = Labels::threshold(&values, shape, [0; 3], shape, 6.0);
-            let plain = blob(shape, |[i, j, k]| values[i + nx * (j + 3 * k)] >= 6.0);
+            let plain = Labels::of_shape(shape, |[i, j, k]| values[i + nx * (j + 3 * k)] >= 6.0);
             assert_eq!(labels, plain, "{nx}");
             assert_eq!(labels.voxels().count(), labels.count());
             assert!(labels.voxels().all(|p| labels.get(p)));
@@ -265,22 +270,22 @@ mod tests {
 
     #[test]
     fn euler_characteristic_counts_components_handles_and_cavities() {
-        let solid = blob([70, 4, 4], |_| true);
+        let solid = Labels::of_shape([70, 4, 4], |_| true);
         assert_eq!(solid.euler_characteristic(), 1);
-        let ring = blob([66, 5, 3], |[i, j, _]| {
+        let ring = Labels::of_shape([66, 5, 3], |[i, j, _]| {
             !((1..65).contains(&i) && (1..4).contains(&j))
         });
         assert_eq!(ring.euler_characteristic(), 0);
-        let shell = blob([5, 5, 5], |p| p.iter().any(|&x| x == 0 || x == 4));
+        let shell = Labels::of_shape([5, 5, 5], |p| p.iter().any(|&x| x == 0 || x == 4));
         assert_eq!(shell.euler_characteristic(), 2);
         // Two voxels that touch along an edge are two components.
-        let pair = blob([2, 2, 1], |[i, j, _]| i == j);
+        let pair = Labels::of_shape([2, 2, 1], |[i, j, _]| i == j);
         assert_eq!(pair.euler_characteristic(), 2);
     }
 
     #[test]
     fn bounds_are_tight() {
-        let labels = blob([80, 6, 5], |p| p == [3, 2, 1] || p == [77, 4, 1]);
+        let labels = Labels::of_shape([80, 6, 5], |p| p == [3, 2, 1] || p == [77, 4, 1]);
         assert_eq!(labels.bounds(), Some(([3, 2, 1], [75, 3, 1])));
         assert_eq!(Labels::empty([0; 3], [4; 3]).bounds(), None);
     }

@@ -115,32 +115,14 @@ fn keeping(values: &[f32], count: usize) -> f32 {
         return 0.5;
     }
     let mut sorted = values.to_vec();
-    let (_, next, rest) = sorted.select_nth_unstable_by(values.len() - count, f32::total_cmp);
-    let above = *next;
-    let _ = rest;
-    let below = sorted[..values.len() - count]
-        .iter()
-        .copied()
-        .fold(0.0, f32::max);
-    f32::midpoint(above, below).max(f32::MIN_POSITIVE)
+    let (lower, above, _) = sorted.select_nth_unstable_by(values.len() - count, f32::total_cmp);
+    let below = lower.iter().copied().fold(0.0, f32::max);
+    f32::midpoint(*above, below).max(f32::MIN_POSITIVE)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn blob(extent: [usize; 3], inside: impl Fn([usize; 3]) -> bool) -> Labels {
-        let mut labels = Labels::empty([0; 3], extent);
-        for n in 0..extent.iter().product::<usize>() {
-            let p = [
-                n % extent[0],
-                n / extent[0] % extent[1],
-                n / extent[0] / extent[1],
-            ];
-            labels.set(p, inside(p));
-        }
-        labels
-    }
 
     fn count(s: &Smoothed) -> usize {
         s.values.iter().filter(|&&v| v >= s.level).count()
@@ -149,7 +131,7 @@ mod tests {
     #[test]
     fn the_level_keeps_the_voxel_count() {
         for radius in [3.3, 5.0, 7.7] {
-            let ball = blob([17; 3], |p| {
+            let ball = Labels::of_shape([17; 3], |p| {
                 p.iter().map(|&x| (x as f64 - 8.1).powi(2)).sum::<f64>() < radius * radius
             });
             let smoothed = smooth(&ball, 0.8);
@@ -162,9 +144,9 @@ mod tests {
 
     #[test]
     fn thin_sheets_and_rods_survive() {
-        let rod = blob([30, 9, 9], |p| p[1] == 4 && p[2] == 4 || p[0] > 20);
-        let sheet = blob([20, 20, 1], |_| true);
-        for thin in [rod, sheet, blob([1; 3], |_| true)] {
+        let rod = Labels::of_shape([30, 9, 9], |p| p[1] == 4 && p[2] == 4 || p[0] > 20);
+        let sheet = Labels::of_shape([20, 20, 1], |_| true);
+        for thin in [rod, sheet, Labels::of_shape([1; 3], |_| true)] {
             let smoothed = smooth(&thin, 3.0);
             let shape = smoothed.shape;
             let labels = Labels::threshold(&smoothed.values, shape, [0; 3], shape, smoothed.level);

@@ -275,19 +275,6 @@ mod tests {
     use crate::geometry::random::{Purpose, stream};
     use rand::RngExt;
 
-    fn blob(extent: [usize; 3], inside: impl Fn([usize; 3]) -> bool) -> Labels {
-        let mut labels = Labels::empty([0; 3], extent);
-        for n in 0..extent.iter().product::<usize>() {
-            let p = [
-                n % extent[0],
-                n / extent[0] % extent[1],
-                n / extent[0] / extent[1],
-            ];
-            labels.set(p, inside(p));
-        }
-        labels
-    }
-
     fn assert_ball(labels: &Labels) {
         assert_eq!(labels.euler_characteristic(), 1);
         assert_eq!(Components::of_inside(labels).sizes.len(), 1);
@@ -300,7 +287,7 @@ mod tests {
     fn simple_voxels_are_those_whose_change_changes_no_topology() {
         let mut random = stream(11, Purpose::PhantomNoise);
         for _ in 0..3000 {
-            let mut labels = blob([3; 3], |_| false);
+            let mut labels = Labels::of_shape([3; 3], |_| false);
             for n in 0..27 {
                 labels.set([n % 3, n / 3 % 3, n / 9], random.random_bool(0.5));
             }
@@ -333,7 +320,7 @@ mod tests {
         let plate = |p: [usize; 3]| {
             (3..9).contains(&p[0]) && (3..9).contains(&p[1]) && (4..6).contains(&p[2])
         };
-        let mut holed = blob([12, 12, 10], |p| plate(p) && (p[0], p[1]) != (5, 6));
+        let mut holed = Labels::of_shape([12, 12, 10], |p| plate(p) && (p[0], p[1]) != (5, 6));
         let changes = make_ball(&mut holed, |_| 1.0, &Monitor::silent()).unwrap();
         assert_ball(&holed);
         assert_eq!(changes.cut, 0);
@@ -344,7 +331,7 @@ mod tests {
                 && (((p[0] == 3 || p[0] == 8) && (6..9).contains(&p[2]))
                     || (p[2] == 9 && (3..9).contains(&p[0])))
         };
-        let mut bridged = blob([12, 12, 11], |p| plate(p) || arch(p));
+        let mut bridged = Labels::of_shape([12, 12, 11], |p| plate(p) || arch(p));
         let value = |p: [usize; 3]| if p == [5, 5, 9] { 1.0 } else { 2.0 };
         let changes = make_ball(&mut bridged, value, &Monitor::silent()).unwrap();
         assert_ball(&bridged);
@@ -354,7 +341,7 @@ mod tests {
 
     #[test]
     fn cavities_and_crumbs_go() {
-        let mut labels = blob([9, 9, 9], |p| {
+        let mut labels = Labels::of_shape([9, 9, 9], |p| {
             let ball = p.iter().map(|&x| (x as i64 - 4).pow(2)).sum::<i64>() <= 12;
             ball && p != [4, 4, 4] || p == [0, 0, 0]
         });
