@@ -1,31 +1,27 @@
 //! A progress bar on a terminal, silence elsewhere.
 
-use crate::progress::{Observer, Stage};
+use crate::progress::{Gauge, Observer, Plan, Stage};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::Instant;
-
-/// Shares of the whole that the stages take, as seen on a 128³ volume and 150 points.
-const SHARES: [(Stage, f64); 6] = [
-    (Stage::Read, 0.1),
-    (Stage::Surface, 0.2),
-    (Stage::Retile, 0.4),
-    (Stage::Optimise, 0.2),
-    (Stage::Report, 0.08),
-    (Stage::Export, 0.02),
-];
 
 const STEPS: u64 = 1000;
 
 /// Shows stages and fractions on standard error, and keeps the time.
 pub struct Bar {
     bar: ProgressBar,
+    gauge: Gauge,
     start: Instant,
 }
 
 impl Bar {
-    /// A bar that hides itself where standard error is no terminal.
+    /// A bar over the making of a model.
     pub fn start() -> Self {
+        Self::over(Plan::GENERATION)
+    }
+
+    /// A bar over the stages of `plan`. It hides itself where standard error is no terminal.
+    pub fn over(plan: Plan) -> Self {
         let target = if std::io::stderr().is_terminal() {
             ProgressDrawTarget::stderr()
         } else {
@@ -38,6 +34,7 @@ impl Bar {
         }
         Self {
             bar,
+            gauge: Gauge::new(plan),
             start: Instant::now(),
         }
     }
@@ -55,44 +52,12 @@ impl Bar {
     }
 }
 
-/// How much of the whole is done when `fraction` of `stage` is.
-pub fn overall(stage: Stage, fraction: f64) -> f64 {
-    let before: f64 = SHARES
-        .iter()
-        .take_while(|(s, _)| *s != stage)
-        .map(|(_, share)| share)
-        .sum();
-    let own = SHARES
-        .iter()
-        .find(|(s, _)| *s == stage)
-        .map_or(0.0, |(_, share)| *share);
-    before + own * fraction
-}
-
 impl Observer for Bar {
     fn progress(&self, stage: Stage, fraction: f64) {
-        self.show(stage.as_str(), overall(stage, fraction));
+        self.show(stage.as_str(), self.gauge.advance(stage, fraction));
     }
 
     fn now_ms(&self) -> f64 {
         self.start.elapsed().as_secs_f64() * 1e3
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_whole_grows_from_nothing_to_everything() {
-        let mut last = 0.0;
-        for stage in Stage::ALL {
-            for fraction in [0.0, 0.5, 1.0] {
-                let now = overall(stage, fraction);
-                assert!(now >= last - 1e-12);
-                last = now;
-            }
-        }
-        assert!((last - 1.0).abs() < 1e-12);
     }
 }
