@@ -14,11 +14,62 @@ pub enum Input<'a> {
 
 /// A value of the right type and within its range.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Checked {
+pub enum Checked {
     Integer(u64),
     Number(f64),
     Integers(Vec<i64>),
+    Numbers(Vec<f64>),
     Text(String),
+}
+
+/// [`Input::check`] has already matched the value with the row's [`Kind`], so each
+/// getter meets its own variant.
+impl Checked {
+    pub(super) fn u64(&self) -> u64 {
+        match self {
+            Checked::Integer(n) => *n,
+            _ => unreachable!("checked against Kind::Integer"),
+        }
+    }
+
+    pub(super) fn usize(&self) -> usize {
+        usize::try_from(self.u64()).unwrap_or(usize::MAX)
+    }
+
+    pub(super) fn f64(&self) -> f64 {
+        match self {
+            Checked::Number(x) => *x,
+            _ => unreachable!("checked against Kind::Number"),
+        }
+    }
+
+    pub(super) fn numbers(&self) -> &[f64] {
+        match self {
+            Checked::Numbers(list) => list,
+            _ => unreachable!("checked against Kind::Numbers"),
+        }
+    }
+
+    pub(super) fn text(&self) -> &str {
+        match self {
+            Checked::Text(t) => t,
+            _ => unreachable!("checked against a Kind of text"),
+        }
+    }
+
+    pub(super) fn integers(&self) -> &[i64] {
+        match self {
+            Checked::Integers(list) => list,
+            _ => unreachable!("checked against Kind::Integers"),
+        }
+    }
+
+    pub(super) fn indices(&self) -> Result<Vec<usize>, String> {
+        self.integers()
+            .iter()
+            .map(|&n| usize::try_from(n).map_err(|_| format!("{n} is not a voxel index")))
+            .collect()
+    }
 }
 
 impl Input<'_> {
@@ -49,6 +100,16 @@ impl Input<'_> {
                 Some(list) if list.len() == count => Ok(Checked::Integers(list)),
                 Some(list) => Err(format!("{} numbers where {count} belong", list.len())),
                 None => Err(format!("{self} is not a list of whole numbers")),
+            },
+            Kind::Numbers { count } => match self.as_numbers() {
+                Some(list) if list.len() == count => Ok(Checked::Numbers(list)),
+                Some(list) => Err(format!("{} numbers where {count} belong", list.len())),
+                None => Err(format!("{self} is not a list of finite numbers")),
+            },
+            Kind::Stored { prefixes, word } => match self.as_text() {
+                Some(text) if !word.is_empty() && text == word => Ok(Checked::Text(text.into())),
+                Some(text) if is_id(text, prefixes) => Ok(Checked::Text(text.into())),
+                _ => Err(format!("{self} is no id of such a thing")),
             },
             Kind::Text { .. } => self
                 .as_text()
@@ -89,6 +150,23 @@ impl Input<'_> {
                 .collect(),
         }
     }
+
+    fn as_numbers(&self) -> Option<Vec<f64>> {
+        match self {
+            Input::Json(Value::Array(list)) => list.iter().map(Value::as_f64).collect(),
+            _ => self
+                .as_text()?
+                .split(',')
+                .map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite()))
+                .collect(),
+        }
+    }
+}
+
+/// One of the prefixes and hexadecimal digits.
+fn is_id(text: &str, prefixes: &[&str]) -> bool {
+    let digits = prefixes.iter().find_map(|prefix| text.strip_prefix(prefix));
+    digits.is_some_and(|d| (1..=64).contains(&d.len()) && d.bytes().all(|b| b.is_ascii_hexdigit()))
 }
 
 impl std::fmt::Display for Input<'_> {

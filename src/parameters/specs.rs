@@ -1,6 +1,5 @@
-//! The table of parameters.
+//! The table of a model's parameters.
 
-use super::input::Checked;
 use super::{Kind, ParameterSpec};
 use crate::optimise::{FitnessForm, Gain};
 use crate::retile::Method;
@@ -438,48 +437,5 @@ fn parse_iso(text: &str) -> Result<IsoLevel, String> {
         }
         Some(percent) => Err(format!("{percent} % does not lie between 0 % and 100 %")),
         None => Err(format!("`{text}` is none of the three forms")),
-    }
-}
-
-/// [`super::Input::check`] has already matched the value with the row's [`Kind`], so each
-/// getter meets its own variant.
-impl Checked {
-    fn u64(&self) -> u64 {
-        match self {
-            Checked::Integer(n) => *n,
-            _ => unreachable!("checked against Kind::Integer"),
-        }
-    }
-
-    fn usize(&self) -> usize {
-        usize::try_from(self.u64()).unwrap_or(usize::MAX)
-    }
-
-    fn f64(&self) -> f64 {
-        match self {
-            Checked::Number(x) => *x,
-            _ => unreachable!("checked against Kind::Number"),
-        }
-    }
-
-    fn text(&self) -> &str {
-        match self {
-            Checked::Text(t) => t,
-            _ => unreachable!("checked against Kind::Text or Kind::Choice"),
-        }
-    }
-
-    fn integers(&self) -> &[i64] {
-        match self {
-            Checked::Integers(list) => list,
-            _ => unreachable!("checked against Kind::Integers"),
-        }
-    }
-
-    fn indices(&self) -> Result<Vec<usize>, String> {
-        self.integers()
-            .iter()
-            .map(|&n| usize::try_from(n).map_err(|_| format!("{n} is not a voxel index")))
-            .collect()
     }
 }

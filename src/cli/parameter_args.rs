@@ -1,19 +1,33 @@
-//! The model parameters as command-line flags, made from the table of names.
+//! Tables of parameters as command-line flags.
 
-use crate::parameters::{Kind, ModelParameters, ParameterError, ParameterSpec, SPECS};
+use crate::parameters::{
+    FitParameters, Kind, ModelParameters, ParameterError, ParameterSpec, Parameters,
+};
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
+use std::marker::PhantomData;
+
+/// The flags of a model.
+pub type ModelArgs = TableArgs<ModelParameters>;
+/// The flags of a fit; `--model` and `--expert` are files here, and the command's own.
+pub type FitArgs = TableArgs<FitParameters>;
 
 /// The flags given, as name and text.
-#[derive(Debug, Clone, Default)]
-pub struct ModelArgs(Vec<(&'static str, String)>);
+#[derive(Debug, Clone)]
+pub struct TableArgs<P>(Vec<(&'static str, String)>, PhantomData<P>);
 
-impl ModelArgs {
+impl<P> Default for TableArgs<P> {
+    fn default() -> Self {
+        Self(Vec::new(), PhantomData)
+    }
+}
+
+impl<P: Parameters> TableArgs<P> {
     /// Checks the flags.
     ///
     /// # Errors
     /// The first flag that cannot be used.
-    pub fn parameters(&self) -> Result<ModelParameters, ParameterError> {
-        ModelParameters::from_pairs(self.0.iter().map(|(name, text)| (*name, text.as_str())))
+    pub fn parameters(&self) -> Result<P, ParameterError> {
+        P::from_pairs(self.0.iter().map(|(name, text)| (*name, text.as_str())))
     }
 
     /// The flags as a query string's pairs.
@@ -22,9 +36,16 @@ impl ModelArgs {
     }
 }
 
-impl Args for ModelArgs {
+/// The rows that are flags: all but those that name what only a service keeps.
+fn rows<P: Parameters>() -> impl Iterator<Item = &'static ParameterSpec<P>> {
+    P::SPECS
+        .iter()
+        .filter(|spec| !matches!(spec.kind, Kind::Stored { .. }))
+}
+
+impl<P: Parameters> Args for TableArgs<P> {
     fn augment_args(command: Command) -> Command {
-        command.args(SPECS.iter().map(flag))
+        command.args(rows::<P>().map(flag))
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -32,7 +53,7 @@ impl Args for ModelArgs {
     }
 }
 
-impl FromArgMatches for ModelArgs {
+impl<P: Parameters> FromArgMatches for TableArgs<P> {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
         let mut args = Self::default();
         args.update_from_arg_matches(matches)?;
@@ -40,27 +61,40 @@ impl FromArgMatches for ModelArgs {
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
-        self.0 = SPECS
-            .iter()
-            .filter_map(|s| Some((s.name, matches.get_one::<String>(s.name)?.clone())))
+        self.0 = rows::<P>()
+            .filter_map(|s| Some((s, matches.get_one::<String>(s.name)?)))
+            .map(|(spec, text)| match spec.kind {
+                Kind::Choice(_) => (spec.name, text.replace('-', "_")),
+                _ => (spec.name, text.clone()),
+            })
             .collect();
         Ok(())
     }
 }
 
 /// The flag of one parameter: `--seed-point` and `--seed_point` are the same.
-fn flag(spec: &'static ParameterSpec) -> Arg {
+fn flag<P: Parameters>(spec: &'static ParameterSpec<P>) -> Arg {
     let mut arg = Arg::new(spec.name)
         .long(spec.name.replace('_', "-"))
         .value_name(value_name(&spec.kind))
         .allow_hyphen_values(true)
-        .help_heading("Model")
+        .help_heading("Parameters")
         .help(help(spec));
     if spec.name.contains('_') {
         arg = arg.alias(spec.name);
     }
+    for (other, own) in P::ALIASES {
+        if *own == spec.name {
+            arg = arg.visible_alias(*other);
+        }
+    }
     match spec.kind {
-        Kind::Choice(words) => arg.value_parser(clap::builder::PossibleValuesParser::new(words)),
+        Kind::Choice(words) => {
+            let words = words
+                .iter()
+                .map(|word| clap::builder::PossibleValue::new(*word).alias(word.replace('_', "-")));
+            arg.value_parser(clap::builder::PossibleValuesParser::new(words))
+        }
         _ => arg,
     }
 }
@@ -73,11 +107,13 @@ fn value_name(kind: &Kind) -> &'static str {
         Kind::Integers { count: 1 } => "N",
         Kind::Integers { count: 3 } => "I,J,K",
         Kind::Integers { .. } => "I0,J0,K0,I1,J1,K1",
+        Kind::Numbers { .. } => "X,Y,Z",
         Kind::Text { .. } => "TEXT",
+        Kind::Stored { .. } => "ID",
     }
 }
 
-fn help(spec: &ParameterSpec) -> String {
+fn help<P: Parameters>(spec: &ParameterSpec<P>) -> String {
     let range = match spec.kind {
         Kind::Integer { max: u64::MAX, .. } => String::new(),
         Kind::Integer { min, max } => format!(" ({min} to {max})"),
@@ -115,6 +151,17 @@ mod tests {
         assert_eq!(args.pairs().len(), 4);
         assert_eq!(args.parameters().unwrap_err().field, "label");
         assert!(parse(&["test", "--method", "papr"]).is_err());
+        let fit = FitArgs::augment_args(Command::new("test"));
+        let line = [
+            "test",
+            "--seed",
+            "1,2,3",
+            "--organ",
+            "left-ventricle",
+            "--axis=-1,0,0",
+        ];
+        let fit = FitArgs::from_arg_matches(&fit.try_get_matches_from(line).unwrap()).unwrap();
+        assert_eq!(fit.parameters().unwrap().place.seed, Some([1, 2, 3]));
         let snake = parse(&["test", "--mask_smoothing", "1.5"]).unwrap();
         assert_eq!(snake.parameters().unwrap().surface.mask_smoothing, 1.5);
     }

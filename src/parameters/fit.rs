@@ -1,0 +1,289 @@
+//! What decides the segmentation that comes out of a volume and a model.
+
+use super::{FIT_SPECS, ParameterError, ParameterSpec, Parameters};
+use crate::deform::DeformParameters;
+use crate::deform::localise::Hints;
+use crate::deform::template::Organ;
+use crate::geometry::Vec3;
+use crate::geometry::bvh::Aabb;
+use crate::polar::PolarParameters;
+use crate::volume::Volume;
+
+/// Everything that decides a segmentation, but for the files.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitParameters {
+    /// Which frame of a 4-D volume, 0-based; `None` for a 3-D one.
+    pub frame: Option<usize>,
+    /// Id of the model to fit, or `auto`: the best of those at hand.
+    pub model: String,
+    /// Id of the expert's mask, where there is one.
+    pub expert: Option<String>,
+    /// What the model shows.
+    pub organ: Organ,
+    /// What is known of the organ's place.
+    pub place: Place,
+    /// [`DeformParameters::margin`]; `None` leaves it to the kind of file.
+    pub margin: Option<f64>,
+    /// How the model is fitted; hints and margin are settled by [`FitParameters::on`].
+    pub deform: DeformParameters,
+    /// How the polar map is made.
+    pub polar: PolarParameters,
+}
+
+impl Default for FitParameters {
+    fn default() -> Self {
+        Self::finish(FitDraft::default()).expect("the defaults contradict nothing")
+    }
+}
+
+/// What is known of the organ's place, in the words of whoever knows it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Place {
+    /// A point in the cavity (or in the organ), LPS mm.
+    pub centre: Option<Vec3>,
+    /// A voxel there.
+    pub seed: Option<[usize; 3]>,
+    /// Base to apex, LPS, any length.
+    pub axis: Option<Vec3>,
+    /// First and last voxel of the box that holds the organ's centre.
+    pub region: Option<[[usize; 3]; 2]>,
+}
+
+/// Parameters of a fit on their way in.
+#[derive(Debug)]
+pub struct FitDraft(pub(super) FitParameters);
+
+impl Default for FitDraft {
+    fn default() -> Self {
+        Self(FitParameters {
+            frame: None,
+            model: FitParameters::AUTO.into(),
+            expert: None,
+            organ: Organ::LeftVentricle,
+            place: Place::default(),
+            margin: None,
+            deform: DeformParameters::default(),
+            polar: PolarParameters::default(),
+        })
+    }
+}
+
+impl Parameters for FitParameters {
+    type Draft = FitDraft;
+
+    const SPECS: &'static [ParameterSpec<Self>] = FIT_SPECS;
+
+    const ALIASES: &'static [(&'static str, &'static str)] = &[
+        ("template", "model"),
+        ("centre", "center"),
+        ("seed", "seed_point"),
+    ];
+
+    fn finish(FitDraft(parameters): FitDraft) -> Result<Self, ParameterError> {
+        if parameters.place.centre.is_some() && parameters.place.seed.is_some() {
+            return Err(ParameterError {
+                field: "seed_point".into(),
+                message: "`center` and `seed_point` both say where the organ is".into(),
+                fix: "Give `center` or `seed_point`, not both.".into(),
+            });
+        }
+        Ok(parameters)
+    }
+}
+
+impl FitParameters {
+    /// The word for "the best of the models at hand".
+    pub const AUTO: &str = "auto";
+
+    /// The fit's parameters on one volume: hints in millimetres, the margin settled by
+    /// `usual_margin` where nobody gave one.
+    ///
+    /// # Errors
+    /// A [`ParameterError`] for a hint that lies outside the volume.
+    pub fn on(
+        &self,
+        volume: &Volume,
+        usual_margin: f64,
+    ) -> Result<DeformParameters, ParameterError> {
+        Ok(DeformParameters {
+            hints: self.place.hints(volume)?,
+            margin: self.margin.unwrap_or(usual_margin),
+            ..self.deform.clone()
+        })
+    }
+}
+
+impl Place {
+    fn hints(&self, volume: &Volume) -> Result<Hints, ParameterError> {
+        let place = |voxel: [usize; 3]| {
+            let index = Vec3::from(voxel.map(|x| x as f64));
+            volume.frame.to_patient(&index)
+        };
+        let inside = |voxel: &[usize; 3]| (0..3).all(|a| voxel[a] < volume.shape[a]);
+        if let Some(centre) = &self.centre {
+            let index = volume.frame.to_voxel(centre);
+            if !(0..3).all(|a| (-0.5..=volume.shape[a] as f64 - 0.5).contains(&index[a])) {
+                return Err(outside("center", volume));
+            }
+        }
+        if self.seed.is_some_and(|seed| !inside(&seed)) {
+            return Err(outside("seed_point", volume));
+        }
+        if self.region.is_some_and(|[_, last]| !inside(&last)) {
+            return Err(outside("box", volume));
+        }
+        let corners = self.region.map(|ends| {
+            let corner = |c: usize| place([0, 1, 2].map(|a| ends[c >> a & 1][a]));
+            Aabb::of(&[0, 1, 2, 3, 4, 5, 6, 7].map(corner))
+        });
+        Ok(Hints {
+            centre: self.centre.or(self.seed.map(place)),
+            axis: self.axis,
+            region: corners,
+        })
+    }
+}
+
+fn outside(field: &str, volume: &Volume) -> ParameterError {
+    let [nx, ny, nz] = volume.shape;
+    let last = Vec3::from(volume.shape.map(|n| n as f64 - 1.0));
+    let ends = [Vec3::zeros(), last].map(|index| {
+        let p = volume.frame.to_patient(&index);
+        format!("{:.0}, {:.0}, {:.0}", p.x, p.y, p.z)
+    });
+    ParameterError {
+        field: field.into(),
+        message: "it lies outside the volume".into(),
+        fix: format!(
+            "The volume has {nx} x {ny} x {nz} voxels, from ({}) to ({}) mm, LPS.",
+            ends[0], ends[1]
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::frame::VoxelToPatient;
+    use serde_json::json;
+
+    fn pairs(list: &[(&str, &str)]) -> Result<FitParameters, ParameterError> {
+        FitParameters::from_pairs(list.iter().copied())
+    }
+
+    fn refusal(list: &[(&str, &str)]) -> ParameterError {
+        pairs(list).unwrap_err()
+    }
+
+    fn volume() -> Volume {
+        Volume {
+            shape: [10, 20, 30],
+            voxels: vec![0.0; 6000],
+            frame: VoxelToPatient::centred([10, 20, 30], [2.0; 3], Vec3::zeros()).unwrap(),
+            integral: true,
+        }
+    }
+
+    #[test]
+    fn what_is_written_out_reads_back_the_same() {
+        for list in [
+            &[][..],
+            &[
+                ("center", "1.5,-2,3e1"),
+                ("axis", "0,0,-1"),
+                ("margin", "-1.25"),
+            ],
+            &[("box", "1,2,3,4,5,6"), ("organ", "kidney"), ("frame", "3")],
+            &[
+                ("model", "tpl_0123"),
+                ("expert", "vol_ab"),
+                ("sensor", "level"),
+            ],
+            &[
+                ("seed_point", "3,4,5"),
+                ("max_iterations", "7"),
+                ("roll", "90"),
+            ],
+        ] {
+            let parameters = pairs(list).unwrap();
+            let written = parameters.to_json();
+            assert_eq!(FitParameters::from_json(&written).unwrap(), parameters);
+            for (name, _) in list {
+                assert!(written.contains_key(*name), "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_table_states_the_defaults_that_the_code_has() {
+        let defaults: Vec<(&str, &str)> = FIT_SPECS
+            .iter()
+            .filter(|s| !s.default.is_empty())
+            .map(|s| (s.name, s.default))
+            .collect();
+        assert_eq!(pairs(&defaults).unwrap(), FitParameters::default());
+    }
+
+    #[test]
+    fn the_table_allows_what_the_fit_allows() {
+        for spec in FIT_SPECS {
+            let super::super::Kind::Number { min, max } = spec.kind else {
+                continue;
+            };
+            for (value, fits) in [(min, true), (max, true), (min - 1e-7, false)] {
+                let read = pairs(&[(spec.name, &value.to_string())]);
+                let sound = read.map(|p| p.deform.validate().is_ok());
+                assert_eq!(sound.unwrap_or(false), fits, "{} = {value}", spec.name);
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_that_are_none_are_refused_by_name() {
+        for bad in ["nan", "inf", "1e999", "1", "1,2", "1,2,3,4", "1,2,nan", ""] {
+            assert_eq!(refusal(&[("center", bad)]).field, "center", "{bad}");
+            assert!(refusal(&[("center", bad)]).fix.contains("3 finite numbers"));
+        }
+        for name in ["margin", "blur", "roll", "spring_stiffness"] {
+            assert_eq!(refusal(&[(name, "NaN")]).field, name);
+            assert_eq!(refusal(&[(name, "-inf")]).field, name);
+        }
+        assert!(refusal(&[("axis", "0,0,0")]).message.contains("length"));
+        let strings = json!({"center": ["1", "2", "3"]});
+        assert!(FitParameters::from_json(strings.as_object().unwrap()).is_err());
+    }
+
+    #[test]
+    fn other_names_are_understood_once() {
+        assert_eq!(pairs(&[("template", "auto")]).unwrap().model, "auto");
+        let twice = refusal(&[("template", "auto"), ("model", "auto")]);
+        assert!(twice.message.contains("once"));
+        assert!(refusal(&[("modell", "auto")]).fix.contains("`model`"));
+        assert!(refusal(&[("model", "lv.json")]).fix.contains("mdl_"));
+        assert!(refusal(&[("expert", "auto")]).fix.contains("vol_"));
+        let both = refusal(&[("center", "1,2,3"), ("seed", "1,2,3")]);
+        assert_eq!(both.field, "seed_point");
+    }
+
+    #[test]
+    fn hints_are_millimetres_within_the_volume() {
+        let hinted = |list: &[(&str, &str)]| pairs(list).unwrap().on(&volume(), 2.5);
+        let seeded = hinted(&[("seed", "0,0,0")]).unwrap();
+        assert_eq!(seeded.hints.centre, Some(Vec3::new(-9.0, -19.0, -29.0)));
+        assert_eq!(seeded.margin, 2.5);
+        let boxed = hinted(&[("box", "0,1,2,3,4,5"), ("margin", "0")]).unwrap();
+        let region = boxed.hints.region.unwrap();
+        assert_eq!(region.min, Vec3::new(-9.0, -17.0, -25.0));
+        assert_eq!(region.max, Vec3::new(-3.0, -11.0, -19.0));
+        assert_eq!(boxed.margin, 0.0);
+        for (name, value) in [
+            ("center", "11,0,0"),
+            ("seed_point", "10,0,0"),
+            ("box", "0,0,0,1,20,1"),
+        ] {
+            let refused = hinted(&[(name, value)]).unwrap_err();
+            assert_eq!(refused.field, name);
+            assert!(refused.fix.contains("10 x 20 x 30"), "{refused:?}");
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! The table of a fit's parameters.
+
+use super::fit::FitParameters;
+use super::{Kind, ParameterSpec};
+use crate::deform::sensors::SensorKind;
+use crate::deform::template::Organ;
+use crate::geometry::Vec3;
+use serde_json::{Value, json};
+
+/// A row for one number at a path within [`FitParameters`].
+macro_rules! number {
+    ($name:literal, $($path:ident).+, $min:literal..=$max:literal, $default:literal, $summary:literal) => {
+        ParameterSpec {
+            name: $name,
+            kind: Kind::Number {
+                min: $min,
+                max: $max,
+            },
+            default: $default,
+            summary: $summary,
+            read: |d, v| {
+                d.0.$($path).+ = v.f64();
+                Ok(())
+            },
+            write: |p| json!(p.$($path).+),
+        }
+    };
+}
+
+/// Every parameter of a fit, in the order in which the stages use them.
+pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
+    ParameterSpec {
+        name: "model",
+        kind: Kind::Stored {
+            prefixes: &["mdl_", "tpl_", "seg_"],
+            word: FitParameters::AUTO,
+        },
+        default: FitParameters::AUTO,
+        summary: "Id of the model to fit (a template, a model or an earlier segmentation), or auto: \
+                  every template of the organ is tried and the best fit taken; without templates \
+                  a built-in ventricle is fitted. Also understood as template",
+        read: |d, v| {
+            d.0.model = v.text().into();
+            Ok(())
+        },
+        write: |p| json!(p.model),
+    },
+    ParameterSpec {
+        name: "expert",
+        kind: Kind::Stored {
+            prefixes: &["vol_"],
+            word: "",
+        },
+        default: "",
+        summary: "Id of a volume with an expert's mask (above 0.5) to measure against",
+        read: |d, v| {
+            d.0.expert = Some(v.text().into());
+            Ok(())
+        },
+        write: |p| json!(p.expert),
+    },
+    ParameterSpec {
+        name: "frame",
+        kind: Kind::Integer {
+            min: 0,
+            max: 1_000_000,
+        },
+        default: "",
+        summary: "Which frame of a 4-D volume, counted from 0",
+        read: |d, v| {
+            d.0.frame = Some(v.usize());
+            Ok(())
+        },
+        write: |p| json!(p.frame),
+    },
+    ParameterSpec {
+        name: "organ",
+        kind: Kind::Choice(&["left_ventricle", "liver", "kidney", "generic"]),
+        default: "left_ventricle",
+        summary: "What the model shows; all but the left ventricle start at the largest bright \
+                  body and have no polar map",
+        read: |d, v| {
+            d.0.organ = Organ::parse(v.text()).unwrap_or(Organ::LeftVentricle);
+            Ok(())
+        },
+        write: |p| json!(p.organ.as_str()),
+    },
+    ParameterSpec {
+        name: "center",
+        kind: Kind::Numbers { count: 3 },
+        default: "",
+        summary: "A point in the cavity, x,y,z in LPS millimetres: the search keeps within 25 mm \
+                  of it and believes it; else the organ is searched",
+        read: |d, v| {
+            d.0.place.centre = Some(point(v.numbers()));
+            Ok(())
+        },
+        write: |p| json!(p.place.centre.map(|c| [c.x, c.y, c.z])),
+    },
+    ParameterSpec {
+        name: "seed_point",
+        kind: Kind::Integers { count: 3 },
+        default: "",
+        summary: "Voxel i,j,k (counted from 0) in the cavity, in place of center. Also understood \
+                  as seed",
+        read: |d, v| {
+            let list = v.indices()?;
+            d.0.place.seed = Some([list[0], list[1], list[2]]);
+            Ok(())
+        },
+        write: |p| json!(p.place.seed),
+    },
+    ParameterSpec {
+        name: "axis",
+        kind: Kind::Numbers { count: 3 },
+        default: "",
+        summary: "Direction from base to apex, x,y,z in LPS, of any length: the search keeps within \
+                  35 degrees of it",
+        read: |d, v| {
+            let axis = point(v.numbers());
+            if !(axis.norm() > 1e-6 && axis.norm().is_finite()) {
+                return Err("a direction needs a length".into());
+            }
+            d.0.place.axis = Some(axis);
+            Ok(())
+        },
+        write: |p| json!(p.place.axis.map(|a| [a.x, a.y, a.z])),
+    },
+    ParameterSpec {
+        name: "box",
+        kind: Kind::Integers { count: 6 },
+        default: "",
+        summary: "The organ's centre lies in this box of voxels: i0,j0,k0,i1,j1,k1, counted from \
+                  0, both corners included",
+        read: |d, v| {
+            let list = v.indices()?;
+            let ends = [[list[0], list[1], list[2]], [list[3], list[4], list[5]]];
+            if (0..3).any(|axis| ends[0][axis] > ends[1][axis]) {
+                return Err("the first corner lies beyond the last one".into());
+            }
+            d.0.place.region = Some(ends);
+            Ok(())
+        },
+        write: |p| match p.place.region {
+            Some([[a, b, c], [d, e, f]]) => json!([a, b, c, d, e, f]),
+            None => Value::Null,
+        },
+    },
+    number!(
+        "roll",
+        deform.roll,
+        -360.0..=360.0,
+        "0",
+        "Turn of the model about the long axis beyond the least turn that brings the axes \
+         together, degrees"
+    ),
+    ParameterSpec {
+        name: "sensor",
+        kind: Kind::Choice(&["gradient", "unsigned", "level"]),
+        default: "gradient",
+        summary: "What the sensors look for: the steepest fall outward, the steepest change \
+                  whichever way, or the crossing of half the organ's uptake",
+        read: |d, v| {
+            d.0.deform.sensor = match v.text() {
+                "unsigned" => SensorKind::Unsigned,
+                "level" => SensorKind::Level,
+                _ => SensorKind::Gradient,
+            };
+            Ok(())
+        },
+        write: |p| {
+            json!(match p.deform.sensor {
+                SensorKind::Gradient => "gradient",
+                SensorKind::Unsigned => "unsigned",
+                SensorKind::Level => "level",
+            })
+        },
+    },
+    number!(
+        "blur",
+        deform.blur,
+        0.0..=10.0,
+        "3",
+        "Gaussian sigma that smooths the image before the sensors read it, millimetres"
+    ),
+    number!(
+        "reach",
+        deform.reach,
+        2.0..=30.0,
+        "10",
+        "How far the sensors look at first, millimetres to either side"
+    ),
+    number!(
+        "last_reach",
+        deform.motion.last_reach,
+        1.0..=30.0,
+        "6",
+        "How far the sensors look at the end, millimetres to either side"
+    ),
+    number!(
+        "narrowing",
+        deform.motion.narrowing,
+        0.1..=0.99,
+        "0.85",
+        "Factor of the sensors' reach from step to step"
+    ),
+    ParameterSpec {
+        name: "margin",
+        kind: Kind::Number {
+            min: -5.0,
+            max: 5.0,
+        },
+        default: "",
+        summary: "How far outside the steepest slope the edge is drawn, millimetres (default 2.5 for \
+                  DICOM NM, whose readers draw wide: measured on one expert's mask; else 0)",
+        read: |d, v| {
+            d.0.margin = Some(v.f64());
+            Ok(())
+        },
+        write: |p| json!(p.margin),
+    },
+    number!(
+        "spring_stiffness",
+        deform.stiffness.spring,
+        0.0..=1e6,
+        "5",
+        "How hard edges keep their length, square millimetres"
+    ),
+    number!(
+        "torsion_stiffness",
+        deform.stiffness.torsion,
+        0.0..=1e6,
+        "15",
+        "How hard each node keeps its place among its neighbours, square millimetres"
+    ),
+    number!(
+        "body_stiffness",
+        deform.stiffness.body,
+        0.0..=1e6,
+        "12",
+        "How hard the model keeps its shape as a whole, square millimetres"
+    ),
+    number!(
+        "thickness_stiffness",
+        deform.stiffness.thickness,
+        0.0..=1e6,
+        "0.1",
+        "How hard the wall keeps its thickness"
+    ),
+    number!(
+        "mass",
+        deform.motion.mass,
+        1e-6..=1e6,
+        "0.1",
+        "Mass of the whole model against a sensor force of 1 per millimetre"
+    ),
+    number!(
+        "damping",
+        deform.motion.damping,
+        0.0..=1e6,
+        "1",
+        "Damping of the motion, per time step"
+    ),
+    number!(
+        "time_step",
+        deform.motion.time_step,
+        1e-3..=1e3,
+        "1",
+        "Length of one step of the motion"
+    ),
+    number!(
+        "tolerance",
+        deform.motion.tolerance,
+        1e-6..=1.0,
+        "0.04",
+        "Largest move of a node that counts as rest, millimetres"
+    ),
+    ParameterSpec {
+        name: "max_iterations",
+        kind: Kind::Integer {
+            min: 1,
+            max: 10_000,
+        },
+        default: "100",
+        summary: "Most steps of the motion",
+        read: |d, v| {
+            d.0.deform.motion.max_iterations = v.usize();
+            Ok(())
+        },
+        write: |p| json!(p.deform.motion.max_iterations),
+    },
+    number!(
+        "polar_threshold",
+        polar.threshold,
+        0.0..=1.0,
+        "0.6",
+        "Share of the wall's own reference uptake below which it counts as a defect"
+    ),
+    number!(
+        "polar_extension",
+        polar.extension,
+        0.0..=10.0,
+        "3",
+        "How far the polar map's samples go beyond the wall on both sides, millimetres"
+    ),
+];
+
+fn point(list: &[f64]) -> Vec3 {
+    Vec3::new(list[0], list[1], list[2])
+}
