@@ -37,7 +37,7 @@ use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
-use crate::progress::{Cancelled, Monitor};
+use crate::progress::{Cancelled, Monitor, Stage};
 use crate::volume::Volume;
 use cup::Cup;
 use dynamics::{Motion, Moved, StopReason};
@@ -230,7 +230,9 @@ pub fn fit(
     monitor: &Monitor,
 ) -> Result<Fit, DeformError> {
     parameters.validate()?;
+    monitor.report(Stage::Localise, 0.0)?;
     let start = Start::find(volume, template, parameters, monitor)?;
+    monitor.report(Stage::Align, 0.0)?;
     let look = start.look(parameters);
     let aligned = align::align(
         &start.posed,
@@ -240,7 +242,9 @@ pub fn fit(
         parameters.motion.last_reach,
         monitor,
     )?;
+    monitor.report(Stage::Deform, 0.0)?;
     let attempt = Attempt::best(&aligned, template, &start, parameters, monitor)?;
+    monitor.report(Stage::Deform, 1.0)?;
     Ok(attempt.into_fit(volume, template, start, &aligned))
 }
 

@@ -27,6 +27,19 @@ pub enum Organ {
 }
 
 impl Organ {
+    /// Every organ.
+    pub const ALL: [Organ; 4] = [
+        Organ::LeftVentricle,
+        Organ::Liver,
+        Organ::Kidney,
+        Organ::Generic,
+    ];
+
+    /// The organ of that name.
+    pub fn parse(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|organ| organ.as_str() == name)
+    }
+
     /// The name in parameters and reports.
     pub fn as_str(self) -> &'static str {
         match self {

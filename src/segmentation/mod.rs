@@ -1,8 +1,9 @@
 //! A patient's segmentation from beginning to end: fit, mask, volumes, polar map, measures.
 //!
 //! Several templates may be given: each is fitted, and the fit with the greatest
-//! [`Fit::merit`](crate::deform::Fit::merit) is taken; the others' figures are kept to say
-//! why.
+//! [`Fit::merit`](crate::deform::Fit::merit) is taken (the first of equals); the others'
+//! figures are kept to say why. A template that cannot be fitted is left out with its reason,
+//! unless none can.
 
 mod expert;
 mod report;
@@ -15,7 +16,7 @@ use crate::deform::voxelise::{Mask, voxelise};
 use crate::deform::{DeformError, DeformParameters, Fit, fit};
 use crate::evaluate::masks::{Agreement, compare};
 use crate::polar::{self, PolarMap, PolarParameters};
-use crate::progress::Monitor;
+use crate::progress::{Cancelled, Monitor, Stage};
 use crate::volume::Volume;
 
 /// Parameters of [`segment`].
@@ -51,6 +52,15 @@ pub struct Candidate {
     pub residual: f64,
 }
 
+/// A template that could not be fitted.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refused {
+    /// The template's name.
+    pub name: String,
+    /// Why.
+    pub reason: String,
+}
+
 /// A segmented patient.
 #[derive(Debug, Clone)]
 pub struct Segmentation {
@@ -64,8 +74,10 @@ pub struct Segmentation {
     pub agreement: Option<Agreement>,
     /// Place of the taken template in `candidates`.
     pub chosen: usize,
-    /// Every template tried, in the order given.
+    /// Every template fitted, in the order given.
     pub candidates: Vec<Candidate>,
+    /// Templates that could not be fitted.
+    pub refused: Vec<Refused>,
 }
 
 /// Why there is no segmentation.
@@ -80,6 +92,9 @@ pub enum SegmentationError {
     /// The expert's mask cannot be used.
     #[error(transparent)]
     Expert(#[from] ExpertError),
+    /// The caller asked for an end.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 /// Segments `volume` by the best of `templates`; measures against `expert` if given.
@@ -94,35 +109,30 @@ pub fn segment(
     monitor: &Monitor,
 ) -> Result<Segmentation, SegmentationError> {
     let expert = expert.map(|e| on_grid(e, volume)).transpose()?;
-    let mut fits: Vec<Fit> = Vec::new();
-    for named in templates {
-        fits.push(fit(volume, &named.template, &parameters.deform, monitor)?);
-    }
-    let candidates: Vec<Candidate> = fits
-        .iter()
-        .zip(templates)
-        .map(|(fit, named)| Candidate {
-            name: named.name.clone(),
-            merit: fit.merit(),
-            active: fit.active,
-            strain: fit.strain.sqrt(),
-            residual: fit.residual,
-        })
-        .collect();
+    let Trials {
+        mut fits,
+        candidates,
+        refused,
+    } = try_all(volume, templates, &parameters.deform, monitor)?;
     let chosen = (0..fits.len())
+        .rev()
         .max_by(|a, b| candidates[*a].merit.total_cmp(&candidates[*b].merit))
         .ok_or(SegmentationError::NoTemplate)?;
     let fit = fits.swap_remove(chosen);
+    monitor.report(Stage::Polar, 0.0)?;
+    let polar = fit
+        .wall
+        .as_ref()
+        .map(|wall| polar::map(volume, wall, &parameters.polar));
+    monitor.report(Stage::Report, 0.0)?;
     let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
+    monitor.report(Stage::Report, 0.5)?;
     let agreement = match &expert {
         // One grid by construction: `on_grid` made the mask on the volume's.
         Some(expert) => compare(&mask, expert, volume.frame.spacing()).ok(),
         None => None,
     };
-    let polar = fit
-        .wall
-        .as_ref()
-        .map(|wall| polar::map(volume, wall, &parameters.polar));
+    monitor.report(Stage::Report, 1.0)?;
     Ok(Segmentation {
         fit,
         mask,
@@ -130,7 +140,52 @@ pub fn segment(
         agreement,
         chosen,
         candidates,
+        refused,
     })
+}
+
+/// Every template's fit, or why there is none.
+#[derive(Default)]
+struct Trials {
+    fits: Vec<Fit>,
+    candidates: Vec<Candidate>,
+    refused: Vec<Refused>,
+}
+
+fn try_all(
+    volume: &Volume,
+    templates: &[NamedTemplate],
+    parameters: &DeformParameters,
+    monitor: &Monitor,
+) -> Result<Trials, SegmentationError> {
+    let mut trials = Trials::default();
+    let mut first = None;
+    for (index, NamedTemplate { name, template }) in templates.iter().enumerate() {
+        let monitor = monitor.piece(index, templates.len());
+        let name = name.clone();
+        match fit(volume, template, parameters, &monitor) {
+            Ok(fit) => {
+                trials.candidates.push(Candidate {
+                    name,
+                    merit: fit.merit(),
+                    active: fit.active,
+                    strain: fit.strain.sqrt(),
+                    residual: fit.residual,
+                });
+                trials.fits.push(fit);
+            }
+            Err(error) => {
+                monitor.check()?;
+                let reason = error.to_string();
+                trials.refused.push(Refused { name, reason });
+                first.get_or_insert(error);
+            }
+        }
+    }
+    match first {
+        Some(error) if trials.fits.is_empty() => Err(error.into()),
+        _ => Ok(trials),
+    }
 }
 
 /// A mask as a volume of 0 and 1 in the place of `like`.

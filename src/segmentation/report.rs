@@ -37,9 +37,16 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
             })
         })
         .collect();
+    let refused: Vec<Value> = segmentation
+        .refused
+        .iter()
+        .map(|r| json!({"template": r.name, "reason": r.reason}))
+        .collect();
     json!({
         "template": segmentation.candidates[segmentation.chosen].name,
+        "choice": choice(segmentation),
         "candidates": candidates,
+        "refused": refused,
         "localisation": fit.localisation.as_ref().map(|l| json!({
             "centre": point(&l.cup.centre),
             "axis": point(&l.cup.axis),
@@ -78,6 +85,28 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
         "flags": flags,
         "mask_rule": "a voxel belongs to the mask if its centre lies inside the surface",
     })
+}
+
+/// Why this template, in a sentence.
+fn choice(segmentation: &Segmentation) -> String {
+    let chosen = &segmentation.candidates[segmentation.chosen];
+    let others = segmentation.candidates.iter().enumerate();
+    let next = others
+        .filter(|(place, _)| *place != segmentation.chosen)
+        .map(|(_, candidate)| candidate)
+        .max_by(|a, b| a.merit.total_cmp(&b.merit));
+    match next {
+        None => format!("{} was the only model fitted", chosen.name),
+        Some(next) => format!(
+            "{} has the greatest merit, {:.3} (next {}: {:.3}): edges seen along {:.0} % of its \
+             surface, less strain, misfit and flags",
+            chosen.name,
+            chosen.merit,
+            next.name,
+            next.merit,
+            100.0 * chosen.active,
+        ),
+    }
 }
 
 fn rows(fit: &crate::deform::Fit) -> Vec<[f64; 3]> {

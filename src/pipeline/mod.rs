@@ -1,13 +1,19 @@
-//! A volume's way through every stage.
+//! A volume's way through every stage: to a model here, to a segmentation in [`segment`].
 //!
 //! [`generate`] reads, surfaces, re-tiles, optimises and measures: the stage calls in order,
 //! nothing else. The stages guarantee what they hand on; the last look is
 //! [`Report::is_sound`], and a model that is not sound is an error, never a result.
 
+mod built_in;
+mod outcome;
+pub mod segment;
+
+pub use outcome::{NamedFile, OutcomeError};
+
 use crate::export::Metadata;
 use crate::mesh::TriMesh;
 use crate::optimise::{self, OptimiseError, Reference};
-use crate::parameters::ModelParameters;
+use crate::parameters::{ModelParameters, Parameters};
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, MeasureParameters, Report, ReportInput};
 use crate::retile::{self, RetileError};
@@ -153,7 +159,7 @@ pub fn from_reading(
     laps.end(Stage::Report);
     let mut report = Report::new(ReportInput {
         input: report::input(&reading.facts),
-        parameters: parameters.to_json(),
+        parameters: parameters.to_json().into(),
         surface: &surface,
         tiled: &tiled,
         optimised: &optimised,

@@ -1,0 +1,150 @@
+//! What comes of a segmentation, as files.
+
+use super::segment::Segmented;
+use crate::export::{self, ExportError, Format, Metadata};
+use crate::parameters::Parameters;
+use crate::polar;
+use crate::progress::{Cancelled, Monitor, Stage};
+use crate::segmentation::{mask_volume, report_json};
+use crate::volume::nifti::{self, StoredType};
+use serde_json::{Map, Value, json};
+
+/// One file of an outcome.
+#[derive(Debug, Clone)]
+pub struct NamedFile {
+    /// `mask.nii.gz`, `mesh.glb`, `report.json`, `polar.svg` ...
+    pub name: String,
+    /// Its media type.
+    pub media_type: &'static str,
+    /// Its content.
+    pub bytes: Vec<u8>,
+}
+
+/// Why an outcome cannot be written as files.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum OutcomeError {
+    /// A mesh format cannot hold the mesh.
+    #[error(transparent)]
+    Mesh(#[from] ExportError),
+    /// The mask or the polar map cannot be written.
+    #[error("{what}: {reason}")]
+    Other {
+        /// The file.
+        what: &'static str,
+        /// Why.
+        reason: String,
+    },
+    /// The caller asked for an end.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl Segmented {
+    /// The mask on the input's grid, the mesh in `formats`, the report and, of a ventricle,
+    /// the polar map. `volume_id` names the volume in the mesh files.
+    ///
+    /// # Errors
+    /// See [`OutcomeError`].
+    pub fn files(
+        &self,
+        formats: &[Format],
+        volume_id: Option<String>,
+        monitor: &Monitor<'_>,
+    ) -> Result<Vec<NamedFile>, OutcomeError> {
+        monitor.report(Stage::Export, 0.0)?;
+        let mut files = vec![self.mask()?];
+        monitor.report(Stage::Export, 0.5)?;
+        let metadata = Metadata {
+            volume_id,
+            quality: self.summary(),
+            ..Metadata::new("Fitted model")
+        };
+        for format in formats {
+            monitor.check()?;
+            files.push(NamedFile {
+                name: format!("mesh.{}", format.extension()),
+                media_type: format.media_type(),
+                bytes: export::encode(*format, &self.segmentation.fit.mesh, &metadata)?,
+            });
+        }
+        monitor.report(Stage::Export, 0.9)?;
+        files.push(json_file("report.json", &self.report()));
+        files.extend(self.polar()?);
+        monitor.report(Stage::Export, 1.0)?;
+        Ok(files)
+    }
+
+    /// The report: everything known, with the parameters used.
+    pub fn report(&self) -> Value {
+        let mut report = report_json(&self.segmentation);
+        if let Some(object) = report.as_object_mut() {
+            let parameters = self.parameters.to_json();
+            object.insert("parameters".into(), parameters.into());
+            let warnings = self.reading.facts.warnings.clone();
+            object.insert("warnings".into(), warnings.into());
+        }
+        report
+    }
+
+    /// The figures one looks at first.
+    pub fn summary(&self) -> Map<String, Value> {
+        let report = report_json(&self.segmentation);
+        let fit = &report["fit"];
+        [
+            ("template", report["template"].clone()),
+            ("choice", report["choice"].clone()),
+            ("candidates", report["candidates"].clone()),
+            ("reason", fit["reason"].clone()),
+            ("confidence", fit["confidence"].clone()),
+            ("volumes_ml", report["volumes_ml"].clone()),
+            ("measures", report["measures"].clone()),
+            ("flags", report["flags"].clone()),
+            ("vertices", json!(self.segmentation.fit.mesh.vertices.len())),
+        ]
+        .into_iter()
+        .map(|(key, value)| (key.to_owned(), value))
+        .collect()
+    }
+
+    fn mask(&self) -> Result<NamedFile, OutcomeError> {
+        let mask = mask_volume(&self.segmentation.mask, &self.reading.volume);
+        let bytes = nifti::write(&mask, StoredType::Uint8, true);
+        Ok(NamedFile {
+            name: "mask.nii.gz".into(),
+            media_type: "application/gzip",
+            bytes: bytes.map_err(|error| other("mask.nii.gz", &error))?,
+        })
+    }
+
+    fn polar(&self) -> Result<Vec<NamedFile>, OutcomeError> {
+        let Some(map) = &self.segmentation.polar else {
+            return Ok(Vec::new());
+        };
+        let svg = NamedFile {
+            name: "polar.svg".into(),
+            media_type: "image/svg+xml",
+            bytes: polar::svg(map).into_bytes(),
+        };
+        let png = NamedFile {
+            name: "polar.png".into(),
+            media_type: "image/png",
+            bytes: polar::png(map).map_err(|error| other("polar.png", &error))?,
+        };
+        Ok(vec![json_file("polar.json", &polar::json(map)), svg, png])
+    }
+}
+
+fn json_file(name: &str, value: &Value) -> NamedFile {
+    NamedFile {
+        name: name.into(),
+        media_type: "application/json",
+        bytes: format!("{value:#}\n").into_bytes(),
+    }
+}
+
+fn other(what: &'static str, error: &dyn std::error::Error) -> OutcomeError {
+    OutcomeError::Other {
+        what,
+        reason: error.to_string(),
+    }
+}
