@@ -1,11 +1,11 @@
 //! The work of kind `model`: [`crate::pipeline`] from files to every download.
 
 use super::reader::{refusal, sentence, volume_files};
-use super::{Failure, Fault, Input, Output, OutputFile, Work, WorkError};
+use super::{Failure, Fault, Input, Output, OutputFile, Resource, Work, WorkError};
 use crate::export::{self, Format};
-use crate::parameters::{ModelParameters, ParameterError};
+use crate::parameters::{ModelParameters, ParameterError, Parameters};
 use crate::pipeline::{self, Model, PipelineError};
-use crate::progress::{Monitor, Stage};
+use crate::progress::{Monitor, Plan, Stage};
 use crate::surface::SurfaceError;
 use crate::volume::ReadLimits;
 use serde_json::{Map, Value, json};
@@ -18,8 +18,12 @@ pub struct Generation {
 }
 
 impl Work for Generation {
-    fn kind(&self) -> &'static str {
-        "model"
+    fn makes(&self) -> Resource {
+        Resource::Model
+    }
+
+    fn plan(&self) -> Plan {
+        Plan::GENERATION
     }
 
     fn parameters_from_text(
@@ -54,13 +58,11 @@ impl Work for Generation {
 fn written_out(
     parameters: Result<ModelParameters, ParameterError>,
 ) -> Result<Map<String, Value>, Failure> {
-    match parameters.map_err(unusable)?.to_json() {
-        Value::Object(object) => Ok(object),
-        _ => Ok(Map::new()),
-    }
+    Ok(parameters.map_err(unusable)?.to_json())
 }
 
-fn unusable(error: ParameterError) -> Failure {
+/// A parameter that cannot be used, for whoever gave it.
+pub(super) fn unusable(error: ParameterError) -> Failure {
     Failure::new(
         Fault::Request,
         "invalid-parameter",
@@ -116,33 +118,21 @@ fn downloads(
             Failure::new(Fault::Content, "not-exportable", sentence(&error)).at(format.extension())
         })?;
         files.push(OutputFile {
-            name: mesh_name(format),
+            name: format!("mesh.{}", format.extension()),
             media_type: format.media_type(),
             bytes,
         });
     }
     files.push(OutputFile {
-        name: "report.json",
+        name: "report.json".into(),
         media_type: "application/json",
         bytes: model.report.to_json_text().into_bytes(),
     });
     files.push(OutputFile {
-        name: "report.html",
+        name: "report.html".into(),
         media_type: "text/html; charset=utf-8",
         bytes: model.report_html().into_bytes(),
     });
     monitor.report(Stage::Export, 1.0)?;
     Ok(files)
-}
-
-fn mesh_name(format: Format) -> &'static str {
-    match format {
-        Format::Glb => "mesh.glb",
-        Format::Gltf => "mesh.gltf",
-        Format::Stl => "mesh.stl",
-        Format::Ply => "mesh.ply",
-        Format::Obj => "mesh.obj",
-        Format::Vtp => "mesh.vtp",
-        Format::Json => "mesh.json",
-    }
 }

@@ -1,14 +1,6 @@
-//! Names of things: `vol_` and `mdl_` by content, the same on every machine; `job_` by chance,
-//! ordered by time.
+//! Names of things: by content, the same on every machine; jobs by chance, ordered by time.
 
 use sha2::{Digest, Sha256};
-
-/// Prefix of volume ids.
-pub const VOLUME: &str = "vol_";
-/// Prefix of model ids.
-pub const MODEL: &str = "mdl_";
-/// Prefix of job ids.
-pub const JOB: &str = "job_";
 
 /// `prefix` and the first 128 bits of the SHA-256 over `parts`, each preceded by its length
 /// so that no two lists of parts read the same.
@@ -41,7 +33,7 @@ mod tests {
 
     #[test]
     fn parts_are_kept_apart() {
-        let id = |parts: &[&str]| content_id(VOLUME, parts.iter().map(|p| p.as_bytes()));
+        let id = |parts: &[&str]| content_id("vol_", parts.iter().map(|p| p.as_bytes()));
         assert_eq!(id(&["ab", "c"]), id(&["ab", "c"]));
         assert_ne!(id(&["ab", "c"]), id(&["a", "bc"]));
         assert_eq!(id(&["ab"]).len(), "vol_".len() + 32);

@@ -3,6 +3,7 @@
 
 use super::{Failure, Timestamp};
 use serde_json::{Map, Value};
+use std::collections::BTreeMap;
 
 /// Where a job is in its life.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -58,7 +59,7 @@ pub struct Job {
     pub id: String,
     /// Order of filing; grows by one with each job.
     pub sequence: i64,
-    /// What kind of work it is: `model`.
+    /// What kind of work it is: `model`, `segmentation`.
     pub kind: String,
     /// The volume it works on.
     pub volume: String,
@@ -84,7 +85,7 @@ pub struct Job {
     pub finished_at: Option<Timestamp>,
     /// Why it failed.
     pub failure: Option<Failure>,
-    /// The model it made.
+    /// What it made.
     pub result: Option<String>,
 }
 
@@ -95,6 +96,8 @@ pub struct NewJob {
     pub kind: String,
     /// See [`Job::volume`].
     pub volume: String,
+    /// What the work needs besides the volume: field of the parameters and id.
+    pub needs: BTreeMap<String, String>,
     /// See [`Job::parameters`].
     pub parameters: Map<String, Value>,
     /// The caller's `Idempotency-Key` and what it stood for.
@@ -121,6 +124,11 @@ pub enum Filed {
     KeyReused,
     /// As many wait as may wait.
     QueueFull,
-    /// The volume does not exist (any more).
-    NoVolume,
+    /// Something that it needs does not exist (any more).
+    Missing {
+        /// `volume`, or the field of the parameters.
+        field: String,
+        /// The id in it.
+        id: String,
+    },
 }

@@ -34,7 +34,7 @@ pub struct Standing {
 pub struct Queue {
     /// The jobs.
     pub jobs: Arc<dyn JobStore>,
-    /// The volumes and models.
+    /// The volumes and what was made.
     pub catalogue: Arc<dyn Catalogue>,
     /// Their files.
     pub blobs: Arc<dyn BlobStore>,

@@ -1,8 +1,11 @@
-//! Looks at volumes by [`crate::volume`].
+//! Looks at volumes by [`crate::volume`], at templates by [`crate::deform`].
 
-use super::{Failure, Fault, Intensity, VolumeFacts, VolumeReader};
+use super::{Failure, Fault, Intensity, Output, OutputFile, VolumeFacts, VolumeReader};
+use crate::deform::template::{Organ, Template};
+use crate::export::{self, Format, Metadata, read_json};
 use crate::progress::Monitor;
 use crate::volume::{self, ReadLimits, ReadOptions, VolumeError, VolumeFile};
+use serde_json::json;
 use std::path::PathBuf;
 
 /// The real reader.
@@ -51,6 +54,65 @@ impl VolumeReader for Reader {
         .map_err(|e| refusal(&e))?;
         Ok(volume::preview_png(&reading.volume))
     }
+
+    fn template(&self, mesh: &[u8], organ: &str) -> Result<Output, Failure> {
+        let unsuitable = |detail: &dyn std::error::Error, fix: &str| {
+            Failure::new(Fault::Content, "unsuitable-model", sentence(detail)).fix(fix)
+        };
+        let mesh = read_json::decode(mesh).map_err(|error| {
+            unsuitable(
+                &error,
+                "Send a JSON mesh as `generate` writes it (mesh.json).",
+            )
+        })?;
+        let organ = Organ::parse(organ).ok_or_else(|| unknown_organ(organ))?;
+        let template = Template::new(mesh, organ, &Monitor::silent()).map_err(|error| {
+            unsuitable(
+                &error,
+                "Send a closed surface that faces outward, in LPS millimetres; of another organ \
+                 than the left ventricle with `organ`.",
+            )
+        })?;
+        let metadata = Metadata::new(format!("Template of a {}", organ.as_str()));
+        let mut files = Vec::new();
+        for format in Format::ALL {
+            let bytes = export::encode(format, &template.mesh, &metadata).map_err(|error| {
+                unsuitable(
+                    &error,
+                    "Send a mesh whose vertices lie apart from each other.",
+                )
+            })?;
+            files.push(OutputFile {
+                name: format!("mesh.{}", format.extension()),
+                media_type: format.media_type(),
+                bytes,
+            });
+        }
+        let summary = [
+            ("vertices", json!(template.mesh.vertices.len())),
+            ("triangles", json!(template.mesh.triangles.len())),
+            ("volume_ml", json!(template.mesh.volume() / 1000.0)),
+            ("length_mm", json!(template.cup.map(|cup| cup.length))),
+        ];
+        Ok(Output {
+            summary: summary
+                .map(|(name, figure)| (name.to_owned(), figure))
+                .into_iter()
+                .collect(),
+            files,
+        })
+    }
+}
+
+fn unknown_organ(organ: &str) -> Failure {
+    let words = Organ::ALL.map(Organ::as_str).join(", ");
+    Failure::new(
+        Fault::Request,
+        "invalid-parameter",
+        format!("There is no organ `{organ}`."),
+    )
+    .at("organ")
+    .fix(format!("Give one of {words}."))
 }
 
 /// Files as the volume's readers take them. Their stored names say nothing to the sender,

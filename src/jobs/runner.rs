@@ -1,35 +1,19 @@
 //! One job from claim to commit.
 
-use super::ids::hex;
+use super::progress::{Notes, Step, Teller};
 use super::worker::WorkerSettings;
 use super::{
-    Engine, Failure, Fault, Input, Job, Lease, MODEL, Model, ModelFile, Outcome, Output, Queue,
-    StoreError, WorkError, content_id, random_id,
+    Engine, Failure, Fault, Job, Lease, Outcome, Output, Queue, StoreError, WorkError, random_id,
 };
-use crate::progress::{CancelToken, Monitor, Observer, Stage};
-use sha2::{Digest, Sha256};
+use crate::progress::{CancelToken, Monitor};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use tokio::sync::{mpsc, oneshot};
 use tokio_util::sync::CancellationToken;
 
-/// Progress within a stage is written at most this often; a new stage at once.
-const PROGRESS_PAUSE: Duration = Duration::from_millis(200);
-
 /// How long work that was told to stop may take before the job is ended without it.
 const STOP_PATIENCE: Duration = Duration::from_secs(5);
-
-/// Share of a job's time that each stage takes, roughly: for one bar over all stages.
-const STAGE_WEIGHTS: [(Stage, f64); 6] = [
-    (Stage::Read, 0.05),
-    (Stage::Surface, 0.20),
-    (Stage::Retile, 0.35),
-    (Stage::Optimise, 0.25),
-    (Stage::Report, 0.10),
-    (Stage::Export, 0.05),
-];
 
 /// One worker's means.
 pub(super) struct Runner {
@@ -130,7 +114,10 @@ impl Runner {
         output: Output,
     ) -> Result<Option<Job>, StoreError> {
         let _shelving = self.queue.shelving.lock().await;
-        let outcome = self.publish(job, output).await;
+        let outcome = match self.engine.work(&job.kind) {
+            Some(work) => self.queue.publish(work.makes(), job, output).await,
+            None => Outcome::Failed(unknown_kind()),
+        };
         let now = self.queue.clock.now();
         self.queue.jobs.finish(lease, &outcome, now).await
     }
@@ -141,26 +128,15 @@ impl Runner {
         job: &Job,
         cancel: &CancelToken,
     ) -> Result<(oneshot::Receiver<Computed>, mpsc::UnboundedReceiver<Step>), StoreError> {
-        let names = self
-            .queue
-            .catalogue
-            .volume(&job.volume)
-            .await?
-            .map(|volume| volume.files)
-            .unwrap_or_default();
-        let input = Input {
-            volume: job.volume.clone(),
-            files: self.queue.blobs.paths(&job.volume, &names),
-            parameters: job.parameters.clone(),
-        };
         let work = self.engine.work(&job.kind).cloned();
+        let input = self.queue.input(job, work.as_deref()).await?;
         let (sender, receiver) = oneshot::channel();
         let (steps, progress) = mpsc::unbounded_channel();
         let cancel = cancel.clone();
         self.threads.spawn(move || {
             let computed = catch_unwind(AssertUnwindSafe(|| match work {
                 Some(work) => {
-                    let teller = Teller::new(steps);
+                    let teller = Teller::new(work.plan(), steps);
                     work.run(&input, &Monitor::new(&teller, cancel))
                 }
                 None => Err(WorkError::Failed(unknown_kind())),
@@ -230,76 +206,15 @@ impl Runner {
     }
 
     async fn note(&self, lease: &Lease, step: &Step) {
-        let overall = overall_progress(step.stage, step.fraction);
         match self
             .queue
             .jobs
-            .progress(lease, step.stage.as_str(), overall)
+            .progress(lease, step.stage.as_str(), step.overall)
             .await
         {
             Ok(Some(job)) => self.queue.announce(&job),
             Ok(None) => {}
             Err(error) => tracing::warn!(job = %lease.job, %error, "progress was not written"),
-        }
-    }
-
-    /// Stores what was made; the row comes with the commit.
-    async fn publish(&self, job: &Job, output: Output) -> Outcome {
-        let model = self.describe(job, &output);
-        match self.write_files(&model.id, output).await {
-            Ok(()) => Outcome::Succeeded(Box::new(model)),
-            Err(error) => {
-                tracing::error!(job = %job.id, %error, "the result could not be stored");
-                Outcome::Failed(
-                    Failure::new(
-                        Fault::Service,
-                        "storage",
-                        "The result was computed but could not be stored.",
-                    )
-                    .fix("Ask the operator for room on the disk, then file the job again."),
-                )
-            }
-        }
-    }
-
-    async fn write_files(&self, id: &str, output: Output) -> Result<(), super::BlobError> {
-        let staged = self.queue.blobs.stage().await?;
-        for file in output.files {
-            tokio::fs::write(staged.folder().join(file.name), file.bytes).await?;
-        }
-        self.queue.blobs.publish(id, staged).await
-    }
-
-    fn describe(&self, job: &Job, output: &Output) -> Model {
-        let files: Vec<ModelFile> = output
-            .files
-            .iter()
-            .map(|file| ModelFile {
-                name: file.name.into(),
-                media_type: file.media_type.into(),
-                bytes: file.bytes.len() as u64,
-                sha256: hex(&Sha256::digest(&file.bytes)),
-            })
-            .collect();
-        let parameters = serde_json::Value::Object(job.parameters.clone()).to_string();
-        // The report carries times, so only the mesh decides the name.
-        let mesh = files
-            .iter()
-            .find(|file| file.name == "mesh.json")
-            .or(files.first())
-            .map_or("", |file| file.sha256.as_str());
-        Model {
-            id: content_id(
-                MODEL,
-                [job.kind.as_str(), &job.volume, &parameters, mesh].map(str::as_bytes),
-            ),
-            sequence: 0,
-            created_at: self.queue.clock.now(),
-            volume: job.volume.clone(),
-            parameters: job.parameters.clone(),
-            summary: output.summary.clone(),
-            software: env!("CARGO_PKG_VERSION").into(),
-            files,
         }
     }
 
@@ -334,71 +249,4 @@ fn unknown_kind() -> Failure {
         "unknown-kind",
         "This version of the program does not know this kind of job.",
     )
-}
-
-fn overall_progress(stage: Stage, fraction: f64) -> f64 {
-    let mut done = 0.0;
-    for (at, weight) in STAGE_WEIGHTS {
-        if at == stage {
-            return (done + weight * fraction).min(1.0);
-        }
-        done += weight;
-    }
-    done
-}
-
-/// One report of progress.
-struct Step {
-    stage: Stage,
-    fraction: f64,
-}
-
-/// Decides which reports reach the table.
-#[derive(Default)]
-struct Notes {
-    last: Option<(Stage, Instant)>,
-}
-
-impl Notes {
-    fn worth_writing(&mut self, step: &Step) -> bool {
-        let worth = match self.last {
-            Some((stage, at)) => stage != step.stage || at.elapsed() >= PROGRESS_PAUSE,
-            None => true,
-        };
-        if worth {
-            self.last = Some((step.stage, Instant::now()));
-        }
-        worth
-    }
-}
-
-/// Carries progress from the work's threads, at most a hundred reports a stage.
-struct Teller {
-    steps: mpsc::UnboundedSender<Step>,
-    /// Stage and per cent last told, packed.
-    told: AtomicU32,
-    started: Instant,
-}
-
-impl Teller {
-    fn new(steps: mpsc::UnboundedSender<Step>) -> Self {
-        Self {
-            steps,
-            told: AtomicU32::new(u32::MAX),
-            started: Instant::now(),
-        }
-    }
-}
-
-impl Observer for Teller {
-    fn progress(&self, stage: Stage, fraction: f64) {
-        let now = (stage as u32) * 1000 + (fraction * 100.0) as u32;
-        if self.told.swap(now, Ordering::Relaxed) != now {
-            let _ = self.steps.send(Step { stage, fraction });
-        }
-    }
-
-    fn now_ms(&self) -> f64 {
-        self.started.elapsed().as_secs_f64() * 1000.0
-    }
 }

@@ -1,6 +1,8 @@
 //! What the queue and the catalogue need of a database, by intent.
 
-use super::{Failure, Filed, Job, Model, NewJob, Page, PageRequest, State, Timestamp, Volume};
+use super::{
+    Failure, Filed, Job, NewJob, Page, PageRequest, Product, Resource, State, Timestamp, Volume,
+};
 use async_trait::async_trait;
 
 /// The database could not do its part: full, locked, gone, damaged.
@@ -22,8 +24,8 @@ pub struct Lease {
 /// How a claimed job ended.
 #[derive(Debug, Clone)]
 pub enum Outcome {
-    /// With this model.
-    Succeeded(Box<Model>),
+    /// With this product.
+    Succeeded(Box<Product>),
     /// With this reason.
     Failed(Failure),
     /// Because somebody asked.
@@ -68,7 +70,8 @@ pub struct Load {
 /// The queue's table. Every method is one transaction.
 #[async_trait]
 pub trait JobStore: Send + Sync + 'static {
-    /// Accepts a job, unless `queue_limit` jobs wait, its volume is unknown or its key says
+    /// Accepts a job, unless `queue_limit` jobs wait, its volume or another of its
+    /// needs is unknown, or its key says
     /// that it was accepted before. Durable on return.
     async fn file(&self, job: &NewJob, queue_limit: usize, now: Timestamp) -> Result<Filed>;
 
@@ -101,7 +104,7 @@ pub trait JobStore: Send + Sync + 'static {
     /// Notes where the work is. `None` if the lease is lost.
     async fn progress(&self, lease: &Lease, stage: &str, progress: f64) -> Result<Option<Job>>;
 
-    /// Ends a claimed job, with its model where there is one, in one transaction. `None` if
+    /// Ends a claimed job, with its product where there is one, in one transaction. `None` if
     /// the lease is lost; then nothing was written.
     async fn finish(&self, lease: &Lease, outcome: &Outcome, now: Timestamp)
     -> Result<Option<Job>>;
@@ -125,7 +128,7 @@ pub trait JobStore: Send + Sync + 'static {
     async fn delete_job(&self, id: &str, now: Timestamp) -> Result<Deleted>;
 }
 
-/// The tables of volumes and models.
+/// The tables of volumes and of what was made.
 #[async_trait]
 pub trait Catalogue: Send + Sync + 'static {
     /// Adds a volume. `false` if it was there.
@@ -140,18 +143,22 @@ pub trait Catalogue: Send + Sync + 'static {
     /// Erases a volume that no unfinished job needs.
     async fn delete_volume(&self, id: &str, now: Timestamp) -> Result<Deleted>;
 
-    /// The model of that id.
-    async fn model(&self, id: &str) -> Result<Option<Model>>;
+    /// Adds a product that no job made. `false` if it was there.
+    async fn add_product(&self, product: &Product) -> Result<bool>;
 
-    /// Models, newest first.
-    async fn models(&self, page: PageRequest) -> Result<Page<Model>>;
+    /// The product of that id.
+    async fn product(&self, id: &str) -> Result<Option<Product>>;
 
-    /// Erases a model.
-    async fn delete_model(&self, id: &str, now: Timestamp) -> Result<Deleted>;
+    /// Products of one kind, newest first.
+    async fn products(&self, kind: Resource, page: PageRequest) -> Result<Page<Product>>;
+
+    /// Erases a product that no unfinished job needs.
+    async fn delete_product(&self, id: &str, now: Timestamp) -> Result<Deleted>;
 
     /// When the thing of that id was erased, if it ever was here.
     async fn erased_at(&self, id: &str) -> Result<Option<Timestamp>>;
 
-    /// Ids of finished jobs, models and volumes that are older than `before`.
+    /// Ids of finished jobs, volumes, models and segmentations that are older than `before`.
+    /// Templates are kept.
     async fn older_than(&self, before: Timestamp) -> Result<Vec<String>>;
 }

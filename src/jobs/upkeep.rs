@@ -1,7 +1,7 @@
 //! What nobody asks for: recovery after a crash, giving up on jobs that never end, erasing
 //! what is old.
 
-use super::{Catalogue, Deleted, Failure, Fault, JOB, MODEL, Queue, StoreError, VOLUME};
+use super::{Catalogue, Deleted, Failure, Fault, Queue, Resource, StoreError};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio_util::sync::CancellationToken;
@@ -26,10 +26,9 @@ async fn erase_orphans(queue: &Queue) -> Result<u64, StoreError> {
     let failed = |e: super::BlobError| StoreError(e.to_string());
     let mut orphans = 0;
     for id in queue.blobs.ids().await.map_err(failed)? {
-        let known = if id.starts_with(MODEL) {
-            queue.catalogue.model(&id).await?.is_some()
-        } else {
-            queue.catalogue.volume(&id).await?.is_some()
+        let known = match Resource::of(&id) {
+            Some(Resource::Volume) => queue.catalogue.volume(&id).await?.is_some(),
+            _ => queue.catalogue.product(&id).await?.is_some(),
         };
         if !known {
             queue.blobs.delete(&id).await.map_err(failed)?;
@@ -60,7 +59,7 @@ pub struct Upkeep {
     pub queue: Arc<Queue>,
     /// Starts of one job before it is given up.
     pub attempt_limit: u32,
-    /// Age at which finished jobs, models and volumes are erased.
+    /// Age at which finished jobs, volumes, models and segmentations are erased.
     pub retention: Option<Duration>,
     /// How often it looks.
     pub every: Duration,
@@ -100,8 +99,7 @@ impl Upkeep {
 }
 
 impl Queue {
-    /// Erases a finished job, a model or a volume that no unfinished job needs, files
-    /// included.
+    /// Erases a finished job, or a thing that no unfinished job needs, files included.
     ///
     /// # Errors
     /// If the database cannot. Files that could not be erased are orphans: the next start
@@ -110,11 +108,11 @@ impl Queue {
         let now = self.clock.now();
         let catalogue: &dyn Catalogue = &*self.catalogue;
         let _shelving = self.shelving.lock().await;
-        let deleted = match id {
-            _ if id.starts_with(JOB) => return self.jobs.delete_job(id, now).await,
-            _ if id.starts_with(MODEL) => catalogue.delete_model(id, now).await?,
-            _ if id.starts_with(VOLUME) => catalogue.delete_volume(id, now).await?,
-            _ => Deleted::Unknown,
+        let deleted = match Resource::of(id) {
+            Some(Resource::Job) => return self.jobs.delete_job(id, now).await,
+            Some(Resource::Volume) => catalogue.delete_volume(id, now).await?,
+            Some(_) => catalogue.delete_product(id, now).await?,
+            None => Deleted::Unknown,
         };
         if deleted == Deleted::Done
             && let Err(error) = self.blobs.delete(id).await

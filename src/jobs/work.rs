@@ -1,13 +1,14 @@
 //! What the service asks of the domain: to look at a volume, and to do work on it.
 
-use super::{Failure, Generation, Reader, VolumeFacts};
-use crate::progress::{Cancelled, Monitor};
+use super::{Failure, Fitting, Generation, Reader, Resource, VolumeFacts};
+use crate::progress::{Cancelled, Monitor, Plan};
 use crate::volume::ReadLimits;
 use serde_json::{Map, Value};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Looks at volumes. Called on blocking threads.
+/// Looks at what was sent. Called on blocking threads.
 pub trait VolumeReader: Send + Sync + 'static {
     /// Reads and checks the files of one volume.
     ///
@@ -20,12 +21,22 @@ pub trait VolumeReader: Send + Sync + 'static {
     /// # Errors
     /// As [`VolumeReader::inspect`].
     fn preview(&self, files: &[PathBuf]) -> Result<Vec<u8>, Failure>;
+
+    /// Reads and checks a JSON mesh that shall serve as a template of `organ`. The output is
+    /// the template: its main figures and every download.
+    ///
+    /// # Errors
+    /// Why the mesh cannot be fitted.
+    fn template(&self, mesh: &[u8], organ: &str) -> Result<Output, Failure>;
 }
 
 /// One kind of work. Called on a worker's threads.
 pub trait Work: Send + Sync + 'static {
-    /// The kind's name in jobs: `model`.
-    fn kind(&self) -> &'static str;
+    /// What it makes; also the kind's name in jobs.
+    fn makes(&self) -> Resource;
+
+    /// Its stages, and what share of the time each takes.
+    fn plan(&self) -> Plan;
 
     /// Checks parameters given as text and writes every default out.
     ///
@@ -45,11 +56,43 @@ pub trait Work: Send + Sync + 'static {
         object: &Map<String, Value>,
     ) -> Result<Map<String, Value>, Failure>;
 
+    /// What else of the store these parameters call for. Nothing, usually.
+    fn needs(&self, _parameters: &Map<String, Value>) -> Needs {
+        Needs::default()
+    }
+
     /// Does the work. Reports progress, and looks at the token at least every 50 ms.
     ///
     /// # Errors
     /// [`WorkError::Cancelled`] if the token was raised, else the reason.
     fn run(&self, input: &Input, monitor: &Monitor<'_>) -> Result<Output, WorkError>;
+}
+
+/// What work calls for besides its volume.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Needs {
+    /// Field of the parameters and the id of the thing in it.
+    pub things: BTreeMap<String, String>,
+    /// Whether it wants the library of templates.
+    pub library: bool,
+}
+
+/// A stored thing as work finds it.
+#[derive(Debug, Clone)]
+pub struct Stored {
+    /// Its id.
+    pub id: String,
+    /// The parameters that it was made by; none for a volume.
+    pub parameters: Map<String, Value>,
+    /// Its files.
+    pub files: Vec<PathBuf>,
+}
+
+impl Stored {
+    /// The file of that name.
+    pub fn file(&self, name: &str) -> Option<&PathBuf> {
+        self.files.iter().find(|path| path.ends_with(name))
+    }
 }
 
 /// What a job works on.
@@ -61,6 +104,10 @@ pub struct Input {
     pub files: Vec<PathBuf>,
     /// Parameters as the same [`Work`] wrote them out.
     pub parameters: Map<String, Value>,
+    /// What [`Work::needs`] named, by field.
+    pub things: BTreeMap<String, Stored>,
+    /// The templates, by id, where [`Work::needs`] asked for them.
+    pub library: Vec<Stored>,
 }
 
 /// What a job made.
@@ -76,7 +123,7 @@ pub struct Output {
 #[derive(Debug, Clone)]
 pub struct OutputFile {
     /// Its name: `mesh.glb`, `report.json` ...
-    pub name: &'static str,
+    pub name: String,
     /// Its `Content-Type`.
     pub media_type: &'static str,
     /// Its content.
@@ -103,7 +150,7 @@ impl From<Cancelled> for WorkError {
 /// All that the service can do with volumes.
 #[derive(Clone)]
 pub struct Engine {
-    /// Looks at volumes.
+    /// Looks at what was sent.
     pub reader: Arc<dyn VolumeReader>,
     /// The kinds of work.
     pub works: Vec<Arc<dyn Work>>,
@@ -114,12 +161,15 @@ impl Engine {
     pub fn new(limits: ReadLimits) -> Self {
         Self {
             reader: Arc::new(Reader { limits }),
-            works: vec![Arc::new(Generation { limits })],
+            works: vec![
+                Arc::new(Generation { limits }),
+                Arc::new(Fitting { limits }),
+            ],
         }
     }
 
     /// The work of that kind.
     pub fn work(&self, kind: &str) -> Option<&Arc<dyn Work>> {
-        self.works.iter().find(|work| work.kind() == kind)
+        self.works.iter().find(|work| work.makes().noun() == kind)
     }
 }

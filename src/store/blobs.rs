@@ -4,7 +4,7 @@
 //! then renamed to its place; a rename happens entirely or not at all. Reading, listing and
 //! erasing go through `object_store`, as they would for S3.
 
-use crate::jobs::{BlobError, BlobStore, BlobStream, MODEL, Staged, random_id};
+use crate::jobs::{BlobError, BlobStore, BlobStream, Resource, Staged, random_id};
 use async_trait::async_trait;
 use bytes::Bytes;
 use futures::{StreamExt, TryStreamExt};
@@ -17,7 +17,6 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 const STAGING: &str = "staging";
-const SHELVES: [&str; 2] = ["volumes", "models"];
 
 /// Files below one folder.
 pub struct FileBlobs {
@@ -35,7 +34,8 @@ impl FileBlobs {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
             _ => {}
         }
-        for name in SHELVES.into_iter().chain([STAGING]) {
+        let shelves = Resource::SHELVED.map(Resource::plural);
+        for name in shelves.into_iter().chain([STAGING]) {
             std::fs::create_dir_all(folder.join(name))?;
         }
         sync(folder)?;
@@ -54,11 +54,7 @@ impl FileBlobs {
 }
 
 fn shelf(id: &str) -> &'static str {
-    if id.starts_with(MODEL) {
-        SHELVES[1]
-    } else {
-        SHELVES[0]
-    }
+    Resource::of(id).unwrap_or(Resource::Volume).plural()
 }
 
 /// Forces a folder's entries, or a file's content, to the disk.
@@ -133,7 +129,7 @@ impl BlobStore for FileBlobs {
 
     async fn ids(&self) -> Result<Vec<String>, BlobError> {
         let mut ids = Vec::new();
-        for shelf in SHELVES {
+        for shelf in Resource::SHELVED.map(Resource::plural) {
             let listed = self
                 .files
                 .list_with_delimiter(Some(&Key::from(shelf)))

@@ -1,4 +1,4 @@
-//! Where jobs, volumes and models are kept: SQLite for the rows, a folder for the files.
+//! Where jobs, volumes and products are kept: SQLite for the rows, a folder for the files.
 //!
 //! ```text
 //! DATA_DIR/
@@ -6,7 +6,7 @@
 //!   ventriform.db     rows (WAL, synchronous=FULL)
 //!   staging/          what nobody can see yet; emptied at every start
 //!   volumes/vol_.../  files of a volume
-//!   models/mdl_.../   files of a model
+//!   models/mdl_.../   files of a model; likewise segmentations/, templates/
 //! ```
 //!
 //! Files are published before their row is committed, and erased after it: at any moment a

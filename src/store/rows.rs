@@ -1,6 +1,6 @@
 //! Rows as SQLite gives them, and the records they stand for.
 
-use crate::jobs::{Job, Model, State, StoreError, Volume};
+use crate::jobs::{Job, Product, State, StoreError, Volume};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sqlx::FromRow;
@@ -78,22 +78,22 @@ impl TryFrom<VolumeRow> for Volume {
 }
 
 #[derive(FromRow)]
-pub(super) struct ModelRow {
+pub(super) struct ProductRow {
     id: String,
     sequence: i64,
     created_at: i64,
-    volume: String,
+    volume: Option<String>,
     parameters: String,
     summary: String,
     software: String,
     files: String,
 }
 
-impl TryFrom<ModelRow> for Model {
+impl TryFrom<ProductRow> for Product {
     type Error = StoreError;
 
-    fn try_from(row: ModelRow) -> Result<Self, StoreError> {
-        Ok(Model {
+    fn try_from(row: ProductRow) -> Result<Self, StoreError> {
+        Ok(Product {
             parameters: from_json(&row.parameters)?,
             summary: from_json(&row.summary)?,
             files: from_json(&row.files)?,

@@ -1,8 +1,10 @@
-//! The tables of volumes and models in SQLite.
+//! The tables of volumes and products in SQLite.
 
-use super::rows::{self, ModelRow, VolumeRow, to_json};
+use super::rows::{self, ProductRow, VolumeRow, to_json};
 use super::sqlite::SqliteStore;
-use crate::jobs::{Catalogue, Deleted, Model, Page, PageRequest, StoreError, Timestamp, Volume};
+use crate::jobs::{
+    Catalogue, Deleted, Page, PageRequest, Product, Resource, StoreError, Timestamp, Volume,
+};
 use async_trait::async_trait;
 use sqlx::{Row, SqliteConnection};
 
@@ -51,60 +53,41 @@ impl Catalogue for SqliteStore {
     }
 
     async fn delete_volume(&self, id: &str, now: Timestamp) -> Result<Deleted> {
-        let mut transaction = self.writer.begin().await?;
-        let done = sqlx::query(
-            "DELETE FROM volumes WHERE id = ?1 AND NOT EXISTS
-                (SELECT 1 FROM jobs WHERE volume = ?1 AND state IN ('queued', 'running'))",
-        )
-        .bind(id)
-        .execute(&mut *transaction)
-        .await?;
-        if done.rows_affected() == 0 {
-            drop(transaction);
-            return Ok(match self.volume(id).await? {
-                Some(_) => Deleted::InUse,
-                None => Deleted::Unknown,
-            });
-        }
-        bury(&mut transaction, id, now).await?;
-        transaction.commit().await?;
-        Ok(Deleted::Done)
+        self.delete_unneeded("volumes", id, now).await
     }
 
-    async fn model(&self, id: &str) -> Result<Option<Model>> {
-        let row: Option<ModelRow> = sqlx::query_as("SELECT * FROM models WHERE id = ?")
+    async fn add_product(&self, product: &Product) -> Result<bool> {
+        let mut transaction = self.writer.begin().await?;
+        let new = insert_product(&mut transaction, product).await?;
+        transaction.commit().await?;
+        Ok(new)
+    }
+
+    async fn product(&self, id: &str) -> Result<Option<Product>> {
+        let row: Option<ProductRow> = sqlx::query_as("SELECT * FROM products WHERE id = ?")
             .bind(id)
             .fetch_optional(&self.readers)
             .await?;
-        row.map(Model::try_from).transpose()
+        row.map(Product::try_from).transpose()
     }
 
-    async fn models(&self, page: PageRequest) -> Result<Page<Model>> {
-        let rows: Vec<ModelRow> = sqlx::query_as(
-            "SELECT * FROM models WHERE ?1 IS NULL OR sequence < ?1
-             ORDER BY sequence DESC LIMIT ?2",
+    async fn products(&self, kind: Resource, page: PageRequest) -> Result<Page<Product>> {
+        let rows: Vec<ProductRow> = sqlx::query_as(
+            "SELECT * FROM products WHERE kind = ?1 AND (?2 IS NULL OR sequence < ?2)
+             ORDER BY sequence DESC LIMIT ?3",
         )
+        .bind(kind.noun())
         .bind(page.before)
         .bind(i64::from(page.limit) + 1)
         .fetch_all(&self.readers)
         .await?;
-        Ok(Page::cut(rows::all(rows)?, page.limit, |m: &Model| {
-            m.sequence
+        Ok(Page::cut(rows::all(rows)?, page.limit, |p: &Product| {
+            p.sequence
         }))
     }
 
-    async fn delete_model(&self, id: &str, now: Timestamp) -> Result<Deleted> {
-        let mut transaction = self.writer.begin().await?;
-        let done = sqlx::query("DELETE FROM models WHERE id = ?")
-            .bind(id)
-            .execute(&mut *transaction)
-            .await?;
-        if done.rows_affected() == 0 {
-            return Ok(Deleted::Unknown);
-        }
-        bury(&mut transaction, id, now).await?;
-        transaction.commit().await?;
-        Ok(Deleted::Done)
+    async fn delete_product(&self, id: &str, now: Timestamp) -> Result<Deleted> {
+        self.delete_unneeded("products", id, now).await
     }
 
     async fn erased_at(&self, id: &str) -> Result<Option<Timestamp>> {
@@ -118,7 +101,7 @@ impl Catalogue for SqliteStore {
     async fn older_than(&self, before: Timestamp) -> Result<Vec<String>> {
         let rows = sqlx::query(
             "SELECT id FROM jobs WHERE finished_at < ?1
-             UNION ALL SELECT id FROM models WHERE created_at < ?1
+             UNION ALL SELECT id FROM products WHERE created_at < ?1 AND kind != 'template'
              UNION ALL SELECT id FROM volumes WHERE created_at < ?1",
         )
         .bind(before)
@@ -128,22 +111,62 @@ impl Catalogue for SqliteStore {
     }
 }
 
-/// Adds a model within a transaction; the one that is there already stays.
-pub(super) async fn insert_model(to: &mut SqliteConnection, model: &Model) -> Result<()> {
-    sqlx::query(
-        "INSERT INTO models (id, created_at, volume, parameters, summary, software, files)
-         VALUES (?, ?, ?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING",
+impl SqliteStore {
+    /// Erases a row of `table`, unless a job that has not ended needs it.
+    async fn delete_unneeded(
+        &self,
+        table: &'static str,
+        id: &str,
+        now: Timestamp,
+    ) -> Result<Deleted> {
+        let mut transaction = self.writer.begin().await?;
+        let delete = format!(
+            "DELETE FROM {table} WHERE id = ?1 AND NOT EXISTS
+                (SELECT 1 FROM jobs WHERE state IN ('queued', 'running') AND
+                    (volume = ?1 OR
+                     EXISTS (SELECT 1 FROM json_each(jobs.needs) WHERE value = ?1)))"
+        );
+        let done = sqlx::query(sqlx::AssertSqlSafe(delete))
+            .bind(id)
+            .execute(&mut *transaction)
+            .await?;
+        if done.rows_affected() == 0 {
+            let count = format!("SELECT count(*) FROM {table} WHERE id = ?");
+            let left: i64 = sqlx::query_scalar(sqlx::AssertSqlSafe(count))
+                .bind(id)
+                .fetch_one(&mut *transaction)
+                .await?;
+            return Ok(match left {
+                0 => Deleted::Unknown,
+                _ => Deleted::InUse,
+            });
+        }
+        bury(&mut transaction, id, now).await?;
+        transaction.commit().await?;
+        Ok(Deleted::Done)
+    }
+}
+
+/// Adds a product within a transaction; the one that is there already stays. Tells whether it
+/// is new.
+pub(super) async fn insert_product(to: &mut SqliteConnection, product: &Product) -> Result<bool> {
+    let done = sqlx::query(
+        "INSERT INTO products
+             (id, kind, created_at, volume, parameters, summary, software, files)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING",
     )
-    .bind(&model.id)
-    .bind(model.created_at)
-    .bind(&model.volume)
-    .bind(to_json(&model.parameters)?)
-    .bind(to_json(&model.summary)?)
-    .bind(&model.software)
-    .bind(to_json(&model.files)?)
+    .bind(&product.id)
+    .bind(product.resource().noun())
+    .bind(product.created_at)
+    .bind(&product.volume)
+    .bind(to_json(&product.parameters)?)
+    .bind(to_json(&product.summary)?)
+    .bind(&product.software)
+    .bind(to_json(&product.files)?)
     .execute(&mut *to)
     .await?;
-    unbury(to, &model.id).await
+    unbury(to, &product.id).await?;
+    Ok(done.rows_affected() == 1)
 }
 
 /// Remembers that something was here.

@@ -4,8 +4,8 @@
 use super::rows::{self, JobRow, to_json};
 use super::sqlite::SqliteStore;
 use crate::jobs::{
-    Deleted, Failure, Filed, Interrupted, JOB, Job, JobStore, Lease, Load, NewJob, Outcome, Page,
-    PageRequest, State, StoreError, Timestamp, random_id,
+    Deleted, Failure, Filed, Interrupted, Job, JobStore, Lease, Load, NewJob, Outcome, Page,
+    PageRequest, Resource, State, StoreError, Timestamp, random_id,
 };
 use async_trait::async_trait;
 use sqlx::Row;
@@ -21,13 +21,18 @@ impl JobStore for SqliteStore {
         if let Some(earlier) = self.earlier(job).await? {
             return Ok(earlier);
         }
-        let id = random_id(JOB);
+        let id = random_id(Resource::Job.prefix());
         let key = job.idempotency.as_ref();
         let inserted: Option<JobRow> = sqlx::query_as(
-            "INSERT INTO jobs (id, kind, volume, parameters, created_at, idempotency_key, fingerprint)
-             SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7
+            "INSERT INTO jobs (id, kind, volume, parameters, created_at, idempotency_key,
+                               fingerprint, needs)
+             SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?9
              WHERE (SELECT count(*) FROM jobs WHERE state = 'queued') < ?8
                AND EXISTS (SELECT 1 FROM volumes WHERE id = ?3)
+               AND NOT EXISTS
+                   (SELECT 1 FROM json_each(?9) AS need
+                    WHERE NOT EXISTS (SELECT 1 FROM volumes WHERE id = need.value)
+                      AND NOT EXISTS (SELECT 1 FROM products WHERE id = need.value))
              ON CONFLICT (idempotency_key) DO NOTHING
              RETURNING *",
         )
@@ -39,6 +44,7 @@ impl JobStore for SqliteStore {
         .bind(key.map(|k| &k.key))
         .bind(key.map(|k| &k.fingerprint))
         .bind(i64::try_from(queue_limit).unwrap_or(i64::MAX))
+        .bind(to_json(&job.needs)?)
         .fetch_optional(&self.writer)
         .await?;
         if let Some(row) = inserted {
@@ -48,14 +54,7 @@ impl JobStore for SqliteStore {
         if let Some(earlier) = self.earlier(job).await? {
             return Ok(earlier);
         }
-        let volume = sqlx::query("SELECT 1 FROM volumes WHERE id = ?")
-            .bind(&job.volume)
-            .fetch_optional(&self.readers)
-            .await?;
-        Ok(match volume {
-            Some(_) => Filed::QueueFull,
-            None => Filed::NoVolume,
-        })
+        Ok(self.missing(job).await?.unwrap_or(Filed::QueueFull))
     }
 
     async fn job(&self, id: &str) -> Result<Option<Job>> {
@@ -171,8 +170,8 @@ impl JobStore for SqliteStore {
         outcome: &Outcome,
         now: Timestamp,
     ) -> Result<Option<Job>> {
-        let (state, failure, model) = match outcome {
-            Outcome::Succeeded(model) => (State::Succeeded, None, Some(model)),
+        let (state, failure, product) = match outcome {
+            Outcome::Succeeded(product) => (State::Succeeded, None, Some(product)),
             Outcome::Failed(failure) => (State::Failed, Some(to_json(failure)?), None),
             Outcome::Cancelled => (State::Cancelled, None, None),
         };
@@ -186,7 +185,7 @@ impl JobStore for SqliteStore {
         )
         .bind(state.as_str())
         .bind(failure)
-        .bind(model.map(|m| &m.id))
+        .bind(product.map(|p| &p.id))
         .bind(now)
         .bind(&lease.job)
         .bind(&lease.token)
@@ -195,8 +194,8 @@ impl JobStore for SqliteStore {
         let Some(row) = row else {
             return Ok(None);
         };
-        if let Some(model) = model {
-            super::sqlite_catalogue::insert_model(&mut transaction, model).await?;
+        if let Some(product) = product {
+            super::sqlite_catalogue::insert_product(&mut transaction, product).await?;
         }
         transaction.commit().await?;
         Ok(Some(row.try_into()?))
@@ -293,6 +292,27 @@ impl JobStore for SqliteStore {
 }
 
 impl SqliteStore {
+    /// The first of the job's needs that is not there.
+    async fn missing(&self, job: &NewJob) -> Result<Option<Filed>> {
+        let volume = ("volume", &job.volume);
+        let others = job.needs.iter().map(|(field, id)| (field.as_str(), id));
+        for (field, id) in std::iter::once(volume).chain(others) {
+            let found = sqlx::query(
+                "SELECT 1 FROM volumes WHERE id = ?1 UNION ALL
+                 SELECT 1 FROM products WHERE id = ?1 AND ?2 != 'volume'",
+            )
+            .bind(id)
+            .bind(field)
+            .fetch_optional(&self.readers)
+            .await?;
+            if found.is_none() {
+                let (field, id) = (field.to_owned(), id.clone());
+                return Ok(Some(Filed::Missing { field, id }));
+            }
+        }
+        Ok(None)
+    }
+
     /// What the job's idempotency key stands for already.
     async fn earlier(&self, job: &NewJob) -> Result<Option<Filed>> {
         let Some(key) = &job.idempotency else {

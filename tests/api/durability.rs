@@ -161,6 +161,7 @@ async fn filed(store: &Store) -> String {
     let order = NewJob {
         kind: "model".into(),
         volume: "vol_1".into(),
+        needs: Default::default(),
         parameters,
         idempotency: None,
     };

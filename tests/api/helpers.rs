@@ -12,11 +12,11 @@ use ventriform::config::Settings;
 use ventriform::export::{self, Format, Metadata};
 use ventriform::http::{Running, start};
 use ventriform::jobs::{
-    Engine, Failure, Fault, Generation, Input, Intensity, Output, OutputFile, VolumeFacts,
+    Engine, Failure, Fault, Input, Intensity, Needs, Output, OutputFile, Resource, VolumeFacts,
     VolumeReader, Work, WorkError,
 };
 use ventriform::mesh::shapes::icosphere;
-use ventriform::progress::{Monitor, Stage};
+use ventriform::progress::{Monitor, Plan, Stage};
 use ventriform::volume::ReadLimits;
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
@@ -153,7 +153,8 @@ impl TestApp {
     /// Names of everything below the data folder's shelves and staging.
     pub fn stored(&self) -> Vec<String> {
         let mut names = Vec::new();
-        for shelf in ["staging", "volumes", "models"] {
+        let shelves = Resource::SHELVED.map(Resource::plural);
+        for shelf in shelves.into_iter().chain(["staging"]) {
             for entry in std::fs::read_dir(self.data.path().join(shelf)).unwrap() {
                 names.push(entry.unwrap().file_name().into_string().unwrap());
             }
@@ -195,15 +196,17 @@ pub fn volume(words: &str) -> Vec<u8> {
     format!("VOLUME {words}").into_bytes()
 }
 
-/// The stand-in.
+/// The stand-in for each kind of work. Parameters and templates are judged by the real one.
 pub fn fake_engine() -> Engine {
+    let real = Engine::new(ReadLimits::default());
+    let stand_in = |work: &Arc<dyn Work>| -> Arc<dyn Work> { Arc::new(FakeWork(work.clone())) };
     Engine {
-        reader: Arc::new(FakeReader),
-        works: vec![Arc::new(FakeWork)],
+        works: real.works.iter().map(stand_in).collect(),
+        reader: Arc::new(FakeReader(real.reader)),
     }
 }
 
-struct FakeReader;
+struct FakeReader(Arc<dyn VolumeReader>);
 
 fn words(files: &[PathBuf]) -> Result<String, Failure> {
     let content = std::fs::read(&files[0]).unwrap();
@@ -248,27 +251,39 @@ impl VolumeReader for FakeReader {
         words(files)?;
         Ok(b"\x89PNG\r\n\x1a\n".to_vec())
     }
+
+    fn template(&self, mesh: &[u8], organ: &str) -> Result<Output, Failure> {
+        self.0.template(mesh, organ)
+    }
 }
 
-struct FakeWork;
+struct FakeWork(Arc<dyn Work>);
 
 impl Work for FakeWork {
-    fn kind(&self) -> &'static str {
-        "model"
+    fn makes(&self) -> Resource {
+        self.0.makes()
+    }
+
+    fn plan(&self) -> Plan {
+        self.0.plan()
+    }
+
+    fn needs(&self, parameters: &Map<String, Value>) -> Needs {
+        self.0.needs(parameters)
     }
 
     fn parameters_from_text(
         &self,
         pairs: &[(String, String)],
     ) -> Result<Map<String, Value>, Failure> {
-        real().parameters_from_text(pairs)
+        self.0.parameters_from_text(pairs)
     }
 
     fn parameters_from_json(
         &self,
         object: &Map<String, Value>,
     ) -> Result<Map<String, Value>, Failure> {
-        real().parameters_from_json(object)
+        self.0.parameters_from_json(object)
     }
 
     fn run(&self, input: &Input, monitor: &Monitor<'_>) -> Result<Output, WorkError> {
@@ -288,7 +303,21 @@ impl Work for FakeWork {
             }
             _ => {}
         }
-        Ok(sphere())
+        let mut output = sphere();
+        if self.makes() == Resource::Segmentation {
+            output.files.retain(|file| file.name != "report.html");
+            output.files.push(OutputFile {
+                name: "mask.nii.gz".into(),
+                media_type: "application/gzip",
+                bytes: b"\x1f\x8b a mask".to_vec(),
+            });
+            let seen = json!({
+                "things": input.things.keys().collect::<Vec<_>>(),
+                "library": input.library.len(),
+            });
+            output.summary.insert("seen".into(), seen);
+        }
+        Ok(output)
     }
 }
 
@@ -300,12 +329,6 @@ fn work_for(time: Duration, monitor: &Monitor<'_>) -> Result<(), WorkError> {
         std::thread::sleep(Duration::from_millis(5));
     }
     Ok(())
-}
-
-fn real() -> Generation {
-    Generation {
-        limits: ReadLimits::default(),
-    }
 }
 
 fn sphere() -> Output {
@@ -324,18 +347,18 @@ fn sphere() -> Output {
         .into_iter()
         .zip(Format::ALL)
         .map(|(name, format)| OutputFile {
-            name,
+            name: name.into(),
             media_type: format.media_type(),
             bytes: encoded(format),
         })
         .collect();
     files.push(OutputFile {
-        name: "report.json",
+        name: "report.json".into(),
         media_type: "application/json",
         bytes: json!({"mesh": {"vertices": 42}}).to_string().into_bytes(),
     });
     files.push(OutputFile {
-        name: "report.html",
+        name: "report.html".into(),
         media_type: "text/html; charset=utf-8",
         bytes: b"<!doctype html><title>report</title>".to_vec(),
     });
