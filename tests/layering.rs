@@ -47,7 +47,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     (
         "parameters",
         &[
-            "progress", "volume", "surface", "retile", "optimise", "deform",
+            "geometry", "progress", "volume", "surface", "retile", "optimise", "deform", "polar",
         ],
     ),
     (
@@ -61,6 +61,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "retile",
             "optimise",
             "deform",
+            "polar",
+            "segmentation",
             "report",
             "export",
             "parameters",
@@ -76,6 +78,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "surface",
             "retile",
             "optimise",
+            "deform",
+            "segmentation",
             "report",
             "export",
             "parameters",

@@ -5,14 +5,14 @@ mod demo;
 mod evaluate;
 mod generate;
 mod measure;
-mod model_args;
+mod parameter_args;
 mod phantom;
 mod segment;
 mod serve;
 mod statistics;
 
-pub use bar::{Bar, overall};
-pub use model_args::ModelArgs;
+pub use bar::Bar;
+pub use parameter_args::{FitArgs, ModelArgs};
 
 use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;

@@ -1,20 +1,15 @@
 //! `ventriform segment`: a model fitted to a patient.
 
-use super::Bar;
-use crate::deform::DeformParameters;
-use crate::deform::localise::Hints;
-use crate::deform::template::{Organ, Template};
-use crate::export::{self, Format, Metadata};
-use crate::geometry::Vec3;
-use crate::polar;
-use crate::progress::{CancelToken, Monitor};
-use crate::segmentation::{
-    NamedTemplate, Segmentation, SegmentationParameters, mask_volume, report_json, segment,
-};
-use crate::volume::nifti::{self, StoredType};
-use crate::volume::{self, ReadLimits, ReadOptions, Reading, Volume, VolumeFile};
-use anyhow::{Context, Result};
-use clap::{Args, ValueEnum};
+use super::{Bar, FitArgs};
+use crate::export::{self, Format};
+use crate::parameters::FitParameters;
+use crate::pipeline::NamedFile;
+use crate::pipeline::segment::{NamedMesh, Order, segment};
+use crate::progress::{CancelToken, Monitor, Plan};
+use crate::segmentation::Segmentation;
+use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeFile};
+use anyhow::{Context, Result, anyhow, bail};
+use clap::Args;
 use std::path::{Path, PathBuf};
 
 /// Fits a model to the left ventricle (or another organ) in a volume.
@@ -22,12 +17,15 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "Examples:
   ventriform segment scan.nii.gz --model lv.json -o out
   ventriform segment scan.dcm --model a.json --model b.json -o out --expert mask.nii.gz
-Writes mask.nii.gz, mesh.glb, mesh.stl, mesh.json, report.json and polar.json/.svg/.png")]
+  ventriform segment scan.nii.gz --model auto -o out --seed 60,70,55 --format ply
+Writes mask.nii.gz, mesh.glb, mesh.stl, mesh.json (or the formats asked for), report.json and,
+for the left ventricle, polar.json, polar.svg and polar.png")]
 pub struct SegmentArgs {
-    /// The volume: NIfTI or DICOM NM
+    /// The volume: NIfTI (.nii, .nii.gz, or a .hdr and .img pair) or DICOM NM
     #[arg(value_name = "IN", required = true, num_args = 1..=2)]
     input: Vec<PathBuf>,
-    /// The model to fit, a JSON mesh of `generate` (repeatable: the best fit is taken)
+    /// The model to fit, a JSON mesh of `generate` (repeatable: the best fit is taken), or auto:
+    /// a built-in ventricle
     #[arg(long, value_name = "MODEL", required = true)]
     model: Vec<PathBuf>,
     /// The folder to write to (made where missing)
@@ -36,104 +34,63 @@ pub struct SegmentArgs {
     /// An expert's mask to measure against
     #[arg(long, value_name = "MASK")]
     expert: Option<PathBuf>,
-    /// What the model shows
-    #[arg(long, value_enum, default_value_t = OrganName::LeftVentricle)]
-    organ: OrganName,
-    /// A point in the cavity, LPS millimetres; else it is searched
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
-    center: Option<Vec3>,
-    /// Direction from base to apex, LPS; else it is searched
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
-    axis: Option<Vec3>,
-    /// How far outside the steepest slope the edge is drawn, millimetres. Default: 2.5 for
-    /// DICOM NM, whose readers draw wide (measured on one expert mask), else 0
-    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
-    margin: Option<f64>,
-    /// The volume's number in a file that holds several
-    #[arg(long, value_name = "N")]
-    frame: Option<usize>,
+    /// Format of the mesh (repeatable)
+    #[arg(
+        long = "format",
+        value_name = "FORMAT",
+        value_parser = parse_format,
+        default_values = ["glb", "stl", "json"]
+    )]
+    formats: Vec<Format>,
+    #[command(flatten)]
+    fit: FitArgs,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum OrganName {
-    #[value(alias = "left_ventricle", alias = "lv")]
-    LeftVentricle,
-    Liver,
-    Kidney,
-    Generic,
-}
+/// The word for the models at hand: on the command line that is the built-in one.
+const AUTO: &str = FitParameters::AUTO;
 
-impl From<OrganName> for Organ {
-    fn from(name: OrganName) -> Self {
-        match name {
-            OrganName::LeftVentricle => Organ::LeftVentricle,
-            OrganName::Liver => Organ::Liver,
-            OrganName::Kidney => Organ::Kidney,
-            OrganName::Generic => Organ::Generic,
-        }
-    }
+fn parse_format(text: &str) -> Result<Format, String> {
+    Format::from_extension(text).ok_or_else(|| {
+        let names = Format::ALL.map(Format::extension).join(", ");
+        format!("give one of {names}")
+    })
 }
-
-fn parse_point(text: &str) -> Result<Vec3, String> {
-    let numbers: Vec<f64> = text
-        .split(',')
-        .map_while(|part| part.trim().parse().ok())
-        .collect();
-    match numbers[..] {
-        [x, y, z] if text.split(',').count() == 3 => Ok(Vec3::new(x, y, z)),
-        _ => Err("three numbers are needed, for example 30,-20,5.5".into()),
-    }
-}
-
-/// Margin of readers of clinical DICOM scans, mm: one expert's mask lies 3 mm outside the
-/// steepest slope; 2.5 mm gave the best agreement there.
-const DICOM_MARGIN: f64 = 2.5;
 
 /// Runs the command.
 ///
 /// # Errors
 /// What reading, fitting or the file system says; nothing is written unless the fit stands.
 pub fn run(args: &SegmentArgs) -> Result<()> {
-    let bar = Bar::start();
+    let parameters = args
+        .fit
+        .parameters()
+        .map_err(|e| anyhow!("{e}. {}", e.fix))?;
+    let named: Vec<&PathBuf> = args.model.iter().filter(|m| !m.ends_with(AUTO)).collect();
+    if !named.is_empty() && named.len() < args.model.len() {
+        bail!("--model {AUTO} takes the built-in model; give {AUTO} or files, not both");
+    }
+    let volume: Vec<VolumeFile> = args.input.iter().map(VolumeFile::at).collect();
+    let expert = args.expert.as_ref().map(|path| [VolumeFile::at(path)]);
+    let order = Order {
+        volume: &volume,
+        expert: expert.as_ref().map(|files| &files[..]),
+        models: named.into_iter().map(|m| mesh(m)).collect::<Result<_>>()?,
+        named: true,
+        parameters: &parameters,
+    };
+    let bar = Bar::over(Plan::SEGMENTATION);
     let monitor = Monitor::new(&bar, CancelToken::new());
-    let made = fit_all(args, &monitor);
+    let made = segment(&order, &ReadLimits::default(), &monitor)
+        .map_err(|error| anyhow!("{error}. {}", error.fix()))
+        .and_then(|made| Ok((made.files(&args.formats, None, &monitor)?, made)));
     bar.finish();
-    let (reading, segmentation) = made?;
-    write_all(&args.output, &reading.volume, &segmentation)?;
-    eprintln!("{}", headline(&segmentation));
-    for flag in &segmentation.fit.flags {
+    let (files, made) = made?;
+    write_all(&args.output, &files)?;
+    eprintln!("{}", headline(&made.segmentation));
+    for flag in &made.segmentation.fit.flags {
         eprintln!("warning: {flag}");
     }
     Ok(())
-}
-
-fn fit_all(args: &SegmentArgs, monitor: &Monitor) -> Result<(Reading, Segmentation)> {
-    let reading = read(&args.input, args.frame, monitor)?;
-    let expert = args
-        .expert
-        .as_ref()
-        .map(|path| read(std::slice::from_ref(path), None, monitor))
-        .transpose()?;
-    let templates = templates(&args.model, args.organ.into(), monitor)?;
-    let margin = match reading.facts.format {
-        volume::Format::DicomNm => DICOM_MARGIN,
-        _ => 0.0,
-    };
-    let parameters = SegmentationParameters {
-        deform: DeformParameters {
-            hints: Hints {
-                centre: args.center,
-                axis: args.axis,
-                region: None,
-            },
-            margin: args.margin.unwrap_or(margin),
-            ..DeformParameters::default()
-        },
-        ..SegmentationParameters::default()
-    };
-    let expert = expert.as_ref().map(|e| &e.volume);
-    let made = segment(&reading.volume, &templates, &parameters, expert, monitor)?;
-    Ok((reading, made))
 }
 
 /// Reads one volume.
@@ -148,26 +105,15 @@ pub(super) fn read(paths: &[PathBuf], frame: Option<usize>, monitor: &Monitor) -
     .with_context(|| format!("{}", paths[0].display()))
 }
 
-/// Reads models and makes them ready.
-pub(super) fn templates(
-    paths: &[PathBuf],
-    organ: Organ,
-    monitor: &Monitor,
-) -> Result<Vec<NamedTemplate>> {
-    paths
-        .iter()
-        .map(|path| {
-            let context = || format!("{}", path.display());
-            let bytes = std::fs::read(path).with_context(context)?;
-            let mesh = export::read_json::decode(&bytes).with_context(context)?;
-            Ok(NamedTemplate {
-                name: path
-                    .file_stem()
-                    .map_or_else(context, |s| s.to_string_lossy().into_owned()),
-                template: Template::new(mesh, organ, monitor).with_context(context)?,
-            })
-        })
-        .collect()
+/// Reads a model.
+fn mesh(path: &Path) -> Result<NamedMesh> {
+    let context = || format!("{}", path.display());
+    let bytes = std::fs::read(path).with_context(context)?;
+    let stem = path.file_stem();
+    Ok(NamedMesh {
+        name: stem.map_or_else(context, |s| s.to_string_lossy().into_owned()),
+        mesh: export::read_json::decode(&bytes).with_context(context)?,
+    })
 }
 
 fn headline(s: &Segmentation) -> String {
@@ -190,32 +136,12 @@ fn headline(s: &Segmentation) -> String {
     line
 }
 
-fn write_all(folder: &Path, volume: &Volume, segmentation: &Segmentation) -> Result<()> {
+fn write_all(folder: &Path, files: &[NamedFile]) -> Result<()> {
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
-    let write = |name: &str, bytes: &[u8]| {
-        let path = folder.join(name);
-        std::fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))
-    };
-    let mask = mask_volume(&segmentation.mask, volume);
-    write(
-        "mask.nii.gz",
-        &nifti::write(&mask, StoredType::Uint8, true)?,
-    )?;
-    let metadata = Metadata::new("Fitted model");
-    for (name, format) in [
-        ("mesh.glb", Format::Glb),
-        ("mesh.stl", Format::Stl),
-        ("mesh.json", Format::Json),
-    ] {
-        let bytes = export::encode(format, &segmentation.fit.mesh, &metadata)?;
-        write(name, &bytes)?;
-    }
-    let report = serde_json::to_vec_pretty(&report_json(segmentation))?;
-    write("report.json", &report)?;
-    if let Some(map) = &segmentation.polar {
-        write("polar.json", &serde_json::to_vec(&polar::json(map))?)?;
-        write("polar.svg", polar::svg(map).as_bytes())?;
-        write("polar.png", &polar::png(map)?)?;
+    for file in files {
+        let path = folder.join(&file.name);
+        std::fs::write(&path, &file.bytes)
+            .with_context(|| format!("cannot write {}", path.display()))?;
     }
     Ok(())
 }

@@ -160,7 +160,9 @@ settings! {
     decompressed_limit: Size = "2GiB";
     /// Longest wait that `Prefer: wait` is granted
     wait_limit: Span = "60s";
-    /// Age at which finished jobs, models and volumes are erased; `off` keeps them
+    /// Most templates of the library
+    template_limit: u32 = "50";
+    /// Age at which finished jobs, volumes, models and segmentations are erased; `off` keeps them
     retention: Retention = "off";
     /// Connections served at the same time; more are closed at once
     connection_limit: usize = "4096";

@@ -2,7 +2,8 @@
 
 use super::app::App;
 use super::problem::{Answer, Problem};
-use crate::jobs::{Model, ModelFile};
+use super::wire::path_of;
+use crate::jobs::{Product, ProductFile};
 use axum::body::Body;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::IntoResponse;
@@ -11,8 +12,8 @@ use std::ops::Range;
 /// Results never change under their name; only the one who asked may keep them.
 const CACHE_CONTROL: &str = "private, max-age=31536000, immutable";
 
-/// Answers with a model's file, or the part of it that `Range` asks for, or 304.
-pub async fn send(app: &App, model: &Model, file: &ModelFile, headers: &HeaderMap) -> Answer {
+/// Answers with a product's file, or the part of it that `Range` asks for, or 304.
+pub async fn send(app: &App, product: &Product, file: &ProductFile, headers: &HeaderMap) -> Answer {
     let etag = format!("\"{}\"", file.sha256);
     if matches_any(headers, &header::IF_NONE_MATCH, &etag) {
         return Ok((
@@ -33,7 +34,7 @@ pub async fn send(app: &App, model: &Model, file: &ModelFile, headers: &HeaderMa
     let content = app
         .queue
         .blobs
-        .read(&model.id, &file.name, span.clone())
+        .read(&product.id, &file.name, span.clone())
         .await?;
     let mut response = (
         status,
@@ -43,10 +44,10 @@ pub async fn send(app: &App, model: &Model, file: &ModelFile, headers: &HeaderMa
             (header::ETAG, etag),
             (header::CACHE_CONTROL, CACHE_CONTROL.into()),
             (header::ACCEPT_RANGES, "bytes".into()),
-            (header::CONTENT_LOCATION, path(model, file)),
+            (header::CONTENT_LOCATION, path(product, file)),
             (
                 header::CONTENT_DISPOSITION,
-                format!("inline; filename=\"{}-{}\"", model.id, file.name),
+                format!("inline; filename=\"{}-{}\"", product.id, file.name),
             ),
         ],
         Body::from_stream(content),
@@ -65,9 +66,9 @@ pub async fn send(app: &App, model: &Model, file: &ModelFile, headers: &HeaderMa
     Ok(response)
 }
 
-/// Where a model's file is found.
-pub fn path(model: &Model, file: &ModelFile) -> String {
-    format!("/v1/models/{}/{}", model.id, file.name)
+/// Where a product's file is found.
+pub fn path(product: &Product, file: &ProductFile) -> String {
+    format!("{}/{}", path_of(&product.id), file.name)
 }
 
 fn matches_any(headers: &HeaderMap, name: &HeaderName, etag: &str) -> bool {

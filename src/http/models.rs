@@ -1,23 +1,22 @@
 //! `/v1/models`: what was made, and the one-line way to make it.
 
 use super::app::App;
-use super::openapi::{FileProblems, ListProblems, LookupProblems, UploadProblems};
-use super::pagination::{list_query, next_cursor};
-use super::problem::{Answer, Problem, shorten};
-use super::request::{Path, query_pairs, refuse_unknown};
-use super::wire::{missing, rfc3339};
-use super::{files, idempotency, jobs as jobs_api, negotiate, upload};
-use crate::export::Format;
-use crate::jobs::{self, Deleted, ModelFile, NewJob, State as JobState};
+use super::jobs::{self, order};
+use super::openapi::{EraseProblems, FileProblems, ListProblems, LookupProblems, UploadProblems};
+use super::pagination::next_cursor;
+use super::problem::Answer;
+use super::products::{self, Download, Offer, Software};
+use super::request::Path;
+use super::wire::{path_of, rfc3339};
+use crate::jobs::{Product, Resource};
 use axum::Json;
 use axum::extract::{RawQuery, Request, State};
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
-use axum::response::IntoResponse;
+use axum::http::HeaderMap;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 
-const KIND: &str = "model";
+const KIND: Resource = Resource::Model;
 
 /// A model: what it was made from, its main figures, and where its files are.
 #[derive(Serialize, ToSchema)]
@@ -44,31 +43,6 @@ pub struct Model {
     links: ModelLinks,
 }
 
-/// A program and its version.
-#[derive(Serialize, ToSchema)]
-struct Software {
-    /// The program.
-    name: String,
-    /// Its version.
-    version: String,
-}
-
-/// One download.
-#[derive(Serialize, ToSchema)]
-struct Download {
-    /// The file's name.
-    #[schema(example = "mesh.glb")]
-    name: String,
-    /// Its path.
-    href: String,
-    /// Its media type.
-    media_type: String,
-    /// Its length.
-    bytes: u64,
-    /// SHA-256 of its content; also its `ETag`.
-    sha256: String,
-}
-
 /// Paths of one model.
 #[derive(Serialize, ToSchema)]
 struct ModelLinks {
@@ -93,36 +67,24 @@ pub struct ModelList {
     next_cursor: Option<String>,
 }
 
-impl From<jobs::Model> for Model {
-    fn from(model: jobs::Model) -> Self {
-        let itself = format!("/v1/models/{}", model.id);
+impl From<Product> for Model {
+    fn from(product: Product) -> Self {
+        let itself = path_of(&product.id);
+        let volume = product.volume.clone().unwrap_or_default();
         Self {
-            created_at: rfc3339(model.created_at),
-            files: model
-                .files
-                .iter()
-                .map(|file| Download {
-                    href: files::path(&model, file),
-                    name: file.name.clone(),
-                    media_type: file.media_type.clone(),
-                    bytes: file.bytes,
-                    sha256: file.sha256.clone(),
-                })
-                .collect(),
+            created_at: rfc3339(product.created_at),
+            files: Download::all(&product),
+            software: Software::of(&product),
             links: ModelLinks {
                 mesh: format!("{itself}/mesh"),
                 report: format!("{itself}/report"),
-                volume: format!("/v1/volumes/{}", model.volume),
+                volume: path_of(&volume),
                 itself,
             },
-            software: Software {
-                name: env!("CARGO_PKG_NAME").into(),
-                version: model.software,
-            },
-            id: model.id,
-            volume: model.volume,
-            parameters: model.parameters,
-            summary: model.summary,
+            volume,
+            id: product.id,
+            parameters: product.parameters,
+            summary: product.summary,
         }
     }
 }
@@ -144,7 +106,7 @@ impl From<jobs::Model> for Model {
         ("Prefer" = Option<String>, Header, description = "`wait=SECONDS`: how long to wait for the mesh")),
     responses(
         super::openapi::MeshAnswer,
-        (status = 202, description = "Accepted", body = jobs_api::Job, headers(
+        (status = 202, description = "Accepted", body = jobs::Job, headers(
             ("Location" = String, description = "The job's path"),
             ("Retry-After" = u64, description = "Seconds after which to look again"))),
         (status = 406, description = "`Accept` names no format of meshes",
@@ -158,71 +120,8 @@ pub async fn create_model(
     RawQuery(query): RawQuery,
     request: Request,
 ) -> Answer {
-    let headers = request.headers().clone();
-    let patience = negotiate::preferred_wait(&headers);
-    if patience.is_some() {
-        negotiate::require_offer(&headers, &mesh_types())?;
-    }
-    let key = idempotency::key(&headers)?;
-    let Some(work) = app.engine.work(KIND) else {
-        return Err(Problem::internal("no work of kind `model`"));
-    };
-    // What can be refused without the body is refused before it is read.
-    let pairs = query_pairs(query.as_deref());
-    let mut parameters = work.parameters_from_text(&pairs)?;
-    if app.queue.is_full().await? {
-        return Err(jobs_api::queue_full(&app).await);
-    }
-    let upload = upload::receive(&app, request).await?;
-    if !upload.fields.is_empty() {
-        let all: Vec<_> = pairs.into_iter().chain(upload.fields.clone()).collect();
-        parameters = work.parameters_from_text(&all)?;
-    }
-    let (volume, _) = upload.store(&app).await?;
-    let job = NewJob {
-        kind: KIND.into(),
-        idempotency: idempotency::promise(key, KIND, &volume.id, &parameters),
-        volume: volume.id,
-        parameters,
-    };
-    let job = jobs_api::file(&app, &job).await?;
-    match patience {
-        Some(patience) => wait_for_mesh(&app, job, patience, &headers).await,
-        None => jobs_api::accepted(&app, job).await,
-    }
-}
-
-async fn wait_for_mesh(
-    app: &App,
-    job: jobs::Job,
-    patience: std::time::Duration,
-    headers: &HeaderMap,
-) -> Answer {
-    let patience = patience.min(app.settings.wait_limit.0);
-    let waited = tokio::select! {
-        job = app.queue.wait(&job.id, patience) => job?,
-        () = app.closing.cancelled() => None,
-    };
-    let job = waited.unwrap_or(job);
-    let applied = HeaderValue::from_str(&format!("wait={}", patience.as_secs()))
-        .unwrap_or(HeaderValue::from_static("wait"));
-    let mut response = match (job.state, &job.result) {
-        (JobState::Succeeded, Some(model)) => {
-            let model = find(app, model).await?;
-            // The headers of this request are about the upload, not about a part of the mesh.
-            let file = mesh_for(&model, headers)?;
-            let mut response = files::send(app, &model, file, &HeaderMap::new()).await?;
-            let location = format!("/v1/models/{}", model.id);
-            if let Ok(location) = HeaderValue::from_str(&location) {
-                response.headers_mut().insert(header::LOCATION, location);
-            }
-            response
-        }
-        (state, _) if state.is_final() => jobs_api::failed(&job),
-        _ => jobs_api::accepted(app, job).await?,
-    };
-    response.headers_mut().insert("preference-applied", applied);
-    Ok(response)
+    let offers = Offer::meshes();
+    order::one_line(&app, KIND, query.as_deref(), request, &[], &offers).await
 }
 
 /// List models
@@ -233,8 +132,7 @@ pub async fn list_models(
     State(app): State<App>,
     RawQuery(query): RawQuery,
 ) -> Answer<Json<ModelList>> {
-    let (page, []) = list_query(query.as_deref(), [])?;
-    let page = app.queue.catalogue.models(page).await?;
+    let page = products::list(&app, KIND, query.as_deref()).await?;
     Ok(Json(ModelList {
         next_cursor: next_cursor(&page),
         models: page.items.into_iter().map(Model::from).collect(),
@@ -250,27 +148,20 @@ pub async fn get_model(
     Path(id): Path<String>,
     RawQuery(query): RawQuery,
 ) -> Answer<Json<Model>> {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    Ok(Json(find(&app, &id).await?.into()))
+    let model = products::get(&app, KIND, &id, query.as_deref()).await?;
+    Ok(Json(model.into()))
 }
 
 /// Erase a model
 #[utoipa::path(delete, path = "/v1/models/{id}", tag = "models",
     params(("id" = String, Path, description = "The model's id")),
-    responses((status = 204, description = "Erased"), LookupProblems))]
+    responses((status = 204, description = "Erased"), EraseProblems, LookupProblems))]
 pub async fn delete_model(
     State(app): State<App>,
     Path(id): Path<String>,
     RawQuery(query): RawQuery,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    if !id.starts_with(jobs::MODEL) {
-        return Err(Problem::not_found("model", &id));
-    }
-    match app.queue.erase(&id).await? {
-        Deleted::Done => Ok(StatusCode::NO_CONTENT.into_response()),
-        _ => Err(missing(&*app.queue.catalogue, "model", &id).await),
-    }
+    products::erase(&app, KIND, &id, query.as_deref()).await
 }
 
 /// A model's mesh
@@ -288,14 +179,8 @@ pub async fn get_mesh(
     RawQuery(query): RawQuery,
     headers: HeaderMap,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let model = find(&app, &id).await?;
-    let file = mesh_for(&model, &headers)?;
-    let mut response = files::send(&app, &model, file, &headers).await?;
-    response
-        .headers_mut()
-        .insert(header::VARY, HeaderValue::from_static("accept"));
-    Ok(response)
+    let offers = Offer::meshes();
+    products::get_offered(&app, KIND, &id, query.as_deref(), &headers, &offers).await
 }
 
 /// A model's quality report
@@ -313,15 +198,11 @@ pub async fn get_report(
     RawQuery(query): RawQuery,
     headers: HeaderMap,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let model = find(&app, &id).await?;
-    let names = ["report.json", "report.html"];
-    let chosen = negotiate::require_offer(&headers, &["application/json", "text/html"])?;
-    let mut response = send_named(&app, &model, names[chosen], &headers).await?;
-    response
-        .headers_mut()
-        .insert(header::VARY, HeaderValue::from_static("accept"));
-    Ok(response)
+    let offers = [
+        Offer::new("application/json", "report.json"),
+        Offer::new("text/html", "report.html"),
+    ];
+    products::get_offered(&app, KIND, &id, query.as_deref(), &headers, &offers).await
 }
 
 /// A model's file by name
@@ -338,51 +219,5 @@ pub async fn get_file(
     RawQuery(query): RawQuery,
     headers: HeaderMap,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    if !super::openapi::file_names().contains(&name) {
-        return Err(no_such_file(&name, &super::openapi::file_names()));
-    }
-    let model = find(&app, &id).await?;
-    send_named(&app, &model, &name, &headers).await
-}
-
-async fn send_named(app: &App, model: &jobs::Model, name: &str, headers: &HeaderMap) -> Answer {
-    match model.file(name) {
-        Some(file) => files::send(app, model, file, headers).await,
-        None => {
-            let names: Vec<_> = model.files.iter().map(|file| file.name.clone()).collect();
-            Err(no_such_file(name, &names))
-        }
-    }
-}
-
-fn no_such_file(name: &str, names: &[String]) -> Problem {
-    Problem::new(
-        StatusCode::NOT_FOUND,
-        "not-found",
-        format!("A model has no file `{}`.", shorten(name)),
-    )
-    .fix(format!("It has {}.", names.join(", ")))
-}
-
-async fn find(app: &App, id: &str) -> Answer<jobs::Model> {
-    match app.queue.catalogue.model(id).await? {
-        Some(model) => Ok(model),
-        None => Err(missing(&*app.queue.catalogue, "model", id).await),
-    }
-}
-
-/// Media types of meshes, the usual one first.
-fn mesh_types() -> Vec<&'static str> {
-    Format::ALL.map(Format::media_type).to_vec()
-}
-
-fn mesh_for<'a>(model: &'a jobs::Model, headers: &HeaderMap) -> Answer<&'a ModelFile> {
-    let meshes: Vec<&ModelFile> = model
-        .files
-        .iter()
-        .filter(|file| file.name.starts_with("mesh."))
-        .collect();
-    let types: Vec<&str> = meshes.iter().map(|file| file.media_type.as_str()).collect();
-    Ok(meshes[negotiate::require_offer(headers, &types)?])
+    products::get_file(&app, KIND, (&id, &name), query.as_deref(), &headers).await
 }

@@ -3,6 +3,7 @@
 use super::app::App;
 use super::problem::{Answer, Problem, shorten};
 use crate::parameters::nearest;
+use axum::body::Bytes;
 use axum::extract::{FromRequestParts, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, StatusCode, header};
@@ -92,8 +93,8 @@ pub fn refuse_content_encoding(headers: &HeaderMap) -> Answer<()> {
     }
 }
 
-/// The JSON object in a request's body.
-pub async fn json_object(app: &App, request: Request) -> Answer<Map<String, Value>> {
+/// A body that is JSON, at most `limit` bytes of it, not parsed yet.
+pub async fn json_bytes(app: &App, request: Request, limit: usize) -> Answer<Bytes> {
     refuse_content_encoding(request.headers())?;
     match media_type(request.headers()).as_deref() {
         None | Some("application/json") => {}
@@ -110,9 +111,8 @@ pub async fn json_object(app: &App, request: Request) -> Answer<Map<String, Valu
             .fix("Send application/json."));
         }
     }
-    let limit = app.settings.json_limit;
-    let bytes = axum::body::to_bytes(request.into_body(), limit.as_usize());
-    let bytes = tokio::time::timeout(app.settings.body_timeout.0, bytes)
+    let bytes = axum::body::to_bytes(request.into_body(), limit);
+    tokio::time::timeout(app.settings.body_timeout.0, bytes)
         .await
         .map_err(|_| {
             Problem::new(
@@ -125,9 +125,14 @@ pub async fn json_object(app: &App, request: Request) -> Answer<Map<String, Valu
             Problem::new(
                 StatusCode::PAYLOAD_TOO_LARGE,
                 "body-too-large",
-                format!("The body is larger than {limit}, or it broke off."),
+                format!("The body is larger than {limit} bytes, or it broke off."),
             )
-        })?;
+        })
+}
+
+/// The JSON object in a request's body.
+pub async fn json_object(app: &App, request: Request) -> Answer<Map<String, Value>> {
+    let bytes = json_bytes(app, request, app.settings.json_limit.as_usize()).await?;
     let not_json = |error: serde_json::Error| {
         Problem::bad_request("malformed-json", format!("The body is not JSON: {error}."))
             .fix("Send one JSON object.")

@@ -3,7 +3,7 @@
 use super::app::App;
 use super::openapi::Document;
 use super::problem::{Problem, from_panic};
-use super::{events, health, jobs, models, observe, pages, volumes};
+use super::{events, health, jobs, models, observe, pages, segmentations, templates, volumes};
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use axum::http::{HeaderValue, Method, StatusCode, header};
@@ -30,6 +30,24 @@ pub fn routes() -> OpenApiRouter<App> {
         .routes(routes!(models::get_mesh))
         .routes(routes!(models::get_report))
         .routes(routes!(models::get_file))
+        .routes(routes!(
+            segmentations::create_segmentation,
+            segmentations::list_segmentations
+        ))
+        .routes(routes!(
+            segmentations::get_segmentation,
+            segmentations::delete_segmentation
+        ))
+        .routes(routes!(segmentations::get_mesh))
+        .routes(routes!(segmentations::get_report))
+        .routes(routes!(segmentations::get_file))
+        .routes(routes!(
+            templates::create_template,
+            templates::list_templates
+        ))
+        .routes(routes!(templates::get_template, templates::delete_template))
+        .routes(routes!(templates::get_mesh))
+        .routes(routes!(templates::get_file))
         .routes(routes!(health::alive))
         .routes(routes!(health::ready))
         .routes(routes!(health::metrics))

@@ -1,13 +1,13 @@
 //! `/v1/volumes`: what was uploaded.
 
 use super::app::App;
-use super::openapi::{ListProblems, LookupProblems, UploadProblems};
+use super::openapi::{EraseProblems, ListProblems, LookupProblems, UploadProblems};
 use super::pagination::{list_query, next_cursor};
 use super::problem::{Answer, Problem};
 use super::request::{Path, query_pairs, refuse_unknown, unknown};
-use super::upload;
-use super::wire::{missing, rfc3339};
-use crate::jobs::{self, Deleted};
+use super::wire::{missing, path_of, rfc3339};
+use super::{products, upload};
+use crate::jobs::{self, Resource};
 use axum::Json;
 use axum::extract::{RawQuery, Request, State};
 use axum::http::{StatusCode, header};
@@ -96,7 +96,7 @@ pub struct VolumeList {
 
 impl From<jobs::Volume> for Volume {
     fn from(volume: jobs::Volume) -> Self {
-        let itself = format!("/v1/volumes/{}", volume.id);
+        let itself = path_of(&volume.id);
         let facts = volume.facts;
         Self {
             created_at: rfc3339(volume.created_at),
@@ -153,17 +153,17 @@ pub async fn create_volume(
     request: Request,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let upload = upload::receive(&app, request).await?;
+    let upload = upload::receive(&app, request, &[]).await?;
     if let Some((name, _)) = upload.fields.first() {
         return Err(unknown("form field", name, &[]));
     }
-    let (volume, new) = upload.store(&app).await?;
+    let (volume, new) = upload.volume.store(&app).await?;
     let status = if new {
         StatusCode::CREATED
     } else {
         StatusCode::OK
     };
-    let location = [(header::LOCATION, format!("/v1/volumes/{}", volume.id))];
+    let location = [(header::LOCATION, path_of(&volume.id))];
     Ok((status, location, Json(Volume::from(volume))).into_response())
 }
 
@@ -230,33 +230,18 @@ pub async fn preview_volume(
 #[utoipa::path(delete, path = "/v1/volumes/{id}", tag = "volumes",
     params(("id" = String, Path, description = "The volume's id")),
     responses((status = 204, description = "Erased"),
-        (status = 409, description = "A job needs it", body = super::problem::ProblemBody,
-            content_type = "application/problem+json"),
-        LookupProblems))]
+        EraseProblems, LookupProblems))]
 pub async fn delete_volume(
     State(app): State<App>,
     Path(id): Path<String>,
     RawQuery(query): RawQuery,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    if !id.starts_with(jobs::VOLUME) {
-        return Err(Problem::not_found("volume", &id));
-    }
-    match app.queue.erase(&id).await? {
-        Deleted::Done => Ok(StatusCode::NO_CONTENT.into_response()),
-        Deleted::Unknown => Err(missing(&*app.queue.catalogue, "volume", &id).await),
-        Deleted::InUse => Err(Problem::new(
-            StatusCode::CONFLICT,
-            "in-use",
-            "A job that has not ended needs this volume.",
-        )
-        .fix("Wait for the job or DELETE it first; GET /v1/jobs?state=queued shows them.")),
-    }
+    products::erase(&app, Resource::Volume, &id, query.as_deref()).await
 }
 
 async fn find(app: &App, id: &str) -> Answer<jobs::Volume> {
     match app.queue.catalogue.volume(id).await? {
         Some(volume) => Ok(volume),
-        None => Err(missing(&*app.queue.catalogue, "volume", id).await),
+        None => Err(missing(&*app.queue.catalogue, Resource::Volume, id).await),
     }
 }

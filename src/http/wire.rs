@@ -1,7 +1,7 @@
 //! Shapes that several resources share.
 
 use super::problem::Problem;
-use crate::jobs::{Catalogue, JOB, MODEL, Timestamp, VOLUME};
+use crate::jobs::{Catalogue, Resource, Timestamp};
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
@@ -13,15 +13,17 @@ pub fn rfc3339(at: Timestamp) -> String {
         .unwrap_or_default()
 }
 
+/// The path of the thing of that id.
+pub fn path_of(id: &str) -> String {
+    let resource = Resource::of(id).unwrap_or(Resource::Job);
+    format!("/v1/{}/{id}", resource.plural())
+}
+
 /// 410 for what was erased, 404 for what never was.
-pub async fn missing(catalogue: &dyn Catalogue, what: &str, id: &str) -> Problem {
-    let prefix = match what {
-        "volume" => VOLUME,
-        "model" => MODEL,
-        _ => JOB,
-    };
+pub async fn missing(catalogue: &dyn Catalogue, resource: Resource, id: &str) -> Problem {
+    let what = resource.noun();
     match catalogue.erased_at(id).await {
-        _ if !id.starts_with(prefix) => Problem::not_found(what, id),
+        _ if Resource::of(id) != Some(resource) => Problem::not_found(what, id),
         Ok(None) => Problem::not_found(what, id),
         Ok(Some(at)) => Problem::new(
             axum::http::StatusCode::GONE,

@@ -4,7 +4,7 @@ use crate::helpers::{TestApp, text};
 use serde_json::Value;
 use std::path::Path;
 use ventriform::http::openapi::document_json;
-use ventriform::parameters::SPECS;
+use ventriform::parameters::{FIT_SPECS, SPECS};
 
 /// Set to write the document anew instead of comparing.
 const UPDATE: &str = "UPDATE_OPENAPI";
@@ -34,19 +34,21 @@ async fn the_service_publishes_the_same_document() {
 }
 
 #[test]
-fn every_parameter_of_a_model_is_documented_twice() {
+fn every_parameter_of_a_job_is_documented_twice() {
     let document: Value = serde_json::from_str(&document_json()).unwrap();
-    let query = document["paths"]["/v1/models"]["post"]["parameters"]
-        .as_array()
-        .unwrap();
-    let schema = &document["components"]["schemas"]["ModelParameters"]["properties"];
-    for spec in SPECS {
-        assert!(
-            query.iter().any(|p| p["name"] == spec.name),
-            "{}",
-            spec.name
-        );
-        assert!(schema[spec.name].is_object(), "{}", spec.name);
+    let fit: Vec<_> = FIT_SPECS.iter().map(|spec| spec.name).collect();
+    let model: Vec<_> = SPECS.iter().map(|spec| spec.name).collect();
+    for (path, schema, names) in [
+        ("/v1/models", "ModelParameters", model),
+        ("/v1/segmentations", "SegmentationParameters", fit),
+    ] {
+        let query = &document["paths"][path]["post"]["parameters"];
+        let schema = &document["components"]["schemas"][schema]["properties"];
+        for name in names {
+            let query = query.as_array().unwrap();
+            assert!(query.iter().any(|p| p["name"] == name), "{name}");
+            assert!(schema[name].is_object(), "{name}");
+        }
     }
 }
 

@@ -46,6 +46,10 @@ problems! {
         410: "It was erased",
         500: "The service met an error of its own",
     }
+    /// Of everything that erases what jobs may need.
+    EraseProblems {
+        409: "A job that has not ended needs it",
+    }
     /// Of everything that takes a file.
     UploadProblems {
         400: "The body is empty, malformed or broke off, or a query parameter is unknown",
@@ -101,6 +105,41 @@ pub struct ReportAnswer;
 impl IntoResponses for ReportAnswer {
     fn responses() -> Responses {
         file_answer("The report", report_contents())
+    }
+}
+
+/// 200 with what a segmentation can be had as.
+pub struct SegmentationAnswer;
+
+impl IntoResponses for SegmentationAnswer {
+    fn responses() -> Responses {
+        let mut contents = mesh_contents();
+        contents.extend(mask_contents());
+        file_answer("The mask, the mesh or the report", contents)
+    }
+}
+
+/// 200 with a segmentation's report.
+pub struct SegmentationReportAnswer;
+
+impl IntoResponses for SegmentationReportAnswer {
+    fn responses() -> Responses {
+        let json = ("application/json", Content::new(Some(object())));
+        file_answer("The report", [json].into())
+    }
+}
+
+/// 200 with any of a segmentation's files.
+pub struct SegmentationFileAnswer;
+
+impl IntoResponses for SegmentationFileAnswer {
+    fn responses() -> Responses {
+        let mut contents = mesh_contents();
+        contents.extend(mask_contents());
+        for picture in ["image/svg+xml", "image/png"] {
+            contents.insert(picture, Content::new(Some(binary())));
+        }
+        file_answer("The file", contents)
     }
 }
 
@@ -168,6 +207,16 @@ fn mesh_contents() -> BTreeMap<&'static str, Content> {
             (format.media_type(), Content::new(Some(schema)))
         })
         .collect()
+}
+
+fn mask_contents() -> BTreeMap<&'static str, Content> {
+    [
+        "application/gzip",
+        "application/nifti",
+        "application/x-nifti",
+    ]
+    .map(|media_type| (media_type, Content::new(Some(binary()))))
+    .into()
 }
 
 fn report_contents() -> BTreeMap<&'static str, Content> {

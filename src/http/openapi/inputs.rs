@@ -1,61 +1,88 @@
 //! Parameters and bodies that several handlers share, and those that come from tables.
 
 use crate::export::Format;
-use crate::parameters::{Kind, ParameterSpec, SPECS};
+use crate::jobs::Resource;
+use crate::parameters::{self, FIT_SPECS, Kind, ParameterSpec, Parameters};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use utoipa::openapi::path::{Parameter, ParameterBuilder, ParameterIn, ParameterStyle};
 use utoipa::openapi::schema::{
-    AdditionalProperties, ArrayBuilder, KnownFormat, Object, ObjectBuilder, Schema, SchemaFormat,
-    Type,
+    AdditionalProperties, ArrayBuilder, Object, ObjectBuilder, Schema, Type,
 };
-use utoipa::openapi::{Ref, RefOr, Required};
+use utoipa::openapi::{RefOr, Required};
 use utoipa::{IntoParams, PartialSchema, ToSchema};
 
-/// Parameters of a model as a JSON object.
-pub struct ModelParameters;
+/// Makes two types that document a table of parameters: as a JSON object, and as query
+/// parameters.
+macro_rules! parameters {
+    ($object:ident, $query:ident, $table:ty, $what:literal) => {
+        #[doc = concat!("Parameters of a ", $what, " as a JSON object.")]
+        pub struct $object;
 
-impl ToSchema for ModelParameters {
-    fn name() -> Cow<'static, str> {
-        "ModelParameters".into()
-    }
+        impl ToSchema for $object {
+            fn name() -> Cow<'static, str> {
+                stringify!($object).into()
+            }
+        }
+
+        impl PartialSchema for $object {
+            fn schema() -> RefOr<Schema> {
+                object_of::<$table>(concat!("What decides a ", $what))
+            }
+        }
+
+        #[doc = concat!("Parameters of a ", $what, " as query parameters.")]
+        pub struct $query;
+
+        impl IntoParams for $query {
+            fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+                query_of::<$table>()
+            }
+        }
+    };
 }
 
-impl PartialSchema for ModelParameters {
-    fn schema() -> RefOr<Schema> {
-        let object = SPECS
-            .iter()
-            .fold(ObjectBuilder::new(), |object, spec| {
-                object.property(spec.name, schema_of(spec))
-            })
-            .description(Some("What decides the model that comes out of a volume"))
-            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
-        Schema::from(object.build()).into()
-    }
+parameters!(
+    ModelParameters,
+    ModelQuery,
+    parameters::ModelParameters,
+    "model"
+);
+parameters!(
+    SegmentationParameters,
+    SegmentationQuery,
+    parameters::FitParameters,
+    "segmentation"
+);
+
+fn object_of<P: Parameters>(description: &str) -> RefOr<Schema> {
+    let object = P::SPECS
+        .iter()
+        .fold(ObjectBuilder::new(), |object, spec| {
+            object.property(spec.name, schema_of(spec))
+        })
+        .description(Some(description))
+        .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
+    Schema::from(object.build()).into()
 }
 
-/// Parameters of a model as query parameters.
-pub struct ModelQuery;
-
-impl IntoParams for ModelQuery {
-    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        SPECS
-            .iter()
-            .map(|spec| {
-                let mut parameter = query(spec.name, spec.summary).schema(Some(schema_of(spec)));
-                if let Kind::Integers { .. } = spec.kind {
-                    // `1,2,3` in one, not repeated.
-                    parameter = parameter
-                        .style(Some(ParameterStyle::Form))
-                        .explode(Some(false));
-                }
-                parameter.build()
-            })
-            .collect()
-    }
+fn query_of<P: Parameters>() -> Vec<Parameter> {
+    P::SPECS
+        .iter()
+        .map(|spec| {
+            let mut parameter = query(spec.name, spec.summary).schema(Some(schema_of(spec)));
+            if let Kind::Integers { .. } | Kind::Numbers { .. } = spec.kind {
+                // `1,2,3` in one, not repeated.
+                parameter = parameter
+                    .style(Some(ParameterStyle::Form))
+                    .explode(Some(false));
+            }
+            parameter.build()
+        })
+        .collect()
 }
 
-fn schema_of(spec: &ParameterSpec) -> Schema {
+fn schema_of<P: Parameters>(spec: &ParameterSpec<P>) -> Schema {
     let object = ObjectBuilder::new()
         .description(Some(spec.summary))
         .default(default_of(spec));
@@ -79,14 +106,19 @@ fn schema_of(spec: &ParameterSpec) -> Schema {
             .schema_type(Type::String)
             .enum_values(Some(words.iter().copied()))
             .into(),
-        Kind::Integers { count } => Schema::Array(
-            ArrayBuilder::new()
-                .description(Some(spec.summary))
-                .items(Object::with_type(Type::Integer))
-                .min_items(Some(count))
-                .max_items(Some(count))
-                .build(),
-        ),
+        Kind::Integers { count } => list_of(Type::Integer, count, spec.summary),
+        Kind::Numbers { count } => list_of(Type::Number, count, spec.summary),
+        Kind::Stored { prefixes, word } => {
+            let id = format!("({})[0-9a-f]{{1,64}}", prefixes.join("|"));
+            let pattern = match word {
+                "" => format!("^{id}$"),
+                _ => format!("^({word}|{id})$"),
+            };
+            object
+                .schema_type(Type::String)
+                .pattern(Some(pattern))
+                .into()
+        }
         Kind::Text { pattern, example } => object
             .schema_type(Type::String)
             .pattern(Some(pattern))
@@ -95,7 +127,18 @@ fn schema_of(spec: &ParameterSpec) -> Schema {
     }
 }
 
-fn default_of(spec: &ParameterSpec) -> Option<Value> {
+fn list_of(kind: Type, count: usize, summary: &str) -> Schema {
+    Schema::Array(
+        ArrayBuilder::new()
+            .description(Some(summary))
+            .items(Object::with_type(kind))
+            .min_items(Some(count))
+            .max_items(Some(count))
+            .build(),
+    )
+}
+
+fn default_of<P: Parameters>(spec: &ParameterSpec<P>) -> Option<Value> {
     if spec.default.is_empty() {
         return None;
     }
@@ -186,39 +229,6 @@ impl IntoParams for EventHeader {
     }
 }
 
-/// A job to be filed, as `create_job` reads it field by field.
-pub struct JobRequest;
-
-impl ToSchema for JobRequest {
-    fn name() -> Cow<'static, str> {
-        "JobRequest".into()
-    }
-
-    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
-        schemas.push((ModelParameters::name().into(), ModelParameters::schema()));
-    }
-}
-
-impl PartialSchema for JobRequest {
-    fn schema() -> RefOr<Schema> {
-        let text = || ObjectBuilder::new().schema_type(Type::String);
-        let kind = text()
-            .description(Some("What kind of work it is"))
-            .enum_values(Some(["model"]))
-            .default(Some(json!("model")));
-        let volume = text()
-            .description(Some("Id of the volume"))
-            .examples(["vol_9f86d081884c7d659a2feaa0c55ad015"]);
-        let object = ObjectBuilder::new()
-            .property("kind", Schema::from(kind))
-            .property("volume", Schema::from(volume))
-            .property("parameters", Ref::from_schema_name(ModelParameters::name()))
-            .required("volume")
-            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
-        Schema::from(object.build()).into()
-    }
-}
-
 /// `If-None-Match`, `Range`, `If-Range`.
 pub struct ConditionalHeaders;
 
@@ -232,55 +242,75 @@ impl IntoParams for ConditionalHeaders {
     }
 }
 
-/// Names of a model's files.
-pub fn file_names() -> Vec<String> {
+/// Names of the files that a product of that kind may have.
+pub fn file_names(resource: Resource) -> Vec<String> {
     let meshes = Format::ALL.map(|format| format!("mesh.{}", format.extension()));
-    let reports = ["report.json", "report.html"].map(str::to_owned);
-    meshes.into_iter().chain(reports).collect()
+    let others: &[&str] = match resource {
+        Resource::Model => &["report.json", "report.html"],
+        Resource::Segmentation => &[
+            "mask.nii.gz",
+            "report.json",
+            "polar.json",
+            "polar.svg",
+            "polar.png",
+        ],
+        _ => &[],
+    };
+    let others = others.iter().map(|name| (*name).to_owned());
+    meshes.into_iter().chain(others).collect()
 }
 
-/// A model's files.
-pub struct FileName;
+/// Makes types that document the file names of a kind of product.
+macro_rules! file_names {
+    ($($name:ident: $resource:ident),+) => {$(
+        #[doc = concat!("The files of a ", stringify!($resource), ".")]
+        pub struct $name;
 
-impl ToSchema for FileName {
-    fn name() -> Cow<'static, str> {
-        "FileName".into()
-    }
+        impl ToSchema for $name {
+            fn name() -> Cow<'static, str> {
+                stringify!($name).into()
+            }
+        }
+
+        impl PartialSchema for $name {
+            fn schema() -> RefOr<Schema> {
+                Schema::from(
+                    ObjectBuilder::new()
+                        .schema_type(Type::String)
+                        .enum_values(Some(file_names(Resource::$resource))),
+                )
+                .into()
+            }
+        }
+    )+};
 }
 
-impl PartialSchema for FileName {
-    fn schema() -> RefOr<Schema> {
-        Schema::from(
-            ObjectBuilder::new()
-                .schema_type(Type::String)
-                .enum_values(Some(file_names())),
-        )
-        .into()
-    }
-}
+file_names!(FileName: Model, SegmentationFileName: Segmentation, TemplateFileName: Template);
 
-/// A form with the volume as file part.
-pub struct UploadForm;
+/// `name`, `organ` and `model` of a template.
+pub struct TemplateQuery;
 
-impl ToSchema for UploadForm {
-    fn name() -> Cow<'static, str> {
-        "UploadForm".into()
-    }
-}
-
-impl PartialSchema for UploadForm {
-    fn schema() -> RefOr<Schema> {
-        let file = ObjectBuilder::new()
-            .schema_type(Type::String)
-            .format(Some(SchemaFormat::KnownFormat(KnownFormat::Binary)))
-            .content_media_type("application/octet-stream")
-            .description(Some(
-                "The volume; several parts make up one: a .hdr/.img pair, a DICOM series",
-            ));
-        let form = ObjectBuilder::new()
-            .property("file", Schema::from(file))
-            .required("file")
-            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
-        Schema::from(form).into()
+impl IntoParams for TemplateQuery {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let text = || ObjectBuilder::new().schema_type(Type::String);
+        let name = text().min_length(Some(1)).max_length(Some(80));
+        let model = text().pattern(Some("^(mdl_|seg_)[0-9a-f]{1,64}$"));
+        let own = [
+            ("name", "Name in reports", name),
+            ("model", "Stored model or segmentation to copy", model),
+        ]
+        .map(|(name, summary, schema)| {
+            let schema = Schema::from(schema);
+            query(name, summary).schema(Some(schema)).build()
+        });
+        let organ = FIT_SPECS.iter().filter(|spec| spec.name == "organ");
+        organ
+            .map(|spec| {
+                query(spec.name, "What it shows")
+                    .schema(Some(schema_of(spec)))
+                    .build()
+            })
+            .chain(own)
+            .collect()
     }
 }

@@ -1,19 +1,23 @@
 //! The published document: OpenAPI 3.1, derived from the handlers.
 //!
-//! What the handlers' attributes cannot say comes from here: the parameters of a model (from
-//! [`crate::parameters::SPECS`], so that a new one needs no word in this file), the formats
+//! What the handlers' attributes cannot say comes from here: the parameters of a model and of a
+//! fit (from the tables of [`crate::parameters`], so that a new one needs no word in this file), the formats
 //! (from [`crate::export::Format`]), and the problems that whole groups of handlers share.
 
 mod answers;
+mod bodies;
 mod inputs;
 
 pub use answers::{
-    DownloadAnswers, EventsAnswer, FileAnswer, FileProblems, ListProblems, LookupProblems,
-    MeshAnswer, ReportAnswer, UploadProblems,
+    DownloadAnswers, EraseProblems, EventsAnswer, FileAnswer, FileProblems, ListProblems,
+    LookupProblems, MeshAnswer, ReportAnswer, SegmentationAnswer, SegmentationFileAnswer,
+    SegmentationReportAnswer, UploadProblems,
 };
+pub use bodies::{JobRequest, MeshDocument, SegmentationForm, UploadForm};
 pub use inputs::{
-    ConditionalHeaders, EventHeader, FileName, IdempotencyHeader, JobRequest, ModelParameters,
-    ModelQuery, PageParameters, UploadForm, file_names,
+    ConditionalHeaders, EventHeader, FileName, IdempotencyHeader, ModelParameters, ModelQuery,
+    PageParameters, SegmentationFileName, SegmentationParameters, SegmentationQuery,
+    TemplateFileName, TemplateQuery, file_names,
 };
 
 use utoipa::OpenApi;
@@ -33,9 +37,11 @@ use utoipa::OpenApi;
         (name = "volumes", description = "What was uploaded"),
         (name = "jobs", description = "What was asked for, and how far it is"),
         (name = "models", description = "What was made, and the one-line way to make it"),
+        (name = "segmentations", description = "Models fitted to volumes, and the one-line way to fit one"),
+        (name = "templates", description = "The library of models that `auto` tries"),
         (name = "operations", description = "For operators"),
     ),
-    components(schemas(super::problem::ProblemBody, FileName))
+    components(schemas(super::problem::ProblemBody, FileName, SegmentationFileName, TemplateFileName))
 )]
 pub struct Document;
 

@@ -1,0 +1,166 @@
+//! A job as a client sees it.
+
+use crate::http::app::App;
+use crate::http::problem::{Answer, Problem, ProblemBody};
+use crate::http::wire::{path_of, rfc3339};
+use crate::jobs::{self, Resource, State};
+use serde::Serialize;
+use serde_json::{Map, Value};
+use utoipa::ToSchema;
+
+/// Work that was accepted.
+#[derive(Serialize, ToSchema)]
+pub struct Job {
+    /// The job's id.
+    #[schema(example = "job_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f")]
+    id: String,
+    /// What kind of work it is.
+    #[schema(example = "model")]
+    kind: String,
+    /// The volume it works on.
+    volume: String,
+    /// The parameters, every default written out.
+    #[schema(value_type = Object)]
+    parameters: Map<String, Value>,
+    /// Where it is in its life.
+    state: JobStateName,
+    /// The stage of the work, once one was reached.
+    #[schema(example = "retile")]
+    stage: Option<String>,
+    /// How much is done.
+    #[schema(minimum = 0, maximum = 1)]
+    progress: f64,
+    /// Place in the queue, the next being 1; only while it waits.
+    queue_position: Option<u64>,
+    /// When it will probably start (RFC 3339); only while it waits and where past jobs tell.
+    #[schema(format = DateTime)]
+    estimated_start: Option<String>,
+    /// How often a worker took it.
+    attempts: u32,
+    /// Whether its end was asked for.
+    cancel_requested: bool,
+    /// Grows with every change; the id of its events.
+    revision: i64,
+    /// When it was accepted (RFC 3339).
+    #[schema(format = DateTime)]
+    created_at: String,
+    /// When a worker last took it (RFC 3339).
+    #[schema(format = DateTime)]
+    started_at: Option<String>,
+    /// When it ended (RFC 3339).
+    #[schema(format = DateTime)]
+    finished_at: Option<String>,
+    /// Why it failed.
+    error: Option<ProblemBody>,
+    /// The model it made, if that was its kind.
+    model: Option<String>,
+    /// The segmentation it made, if that was its kind.
+    segmentation: Option<String>,
+    /// Where to go from here.
+    links: JobLinks,
+}
+
+/// Where a job is in its life.
+#[derive(Serialize, ToSchema)]
+#[schema(as = JobState)]
+#[serde(rename_all = "snake_case")]
+pub enum JobStateName {
+    /// Waits for a worker.
+    Queued,
+    /// Is being computed.
+    Running,
+    /// Its result is there.
+    Succeeded,
+    /// See `error`.
+    Failed,
+    /// Somebody ended it.
+    Cancelled,
+}
+
+/// Paths of one job and of its results.
+#[derive(Serialize, ToSchema)]
+struct JobLinks {
+    /// This job.
+    #[serde(rename = "self")]
+    itself: String,
+    /// Its changes as server-sent events.
+    events: String,
+    /// Its volume.
+    volume: String,
+    /// The model it made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    model: Option<String>,
+    /// The segmentation it made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    segmentation: Option<String>,
+    /// The segmentation's mask.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mask: Option<String>,
+    /// The mesh of what it made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mesh: Option<String>,
+    /// The report on what it made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    report: Option<String>,
+}
+
+impl From<State> for JobStateName {
+    fn from(state: State) -> Self {
+        match state {
+            State::Queued => JobStateName::Queued,
+            State::Running => JobStateName::Running,
+            State::Succeeded => JobStateName::Succeeded,
+            State::Failed => JobStateName::Failed,
+            State::Cancelled => JobStateName::Cancelled,
+        }
+    }
+}
+
+/// A job as a client sees it.
+pub async fn describe(app: &App, job: jobs::Job) -> Answer<Job> {
+    let standing = match job.state {
+        State::Queued => Some(app.queue.standing(&job).await?),
+        _ => None,
+    };
+    let now = app.queue.clock.now();
+    let made = |resource: Resource| {
+        let id = job.result.clone();
+        id.filter(|id| Resource::of(id) == Some(resource))
+    };
+    let (model, segmentation) = (made(Resource::Model), made(Resource::Segmentation));
+    let result = job.result.as_deref().map(path_of);
+    let below = |name: &str| result.as_ref().map(|path| format!("{path}/{name}"));
+    let itself = format!("/v1/jobs/{}", job.id);
+    Ok(Job {
+        state: job.state.into(),
+        queue_position: standing.map(|s| s.position),
+        estimated_start: standing
+            .and_then(|s| s.starts_in_ms)
+            .map(|ms| rfc3339(now.saturating_add(ms as i64))),
+        error: job.failure.map(|f| Problem::from(f).into_body()),
+        created_at: rfc3339(job.created_at),
+        started_at: job.started_at.map(rfc3339),
+        finished_at: job.finished_at.map(rfc3339),
+        links: JobLinks {
+            events: format!("{itself}/events"),
+            itself,
+            volume: format!("/v1/volumes/{}", job.volume),
+            model: model.as_deref().map(path_of),
+            segmentation: segmentation.as_deref().map(path_of),
+            mask: segmentation.as_ref().and_then(|_| below("mask.nii.gz")),
+            mesh: below("mesh"),
+            report: below("report"),
+        },
+        id: job.id,
+        kind: job.kind,
+        volume: job.volume,
+        parameters: job.parameters,
+        stage: job.stage,
+        progress: job.progress,
+        attempts: job.attempts,
+        cancel_requested: job.cancel_requested,
+        revision: job.revision,
+        model,
+        segmentation,
+    })
+}

@@ -1,0 +1,145 @@
+//! Bodies that the handlers read piece by piece, so that no type of theirs describes them.
+
+use super::inputs::{ModelParameters, SegmentationParameters};
+use serde_json::json;
+use std::borrow::Cow;
+use utoipa::openapi::schema::{
+    AdditionalProperties, AnyOfBuilder, ArrayBuilder, KnownFormat, Object, ObjectBuilder, Schema,
+    SchemaFormat, Type,
+};
+use utoipa::openapi::{Ref, RefOr};
+use utoipa::{PartialSchema, ToSchema};
+
+/// A job to be filed, as `create_job` reads it field by field.
+pub struct JobRequest;
+
+impl ToSchema for JobRequest {
+    fn name() -> Cow<'static, str> {
+        "JobRequest".into()
+    }
+
+    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
+        schemas.push((ModelParameters::name().into(), ModelParameters::schema()));
+        schemas.push((
+            SegmentationParameters::name().into(),
+            SegmentationParameters::schema(),
+        ));
+    }
+}
+
+impl PartialSchema for JobRequest {
+    fn schema() -> RefOr<Schema> {
+        let text = || ObjectBuilder::new().schema_type(Type::String);
+        let kind = text()
+            .description(Some("What kind of work it is"))
+            .enum_values(Some(["model", "segmentation"]))
+            .default(Some(json!("model")));
+        let volume = text()
+            .description(Some("Id of the volume"))
+            .examples(["vol_9f86d081884c7d659a2feaa0c55ad015"]);
+        let parameters = AnyOfBuilder::new()
+            .description(Some("The parameters of that kind of work"))
+            .item(Ref::from_schema_name(ModelParameters::name()))
+            .item(Ref::from_schema_name(SegmentationParameters::name()));
+        let object = ObjectBuilder::new()
+            .property("kind", Schema::from(kind))
+            .property("volume", Schema::from(volume))
+            .property("parameters", Schema::AnyOf(parameters.build()))
+            .required("volume")
+            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
+        Schema::from(object.build()).into()
+    }
+}
+
+fn file(description: &str) -> ObjectBuilder {
+    ObjectBuilder::new()
+        .schema_type(Type::String)
+        .format(Some(SchemaFormat::KnownFormat(KnownFormat::Binary)))
+        .content_media_type("application/octet-stream")
+        .description(Some(description))
+}
+
+/// A form with the volume as file part.
+pub struct UploadForm;
+
+impl ToSchema for UploadForm {
+    fn name() -> Cow<'static, str> {
+        "UploadForm".into()
+    }
+}
+
+impl PartialSchema for UploadForm {
+    fn schema() -> RefOr<Schema> {
+        let file = file("The volume; several parts make up one: a .hdr/.img pair, a DICOM series");
+        let form = ObjectBuilder::new()
+            .property("file", file)
+            .required("file")
+            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
+        Schema::from(form).into()
+    }
+}
+
+/// A form with a volume and an expert's mask.
+pub struct SegmentationForm;
+
+impl ToSchema for SegmentationForm {
+    fn name() -> Cow<'static, str> {
+        "SegmentationForm".into()
+    }
+}
+
+impl PartialSchema for SegmentationForm {
+    fn schema() -> RefOr<Schema> {
+        let form = ObjectBuilder::new()
+            .property("volume", file("The volume; several parts make up one"))
+            .property(
+                "expert",
+                file("An expert's mask (above 0.5) to measure against"),
+            )
+            .required("volume")
+            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
+        Schema::from(form).into()
+    }
+}
+
+/// A mesh as `mesh.json` has it.
+pub struct MeshDocument;
+
+impl ToSchema for MeshDocument {
+    fn name() -> Cow<'static, str> {
+        "MeshDocument".into()
+    }
+}
+
+impl PartialSchema for MeshDocument {
+    fn schema() -> RefOr<Schema> {
+        let triples = |kind: Type, description: &str| {
+            let triple = ArrayBuilder::new()
+                .items(Object::with_type(kind))
+                .min_items(Some(3))
+                .max_items(Some(3));
+            ArrayBuilder::new()
+                .items(RefOr::T(Schema::Array(triple.build())))
+                .description(Some(description))
+        };
+        let word = |only: &'static str| {
+            ObjectBuilder::new()
+                .schema_type(Type::String)
+                .enum_values(Some([only]))
+        };
+        let mesh = ObjectBuilder::new()
+            .property("frame", word("LPS"))
+            .property("unit", word("mm"))
+            .property("vertices", triples(Type::Number, "Points, LPS millimetres"))
+            .property(
+                "triangles",
+                triples(
+                    Type::Integer,
+                    "Places of three vertices each, counter-clockwise seen from outside",
+                ),
+            )
+            .required("vertices")
+            .required("triangles");
+        Schema::from(mesh).into()
+    }
+}

@@ -1,0 +1,192 @@
+//! Files that arrived and make up one volume.
+
+use crate::http::app::App;
+use crate::http::problem::{Answer, Problem};
+use crate::jobs::{Resource, Staged, Volume};
+use axum::body::Bytes;
+use futures::{Stream, StreamExt};
+use sha2::{Digest, Sha256};
+use std::path::Path;
+use tokio::io::AsyncWriteExt;
+
+/// Bytes gathered before one write.
+const WRITE_BYTES: usize = 1 << 20;
+
+/// The files of one volume, which nobody can see yet.
+pub struct Bundle {
+    staged: Staged,
+    files: Vec<Received>,
+}
+
+/// One file.
+pub struct Received {
+    name: String,
+    kind: &'static str,
+    digest: [u8; 32],
+    bytes: u64,
+}
+
+impl Received {
+    /// Takes the sender's name for the file into account.
+    pub fn known_as(&mut self, given: &str) {
+        self.kind = kind_by_name(given).unwrap_or(self.kind);
+    }
+}
+
+/// Writes a stream to a file, hashing it. Forced to the disk when it is published.
+async fn receive<E>(
+    mut pieces: impl Stream<Item = Result<Bytes, E>> + Unpin,
+    folder: &Path,
+    name: &str,
+    broken: impl FnOnce() -> Problem,
+) -> Answer<Received> {
+    let mut file = tokio::fs::File::create(folder.join(name))
+        .await
+        .map_err(Problem::internal)?;
+    let mut hash = Sha256::new();
+    let mut waiting = Vec::with_capacity(64 << 10);
+    let mut head = Vec::new();
+    let mut bytes = 0;
+    loop {
+        let piece = match pieces.next().await {
+            Some(Ok(piece)) => piece,
+            Some(Err(_)) => return Err(broken()),
+            None => break,
+        };
+        hash.update(&piece);
+        bytes += piece.len() as u64;
+        if head.len() < 132 {
+            head.extend_from_slice(&piece[..piece.len().min(132 - head.len())]);
+        }
+        waiting.extend_from_slice(&piece);
+        if waiting.len() >= WRITE_BYTES {
+            file.write_all(&waiting).await.map_err(Problem::internal)?;
+            waiting.clear();
+        }
+    }
+    file.write_all(&waiting).await.map_err(Problem::internal)?;
+    file.flush().await.map_err(Problem::internal)?;
+    Ok(Received {
+        name: name.to_owned(),
+        kind: kind_by_content(&head),
+        digest: hash.finalize().into(),
+        bytes,
+    })
+}
+
+/// The extension that the first bytes speak for.
+fn kind_by_content(head: &[u8]) -> &'static str {
+    match head {
+        [0x1f, 0x8b, ..] => "nii.gz",
+        _ if head.get(128..132) == Some(b"DICM") => "dcm",
+        _ => "nii",
+    }
+}
+
+/// The two extensions that only a name can tell apart.
+fn kind_by_name(name: &str) -> Option<&'static str> {
+    ["hdr.gz", "img.gz", "hdr", "img"]
+        .into_iter()
+        .find(|kind| name.ends_with(&format!(".{kind}")))
+}
+
+impl Bundle {
+    /// A bundle without files.
+    pub async fn new(app: &App) -> Answer<Self> {
+        Ok(Self {
+            staged: app.queue.blobs.stage().await?,
+            files: Vec::new(),
+        })
+    }
+
+    /// Whether nothing was received.
+    pub fn is_empty(&self) -> bool {
+        self.files.iter().all(|file| file.bytes == 0)
+    }
+
+    /// Adds a file; `broken` says why where its stream breaks off.
+    pub async fn write<E>(
+        &mut self,
+        pieces: impl Stream<Item = Result<Bytes, E>> + Unpin,
+        broken: impl FnOnce() -> Problem,
+    ) -> Answer<&mut Received> {
+        let name = self.files.len().to_string();
+        let file = receive(pieces, self.staged.folder(), &name, broken).await?;
+        self.files.push(file);
+        let last = self.files.len() - 1;
+        Ok(&mut self.files[last])
+    }
+
+    /// Reads the volume and stores it. Tells whether it is new.
+    ///
+    /// # Errors
+    /// 413 or 422 if the files are no volume that can be used.
+    pub async fn store(mut self, app: &App) -> Answer<(Volume, bool)> {
+        // The order of parts carries no meaning, so it must not change the id.
+        self.files
+            .sort_by(|a, b| (a.kind, a.digest).cmp(&(b.kind, b.digest)));
+        let id = self.volume_id();
+        if let Some(known) = app.queue.catalogue.volume(&id).await? {
+            return Ok((known, false));
+        }
+        let names = self.name_files().await.map_err(Problem::internal)?;
+        let paths: Vec<_> = names.iter().map(|n| self.staged.folder().join(n)).collect();
+        let facts = {
+            let _permit = app.inspections.acquire().await.map_err(Problem::internal)?;
+            let reader = app.engine.reader.clone();
+            tokio::task::spawn_blocking(move || reader.inspect(&paths))
+                .await
+                .map_err(Problem::internal)??
+        };
+        let volume = Volume {
+            sequence: 0,
+            created_at: app.queue.clock.now(),
+            bytes: self.files.iter().map(|f| f.bytes).sum(),
+            files: names,
+            facts,
+            id: id.clone(),
+        };
+        let _shelving = app.queue.shelving.lock().await;
+        app.queue.blobs.publish(&id, self.staged).await?;
+        let new = app.queue.catalogue.add_volume(&volume).await?;
+        let stored = app.queue.catalogue.volume(&id).await?;
+        Ok((stored.unwrap_or(volume), new))
+    }
+
+    /// One file: its SHA-256, as `sha256sum` shows it, cut to 32 digits. Several: the same of
+    /// the list of kinds and hashes.
+    fn volume_id(&self) -> String {
+        let prefix = Resource::Volume.prefix();
+        if let [file] = &self.files[..] {
+            return format!("{prefix}{}", hex(&file.digest[..16]));
+        }
+        let mut hash = Sha256::new();
+        for file in &self.files {
+            hash.update(format!("{}:{}\n", file.kind, hex(&file.digest)));
+        }
+        format!("{prefix}{}", hex(&hash.finalize()[..16]))
+    }
+
+    /// Gives the files the names they keep: `volume.hdr` and `volume.img` for a pair, else
+    /// numbers with the extension that the content speaks for.
+    async fn name_files(&self) -> std::io::Result<Vec<String>> {
+        let pair = self.files.len() == 2
+            && self.files[0].kind.starts_with("hdr")
+            && self.files[1].kind.starts_with("img");
+        let mut names = Vec::new();
+        for (number, file) in self.files.iter().enumerate() {
+            let name = match (pair, self.files.len()) {
+                (true, _) | (_, 1) => format!("volume.{}", file.kind),
+                _ => format!("{number:04}.{}", file.kind),
+            };
+            let folder = self.staged.folder();
+            tokio::fs::rename(folder.join(&file.name), folder.join(&name)).await?;
+            names.push(name);
+        }
+        Ok(names)
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
