@@ -75,6 +75,8 @@ enum TemplatesAction {
         #[arg(short, long = "output", value_name = "DIR")]
         output: PathBuf,
     },
+    /// Adds models to the library of a service that does not run just now
+    Import(super::library::ImportArgs),
 }
 
 /// Runs `ventriform templates`.
@@ -82,11 +84,14 @@ enum TemplatesAction {
 /// # Errors
 /// What reading, generating or the file system says.
 pub fn run_templates(args: &TemplatesArgs) -> Result<()> {
-    let TemplatesAction::Build {
-        cohort,
-        points,
-        output,
-    } = &args.action;
+    let (cohort, points, output) = match &args.action {
+        TemplatesAction::Build {
+            cohort,
+            points,
+            output,
+        } => (cohort, points, output),
+        TemplatesAction::Import(args) => return super::library::import(args),
+    };
     let cohort = Cohort::open(cohort)?;
     make_folder(output)?;
     for n in points {

@@ -5,7 +5,7 @@ use crate::deform::voxelise::Mask;
 use crate::evaluate::masks::compare;
 use crate::progress::Monitor;
 use crate::segmentation::{agreement_json, on_grid};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -36,6 +36,12 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
         shape: a.shape,
         voxels: a.voxels.iter().map(|v| *v > 0.5).collect(),
     };
+    if !judged.voxels.contains(&true) {
+        bail!(
+            "{}: the mask is empty: no voxel is above 0.5",
+            args.a.display()
+        );
+    }
     let reference = on_grid(&b, &a).with_context(|| format!("{}", args.b.display()))?;
     let agreement = compare(&judged, &reference, a.frame.spacing())?;
     println!(

@@ -4,6 +4,7 @@ mod bar;
 mod demo;
 mod evaluate;
 mod generate;
+mod library;
 mod measure;
 mod parameter_args;
 mod phantom;

@@ -47,10 +47,12 @@ a model of 150 points, as GLB:
   curl -fsS --data-binary @spect.nii.gz -H 'Prefer: wait=60' -H 'Accept: model/gltf-binary' '{url}/v1/models?points=150' -o lv.glb
 the same in the background; the answer names the job:
   curl -fsS --data-binary @spect.nii.gz '{url}/v1/models?points=150'
+the wall of the ventricle in a scan, by the best model of the library, as mask.nii.gz:
+  curl -fsS --data-binary @spect.nii.gz -H 'Prefer: wait=60' '{url}/v1/segmentations?model=auto' -o mask.nii.gz
 how far the jobs are:
   curl -fsS '{url}/v1/jobs'
 what was made:
-  curl -fsS '{url}/v1/models'
+  curl -fsS '{url}/v1/models'; curl -fsS '{url}/v1/segmentations'
 a model's quality, for a person:
   curl -fsS '{url}/v1/models/ID/report.html' -o report.html
 

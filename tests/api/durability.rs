@@ -1,11 +1,11 @@
 //! What survives a kill: the real program, killed with no warning.
 
-use crate::helpers::{Service, fake_engine, scan, text};
+use crate::helpers::{Service, fake_engine, heart, scan, text};
 use serde_json::{Value, json};
 use std::time::Duration;
 use ventriform::jobs::{
-    Catalogue, Failure, Fault, Filed, Intensity, JobStore, Lease, NewJob, Outcome, State, Volume,
-    VolumeFacts,
+    Catalogue, Failure, Fault, Filed, Intensity, JobStore, Lease, NewJob, Outcome, PageRequest,
+    Resource, State, Volume, VolumeFacts,
 };
 use ventriform::store::Store;
 
@@ -16,8 +16,12 @@ async fn every_accepted_job_ends_once_whenever_the_service_is_killed() {
     for round in 0..4u64 {
         let service = Service::start(data.path(), &["--workers", "1"]).await;
         for seed in 0..3 {
-            let path = format!("/v1/models?points=67&seed={}", round * 10 + seed);
-            let answer = service.post(&path).body(scan()).send().await.unwrap();
+            let number = round * 10 + seed;
+            let (path, body) = match seed {
+                1 => (format!("/v1/segmentations?roll={number}"), heart().0),
+                _ => (format!("/v1/models?points=67&seed={number}"), scan()),
+            };
+            let answer = service.post(&path).body(body).send().await.unwrap();
             let job: Value = answer.json().await.unwrap();
             accepted.push(text(&job["id"]));
         }
@@ -30,7 +34,11 @@ async fn every_accepted_job_ends_once_whenever_the_service_is_killed() {
         assert_eq!(job["state"], "succeeded", "{job}");
         let mesh = service.get(&format!("{}.json", text(&job["links"]["mesh"])));
         let mesh: Value = mesh.send().await.unwrap().json().await.unwrap();
-        assert_eq!(mesh["vertices"].as_array().unwrap().len(), 67);
+        let points = match job["kind"].as_str() {
+            Some("model") => 67,
+            _ => 150,
+        };
+        assert_eq!(mesh["vertices"].as_array().unwrap().len(), points);
     }
     let all: Value = service
         .get("/v1/jobs?limit=100")
@@ -45,18 +53,14 @@ async fn every_accepted_job_ends_once_whenever_the_service_is_killed() {
         accepted.len(),
         "none twice"
     );
-    let models: Value = service
-        .get("/v1/models?limit=100")
-        .send()
-        .await
-        .unwrap()
-        .json()
-        .await
-        .unwrap();
-    assert_eq!(models["models"].as_array().unwrap().len(), accepted.len());
-    let shelves = ["staging", "volumes", "models"];
+    for (list, count) in [("models", 8), ("segmentations", 4)] {
+        let made = service.get(&format!("/v1/{list}?limit=100"));
+        let made: Value = made.send().await.unwrap().json().await.unwrap();
+        assert_eq!(made[list].as_array().unwrap().len(), count, "{list}");
+    }
+    let shelves = ["staging", "volumes", "models", "segmentations", "templates"];
     let stored = shelves.map(|shelf| std::fs::read_dir(data.path().join(shelf)).unwrap().count());
-    assert_eq!(stored, [0, 1, accepted.len()], "no orphans");
+    assert_eq!(stored, [0, 2, 8, 4, 0], "no orphans");
 }
 
 #[tokio::test]
@@ -168,5 +172,42 @@ async fn filed(store: &Store) -> String {
     match store.rows.file(&order, 10, 0).await.unwrap() {
         Filed::New(job) => job.id,
         other => panic!("{other:?}"),
+    }
+}
+
+#[tokio::test]
+async fn models_of_an_older_database_are_still_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let older = folder.path().join("migrations");
+    std::fs::create_dir(&older).unwrap();
+    let first = "0001_queue_and_catalogue.sql";
+    let source = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/store/migrations");
+    std::fs::copy(source.join(first), older.join(first)).unwrap();
+    let options = sqlx::sqlite::SqliteConnectOptions::new()
+        .filename(folder.path().join("ventriform.db"))
+        .create_if_missing(true);
+    let pool = sqlx::SqlitePool::connect_with(options).await.unwrap();
+    let migrator = sqlx::migrate::Migrator::new(older.as_path()).await.unwrap();
+    migrator.run(&pool).await.unwrap();
+    sqlx::query(
+        "INSERT INTO models (id, created_at, volume, parameters, summary, software, files)
+         VALUES ('mdl_1', 5, 'vol_1', '{}', '{}', '0', '[]')",
+    )
+    .execute(&pool)
+    .await
+    .unwrap();
+    pool.close().await;
+
+    let store = Store::open(folder.path()).await.unwrap();
+    let model = store.rows.product("mdl_1").await.unwrap().unwrap();
+    assert_eq!(model.volume.as_deref(), Some("vol_1"));
+    assert_eq!(model.created_at, 5);
+    let page = PageRequest {
+        before: None,
+        limit: 9,
+    };
+    for (kind, count) in [(Resource::Model, 1), (Resource::Segmentation, 0)] {
+        let listed = store.rows.products(kind, page).await.unwrap();
+        assert_eq!(listed.items.len(), count);
     }
 }

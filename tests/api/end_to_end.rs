@@ -1,7 +1,13 @@
 //! The real work in the real program, from file to mesh.
 
-use crate::helpers::{Service, problem, scan, text};
+use crate::helpers::{Service, heart, problem, scan, text};
+use reqwest::Response;
+use reqwest::multipart::{Form, Part};
 use serde_json::Value;
+use ventriform::geometry::Vec3;
+use ventriform::geometry::frame::VoxelToPatient;
+use ventriform::volume::Volume;
+use ventriform::volume::nifti::{self, StoredType};
 
 #[tokio::test]
 async fn a_scan_becomes_a_closed_mesh_of_exactly_the_points_asked_for() {
@@ -93,4 +99,192 @@ async fn an_upload_takes_no_memory() {
     assert_eq!(answer.status(), 422);
     let grown = service.peak_memory_kib() - before;
     assert!(grown < 32 << 10, "{grown} KiB for 256 MiB");
+}
+
+/// A cube of voxels of `value` by place in millimetres about `centre`, as a `.nii`.
+fn cube(voxels: usize, spacing: f64, centre: Vec3, value: impl Fn(&Vec3) -> f32) -> Vec<u8> {
+    let shape = [voxels; 3];
+    let frame = VoxelToPatient::centred(shape, [spacing; 3], centre).unwrap();
+    let place = |v: usize| {
+        let index = [v % voxels, v / voxels % voxels, v / (voxels * voxels)];
+        frame.to_patient(&Vec3::from(index.map(|x| x as f64)))
+    };
+    let volume = Volume {
+        voxels: (0..voxels.pow(3)).map(|v| value(&place(v))).collect(),
+        shape,
+        integral: true,
+        frame,
+    };
+    nifti::write(&volume, StoredType::Uint8, false).unwrap()
+}
+
+fn ball(p: &Vec3) -> f32 {
+    if p.norm() < 40.0 { 100.0 } else { 5.0 }
+}
+
+struct Segmenter(Service);
+
+impl Segmenter {
+    /// Sends a scan, perhaps with an expert's mask, and waits for the report.
+    async fn report(&self, query: &str, scan: Vec<u8>, expert: Option<Vec<u8>>) -> Response {
+        let part = |bytes: Vec<u8>| Part::bytes(bytes).file_name("volume.nii.gz");
+        let mut form = Form::new().part("volume", part(scan));
+        if let Some(expert) = expert {
+            form = form.part("expert", part(expert));
+        }
+        self.0
+            .post(&format!("/v1/segmentations?{query}"))
+            .header("prefer", "wait=60")
+            .header("accept", "application/json")
+            .multipart(form)
+            .send()
+            .await
+            .unwrap()
+    }
+
+    async fn json(&self, path: &str) -> Value {
+        let answer = self.0.get(path).send().await.unwrap();
+        assert_eq!(answer.status(), 200, "{path}");
+        answer.json().await.unwrap()
+    }
+}
+
+#[tokio::test]
+async fn a_scan_is_segmented_and_measured_against_an_expert() {
+    let data = tempfile::tempdir().unwrap();
+    let service = Segmenter(Service::start(data.path(), &[]).await);
+    let (scan, truth) = heart();
+    let answer = service
+        .report("model=auto", scan.clone(), Some(truth.clone()))
+        .await;
+    assert_eq!(answer.status(), 200);
+    let path = answer.headers()["location"].to_str().unwrap().to_owned();
+    let report: Value = answer.json().await.unwrap();
+    assert_eq!(report["template"], "built-in");
+    assert_eq!(report["fit"]["reason"], "converged");
+    assert!(report["fit"]["confidence"].as_f64().unwrap() > 0.8);
+    // The apparent edge lies outside the true one by the blur.
+    assert!(report["measures"]["jaccard"].as_f64().unwrap() > 0.55);
+    assert!(report["measures"]["contour_distance_voxels"].is_number());
+    assert!(report["volumes_ml"]["wall"].as_f64().unwrap() > 80.0);
+    assert!(report["volumes_ml"]["cavity"].as_f64().unwrap() > 20.0);
+    assert!(report["flags"].is_array());
+    let nodes = report["fit"]["displacement_mm"].as_array().unwrap();
+    assert_eq!(nodes.len(), 150);
+
+    let made = service.json(&path).await;
+    assert_eq!(made["summary"]["measures"], report["measures"]);
+    let names: Vec<_> = made["files"].as_array().unwrap().iter().collect();
+    for file in names {
+        let answer = service.0.get(&text(&file["href"])).send().await.unwrap();
+        assert_eq!(answer.headers()["content-type"], text(&file["media_type"]));
+        let bytes = answer.bytes().await.unwrap();
+        assert_eq!(bytes.len() as u64, file["bytes"].as_u64().unwrap());
+    }
+    let polar = service.json(&format!("{path}/polar.json")).await;
+    assert_eq!(polar["segments"].as_array().unwrap().len(), 17);
+
+    // The mask lies on the scan's own grid: sent back as the expert's, it agrees with itself.
+    let mask = service.0.get(&format!("{path}/mask.nii.gz"));
+    let mask = mask.send().await.unwrap().bytes().await.unwrap().to_vec();
+    let again = service.report("model=auto", scan.clone(), Some(mask)).await;
+    let again: Value = again.json().await.unwrap();
+    assert_eq!(again["measures"]["jaccard"], 1.0);
+
+    // A model made by a job is fitted by its id, and from the library by auto.
+    let model = service.0.post("/v1/models?points=110").body(scan.clone());
+    let model = model.header("prefer", "wait=60").send().await.unwrap();
+    let model = model.headers()["location"].to_str().unwrap().to_owned();
+    let id = model.rsplit('/').next().unwrap();
+    let fitted = service
+        .report(&format!("model={id}"), scan.clone(), None)
+        .await;
+    let fitted: Value = fitted.json().await.unwrap();
+    assert_eq!(fitted["template"], id);
+    assert!(fitted["measures"].is_null());
+    for (from, name) in [(id, "own"), (path.rsplit('/').next().unwrap(), "fitted")] {
+        let template = service
+            .0
+            .post(&format!("/v1/templates?model={from}&name={name}"));
+        assert_eq!(template.send().await.unwrap().status(), 201);
+    }
+    let best: Value = service
+        .report("template=auto", scan, None)
+        .await
+        .json()
+        .await
+        .unwrap();
+    let candidates = best["candidates"].as_array().unwrap();
+    assert_eq!(candidates.len(), 2);
+    let greatest = candidates
+        .iter()
+        .max_by(|a, b| f64::total_cmp(&a["merit"].as_f64().unwrap(), &b["merit"].as_f64().unwrap()))
+        .unwrap();
+    assert_eq!(best["template"], greatest["template"]);
+    assert!(text(&best["choice"]).contains("greatest merit"), "{best}");
+}
+
+#[tokio::test]
+async fn what_cannot_be_segmented_is_said_with_what_was_seen() {
+    let data = tempfile::tempdir().unwrap();
+    let service = Segmenter(Service::start(data.path(), &[]).await);
+    let (scan, _) = heart();
+    let solid = cube(48, 4.0, Vec3::zeros(), ball);
+    let refused = service.report("", solid.clone(), None).await;
+    let refused = problem(refused, 422, "no-heart").await;
+    assert_eq!(refused["field"], "center");
+    assert!(text(&refused["detail"]).contains("correlates"), "{refused}");
+    assert!(text(&refused["job"]).starts_with("job_"));
+
+    let empty = cube(64, 3.2, Vec3::zeros(), |_| 0.0);
+    let refused = service.report("", scan.clone(), Some(empty)).await;
+    assert_eq!(problem(refused, 422, "empty-mask").await["field"], "expert");
+    let far = Vec3::new(900.0, 0.0, 0.0);
+    let elsewhere = cube(48, 4.0, far, |p| ball(&(p - far)));
+    let refused = service.report("", scan.clone(), Some(elsewhere)).await;
+    let refused = problem(refused, 422, "mask-elsewhere").await;
+    assert_eq!(refused["field"], "expert");
+    let blank = cube(32, 4.0, Vec3::zeros(), |_| 7.0);
+    let refused = service.report("", blank, None).await;
+    assert_eq!(refused.status(), 422);
+
+    let outside = service.report("center=900,0,0", scan.clone(), None).await;
+    let outside = problem(outside, 422, "invalid-parameter").await;
+    assert_eq!(outside["field"], "center");
+    let liver = service.report("organ=liver", scan.clone(), None).await;
+    assert_eq!(problem(liver, 422, "no-model").await["field"], "model");
+
+    // A model of another organ: by its shape, and by what it was said to be.
+    let model = service
+        .0
+        .post("/v1/models?isolate=none")
+        .body(solid.clone());
+    let model = model.header("prefer", "wait=60").send().await.unwrap();
+    assert_eq!(model.status(), 200);
+    let model = model.headers()["location"].to_str().unwrap().to_owned();
+    let id = model.rsplit('/').next().unwrap();
+    let refused = service
+        .report(&format!("model={id}"), scan.clone(), None)
+        .await;
+    let refused = problem(refused, 422, "unsuitable-model").await;
+    assert_eq!(refused["field"], "model");
+    assert!(text(&refused["fix"]).contains("organ"));
+    let template = service
+        .0
+        .post(&format!("/v1/templates?model={id}&organ=generic"));
+    let template: Value = template.send().await.unwrap().json().await.unwrap();
+    let other = format!("model={}", text(&template["id"]));
+    let refused = service.report(&other, scan, None).await;
+    let refused = problem(refused, 422, "unsuitable-model").await;
+    assert!(text(&refused["detail"]).contains("generic"), "{refused}");
+
+    // Where it belongs, it fits: the ball's model on the ball, with no polar map.
+    let own = cube(48, 4.0, Vec3::zeros(), |p| ball(p) - 5.0);
+    let fitted = service
+        .report(&format!("{other}&organ=generic"), solid, Some(own))
+        .await;
+    assert_eq!(fitted.status(), 200);
+    let fitted: Value = fitted.json().await.unwrap();
+    assert!(fitted["measures"]["dice"].as_f64().unwrap() > 0.9);
+    assert!(fitted["polar"].is_null());
 }

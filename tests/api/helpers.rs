@@ -15,6 +15,7 @@ use ventriform::jobs::{
     Engine, Failure, Fault, Input, Intensity, Needs, Output, OutputFile, Resource, VolumeFacts,
     VolumeReader, Work, WorkError,
 };
+use ventriform::mesh::TriMesh;
 use ventriform::mesh::shapes::icosphere;
 use ventriform::progress::{Monitor, Plan, Stage};
 use ventriform::volume::ReadLimits;
@@ -366,6 +367,30 @@ fn sphere() -> Output {
         summary: [("vertices".to_owned(), json!(42))].into_iter().collect(),
         files,
     }
+}
+
+/// A mesh as a JSON file.
+pub fn mesh_json(mesh: &TriMesh) -> Vec<u8> {
+    export::encode(Format::Json, mesh, &Metadata::new("test")).unwrap()
+}
+
+/// A simulated scan of the heart alone with its true mask, as `.nii.gz` files, made once.
+pub fn heart() -> (Vec<u8>, Vec<u8>) {
+    static HEART: std::sync::OnceLock<(Vec<u8>, Vec<u8>)> = std::sync::OnceLock::new();
+    HEART
+        .get_or_init(|| {
+            let parameters = PhantomParameters {
+                shape: [64; 3],
+                ..PhantomParameters::default()
+            };
+            let made = phantom(&parameters, &Monitor::silent()).unwrap();
+            let file = |volume, stored| nifti::write(volume, stored, true).unwrap();
+            (
+                file(&made.volume, StoredType::Int16),
+                file(&made.truth, StoredType::Uint8),
+            )
+        })
+        .clone()
 }
 
 /// A simulated scan as a `.nii.gz`, small enough to be quick and made once.

@@ -20,5 +20,6 @@ mod jobs;
 mod models;
 mod openapi;
 mod operations;
+mod segmentations;
 mod shutdown;
 mod volumes;

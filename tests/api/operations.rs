@@ -48,7 +48,12 @@ async fn the_door_opens_for_people_and_for_curl() {
         .text()
         .await
         .unwrap();
-    assert_eq!(text.matches("curl -fsS").count(), 5);
+    assert_eq!(
+        text.lines()
+            .filter(|line| line.contains("curl -fsS"))
+            .count(),
+        6
+    );
     assert!(text.contains(&app.url));
 }
 

@@ -1,0 +1,74 @@
+//! `ventriform templates import`: models into the library of a service's data folder.
+
+use crate::config::Settings;
+use crate::jobs::{Engine, Queue, QueueSettings, SystemClock};
+use crate::store::Store;
+use crate::volume::ReadLimits;
+use anyhow::{Context, Result, anyhow};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use tokio::runtime::Runtime;
+
+/// Where models go, and which.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  ventriform templates build --cohort cohort --points 150 -o templates
+  ventriform templates import templates/*.json --data-dir ventriform-data
+While the service runs, send them to it instead:
+  curl --data-binary @templates/t1_150.json -H 'content-type: application/json' \\
+       'http://127.0.0.1:8080/v1/templates?name=t1_150'")]
+pub struct ImportArgs {
+    /// JSON meshes of `templates build` or `generate`; the file's name becomes the template's
+    #[arg(value_name = "MODEL", required = true)]
+    models: Vec<PathBuf>,
+    /// The service's data folder (made where missing)
+    #[arg(long, value_name = "DIR")]
+    data_dir: PathBuf,
+    /// What the models show: left_ventricle, liver, kidney or generic
+    #[arg(long, value_name = "WORD", default_value = "left_ventricle")]
+    organ: String,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Where a model cannot be fitted, or the data folder is in use or cannot be written.
+pub fn import(args: &ImportArgs) -> Result<()> {
+    Runtime::new()?.block_on(async {
+        let store = Store::open(&args.data_dir).await?;
+        let queue = Queue::new(
+            store.rows.clone(),
+            store.rows.clone(),
+            store.blobs.clone(),
+            Arc::new(SystemClock),
+            QueueSettings {
+                limit: Settings::default().queue_limit,
+                workers: 1,
+            },
+        );
+        let engine = Engine::new(ReadLimits::default());
+        for path in &args.models {
+            let id = add(&queue, &engine, path, &args.organ)
+                .await
+                .with_context(|| format!("{}", path.display()))?;
+            println!("{id} {}", name(path));
+        }
+        Ok(())
+    })
+}
+
+async fn add(queue: &Queue, engine: &Engine, path: &Path, organ: &str) -> Result<String> {
+    let mesh = std::fs::read(path)?;
+    let output = engine
+        .reader
+        .template(&mesh, organ)
+        .map_err(|failure| anyhow!("{failure} {}", failure.fix.clone().unwrap_or_default()))?;
+    let (template, _) = queue.add_template(&name(path), organ, output).await?;
+    Ok(template.id)
+}
+
+fn name(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or(path.as_os_str());
+    stem.to_string_lossy().into_owned()
+}
