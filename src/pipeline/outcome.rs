@@ -5,8 +5,8 @@ use crate::export::{self, ExportError, Format, Metadata};
 use crate::parameters::Parameters;
 use crate::polar;
 use crate::progress::{Cancelled, Monitor, Stage};
-use crate::segmentation::{mask_volume, report_json};
-use crate::volume::nifti::{self, StoredType};
+use crate::segmentation::report_json;
+use crate::volume::nifti::{self, MaskError};
 use serde_json::{Map, Value, json};
 
 /// One file of an outcome.
@@ -52,7 +52,7 @@ impl Segmented {
         monitor: &Monitor<'_>,
     ) -> Result<Vec<NamedFile>, OutcomeError> {
         monitor.report(Stage::Export, 0.0)?;
-        let mut files = vec![self.mask()?];
+        let mut files = vec![self.mask(monitor)?];
         monitor.report(Stage::Export, 0.5)?;
         let metadata = Metadata {
             volume_id,
@@ -106,13 +106,17 @@ impl Segmented {
         .collect()
     }
 
-    fn mask(&self) -> Result<NamedFile, OutcomeError> {
-        let mask = mask_volume(&self.segmentation.mask, &self.reading.volume);
-        let bytes = nifti::write(&mask, StoredType::Uint8, true);
+    fn mask(&self, monitor: &Monitor<'_>) -> Result<NamedFile, OutcomeError> {
+        let mask = &self.segmentation.mask;
+        let frame = &self.reading.volume.frame;
+        let bytes = nifti::write_mask(&mask.voxels, mask.shape, frame, monitor);
         Ok(NamedFile {
             name: "mask.nii.gz".into(),
             media_type: "application/gzip",
-            bytes: bytes.map_err(|error| other("mask.nii.gz", &error))?,
+            bytes: bytes.map_err(|error| match error {
+                MaskError::Cancelled(cancelled) => cancelled.into(),
+                MaskError::TooLong(error) => other("mask.nii.gz", &error),
+            })?,
         })
     }
 

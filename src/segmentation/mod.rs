@@ -187,17 +187,3 @@ fn try_all(
         _ => Ok(trials),
     }
 }
-
-/// A mask as a volume of 0 and 1 in the place of `like`.
-pub fn mask_volume(mask: &Mask, like: &Volume) -> Volume {
-    Volume {
-        shape: mask.shape,
-        voxels: mask
-            .voxels
-            .iter()
-            .map(|v| f32::from(u8::from(*v)))
-            .collect(),
-        frame: like.frame.clone(),
-        integral: true,
-    }
-}

@@ -14,7 +14,7 @@ pub mod write;
 #[cfg(test)]
 mod tests;
 
-pub use write::{StoredType, write};
+pub use write::{MaskError, StoredType, TooLong, write, write_mask};
 
 use self::header::Header;
 use self::place::{Placement, place};

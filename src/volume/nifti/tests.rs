@@ -1,9 +1,10 @@
 //! Odd files made by code, and random damage.
 
-use super::super::{AffineSource, ByteOrder, Format, VolumeFile, read as read_volume};
+use super::super::{AffineSource, ByteOrder, Format, Volume, VolumeFile, read as read_volume};
 use super::*;
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
+use crate::progress::Monitor;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use nalgebra::Matrix3;
@@ -702,4 +703,27 @@ proptest! {
         bytes[at] = value;
         let _ = read_bytes(&bytes);
     }
+}
+
+#[test]
+fn a_mask_written_by_slices_is_the_mask_written_whole() {
+    let mut volume = Volume {
+        shape: [5, 4, 3],
+        voxels: (0..60).map(|v| f32::from(u8::from(v % 7 < 3))).collect(),
+        frame: VoxelToPatient::centred([5, 4, 3], [1.0, 2.0, 3.0], Vec3::new(4.0, 5.0, 6.0))
+            .unwrap(),
+        integral: true,
+    };
+    let mask: Vec<bool> = volume.voxels.iter().map(|v| *v > 0.5).collect();
+    let written = write_mask(&mask, volume.shape, &volume.frame, &Monitor::silent()).unwrap();
+    let unpacked = |bytes: &[u8]| {
+        let mut plain = Vec::new();
+        std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(bytes), &mut plain).unwrap();
+        plain
+    };
+    let whole = write(&volume, StoredType::Uint8, true).unwrap();
+    assert_eq!(unpacked(&written), unpacked(&whole));
+    volume.shape = [40_000, 1, 1];
+    let long = write_mask(&mask, volume.shape, &volume.frame, &Monitor::silent());
+    assert!(matches!(long, Err(MaskError::TooLong(_))));
 }

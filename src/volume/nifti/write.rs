@@ -6,6 +6,7 @@
 
 use super::super::Volume;
 use crate::geometry::frame::VoxelToPatient;
+use crate::progress::{Cancelled, Monitor};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
@@ -50,6 +51,39 @@ pub struct TooLong {
     pub size: usize,
 }
 
+/// A mask cannot be written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum MaskError {
+    /// NIfTI-1 cannot say its size.
+    #[error(transparent)]
+    TooLong(#[from] TooLong),
+    /// The caller asked for an end.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// The bytes of a `.nii.gz` with `mask` as 0 and 1 on the grid of `shape` and `frame`. Packed
+/// slice by slice: takes no memory but that of the result, and looks at the token in between.
+///
+/// # Errors
+/// [`MaskError`].
+pub fn write_mask(
+    mask: &[bool],
+    shape: [usize; 3],
+    frame: &VoxelToPatient,
+    monitor: &Monitor<'_>,
+) -> Result<Vec<u8>, MaskError> {
+    let header = header(shape, frame, StoredType::Uint8, Scaling::NONE)?;
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::new(6));
+    put(&mut encoder, &header);
+    for slice in mask.chunks((shape[0] * shape[1]).max(1)) {
+        monitor.check()?;
+        let bytes: Vec<u8> = slice.iter().map(|inside| u8::from(*inside)).collect();
+        put(&mut encoder, &bytes);
+    }
+    Ok(finish(encoder))
+}
+
 /// The bytes of a `.nii` (of a `.nii.gz` where `gzip` is set) with `volume`.
 ///
 /// # Errors
@@ -59,7 +93,7 @@ pub fn write(volume: &Volume, stored: StoredType, gzip: bool) -> Result<Vec<u8>,
         StoredType::Int16 => scaling(&volume.voxels),
         StoredType::Float32 | StoredType::Uint8 => Scaling::NONE,
     };
-    let mut bytes = header(volume, stored, scaling)?;
+    let mut bytes = header(volume.shape, &volume.frame, stored, scaling)?;
     append_voxels(&mut bytes, &volume.voxels, stored, scaling);
     Ok(if gzip { pack(&bytes) } else { bytes })
 }
@@ -114,14 +148,19 @@ fn append_voxels(bytes: &mut Vec<u8>, voxels: &[f32], stored: StoredType, scalin
     }
 }
 
-fn header(volume: &Volume, stored: StoredType, scaling: Scaling) -> Result<Vec<u8>, TooLong> {
+fn header(
+    shape: [usize; 3],
+    frame: &VoxelToPatient,
+    stored: StoredType,
+    scaling: Scaling,
+) -> Result<Vec<u8>, TooLong> {
     let mut bytes = vec![0; VOX_OFFSET];
     let mut put = |at: usize, field: &[u8]| bytes[at..at + field.len()].copy_from_slice(field);
     let (datatype, bitpix) = stored.code_and_bits();
     put(0, &348_i32.to_le_bytes());
     put(40, &3_i16.to_le_bytes());
     for axis in 0..7 {
-        let size = volume.shape.get(axis).copied().unwrap_or(1);
+        let size = shape.get(axis).copied().unwrap_or(1);
         let extent = i16::try_from(size).map_err(|_| TooLong { size })?;
         put(42 + 2 * axis, &extent.to_le_bytes());
     }
@@ -129,13 +168,9 @@ fn header(volume: &Volume, stored: StoredType, scaling: Scaling) -> Result<Vec<u
     put(72, &bitpix.to_le_bytes());
     let reals =
         |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|v| v.to_le_bytes()).collect() };
-    let spacing = volume.frame.spacing().map(|s| s as f32);
-    let pose = quaternion(&volume.frame);
-    let qfac = if volume.frame.is_left_handed() {
-        -1.0
-    } else {
-        1.0
-    };
+    let spacing = frame.spacing().map(|s| s as f32);
+    let pose = quaternion(frame);
+    let qfac = if frame.is_left_handed() { -1.0 } else { 1.0 };
     put(
         76,
         &reals(&[qfac, spacing[0], spacing[1], spacing[2], 1.0, 1.0, 1.0, 1.0]),
@@ -146,7 +181,7 @@ fn header(volume: &Volume, stored: StoredType, scaling: Scaling) -> Result<Vec<u
     );
     put(123, &[2]);
     put(148, b"ventriform");
-    let ras = volume.frame.to_ras();
+    let ras = frame.to_ras();
     if let Some(bcd) = pose {
         put(252, &XFORM_CODE.to_le_bytes());
         put(256, &reals(&bcd));
@@ -185,8 +220,16 @@ fn quaternion(frame: &VoxelToPatient) -> Option<[f32; 3]> {
 
 fn pack(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::new(6));
+    put(&mut encoder, bytes);
+    finish(encoder)
+}
+
+fn put(encoder: &mut GzEncoder<Vec<u8>>, bytes: &[u8]) {
     encoder
         .write_all(bytes)
         .expect("writing to memory does not fail");
+}
+
+fn finish(encoder: GzEncoder<Vec<u8>>) -> Vec<u8> {
     encoder.finish().expect("writing to memory does not fail")
 }
