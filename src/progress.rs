@@ -202,6 +202,16 @@ impl<'a> Monitor<'a> {
         }
     }
 
+    /// A monitor that tells nobody and obeys the same token: for work that is no stage of
+    /// the whole's.
+    #[must_use]
+    pub fn untold(&self) -> Monitor<'static> {
+        Monitor {
+            cancel: self.cancel.clone(),
+            ..Monitor::silent()
+        }
+    }
+
     /// The monitor for piece `index` of `count` alike: its stages are that part of the whole's.
     #[must_use]
     pub fn piece(&self, index: usize, count: usize) -> Self {

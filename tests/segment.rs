@@ -6,15 +6,20 @@
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use ventriform::export::{self, Format, Metadata};
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::mesh::shapes;
-use ventriform::progress::Monitor;
-use ventriform::volume::Volume;
+use ventriform::parameters::FitParameters;
+use ventriform::pipeline::OutcomeError;
+use ventriform::pipeline::segment::{Order, segment};
+use ventriform::progress::{CancelToken, Gauge, Monitor, Observer, Plan, Stage};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
+use ventriform::volume::{ReadLimits, Volume, VolumeFile};
 
 /// A folder with `scan.nii.gz`, its `truth.nii.gz`, and masks that do not suit it.
 fn folder() -> TempDir {
@@ -194,4 +199,86 @@ fn templates_are_imported_into_a_data_folder() {
     assert_eq!(first, again);
     let ball = refusal(here, "templates import sphere.json --data-dir data");
     assert!(ball.contains("no ventricle"), "{ball}");
+}
+
+/// Notes the stages and how the whole grows, and raises the token at one of them.
+struct Watcher {
+    gauge: Gauge,
+    stages: Mutex<Vec<Stage>>,
+    whole: Mutex<f64>,
+    stop_at: Option<Stage>,
+    token: CancelToken,
+    raised: Mutex<Option<Instant>>,
+}
+
+impl Watcher {
+    fn new(stop_at: Option<Stage>) -> Self {
+        Self {
+            gauge: Gauge::new(Plan::SEGMENTATION),
+            stages: Mutex::default(),
+            whole: Mutex::new(0.0),
+            stop_at,
+            token: CancelToken::new(),
+            raised: Mutex::default(),
+        }
+    }
+
+    /// Segments the scan to the last file; whether it ended because it was told to.
+    fn segment(&self, scan: &Path) -> bool {
+        let monitor = Monitor::new(self, self.token.clone());
+        let parameters = FitParameters::default();
+        let order = Order {
+            volume: &[VolumeFile::at(scan)],
+            expert: None,
+            models: Vec::new(),
+            named: false,
+            parameters: &parameters,
+        };
+        match segment(&order, &ReadLimits::default(), &monitor) {
+            Ok(made) => match made.files(&Format::ALL, None, &monitor) {
+                Ok(_) => false,
+                Err(error) => matches!(error, OutcomeError::Cancelled(_)),
+            },
+            Err(error) => error.is_cancelled(),
+        }
+    }
+}
+
+impl Observer for Watcher {
+    fn progress(&self, stage: Stage, fraction: f64) {
+        let mut stages = self.stages.lock().unwrap();
+        if stages.last() != Some(&stage) {
+            stages.push(stage);
+        }
+        let now = self.gauge.advance(stage, fraction);
+        let mut whole = self.whole.lock().unwrap();
+        assert!(now >= *whole);
+        *whole = now;
+        if self.stop_at == Some(stage) {
+            self.token.cancel();
+            self.raised.lock().unwrap().get_or_insert_with(Instant::now);
+        }
+    }
+}
+
+#[test]
+fn every_stage_tells_where_it_is_and_ends_when_it_is_told_to() {
+    let folder = folder();
+    let scan = folder.path().join("scan.nii.gz");
+    let watcher = Watcher::new(None);
+    assert!(!watcher.segment(&scan));
+    let planned: Vec<Stage> = Plan::SEGMENTATION
+        .0
+        .iter()
+        .map(|(stage, _)| *stage)
+        .collect();
+    assert_eq!(*watcher.stages.lock().unwrap(), planned);
+    assert!((*watcher.whole.lock().unwrap() - 1.0).abs() < 1e-9);
+    for stage in planned {
+        let watcher = Watcher::new(Some(stage));
+        assert!(watcher.segment(&scan), "{stage:?}");
+        let raised = watcher.raised.lock().unwrap().unwrap();
+        // Generous: the machine may be busy. Alone, no stage takes a tenth of it.
+        assert!(raised.elapsed() < Duration::from_secs(1), "{stage:?}");
+    }
 }

@@ -65,7 +65,11 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
         .fit
         .parameters()
         .map_err(|e| anyhow!("{e}. {}", e.fix))?;
-    let named: Vec<&PathBuf> = args.model.iter().filter(|m| !m.ends_with(AUTO)).collect();
+    let named: Vec<&PathBuf> = args
+        .model
+        .iter()
+        .filter(|m| m.as_os_str() != AUTO)
+        .collect();
     if !named.is_empty() && named.len() < args.model.len() {
         bail!("--model {AUTO} takes the built-in model; give {AUTO} or files, not both");
     }

@@ -24,18 +24,14 @@ pub fn template(monitor: &Monitor<'_>) -> Result<Template, Cancelled> {
     if let Some(template) = TEMPLATE.get() {
         return Ok(template.clone());
     }
-    monitor.check()?;
-    let made = make();
-    monitor.check()?;
+    let made = make(&monitor.untold())?;
     Ok(TEMPLATE.get_or_init(|| made).clone())
 }
 
 /// Points of the model: within the paper's best range.
 const POINTS: &str = "150";
 
-fn make() -> Template {
-    // Nothing here depends on the caller, so a failure would be a defect that the test meets.
-    const SOUND: &str = "the built-in model is the same on every machine and passes its test";
+fn make(monitor: &Monitor<'_>) -> Result<Template, Cancelled> {
     let parameters = PhantomParameters {
         shape: [64; 3],
         right_ventricle: 0.0,
@@ -46,19 +42,43 @@ fn make() -> Template {
         pose_spread_mm: 0.0,
         ..PhantomParameters::default()
     };
-    let silent = Monitor::silent();
-    let scan = phantom(&parameters, &silent).expect(SOUND).volume;
-    let bytes = nifti::write(&scan, nifti::StoredType::Float32, false).expect(SOUND);
-    let file = VolumeFile::in_memory("built-in.nii", bytes);
-    let parameters = ModelParameters::from_pairs([("points", POINTS)]).expect(SOUND);
+    let scan = sound(phantom(&parameters, monitor), monitor)?.volume;
+    let bytes = nifti::write(&scan, nifti::StoredType::Float32, false);
+    let file = VolumeFile::in_memory("built-in.nii", sound(bytes, monitor)?);
+    let parameters = sound(ModelParameters::from_pairs([("points", POINTS)]), monitor)?;
     let limits = ReadLimits::default();
-    let model = super::generate(&[file], &parameters, &limits, &silent).expect(SOUND);
-    Template::new(model.mesh, Organ::LeftVentricle, &silent).expect(SOUND)
+    let model = super::generate(&[file], &parameters, &limits, monitor);
+    let mesh = sound(model, monitor)?.mesh;
+    sound(Template::new(mesh, Organ::LeftVentricle, monitor), monitor)
+}
+
+/// Nothing here depends on the caller but for the token, so any other failure would be a
+/// defect, which the test below meets.
+fn sound<T, E: std::fmt::Debug>(
+    result: Result<T, E>,
+    monitor: &Monitor<'_>,
+) -> Result<T, Cancelled> {
+    match result {
+        Ok(value) => Ok(value),
+        Err(error) => {
+            monitor.check()?;
+            unreachable!("the built-in model is the same on every machine: {error:?}")
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::progress::{CancelToken, Silent};
+
+    #[test]
+    fn making_it_ends_when_it_is_told_to() {
+        let cancel = CancelToken::new();
+        cancel.cancel();
+        let monitor = Monitor::new(&Silent, cancel);
+        assert!(make(&monitor.untold()).is_err());
+    }
 
     #[test]
     fn the_built_in_model_is_a_plausible_ventricle() {
