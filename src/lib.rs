@@ -28,6 +28,8 @@ pub mod retile;
 
 pub mod optimise;
 
+pub mod decimate;
+
 pub mod deform;
 
 pub mod polar;

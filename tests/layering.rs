@@ -17,6 +17,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "optimise",
         &["geometry", "mesh", "progress", "surface", "retile"],
     ),
+    ("decimate", &["geometry", "mesh", "progress"]),
     (
         "deform",
         &[
@@ -123,6 +124,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "surface",
             "retile",
             "optimise",
+            "decimate",
         ],
     ),
 ];

@@ -329,6 +329,18 @@ pub fn optimise(
     })
 }
 
+/// The fitness of any closed mesh against `reference`, with the weights w1..w4.
+///
+/// # Errors
+/// The first [`Defect`] of a mesh that is no closed manifold.
+pub fn assess(
+    mesh: &TriMesh,
+    reference: &Reference,
+    weights: [f64; 4],
+) -> Result<FitnessSummary, Defect> {
+    Ok(configurations(mesh, reference)?.summary(weights))
+}
+
 /// Shares of the guard that are tried, in this order, where neither fit nor flips could better
 /// the mesh: on rugged surfaces every gain costs some shape.
 const EASED_GUARDS: [f64; 4] = [0.75, 0.5, 0.25, 0.0];
