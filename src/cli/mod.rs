@@ -11,6 +11,7 @@ mod phantom;
 mod segment;
 mod serve;
 mod statistics;
+mod templates;
 
 pub use bar::Bar;
 pub use parameter_args::{FitArgs, ModelArgs};
@@ -38,8 +39,8 @@ enum Command {
     Generate(Box<generate::GenerateArgs>),
     Segment(Box<segment::SegmentArgs>),
     Measure(measure::MeasureArgs),
-    Evaluate(evaluate::EvaluateArgs),
-    Templates(evaluate::TemplatesArgs),
+    Evaluate(Box<evaluate::EvaluateArgs>),
+    Templates(templates::TemplatesArgs),
     Statistics(statistics::StatisticsArgs),
     Serve(Box<serve::ServeArgs>),
     Phantom(phantom::PhantomArgs),
@@ -59,7 +60,7 @@ pub fn main() -> ExitCode {
         Command::Segment(args) => segment::run(&args),
         Command::Measure(args) => measure::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
-        Command::Templates(args) => evaluate::run_templates(&args),
+        Command::Templates(args) => templates::run(&args),
         Command::Statistics(args) => statistics::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::run(&args),

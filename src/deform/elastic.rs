@@ -11,11 +11,17 @@
 //!   sheet may undulate at hardly any local cost, the less the finer the mesh is; this term
 //!   charges undulations by their slope, the same for every mesh;
 //! - thickness: k_w / 2 · Σ a_p (|x_p| - l_p)² over pairs of nodes across the wall, a_p being
-//!   the share of the model's area that the pair stands for.
+//!   the share of the model's area that the pair stands for;
+//! - support (off): k_p / 2N · Σ (|x_p| - l_p)² over *all* pairs of nodes nearer to each other
+//!   than a radius at rest. A node's sensors have the weight 1/N, so k_p is the stiffness of
+//!   one spring against what pulls one node. This is how stable mass-spring models were
+//!   stiffened, and it is here to show what it does: the pairs grow with N², the energy with
+//!   N, and the finer the model the less it follows the image. Scaled by 1/N it does not.
 //!
-//! Energies are mm²; k_s, k_t, k_b are mm², k_w is a number. Because of the division by D
-//! and the shares of area, none of them depends on the number of nodes. All terms are blind
-//! to translation and rotation, and their forces balance: no net force, no net torque.
+//! Energies are mm²; k_s, k_t, k_b are mm², k_w and k_p are numbers. Because of the division
+//! by D and the shares of area, none of the first four depends on the number of nodes. All
+//! terms are blind to translation and rotation, and their forces balance: no net force, no
+//! net torque.
 //!
 //! Every term is written as a spring towards a target vector (projective dynamics): for
 //! fixed rotations and unit vectors the energy is quadratic with a constant matrix, and
@@ -38,7 +44,27 @@ pub struct Stiffness {
     pub body: f64,
     /// k_w. Default 0.1.
     pub thickness: f64,
+    /// k_p. Default 0: no support springs.
+    pub support: f64,
+    /// Length up to which two nodes are joined by a support spring, mm. Default 46, the 14
+    /// voxels of the experiment that it is for.
+    pub support_radius: f64,
+    /// How k_p goes with the number of nodes. Default [`SupportScaling::Fixed`].
+    pub support_scaling: SupportScaling,
 }
+
+/// How the stiffness of a support spring goes with the number of nodes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SupportScaling {
+    /// Every spring has k_p, however many there are.
+    Fixed,
+    /// k_p · 150/N: as stiff as [`SupportScaling::Fixed`] at 150 nodes, and no stiffer with
+    /// more.
+    PerNode,
+}
+
+/// Nodes at which both scalings agree.
+const SUPPORT_NODES: f64 = 150.0;
 
 impl Default for Stiffness {
     fn default() -> Self {
@@ -47,6 +73,9 @@ impl Default for Stiffness {
             torsion: 15.0,
             body: 12.0,
             thickness: 0.1,
+            support: 0.0,
+            support_radius: 46.0,
+            support_scaling: SupportScaling::Fixed,
         }
     }
 }
@@ -59,6 +88,8 @@ impl Stiffness {
             torsion: self.torsion * factor,
             body: self.body * factor,
             thickness: self.thickness * factor,
+            support: self.support * factor,
+            ..self
         }
     }
 }
@@ -72,14 +103,21 @@ pub struct Strut {
     pub share: f64,
 }
 
-/// The elastic body: edges, struts and their rest state.
+/// A spring that is no edge: a strut or a support.
+#[derive(Debug, Clone, Copy)]
+struct Spring {
+    nodes: [u32; 2],
+    weight: f64,
+    length: f64,
+}
+
+/// The elastic body: edges, struts, supports and their rest state.
 #[derive(Debug, Clone)]
 pub struct Elastic {
     nodes: usize,
     edges: Vec<[u32; 2]>,
-    struts: Vec<Strut>,
+    springs: Vec<Spring>,
     directions: Vec<Vec3>,
-    lengths: Vec<f64>,
     stiffness: Stiffness,
     unit: f64,
 }
@@ -90,9 +128,8 @@ impl Elastic {
         let mut body = Self {
             nodes: mesh.vertices.len(),
             edges: edges(mesh),
-            struts: struts.to_vec(),
+            springs: springs(mesh, struts, &stiffness),
             directions: Vec::new(),
-            lengths: Vec::new(),
             stiffness,
             unit: 1.0,
         };
@@ -104,7 +141,9 @@ impl Elastic {
     pub fn set_rest(&mut self, positions: &[Vec3]) {
         let along = |[a, b]: [u32; 2]| positions[b as usize] - positions[a as usize];
         self.directions = self.edges.iter().map(|e| along(*e)).collect();
-        self.lengths = self.struts.iter().map(|s| along(s.nodes).norm()).collect();
+        for spring in &mut self.springs {
+            spring.length = along(spring.nodes).norm();
+        }
         self.unit = 1.0
             / self
                 .directions
@@ -116,8 +155,8 @@ impl Elastic {
 
     /// Every pair of nodes that a force acts between.
     pub fn pairs(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
-        let struts = self.struts.iter().map(|s| s.nodes);
-        self.edges.iter().copied().chain(struts)
+        let springs = self.springs.iter().map(|s| s.nodes);
+        self.edges.iter().copied().chain(springs)
     }
 
     /// The constant matrix of the quadratic form.
@@ -126,9 +165,8 @@ impl Elastic {
         for [a, b] in &self.edges {
             matrix.add_spring(*a, *b, (k.spring + k.torsion + k.body) * self.unit);
         }
-        for strut in &self.struts {
-            let [a, b] = strut.nodes;
-            matrix.add_spring(a, b, k.thickness * strut.share);
+        for Spring { nodes, weight, .. } in &self.springs {
+            matrix.add_spring(nodes[0], nodes[1], *weight);
         }
     }
 
@@ -146,9 +184,9 @@ impl Elastic {
             rhs[i] -= target * self.unit;
             rhs[j] += target * self.unit;
         }
-        for (strut, length) in self.struts.iter().zip(&self.lengths) {
-            let [a, b] = strut.nodes;
-            let pull = direction(positions, [a, b]) * (k.thickness * strut.share * length);
+        for spring in &self.springs {
+            let [a, b] = spring.nodes;
+            let pull = direction(positions, [a, b]) * (spring.weight * spring.length);
             rhs[a as usize] -= pull;
             rhs[b as usize] += pull;
         }
@@ -169,9 +207,9 @@ impl Elastic {
                     + 0.5 * k.body * (now - body * d).norm_squared()
                     + 0.5 * k.spring * (now.norm() - d.norm()).powi(2));
         }
-        for (strut, length) in self.struts.iter().zip(&self.lengths) {
-            let [a, b] = strut.nodes.map(|v| positions[v as usize]);
-            energy += 0.5 * k.thickness * strut.share * ((b - a).norm() - length).powi(2);
+        for spring in &self.springs {
+            let [a, b] = spring.nodes.map(|v| positions[v as usize]);
+            energy += 0.5 * spring.weight * ((b - a).norm() - spring.length).powi(2);
         }
         energy
     }
@@ -203,8 +241,8 @@ impl Elastic {
         for edge in &self.edges {
             between(*edge, (k.spring + k.torsion + k.body) * self.unit);
         }
-        for strut in &self.struts {
-            between(strut.nodes, k.thickness * strut.share);
+        for spring in &self.springs {
+            between(spring.nodes, spring.weight);
         }
         forces
     }
@@ -228,6 +266,34 @@ impl Elastic {
         }
         rotation_of(&moment)
     }
+}
+
+/// The struts, and the supports if there are to be any; lengths are not known yet.
+fn springs(mesh: &TriMesh, struts: &[Strut], k: &Stiffness) -> Vec<Spring> {
+    let strut = |s: &Strut| Spring {
+        nodes: s.nodes,
+        weight: k.thickness * s.share,
+        length: 0.0,
+    };
+    let mut springs: Vec<Spring> = struts.iter().map(strut).collect();
+    if k.support == 0.0 {
+        return springs;
+    }
+    let nodes = mesh.vertices.len();
+    let share = k.support / nodes as f64;
+    let weight = match k.support_scaling {
+        SupportScaling::Fixed => share,
+        SupportScaling::PerNode => share * SUPPORT_NODES / nodes as f64,
+    };
+    for a in 0..nodes {
+        let near = |b: &usize| (mesh.vertices[*b] - mesh.vertices[a]).norm() <= k.support_radius;
+        springs.extend((a + 1..nodes).filter(near).map(|b| Spring {
+            nodes: [a as u32, b as u32],
+            weight,
+            length: 0.0,
+        }));
+    }
+    springs
 }
 
 /// The rotation nearest to `m` (polar decomposition by SVD; a mirror is turned back).
@@ -385,6 +451,33 @@ mod tests {
                 assert!((slope + forces[node][axis]).abs() < 1e-6);
             }
         }
+    }
+
+    #[test]
+    fn fixed_supports_stiffen_a_finer_model_and_scaled_ones_do_not() {
+        let energy = |subdivisions, support_scaling| {
+            let mesh = shapes::icosphere(30.0, subdivisions);
+            let stiffness = Stiffness {
+                spring: 0.0,
+                torsion: 0.0,
+                body: 0.0,
+                support: 1.0,
+                support_scaling,
+                ..Stiffness::default()
+            };
+            let body = Elastic::new(&mesh, &[], stiffness);
+            let stretched: Vec<Vec3> = mesh
+                .vertices
+                .iter()
+                .map(|p| Vec3::new(p.x, p.y, 1.1 * p.z))
+                .collect();
+            assert!(body.energy(&mesh.vertices) < 1e-20);
+            body.energy(&stretched)
+        };
+        // 162 and 642 nodes: four times as many.
+        let growth = |scaling| energy(3, scaling) / energy(2, scaling);
+        assert!((3.7..4.3).contains(&growth(SupportScaling::Fixed)));
+        assert!((0.93..1.07).contains(&growth(SupportScaling::PerNode)));
     }
 
     #[test]

@@ -107,6 +107,8 @@ impl DeformParameters {
             ("stiffness.torsion", k.torsion, 0.0, 1e6),
             ("stiffness.body", k.body, 0.0, 1e6),
             ("stiffness.thickness", k.thickness, 0.0, 1e6),
+            ("stiffness.support", k.support, 0.0, 1e6),
+            ("stiffness.support_radius", k.support_radius, 0.0, 1e3),
             ("reach", self.reach, 2.0, 30.0),
             ("blur", self.blur, 0.0, 10.0),
             ("margin", self.margin, -5.0, 5.0),
@@ -230,6 +232,7 @@ pub fn fit(
     monitor: &Monitor,
 ) -> Result<Fit, DeformError> {
     parameters.validate()?;
+    supports_fit(template, &parameters.stiffness)?;
     monitor.report(Stage::Localise, 0.0)?;
     let start = Start::find(volume, template, parameters, monitor)?;
     monitor.report(Stage::Align, 0.0)?;
@@ -246,6 +249,21 @@ pub fn fit(
     let attempt = Attempt::best(&aligned, template, &start, parameters, monitor)?;
     monitor.report(Stage::Deform, 1.0)?;
     Ok(attempt.into_fit(volume, template, start, &aligned))
+}
+
+/// Most nodes of a model with support springs: their number grows with the square.
+const MAX_SUPPORTED_NODES: usize = 1000;
+
+fn supports_fit(template: &Template, stiffness: &Stiffness) -> Result<(), DeformError> {
+    if stiffness.support > 0.0 && template.mesh.vertices.len() > MAX_SUPPORTED_NODES {
+        return Err(DeformError::Parameter {
+            field: "stiffness.support (of a model of more than 1000 nodes)",
+            value: stiffness.support,
+            least: 0.0,
+            most: 0.0,
+        });
+    }
+    Ok(())
 }
 
 /// The template put in its place, and the image to fit it to.

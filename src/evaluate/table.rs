@@ -1,368 +1,337 @@
-//! The cohort's results as tables and plots: the paper's Figure 3 and Table 1.
+//! The results as CSV and JSON.
 //!
-//! A [`Row`] is one model fitted to one patient and measured against both gold standards. A
-//! [`ModelRow`] is one model's mean fitness after re-tiling and after the flips.
+//! Figures are rounded to six places before anything else is done with them: that is below
+//! what a fit can resolve, and the same whether a row was just made or read from an earlier
+//! run.
 
 use std::fmt::Write;
 
 use serde_json::{Value, json};
 
-/// One model fitted to one patient.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Row {
-    /// The model's template.
-    pub template: String,
-    /// The model's number of points.
-    pub points: usize,
+use super::findings::Finding;
+use super::rows::{self, Agreed, Cell, Gold, Kind, ModelRow, Row};
+
+/// A cohort's evaluation, ready to be written out.
+#[derive(Debug, Clone, Default)]
+pub struct Evaluation {
+    /// What the run was asked for, by name.
+    pub settings: Vec<(String, String)>,
+    /// The templates and what each model was made from.
+    pub templates: Vec<(String, String)>,
+    /// What was missing or could not be read: the case, and what is the matter.
+    pub problems: Vec<(String, String)>,
+    /// The models.
+    pub models: Vec<ModelRow>,
+    /// The fits.
+    pub rows: Vec<Row>,
+    /// What they say about the paper's findings.
+    pub findings: Vec<Finding>,
+    /// Slices of one fit of each patient.
+    pub pictures: Vec<Picture>,
+}
+
+/// A picture for the page.
+#[derive(Debug, Clone)]
+pub struct Picture {
     /// The patient.
     pub case: String,
-    /// What the fit says and how it agrees, by name; `None` where it has no number.
-    pub figures: Vec<(&'static str, Option<f64>)>,
-    /// Why the fit ended, or why there is none.
-    pub reason: String,
+    /// What it shows.
+    pub caption: String,
+    /// PNG.
+    pub png: Vec<u8>,
 }
 
-impl Row {
-    /// The figure of a name.
-    pub fn get(&self, name: &str) -> Option<f64> {
-        self.figures.iter().find(|f| f.0 == name).and_then(|f| f.1)
+/// Six places, as every figure is kept.
+pub fn rounded(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
+}
+
+const AGREED: [&str; 5] = [
+    "jaccard",
+    "contour_distance_voxels",
+    "contour_distance_mm",
+    "dice",
+    "hausdorff95_mm",
+];
+
+fn agreed_figures(agreed: Option<&Agreed>) -> [Option<f64>; 5] {
+    let of = |pick: fn(&Agreed) -> Option<f64>| agreed.and_then(pick);
+    [
+        of(|a| Some(a.jaccard)),
+        of(|a| a.contour_voxels),
+        of(|a| a.contour_mm),
+        of(|a| Some(a.dice)),
+        of(|a| a.hausdorff95_mm),
+    ]
+}
+
+/// Text as one field of CSV (RFC 4180).
+fn field(text: &str) -> String {
+    if text.contains(['"', ',', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
     }
 }
 
-/// One model's fitness.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ModelRow {
-    /// Its template.
-    pub template: String,
-    /// Its number of points.
-    pub points: usize,
-    /// Mean fitness after re-tiling, in the paper's raw form and ours.
-    pub retiled: [f64; 2],
-    /// Mean fitness after fit and flips, in both forms.
-    pub optimised: [f64; 2],
+fn number(value: Option<f64>) -> String {
+    value.map_or_else(String::new, |v| format!("{v:.4}"))
 }
 
-/// Mean of a figure over rows with `points` (all templates if `None`), lost cases as 0 for
-/// agreement: a fit that is missing is not left out of a mean in silence.
-pub fn mean(rows: &[Row], template: Option<&str>, points: usize, name: &str) -> Option<f64> {
-    let values: Vec<f64> = chosen(rows, template, points)
-        .filter_map(|r| match r.get(name) {
-            None if name.starts_with("jaccard") => Some(0.0),
-            value => value,
-        })
+/// Every fit as a line.
+pub fn fits_csv(rows: &[Row]) -> String {
+    let mut names: Vec<&str> = rows
+        .iter()
+        .flat_map(|r| r.figures.keys().map(String::as_str))
         .collect();
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-}
-
-fn chosen<'a>(
-    rows: &'a [Row],
-    template: Option<&'a str>,
-    points: usize,
-) -> impl Iterator<Item = &'a Row> {
-    rows.iter()
-        .filter(move |r| r.points == points && template.is_none_or(|t| r.template == t))
-}
-
-/// The distinct values of `key` in order of appearance.
-fn distinct<T: PartialEq + Clone>(rows: &[Row], key: impl Fn(&Row) -> T) -> Vec<T> {
-    let mut found: Vec<T> = Vec::new();
-    for row in rows {
-        let value = key(row);
-        if !found.contains(&value) {
-            found.push(value);
+    names.sort_unstable();
+    names.dedup();
+    let mut out = String::from("case,template,model,points,state,reason");
+    for gold in Gold::ALL {
+        for name in AGREED {
+            let _ = write!(out, ",{name}_{}", gold.as_str());
         }
     }
-    found
-}
-
-/// All rows as CSV.
-pub fn csv(rows: &[Row]) -> String {
-    let names: Vec<&str> = rows
-        .first()
-        .map_or_else(Vec::new, |r| r.figures.iter().map(|f| f.0).collect());
-    let mut out = format!("template,points,case,reason,{}\n", names.join(","));
+    names.iter().for_each(|n| {
+        let _ = write!(out, ",{n}");
+    });
+    out.push('\n');
     for row in rows {
-        // Reasons are sentences of ours; a comma in one would shift the columns.
-        let reason = row.reason.replace([',', '\n', '"'], ";");
-        let _ = write!(out, "{},{},{},{reason}", row.template, row.points, row.case);
-        for name in &names {
-            out.push(',');
-            if let Some(value) = row.get(name) {
-                let _ = write!(out, "{value:.4}");
-            }
+        let _ = write!(
+            out,
+            "{},{},{},{},{},{}",
+            field(&row.case),
+            field(&row.template),
+            row.kind.variant.as_str(),
+            row.kind.points,
+            row.outcome.as_str(),
+            field(row.outcome.reason())
+        );
+        let agreed = row.agreed.iter().flat_map(|a| agreed_figures(a.as_ref()));
+        let own = names.iter().map(|n| row.figures.get(*n).copied());
+        for value in agreed.chain(own) {
+            let _ = write!(out, ",{}", number(value));
         }
         out.push('\n');
     }
     out
 }
 
-/// Figure 3 as CSV.
+/// Figure 3: the mean fitness of every model.
 pub fn figure3_csv(models: &[ModelRow]) -> String {
     let mut out = String::from(
-        "template,points,raw_retiled,raw_optimised,normalised_retiled,normalised_optimised\n",
+        "template,model,points,fitness_raw,fitness_normalised,fitness_robust,\
+         radius_ratio_mean,radius_ratio_least\n",
     );
     for m in models {
         let _ = writeln!(
             out,
-            "{},{},{:.4},{:.4},{:.4},{:.4}",
-            m.template, m.points, m.retiled[0], m.optimised[0], m.retiled[1], m.optimised[1]
+            "{},{},{},{:.4},{:.4},{:.4},{:.4},{:.4}",
+            field(&m.template),
+            m.kind.variant.as_str(),
+            m.kind.points,
+            m.raw,
+            m.normalised,
+            m.robust,
+            m.shape,
+            m.worst_shape
         );
+    }
+    out
+}
+
+/// Who a mean of Table 1 is over.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Line {
+    /// The template, or `all`.
+    pub template: String,
+    /// The patient, or `mean`.
+    pub case: String,
+}
+
+/// Table 1: for every template and for all of them, each patient and the mean over all.
+pub fn table1(rows: &[Row], gold: Gold) -> Vec<(Line, Vec<(Kind, Option<Cell>)>)> {
+    let kinds = rows::kinds(rows);
+    let cases = rows::distinct(rows, |r| r.case.clone());
+    let mut templates = vec![None];
+    templates.extend(
+        rows::distinct(rows, |r| r.template.clone())
+            .into_iter()
+            .map(Some),
+    );
+    let mut lines = Vec::new();
+    for template in &templates {
+        for case in cases.iter().map(Some).chain([None]) {
+            let cells = kinds.iter().map(|kind| {
+                let own = rows::of_kind(rows, template.as_deref(), *kind)
+                    .filter(|r| case.is_none_or(|c| r.case == *c));
+                (*kind, rows::mean(own, gold))
+            });
+            let line = Line {
+                template: template.clone().unwrap_or_else(|| "all".into()),
+                case: case.map_or_else(|| "mean".into(), Clone::clone),
+            };
+            lines.push((line, cells.collect()));
+        }
+    }
+    lines
+}
+
+/// Table 1 against both gold standards as CSV.
+pub fn table1_csv(rows: &[Row]) -> String {
+    let mut out = String::from(
+        "gold,template,case,model,points,jaccard,contour_distance_voxels,least_jaccard,fits\n",
+    );
+    for gold in Gold::ALL {
+        for (line, cells) in table1(rows, gold) {
+            for (kind, cell) in cells {
+                let _ = writeln!(
+                    out,
+                    "{},{},{},{},{},{},{},{},{}",
+                    gold.as_str(),
+                    field(&line.template),
+                    field(&line.case),
+                    kind.variant.as_str(),
+                    kind.points,
+                    number(cell.map(|c| c.jaccard)),
+                    number(cell.and_then(|c| c.contour)),
+                    number(cell.map(|c| c.least)),
+                    cell.map_or(0, |c| c.count)
+                );
+            }
+        }
     }
     out
 }
 
 /// Everything as JSON.
-pub fn to_json(rows: &[Row], models: &[ModelRow]) -> Value {
-    let rows_json: Vec<Value> = rows.iter().map(row_json).collect();
-    let figure3: Vec<Value> = models
-        .iter()
-        .map(|m| {
-            json!({
-                "template": m.template, "points": m.points,
-                "raw": {"retiled": m.retiled[0], "optimised": m.optimised[0]},
-                "normalised": {"retiled": m.retiled[1], "optimised": m.optimised[1]},
-            })
-        })
-        .collect();
-    let mut means = Vec::new();
-    for points in distinct(rows, |r| r.points) {
-        let templates = distinct(rows, |r| r.template.clone());
-        let all = std::iter::once(None).chain(templates.iter().map(|t| Some(t.as_str())));
-        for template in all {
-            means.push(json!({
-                "template": template.unwrap_or("all"),
-                "points": points,
-                "jaccard": mean(rows, template, points, "jaccard"),
-                "contour_distance_voxels": mean(rows, template, points, "contour_distance_voxels"),
-                "jaccard_truth": mean(rows, template, points, "jaccard_truth"),
-                "least_jaccard": chosen(rows, template, points)
-                    .map(|r| r.get("jaccard").unwrap_or(0.0))
-                    .fold(1.0, f64::min),
-            }));
-        }
-    }
-    json!({"means": means, "figure3": figure3, "fits": rows_json})
-}
-
-/// One row as JSON, as it is kept for resuming.
-pub fn row_json(row: &Row) -> Value {
-    let mut value = json!({
-        "template": row.template,
-        "points": row.points,
-        "case": row.case,
-        "reason": row.reason,
-    });
-    for (name, figure) in &row.figures {
-        value[*name] = json!(figure);
-    }
-    value
-}
-
-/// One self-contained page: plots over N, Table 1, every fit.
-pub fn html(rows: &[Row], models: &[ModelRow]) -> String {
-    let points = distinct(rows, |r| r.points);
-    let templates = distinct(rows, |r| r.template.clone());
-    let series = |name: &'static str| -> Vec<(String, Vec<(f64, f64)>)> {
-        let named = templates.iter().map(|t| (t.clone(), Some(t.as_str())));
-        named
-            .chain([("mean".to_owned(), None)])
-            .map(|(label, template)| {
-                let line = points
-                    .iter()
-                    .filter_map(|n| Some((*n as f64, mean(rows, template, *n, name)?)))
-                    .collect();
-                (label, line)
-            })
-            .collect()
-    };
-    let fitness = |pick: fn(&ModelRow) -> f64| -> Vec<(f64, f64)> {
-        points
+pub fn to_json(evaluation: &Evaluation) -> Value {
+    let pairs = |pairs: &[(String, String)], names: [&str; 2]| -> Vec<Value> {
+        pairs
             .iter()
-            .filter_map(|n| {
-                let own: Vec<f64> = models.iter().filter(|m| m.points == *n).map(pick).collect();
-                let count = own.len() as f64;
-                (count > 0.0).then(|| (*n as f64, own.iter().sum::<f64>() / count))
-            })
+            .map(|(a, b)| json!({names[0]: a, names[1]: b}))
             .collect()
     };
-    let figure3 = vec![
-        ("after re-tiling".to_owned(), fitness(|m| m.retiled[0])),
-        (
-            "after fit and flips".to_owned(),
-            fitness(|m| m.optimised[0]),
-        ),
-    ];
-    let mut out = String::from(
-        "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>Cohort evaluation\
-         </title>\n<style>body{font:15px sans-serif;max-width:70em;margin:2em auto;padding:0 1em}\
-         table{border-collapse:collapse}td,th{padding:.2em .7em;border-bottom:1px solid #ddd;\
-         text-align:right}td:first-child,th:first-child{text-align:left}svg{margin:1em}</style>\n\
-         <h1>Cohort evaluation</h1>\n",
-    );
-    out.push_str("<h2>Figure 3: mean fitness of the models (raw form)</h2>\n");
-    out.push_str(&plot("mean fitness", &figure3));
-    out.push_str("<h2>Agreement with the expert</h2>\n");
-    out.push_str(&plot("Jaccard E_J", &series("jaccard")));
-    out.push_str(&plot(
-        "contour distance E_CD, voxels",
-        &series("contour_distance_voxels"),
-    ));
-    out.push_str("<h2>Agreement with the anatomical truth</h2>\n");
-    out.push_str(&plot("Jaccard E_J", &series("jaccard_truth")));
-    for template in &templates {
-        out.push_str(&table1(rows, template, &points));
-    }
-    out.push_str("</html>\n");
-    out
+    let figure3: Vec<Value> = evaluation.models.iter().map(model_json).collect();
+    let findings: Vec<Value> = evaluation
+        .findings
+        .iter()
+        .map(|f| json!({"claim": f.claim, "verdict": f.verdict.as_str(), "figures": f.figures}))
+        .collect();
+    let settings: serde_json::Map<String, Value> = evaluation
+        .settings
+        .iter()
+        .map(|(name, value)| (name.clone(), json!(value)))
+        .collect();
+    json!({
+        "settings": settings,
+        "templates": pairs(&evaluation.templates, ["case", "source"]),
+        "problems": pairs(&evaluation.problems, ["case", "problem"]),
+        "findings": findings,
+        "figure3": figure3,
+        "means": means_json(&evaluation.rows),
+        "fits": evaluation.rows.iter().map(row_json).collect::<Vec<_>>(),
+    })
 }
 
-/// Table 1 of one template: E_J / E_CD of each patient and N.
-fn table1(rows: &[Row], template: &str, points: &[usize]) -> String {
-    let mut out = format!(
-        "<h2>Table 1, model from {}</h2>\n<table><tr><th>patient</th>",
-        escape(template)
-    );
-    for n in points {
-        let _ = write!(out, "<th>N = {n}</th>");
-    }
-    out.push_str("</tr>\n");
-    for case in distinct(rows, |r| r.case.clone()) {
-        let _ = write!(out, "<tr><td>{}</td>", escape(&case));
-        for n in points {
-            let row = chosen(rows, Some(template), *n).find(|r| r.case == case);
-            let pair =
-                row.and_then(|r| Some((r.get("jaccard")?, r.get("contour_distance_voxels")?)));
-            match pair {
-                Some((jaccard, distance)) => {
-                    let _ = write!(out, "<td>{jaccard:.3} / {distance:.3}</td>");
-                }
-                None => out.push_str("<td>-</td>"),
+fn model_json(m: &ModelRow) -> Value {
+    json!({
+        "template": m.template, "model": m.kind.variant.as_str(), "points": m.kind.points,
+        "fitness": {"raw": rounded(m.raw), "normalised": rounded(m.normalised),
+                    "robust": rounded(m.robust)},
+        "radius_ratio": {"mean": rounded(m.shape), "least": rounded(m.worst_shape)},
+    })
+}
+
+/// The lines of Table 1 that are means over patients.
+fn means_json(rows: &[Row]) -> Vec<Value> {
+    let mut means = Vec::new();
+    for gold in Gold::ALL {
+        for (line, cells) in table1(rows, gold) {
+            if line.case != "mean" {
+                continue;
+            }
+            for (kind, cell) in cells {
+                let Some(cell) = cell else { continue };
+                means.push(json!({
+                    "gold": gold.as_str(),
+                    "template": line.template,
+                    "model": kind.variant.as_str(),
+                    "points": kind.points,
+                    "jaccard": rounded(cell.jaccard),
+                    "contour_distance_voxels": cell.contour.map(rounded),
+                    "least_jaccard": rounded(cell.least),
+                    "fits": cell.count,
+                }));
             }
         }
-        out.push_str("</tr>\n");
     }
-    out.push_str("<tr><th>mean</th>");
-    for n in points {
-        let of = |name| mean(rows, Some(template), *n, name).unwrap_or(f64::NAN);
-        let _ = write!(
-            out,
-            "<th>{:.3} / {:.3}</th>",
-            of("jaccard"),
-            of("contour_distance_voxels")
-        );
-    }
-    out.push_str("</tr></table>\n");
-    out
+    means
 }
 
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;")
-}
-
-/// Lines over N as SVG.
-fn plot(title: &str, series: &[(String, Vec<(f64, f64)>)]) -> String {
-    const COLOURS: [&str; 7] = [
-        "#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#000000",
-    ];
-    let all = || series.iter().flat_map(|s| s.1.iter());
-    let range = |pick: fn(&(f64, f64)) -> f64| {
-        let low = all().map(pick).fold(f64::INFINITY, f64::min);
-        let high = all().map(pick).fold(f64::NEG_INFINITY, f64::max);
-        let margin = 0.05 * (high - low).max(1e-6);
-        (low - margin, high + margin)
+fn row_json(row: &Row) -> Value {
+    let agreed = |gold: Gold| -> Value {
+        let figures = agreed_figures(row.agreed[gold as usize].as_ref());
+        let named = AGREED.iter().zip(figures);
+        let object: serde_json::Map<String, Value> =
+            named.map(|(n, v)| ((*n).to_owned(), json!(v))).collect();
+        Value::Object(object)
     };
-    let ((x0, x1), (y0, y1)) = (range(|p| p.0), range(|p| p.1));
-    let at = |p: &(f64, f64)| {
-        (
-            60.0 + 380.0 * (p.0 - x0) / (x1 - x0),
-            260.0 - 220.0 * (p.1 - y0) / (y1 - y0),
-        )
-    };
-    let mut out = format!(
-        "<svg width=\"600\" height=\"310\" font-size=\"12\"><text x=\"60\" y=\"20\" \
-         font-weight=\"bold\">{}</text><path d=\"M60 40V260H440\" fill=\"none\" \
-         stroke=\"#888\"/>",
-        escape(title)
-    );
-    for step in 0..5 {
-        let y = y0 + (y1 - y0) * f64::from(step) / 4.0;
-        let _ = write!(
-            out,
-            "<text x=\"54\" y=\"{:.1}\" text-anchor=\"end\">{y:.3}</text>",
-            264.0 - 55.0 * f64::from(step)
-        );
-    }
-    for (n, (label, line)) in series.iter().enumerate() {
-        let colour = COLOURS[n % COLOURS.len()];
-        let path: Vec<String> = line
-            .iter()
-            .map(|p| {
-                let (x, y) = at(p);
-                format!("{x:.1},{y:.1}")
-            })
-            .collect();
-        let _ = write!(
-            out,
-            "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>\
-             <text x=\"455\" y=\"{}\" fill=\"{colour}\">{}</text>",
-            path.join(" "),
-            55 + 18 * n,
-            escape(label)
-        );
-        for p in line {
-            let (x, _) = at(p);
-            let _ = write!(
-                out,
-                "<text x=\"{x:.1}\" y=\"278\" text-anchor=\"middle\">{}</text>",
-                p.0
-            );
-        }
-    }
-    out.push_str("</svg>\n");
-    out
+    json!({
+        "case": row.case,
+        "template": row.template,
+        "model": row.kind.variant.as_str(),
+        "points": row.kind.points,
+        "state": row.outcome.as_str(),
+        "reason": row.outcome.reason(),
+        "expert": agreed(Gold::Expert),
+        "truth": agreed(Gold::Truth),
+        "figures": row.figures,
+    })
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::rows::Variant;
+    use super::super::rows::tests::row;
     use super::*;
 
-    fn row(case: &str, points: usize, jaccard: Option<f64>) -> Row {
-        Row {
-            template: "t1".into(),
-            points,
-            case: case.into(),
-            figures: vec![
-                ("jaccard", jaccard),
-                ("contour_distance_voxels", jaccard.map(|j| 1.0 - j)),
-            ],
-            reason: "converged".into(),
-        }
-    }
-
     #[test]
-    fn a_lost_case_counts_as_no_agreement() {
-        let rows = [row("p1", 150, Some(0.8)), row("p2", 150, None)];
-        assert_eq!(mean(&rows, None, 150, "jaccard"), Some(0.4));
-        let distance = mean(&rows, None, 150, "contour_distance_voxels").unwrap();
-        assert!((distance - 0.2).abs() < 1e-12);
-        assert_eq!(mean(&rows, Some("t2"), 150, "jaccard"), None);
-    }
-
-    #[test]
-    fn every_fit_has_a_line_and_a_cell() {
+    fn every_fit_has_a_line_of_as_many_fields() {
         let rows = [
-            row("p1", 67, Some(0.71)),
-            row("p1", 150, Some(0.82)),
-            row("p2", 150, None),
+            row("p1", Variant::Reference, 67, Some(0.71)),
+            row("p1", Variant::Optimised, 150, Some(0.82)),
         ];
-        let text = csv(&rows);
-        assert_eq!(text.lines().count(), 4);
-        assert!(text.lines().all(|l| l.split(',').count() == 6));
-        let page = html(&rows, &[]);
-        assert!(page.contains("0.820 / 0.180") && page.contains("<td>-</td>"));
-        assert!(!page.contains("http://") && !page.contains("https://"));
-        let value = to_json(&rows, &[]);
-        assert_eq!(value["fits"].as_array().unwrap().len(), 3);
-        assert_eq!(value["means"][0]["points"], 67);
+        let text = fits_csv(&rows);
+        let fields: Vec<usize> = text.lines().map(|l| l.split(',').count()).collect();
+        assert_eq!(fields, [17; 3]);
+        // A comma in a reason is quoted.
+        let lost = fits_csv(&[row("p2", Variant::Optimised, 150, None)]);
+        assert!(lost.contains(",lost,\"no heart, none at all\","));
+    }
+
+    #[test]
+    fn table_1_has_each_patient_and_the_mean_for_each_template_and_all() {
+        let mut rows = vec![
+            row("p1", Variant::Optimised, 150, Some(0.82)),
+            row("p2", Variant::Optimised, 150, Some(0.72)),
+        ];
+        for mut other in rows.clone() {
+            other.template = "t2".into();
+            rows.push(other);
+        }
+        let table = table1(&rows, Gold::Expert);
+        let names: Vec<String> = table
+            .iter()
+            .map(|(l, _)| format!("{} {}", l.template, l.case))
+            .collect();
+        let expected = ["all", "t1", "t2"]
+            .iter()
+            .flat_map(|t| ["p1", "p2", "mean"].map(|c| format!("{t} {c}")));
+        assert_eq!(names, expected.collect::<Vec<_>>());
+        let all = table[2].1[0].1.unwrap();
+        assert!((all.jaccard - 0.77).abs() < 1e-12 && all.count == 4);
+        let csv = table1_csv(&rows);
+        assert_eq!(csv.lines().count(), 1 + 2 * 9);
     }
 }

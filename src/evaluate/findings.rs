@@ -1,0 +1,230 @@
+//! What the results say about the paper's findings, each as a claim, a verdict and figures.
+
+use super::rows::{self, Gold, Kind, ModelRow, Row, Variant};
+
+/// What became of a claim.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// The figures agree.
+    Confirmed,
+    /// The figures contradict.
+    Refuted,
+    /// The run did not include what it takes to say.
+    Open,
+}
+
+impl Verdict {
+    /// The word in reports.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Verdict::Confirmed => "confirmed",
+            Verdict::Refuted => "refuted",
+            Verdict::Open => "not decided",
+        }
+    }
+
+    fn of(holds: Option<bool>) -> Self {
+        match holds {
+            Some(true) => Verdict::Confirmed,
+            Some(false) => Verdict::Refuted,
+            None => Verdict::Open,
+        }
+    }
+}
+
+/// One of the paper's findings in the light of these results.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// What the paper says.
+    pub claim: &'static str,
+    /// Whether it holds here.
+    pub verdict: Verdict,
+    /// By which figures.
+    pub figures: String,
+}
+
+/// All findings that the paper states of its evaluation.
+pub fn findings(rows: &[Row], models: &[ModelRow]) -> Vec<Finding> {
+    vec![
+        flips_raise_fitness(models),
+        best_number(rows),
+        more_points_hurt(rows),
+        new_models_beat_the_reference(rows),
+        flips_help_the_fit(rows),
+    ]
+}
+
+fn flips_raise_fitness(models: &[ModelRow]) -> Finding {
+    let mut gains: Vec<f64> = Vec::new();
+    for after in models
+        .iter()
+        .filter(|m| m.kind.variant == Variant::Optimised)
+    {
+        let before = Kind {
+            variant: Variant::Retiled,
+            ..after.kind
+        };
+        let before = models
+            .iter()
+            .find(|m| m.kind == before && m.template == after.template);
+        gains.extend(before.map(|b| 100.0 * (after.raw / b.raw - 1.0)));
+    }
+    let least = gains.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = gains.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    Finding {
+        claim: "Flips (here with the fit before them) raise the mean fitness of every model.",
+        verdict: Verdict::of((!gains.is_empty()).then_some(least > 0.0)),
+        figures: format!(
+            "gain in the raw form {least:.1} to {most:.1} % over {} models",
+            gains.len()
+        ),
+    }
+}
+
+/// Mean E_J against the expert by number of points, for one variant.
+fn curve(rows: &[Row], variant: Variant) -> Vec<(usize, f64)> {
+    rows::kinds(rows)
+        .into_iter()
+        .filter(|k| k.variant == variant)
+        .filter_map(|kind| {
+            let cell = rows::mean(rows::of_kind(rows, None, kind), Gold::Expert)?;
+            Some((kind.points, cell.jaccard))
+        })
+        .collect()
+}
+
+fn best(curve: &[(usize, f64)]) -> Option<(usize, f64)> {
+    curve.iter().copied().reduce(|best, next| {
+        // The smaller number wins where both are as good.
+        if next.1 > best.1 { next } else { best }
+    })
+}
+
+fn best_number(rows: &[Row]) -> Finding {
+    let best = best(&curve(rows, Variant::Optimised));
+    Finding {
+        claim: "The best number of points lies between 110 and 200.",
+        verdict: Verdict::of(best.map(|b| (110..=200).contains(&b.0))),
+        figures: best.map_or_else(String::new, |(n, j)| {
+            format!("best N = {n}, mean E_J {j:.3}")
+        }),
+    }
+}
+
+/// A change of the mean E_J below this is no change: half of what two readers' noise makes.
+const NOTICEABLE: f64 = 0.005;
+
+fn more_points_hurt(rows: &[Row]) -> Finding {
+    let curve = curve(rows, Variant::Optimised);
+    let most = curve.last().copied().filter(|c| c.0 > 200);
+    let best = best(&curve);
+    let holds = most
+        .zip(best)
+        .map(|(most, best)| best.1 - most.1 > NOTICEABLE);
+    Finding {
+        claim: "More than 200 points hurt.",
+        verdict: Verdict::of(holds),
+        figures: most.zip(best).map_or_else(String::new, |(most, best)| {
+            format!(
+                "mean E_J {:.3} at {} points, {:.3} at the best number, {}",
+                most.1, most.0, best.1, best.0
+            )
+        }),
+    }
+}
+
+/// Differences of E_J (new minus old) over the pairs of fits that differ in the kind alone.
+fn differences(rows: &[Row], new: Kind, old: Kind) -> Vec<f64> {
+    rows::of_kind(rows, None, new)
+        .filter_map(|row| {
+            let other =
+                rows::of_kind(rows, Some(&row.template), old).find(|o| o.case == row.case)?;
+            Some(row.jaccard(Gold::Expert)? - other.jaccard(Gold::Expert)?)
+        })
+        .collect()
+}
+
+fn compare(
+    rows: &[Row],
+    claim: &'static str,
+    old: Variant,
+    accept: impl Fn(f64) -> bool,
+) -> Finding {
+    let mut holds = None;
+    let mut figures = Vec::new();
+    for new in rows::kinds(rows) {
+        if new.variant != Variant::Optimised {
+            continue;
+        }
+        let old = Kind {
+            variant: old,
+            ..new
+        };
+        let found = differences(rows, new, old);
+        let Some(mean) = rows::average(&found) else {
+            continue;
+        };
+        let wins = found.iter().filter(|d| **d > 0.0).count();
+        holds = Some(holds.unwrap_or(true) && accept(mean));
+        figures.push(format!(
+            "N = {}: {mean:+.4} in the mean, better in {wins} of {}",
+            new.points,
+            found.len()
+        ));
+    }
+    Finding {
+        claim,
+        verdict: Verdict::of(holds),
+        figures: figures.join("; "),
+    }
+}
+
+fn new_models_beat_the_reference(rows: &[Row]) -> Finding {
+    let claim = "New models segment better than the reference model of as many points (E_J).";
+    compare(rows, claim, Variant::Reference, |mean| mean > 0.0)
+}
+
+fn flips_help_the_fit(rows: &[Row]) -> Finding {
+    let claim = "Models after the flips segment no worse than after re-tiling alone (E_J).";
+    compare(rows, claim, Variant::Retiled, |mean| mean > -NOTICEABLE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::rows::tests::row;
+    use super::*;
+
+    fn verdict(rows: &[Row], claim: &str) -> Verdict {
+        let found = findings(rows, &[]);
+        let of = |f: &&Finding| f.claim.contains(claim);
+        found.iter().find(of).unwrap().verdict
+    }
+
+    #[test]
+    fn the_papers_own_curve_confirms_its_findings() {
+        let curve = [
+            (67, 0.662),
+            (110, 0.751),
+            (150, 0.758),
+            (200, 0.748),
+            (300, 0.649),
+        ];
+        let mut rows: Vec<Row> = curve
+            .map(|(n, j)| row("p1", Variant::Optimised, n, Some(j)))
+            .into();
+        assert_eq!(verdict(&rows, "reference model"), Verdict::Open);
+        rows.push(row("p1", Variant::Reference, 67, Some(0.6)));
+        for claim in ["between 110 and 200", "hurt", "reference model"] {
+            assert_eq!(verdict(&rows, claim), Verdict::Confirmed, "{claim}");
+        }
+        assert_eq!(verdict(&rows, "after re-tiling"), Verdict::Open);
+        assert_eq!(verdict(&rows, "raise the mean fitness"), Verdict::Open);
+    }
+
+    #[test]
+    fn a_flat_curve_refutes_that_more_points_hurt() {
+        let rows = [150, 300].map(|n| row("p1", Variant::Optimised, n, Some(0.8)));
+        assert_eq!(verdict(&rows, "hurt"), Verdict::Refuted);
+        assert_eq!(verdict(&rows, "between 110"), Verdict::Confirmed);
+    }
+}

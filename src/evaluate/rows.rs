@@ -1,0 +1,294 @@
+//! The results of a cohort: one [`Row`] for each model fitted to each patient, one
+//! [`ModelRow`] for each model, and means over them.
+//!
+//! A fit that failed counts as no agreement at all (E_J = 0), lest losing a hard case raise a
+//! mean. What there is nothing to measure against is left out of means: a patient without a
+//! gold standard, or one whose scan could not be read.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// Which kind of model was fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Variant {
+    /// The stand-in for the paper's older model: Marching Cubes thinned out by quadric error.
+    Reference,
+    /// Ours after re-tiling, before fit and flips.
+    Retiled,
+    /// Ours, finished.
+    Optimised,
+}
+
+impl Variant {
+    /// All of them, in the order of tables.
+    pub const ALL: [Variant; 3] = [Variant::Reference, Variant::Retiled, Variant::Optimised];
+
+    /// The name in tables and files.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Variant::Reference => "reference",
+            Variant::Retiled => "retiled",
+            Variant::Optimised => "optimised",
+        }
+    }
+
+    /// What it is, for people.
+    pub fn title(self) -> &'static str {
+        match self {
+            Variant::Reference => "reference model",
+            Variant::Retiled => "after re-tiling",
+            Variant::Optimised => "after fit and flips",
+        }
+    }
+}
+
+/// What the fits are measured against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Gold {
+    /// `lv_expert_img`: what a reader would draw on the image; the paper's gold standard.
+    Expert,
+    /// `lv_truth`: the wall as anatomy has it.
+    Truth,
+}
+
+impl Gold {
+    /// Both, the paper's first.
+    pub const ALL: [Gold; 2] = [Gold::Expert, Gold::Truth];
+
+    /// The file in a case's folder.
+    pub fn file(self) -> &'static str {
+        match self {
+            Gold::Expert => "lv_expert_img.nii.gz",
+            Gold::Truth => "lv_truth.nii.gz",
+        }
+    }
+
+    /// The name in tables.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Gold::Expert => "expert",
+            Gold::Truth => "truth",
+        }
+    }
+}
+
+/// One kind of model: what a mean is taken over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Kind {
+    /// Which kind.
+    pub variant: Variant,
+    /// Number of points.
+    pub points: usize,
+}
+
+/// How the attempt to fit went.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Outcome {
+    /// There is a fit; why its motion ended.
+    Fitted(String),
+    /// There is none, and why.
+    Lost(String),
+    /// The scan could not be read; nothing was tried.
+    Unreadable(String),
+}
+
+impl Outcome {
+    /// The reason alone.
+    pub fn reason(&self) -> &str {
+        match self {
+            Outcome::Fitted(r) | Outcome::Lost(r) | Outcome::Unreadable(r) => r,
+        }
+    }
+
+    /// The state alone.
+    pub fn as_str(&self) -> &'static str {
+        match self {
+            Outcome::Fitted(_) => "fitted",
+            Outcome::Lost(_) => "lost",
+            Outcome::Unreadable(_) => "unreadable",
+        }
+    }
+}
+
+/// Agreement with one gold standard.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Agreed {
+    /// E_J.
+    pub jaccard: f64,
+    /// E_CD in voxels; `None` where the fit's mask is empty.
+    pub contour_voxels: Option<f64>,
+    /// E_CD in mm.
+    pub contour_mm: Option<f64>,
+    /// Dice.
+    pub dice: f64,
+    /// 95 % Hausdorff distance, mm.
+    pub hausdorff95_mm: Option<f64>,
+}
+
+/// One model fitted to one patient.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// The case that the model was made from.
+    pub template: String,
+    /// The kind of model.
+    pub kind: Kind,
+    /// The patient.
+    pub case: String,
+    /// How it went.
+    pub outcome: Outcome,
+    /// Agreement with [`Gold::ALL`]; `None` where there is no such gold standard or no fit.
+    pub agreed: [Option<Agreed>; 2],
+    /// Which gold standards the patient has.
+    pub golds: [bool; 2],
+    /// What the fit says of itself, by name.
+    pub figures: BTreeMap<String, f64>,
+}
+
+impl Row {
+    /// E_J; 0 for a lost case, `None` where there is nothing to compare.
+    pub fn jaccard(&self, gold: Gold) -> Option<f64> {
+        match self.outcome {
+            Outcome::Lost(_) if self.golds[gold as usize] => Some(0.0),
+            _ => self.agreed[gold as usize].map(|a| a.jaccard),
+        }
+    }
+
+    /// E_CD in voxels.
+    pub fn contour(&self, gold: Gold) -> Option<f64> {
+        self.agreed[gold as usize].and_then(|a| a.contour_voxels)
+    }
+}
+
+/// One model's mean fitness against its surface.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelRow {
+    /// Its template.
+    pub template: String,
+    /// The kind of model.
+    pub kind: Kind,
+    /// In the paper's raw form.
+    pub raw: f64,
+    /// In ours.
+    pub normalised: f64,
+    /// For comparison between tools.
+    pub robust: f64,
+    /// Mean radius ratio 2r/R of its triangles.
+    pub shape: f64,
+    /// The least one.
+    pub worst_shape: f64,
+}
+
+/// A cell of a table: E_J and E_CD.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cell {
+    /// Mean E_J.
+    pub jaccard: f64,
+    /// Mean E_CD in voxels over the cases that have one.
+    pub contour: Option<f64>,
+    /// Least E_J.
+    pub least: f64,
+    /// Rows that the mean is over.
+    pub count: usize,
+}
+
+/// The mean over the rows that `choose` takes; `None` if none of them can be measured.
+pub fn mean<'a>(rows: impl IntoIterator<Item = &'a Row>, gold: Gold) -> Option<Cell> {
+    let (mut jaccards, mut contours) = (Vec::new(), Vec::new());
+    for row in rows {
+        jaccards.extend(row.jaccard(gold));
+        contours.extend(row.contour(gold));
+    }
+    let jaccard = average(&jaccards)?;
+    Some(Cell {
+        jaccard,
+        contour: average(&contours),
+        least: jaccards.iter().copied().fold(1.0, f64::min),
+        count: jaccards.len(),
+    })
+}
+
+/// The mean of some numbers.
+pub fn average(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+/// The rows of a kind, of one template or of all.
+pub fn of_kind<'a>(
+    rows: &'a [Row],
+    template: Option<&'a str>,
+    kind: Kind,
+) -> impl Iterator<Item = &'a Row> {
+    rows.iter()
+        .filter(move |r| r.kind == kind && template.is_none_or(|t| r.template == t))
+}
+
+/// The distinct values of `key`, in order of appearance.
+pub fn distinct<T, K: PartialEq>(items: &[T], key: impl Fn(&T) -> K) -> Vec<K> {
+    let mut found: Vec<K> = Vec::new();
+    for value in items.iter().map(key) {
+        if !found.contains(&value) {
+            found.push(value);
+        }
+    }
+    found
+}
+
+/// The kinds that occur, by variant and number of points.
+pub fn kinds(rows: &[Row]) -> Vec<Kind> {
+    let mut found = distinct(rows, |r| r.kind);
+    found.sort_unstable();
+    found
+}
+
+#[cfg(test)]
+pub mod tests {
+    use super::*;
+
+    /// A row with E_CD = 1 - E_J against both gold standards; lost without an E_J.
+    pub fn row(case: &str, variant: Variant, points: usize, jaccard: Option<f64>) -> Row {
+        let agreed = jaccard.map(|jaccard| Agreed {
+            jaccard,
+            contour_voxels: Some(1.0 - jaccard),
+            contour_mm: Some(4.0 * (1.0 - jaccard)),
+            dice: 2.0 * jaccard / (1.0 + jaccard),
+            hausdorff95_mm: Some(5.0),
+        });
+        Row {
+            template: "t1".into(),
+            kind: Kind { variant, points },
+            case: case.into(),
+            outcome: match jaccard {
+                Some(_) => Outcome::Fitted("converged".into()),
+                None => Outcome::Lost("no heart, none at all".into()),
+            },
+            agreed: [agreed; 2],
+            golds: [true; 2],
+            figures: BTreeMap::from([("wall_ml".to_owned(), 130.0)]),
+        }
+    }
+
+    #[test]
+    fn a_lost_case_counts_as_no_agreement() {
+        let rows = [
+            row("p1", Variant::Optimised, 150, Some(0.8)),
+            row("p2", Variant::Optimised, 150, None),
+        ];
+        let cell = mean(&rows, Gold::Expert).unwrap();
+        assert_eq!((cell.jaccard, cell.least, cell.count), (0.4, 0.0, 2));
+        assert!((cell.contour.unwrap() - 0.2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_cannot_be_measured_is_left_out() {
+        let mut rows = [
+            row("p1", Variant::Optimised, 150, Some(0.8)),
+            row("p2", Variant::Optimised, 150, None),
+            row("p3", Variant::Optimised, 150, None),
+        ];
+        rows[1].golds = [false; 2];
+        rows[2].outcome = Outcome::Unreadable("truncated".into());
+        assert_eq!(mean(&rows, Gold::Truth).unwrap().count, 1);
+        assert_eq!(mean(&rows[1..], Gold::Truth), None);
+    }
+}
