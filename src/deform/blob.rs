@@ -3,6 +3,9 @@
 //! The largest connected part (6-neighbours) of the coarse picture above 40 % of its
 //! maximum, or the part that holds the hinted centre. Its centroid and volume give shift and
 //! scale; the turn is left to the alignment, because an intensity blob shows none reliably.
+//!
+//! A map of several labels is no picture of one body: the label at the hinted centre, else the
+//! most frequent one, is taken as a mask, and the others count as nothing.
 
 use super::cup::Cup;
 use super::field::Field;
@@ -10,7 +13,8 @@ use super::localise::{Hints, LocaliseError};
 use super::template::Pose;
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
-use crate::progress::Monitor;
+use crate::progress::{Cancelled, Monitor};
+use crate::surface::survey::label_map;
 use crate::volume::Volume;
 
 /// Samples of the coarse picture, mm.
@@ -63,6 +67,51 @@ pub fn find(volume: &Volume, hints: &Hints, monitor: &Monitor) -> Result<Blob, L
     best.ok_or(LocaliseError::HintOutside)
 }
 
+/// The mask of one label of a map that has several; `None` for any other volume.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn one_label(
+    volume: &Volume,
+    hints: &Hints,
+    monitor: &Monitor,
+) -> Result<Option<Volume>, Cancelled> {
+    let Some(labels) = label_map(volume, monitor)?.filter(|l| l.len() > 1) else {
+        return Ok(None);
+    };
+    let most = labels
+        .iter()
+        .max_by_key(|(label, count)| (**count, -**label));
+    let label = match hints.centre {
+        Some(centre) => nearest_label(volume, &centre),
+        None => most.map(|(label, _)| *label as f32),
+    };
+    Ok(label.map(|label| Volume {
+        voxels: volume
+            .voxels
+            .iter()
+            .map(|v| f32::from(u8::from(*v == label)))
+            .collect(),
+        shape: volume.shape,
+        frame: volume.frame.clone(),
+        integral: true,
+    }))
+}
+
+/// The label of the labelled voxel nearest to `centre`.
+fn nearest_label(volume: &Volume, centre: &Vec3) -> Option<f32> {
+    let [nx, ny, _] = volume.shape;
+    let labelled = (0..volume.voxels.len()).filter(|v| volume.voxels[*v] != 0.0);
+    let distance = |v: usize| {
+        let index = [v % nx, v / nx % ny, v / (nx * ny)].map(|x| x as f64);
+        (volume.frame.to_patient(&Vec3::from(index)) - centre).norm_squared()
+    };
+    labelled
+        .map(|v| (distance(v), volume.voxels[v]))
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, label)| label)
+}
+
 /// Marks and measures the part above `level` that holds `seed`.
 fn flood(field: &Field, level: f32, seed: usize, label: &mut [u32]) -> Blob {
     let [nx, ny, nz] = field.shape();
@@ -109,5 +158,56 @@ impl Blob {
             &place(self.centre, self.volume),
             0.0,
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::frame::VoxelToPatient;
+
+    /// Two balls side by side: label 1 small on the left (+x), label 3 large on the right.
+    fn map() -> Volume {
+        let shape = [40, 24, 24];
+        let frame = VoxelToPatient::centred(shape, [4.0; 3], Vec3::zeros()).unwrap();
+        let inside = |p: &Vec3, x: f64, radius: f64| (p - Vec3::new(x, 0.0, 0.0)).norm() < radius;
+        let voxels = (0..shape.iter().product::<usize>())
+            .map(|v| {
+                let index = [v % 40, v / 40 % 24, v / 960].map(|x| x as f64);
+                let p = frame.to_patient(&Vec3::from(index));
+                match (inside(&p, 40.0, 24.0), inside(&p, -30.0, 36.0)) {
+                    (true, _) => 1.0,
+                    (_, true) => 3.0,
+                    _ => 0.0,
+                }
+            })
+            .collect();
+        Volume {
+            shape,
+            voxels,
+            frame,
+            integral: true,
+        }
+    }
+
+    #[test]
+    fn one_label_is_looked_at_and_the_centre_says_which() {
+        let volume = map();
+        let found = |centre: Option<Vec3>| {
+            let hints = Hints {
+                centre,
+                ..Hints::default()
+            };
+            let mask = one_label(&volume, &hints, &Monitor::silent())
+                .unwrap()
+                .unwrap();
+            find(&mask, &hints, &Monitor::silent()).unwrap()
+        };
+        assert!((found(None).centre.x + 30.0).abs() < 1.0);
+        assert!((found(Some(Vec3::new(44.0, 5.0, 0.0))).centre.x - 40.0).abs() < 1.0);
+        let mut mask = volume.clone();
+        mask.voxels.iter_mut().for_each(|v| *v = v.min(1.0));
+        let none = one_label(&mask, &Hints::default(), &Monitor::silent()).unwrap();
+        assert!(none.is_none(), "one label is a mask already");
     }
 }

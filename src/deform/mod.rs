@@ -57,6 +57,9 @@ pub struct DeformParameters {
     /// Turn of the template about the long axis beyond the least turn that brings the axes
     /// together, degrees. Default 0: patients lie in the scanner as they lie in the frame.
     pub roll: f64,
+    /// Whether the model is aligned as a whole (step 3) before it moves. Default true; without,
+    /// as in models that are placed by hand, the rest state is the posed template.
+    pub align: bool,
     /// Stiffness of the model.
     pub stiffness: Stiffness,
     /// What the sensors look for. Default [`SensorKind::Gradient`].
@@ -76,6 +79,7 @@ impl Default for DeformParameters {
         Self {
             hints: Hints::default(),
             roll: 0.0,
+            align: true,
             stiffness: Stiffness::default(),
             sensor: SensorKind::Gradient,
             reach: 10.0,
@@ -237,14 +241,18 @@ pub fn fit(
     let start = Start::find(volume, template, parameters, monitor)?;
     monitor.report(Stage::Align, 0.0)?;
     let look = start.look(parameters);
-    let aligned = align::align(
-        &start.posed,
-        &start.axis,
-        &start.field,
-        &look,
-        parameters.motion.last_reach,
-        monitor,
-    )?;
+    let aligned = if parameters.align {
+        align::align(
+            &start.posed,
+            &start.axis,
+            &start.field,
+            &look,
+            parameters.motion.last_reach,
+            monitor,
+        )?
+    } else {
+        start.posed.clone()
+    };
     monitor.report(Stage::Deform, 0.0)?;
     let attempt = Attempt::best(&aligned, template, &start, parameters, monitor)?;
     monitor.report(Stage::Deform, 1.0)?;
@@ -286,6 +294,11 @@ impl Start {
         parameters: &DeformParameters,
         monitor: &Monitor,
     ) -> Result<Self, DeformError> {
+        let picked = match template.cup {
+            Some(_) => None,
+            None => blob::one_label(volume, &parameters.hints, monitor)?,
+        };
+        let volume = picked.as_ref().unwrap_or(volume);
         let (localisation, pose, axis, cavity_axis, uptake) = match &template.cup {
             Some(from) => {
                 let found = localise::localise(volume, &parameters.hints, monitor)?;

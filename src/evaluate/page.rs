@@ -10,7 +10,7 @@ use super::rows::{self, Cell, Gold, Kind, ModelRow, Row, Variant};
 use super::slices;
 use super::table::{Evaluation, table1};
 
-const STYLE: &str = "body{font:15px/1.45 system-ui,sans-serif;color:#1c2430;max-width:74em;\
+const STYLE: &str = "body{font:15px/1.45 system-ui,sans-serif;color:#1c2430;max-width:76em;\
 margin:2em auto;padding:0 1em}h1,h2,h3{line-height:1.2}table{border-collapse:collapse;\
 font-variant-numeric:tabular-nums}td,th{padding:.2em .7em;border-bottom:1px solid #dde2e8;\
 text-align:right;font-weight:normal}th{font-weight:600}td:first-child,th:first-child,\
@@ -262,12 +262,13 @@ fn curves(rows: &[Row], gold: Gold, pick: fn(&Cell) -> Option<f64>) -> Vec<Serie
         })
         .filter(|s| !s.points.is_empty())
         .collect();
-    for template in rows::distinct(rows, |r| r.template.clone()) {
+    let templates = rows::distinct(rows, |r| r.template.clone());
+    for template in templates.iter().filter(|_| templates.len() > 1) {
         series.push(Series {
             label: format!("models of {template}"),
             colour: "#8fa3bd",
             thin: true,
-            points: line(Variant::Optimised, Some(&template)),
+            points: line(Variant::Optimised, Some(template)),
         });
     }
     series

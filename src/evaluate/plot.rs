@@ -15,7 +15,7 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
 }
 
-const WIDTH: f64 = 560.0;
+const WIDTH: f64 = 540.0;
 const HEIGHT: f64 = 300.0;
 /// Left, top, right and bottom of the plotting area.
 const AREA: [f64; 4] = [58.0, 34.0, 400.0, 256.0];

@@ -7,6 +7,11 @@
 //! 2002). Rings by share of the way from apex to base: 17 within 0.25; 13 to 16 within 0.5;
 //! 7 to 12 within 0.75; 1 to 6 beyond.
 //!
+//! Before it is sampled the image is blurred a little ([`PolarParameters::blur`]): the largest of
+//! many noisy values is always too large. Towards the rim blur mixes the wall with what lies
+//! beyond, and where exactly a model ends there is the least certain thing about it; the last
+//! [`PolarParameters::rim_margin`] millimetres are shown and not counted.
+//!
 //! Means and extents weigh each ray with the piece of wall it stands for, not with pixels.
 //! The extent is the share of wall below a threshold of this patient's own reference (98th
 //! percentile). There is no normal database behind it: it is no TPD, no summed score and no
@@ -30,6 +35,10 @@ pub struct PolarParameters {
     pub threshold: f64,
     /// How far the samples go beyond the wall on both sides, mm, 0..=10. Default 3.
     pub extension: f64,
+    /// Gaussian blur of the image before it is sampled, sigma in mm, 0..=10. Default 3.
+    pub blur: f64,
+    /// Length of wall at the rim that segments leave out, mm, 0..=20. Default 6.
+    pub rim_margin: f64,
 }
 
 impl Default for PolarParameters {
@@ -37,6 +46,8 @@ impl Default for PolarParameters {
         Self {
             threshold: 0.6,
             extension: 3.0,
+            blur: 3.0,
+            rim_margin: 6.0,
         }
     }
 }
@@ -50,6 +61,8 @@ pub struct Pixel {
     pub mean: f64,
     /// Piece of wall that the ray stands for, mm².
     pub area: f64,
+    /// Whether it lies so near to the rim that it is not counted.
+    pub rim: bool,
 }
 
 /// One of the 17 segments.
@@ -142,20 +155,36 @@ pub fn map(volume: &Volume, wall: &Wall, parameters: &PolarParameters) -> PolarM
         Some(r.start + r.direction * reach)
     });
     let points: Vec<Vec3> = ends.chain(wall.rays.iter().map(|r| r.start)).collect();
-    let field = Field::new(volume, Some(&Aabb::of(&points)), 0.0);
+    let mut region = Aabb::of(&points);
+    let border = Vec3::repeat(4.0 * parameters.blur);
+    region.min -= border;
+    region.max += border;
+    let field = Field::new(volume, Some(&region), parameters.blur);
+    let counted = counted_rows(wall, parameters.rim_margin);
     let pixels: Vec<Option<Pixel>> = wall
         .rays
         .iter()
-        .map(|ray| pixel(&field, ray, wall.row_spacing, parameters.extension))
+        .enumerate()
+        .map(|(index, ray)| {
+            let pixel = pixel(&field, ray, wall.row_spacing, parameters.extension)?;
+            let rim = index / COLUMNS >= counted[index % COLUMNS];
+            Some(Pixel { rim, ..pixel })
+        })
         .collect();
-    let mut maxima: Vec<f64> = pixels.iter().flatten().map(|p| p.max).collect();
+    let counts = |p: &&Pixel| !p.rim;
+    let mut maxima: Vec<f64> = pixels
+        .iter()
+        .flatten()
+        .filter(counts)
+        .map(|p| p.max)
+        .collect();
     maxima.sort_by(f64::total_cmp);
     let reference = maxima
         .get((maxima.len() * 98 / 100).min(maxima.len().saturating_sub(1)))
         .copied()
         .unwrap_or(0.0);
     let limit = parameters.threshold * reference;
-    let indexed = || (0..pixels.len()).filter_map(|i| Some((i, pixels[i]?)));
+    let indexed = || (0..pixels.len()).filter_map(|i| Some((i, pixels[i].filter(|p| !p.rim)?)));
     let segments = std::array::from_fn(|s| {
         let own = indexed().filter(|(i, _)| segment_of(i / COLUMNS, i % COLUMNS) == s + 1);
         summarise(s + 1, own.map(|(_, p)| p), reference, limit)
@@ -168,6 +197,16 @@ pub fn map(volume: &Volume, wall: &Wall, parameters: &PolarParameters) -> PolarM
         extent_percent: all.extent_percent,
         pixels,
     }
+}
+
+/// For every column the row from which on it lies within `margin` mm of the rim.
+fn counted_rows(wall: &Wall, margin: f64) -> [usize; COLUMNS] {
+    let margin = (margin / wall.row_spacing).round().max(0.0) as usize;
+    std::array::from_fn(|column| {
+        let met = |row: &usize| wall.rays[row * COLUMNS + column].wall.is_some();
+        let end = (0..ROWS).rev().find(met).map_or(0, |row| row + 1);
+        end.saturating_sub(margin)
+    })
 }
 
 fn pixel(field: &Field, ray: &Ray, row_spacing: f64, extension: f64) -> Option<Pixel> {
@@ -187,6 +226,7 @@ fn pixel(field: &Field, ray: &Ray, row_spacing: f64, extension: f64) -> Option<P
         max,
         mean: sum / (steps + 1) as f64,
         area: row_spacing * middle * std::f64::consts::TAU / COLUMNS as f64,
+        rim: false,
     })
 }
 
@@ -280,7 +320,8 @@ mod tests {
             map.extent_percent
         );
         let areas: f64 = map.segments.iter().map(|s| s.area).sum();
-        let all: f64 = map.pixels.iter().flatten().map(|p| p.area).sum();
+        let counted = map.pixels.iter().flatten().filter(|p| !p.rim);
+        let all: f64 = counted.map(|p| p.area).sum();
         assert!((areas - all).abs() < 1e-6);
     }
 

@@ -94,7 +94,10 @@ fn range(values: &[f32]) -> (f32, f32, usize) {
 }
 
 /// Counts the labels, or `None` as soon as a value shows that these are intensities.
-fn label_map(
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn label_map(
     volume: &Volume,
     monitor: &Monitor,
 ) -> Result<Option<BTreeMap<i64, usize>>, Cancelled> {

@@ -99,6 +99,9 @@ pub struct EvaluateArgs {
         help_heading = "Experiment"
     )]
     support_scaling: ScalingName,
+    /// Leave the alignment of the model as a whole out, as where models are placed by hand
+    #[arg(long, help_heading = "Experiment")]
+    no_align: bool,
     /// Where the results go (made where missing)
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -150,6 +153,7 @@ impl EvaluateArgs {
 
     fn deform_parameters(&self) -> Result<DeformParameters> {
         let parameters = DeformParameters {
+            align: !self.no_align,
             stiffness: Stiffness {
                 support: self.support,
                 support_radius: self.support_radius,
@@ -188,6 +192,9 @@ impl EvaluateArgs {
                 format!("ventriform {}", env!("CARGO_PKG_VERSION")),
             ),
         ];
+        if self.no_align {
+            settings.push(("alignment as a whole".to_owned(), "left out".to_owned()));
+        }
         if self.support > 0.0 {
             let scaling = match self.support_scaling {
                 ScalingName::Fixed => "the same for every N",

@@ -1,0 +1,195 @@
+//! `ventriform evaluate` on a simulated cohort, from folder to page.
+
+// Helpers of a test state their expectations by panicking, as tests do.
+#![allow(clippy::unwrap_used)]
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Command, Output};
+use std::time::SystemTime;
+
+use ventriform::progress::Monitor;
+use ventriform::volume::nifti::{self, StoredType};
+use ventriform::volume::phantom::{Defect, PhantomParameters, phantom};
+
+/// A case's folder with scan and truth.
+fn case(cohort: &Path, name: &str, seed: u64, defects: Vec<Defect>) {
+    let made = phantom(
+        &PhantomParameters {
+            shape: [56; 3],
+            spacing_mm: [4.5; 3],
+            seed,
+            defects,
+            ..PhantomParameters::default()
+        },
+        &Monitor::silent(),
+    )
+    .unwrap();
+    let folder = cohort.join(name);
+    std::fs::create_dir_all(&folder).unwrap();
+    for (file, volume, stored) in [
+        ("spect.nii.gz", &made.volume, StoredType::Float32),
+        ("lv_truth.nii.gz", &made.truth, StoredType::Uint8),
+        ("lv_expert_img.nii.gz", &made.truth, StoredType::Uint8),
+    ] {
+        std::fs::write(
+            folder.join(file),
+            nifti::write(volume, stored, true).unwrap(),
+        )
+        .unwrap();
+    }
+}
+
+/// One template that works and one that does not; a whole patient, one without a gold
+/// standard, one whose scan is torn off, one without a scan.
+fn cohort() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    case(path, "t1", 1, Vec::new());
+    std::fs::create_dir_all(path.join("t2")).unwrap();
+    std::fs::write(path.join("t2/spect.nii.gz"), b"no NIfTI").unwrap();
+    let defect = Defect {
+        segment: 8,
+        severity: 0.6,
+    };
+    case(path, "p1", 2, vec![defect]);
+    case(path, "p2", 3, Vec::new());
+    std::fs::remove_file(path.join("p2/lv_expert_img.nii.gz")).unwrap();
+    case(path, "p3", 4, Vec::new());
+    let whole = std::fs::read(path.join("p3/spect.nii.gz")).unwrap();
+    std::fs::write(path.join("p3/spect.nii.gz"), &whole[..whole.len() / 3]).unwrap();
+    case(path, "p4", 5, Vec::new());
+    std::fs::remove_file(path.join("p4/spect.nii.gz")).unwrap();
+    folder
+}
+
+fn evaluate(cohort: &Path, out: &Path, threads: usize) -> Output {
+    let output = Command::new(env!("CARGO_BIN_EXE_ventriform"))
+        .args([
+            "evaluate",
+            "--points",
+            "67",
+            "--models",
+            "reference,optimised",
+        ])
+        .arg("--cohort")
+        .arg(cohort)
+        .arg("--out")
+        .arg(out)
+        .env("RAYON_NUM_THREADS", threads.to_string())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    output
+}
+
+/// Every file below a folder.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap().flatten() {
+        let (path, name) = (
+            entry.path(),
+            entry.file_name().to_string_lossy().into_owned(),
+        );
+        if path.is_dir() {
+            let below = files(&path).into_iter();
+            found.extend(below.map(|(n, bytes)| (format!("{name}/{n}"), bytes)));
+        } else {
+            found.insert(name, std::fs::read(&path).unwrap());
+        }
+    }
+    found
+}
+
+fn modified(path: &Path) -> SystemTime {
+    path.metadata().unwrap().modified().unwrap()
+}
+
+#[test]
+fn a_cohort_with_gaps_is_evaluated_resumed_and_reproduced() {
+    let cohort = cohort();
+    let work = tempfile::tempdir().unwrap();
+    let (first, second) = (work.path().join("first"), work.path().join("second"));
+    evaluate(cohort.path(), &first, 1);
+    evaluate(cohort.path(), &second, 4);
+    let whole = files(&first);
+    assert!(whole == files(&second), "threads changed the results");
+
+    let page = String::from_utf8(whole["evaluation.html"].clone()).unwrap();
+    for case in ["t2", "p2", "p3", "p4"] {
+        let gaps = page.split("What is missing").nth(1).unwrap();
+        let gaps = gaps.split("</table>").next().unwrap();
+        assert!(gaps.contains(&format!("<td>{case}</td>")), "{case}: {gaps}");
+    }
+    assert_eq!(page.matches("data:image/png;base64,").count(), 2);
+    assert!(page.contains("unreadable") && page.contains("no gold standard"));
+    assert!(!page.contains("http"));
+    let json: serde_json::Value = serde_json::from_slice(&whole["evaluation.json"]).unwrap();
+    let mean = |gold: &str| {
+        let means = json["means"].as_array().unwrap();
+        let wanted = |m: &&serde_json::Value| {
+            m["gold"] == gold && m["template"] == "all" && m["model"] == "optimised"
+        };
+        means.iter().find(wanted).unwrap().clone()
+    };
+    // Only what there is something to measure against counts.
+    assert_eq!(mean("expert")["fits"], 1);
+    assert_eq!(mean("truth")["fits"], 2);
+    assert!(mean("truth")["jaccard"].as_f64().unwrap() > 0.6);
+
+    // Killed in the midst: one record torn, one gone, one file half written.
+    let fit = |case: &str, model: &str| first.join(format!("fits/{case}_t1_{model}_67.json"));
+    let torn = std::fs::read(fit("p1", "optimised")).unwrap();
+    std::fs::write(fit("p1", "optimised"), &torn[..torn.len() / 2]).unwrap();
+    std::fs::remove_file(fit("p2", "optimised")).unwrap();
+    std::fs::write(
+        first.join("fits/.p2_t1_optimised_67.json.part"),
+        &torn[..99],
+    )
+    .unwrap();
+    let kept = modified(&fit("p1", "reference"));
+    evaluate(cohort.path(), &first, 2);
+    assert!(
+        files(&first) == whole,
+        "a resumed run differs from one that was not stopped"
+    );
+    assert_eq!(
+        modified(&fit("p1", "reference")),
+        kept,
+        "a whole record is not made again"
+    );
+
+    // Another gold standard: the patient's fits are measured anew.
+    let other = std::fs::read(cohort.path().join("p2/lv_truth.nii.gz")).unwrap();
+    std::fs::write(cohort.path().join("p1/lv_expert_img.nii.gz"), other).unwrap();
+    evaluate(cohort.path(), &first, 2);
+    assert_ne!(modified(&fit("p1", "reference")), kept);
+    assert_ne!(files(&first)["table1.csv"], whole["table1.csv"]);
+}
+
+#[test]
+fn a_cohort_of_nothing_useful_is_refused_with_the_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let run = |cohort: &Path| {
+        let output = Command::new(env!("CARGO_BIN_EXE_ventriform"))
+            .arg("evaluate")
+            .arg("--cohort")
+            .arg(cohort)
+            .arg("--out")
+            .arg(&out)
+            .output()
+            .unwrap();
+        assert!(!output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let said = run(&folder.path().join("nowhere"));
+    assert!(said.contains("nowhere"), "{said}");
+    for case in ["t1", "p1"] {
+        std::fs::create_dir_all(folder.path().join(case)).unwrap();
+        std::fs::write(folder.path().join(case).join("spect.nii.gz"), b"?").unwrap();
+    }
+    let said = run(folder.path());
+    assert!(said.contains("no model could be made"), "{said}");
+}
