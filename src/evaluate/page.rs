@@ -15,8 +15,9 @@ margin:2em auto;padding:0 1em}h1,h2,h3{line-height:1.2}table{border-collapse:col
 font-variant-numeric:tabular-nums}td,th{padding:.2em .7em;border-bottom:1px solid #dde2e8;\
 text-align:right;font-weight:normal}th{font-weight:600}td:first-child,th:first-child,\
 td.text{text-align:left}tr.mean td{font-weight:600;border-top:2px solid #1c2430}\
-td.best{background:#e2f2e4}.scroll{overflow-x:auto}svg{font:12px system-ui,sans-serif;\
-max-width:100%;height:auto}svg .title{font-weight:600;font-size:13px}.grid{stroke:#e4e8ed}\
+.scroll td,.scroll th{padding:.2em .5em}\
+td.best{background:#e2f2e4}.scroll{overflow-x:auto;font-size:13px;white-space:nowrap}\
+svg{font:12px system-ui,sans-serif;max-width:100%;height:auto}svg .title{font-weight:600;font-size:13px}.grid{stroke:#e4e8ed}\
 .tick{fill:#5b6673}figure{margin:.5em 0;display:inline-block}figcaption{color:#5b6673;\
 font-size:13px}img{max-width:100%}.confirmed{color:#17722f}.refuted{color:#b3261e}\
 .plots{display:flex;flex-wrap:wrap;gap:1em}summary{cursor:pointer;margin:.6em 0}";
