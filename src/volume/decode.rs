@@ -3,6 +3,7 @@
 use super::VolumeError;
 use super::facts::ByteOrder;
 use super::source::Source;
+use super::summary::Tally;
 use crate::progress::Cancelled;
 
 /// Voxels decoded at a time: a few milliseconds of unpacking, half a mebibyte at most.
@@ -80,6 +81,13 @@ pub(super) struct VoxelReader<'a> {
     format: VoxelFormat,
     source: &'a mut Source,
     buffer: Vec<u8>,
+    odd: Odd,
+    tally: Tally,
+}
+
+/// Values that `f32` does not hold as they are.
+#[derive(Debug, Default)]
+struct Odd {
     infinite: u64,
     inexact: bool,
 }
@@ -91,8 +99,8 @@ impl<'a> VoxelReader<'a> {
             format,
             source,
             buffer: Vec::new(),
-            infinite: 0,
-            inexact: false,
+            odd: Odd::default(),
+            tally: Tally::default(),
         }
     }
 
@@ -110,78 +118,47 @@ impl<'a> VoxelReader<'a> {
             .map_err(|_| VolumeError::Memory {
                 bytes: 4 * count as u64,
             })?;
-        self.source.skip_to(begin)?;
         let size = self.format.data_type.size();
         let end = begin + count as u64 * size as u64;
-        let mut buffer = std::mem::take(&mut self.buffer);
-        buffer.resize(count.min(PORTION) * size, 0);
+        self.source.prepare(end)?;
+        self.source.skip_to(begin)?;
         let mut done = 0;
         while done < count {
             report(done as f64 / count as f64)?;
             let portion = (count - done).min(PORTION);
-            let bytes = &mut buffer[..portion * size];
-            self.source.fill_all(bytes, end)?;
+            let bytes = match self.source.lend(portion * size) {
+                Some(bytes) => bytes,
+                None => {
+                    self.buffer.resize(portion * size, 0);
+                    self.source.fill_all(&mut self.buffer, end)?;
+                    &self.buffer
+                }
+            };
             let start = voxels.len();
             decode(bytes, &self.format, voxels);
-            self.settle(bytes, voxels, start)?;
+            self.odd.settle(bytes, &self.format, voxels, start)?;
+            // While they are still in the cache.
+            self.tally.add_portion(&voxels[start..]);
             done += portion;
         }
-        self.buffer = buffer;
         Ok(report(1.0)?)
     }
 
-    /// Looks for values that `f32` cannot hold.
-    fn settle(
-        &mut self,
-        bytes: &[u8],
-        voxels: &mut [f32],
-        start: usize,
-    ) -> Result<(), VolumeError> {
-        let (mut infinite, mut large) = (false, false);
-        for v in &voxels[start..] {
-            // Without their sign bit, floats are ordered as their bits are.
-            let size = v.to_bits() & !SIGN;
-            infinite |= size == INFINITY;
-            large |= size > EXACT && size < INFINITY;
-        }
-        self.inexact |= large && self.format.data_type != DataType::F32;
-        match infinite {
-            true => self.settle_infinite(bytes, voxels, start),
-            false => Ok(()),
-        }
-    }
-
-    /// Makes infinities NaN, and refuses those that the file does not hold: numbers too large.
-    fn settle_infinite(
-        &mut self,
-        bytes: &[u8],
-        voxels: &mut [f32],
-        start: usize,
-    ) -> Result<(), VolumeError> {
-        let stored = bytes.chunks_exact(self.format.data_type.size());
-        for ((n, v), bytes) in (start..).zip(&mut voxels[start..]).zip(stored) {
-            if v.is_infinite() {
-                let value = exact(bytes, &self.format);
-                if value.is_finite() {
-                    return Err(overflow(&self.format, n, value));
-                }
-                *v = f32::NAN;
-                self.infinite += 1;
-            }
-        }
-        Ok(())
+    /// The figures of all voxels so far.
+    pub(super) fn tally(&self) -> Tally {
+        self.tally
     }
 
     /// What happened to the values.
     pub(super) fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
-        if self.infinite > 0 {
-            let n = self.infinite;
+        if self.odd.infinite > 0 {
+            let n = self.odd.infinite;
             warnings.push(format!(
                 "{n} voxels are infinite and were taken as missing (NaN)."
             ));
         }
-        if self.inexact {
+        if self.odd.inexact {
             let name = self.format.data_type.name();
             warnings.push(format!(
                 "Some {name} values exceed 2^24 and were rounded to 24 binary digits."
@@ -194,6 +171,52 @@ impl<'a> VoxelReader<'a> {
     pub(super) fn finish(&mut self) -> Result<Option<String>, VolumeError> {
         let left_over = self.source.finish()?;
         Ok(left_over.then(|| "Bytes that follow the last voxel were left aside.".into()))
+    }
+}
+
+impl Odd {
+    /// Looks for values that `f32` cannot hold.
+    fn settle(
+        &mut self,
+        bytes: &[u8],
+        format: &VoxelFormat,
+        voxels: &mut [f32],
+        start: usize,
+    ) -> Result<(), VolumeError> {
+        let (mut infinite, mut large) = (false, false);
+        for v in &voxels[start..] {
+            // Without their sign bit, floats are ordered as their bits are.
+            let size = v.to_bits() & !SIGN;
+            infinite |= size == INFINITY;
+            large |= size > EXACT && size < INFINITY;
+        }
+        self.inexact |= large && format.data_type != DataType::F32;
+        match infinite {
+            true => self.settle_infinite(bytes, format, voxels, start),
+            false => Ok(()),
+        }
+    }
+
+    /// Makes infinities NaN, and refuses those that the file does not hold: numbers too large.
+    fn settle_infinite(
+        &mut self,
+        bytes: &[u8],
+        format: &VoxelFormat,
+        voxels: &mut [f32],
+        start: usize,
+    ) -> Result<(), VolumeError> {
+        let stored = bytes.chunks_exact(format.data_type.size());
+        for ((n, v), bytes) in (start..).zip(&mut voxels[start..]).zip(stored) {
+            if v.is_infinite() {
+                let value = exact(bytes, format);
+                if value.is_finite() {
+                    return Err(overflow(format, n, value));
+                }
+                *v = f32::NAN;
+                self.infinite += 1;
+            }
+        }
+        Ok(())
     }
 }
 

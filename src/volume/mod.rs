@@ -5,7 +5,7 @@
 //! tell a person what was understood of the file. The way of a file:
 //!
 //! 1. `source`: opened, unpacked where gzipped (several members too), every byte counted
-//!    against the limits;
+//!    against the limits; `unpack` is the fast way for small files;
 //! 2. `recognise`: told by its content, never by its name;
 //! 3. [`nifti`] or `dicom`: header checked field by field;
 //! 4. `decode`: the voxels, in portions, straight into their final place;
@@ -13,7 +13,8 @@
 //!
 //! Guaranteed: a file gives the values and positions that its standard assigns to them, or an
 //! error naming field and value. No size that a file states is believed before the file has
-//! shown that it can hold it; memory beyond the voxels themselves stays under a mebibyte.
+//! shown that it can hold it; memory beyond the voxels themselves stays under a mebibyte, except
+//! for gzipped files of at most 16 MiB (packed and unpacked), which are held whole.
 //! Not guaranteed: that the file's own statement about the patient is true. Contradictions
 //! inside a file are told as warnings.
 //!
@@ -48,6 +49,7 @@ mod read;
 mod recognise;
 mod source;
 mod summary;
+mod unpack;
 
 pub use error::VolumeError;
 pub use facts::{

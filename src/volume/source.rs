@@ -2,8 +2,9 @@
 //!
 //! A gzipped file may consist of several members one after the other (RFC 1952, 2.2); they
 //! read as one stream. Whatever follows the last member is not part of it, as for `gzip -d`.
+//! Small files of one member are unpacked [at once](super::unpack), which is faster.
 
-use super::VolumeError;
+use super::{VolumeError, unpack};
 use flate2::bufread::GzDecoder;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, ErrorKind, Read, Seek, SeekFrom};
@@ -84,15 +85,18 @@ pub(super) struct Source {
     stored: u64,
     position: u64,
     limit: u64,
+    gzip: bool,
     cut_off: bool,
 }
 
 enum Body {
     Plain(BufReader<Box<dyn ReadSeek>>),
     Gzip(Box<Members>),
+    /// All that the file unpacks to.
+    Unpacked(Cursor<Vec<u8>>),
 }
 
-trait ReadSeek: Read + Seek {}
+pub(super) trait ReadSeek: Read + Seek {}
 impl<T: Read + Seek> ReadSeek for T {}
 
 impl Source {
@@ -121,6 +125,7 @@ impl Source {
             stored,
             position: 0,
             limit,
+            gzip: gzipped,
             cut_off: false,
         })
     }
@@ -137,15 +142,56 @@ impl Source {
 
     /// Whether the bytes are unpacked from gzip.
     pub(super) fn is_gzip(&self) -> bool {
-        matches!(self.body, Body::Gzip(_))
+        self.gzip
     }
 
     /// How many unpacked bytes there can be at most.
     pub(super) fn capacity(&self) -> u64 {
-        match self.body {
-            Body::Plain(_) => self.stored,
-            Body::Gzip(_) => self.stored.saturating_mul(GREATEST_RATIO),
+        match self.gzip {
+            false => self.stored,
+            true => self.stored.saturating_mul(GREATEST_RATIO),
         }
+    }
+
+    /// Says that bytes up to `end` will be wanted. Where the file can be unpacked at once, it
+    /// is; what can be read, and what is wrong with it, stays the same.
+    pub(super) fn prepare(&mut self, end: u64) -> Result<(), VolumeError> {
+        let Body::Gzip(members) = &mut self.body else {
+            return Ok(());
+        };
+        let Some(mut packed) = members.take_first() else {
+            return Ok(());
+        };
+        let unpacked = unpack::at_once(&mut packed, self.stored, end, self.limit);
+        let restarted = unpacked.and_then(|unpacked| match unpacked {
+            Some(bytes) => {
+                let mut cursor = Cursor::new(bytes);
+                cursor.set_position(self.position);
+                Ok(Body::Unpacked(cursor))
+            }
+            None => {
+                packed.rewind()?;
+                let mut members = Members::new(packed);
+                io::copy(&mut members.by_ref().take(self.position), &mut io::sink())?;
+                Ok(Body::Gzip(Box::new(members)))
+            }
+        });
+        self.body = restarted.map_err(|e| self.failure(&e, 0))?;
+        Ok(())
+    }
+
+    /// The next `length` bytes from where they lie, if they are in memory.
+    pub(super) fn lend(&mut self, length: usize) -> Option<&[u8]> {
+        let Body::Unpacked(cursor) = &mut self.body else {
+            return None;
+        };
+        let begin = cursor.position() as usize;
+        if cursor.get_ref().len() < begin + length {
+            return None;
+        }
+        cursor.set_position((begin + length) as u64);
+        self.position += length as u64;
+        cursor.get_ref().get(begin..begin + length)
     }
 
     /// Fills `buffer` as far as the file reaches and says how far that was.
@@ -156,6 +202,7 @@ impl Source {
             let got = match &mut self.body {
                 Body::Plain(reader) => reader.read(part),
                 Body::Gzip(members) => members.read(part),
+                Body::Unpacked(bytes) => bytes.read(part),
             };
             match got {
                 Ok(0) => break,
@@ -268,13 +315,23 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 
 /// Gzip members, one after the other. (`MultiGzDecoder` of flate2 takes padding after the last
 /// member for a damaged one.)
-struct Members(Option<GzDecoder<BufReader<Box<dyn ReadSeek>>>>);
+struct Members {
+    current: Option<GzDecoder<BufReader<Box<dyn ReadSeek>>>>,
+    first: bool,
+}
 
 impl Members {
     fn new(packed: Box<dyn ReadSeek>) -> Self {
-        Self(Some(GzDecoder::new(BufReader::with_capacity(
-            PORTION, packed,
-        ))))
+        Self {
+            current: Some(GzDecoder::new(BufReader::with_capacity(PORTION, packed))),
+            first: true,
+        }
+    }
+
+    /// The packed file, if no member has ended yet; nothing can be read after that.
+    fn take_first(&mut self) -> Option<Box<dyn ReadSeek>> {
+        let member = self.current.take_if(|_| self.first)?;
+        Some(member.into_inner().into_inner())
     }
 
     /// Steps to the member after the one that has ended.
@@ -283,16 +340,21 @@ impl Members {
         // The reader may hold a single byte of what follows; one is enough to tell padding,
         // and a member that starts right and goes on wrong is an error worth telling.
         let follows = packed.fill_buf()?.first() == Some(&GZIP[0]);
-        Ok(Self(follows.then(|| GzDecoder::new(packed))))
+        Ok(Self {
+            current: follows.then(|| GzDecoder::new(packed)),
+            first: false,
+        })
     }
 }
 
 impl Read for Members {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        while let Some(member) = &mut self.0 {
+        while let Some(member) = &mut self.current {
             match member.read(buffer)? {
                 0 if !buffer.is_empty() => {
-                    let Some(ended) = self.0.take() else { break };
+                    let Some(ended) = self.current.take() else {
+                        break;
+                    };
                     *self = Members::next(ended)?;
                 }
                 n => return Ok(n),

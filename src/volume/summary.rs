@@ -1,11 +1,10 @@
 //! What values a volume holds, and whether they look like labels.
 //!
-//! Sums are taken in fixed portions whose results are added in order, so that the figures do
-//! not depend on the number of threads.
+//! The reader adds every portion that it has decoded, while it is still in the cache. Sums are taken
+//! within portions whose results are added in order.
 
 use super::VolumeError;
 use super::facts::{IntensitySummary, LabelCount};
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Voxels summed together before the sums are added.
@@ -21,12 +20,10 @@ const LEAST_COHERENCE: f64 = 0.5;
 /// Summarises `voxels`, which lie in rows of `row` along i.
 pub fn summarise(voxels: &[f32], row: usize) -> IntensitySummary {
     let mut tally = Tally::default();
-    tally.add(voxels);
-    let labels = match tally.fractional {
-        false => labels(voxels, row),
-        true => None,
-    };
-    tally.summary(labels)
+    for portion in voxels.chunks(PORTION) {
+        tally.add_portion(portion);
+    }
+    tally.with_labels(voxels, row)
 }
 
 /// Refuses a volume without any number, and has a sentence for one that is all the same.
@@ -67,34 +64,31 @@ impl Default for Tally {
 }
 
 impl Tally {
-    /// Takes in a volume.
-    pub(super) fn add(&mut self, voxels: &[f32]) {
-        let portions: Vec<Tally> = voxels.par_chunks(PORTION).map(Tally::of).collect();
-        for portion in portions {
-            self.merge(&portion);
-        }
+    /// Takes in the voxels that come next.
+    pub(super) fn add_portion(&mut self, portion: &[f32]) {
+        self.merge(&Tally::of(portion));
     }
 
     /// The figures of one portion, in lanes that a vector unit can hold.
     fn of(portion: &[f32]) -> Self {
-        let (groups, rest) = portion.as_chunks::<LANES>();
         let mut lanes = Lanes::new();
-        for group in groups {
-            lanes.add(group);
+        let (blocks, rest) = portion.as_chunks::<BLOCK>();
+        for block in blocks {
+            lanes.add_block(block);
         }
         // What is left over is filled up with voxels that count for nothing.
-        let mut last = [f32::NAN; LANES];
+        let mut last = [f32::NAN; BLOCK];
         last[..rest.len()].copy_from_slice(rest);
-        lanes.add(&last);
-        let padding = (LANES - rest.len()) as u64;
-        let missing = lanes.missing.iter().map(|&n| u64::from(n)).sum::<u64>() - padding;
+        lanes.add_block(&last);
+        let padding = (BLOCK - rest.len()) as u64;
+        let missing = lanes.missing - padding;
         Self {
             minimum: lanes.minimum.into_iter().fold(f32::INFINITY, f32::min),
             maximum: lanes.maximum.into_iter().fold(f32::NEG_INFINITY, f32::max),
             sum: lanes.sum.iter().sum(),
             finite: portion.len() as u64 - missing,
             missing,
-            fractional: lanes.fractional.contains(&true),
+            fractional: lanes.fractional,
         }
     }
 
@@ -105,6 +99,15 @@ impl Tally {
         self.finite += other.finite;
         self.missing += other.missing;
         self.fractional |= other.fractional;
+    }
+
+    /// The figures of a volume that was taken in, with its labels if it looks like having any.
+    pub(super) fn with_labels(&self, voxels: &[f32], row: usize) -> IntensitySummary {
+        let labels = match self.fractional {
+            false => labels(voxels, row),
+            true => None,
+        };
+        self.summary(labels)
     }
 
     /// The figures so far. Without any number they are all zero.
@@ -126,16 +129,19 @@ impl Tally {
 /// Values taken side by side.
 const LANES: usize = 8;
 
+/// Values looked at together for what is rare.
+const BLOCK: usize = 16 * LANES;
+
 /// From here on every `f32` is whole.
 const WHOLE: f32 = 8_388_608.0;
 
-/// Figures of every eighth voxel.
+/// Figures of every eighth voxel, and of all.
 struct Lanes {
     minimum: [f32; LANES],
     maximum: [f32; LANES],
     sum: [f64; LANES],
-    missing: [u32; LANES],
-    fractional: [bool; LANES],
+    missing: u64,
+    fractional: bool,
 }
 
 impl Lanes {
@@ -144,33 +150,33 @@ impl Lanes {
             minimum: [f32::INFINITY; LANES],
             maximum: [f32::NEG_INFINITY; LANES],
             sum: [0.0; LANES],
-            missing: [0; LANES],
-            fractional: [false; LANES],
+            missing: 0,
+            fractional: false,
         }
     }
 
-    /// Without branches: comparisons with NaN are false.
-    #[inline]
-    fn add(&mut self, group: &[f32; LANES]) {
-        for l in 0..LANES {
-            let v = group[l];
-            let nan = v.is_nan();
-            self.missing[l] += u32::from(nan);
-            self.minimum[l] = if v < self.minimum[l] {
-                v
-            } else {
-                self.minimum[l]
-            };
-            self.maximum[l] = if v > self.maximum[l] {
-                v
-            } else {
-                self.maximum[l]
-            };
-            self.sum[l] += f64::from(if nan { 0.0 } else { v });
-            // Added to 2^23, a number loses its fraction to rounding.
-            let size = v.abs();
-            let whole = (size + WHOLE) - WHOLE == size || size >= WHOLE;
-            self.fractional[l] |= !(whole | nan);
+    /// Without branches on single values. Most blocks miss nothing, and once a fraction was seen
+    /// there is no need to look for more.
+    fn add_block(&mut self, block: &[f32; BLOCK]) {
+        let missing = block.iter().map(|v| u64::from(v.is_nan())).sum::<u64>();
+        self.missing += missing;
+        for group in block.as_chunks::<LANES>().0 {
+            for l in 0..LANES {
+                // Comparisons with NaN are false.
+                let (v, low, high) = (group[l], self.minimum[l], self.maximum[l]);
+                self.minimum[l] = if v < low { v } else { low };
+                self.maximum[l] = if v > high { v } else { high };
+                let counted = if missing > 0 && v.is_nan() { 0.0 } else { v };
+                self.sum[l] += f64::from(counted);
+            }
+        }
+        if !self.fractional {
+            self.fractional = block.iter().fold(false, |any, v| {
+                // Added to 2^23, a number loses its fraction to rounding.
+                let size = v.abs();
+                let whole = (size + WHOLE) - WHOLE == size || size >= WHOLE;
+                any | !(whole | v.is_nan())
+            });
         }
     }
 }

@@ -31,7 +31,7 @@ use super::decode::VoxelReader;
 use super::facts::{Format, LengthUnit};
 use super::read::choose_frame;
 use super::source::{Source, VolumeFile};
-use super::summary::{Tally, judge, summarise};
+use super::summary::{Tally, judge};
 use super::{IntensitySummary, ReadLimits, ReadOptions, Reading, Volume, VolumeError, VolumeFacts};
 use crate::progress::{Monitor, Stage};
 
@@ -44,9 +44,9 @@ pub(super) fn read(
 ) -> Result<Reading, VolumeError> {
     let mut opened = Opened::open(file, limits, monitor)?;
     let gate = choose_frame(options.frame, opened.order.gates())?;
-    let (voxels, warnings) = opened.read_gate(gate, monitor)?;
+    let (voxels, tally, warnings) = opened.read_gate(gate, monitor)?;
     let shape = opened.pixels.shape;
-    let intensity = summarise(&voxels, shape[0]);
+    let intensity = tally.with_labels(&voxels, shape[0]);
     let integral = intensity.integral;
     let facts = opened.facts(Some(gate), intensity, warnings)?;
     let volume = Volume {
@@ -71,7 +71,6 @@ pub(super) fn inspect(
     }
     let pixels = &opened.pixels;
     let mut voxels = Vec::new();
-    let mut tally = Tally::default();
     let mut reader = VoxelReader::new(pixels.format.clone(), &mut opened.source);
     let count = pixels.frame_voxels() * pixels.shape[2];
     for part in 0..gates {
@@ -81,9 +80,8 @@ pub(super) fn inspect(
         reader.append(begin, count, &mut voxels, &mut |done| {
             monitor.report(Stage::Read, (part as f64 + done) / gates as f64)
         })?;
-        tally.add(&voxels);
     }
-    let warnings = reader.warnings();
+    let (tally, warnings) = (reader.tally(), reader.warnings());
     opened.facts(None, tally.summary(None), warnings)
 }
 
@@ -120,12 +118,12 @@ impl Opened {
         })
     }
 
-    /// The slices of `gate`, stacked, and what is to be said about their values.
+    /// The slices of `gate`, stacked, their figures and what is to be said about their values.
     fn read_gate(
         &mut self,
         gate: usize,
         monitor: &Monitor,
-    ) -> Result<(Vec<f32>, Vec<String>), VolumeError> {
+    ) -> Result<(Vec<f32>, Tally, Vec<String>), VolumeError> {
         let slices = self.order.slices_of(gate);
         let pixels = &self.pixels;
         let frame_voxels = pixels.frame_voxels();
@@ -142,16 +140,16 @@ impl Opened {
             })?;
             done += run.len();
         }
-        let warnings = reader.warnings();
+        let (tally, warnings) = (reader.tally(), reader.warnings());
         if stored == slices {
-            return Ok((voxels, warnings));
+            return Ok((voxels, tally, warnings));
         }
         let mut ordered = Vec::with_capacity(voxels.len());
         for frame in slices {
             let at = stored.partition_point(|s| s < frame) * frame_voxels;
             ordered.extend_from_slice(&voxels[at..at + frame_voxels]);
         }
-        Ok((ordered, warnings))
+        Ok((ordered, tally, warnings))
     }
 
     fn facts(

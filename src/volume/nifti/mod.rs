@@ -21,7 +21,7 @@ use self::place::{Placement, place};
 use super::decode::VoxelReader;
 use super::read::choose_frame;
 use super::source::{Source, VolumeFile};
-use super::summary::{Tally, judge, summarise};
+use super::summary::judge;
 use super::{IntensitySummary, ReadLimits, ReadOptions, Reading, Volume, VolumeError, VolumeFacts};
 use crate::progress::{Monitor, Stage};
 
@@ -42,12 +42,13 @@ pub(super) fn read(
     reader.append(begin, header.voxels(), &mut voxels, &mut |done| {
         monitor.report(Stage::Read, done)
     })?;
+    let tally = reader.tally();
     let mut warnings = reader.warnings();
     if frame + 1 == header.frames {
         warnings.extend(reader.finish()?);
     }
     let shape = file.header.shape;
-    let intensity = summarise(&voxels, shape[0]);
+    let intensity = tally.with_labels(&voxels, shape[0]);
     let integral = intensity.integral;
     let facts = file.facts(Some(frame), intensity, warnings)?;
     let volume = Volume {
@@ -74,7 +75,6 @@ pub(super) fn inspect(
     }
     let header = &file.header;
     let mut voxels = Vec::new();
-    let mut tally = Tally::default();
     let mut reader = VoxelReader::new(header.voxel_format(), &mut file.source);
     for frame in 0..frames {
         voxels.clear();
@@ -82,8 +82,8 @@ pub(super) fn inspect(
         reader.append(begin, header.voxels(), &mut voxels, &mut |done| {
             monitor.report(Stage::Read, (frame as f64 + done) / frames as f64)
         })?;
-        tally.add(&voxels);
     }
+    let tally = reader.tally();
     let mut warnings = reader.warnings();
     warnings.extend(reader.finish()?);
     file.facts(None, tally.summary(None), warnings)
