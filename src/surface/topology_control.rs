@@ -82,33 +82,39 @@ fn grow(
     value: &impl Fn([usize; 3]) -> f32,
     monitor: &Monitor,
 ) -> Result<Labels, Cancelled> {
-    let mut ball = Grid::new(low, extent, false);
-    let mut front = BinaryHeap::new();
+    let mut ball = Grid::new(object, low, extent);
     let start = object
         .voxels()
         .max_by_key(|&p| (ordered(value(p)), std::cmp::Reverse(p)));
+    let mut front = Front::default();
     if let Some(p) = start {
-        front.push((u32::MAX, std::cmp::Reverse(ball.index(p))));
+        // The first voxel is no neighbour of anything, hence not simple.
+        let at = ball.index(p);
+        ball.cells[at] |= INSIDE;
+        ball.push_around(
+            at,
+            &mut front,
+            |cell| cell & (INSIDE | OBJECT) == OBJECT,
+            |p| ordered(value(p)),
+        );
     }
-    let mut first = true;
     let mut steps = 0u32;
-    while let Some((_, std::cmp::Reverse(at))) = front.pop() {
+    while let Some(at) = front.pop(&mut ball) {
         steps += 1;
         if steps.is_multiple_of(1 << 16) {
             monitor.check()?;
         }
-        if ball.inside[at] || !(first || is_simple(ball.around(at))) {
+        if ball.cells[at] & INSIDE != 0 || !is_simple(ball.around(at)) {
             continue;
         }
-        first = false;
-        ball.inside[at] = true;
+        ball.cells[at] |= INSIDE;
         // A neighbour that was refused before may have become simple.
-        for q in ball.all_neighbours(at) {
-            let p = ball.voxel(q);
-            if let Some(p) = p.filter(|&p| !ball.inside[q] && object.get(p)) {
-                front.push((ordered(value(p)), std::cmp::Reverse(q)));
-            }
-        }
+        ball.push_around(
+            at,
+            &mut front,
+            |cell| cell & (INSIDE | OBJECT) == OBJECT,
+            |p| ordered(value(p)),
+        );
     }
     Ok(ball.into_labels(object))
 }
@@ -121,60 +127,83 @@ fn shrink(
     value: &impl Fn([usize; 3]) -> f32,
     monitor: &Monitor,
 ) -> Result<Labels, Cancelled> {
-    let mut ball = Grid::new(low, extent, true);
-    let mut front = BinaryHeap::new();
-    let removable = |ball: &Grid, at: usize| {
-        ball.voxel(at)
-            .filter(|&p| ball.inside[at] && !object.get(p))
-    };
-    for at in 0..ball.inside.len() {
-        let Some(p) = removable(&ball, at) else {
+    let mut ball = Grid::new(object, low, extent);
+    let mut front = Front::default();
+    for at in 0..ball.cells.len() {
+        let Some(p) = ball.voxel(at) else {
             continue;
         };
+        ball.cells[at] |= INSIDE;
         let on_side = (0..3).any(|r| p[r] == low[r] || p[r] + 1 == low[r] + extent[r]);
-        if on_side {
-            front.push((!ordered(value(p)), std::cmp::Reverse(at)));
+        if on_side && ball.cells[at] & OBJECT == 0 {
+            front.push(&mut ball, at, !ordered(value(p)));
         }
     }
     let mut steps = 0u32;
-    while let Some((_, std::cmp::Reverse(at))) = front.pop() {
+    while let Some(at) = front.pop(&mut ball) {
         steps += 1;
         if steps.is_multiple_of(1 << 16) {
             monitor.check()?;
         }
-        if !ball.inside[at] || !is_simple(ball.around(at)) {
+        if ball.cells[at] & INSIDE == 0 || !is_simple(ball.around(at)) {
             continue;
         }
-        ball.inside[at] = false;
+        ball.cells[at] &= !INSIDE;
         // Background is 26-connected: removing a voxel may make any of its 26 simple.
-        for q in ball.all_neighbours(at) {
-            if let Some(p) = removable(&ball, q) {
-                front.push((!ordered(value(p)), std::cmp::Reverse(q)));
-            }
-        }
+        ball.push_around(
+            at,
+            &mut front,
+            |cell| cell & (INSIDE | OBJECT) == INSIDE,
+            |p| !ordered(value(p)),
+        );
     }
     Ok(ball.into_labels(object))
 }
 
-/// Labels as bytes with a border of one voxel, where neighbours are plain offsets.
+/// Voxels to look at, by falling key, of equals the first in array order. A voxel waits once:
+/// a second look without a change between could only come to the same end.
+#[derive(Default)]
+struct Front(BinaryHeap<(u32, std::cmp::Reverse<usize>)>);
+
+impl Front {
+    fn push(&mut self, grid: &mut Grid, at: usize, key: u32) {
+        grid.cells[at] |= WAITING;
+        self.0.push((key, std::cmp::Reverse(at)));
+    }
+
+    fn pop(&mut self, grid: &mut Grid) -> Option<usize> {
+        let (_, std::cmp::Reverse(at)) = self.0.pop()?;
+        grid.cells[at] &= !WAITING;
+        Some(at)
+    }
+}
+
+/// The voxel belongs to the ball.
+const INSIDE: u8 = 1;
+/// The voxel belongs to the given object.
+const OBJECT: u8 = 2;
+/// The voxel waits in the front.
+const WAITING: u8 = 4;
+
+/// A box of voxels as bytes with a border of one voxel, where neighbours are plain offsets.
 struct Grid {
     low: [usize; 3],
     size: [usize; 3],
-    inside: Vec<bool>,
+    cells: Vec<u8>,
 }
 
 impl Grid {
-    fn new(low: [usize; 3], extent: [usize; 3], full: bool) -> Self {
+    /// The box with the object in it and an empty ball.
+    fn new(object: &Labels, low: [usize; 3], extent: [usize; 3]) -> Self {
         let size = extent.map(|e| e + 2);
         let mut grid = Self {
             low,
             size,
-            inside: vec![false; size.iter().product()],
+            cells: vec![0; size.iter().product()],
         };
-        if full {
-            for at in 0..grid.inside.len() {
-                grid.inside[at] = grid.voxel(at).is_some();
-            }
+        for p in object.voxels() {
+            let at = grid.index(p);
+            grid.cells[at] = OBJECT;
         }
         grid
     }
@@ -193,21 +222,47 @@ impl Grid {
             .then(|| [0, 1, 2].map(|r| p[r] - 1 + self.low[r]))
     }
 
-    fn all_neighbours(&self, at: usize) -> impl Iterator<Item = usize> + use<> {
+    /// First indices of the nine rows of three around an index.
+    fn rows_around(&self, at: usize) -> [usize; 9] {
         let (y, z) = (self.size[0], self.size[0] * self.size[1]);
-        (0..27).map(move |n| at + n % 3 + n / 3 % 3 * y + n / 9 * z - 1 - y - z)
+        std::array::from_fn(|n| at + n % 3 * y + n / 3 * z - 1 - y - z)
     }
 
     /// The 27 labels around an index as bits, x fastest.
     fn around(&self, at: usize) -> u32 {
-        self.all_neighbours(at)
-            .enumerate()
-            .fold(0, |bits, (n, q)| bits | u32::from(self.inside[q]) << n)
+        let mut bits = 0;
+        for (n, row) in self.rows_around(at).into_iter().enumerate() {
+            for (k, cell) in self.cells[row..row + 3].iter().enumerate() {
+                bits |= u32::from(cell & INSIDE) << (3 * n + k);
+            }
+        }
+        bits
+    }
+
+    /// Lets the neighbours that `wanted` names by their flags wait, unless they do already.
+    fn push_around(
+        &mut self,
+        at: usize,
+        front: &mut Front,
+        wanted: impl Fn(u8) -> bool,
+        key: impl Fn([usize; 3]) -> u32,
+    ) {
+        for row in self.rows_around(at) {
+            for q in row..row + 3 {
+                let cell = self.cells[q];
+                if cell & WAITING == 0
+                    && wanted(cell)
+                    && let Some(p) = self.voxel(q)
+                {
+                    front.push(self, q, key(p));
+                }
+            }
+        }
     }
 
     fn into_labels(self, like: &Labels) -> Labels {
         let mut labels = Labels::empty(like.origin, like.extent);
-        for at in (0..self.inside.len()).filter(|&at| self.inside[at]) {
+        for at in (0..self.cells.len()).filter(|&at| self.cells[at] & INSIDE != 0) {
             if let Some(p) = self.voxel(at) {
                 labels.set(p, true);
             }
@@ -313,6 +368,46 @@ mod tests {
         assert!(!is_simple((1 << 27) - 1));
         assert!(!is_simple(1 << 12 | 1 << 14));
         assert!(is_simple(1 << 12));
+    }
+
+    /// Shrinking with every change of a neighbour asking for one look more: the oracle.
+    fn shrink_plainly(object: &Labels, value: impl Fn([usize; 3]) -> f32) -> Labels {
+        let mut ball = Grid::new(object, [0; 3], object.extent);
+        let mut front = BinaryHeap::new();
+        for at in 0..ball.cells.len() {
+            if let Some(p) = ball.voxel(at) {
+                ball.cells[at] |= INSIDE;
+                front.push((!ordered(value(p)), std::cmp::Reverse(at)));
+            }
+        }
+        while let Some((_, std::cmp::Reverse(at))) = front.pop() {
+            if ball.cells[at] == INSIDE && is_simple(ball.around(at)) {
+                ball.cells[at] = 0;
+                for q in ball
+                    .rows_around(at)
+                    .into_iter()
+                    .flat_map(|row| row..row + 3)
+                {
+                    if let Some(p) = ball.voxel(q) {
+                        front.push((!ordered(value(p)), std::cmp::Reverse(q)));
+                    }
+                }
+            }
+        }
+        ball.into_labels(object)
+    }
+
+    #[test]
+    fn waiting_once_changes_no_outcome() {
+        let mut random = stream(13, Purpose::PhantomNoise);
+        for _ in 0..40 {
+            let extent = [10, 9, 8];
+            let values: Vec<f32> = (0..720).map(|_| random.random_range(0.0..1.0)).collect();
+            let value = |p: [usize; 3]| values[p[0] + 10 * (p[1] + 9 * p[2])];
+            let object = Labels::of_shape(extent, |p| value(p) > 0.7);
+            let found = shrink(&object, [0; 3], extent, &value, &Monitor::silent()).unwrap();
+            assert_eq!(found, shrink_plainly(&object, value));
+        }
     }
 
     #[test]
