@@ -22,36 +22,61 @@ pub fn previous(h: u32) -> u32 {
 }
 
 impl Adjacency {
-    /// Pairs the half-edges of `triangles`. O(n log n), independent of thread count.
+    /// Pairs the half-edges of `triangles`. Takes O(n) where few edges meet at a vertex, and
+    /// four bytes for each index up to the highest; independent of thread count.
     ///
     /// # Errors
     /// The first [`Defect`] found unless every edge belongs to exactly two triangles that run
     /// through it in opposite directions.
     pub fn new(triangles: &[[u32; 3]]) -> Result<Self, Defect> {
-        let mut keyed: Vec<(u64, u32)> = Vec::with_capacity(3 * triangles.len());
-        for (t, triangle) in triangles.iter().enumerate() {
-            for k in 0..3 {
-                let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
-                if a == b {
-                    return Err(Defect::DegenerateTriangle { triangle: t as u32 });
-                }
-                let key = (u64::from(a.min(b)) << 32) | u64::from(a.max(b));
-                keyed.push((key, (3 * t + k) as u32));
+        let halfedges = || {
+            (0u32..).zip(triangles).flat_map(|(t, triangle)| {
+                [0, 1, 2].map(|k| {
+                    (
+                        3 * t + k,
+                        triangle[k as usize],
+                        triangle[(k as usize + 1) % 3],
+                    )
+                })
+            })
+        };
+        // A counting sort by the lower vertex; what stands together is then sorted by the upper.
+        let highest = triangles.iter().flatten().max().map_or(0, |v| *v as usize);
+        let mut ends = vec![0u32; highest + 1];
+        for (h, a, b) in halfedges() {
+            if a == b {
+                return Err(Defect::DegenerateTriangle { triangle: h / 3 });
             }
+            ends[a.min(b) as usize] += 1;
         }
-        keyed.sort_unstable();
+        let mut begin = 0;
+        for place in &mut ends {
+            begin += std::mem::replace(place, begin);
+        }
+        let mut keyed = vec![(0u32, 0u32); 3 * triangles.len()];
+        for (h, a, b) in halfedges() {
+            let place = &mut ends[a.min(b) as usize];
+            keyed[*place as usize] = (a.max(b), h);
+            *place += 1;
+        }
         let origin = |h: u32| triangles[h as usize / 3][h as usize % 3];
         let mut twins = vec![0; keyed.len()];
-        for group in keyed.chunk_by(|x, y| x.0 == y.0) {
-            let edge = [(group[0].0 >> 32) as u32, group[0].0 as u32];
-            match *group {
-                [_] => return Err(Defect::OpenEdge { edge }),
-                [(_, g), (_, h)] if origin(g) != origin(h) => {
-                    twins[g as usize] = h;
-                    twins[h as usize] = g;
+        let mut begin = 0;
+        for (low, &end) in (0u32..).zip(&ends) {
+            let around = &mut keyed[begin as usize..end as usize];
+            begin = end;
+            around.sort_unstable();
+            for group in around.chunk_by(|x, y| x.0 == y.0) {
+                let edge = [low, group[0].0];
+                match *group {
+                    [_] => return Err(Defect::OpenEdge { edge }),
+                    [(_, g), (_, h)] if origin(g) != origin(h) => {
+                        twins[g as usize] = h;
+                        twins[h as usize] = g;
+                    }
+                    [_, _] => return Err(Defect::TurnedTriangles { edge }),
+                    _ => return Err(Defect::NonManifoldEdge { edge }),
                 }
-                [_, _] => return Err(Defect::TurnedTriangles { edge }),
-                _ => return Err(Defect::NonManifoldEdge { edge }),
             }
         }
         Ok(Self { twins })

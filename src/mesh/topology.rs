@@ -91,20 +91,17 @@ pub fn check(mesh: &TriMesh) -> Result<Census, Defect> {
 /// The first [`Defect`] met.
 pub fn check_triangles(vertices: usize, triangles: &[[u32; 3]]) -> Result<Census, Defect> {
     let adjacency = Adjacency::new(triangles)?;
-    let mut sorted: Vec<([u32; 3], u32)> = triangles
-        .iter()
-        .zip(0..)
-        .map(|(t, index)| {
-            let mut key = *t;
-            key.sort_unstable();
-            (key, index)
-        })
-        .collect();
-    sorted.sort_unstable();
-    if let Some(pair) = sorted.windows(2).find(|w| w[0].0 == w[1].0) {
-        return Err(Defect::DoubledTriangle {
-            triangle: pair[1].1,
-        });
+    // Where every edge belongs to two triangles, a double lies across each of the three.
+    let sorted = |t: u32| {
+        let mut key = triangles[t as usize];
+        key.sort_unstable();
+        key
+    };
+    for t in 0..triangles.len() as u32 {
+        let across = adjacency.neighbours(t)[0];
+        if t < across && sorted(t) == sorted(across) {
+            return Err(Defect::DoubledTriangle { triangle: across });
+        }
     }
     let mut corners = vec![0u32; vertices];
     for &v in triangles.iter().flatten() {
