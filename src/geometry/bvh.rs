@@ -11,6 +11,9 @@ use super::{Vec3, triangle};
 /// fastest of 2, 4 and 8.
 const LEAF_SIZE: usize = 4;
 
+/// Triangles from which on the two halves of a subtree are built side by side.
+const PARALLEL_SIZE: usize = 2048;
+
 /// An axis-aligned box in millimetres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aabb {
@@ -244,11 +247,35 @@ fn build(
             .then(s.cmp(&t))
     });
     let (left, right) = order.split_at_mut(middle);
-    build(nodes, left, offset, corners, centroids);
-    let right_index = nodes.len() as u32;
-    build(nodes, right, offset + middle, corners, centroids);
-    nodes[index].first_or_right = right_index;
+    let right_index;
+    if middle < PARALLEL_SIZE {
+        build(nodes, left, offset, corners, centroids);
+        right_index = nodes.len();
+        build(nodes, right, offset + middle, corners, centroids);
+    } else {
+        let alone = |order, offset| {
+            let mut nodes = Vec::new();
+            build(&mut nodes, order, offset, corners, centroids);
+            nodes
+        };
+        let (left, right) = rayon::join(|| alone(left, offset), || alone(right, offset + middle));
+        append(nodes, left);
+        right_index = nodes.len();
+        append(nodes, right);
+    }
+    nodes[index].first_or_right = right_index as u32;
     nodes[index].count = 0;
+}
+
+/// Appends a subtree that was built by itself.
+fn append(nodes: &mut Vec<Node>, subtree: Vec<Node>) {
+    let shift = nodes.len() as u32;
+    nodes.extend(subtree.into_iter().map(|mut node| {
+        if node.count == 0 {
+            node.first_or_right += shift;
+        }
+        node
+    }));
 }
 
 #[cfg(test)]
@@ -274,6 +301,26 @@ mod tests {
                 })
                 .fold(f64::INFINITY, f64::min);
             assert_eq!(found.squared_distance, brute);
+        }
+    }
+
+    #[test]
+    fn halves_built_side_by_side_make_the_same_tree() {
+        let mesh = shapes::icosphere(5.0, 5);
+        let tree = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            let pool = pool.build().unwrap();
+            pool.install(|| Bvh::new(&mesh.vertices, &mesh.triangles))
+        };
+        let one = tree(1);
+        assert!(one.order.len() > 4 * PARALLEL_SIZE);
+        let many = tree(3);
+        assert_eq!(format!("{:?}", one.nodes), format!("{:?}", many.nodes));
+        // Every triangle is its own closest: the parts were put together rightly.
+        for t in (0..mesh.triangles.len()).step_by(97) {
+            let [a, b, c] = mesh.corners(t);
+            let found = many.closest(&((a + b + c) / 3.0)).unwrap();
+            assert_eq!(found.triangle, t as u32);
         }
     }
 
