@@ -143,10 +143,13 @@ pub fn from_reading(
     let surface = surface::extract(&reading.volume, &parameters.surface, monitor)
         .map_err(PipelineError::Surface)?;
     laps.end(Stage::Surface);
-    let tiled =
-        retile::retile(&surface, &parameters.retile, monitor).map_err(PipelineError::Retile)?;
+    // Neither needs the other.
+    let (tiled, reference) = rayon::join(
+        || retile::retile(&surface, &parameters.retile, monitor),
+        || Reference::new(&surface),
+    );
+    let tiled = tiled.map_err(PipelineError::Retile)?;
     laps.end(Stage::Retile);
-    let reference = Reference::new(&surface);
     let optimised = optimise::optimise(&tiled, &reference, &parameters.optimise, monitor)
         .map_err(PipelineError::Optimise)?;
     laps.end(Stage::Optimise);

@@ -89,8 +89,11 @@ pub fn distance(
 ) -> Result<Distance, Cancelled> {
     let surface = &reference.mesh;
     let model_tree = Bvh::new(&model.vertices, &model.triangles);
-    let there = Direction::between(model, surface, &reference.bvh, samples, monitor)?;
-    let back = Direction::between(surface, model, &model_tree, samples, monitor)?;
+    let (there, back) = rayon::join(
+        || Direction::between(model, surface, &reference.bvh, samples, monitor),
+        || Direction::between(surface, model, &model_tree, samples, monitor),
+    );
+    let (there, back) = (there?, back?);
 
     let mean_mm = f64::midpoint(there.mean_mm, back.mean_mm);
     let hausdorff_mm = there.max_mm.max(back.max_mm);
@@ -157,8 +160,10 @@ fn farthest(
     let mut spent = corners.len();
     let limit = |best: f64| best * (1.0 + TOLERANCE) + f64::EPSILON;
     let mut cells: Vec<[Vec3; 3]> = (0..from.triangles.len())
+        .into_par_iter()
+        .with_min_len(256)
         .filter(|&t| bound_by_corners(from, t, &corners, to) > limit(best))
-        .flat_map(|t| quarters(&from.corners(t)))
+        .flat_map_iter(|t| quarters(&from.corners(t)))
         .collect();
     while !cells.is_empty() {
         spent += cells.len();
@@ -168,14 +173,15 @@ fn farthest(
         let centroids: Vec<Vec3> = cells.iter().map(|[a, b, c]| (a + b + c) / 3.0).collect();
         let closest = closest_points(&centroids, tree, monitor)?;
         best = closest.iter().map(distance).fold(best, f64::max);
-        cells = (cells.iter().zip(&centroids).zip(&closest))
+        cells = (cells.par_iter().zip(&centroids).zip(&closest))
+            .with_min_len(256)
             .filter(|((cell, centroid), closest)| {
                 let around = distance(closest) + farthest_corner(cell, |p| (p - *centroid).norm());
                 let triangle = to.corners(closest.triangle as usize);
                 let to_one = farthest_corner(cell, |p| distance_to(p, &triangle));
                 around.min(to_one) > limit(best)
             })
-            .flat_map(|((cell, _), _)| quarters(cell))
+            .flat_map_iter(|((cell, _), _)| quarters(cell))
             .collect();
     }
     Ok((best, Some(best * (1.0 + TOLERANCE))))

@@ -29,7 +29,7 @@ const COOLING_ROUNDS: usize = 10;
 /// Root mean square way to the centroid, in spacings, below which relaxation has settled.
 const SETTLED: f64 = 2e-4;
 /// Samples that one task looks at.
-const CHUNK: usize = 4096;
+const CHUNK: usize = 1024;
 
 /// Which site each sample belongs to, and where the sites are.
 #[derive(Debug, Clone)]

@@ -57,7 +57,8 @@ impl<'a> Patches<'a> {
         let density = |v: u32| weights[v as usize] / samples.area[v as usize];
         let moments = samples
             .triangles
-            .iter()
+            .par_iter()
+            .with_min_len(LEAST_CHUNK / 4)
             .map(|t| {
                 let [a, b, c] = t.map(|v| samples.working[v as usize]);
                 let mass =

@@ -6,6 +6,7 @@
 
 use crate::geometry::Vec3;
 use crate::geometry::triangle::area_normal;
+use rayon::prelude::*;
 
 /// Vertices with neighbours and weights.
 #[derive(Debug, Clone)]
@@ -88,8 +89,9 @@ impl Samples {
         };
         let triangles = self
             .triangles
-            .iter()
-            .flat_map(|&[a, b, c]| {
+            .par_iter()
+            .with_min_len(4096)
+            .flat_map_iter(|&[a, b, c]| {
                 let (ab, bc, ca) = (between(a, b), between(b, c), between(c, a));
                 [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
             })

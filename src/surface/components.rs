@@ -89,6 +89,12 @@ impl Components {
         (0..self.sizes.len()).rev().max_by_key(|&c| self.sizes[c])
     }
 
+    /// The component of every voxel, in array order.
+    pub fn of_voxels(&self) -> impl Iterator<Item = usize> + '_ {
+        (self.runs.iter().zip(&self.component))
+            .flat_map(|(run, &component)| std::iter::repeat_n(component, run.end - run.start))
+    }
+
     /// The component that holds voxel `p` of the box.
     pub fn containing(&self, labels: &Labels, p: [usize; 3]) -> Option<usize> {
         let row = (p[1] + 1) + labels.rows()[0] * (p[2] + 1);
@@ -239,6 +245,9 @@ mod tests {
                 inside.paint(&mut one, false, |other| other != c);
                 assert_eq!(one.count(), inside.sizes[c]);
                 let p = one.voxels().next().unwrap();
+                assert_eq!(inside.containing(&labels, p), Some(c));
+            }
+            for (p, c) in labels.voxels().zip(inside.of_voxels()) {
                 assert_eq!(inside.containing(&labels, p), Some(c));
             }
         }

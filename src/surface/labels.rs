@@ -106,9 +106,22 @@ impl Labels {
 
     /// Inside voxels of the box in array order.
     pub fn voxels(&self) -> impl Iterator<Item = [usize; 3]> + '_ {
-        self.bits.iter().enumerate().flat_map(move |(at, &word)| {
-            let (row, word_in_row) = (at / self.words, at % self.words);
-            let (j, k) = (row % self.rows[0], row / self.rows[0]);
+        (0..self.rows[1]).flat_map(|k| self.voxels_of_plane(k))
+    }
+
+    /// [`Self::voxels`] for many threads.
+    pub fn par_voxels(&self) -> impl ParallelIterator<Item = [usize; 3]> + '_ {
+        (0..self.rows[1])
+            .into_par_iter()
+            .flat_map_iter(|k| self.voxels_of_plane(k))
+    }
+
+    /// Inside voxels of plane `k`, border included in the number.
+    fn voxels_of_plane(&self, k: usize) -> impl Iterator<Item = [usize; 3]> + '_ {
+        let plane = self.words * self.rows[0];
+        let bits = &self.bits[k * plane..(k + 1) * plane];
+        bits.iter().enumerate().flat_map(move |(at, &word)| {
+            let (j, word_in_row) = (at / self.words, at % self.words);
             set_bits(word).map(move |bit| [64 * word_in_row + bit - 1, j - 1, k - 1])
         })
     }
@@ -265,6 +278,8 @@ mod tests {
             assert_eq!(labels, plain, "{nx}");
             assert_eq!(labels.voxels().count(), labels.count());
             assert!(labels.voxels().all(|p| labels.get(p)));
+            let in_parallel: Vec<[usize; 3]> = labels.par_voxels().collect();
+            assert!(labels.voxels().eq(in_parallel));
         }
     }
 

@@ -103,8 +103,11 @@ pub fn find(
     if !(blocks.maximum > 0.0) {
         return Ok(None);
     }
-    let parts = parts(&blocks, monitor)?;
-    let grid = Coarse::new(volume, RAY_BLOCK, survey.minimum, has_nan);
+    let (parts, grid) = rayon::join(
+        || parts(&blocks, monitor),
+        || Coarse::new(volume, RAY_BLOCK, survey.minimum, has_nan),
+    );
+    let parts = parts?;
     let table = directions();
     let best = best_of(&grid, &table, &parts, monitor)?;
     if best.as_ref().is_some_and(|b| b.score >= DOUBTFUL) {

@@ -426,8 +426,8 @@ pub fn extract(
         .spacing()
         .into_iter()
         .fold(f64::INFINITY, f64::min);
-    let census = topology::check(&mesh)?;
-    let surface = finish(mesh, census, spacing, facts);
+    let (census, working) = rayon::join(|| topology::check(&mesh), || working_surface(&mesh));
+    let surface = finish(mesh, working, census?, spacing, facts);
     monitor.report(Stage::Surface, 1.0)?;
     Ok(surface)
 }
@@ -451,17 +451,28 @@ pub fn from_mesh(mesh: TriMesh, spacing: f64) -> Result<Surface, SurfaceError> {
         region_ml: mesh.volume() / 1000.0,
         ..SurfaceFacts::default()
     };
-    Ok(finish(mesh, census, spacing, facts))
+    let working = working_surface(&mesh);
+    Ok(finish(mesh, working, census, spacing, facts))
 }
 
-fn finish(mesh: TriMesh, census: Census, spacing: f64, mut facts: SurfaceFacts) -> Surface {
+fn working_surface(mesh: &TriMesh) -> Vec<Vec3> {
+    working::taubin(&mesh.vertices, &mesh.triangles, WORKING_PASSES)
+}
+
+fn finish(
+    mesh: TriMesh,
+    working: Vec<Vec3>,
+    census: Census,
+    spacing: f64,
+    mut facts: SurfaceFacts,
+) -> Surface {
     facts.euler_characteristic = census.euler_characteristic;
     facts.components = census.components;
     facts.genus = census.genus();
     facts.vertices = census.vertices;
     facts.triangles = census.triangles;
     Surface {
-        working: working::taubin(&mesh.vertices, &mesh.triangles, WORKING_PASSES),
+        working,
         mesh,
         spacing,
         facts,
@@ -887,11 +898,8 @@ fn reference_in_box(
 }
 
 fn otsu_in_box(volume: &Volume, origin: [usize; 3], extent: [usize; 3], survey: &Survey) -> f32 {
-    survey::otsu(
-        rows_in_box(volume, origin, extent),
-        survey.minimum,
-        survey.maximum,
-    )
+    let rows: Vec<&[f32]> = rows_in_box(volume, origin, extent).collect();
+    survey::otsu(&rows, survey.minimum, survey.maximum)
 }
 
 fn rows_in_box(

@@ -13,6 +13,8 @@
 
 use std::collections::BinaryHeap;
 
+use rayon::prelude::*;
+
 use super::components::Components;
 use super::labels::Labels;
 use super::left_ventricle::{Compass, Ventricle};
@@ -134,7 +136,7 @@ impl<'a> Wall<'a> {
         let values = &self.volume.voxels;
         let bright = Labels::threshold(values, self.volume.shape, self.origin, self.extent, level);
         let mut wall: Vec<f32> = bright
-            .voxels()
+            .par_voxels()
             .filter(|&p| {
                 let (depth, seen) = self.depth(p);
                 seen && depth.abs() <= WALL
@@ -160,16 +162,15 @@ impl<'a> Wall<'a> {
             Labels::threshold(values, self.volume.shape, self.origin, self.extent, iso);
         let components = Components::of_inside(&labels);
         monitor.check()?;
-        let zones: Vec<([usize; 3], Zone)> = labels.voxels().map(|p| (p, self.zone(p))).collect();
+        let zones: Vec<([usize; 3], Zone)> =
+            labels.par_voxels().map(|p| (p, self.zone(p))).collect();
         let mut core = vec![0usize; components.sizes.len()];
         let mut beyond = vec![0usize; components.sizes.len()];
-        for &(p, zone) in &zones {
-            if let Some(c) = components.containing(&labels, p) {
-                match zone {
-                    Zone::Core => core[c] += 1,
-                    Zone::Beyond => beyond[c] += 1,
-                    Zone::Between => {}
-                }
+        for (&(_, zone), c) in zones.iter().zip(components.of_voxels()) {
+            match zone {
+                Zone::Core => core[c] += 1,
+                Zone::Beyond => beyond[c] += 1,
+                Zone::Between => {}
             }
         }
         let Some(chosen) = (0..core.len()).rev().max_by_key(|&c| core[c]) else {

@@ -132,17 +132,24 @@ pub fn label_map(
 
 /// Otsu's threshold of the values in `rows` (IEEE SMC 1979), 256 bins between minimum and
 /// maximum.
-pub fn otsu<'a>(rows: impl Iterator<Item = &'a [f32]>, minimum: f32, maximum: f32) -> f32 {
+pub fn otsu(rows: &[&[f32]], minimum: f32, maximum: f32) -> f32 {
     const BINS: usize = 256;
     let (low, width) = (f64::from(minimum), f64::from(maximum) - f64::from(minimum));
     let scale = BINS as f64 / width;
-    let mut histogram = [0u64; BINS];
-    for row in rows {
-        for v in row.iter().filter(|v| v.is_finite()) {
-            let bin = ((f64::from(*v) - low) * scale) as usize;
-            histogram[bin.min(BINS - 1)] += 1;
+    let counted = |rows: &[&[f32]]| {
+        let mut histogram = [0u64; BINS];
+        for v in rows.iter().flat_map(|row| row.iter()) {
+            if v.is_finite() {
+                let bin = ((f64::from(*v) - low) * scale) as usize;
+                histogram[bin.min(BINS - 1)] += 1;
+            }
         }
-    }
+        histogram
+    };
+    let histogram = rows.par_chunks(256).map(counted).reduce(
+        || [0; BINS],
+        |a, b| std::array::from_fn(|bin| a[bin] + b[bin]),
+    );
     let total = histogram.iter().sum::<u64>() as f64;
     let weighted = |(bin, n): (usize, &u64)| bin as f64 * *n as f64;
     let all: f64 = histogram.iter().enumerate().map(weighted).sum();
@@ -219,7 +226,8 @@ mod tests {
         let values: Vec<f32> = (0..1000)
             .map(|n| if n % 4 == 0 { 9.0 } else { 1.0 } + (n % 10) as f32 * 0.05)
             .collect();
-        let level = otsu(values.chunks(100), 1.0, 9.45);
+        let rows: Vec<&[f32]> = values.chunks(100).collect();
+        let level = otsu(&rows, 1.0, 9.45);
         assert!((1.45..=9.0).contains(&level), "{level}");
     }
 }
