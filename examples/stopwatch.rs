@@ -1,0 +1,141 @@
+//! Times single steps on a volume that stays in memory, for `scripts/compare_peers.sh`.
+//!
+//! Reads one command a line from standard input and answers each with one line of JSON that
+//! holds `wall_ms` and what came out:
+//!
+//! ```text
+//! read PATH                  the volume of a file, kept for the commands that follow
+//! surface ISO                Marching Cubes over the whole volume at an absolute iso-value
+//! model POINTS SEED [ISO]    the whole way from the volume to the measured model
+//! ```
+//!
+//! Whoever asks can thus take turns with other programs and time both warm, and reads processor
+//! time and memory of this process from `/proc`.
+
+use anyhow::{Context, Result, bail};
+use serde_json::{Value, json};
+use std::io::{BufRead, Write};
+use std::time::Instant;
+use ventriform::parameters::ModelParameters;
+use ventriform::pipeline;
+use ventriform::progress::{CancelToken, Monitor, Observer, Stage};
+use ventriform::surface::IsoLevel;
+use ventriform::surface::labels::Labels;
+use ventriform::surface::marching_cubes::{Samples, marching_cubes};
+use ventriform::volume::{self, ReadLimits, ReadOptions, Reading, VolumeFile};
+
+fn main() -> Result<()> {
+    let clock = Clock(Instant::now());
+    let monitor = Monitor::new(&clock, CancelToken::new());
+    let mut reading = None;
+    for line in std::io::stdin().lock().lines() {
+        let line = line?;
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let answer = match words[..] {
+            ["read", path] => {
+                // The old volume goes first, or two would be held at once.
+                drop(reading.take());
+                let (kept, answer) = read(path, &monitor)?;
+                reading = Some(kept);
+                answer
+            }
+            ["surface", iso] => surface(kept(&reading)?, iso.parse()?, &monitor)?,
+            ["model", points, seed] => model(
+                kept(&reading)?,
+                points.parse()?,
+                seed.parse()?,
+                None,
+                &monitor,
+            )?,
+            ["model", points, seed, iso] => {
+                let iso = Some(iso.parse()?);
+                model(
+                    kept(&reading)?,
+                    points.parse()?,
+                    seed.parse()?,
+                    iso,
+                    &monitor,
+                )?
+            }
+            _ => bail!("`{line}` is no command"),
+        };
+        println!("{answer}");
+        std::io::stdout().flush()?;
+    }
+    Ok(())
+}
+
+fn kept(reading: &Option<Reading>) -> Result<&Reading> {
+    reading.as_ref().context("read a volume first")
+}
+
+fn read(path: &str, monitor: &Monitor) -> Result<(Reading, Value)> {
+    let files = [VolumeFile::at(path)];
+    let start = Instant::now();
+    let reading = volume::read(
+        &files,
+        &ReadOptions::default(),
+        &ReadLimits::default(),
+        monitor,
+    )?;
+    let wall_ms = since(start);
+    let shape = reading.volume.shape;
+    Ok((reading, json!({ "wall_ms": wall_ms, "shape": shape })))
+}
+
+fn surface(reading: &Reading, iso: f32, monitor: &Monitor) -> Result<Value> {
+    let volume = &reading.volume;
+    let start = Instant::now();
+    let labels = Labels::threshold(&volume.voxels, volume.shape, [0; 3], volume.shape, iso);
+    let samples = Samples {
+        values: &volume.voxels,
+        shape: volume.shape,
+        beyond: iso - reading.facts.intensity.maximum,
+    };
+    let mesh = marching_cubes(&labels, &samples, iso, &volume.frame, monitor)?;
+    Ok(json!({
+        "wall_ms": since(start),
+        "vertices": mesh.vertices.len(),
+        "triangles": mesh.triangles.len(),
+    }))
+}
+
+fn model(
+    reading: &Reading,
+    points: usize,
+    seed: u64,
+    iso: Option<f64>,
+    monitor: &Monitor,
+) -> Result<Value> {
+    let mut parameters = ModelParameters::default();
+    parameters.retile.points = points;
+    parameters.retile.seed = seed;
+    if let Some(iso) = iso {
+        parameters.surface.iso = IsoLevel::Absolute(iso);
+    }
+    let start = Instant::now();
+    let model = pipeline::from_reading(reading, &parameters, 0.0, monitor)?;
+    Ok(json!({
+        "wall_ms": since(start),
+        "stages_ms": model.report.timings_ms,
+        "triangles": model.report.surface.triangles,
+        "iso_value": model.report.surface.iso_value,
+        "radius_ratio_mean": model.report.shape.radius_ratio.mean,
+        "distance_mean_mm": model.report.distance.mean_mm,
+    }))
+}
+
+fn since(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1000.0
+}
+
+/// Lends the stages a clock for their timings.
+struct Clock(Instant);
+
+impl Observer for Clock {
+    fn progress(&self, _: Stage, _: f64) {}
+
+    fn now_ms(&self) -> f64 {
+        since(self.0)
+    }
+}

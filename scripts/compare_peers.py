@@ -1,0 +1,242 @@
+"""ventriform beside its peers: what scripts/compare_peers.sh runs."""
+import argparse
+import json
+import math
+import os
+import pathlib
+import subprocess
+import sys
+import time
+
+import nibabel
+import numpy
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent / "peers"))
+import plot
+from clock import Ours, in_turn, show, timed
+
+POINTS = 150
+# Sides of the volumes and numbers of points of the scaling plots; each volume spans 256 mm.
+SIDES = [64, 96, 128, 192, 256, 384, 512]
+COUNTS = [100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000]
+COUNTS_SIDE = 256
+
+
+class Bench:
+    def __init__(self, arguments):
+        self.a = arguments
+        self.work = arguments.work
+        self.ventriform = str(arguments.binaries / "ventriform")
+        self.stopwatch = str(arguments.binaries / "examples" / "stopwatch")
+
+    def phantom(self, side, spacing):
+        """Folder of a simulated scan; made once."""
+        folder = self.work / f"phantom-{side}-{spacing:g}"
+        if not (folder / "params.json").exists():
+            subprocess.run([self.ventriform, "phantom", "--size", str(side), "--spacing",
+                            str(spacing), "-o", str(folder)], check=True, capture_output=True)
+        return folder
+
+    def as_float(self, scan, name):
+        """The same scan as float32, as nibabel writes it."""
+        path = scan.parent / name
+        if not path.exists():
+            loaded = nibabel.load(scan)
+            voxels = numpy.asarray(loaded.dataobj, dtype=numpy.float32)
+            nibabel.save(nibabel.Nifti1Image(voxels, loaded.affine), path)
+        return path
+
+    def pin(self):
+        os.sched_setaffinity(0, {self.a.core})
+
+    def unpin(self):
+        os.sched_setaffinity(0, set(range(os.cpu_count())))
+
+    def keep(self, part, result):
+        about = {"measured": time.strftime("%Y-%m-%d"), "cores": os.cpu_count(),
+                 "load": os.getloadavg()[0], "results": result}
+        (self.work / f"{part}.json").write_text(json.dumps(about, indent=1) + "\n")
+
+    # ------------------------------------------------------------------ parts
+    def speed(self):
+        """Marching Cubes alone, and the way from voxels to 150 points."""
+        import others
+        self.pin()
+        remeshers = {name: others.Remesher(str(self.work / f"{name}.so"))
+                     for name in ("geogram", "cgal") if (self.work / f"{name}.so").exists()}
+        result = {}
+        for spacing in (3.2, 2.0):
+            folder = self.phantom(128, spacing)
+            ours = Ours(self.stopwatch)
+            ours.ask("read", folder / "spect.nii.gz")
+            iso = ours.ask("model", POINTS, 1)["iso_value"]
+            loaded = nibabel.load(folder / "spect.nii.gz")
+            voxels = numpy.asarray(loaded.dataobj, dtype=numpy.float32)
+            whole = others.image(voxels, [spacing] * 3)
+            name = f"Marching Cubes, 128^3 voxels of {spacing} mm"
+            result[name] = in_turn({
+                "ventriform": ours.turn("surface", iso),
+                "vtkFlyingEdges3D": timed(lambda: others.flying_edges(whole, iso)),
+            }, 3 * self.a.rounds)
+            show(name, result[name])
+            # The peers have nothing that finds the heart: they get a volume in which all else was
+            # painted out, and are not charged for that. ventriform gets the whole volume.
+            heart = nibabel.load(folder / "lv_truth.nii.gz")
+            near = numpy.asarray(heart.dataobj) > 0
+            for _ in range(round(8 / spacing)):
+                near = dilated(near)
+            alone = others.image(numpy.where(near, voxels, 0).astype(numpy.float32), [spacing] * 3)
+            edge = self.edge_for(remeshers.get("cgal"), others, alone, iso)
+
+            def then(remesh, target):
+                return timed(lambda: remesh(others.flying_edges(alone, iso), target))
+
+            contestants = {
+                "ventriform": ours.turn("model", POINTS, lambda number: number),
+                "vtkFlyingEdges3D + pyacvd": then(others.acvd, POINTS),
+            }
+            if "geogram" in remeshers:
+                contestants["vtkFlyingEdges3D + Geogram"] = then(remeshers["geogram"], POINTS)
+            if "cgal" in remeshers:
+                contestants["vtkFlyingEdges3D + CGAL"] = then(remeshers["cgal"], edge)
+            name = f"Volume in memory to {POINTS} points, 128^3 voxels of {spacing} mm"
+            result[name] = in_turn(contestants, self.a.rounds)
+            show(name, result[name])
+            ours.close()
+        self.unpin()
+        self.keep("speed", result)
+
+    def edge_for(self, cgal, others, data, iso):
+        """CGAL takes an edge length: the one that gives about POINTS points, found untimed."""
+        if cgal is None:
+            return None
+        surface = others.flying_edges(data, iso)
+        edge = math.sqrt(4 / math.sqrt(3) * others.area(surface) / (2 * POINTS))
+        for _ in range(8):
+            edge *= math.sqrt(cgal(surface, edge) / POINTS)
+        return edge
+
+    def reading(self):
+        """A compressed volume from the page cache to float32 in memory."""
+        self.pin()
+        scan = self.phantom(128, 3.2) / "spect.nii.gz"
+        result = {}
+        for name, path in {"int16": scan, "float32": self.as_float(scan, "float.nii.gz")}.items():
+            ours = Ours(self.stopwatch)
+            title = f"Reading .nii.gz, 128^3 {name}"
+            result[title] = in_turn({
+                "ventriform": ours.turn("read", path),
+                "nibabel": timed(
+                    lambda: numpy.asarray(nibabel.load(path).dataobj, dtype=numpy.float32)),
+            }, 2 * self.a.rounds)
+            show(title, result[title])
+            ours.close()
+        self.unpin()
+        self.keep("reading", result)
+
+    def threads(self):
+        """Two threads against one, nothing pinned. Meaningful on an idle machine alone."""
+        result = {}
+        for side, points in ((128, 150), (256, 1000), (256, 10_000)):
+            scan = self.phantom(side, 256 / side) / "spect.nii.gz"
+            workers = {n: Ours(self.stopwatch, n) for n in (2, 1)}
+            for worker in workers.values():
+                worker.ask("read", scan)
+            title = f"Volume in memory to {points} points, {side}^3"
+            result[title] = in_turn({
+                f"{n} thread{'s' * (n > 1)}": worker.turn("model", points, 1)
+                for n, worker in workers.items()}, self.a.rounds)
+            show(title, result[title])
+            for worker in workers.values():
+                worker.close()
+        self.keep("threads", result)
+
+    def memory(self):
+        """Peak memory of the whole command against the size of the volume as float32."""
+        result = {}
+        print(f"\n{'Peak memory, ventriform generate':34} {'MiB':>9} {'volume':>9} {'ratio':>7}")
+        for side in (128, 256, 512):
+            scan = self.phantom(side, 256 / side) / "spect.nii.gz"
+            for path in (scan, self.as_float(scan, "float.nii")):
+                process = subprocess.Popen([self.ventriform, "generate", str(path), "--quiet", "-o",
+                                            str(self.work / "model.ply")])
+                _, status, usage = os.wait4(process.pid, 0)
+                if status != 0:
+                    raise RuntimeError(f"no model of {path}")
+                peak, volume = usage.ru_maxrss / 1024, 4 * side**3 / 2**20
+                title = f"{side}^3 {path.name}"
+                result[title] = {"peak_mib": peak, "volume_mib": volume, "ratio": peak / volume}
+                print(f"  {title:32} {peak:9.0f} {volume:9.0f} {peak / volume:7.2f}", flush=True)
+        self.keep("memory", result)
+
+    def scaling(self):
+        """Cost against the size of the surface and the number of points."""
+        self.pin()
+        by_surface = [self.cost(side, POINTS) for side in SIDES]
+        by_points = [self.cost(COUNTS_SIDE, points) for points in COUNTS]
+        self.unpin()
+        self.keep("scaling", {"by_surface": by_surface, "by_points": by_points})
+        for rows, key, axis, name in (
+            (by_surface, "triangles", "triangles of the iso-surface", "surface"),
+            (by_points, "points", "points N", "points"),
+        ):
+            plot.loglog(
+                self.a.docs / f"scaling-{name}.svg",
+                title=f"Cost against {axis}",
+                axes=(axis, "processor time, ms"),
+                series={stage: [(r[key], r["stages_cpu_ms"][stage]) for r in rows]
+                        for stage in ("total", "surface", "retile", "optimise", "report")})
+            print(f"\nCost against {axis}: cpu ms, growth exponent from the row before")
+            for before, row in zip([None, *rows], rows):
+                exponent = "" if before is None else growth(before, row, key)
+                stages = "  ".join(f"{s} {t:.0f}" for s, t in row["stages_cpu_ms"].items())
+                print(f"  {row[key]:9} {exponent:>6}  {stages}")
+
+    def cost(self, side, points):
+        """Processor time of every stage: the stage's share of the wall time of the median run."""
+        ours = Ours(self.stopwatch)
+        ours.ask("read", self.phantom(side, 256 / side) / "spect.nii.gz")
+        runs = sorted((ours.ask("model", points, seed) for seed in (1, 2, 3)),
+                      key=lambda answer: answer["cpu_ms"])
+        ours.close()
+        median = runs[1]
+        walls = {stage: ms for stage, ms in median["stages_ms"].items() if stage != "read"}
+        share = median["cpu_ms"] / walls["total"]
+        print(f"  {side}^3, {points} points: {median['cpu_ms']:.0f} ms", flush=True)
+        return {"side": side, "points": points, "triangles": median["triangles"],
+                "stages_cpu_ms": {stage: ms * share for stage, ms in walls.items()}}
+
+
+def dilated(mask):
+    """The mask and its six neighbours."""
+    out = mask.copy()
+    for axis in range(3):
+        out |= numpy.roll(mask, 1, axis) | numpy.roll(mask, -1, axis)
+    return out
+
+
+def growth(before, row, key):
+    cost = row["stages_cpu_ms"]["total"] / before["stages_cpu_ms"]["total"]
+    return f"{math.log(cost) / math.log(row[key] / before[key]):.2f}"
+
+
+def main():
+    parts = ["speed", "reading", "threads", "memory", "scaling"]
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("parts", nargs="*", metavar="PART", help=" ".join(parts))
+    parser.add_argument("--work", type=pathlib.Path, required=True)
+    parser.add_argument("--docs", type=pathlib.Path, required=True)
+    parser.add_argument("--binaries", type=pathlib.Path, required=True)
+    parser.add_argument("--rounds", type=int, default=15)
+    parser.add_argument("--core", type=int, default=os.cpu_count() - 1)
+    arguments = parser.parse_args()
+    unknown = set(arguments.parts) - set(parts)
+    if unknown:
+        parser.error(f"no such part: {', '.join(sorted(unknown))}")
+    bench = Bench(arguments)
+    for part in arguments.parts or parts:
+        getattr(bench, part)()
+
+
+if __name__ == "__main__":
+    main()

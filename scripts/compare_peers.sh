@@ -1,0 +1,44 @@
+#!/usr/bin/env bash
+# Times ventriform beside the tools that people would use instead, on one core and in turn.
+#
+#   scripts/compare_peers.sh [PART...]     PART: speed reading threads memory scaling (default: all)
+#
+# Prints tables and writes target/compare-peers/PART.json; `scaling` also writes docs/scaling-*.svg.
+# Under target/compare-peers it installs the peers' Python packages and builds those in C++ for
+# which the machine has the headers (Geogram comes with its wheel; CGAL: libcgal-dev).
+#
+# PYTHON: an interpreter that has the packages already. ROUNDS: turns of each contestant (15).
+# CORE: the core to run on (the last one).
+set -euo pipefail
+cd "$(dirname "$0")/.."
+work=$PWD/target/compare-peers
+mkdir -p "$work"
+
+if [ -z "${PYTHON:-}" ]; then
+    PYTHON=$work/venv/bin/python
+    [ -x "$PYTHON" ] || python3 -m venv "$work/venv"
+    "$PYTHON" -c 'import geogram, nibabel, pyacvd' 2>/dev/null ||
+        "$PYTHON" -m pip install --quiet --disable-pip-version-check \
+            numpy nibabel vtk pyvista pyacvd geogram
+fi
+
+cpp() { # cpp NAME FLAGS...: builds scripts/peers/NAME.cpp where that is possible
+    local name=$1
+    shift
+    [ "$work/$name.so" -nt "scripts/peers/$name.cpp" ] && return
+    g++ -O3 -march=native -DNDEBUG -std=c++17 -fPIC -shared "scripts/peers/$name.cpp" \
+        -o "$work/$name.so" "$@" -Wl,--no-undefined 2>"$work/$name.log" ||
+        echo "$name is left out: it does not build here (see $work/$name.log)"
+}
+site=$("$PYTHON" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
+if [ -e "$site/lib64/libgeogram.a" ]; then
+    tbb=$(basename "$site"/geogram.libs/libtbb*)
+    cpp geogram -fopenmp -I"$site/include/geogram1" "$site/lib64/libgeogram.a" \
+        -L"$site/geogram.libs" "-l:$tbb" -Wl,-rpath,"$site/geogram.libs" -lpthread -ldl
+fi
+[ -d /usr/include/CGAL ] && cpp cgal -I/usr/include/eigen3 -lgmp -lmpfr
+
+cargo build --release --quiet --bin ventriform --example stopwatch
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 VTK_SMP_MAX_THREADS=1
+exec "$PYTHON" scripts/compare_peers.py --work "$work" --docs docs \
+    --binaries "${CARGO_TARGET_DIR:-target}/release" --rounds "${ROUNDS:-15}" ${CORE:+--core "$CORE"} "$@"

@@ -1,0 +1,94 @@
+"""Taking turns on one core, and what each turn cost.
+
+A contestant is a function of the round's number that does its work once and returns
+(wall ms, processor ms). All run warm, one after the other, round after round, so that whatever else
+the machine does meets all of them alike; ratios are taken within a round and their median reported.
+"""
+import json
+import os
+import statistics
+import subprocess
+import time
+
+
+class Ours:
+    """The example `stopwatch` as a long-lived process; see examples/stopwatch.rs."""
+
+    def __init__(self, binary, threads=1):
+        environment = dict(os.environ, RAYON_NUM_THREADS=str(threads))
+        self.process = subprocess.Popen(
+            [binary], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment)
+
+    def ask(self, *words):
+        """The answer to a command, with `cpu_ms` of all its threads."""
+        before = self.cpu_ms()
+        self.process.stdin.write(" ".join(str(w) for w in words) + "\n")
+        self.process.stdin.flush()
+        line = self.process.stdout.readline()
+        if not line:
+            raise RuntimeError(f"stopwatch ended at `{' '.join(map(str, words))}`")
+        answer = json.loads(line)
+        answer["cpu_ms"] = self.cpu_ms() - before
+        return answer
+
+    def cpu_ms(self):
+        """Processor time of every thread since it began, ms (getrusage counts in ticks)."""
+        tasks = f"/proc/{self.process.pid}/task"
+        total = 0
+        for task in os.listdir(tasks):
+            with open(f"{tasks}/{task}/schedstat") as file:
+                total += int(file.read().split()[0])
+        return total / 1e6
+
+    def turn(self, *words):
+        """A contestant: `words` may hold functions of the round's number."""
+        def run(number):
+            asked = [w(number) if callable(w) else w for w in words]
+            answer = self.ask(*asked)
+            return answer["wall_ms"], answer["cpu_ms"]
+        return run
+
+    def close(self):
+        self.process.stdin.close()
+        self.process.wait()
+
+
+def timed(work):
+    """A contestant out of a Python function without arguments."""
+    def run(_):
+        wall, cpu = time.perf_counter(), time.process_time()
+        work()
+        return 1e3 * (time.perf_counter() - wall), 1e3 * (time.process_time() - cpu)
+    return run
+
+
+def in_turn(contestants, rounds):
+    """Medians of each contestant and, against the first one, median ratios within a round."""
+    for run in contestants.values():
+        run(0)
+    seen = {name: [] for name in contestants}
+    for number in range(1, rounds + 1):
+        for name, run in contestants.items():
+            seen[name].append(run(number))
+    first = next(iter(contestants))
+    result = {}
+    for name, times in seen.items():
+        wall, cpu = zip(*times)
+        result[name] = {
+            "runs": rounds,
+            "wall_ms": statistics.median(wall),
+            "wall_ms_least": min(wall),
+            "cpu_ms": statistics.median(cpu),
+            "wall_ratio": statistics.median(t[0] / o[0] for t, o in zip(times, seen[first])),
+            "cpu_ratio": statistics.median(t[1] / o[1] for t, o in zip(times, seen[first])),
+        }
+    return result
+
+
+def show(title, result):
+    """Prints the contestants as a table."""
+    print(f"\n{title}")
+    print(f"  {'':34} {'wall ms':>9} {'least':>9} {'cpu ms':>9} {'ratio':>7} {'by cpu':>7}")
+    for name, r in result.items():
+        print(f"  {name:34} {r['wall_ms']:9.2f} {r['wall_ms_least']:9.2f} {r['cpu_ms']:9.2f}"
+              f" {r['wall_ratio']:7.2f} {r['cpu_ratio']:7.2f}", flush=True)

@@ -1,0 +1,70 @@
+"""The programs that users would pick instead, each as a function over what they have in memory."""
+import ctypes
+
+import numpy
+import pyacvd
+import pyvista
+import vtk
+from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+
+
+def image(voxels, spacing):
+    """A volume (i fastest) as VTK holds it."""
+    data = vtk.vtkImageData()
+    data.SetDimensions(*voxels.shape)
+    data.SetSpacing(*spacing)
+    flat = numpy_to_vtk(voxels.ravel(order="F"), deep=1)
+    data.GetPointData().SetScalars(flat)
+    return data
+
+
+def flying_edges(data, iso):
+    """vtkFlyingEdges3D without normals and gradients, the fastest it can be asked for."""
+    contour = vtk.vtkFlyingEdges3D()
+    contour.SetInputData(data)
+    contour.SetValue(0, iso)
+    contour.ComputeNormalsOff()
+    contour.ComputeGradientsOff()
+    contour.ComputeScalarsOff()
+    contour.Update()
+    return contour.GetOutput()
+
+
+def acvd(surface, points):
+    """pyacvd on the surface subdivided twice, as its documentation advises for few points."""
+    clustering = pyacvd.Clustering(pyvista.wrap(surface))
+    clustering.subdivide(2)
+    clustering.cluster(points)
+    return clustering.create_mesh()
+
+
+def arrays(surface):
+    """Vertices and triangles as the C++ libraries take them."""
+    vertices = vtk_to_numpy(surface.GetPoints().GetData()).astype(numpy.float64)
+    triangles = vtk_to_numpy(surface.GetPolys().GetConnectivityArray())
+    return vertices, triangles.reshape(-1, 3).astype(numpy.int32)
+
+
+def area(surface):
+    """Area of the surface, mm²."""
+    vertices, triangles = arrays(surface)
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    return numpy.linalg.norm(numpy.cross(b - a, c - a), axis=1).sum() / 2
+
+
+class Remesher:
+    """A library of scripts/peers/*.cpp: `int remesh(V, nv, F, nf, target)` returns the vertices."""
+
+    def __init__(self, library):
+        self.call = ctypes.CDLL(library).remesh
+        self.call.restype = ctypes.c_int64
+
+    def __call__(self, surface, target):
+        vertices, triangles = arrays(surface)
+        made = self.call(
+            vertices.ctypes.data_as(ctypes.c_void_p), ctypes.c_int64(len(vertices)),
+            triangles.ctypes.data_as(ctypes.c_void_p), ctypes.c_int64(len(triangles)),
+            ctypes.c_double(target))
+        if made <= 0:
+            raise RuntimeError("the peer made no mesh")
+        return made
