@@ -12,6 +12,7 @@
 
 use rayon::prelude::*;
 use serde::Serialize;
+use std::collections::VecDeque;
 
 use super::summary::Summary;
 use crate::geometry::bvh::{Bvh, Closest};
@@ -26,6 +27,9 @@ const CHUNK: usize = 8192;
 const TOLERANCE: f64 = 0.01;
 /// Most queries for a largest distance, in units of the even samples.
 const MOST_REFINED: usize = 40;
+
+/// Triangles that are tried before the tree: the sheets of a wall that a row of voxels meets.
+const RECENT: usize = 6;
 
 /// How far model and surface lie apart.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -154,7 +158,7 @@ fn farthest(
     budget: usize,
     monitor: &Monitor,
 ) -> Result<(f64, Option<f64>), Cancelled> {
-    let corners = closest_points(&from.vertices, tree, monitor)?;
+    let corners = close_points(&from.vertices, (to, tree), found, monitor)?;
     let distance = |c: &Closest| c.squared_distance.sqrt();
     let mut best = corners.iter().map(distance).fold(found, f64::max);
     let mut spent = corners.len();
@@ -234,6 +238,53 @@ fn closest_points(points: &[Vec3], to: &Bvh, monitor: &Monitor) -> Result<Vec<Cl
         closest.par_extend(found.filter_map(|p| to.closest(p)));
     }
     Ok(closest)
+}
+
+/// For each point, in order, the closest point of `to`; or, where one of the triangles that
+/// were closest to points just before is no farther than `near`, the closest point of that one,
+/// which is found much faster.
+fn close_points(
+    points: &[Vec3],
+    (to, tree): (&TriMesh, &Bvh),
+    near: f64,
+    monitor: &Monitor,
+) -> Result<Vec<Closest>, Cancelled> {
+    let look = |points: &[Vec3]| -> Vec<Closest> {
+        let mut recent: VecDeque<u32> = VecDeque::with_capacity(RECENT);
+        let find = |p: &Vec3| {
+            let known = recent.iter().map(|&t| closest_on(to, t, p));
+            let mut known = known.filter(|c| c.squared_distance <= near * near);
+            if let Some(found) = known.next() {
+                return Some(found);
+            }
+            let found = tree.closest(p)?;
+            recent.truncate(RECENT - 1);
+            recent.push_front(found.triangle);
+            Some(found)
+        };
+        points.iter().filter_map(find).collect()
+    };
+    let mut closest = Vec::with_capacity(points.len());
+    for block in points.chunks(CHUNK) {
+        monitor.check()?;
+        let parts: Vec<Vec<Closest>> = block.par_chunks(256).map(look).collect();
+        closest.extend(parts.into_iter().flatten());
+    }
+    Ok(closest)
+}
+
+/// The point of triangle `t` closest to `p`.
+fn closest_on(mesh: &TriMesh, t: u32, p: &Vec3) -> Closest {
+    let [a, b, c] = mesh.corners(t as usize);
+    let barycentric = triangle::closest_barycentric(p, &a, &b, &c);
+    let [u, v, w] = barycentric;
+    let point = a * u + b * v + c * w;
+    Closest {
+        triangle: t,
+        barycentric,
+        point,
+        squared_distance: (point - p).norm_squared(),
+    }
 }
 
 /// `count` points spread evenly over the area: one in each of `count` equal shares of it, in
