@@ -5,6 +5,7 @@
 
 use std::borrow::Cow;
 
+use super::survey::Survey;
 use crate::geometry::Vec3;
 use crate::volume::Volume;
 
@@ -27,19 +28,20 @@ pub struct Coarse<'a> {
 }
 
 impl<'a> Coarse<'a> {
-    /// Averages `volume` to blocks of at most `size` mm, or of one voxel where that is larger;
-    /// `minimum` stands in for what is not finite.
-    pub fn new(volume: &'a Volume, size: f64, minimum: f32, has_nan: bool) -> Self {
+    /// Averages `volume` to blocks of at most `size` mm, or of one voxel where that is larger; the
+    /// minimum that `survey` found stands in for what is not finite.
+    pub fn new(volume: &'a Volume, size: f64, survey: &Survey) -> Self {
         let fine = volume.frame.spacing();
         let factor = [0, 1, 2].map(|r| ((size / fine[r]) as usize).clamp(1, volume.shape[r]));
         let shape = [0, 1, 2].map(|r| volume.shape[r] / factor[r]);
         let spacing = [0, 1, 2].map(|r| fine[r] * factor[r] as f64);
-        let values: Cow<[f32]> = if factor == [1; 3] && !has_nan {
-            Cow::Borrowed(&volume.voxels)
+        let (values, maximum): (Cow<[f32]>, f32) = if factor == [1; 3] && survey.not_finite == 0 {
+            (Cow::Borrowed(&volume.voxels), survey.maximum)
         } else {
-            Cow::Owned(block_means(volume, shape, factor, minimum))
+            let means = block_means(volume, shape, factor, survey.minimum);
+            let maximum = means.iter().copied().fold(survey.minimum, f32::max);
+            (Cow::Owned(means), maximum)
         };
-        let maximum = values.iter().copied().fold(minimum, f32::max);
         Self {
             values,
             shape,

@@ -98,14 +98,13 @@ pub fn find(
     survey: &Survey,
     monitor: &Monitor,
 ) -> Result<Option<Ventricle>, Cancelled> {
-    let has_nan = survey.not_finite > 0;
-    let blocks = Coarse::new(volume, PART_BLOCK, survey.minimum, has_nan);
+    let blocks = Coarse::new(volume, PART_BLOCK, survey);
     if !(blocks.maximum > 0.0) {
         return Ok(None);
     }
     let (parts, grid) = rayon::join(
         || parts(&blocks, monitor),
-        || Coarse::new(volume, RAY_BLOCK, survey.minimum, has_nan),
+        || Coarse::new(volume, RAY_BLOCK, survey),
     );
     let parts = parts?;
     let table = directions();

@@ -64,18 +64,25 @@ fn range(values: &[f32]) -> (f32, f32, usize) {
     let (mut minimum, mut maximum) = (f32::INFINITY, f32::NEG_INFINITY);
     let mut not_finite = 0;
     for chunk in values.chunks(1 << 10) {
-        // Branchless, so that it vectorises; 0 · NaN and 0 · ∞ are NaN and stay.
-        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-        let mut sums = [0f32; 8];
-        for eight in chunk.chunks(8) {
-            for (sum, &v) in sums.iter_mut().zip(eight) {
-                *sum += v * 0.0;
+        // Branchless and in lanes, so that it vectorises; 0 · NaN and 0 · ∞ are NaN and stay.
+        const LANES: usize = 16;
+        let mut lows = [f32::INFINITY; LANES];
+        let mut highs = [f32::NEG_INFINITY; LANES];
+        let mut sums = [0f32; LANES];
+        let (groups, rest) = chunk.as_chunks::<LANES>();
+        // What does not fill the lanes is looked at twice.
+        let mut last = [chunk[0]; LANES];
+        last[..rest.len()].copy_from_slice(rest);
+        for group in groups.iter().chain([&last]) {
+            for l in 0..LANES {
+                let v = group[l];
+                lows[l] = if v < lows[l] { v } else { lows[l] };
+                highs[l] = if v > highs[l] { v } else { highs[l] };
+                sums[l] += v * 0.0;
             }
         }
-        for &v in chunk {
-            low = if v < low { v } else { low };
-            high = if v > high { v } else { high };
-        }
+        let mut low = lows.into_iter().fold(f32::INFINITY, f32::min);
+        let mut high = highs.into_iter().fold(f32::NEG_INFINITY, f32::max);
         if sums.iter().any(|s| s.is_nan()) {
             (low, high) = (f32::INFINITY, f32::NEG_INFINITY);
             for &v in chunk {
