@@ -14,7 +14,7 @@ use crate::geometry::Vec3;
 use crate::geometry::triangle::area_normal;
 
 /// Triangles in one parallel task, and most tasks: each task sums up all cells.
-const LEAST_CHUNK: usize = 8192;
+const LEAST_CHUNK: usize = 2048;
 const MOST_CHUNKS: usize = 8;
 
 /// Moment (mass times place) and mass.
@@ -58,7 +58,7 @@ impl<'a> Patches<'a> {
         let moments = samples
             .triangles
             .par_iter()
-            .with_min_len(LEAST_CHUNK / 4)
+            .with_min_len(LEAST_CHUNK)
             .map(|t| {
                 let [a, b, c] = t.map(|v| samples.working[v as usize]);
                 let mass =
