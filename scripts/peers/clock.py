@@ -40,6 +40,12 @@ class Ours:
                 total += int(file.read().split()[0])
         return total / 1e6
 
+    def peak_mib(self):
+        """The most memory it ever held, MiB."""
+        with open(f"/proc/{self.process.pid}/status") as file:
+            line = next(line for line in file if line.startswith("VmHWM"))
+        return int(line.split()[1]) / 1024
+
     def turn(self, *words):
         """A contestant: `words` may hold functions of the round's number."""
         def run(number):

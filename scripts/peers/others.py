@@ -1,11 +1,15 @@
 """The programs that users would pick instead, each as a function over what they have in memory."""
 import ctypes
+import warnings
 
 import numpy
 import pyacvd
 import pyvista
 import vtk
 from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+
+# pyacvd 0.4 still asks pyvista for a name that the latter gave up.
+warnings.filterwarnings("ignore", category=Warning, module="pyacvd")
 
 
 def image(voxels, spacing):
