@@ -290,10 +290,10 @@ fn pictures(out: &mut String, evaluation: &Evaluation) {
         Gold::Expert.file()
     );
     for picture in &evaluation.pictures {
-        let _ = write!(
+        let _ = writeln!(
             out,
             "<figure><img alt=\"Slices of {case}\" width=\"{}\" src=\"data:image/png;base64,{}\">\
-             <figcaption>{}</figcaption></figure>\n",
+             <figcaption>{}</figcaption></figure>",
             3 * slices::SIDE + 8,
             BASE64.encode(&picture.png),
             escape(&picture.caption),

@@ -242,7 +242,7 @@ pub fn kinds(rows: &[Row]) -> Vec<Kind> {
 }
 
 #[cfg(test)]
-pub mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// A row with E_CD = 1 - E_J against both gold standards; lost without an E_J.

@@ -149,8 +149,11 @@ pub struct Line {
     pub case: String,
 }
 
+/// What a line of Table 1 holds: a cell for each kind of model, where there is one.
+pub type Cells = Vec<(Kind, Option<Cell>)>;
+
 /// Table 1: for every template and for all of them, each patient and the mean over all.
-pub fn table1(rows: &[Row], gold: Gold) -> Vec<(Line, Vec<(Kind, Option<Cell>)>)> {
+pub fn table1(rows: &[Row], gold: Gold) -> Vec<(Line, Cells)> {
     let kinds = rows::kinds(rows);
     let cases = rows::distinct(rows, |r| r.case.clone());
     let mut templates = vec![None];
