@@ -183,6 +183,25 @@ impl Cup {
             hollowness: 1.0 - cavity.value() / wall,
         }
     }
+
+    /// How bright it is across the base, wall = 1: the brightest of the discs about the axis
+    /// from 0.3 of the length behind the base plane to 0.2 before it. A ventricle is open
+    /// there (blood, atrium, lung); a stomach, a skull or a ball is closed.
+    pub fn lid(&self, field: &Field, wall: f64) -> f64 {
+        let (e1, e2) = perpendicular(&self.axis);
+        let disc = |along: f64| {
+            let centre = self.base() + self.axis * (along * self.length);
+            let ring = (0..6).map(|n| {
+                let (sin, cos) = (TAU * f64::from(n) / 6.0).sin_cos();
+                field.at(&(centre + (e1 * cos + e2 * sin) * (0.12 * self.length)))
+            });
+            (field.at(&centre) + ring.sum::<f64>()) / 7.0
+        };
+        let brightest = (-6..=4)
+            .map(|n| disc(0.05 * f64::from(n)))
+            .fold(f64::NEG_INFINITY, f64::max);
+        brightest / wall
+    }
 }
 
 /// A weighted mean on the way.

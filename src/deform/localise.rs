@@ -8,7 +8,8 @@
 //! Correlation does not care how hot a structure is, so liver, gut or gallbladder win only
 //! if they look like a cup. Two weak priors break ties: the long axis of the human heart in
 //! the patient (left, anterior, inferior; at most 0.06 of correlation for each right angle
-//! away from it) and the length of the heart. [`Localisation::confidence`] weighs the
+//! away from it) and the length of the heart. Candidates that are closed at the base (stomach,
+//! skull) are passed over. [`Localisation::confidence`] weighs the
 //! correlation itself and its margin over the best candidate elsewhere.
 
 use super::cup::{Cup, Moments, Pattern, perpendicular};
@@ -47,6 +48,41 @@ pub struct Localisation {
     pub confidence: f64,
 }
 
+/// What speaks against a candidate.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum NotAHeart {
+    /// The image does not look like a cup there.
+    #[error("correlates {correlation:.2} with a ventricle's wall ({NEEDED:.2} is needed)")]
+    Unlike {
+        /// Correlation with a cup.
+        correlation: f64,
+    },
+    /// It has no cavity.
+    #[error("is hollow by {hollowness:.2} ({SOLID:.2} is needed)")]
+    Solid {
+        /// 1 - cavity / wall.
+        hollowness: f64,
+    },
+    /// It is closed at the base.
+    #[error("is closed at the base: {lid:.2} of the wall's value there (at most {CLOSED:.2})")]
+    Closed {
+        /// Value across the base, wall = 1.
+        lid: f64,
+    },
+    /// The fitted model found no wall.
+    #[error(
+        "has no wall: {:.0} % of the fitted surface see an edge, {residual:.1} mm from it in \
+         the mean",
+        100.0 * active
+    )]
+    Edgeless {
+        /// Share of the fitted model's area that sees an edge.
+        active: f64,
+        /// Weighted rms distance of those edges, mm.
+        residual: f64,
+    },
+}
+
 /// Why no ventricle was found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LocaliseError {
@@ -55,19 +91,15 @@ pub enum LocaliseError {
     Blank,
     /// No place looks like a ventricle.
     #[error(
-        "no heart found: the best candidate, at {centre:.0?} mm (LPS), correlates \
-         {correlation:.2} with a ventricle's wall ({needed:.2} is needed) and is hollow by \
-         {hollowness:.2} (0.2 is needed). Give a centre to overrule"
+        "no heart found: the best candidate, at {centre:.0?} mm (LPS), {reason}. Give a centre to overrule"
     )]
     NoHeart {
         /// Best candidate's centre, LPS mm.
         centre: [f64; 3],
-        /// Its correlation.
+        /// Its correlation with a ventricle.
         correlation: f64,
-        /// The least correlation that is believed.
-        needed: f64,
-        /// 1 - cavity / wall.
-        hollowness: f64,
+        /// What speaks against it.
+        reason: NotAHeart,
     },
     /// The hints leave no place to search.
     #[error("the hinted centre or region lies outside the volume")]
@@ -101,6 +133,10 @@ const DISTINCT: f64 = 25.0;
 const NEEDED: f64 = 0.6;
 /// Below this hollowness a body counts as solid. Hearts: 0.45 to 0.76; the others: 0.08 to 0.15.
 const SOLID: f64 = 0.2;
+/// Above this share of the wall's value the base counts as closed. Hearts: 0.2 to 0.7 (the
+/// latter in a scan with a background of half the heart's uptake); spherical shells, brains
+/// and stomachs: 1.0 and more.
+const CLOSED: f64 = 0.85;
 
 /// Searches `volume` for the left ventricle.
 ///
@@ -166,6 +202,20 @@ struct Scored {
     correlation: f64,
     wall: f64,
     hollowness: f64,
+}
+
+impl Scored {
+    /// What speaks against a ventricle, of what the cup itself shows.
+    fn doubt(&self) -> Option<NotAHeart> {
+        let (correlation, hollowness) = (self.correlation, self.hollowness);
+        if correlation < NEEDED {
+            Some(NotAHeart::Unlike { correlation })
+        } else if hollowness < SOLID {
+            Some(NotAHeart::Solid { hollowness })
+        } else {
+            None
+        }
+    }
 }
 
 struct Search<'a> {
@@ -249,20 +299,31 @@ impl Search<'_> {
     }
 
     fn conclude(&self, found: &[Scored]) -> Result<Localisation, LocaliseError> {
-        let Some(best) = found.first() else {
+        let Some(first) = found.first() else {
             return Err(LocaliseError::HintOutside);
         };
-        if (best.correlation < NEEDED || best.hollowness < SOLID) && self.hints.centre.is_none() {
+        let overruled = self.hints.centre.is_some();
+        let open = |s: &&Scored| overruled || s.cup.lid(self.field, s.wall) <= CLOSED;
+        let best = found.iter().find(open);
+        if let Some(reason) = best.map_or_else(
+            || {
+                let lid = first.cup.lid(self.field, first.wall);
+                Some(NotAHeart::Closed { lid })
+            },
+            |best| best.doubt().filter(|_| !overruled),
+        ) {
+            let candidate = best.unwrap_or(first);
             return Err(LocaliseError::NoHeart {
-                centre: best.cup.centre.into(),
-                correlation: best.correlation,
-                needed: NEEDED,
-                hollowness: best.hollowness,
+                centre: candidate.cup.centre.into(),
+                correlation: candidate.correlation,
+                reason,
             });
         }
+        let best = best.unwrap_or(first);
         let elsewhere = found
             .iter()
-            .find(|s| (s.cup.centre - best.cup.centre).norm() > DISTINCT);
+            .filter(|s| (s.cup.centre - best.cup.centre).norm() > DISTINCT)
+            .find(open);
         Ok(self.report(best, elsewhere))
     }
 
