@@ -36,13 +36,13 @@ use crate::mesh::TriMesh;
 /// Stiffness of each kind of force.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stiffness {
-    /// k_s, mm². Default 5.
+    /// k_s, mm². Default 2.5.
     pub spring: f64,
-    /// k_t, mm². Default 15.
+    /// k_t, mm². Default 7.5.
     pub torsion: f64,
-    /// k_b, mm². Default 12.
+    /// k_b, mm². Default 6.
     pub body: f64,
-    /// k_w. Default 0.1.
+    /// k_w. Default 0.02.
     pub thickness: f64,
     /// k_p. Default 0: no support springs.
     pub support: f64,
@@ -69,10 +69,10 @@ const SUPPORT_NODES: f64 = 150.0;
 impl Default for Stiffness {
     fn default() -> Self {
         Self {
-            spring: 5.0,
-            torsion: 15.0,
-            body: 12.0,
-            thickness: 0.1,
+            spring: 2.5,
+            torsion: 7.5,
+            body: 6.0,
+            thickness: 0.02,
             support: 0.0,
             support_radius: 46.0,
             support_scaling: SupportScaling::Fixed,

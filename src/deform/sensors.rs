@@ -4,24 +4,23 @@
 //! parts, so that a sensor speaks for the same share of area as its triangle's others and
 //! the sum over all does not depend on the number of nodes. A sensor reads the image along
 //! the normal, `reach` millimetres to both sides, and looks for the steepest fall outward
-//! (direction-weighted gradient): score(t) = max(0, -df/dn) · exp(-t²/2(reach/2)²). Its
-//! target is the score's maximum, its weight how strong that is against the others.
+//! (direction-weighted gradient): score(t) = max(0, -df/dn) · exp(-t²/2(reach/2)²). The
+//! score's maximum says *which* edge it is, and how strong it is against the others is the
+//! sensor's weight. *Where* on it the target lies depends on [`SensorKind`].
 //!
 //! A perfusion defect has no edge, so its sensors have next to no weight and the shape
 //! carries the wall through. An organ that touches the heart has its own edges farther out,
-//! which the Gaussian makes faint.
+//! which the Gaussian makes faint. Where it blurs into the wall (the right ventricle's
+//! insertion, the liver), the wall looks thicker than elsewhere: sensors whose half width
+//! (ridge to edge) departs from the usual one count less.
 
 use super::field::Field;
+use super::profile::Profile;
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
 
 /// Sensors on each triangle: the centroids of its nine congruent parts.
 pub const PER_TRIANGLE: usize = 9;
-
-/// Distance of the readings along a profile, mm.
-const STEP: f64 = 1.0;
-/// Half the distance between the readings of a difference quotient, in steps.
-const HALF: usize = 2;
 
 /// Sensors on the rim look this many times as far along their normals as the others: how far
 /// the wall reaches basally differs between patients more than its radius does.
@@ -30,6 +29,11 @@ const RIM_REACH: f64 = 1.75;
 /// What a sensor looks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SensorKind {
+    /// The point half-way down the steepest fall outward, between the ridge before it and
+    /// the trough behind it: the full width at half maximum, which readers take for the
+    /// wall. Over simulated scans it scatters by 0.8 mm about the wall's apparent edge, the
+    /// steepest slope by 1.0 mm.
+    HalfMaximum,
     /// The steepest fall outward.
     Gradient,
     /// The steepest change, whichever way.
@@ -53,44 +57,47 @@ pub struct Look {
     pub shift: Shift,
 }
 
-/// The edge that a reader draws, against the steepest slope of the blurred image, mm
-/// outward. Blur moves the steepest slope of a curved edge towards the centre of curvature:
-/// into the cavity on the inner side, into the wall on the outer one.
+/// The edge that a reader draws against the one that the sensors find, mm outward.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shift {
     /// Where the surface faces the long axis.
     pub inner: f64,
     /// Where it faces away from it.
     pub outer: f64,
+    /// Where it looks out of the base.
+    pub rim: f64,
     /// Two ends of the axis that the surface is said to face.
     pub axis: [Vec3; 2],
 }
 
-impl Shift {
-    /// Whether the surface there looks out of the base.
-    fn is_rim(&self, place: &Vec3, normal: &Vec3) -> bool {
-        let along = self.axis[1] - self.axis[0];
-        let length = along.norm();
-        length > 0.0
-            && normal.dot(&along) < -0.6 * length
-            && (place - self.axis[0]).dot(&along) < 0.5 * length * length
-    }
+/// Which of the wall's surfaces a sensor stands on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Surface {
+    Inner,
+    Outer,
+    Rim,
+}
 
-    /// The shift of an edge seen there.
-    fn at(&self, place: &Vec3, normal: &Vec3) -> f64 {
+impl Shift {
+    /// The surface there and the shift of an edge seen from it.
+    fn at(&self, place: &Vec3, normal: &Vec3) -> (Surface, f64) {
         let along = self.axis[1] - self.axis[0];
-        let length = along.norm_squared();
+        let (length, position) = (along.norm(), (place - self.axis[0]).dot(&along));
+        let basal = position < 0.5 * length * length;
+        if length > 0.0 && basal && normal.dot(&along) < -0.6 * length {
+            return (Surface::Rim, self.rim);
+        }
         let share = if length > 0.0 {
-            ((place - self.axis[0]).dot(&along) / length).clamp(0.0, 1.0)
+            (position / length.powi(2)).clamp(0.0, 1.0)
         } else {
             0.0
         };
         let towards = self.axis[0] + along * share - place;
         let facing = normal.dot(&towards) / towards.norm().max(f64::MIN_POSITIVE);
         if facing > 0.0 {
-            self.inner * facing
+            (Surface::Inner, self.inner * facing)
         } else {
-            -self.outer * facing
+            (Surface::Outer, -self.outer * facing)
         }
     }
 }
@@ -136,6 +143,11 @@ fn centroid(a: usize, b: usize, shift: usize) -> [f64; 3] {
     [1.0 - u - v, u, v]
 }
 
+/// Exponent of a sensor's weight over its share of the strong sensors' score: the scatter of
+/// edges grows faster than their slope falls. From 1 to 1.5, an apex without any uptake
+/// gains 0.04 of Jaccard, and the simulated cohort's mean does not change.
+const TRUST: f64 = 1.5;
+
 /// Lets all sensors look. Ordered by triangle, [`PER_TRIANGLE`] each.
 pub fn read(mesh: &TriMesh, field: &Field, look: &Look) -> Vec<Reading> {
     let normals = mesh.vertex_normals();
@@ -147,7 +159,7 @@ pub fn read(mesh: &TriMesh, field: &Field, look: &Look) -> Vec<Reading> {
         ..*look
     });
     let mut readings = Vec::with_capacity(mesh.triangles.len() * PER_TRIANGLE);
-    let mut scores = Vec::with_capacity(readings.capacity());
+    let mut widths = Vec::with_capacity(readings.capacity());
     for (t, triangle) in mesh.triangles.iter().enumerate() {
         let share = mesh.area_normal(t).norm() / total;
         let corners = mesh.corners(t);
@@ -157,143 +169,73 @@ pub fn read(mesh: &TriMesh, field: &Field, look: &Look) -> Vec<Reading> {
             let normal = (sides[0] * w[0] + sides[1] * w[1] + sides[2] * w[2])
                 .try_normalize(0.0)
                 .unwrap_or_else(Vec3::zeros);
-            let eye = if look.shift.is_rim(&place, &normal) {
-                &mut rim
-            } else {
-                &mut profile
+            let (surface, shift) = look.shift.at(&place, &normal);
+            let eye = match surface {
+                Surface::Rim => &mut rim,
+                Surface::Inner | Surface::Outer => &mut profile,
             };
-            let (offset, score) = eye.look(field, &place, &normal);
-            let offset = offset + look.shift.at(&place, &normal);
-            scores.push(score);
+            let edge = eye.look(field, &place, &normal);
+            widths.push((surface, edge.half_width));
             readings.push(Reading {
                 place,
                 normal,
-                offset,
-                weight: score,
+                offset: edge.offset + shift,
+                weight: edge.score,
                 share,
             });
         }
     }
-    scores.sort_by(f64::total_cmp);
-    let strong = scores[scores.len() * 9 / 10];
-    for r in &mut readings {
-        r.weight = if strong > 0.0 {
-            (r.weight / strong).min(1.0)
-        } else {
-            0.0
-        };
+    weigh(&mut readings);
+    for surface in [Surface::Inner, Surface::Outer, Surface::Rim] {
+        doubt_odd_widths(&mut readings, &widths, surface);
     }
     readings
 }
 
-/// Scratch for one profile.
-struct Profile {
-    look: Look,
-    half: usize,
-    values: Vec<f64>,
-    slopes: Vec<f64>,
-}
-
-impl Profile {
-    fn new(look: &Look) -> Self {
-        Self {
-            look: *look,
-            half: (look.reach / STEP).ceil().max(1.0) as usize,
-            values: Vec::new(),
-            slopes: Vec::new(),
-        }
-    }
-
-    /// Distance to the edge and its score (slope, image units per mm, times nearness).
-    fn look(&mut self, field: &Field, place: &Vec3, normal: &Vec3) -> (f64, f64) {
-        let reach = self.half + HALF;
-        let start = field.to_index(place);
-        let step = field.step(normal) * STEP;
-        self.values.clear();
-        self.values.extend((0..=2 * reach).map(|s| {
-            let t = s as f64 - reach as f64;
-            field.at_index(&(start + step * t)).min(self.look.ceiling)
-        }));
-        if self.look.kind == SensorKind::Level {
-            return self.crossing(reach);
-        }
-        let spread = 2.0 * (self.look.reach / 2.0).powi(2);
-        self.slopes.clear();
-        self.slopes.extend((0..=2 * self.half).map(|s| {
-            let slope = (self.values[s] - self.values[s + 2 * HALF]) / (2.0 * HALF as f64 * STEP);
-            match self.look.kind {
-                SensorKind::Unsigned => slope.abs(),
-                _ => slope.max(0.0),
-            }
-        }));
-        let score = |s: usize| {
-            let t = (s as f64 - self.half as f64) * STEP;
-            self.slopes[s] * (-t * t / spread).exp()
-        };
-        let mut best = 0;
-        for s in 1..self.slopes.len() {
-            if score(s) > score(best) {
-                best = s;
-            }
-        }
-        let seen = score(best);
-        // The Gaussian has chosen the hill, but it also pulls the summit towards the sensor:
-        // climb on the slope itself.
-        let top = climb(&self.slopes, best);
-        let offset = top as f64 - self.half as f64 + parabola(&self.slopes, top);
-        (offset * STEP, seen)
-    }
-
-    /// The nearest outward fall through the level.
-    fn crossing(&self, reach: usize) -> (f64, f64) {
-        let level = self.look.level;
-        let mut best: Option<(f64, f64)> = None;
-        for (s, pair) in self.values.windows(2).enumerate() {
-            if pair[0] >= level && pair[1] < level {
-                let t = s as f64 - reach as f64 + (pair[0] - level) / (pair[0] - pair[1]);
-                if best.is_none_or(|b| t.abs() < b.0.abs()) {
-                    best = Some((t, pair[0] - pair[1]));
-                }
-            }
-        }
-        let (t, slope) = best.unwrap_or((0.0, 0.0));
-        let spread = 2.0 * (self.look.reach / 2.0).powi(2);
-        (
-            t * STEP,
-            slope / STEP * (-t * STEP * t * STEP / spread).exp(),
-        )
-    }
-}
-
-/// The local maximum above `start`.
-fn climb(values: &[f64], start: usize) -> usize {
-    let mut top = start;
-    loop {
-        let right = (top + 1).min(values.len() - 1);
-        let left = top.saturating_sub(1);
-        let next = if values[right] > values[left] {
-            right
+/// Turns scores into weights.
+fn weigh(readings: &mut [Reading]) {
+    let mut scores: Vec<f64> = readings.iter().map(|r| r.weight).collect();
+    scores.sort_by(f64::total_cmp);
+    let strong = scores[scores.len() * 9 / 10];
+    for r in readings {
+        r.weight = if strong > 0.0 {
+            (r.weight / strong).min(1.0).powf(TRUST)
         } else {
-            left
+            0.0
         };
-        if values[next] > values[top] {
-            top = next;
-        } else {
-            return top;
-        }
     }
 }
 
-/// Where between its neighbours the maximum of a parabola lies, -0.5..=0.5.
-fn parabola(scores: &[f64], best: usize) -> f64 {
-    if best == 0 || best + 1 == scores.len() {
-        return 0.0;
-    }
-    let (a, b, c) = (scores[best - 1], scores[best], scores[best + 1]);
-    let bend = a - 2.0 * b + c;
-    if bend < 0.0 {
-        (0.5 * (a - c) / bend).clamp(-0.5, 0.5)
-    } else {
-        0.0
+/// Half widths that depart from the usual one by this much count half, mm. Their standard
+/// deviation over clear edges of simulated scans is 1.0 mm.
+const ODD_WIDTH: f64 = 1.5;
+/// How far the rim's edge moves with its half width, mm for mm: the ridge before the rim is
+/// where the wall ends less blur, so a wide fall ends farther out than its half-way point.
+const RIM_WIDTH: f64 = 0.3;
+
+/// Compares the half widths of a surface's edges with their median.
+fn doubt_odd_widths(readings: &mut [Reading], widths: &[(Surface, Option<f64>)], surface: Surface) {
+    let own = |w: &(Surface, Option<f64>)| w.1.filter(|_| w.0 == surface);
+    let mut clear: Vec<f64> = widths
+        .iter()
+        .zip(&*readings)
+        .filter(|(_, r)| r.weight > 0.25)
+        .filter_map(|(w, _)| own(w))
+        .collect();
+    clear.sort_by(f64::total_cmp);
+    let Some(usual) = clear.get(clear.len() / 2) else {
+        return;
+    };
+    for (w, r) in widths.iter().zip(readings) {
+        let Some(more) = own(w).map(|width| width - usual) else {
+            continue;
+        };
+        match surface {
+            Surface::Rim => r.offset += RIM_WIDTH * more.clamp(-4.0, 4.0),
+            Surface::Inner | Surface::Outer => {
+                let odd = (more / ODD_WIDTH).powi(2);
+                r.weight /= 1.0 + odd + odd * odd / 16.0;
+            }
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::fit::FitParameters;
 use super::{Kind, ParameterSpec};
+use crate::deform::Edge;
 use crate::deform::sensors::SensorKind;
 use crate::deform::template::Organ;
 use crate::geometry::Vec3;
@@ -156,20 +157,23 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     ),
     ParameterSpec {
         name: "sensor",
-        kind: Kind::Choice(&["gradient", "unsigned", "level"]),
-        default: "gradient",
-        summary: "What the sensors look for: the steepest fall outward, the steepest change \
-                  whichever way, or the crossing of half the organ's uptake",
+        kind: Kind::Choice(&["half_maximum", "gradient", "unsigned", "level"]),
+        default: "half_maximum",
+        summary: "What the sensors look for: the point half-way down the steepest fall outward, \
+                  that fall's steepest point, the steepest change whichever way, or the crossing \
+                  of half the organ's uptake",
         read: |d, v| {
             d.0.deform.sensor = match v.text() {
                 "unsigned" => SensorKind::Unsigned,
                 "level" => SensorKind::Level,
-                _ => SensorKind::Gradient,
+                "gradient" => SensorKind::Gradient,
+                _ => SensorKind::HalfMaximum,
             };
             Ok(())
         },
         write: |p| {
             json!(match p.deform.sensor {
+                SensorKind::HalfMaximum => "half_maximum",
                 SensorKind::Gradient => "gradient",
                 SensorKind::Unsigned => "unsigned",
                 SensorKind::Level => "level",
@@ -211,7 +215,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
             max: 5.0,
         },
         default: "",
-        summary: "How far outside the steepest slope the edge is drawn, millimetres (default 2.5 for \
+        summary: "How far outside the edge found the edge is drawn, millimetres (default 2.5 for \
                   DICOM NM, whose readers draw wide: measured on one expert's mask; else 0)",
         read: |d, v| {
             d.0.margin = Some(v.f64());
@@ -219,32 +223,60 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         },
         write: |p| json!(p.margin),
     },
+    ParameterSpec {
+        name: "edge",
+        kind: Kind::Choice(&["apparent", "anatomical"]),
+        default: "apparent",
+        summary: "Which edge of a ventricle's wall is wanted: the one seen in the blurred image, or \
+                  the wall's own, with blur's share of the thickness taken off",
+        read: |d, v| {
+            d.0.deform.edge = match v.text() {
+                "anatomical" => Edge::Anatomical,
+                _ => Edge::Apparent,
+            };
+            Ok(())
+        },
+        write: |p| {
+            json!(match p.deform.edge {
+                Edge::Apparent => "apparent",
+                Edge::Anatomical => "anatomical",
+            })
+        },
+    },
+    number!(
+        "resolution",
+        deform.resolution,
+        0.0..=30.0,
+        "11.5",
+        "The image's resolution for edge=anatomical: full width of a point at half its maximum, \
+         motion and filters included, millimetres"
+    ),
     number!(
         "spring_stiffness",
         deform.stiffness.spring,
         0.0..=1e6,
-        "5",
+        "2.5",
         "How hard edges keep their length, square millimetres"
     ),
     number!(
         "torsion_stiffness",
         deform.stiffness.torsion,
         0.0..=1e6,
-        "15",
+        "7.5",
         "How hard each node keeps its place among its neighbours, square millimetres"
     ),
     number!(
         "body_stiffness",
         deform.stiffness.body,
         0.0..=1e6,
-        "12",
+        "6",
         "How hard the model keeps its shape as a whole, square millimetres"
     ),
     number!(
         "thickness_stiffness",
         deform.stiffness.thickness,
         0.0..=1e6,
-        "0.1",
+        "0.02",
         "How hard the wall keeps its thickness"
     ),
     number!(

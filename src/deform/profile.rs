@@ -1,0 +1,213 @@
+//! One sensor's profile: the image along a normal, and the edge on it.
+
+use super::field::Field;
+use super::sensors::{Look, SensorKind};
+use crate::geometry::Vec3;
+
+/// Distance of the readings along a profile, mm.
+const STEP: f64 = 1.0;
+/// Half the distance between the readings of a difference quotient, in steps.
+const HALF: usize = 2;
+/// The ridge and the trough beside an edge are looked for this far from it, in steps.
+const FLANK: f64 = 14.0;
+/// The half-way point lies at most this far from the steepest slope, in steps; what seems to
+/// lie farther away belongs to other structures.
+const NEAR: f64 = 2.0;
+
+/// The edge on a profile.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Edge {
+    /// Where it lies, mm along the normal.
+    pub offset: f64,
+    /// Slope (image units per mm) times nearness; 0 where there is none.
+    pub score: f64,
+    /// From the ridge to the half-way point, mm, where the kind of sensor looks for them.
+    pub half_width: Option<f64>,
+}
+
+/// A profile and room for its readings.
+pub struct Profile {
+    look: Look,
+    half: usize,
+    values: Vec<f64>,
+    slopes: Vec<f64>,
+}
+
+impl Profile {
+    /// A profile for sensors that look like this.
+    pub fn new(look: &Look) -> Self {
+        Self {
+            look: *look,
+            half: (look.reach / STEP).ceil().max(1.0) as usize,
+            values: Vec::new(),
+            slopes: Vec::new(),
+        }
+    }
+
+    /// Looks for the edge near `place`, along `normal`.
+    pub fn look(&mut self, field: &Field, place: &Vec3, normal: &Vec3) -> Edge {
+        let reach = self.half + HALF;
+        let start = field.to_index(place);
+        let step = field.step(normal) * STEP;
+        self.values.clear();
+        self.values.extend((0..=2 * reach).map(|s| {
+            let t = s as f64 - reach as f64;
+            field.at_index(&(start + step * t)).min(self.look.ceiling)
+        }));
+        if self.look.kind == SensorKind::Level {
+            return self.crossing(reach);
+        }
+        let spread = 2.0 * (self.look.reach / 2.0).powi(2);
+        self.slopes.clear();
+        self.slopes.extend((0..=2 * self.half).map(|s| {
+            let slope = (self.values[s] - self.values[s + 2 * HALF]) / (2.0 * HALF as f64 * STEP);
+            match self.look.kind {
+                SensorKind::Unsigned => slope.abs(),
+                _ => slope.max(0.0),
+            }
+        }));
+        let score = |s: usize| {
+            let t = (s as f64 - self.half as f64) * STEP;
+            self.slopes[s] * (-t * t / spread).exp()
+        };
+        let mut best = 0;
+        for s in 1..self.slopes.len() {
+            if score(s) > score(best) {
+                best = s;
+            }
+        }
+        let seen = score(best);
+        // The Gaussian has chosen the hill, but it also pulls the summit towards the sensor:
+        // climb on the slope itself.
+        let top = climb(&self.slopes, best);
+        let steepest = top as f64 - self.half as f64;
+        let half_way = (self.look.kind == SensorKind::HalfMaximum && seen > 0.0).then(|| {
+            let value = |s: f64| {
+                let index = start + step * (steepest + s);
+                field.at_index(&index).min(self.look.ceiling)
+            };
+            half_way(value)
+        });
+        let (beyond, half_width) = match half_way {
+            Some((beyond, width)) => (beyond, Some(width * STEP)),
+            None => (parabola(&self.slopes, top), None),
+        };
+        Edge {
+            offset: (steepest + beyond) * STEP,
+            score: seen,
+            half_width,
+        }
+    }
+
+    /// The nearest outward fall through the level.
+    fn crossing(&self, reach: usize) -> Edge {
+        let level = self.look.level;
+        let mut best: Option<(f64, f64)> = None;
+        for (s, pair) in self.values.windows(2).enumerate() {
+            if pair[0] >= level && pair[1] < level {
+                let t = s as f64 - reach as f64 + (pair[0] - level) / (pair[0] - pair[1]);
+                if best.is_none_or(|b| t.abs() < b.0.abs()) {
+                    best = Some((t, pair[0] - pair[1]));
+                }
+            }
+        }
+        let (t, slope) = best.unwrap_or((0.0, 0.0));
+        let spread = 2.0 * (self.look.reach / 2.0).powi(2);
+        Edge {
+            offset: t * STEP,
+            score: slope / STEP * (-t * STEP * t * STEP / spread).exp(),
+            half_width: None,
+        }
+    }
+}
+
+/// Steps from the steepest fall (0) to where `value` passes half-way from the ridge before it
+/// to the trough behind it, at most [`NEAR`] either way, and from the ridge to there.
+fn half_way(value: impl Fn(f64) -> f64) -> (f64, f64) {
+    let ridge = turning(&value, -1.0);
+    let trough = turning(&value, 1.0);
+    let level = 0.5 * (ridge.1 + trough.1);
+    let towards = if value(0.0) > level { 1.0 } else { -1.0 };
+    let (mut s, mut last) = (0.0, value(0.0));
+    let mut crossing = 0.0;
+    while s < FLANK {
+        let next = value((s + 1.0) * towards);
+        if (next - level) * towards <= 0.0 {
+            // `last` lies strictly on the other side, or s is 0 and the level is here.
+            let share = (last - level) / (last - next);
+            crossing = towards * (s + if share.is_finite() { share } else { 0.0 });
+            break;
+        }
+        (s, last) = (s + 1.0, next);
+    }
+    (crossing.clamp(-NEAR, NEAR), crossing + ridge.0)
+}
+
+/// Where a falling profile stops to rise backward (`towards` = -1) or to fall forward (1):
+/// steps from 0 and value.
+fn turning(value: impl Fn(f64) -> f64, towards: f64) -> (f64, f64) {
+    let (mut s, mut last) = (0.0, value(0.0));
+    while s < FLANK {
+        let next = value((s + 1.0) * towards);
+        if (next - last) * towards >= 0.0 {
+            break;
+        }
+        (s, last) = (s + 1.0, next);
+    }
+    (s, last)
+}
+
+/// The local maximum above `start`.
+fn climb(values: &[f64], start: usize) -> usize {
+    let mut top = start;
+    loop {
+        let right = (top + 1).min(values.len() - 1);
+        let left = top.saturating_sub(1);
+        let next = if values[right] > values[left] {
+            right
+        } else {
+            left
+        };
+        if values[next] > values[top] {
+            top = next;
+        } else {
+            return top;
+        }
+    }
+}
+
+/// Where between its neighbours the maximum of a parabola lies, -0.5..=0.5.
+fn parabola(scores: &[f64], best: usize) -> f64 {
+    if best == 0 || best + 1 == scores.len() {
+        return 0.0;
+    }
+    let (a, b, c) = (scores[best - 1], scores[best], scores[best + 1]);
+    let bend = a - 2.0 * b + c;
+    if bend < 0.0 {
+        (0.5 * (a - c) / bend).clamp(-0.5, 0.5)
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_way_down_a_ramp_is_its_middle() {
+        // A plateau of 9, a fall of 1.5 a step from -3 to 3, a plateau of 0; seen from the
+        // steepest slope half a step off the middle.
+        let value = |s: f64| (4.5 - 1.5 * (s - 0.5)).clamp(0.0, 9.0);
+        let (crossing, width) = half_way(value);
+        assert!((crossing - 0.5).abs() < 1e-12, "{crossing}");
+        assert!((width - 3.5).abs() < 0.51, "{width}");
+    }
+
+    #[test]
+    fn a_profile_without_end_stays_near() {
+        let (crossing, width) = half_way(|s| -s * s * s);
+        assert!(crossing.abs() <= NEAR && width.is_finite());
+        assert_eq!(half_way(|_| 1.0), (0.0, 0.0));
+    }
+}
