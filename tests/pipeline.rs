@@ -103,7 +103,8 @@ fn another_seed_gives_another_mesh_of_the_same_surface() {
 #[test]
 fn adaptive_density_puts_smaller_triangles_where_the_surface_bends() {
     let spread = |adaptive: &str| {
-        let model = generate(&[("adaptive", adaptive), ("points", "300")]).unwrap();
+        let everywhere = ("adaptive_from", "0");
+        let model = generate(&[("adaptive", adaptive), everywhere, ("points", "300")]).unwrap();
         model.report.shape.area_mm2.cv
     };
     assert!(spread("0.5") > spread("0") + 0.05);

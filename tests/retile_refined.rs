@@ -115,15 +115,18 @@ fn triangles_are_nearly_equilateral() {
 #[test]
 fn curvature_draws_points_together() {
     let surface = surface(shapes::cup(60.0, 30.0, 8.0, 64));
-    let parameters = RetileParameters {
-        points: 200,
-        adaptive: 0.5,
-        ..RetileParameters::default()
+    let with = |adaptive| {
+        let parameters = RetileParameters {
+            points: 200,
+            adaptive,
+            adaptive_from: 0.0,
+            ..RetileParameters::default()
+        };
+        retile(&surface, &parameters, &Monitor::silent()).expect("200 points")
     };
-    let tiled = retile(&surface, &parameters, &Monitor::silent()).expect("200 points");
+    let (even, tiled) = (with(0.0), with(0.5));
     check(&surface, 200, &tiled);
     let rim = |mesh: &TriMesh| mesh.vertices.iter().filter(|v| v.z > -2.0).count();
-    let even = refined(&surface, 200, 1).expect("200 points");
     assert!(rim(&tiled.mesh) > rim(&even.mesh) * 5 / 4);
     assert!(tiled.sizing.iter().all(|h| (0.3..3.0).contains(h)));
 }

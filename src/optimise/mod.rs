@@ -81,23 +81,29 @@ pub struct OptimiseParameters {
 /// Parameters of the least-squares fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitParameters {
-    /// Rounds, 0..=200; 0 leaves the vertices on the surface, as the paper does. Default 14.
+    /// Rounds, 0..=200; 0 leaves the vertices on the surface, as the paper does. Default 20.
     pub rounds: usize,
-    /// Weight of triangle shape against squared distance, (0, 10]. Default 0.05.
+    /// Weight of triangle shape against squared distance, (0, 10]. Default 0.062.
     pub shape_weight: f64,
+    /// Mean bend between neighbouring triangles, degrees in 1..=180, from which on a start counts
+    /// as coarse: shapes and peaks then weigh more, shapes in proportion to the squared bend, up to
+    /// twice as much. Default 24; 180 for none.
+    pub coarse_bend: f64,
     /// How much more a misshapen triangle counts: its weight is 1 + this · (R/(2r) - 1), 0..=100.
-    /// Default 20.
+    /// Default 3.
     pub worst_weight: f64,
     /// How far triangles may choose their own size, 0..=1: 0 draws all to one size (times the
-    /// wanted relative spacing), 1 to the size that each has. Default 0.9.
+    /// wanted relative spacing), 1 to the size that each has. Default 1.
     pub free_size: f64,
     /// How much more a distant sample counts: its weight is 1 + this · r²/mean r², 0..=10.
-    /// Lowers the largest distance at the cost of the mean. Default 0.
+    /// Lowers the largest distance, from about 0.1 on at the cost of the mean. Default 0.04.
     pub peak_weight: f64,
+    /// Share of the last round's step that a round adds to its own, 0..=0.9. Default 0.6.
+    pub momentum: f64,
     /// Weight of staying put, a share of the distances' weight spread over the vertices,
-    /// (0, 1]. Default 0.003.
+    /// (0, 1]. Default 0.0005.
     pub damping: f64,
-    /// Samples of the surface for each of the model's triangles, 4..=200. Default 12.
+    /// Samples of the surface for each of the model's triangles, 4..=200. Default 16.
     pub samples_per_triangle: usize,
     /// How many flips the fit looks ahead, 0..=4, to move irregular vertices together until they
     /// cancel; each more costs several times as much. Default 3.
@@ -110,13 +116,15 @@ pub struct FitParameters {
 impl Default for FitParameters {
     fn default() -> Self {
         Self {
-            rounds: 14,
-            shape_weight: 0.05,
-            worst_weight: 20.0,
-            free_size: 0.9,
-            peak_weight: 0.0,
-            damping: 0.003,
-            samples_per_triangle: 12,
+            rounds: 20,
+            shape_weight: 0.062,
+            coarse_bend: 24.0,
+            worst_weight: 3.0,
+            free_size: 1.0,
+            peak_weight: 0.04,
+            momentum: 0.6,
+            damping: 0.0005,
+            samples_per_triangle: 16,
             glide: 3,
             midpoint_weight: 1.0,
         }
@@ -436,9 +444,11 @@ impl OptimiseParameters {
         within("guard", self.guard, 0.0, 1.0)?;
         within("fit.rounds", fit.rounds as f64, 0.0, 200.0)?;
         within("fit.shape_weight", fit.shape_weight, 1e-6, 10.0)?;
+        within("fit.coarse_bend", fit.coarse_bend, 1.0, 180.0)?;
         within("fit.worst_weight", fit.worst_weight, 0.0, 100.0)?;
         within("fit.free_size", fit.free_size, 0.0, 1.0)?;
         within("fit.peak_weight", fit.peak_weight, 0.0, 10.0)?;
+        within("fit.momentum", fit.momentum, 0.0, 0.9)?;
         within("fit.glide", fit.glide as f64, 0.0, 4.0)?;
         within("fit.midpoint_weight", fit.midpoint_weight, 0.0, 10.0)?;
         within("fit.damping", fit.damping, 1e-6, 1.0)?;

@@ -34,6 +34,7 @@ pub struct Draft {
     pub(super) retile: RetileParameters,
     pub(super) optimise: OptimiseParameters,
     isolate_words: Vec<&'static str>,
+    pub(super) adaptive: Option<f64>,
     pub(super) fit_rounds: Option<usize>,
 }
 
@@ -64,11 +65,13 @@ impl Parameters for ModelParameters {
                 fix: "Give at least one of w1, w2, w3, w4 a value above 0.".into(),
             });
         }
-        // The paper leaves the points on the surface; the fit belongs to the refined route.
-        let usual_fit = match draft.retile.method {
-            Method::Paper => 0,
-            Method::Refined => draft.optimise.fit.rounds,
+        // The paper spreads its points evenly and leaves them on the surface; density and fit
+        // belong to the refined route.
+        let (usual_adaptive, usual_fit) = match draft.retile.method {
+            Method::Paper => (0.0, 0),
+            Method::Refined => (draft.retile.adaptive, draft.optimise.fit.rounds),
         };
+        draft.retile.adaptive = draft.adaptive.unwrap_or(usual_adaptive);
         draft.optimise.fit.rounds = draft.fit_rounds.unwrap_or(usual_fit);
         Ok(Self {
             frame: draft.frame,

@@ -235,14 +235,29 @@ pub const SPECS: &[ParameterSpec] = &[
     ParameterSpec {
         name: "adaptive",
         kind: Kind::Number { min: 0.0, max: 1.0 },
-        default: "0",
+        default: "",
         summary: "Denser points where the surface bends: spacing falls as curvature^-adaptive; \
-                  0 is even, 0.25 a good choice",
+                  0 is even (default 0.25 for refined, 0 for paper)",
         read: |d, v| {
-            d.retile.adaptive = v.f64();
+            d.adaptive = Some(v.f64());
             Ok(())
         },
         write: |p| json!(p.retile.adaptive),
+    },
+    ParameterSpec {
+        name: "adaptive_from",
+        kind: Kind::Number {
+            min: 0.0,
+            max: 100.0,
+        },
+        default: "0.8",
+        summary: "Rise of the surface over one edge of even spacing, in percent of its size, from \
+                  which on `adaptive` acts; 0 adapts everywhere",
+        read: |d, v| {
+            d.retile.adaptive_from = v.f64();
+            Ok(())
+        },
+        write: |p| json!(p.retile.adaptive_from),
     },
     ParameterSpec {
         name: "repulsion_iterations",
@@ -285,7 +300,7 @@ pub const SPECS: &[ParameterSpec] = &[
         kind: Kind::Integer { min: 0, max: 200 },
         default: "",
         summary: "Rounds of the least-squares fit; 0 leaves the points on the surface (default \
-                  14 for refined, 0 for paper)",
+                  20 for refined, 0 for paper)",
         read: |d, v| {
             d.fit_rounds = Some(v.usize());
             Ok(())
@@ -296,29 +311,43 @@ pub const SPECS: &[ParameterSpec] = &[
         "fit_shape_weight",
         shape_weight,
         0.0001..=10.0,
-        "0.05",
+        "0.062",
         "Weight of triangle shape against squared distance in the fit"
+    ),
+    fit_spec!(
+        "fit_coarse_bend",
+        coarse_bend,
+        1.0..=180.0,
+        "24",
+        "Mean bend of the start in degrees from which on shapes weigh more in the fit"
     ),
     fit_spec!(
         "fit_worst_weight",
         worst_weight,
         0.0..=100.0,
-        "20",
+        "3",
         "How much more a misshapen triangle counts in the fit"
     ),
     fit_spec!(
         "fit_free_size",
         free_size,
         0.0..=1.0,
-        "0.9",
+        "1",
         "How far the fit lets triangles choose their own size"
     ),
     fit_spec!(
         "fit_peak_weight",
         peak_weight,
         0.0..=10.0,
-        "0",
+        "0.04",
         "How much more a distant sample counts in the fit: lowers the largest distance"
+    ),
+    fit_spec!(
+        "fit_momentum",
+        momentum,
+        0.0..=0.9,
+        "0.6",
+        "Share of its last step that a vertex repeats in a round of the fit"
     ),
     fit_spec!(
         "fit_midpoint_weight",
@@ -331,13 +360,13 @@ pub const SPECS: &[ParameterSpec] = &[
         "fit_damping",
         damping,
         0.000001..=1.0,
-        "0.003",
+        "0.0005",
         "Weight of staying put in a round of the fit"
     ),
     ParameterSpec {
         name: "fit_samples",
         kind: Kind::Integer { min: 4, max: 200 },
-        default: "12",
+        default: "16",
         summary: "Samples of the surface for each of the model's triangles in the fit",
         read: |d, v| {
             d.optimise.fit.samples_per_triangle = v.usize();

@@ -71,9 +71,13 @@ pub struct RetileParameters {
     pub seed: u64,
     /// Default [`Method::Refined`].
     pub method: Method,
-    /// Curvature-adaptive density: spacing ∝ curvature^-γ, γ in 0..=1. Default 0 (even
-    /// spacing); 0.25 is a good choice where the surface bends.
+    /// Curvature-adaptive density: spacing ∝ curvature^-γ, γ in 0..=1, 0 for even spacing.
+    /// Default 0.25; 0 is the paper's.
     pub adaptive: f64,
+    /// Rise of the surface's arc over one edge of even spacing, in percent of the square root of
+    /// the surface's area, 0..=100, from which on spacing adapts: what N even points resolve
+    /// needs no denser ones. Default 0.8; 0 adapts everywhere.
+    pub adaptive_from: f64,
     /// Rounds of geodesic repulsion ([`Method::Paper`]), 0..=1000. Default 40.
     pub repulsion_iterations: usize,
     /// Share of the overlap that one round of repulsion moves, (0, 1]. Default 0.15 (Turk).
@@ -88,7 +92,8 @@ impl Default for RetileParameters {
             points: 150,
             seed: 1,
             method: Method::Refined,
-            adaptive: 0.0,
+            adaptive: 0.25,
+            adaptive_from: 0.8,
             repulsion_iterations: 40,
             repulsion_strength: 0.15,
             relaxation_iterations: 80,
@@ -255,6 +260,9 @@ fn validate(parameters: &RetileParameters) -> Result<(), RetileError> {
     }
     if !(0.0..=1.0).contains(&p.adaptive) {
         return bad("adaptive", p.adaptive, "0..=1");
+    }
+    if !(0.0..=100.0).contains(&p.adaptive_from) {
+        return bad("adaptive_from", p.adaptive_from, "0..=100");
     }
     if !(p.repulsion_strength > 0.0 && p.repulsion_strength <= 1.0) {
         return bad("repulsion_strength", p.repulsion_strength, "(0, 1]");

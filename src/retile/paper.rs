@@ -79,7 +79,7 @@ impl<'a> Job<'a> {
             parameters,
             monitor,
             domain,
-            spacing: sizing::spacing(&samples, parameters.adaptive),
+            spacing: sizing::spacing(&samples, parameters, parameters.points),
         })
     }
 }

@@ -115,7 +115,7 @@ impl<'a> Job<'a> {
             &surface.mesh.triangles,
             points * SAMPLES_PER_CELL,
         );
-        let spacing = sizing::spacing(&samples, parameters.adaptive);
+        let spacing = sizing::spacing(&samples, parameters, points);
         let weights = (samples.area.iter().zip(&spacing))
             .map(|(area, h)| area * h.powi(-4))
             .collect();

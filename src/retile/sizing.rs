@@ -3,8 +3,12 @@
 //! Spacing h falls with curvedness: h ∝ κ^-γ, where κ = sqrt((κ1² + κ2²)/2) (Koenderink and van
 //! Doorn 1992) is the root mean square of |Δn|/|Δx| over the edges of a vertex, smoothed over
 //! the surface and held between its 5th and 97th percentile, so that noise and corners do
-//! not pile points up. h is relative: its area-weighted mean density is that of even spacing.
+//! not pile points up. Where even points resolve the surface, that is where the arc over one
+//! edge between them rises by less than a given share of the whole's size, spacing stays even.
+//! So few points gather where the surface bends, while many stay as even as they can be.
+//! h is relative: its area-weighted mean density is that of even spacing.
 
+use super::RetileParameters;
 use super::samples::Samples;
 use crate::geometry::Vec3;
 use crate::geometry::triangle::area_normal;
@@ -15,10 +19,17 @@ const LARGEST_RATIO: f64 = 2.5;
 const SMOOTHING_ROUNDS: usize = 10;
 
 /// Relative spacing at every sample: 1 on average; all 1 for γ = 0.
-pub(super) fn spacing(samples: &Samples, gamma: f64) -> Vec<f64> {
+pub(super) fn spacing(samples: &Samples, parameters: &RetileParameters, points: usize) -> Vec<f64> {
+    let gamma = parameters.adaptive;
     if gamma == 0.0 {
         return vec![1.0; samples.len()];
     }
+    let area: f64 = samples.area.iter().sum();
+    // Each of even points has two equilateral triangles.
+    let edge = (2.0 * area / (3f64.sqrt() * points as f64)).sqrt();
+    // An arc of curvature k rises by k/8 of its squared chord.
+    let rise = parameters.adaptive_from / 100.0 * area.sqrt();
+    let resolved = 8.0 * rise / (edge * edge);
     let mut curvature = curvedness(samples);
     for _ in 0..SMOOTHING_ROUNDS {
         curvature = (0..samples.len())
@@ -32,21 +43,20 @@ pub(super) fn spacing(samples: &Samples, gamma: f64) -> Vec<f64> {
     let mut sorted = curvature.clone();
     sorted.sort_by(f64::total_cmp);
     let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share) as usize];
-    let (low, high) = (at(0.05), at(0.97));
+    let (low, high) = (at(0.05).max(resolved), at(0.97));
     if !(low > 0.0) {
         return vec![1.0; samples.len()];
     }
-    let high = high.min(low * LARGEST_RATIO.powf(1.0 / gamma));
+    let high = high.clamp(low, low * LARGEST_RATIO.powf(1.0 / gamma));
     let mut spacing: Vec<f64> = curvature
         .iter()
         .map(|k| k.clamp(low, high).powf(-gamma))
         .collect();
     // As many points as even spacing takes: the sum of area/h² is the area.
-    let area: f64 = samples.area.iter().sum();
-    let points: f64 = (0..samples.len())
+    let needed: f64 = (0..samples.len())
         .map(|v| samples.area[v] / spacing[v].powi(2))
         .sum();
-    let scale = (points / area).sqrt();
+    let scale = (needed / area).sqrt();
     spacing.iter_mut().for_each(|h| *h *= scale);
     spacing
 }
@@ -98,11 +108,21 @@ mod tests {
             let exact = f64::midpoint(k1 * k1, k2 * k2).sqrt();
             assert!((k / exact - 1.0).abs() < 0.1, "{k} {exact}");
         }
-        let h = spacing(&samples, 0.5);
+        let with = |adaptive, adaptive_from| RetileParameters {
+            adaptive,
+            adaptive_from,
+            ..RetileParameters::default()
+        };
+        let h = spacing(&samples, &with(0.5, 0.0), 100);
         let density: f64 = (0..samples.len())
             .map(|v| samples.area[v] / h[v].powi(2))
             .sum();
         assert!((density / torus.area() - 1.0).abs() < 1e-9);
-        assert!(spacing(&samples, 0.0).iter().all(|h| *h == 1.0));
+        assert!(h.iter().any(|h| *h > 1.01) && h.iter().any(|h| *h < 0.99));
+        // Without adaptation, or where no place bends enough for it, spacing is even.
+        for (parameters, points) in [(with(0.0, 0.0), 100), (with(0.5, 1.0), 10_000)] {
+            let h = spacing(&samples, &parameters, points);
+            assert!(h.iter().all(|h| (h - 1.0).abs() < 1e-12));
+        }
     }
 }

@@ -10,6 +10,10 @@
 //! 4. volume: the whole is to enclose what S encloses;
 //! 5. damping: a little weight on staying put.
 //!
+//! Steps have momentum (Polyak's heavy ball): vertices slide slowly along S, where only the
+//! triangles' shapes and far samples pull, and momentum gets them further in as many rounds.
+//! The last rounds go without, so that the vertices come to rest.
+//!
 //! After every second round edges are flipped where that betters shapes and valences; in the
 //! first half of the rounds irregular vertices are moved together until they cancel.
 //!
@@ -27,9 +31,12 @@ use samples::{Sample, find_partners, follow_partners, spread};
 
 use super::connectivity::Connectivity;
 use super::{FitParameters, Reference};
-use crate::geometry::Vec3;
+use crate::geometry::{Vec3, triangle};
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Monitor, Stage};
+
+/// Last rounds, without momentum.
+const CALM_ROUNDS: usize = 5;
 
 /// The mesh on its way, and what it is drawn to.
 struct Model<'a> {
@@ -40,6 +47,8 @@ struct Model<'a> {
     reference: &'a Reference,
     /// That of the reference, mm³.
     volume: f64,
+    /// How much more shapes weigh in this model than in one of more points, 1 or more.
+    coarseness: f64,
     parameters: &'a FitParameters,
 }
 
@@ -70,6 +79,7 @@ pub fn fit(
     monitor: &Monitor,
 ) -> Result<Fitted, Cancelled> {
     let count = parameters.samples_per_triangle * connectivity.triangles().len();
+    let coarseness = coarseness(start, &connectivity, parameters.coarse_bend);
     let mut model = Model {
         vertices: start.to_vec(),
         connectivity,
@@ -77,15 +87,26 @@ pub fn fit(
         sizing,
         reference,
         volume: reference.mesh.volume(),
+        coarseness,
         parameters,
     };
     find_partners(&mut model);
     let (mut flips, mut shortened) = (0, 0);
+    let mut velocity = vec![Vec3::zeros(); start.len()];
     for round in 0..parameters.rounds {
         let fraction = round as f64 / (parameters.rounds + 1) as f64;
         monitor.report(Stage::Optimise, fraction)?;
-        let step = terms::displacement(&model, monitor)?;
+        let mut step = terms::displacement(&model, monitor)?;
+        if round + CALM_ROUNDS < parameters.rounds {
+            for (step, velocity) in step.iter_mut().zip(&velocity) {
+                *step += velocity * parameters.momentum;
+            }
+        }
+        velocity.copy_from_slice(&model.vertices);
         shortened += usize::from(advance(&mut model.vertices, &model.connectivity, &step));
+        for (velocity, vertex) in velocity.iter_mut().zip(&model.vertices) {
+            *velocity = vertex - *velocity;
+        }
         monitor.check()?;
         follow_partners(&mut model);
         if round % 2 == 1 && round + 1 < parameters.rounds {
@@ -107,6 +128,27 @@ pub fn fit(
         flips,
         shortened,
     })
+}
+
+/// Largest factor by which a coarse start raises the weight of shapes.
+const MOST_COARSENESS: f64 = 2.0;
+
+/// The square of the mean bend between neighbouring triangles against `usual` (degrees), 1..=2.
+/// Distances grow with the square of the bend: at a fixed weight the shapes of a coarse model
+/// would pay for every distance.
+fn coarseness(vertices: &[Vec3], connectivity: &Connectivity, usual: f64) -> f64 {
+    let normal = |t: u32| {
+        let [a, b, c] = connectivity.triangles()[t as usize].map(|v| vertices[v as usize]);
+        triangle::area_normal(&a, &b, &c)
+    };
+    let bends = connectivity
+        .edges()
+        .map(|h| triangle::angle_between(&normal(h / 3), &normal(connectivity.twin(h) / 3)));
+    let edges = connectivity.halfedges() / 2;
+    let mean = bends.sum::<f64>() / f64::from(edges.max(1));
+    (mean / usual.to_radians())
+        .powi(2)
+        .clamp(1.0, MOST_COARSENESS)
 }
 
 #[cfg(test)]
@@ -234,6 +276,7 @@ mod tests {
             sizing,
             reference,
             volume: reference.mesh.volume(),
+            coarseness: 1.0,
             parameters,
         };
         find_partners(&mut model);
