@@ -16,6 +16,7 @@ use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Monitor};
 use crate::surface::survey::label_map;
 use crate::volume::Volume;
+use std::collections::BTreeMap;
 
 /// Samples of the coarse picture, mm.
 const COARSE: f64 = 4.0;
@@ -76,7 +77,10 @@ pub fn one_label(
     hints: &Hints,
     monitor: &Monitor,
 ) -> Result<Option<Volume>, Cancelled> {
-    let Some(labels) = label_map(volume, monitor)?.filter(|l| l.len() > 1) else {
+    // A body in a constant background has two values as well; a map has unlabelled voxels.
+    let several =
+        |l: &BTreeMap<i64, usize>| l.len() > 1 && l.values().sum::<usize>() < volume.voxels.len();
+    let Some(labels) = label_map(volume, monitor)?.filter(several) else {
         return Ok(None);
     };
     let most = labels

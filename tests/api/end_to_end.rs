@@ -285,6 +285,7 @@ async fn what_cannot_be_segmented_is_said_with_what_was_seen() {
         .await;
     assert_eq!(fitted.status(), 200);
     let fitted: Value = fitted.json().await.unwrap();
-    assert!(fitted["measures"]["dice"].as_f64().unwrap() > 0.9);
+    let dice = fitted["measures"]["dice"].as_f64().unwrap();
+    assert!(dice > 0.9, "{dice}");
     assert!(fitted["polar"].is_null());
 }
