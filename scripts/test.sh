@@ -3,7 +3,7 @@
 #   N passed, N failed, N skipped
 #
 #   scripts/test.sh            everything
-#   scripts/test.sh --quick    without the outside judges (trimesh, vtk, glTF validator, schemathesis)
+#   scripts/test.sh --quick    without the outside judges (trimesh, vtk, glTF validator, pygeodesic, schemathesis)
 set -uo pipefail
 cd "$(dirname "$0")/.."
 
@@ -48,10 +48,10 @@ install_judges() {
   need node nodejs npm
   need npm npm
   python3 -c 'import ensurepip, venv' 2>/dev/null || need no-such-command python3 python3-venv python3-pip
-  if [ ! -e "$tools/python.done" ]; then
+  if ! cmp -s scripts/requirements.txt "$tools/python.done"; then
     python3 -m venv "$tools/python" &&
       "$tools/python/bin/pip" install -q -r scripts/requirements.txt &&
-      touch "$tools/python.done"
+      cp scripts/requirements.txt "$tools/python.done"
   fi
   [ -e "$tools/node_modules/gltf-validator" ] ||
     npm install --silent --no-fund --no-audit --prefix "$tools" gltf-validator@2.0.0-dev.3.10
@@ -79,6 +79,7 @@ if [ "$quick" = --quick ]; then finish; fi
 if install_judges; then
   export PYTHON=$tools/python/bin/python NODE_PATH=$tools/node_modules
   check "formats read back by trimesh, vtk and the glTF validator" scripts/check_formats.sh
+  check "geodesics compared with pygeodesic" scripts/check_geodesics.sh
   check "schemathesis against the running service" scripts/check_api.sh
 else
   echo "the outside judges could not be installed"

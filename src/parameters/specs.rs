@@ -2,7 +2,7 @@
 
 use super::{Kind, ParameterSpec};
 use crate::optimise::{FitnessForm, Gain};
-use crate::retile::Method;
+use crate::retile::{Geodesics, Method};
 use crate::surface::{IsoLevel, Isolate, TopologyMode};
 use serde_json::{Value, json};
 
@@ -283,6 +283,26 @@ pub const SPECS: &[ParameterSpec] = &[
             Ok(())
         },
         write: |p| json!(p.retile.repulsion_strength),
+    },
+    ParameterSpec {
+        name: "geodesics",
+        kind: Kind::Choice(&["approximate", "exact"]),
+        default: "approximate",
+        summary: "Distances along the surface that repulsion goes by (method paper): exact ones \
+                  take many times longer and are for validation",
+        read: |d, v| {
+            d.retile.geodesics = match v.text() {
+                "exact" => Geodesics::Exact,
+                _ => Geodesics::Approximate,
+            };
+            Ok(())
+        },
+        write: |p| {
+            json!(match p.retile.geodesics {
+                Geodesics::Approximate => "approximate",
+                Geodesics::Exact => "exact",
+            })
+        },
     },
     ParameterSpec {
         name: "relaxation_iterations",

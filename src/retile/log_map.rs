@@ -7,26 +7,21 @@
 //! the plane; the third corner's distance is that to the virtual source, and its direction
 //! divides the directions of i and j as the ray divides the angle between them.
 //!
+//! Over obtuse corners the wave may first come the long way along an edge, so a vertex is taken
+//! up again whenever it is reached sooner (without that, distances just behind the source's
+//! triangle were up to 40 % too long).
+//!
 //! Exact wherever no vertex bends the wave (planes, and developable surfaces laid flat);
-//! elsewhere an approximation from above and below, measured in this file's tests.
+//! elsewhere an approximation from above and below: against [`super::exact`] within two
+//! spacings 0.05 to 0.08 % on average and 1.2 % at worst (that module's tests).
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::SurfacePoint;
 use super::domain::{Domain, apex};
-use crate::geometry::Vec2;
+use super::geodesics::{GeodesicMap, Reach};
 use crate::mesh::adjacency::previous;
-
-/// A vertex as seen from the source: the vector in the source triangle's frame that a walker
-/// must take to get there, and its length.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Reach {
-    /// Direction times distance, in the frame of the source's triangle, mm.
-    pub vector: Vec2,
-    /// Geodesic distance, mm.
-    pub distance: f64,
-}
 
 /// The third corner of a triangle whose corners i (at the origin) and j (at `base` on the x
 /// axis) are known, the third being `left` from i and `right` from j. `None` where the ray
@@ -95,6 +90,10 @@ pub(crate) fn queue_key(distance: f64, vertex: u32) -> Reverse<u64> {
     Reverse((u64::from((distance as f32).to_bits()) << 32) | u64::from(vertex))
 }
 
+/// Share by which a distance must fall to be taken up again: beyond rounding, so that the wave
+/// ends.
+const SHORTER: f64 = 1.0 + 1e-9;
+
 const UNSEEN: u8 = 0;
 const SEEN: u8 = 1;
 const DONE: u8 = 2;
@@ -107,48 +106,37 @@ pub(crate) struct LogMap {
     state: Vec<u8>,
     visited: Vec<u32>,
     queue: BinaryHeap<Reverse<u64>>,
+    source: SurfacePoint,
 }
 
-impl LogMap {
-    /// An empty map over `vertices` vertices.
-    pub fn new(vertices: usize) -> Self {
+impl GeodesicMap for LogMap {
+    fn over(domain: &Domain) -> Self {
+        let vertices = domain.vertices.len();
         Self {
-            reach: vec![
-                Reach {
-                    vector: Vec2::zeros(),
-                    distance: f64::INFINITY,
-                };
-                vertices
-            ],
+            reach: vec![Reach::UNKNOWN; vertices],
             state: vec![UNSEEN; vertices],
             visited: Vec::new(),
             queue: BinaryHeap::new(),
+            source: SurfacePoint {
+                triangle: u32::MAX,
+                barycentric: [0.0; 3],
+            },
         }
     }
 
-    /// The vertex as seen from the source, if it lies within the radius.
-    pub fn reach(&self, vertex: u32) -> Option<Reach> {
-        (self.state[vertex as usize] == DONE).then(|| self.reach[vertex as usize])
-    }
-
-    /// The vertices within the radius, in no particular order, and those just beyond.
-    pub fn visited(&self) -> &[u32] {
-        &self.visited
-    }
-
-    /// Maps everything within `radius` mm of `source`.
-    pub fn spread(&mut self, domain: &Domain, source: &SurfacePoint, radius: f64) {
+    fn spread(&mut self, domain: &Domain, source: &SurfacePoint, radius: f64) {
         self.clear();
+        self.source = *source;
         let corners = domain.triangles[source.triangle as usize];
         for (v, reach) in corners.into_iter().zip(first_corners(domain, source)) {
             self.offer(v, reach);
         }
         while let Some(Reverse(key)) = self.queue.pop() {
             let i = key as u32;
-            if self.state[i as usize] == DONE {
+            let here = self.reach[i as usize];
+            if self.state[i as usize] == DONE || queue_key(here.distance, i) != Reverse(key) {
                 continue;
             }
-            let here = self.reach[i as usize];
             if here.distance > radius {
                 break;
             }
@@ -157,6 +145,34 @@ impl LogMap {
         }
     }
 
+    fn reach(&self, vertex: u32) -> Option<Reach> {
+        (self.state[vertex as usize] == DONE).then(|| self.reach[vertex as usize])
+    }
+
+    fn visited(&self) -> &[u32] {
+        &self.visited
+    }
+
+    /// The mean of the corners' vectors; exact in the source's own triangle. `None` where a
+    /// corner lies beyond the radius.
+    fn reach_point(&self, domain: &Domain, point: &SurfacePoint) -> Option<Reach> {
+        let corners = domain.triangles[point.triangle as usize];
+        let vectors = if point.triangle == self.source.triangle {
+            first_corners(domain, &self.source).map(|r| r.vector)
+        } else {
+            let [a, b, c] = corners.map(|v| self.reach(v).map(|r| r.vector));
+            [a?, b?, c?]
+        };
+        let [u, v, w] = point.barycentric;
+        let vector = vectors[0] * u + vectors[1] * v + vectors[2] * w;
+        Some(Reach {
+            vector,
+            distance: vector.norm(),
+        })
+    }
+}
+
+impl LogMap {
     fn relax_around(&mut self, domain: &Domain, i: u32, here: Reach) {
         for out in domain.adjacency.around(domain.outgoing[i as usize]) {
             // The triangle i, a, b.
@@ -164,11 +180,9 @@ impl LogMap {
             let [a, b] = [domain.ends(out)[1], domain.ends(back)[0]];
             let across = domain.lengths[3 * (out as usize / 3) + (out as usize + 1) % 3];
             let (to_a, to_b) = (domain.lengths[out as usize], domain.lengths[back as usize]);
-            if self.state[a as usize] != DONE {
-                self.offer(a, along_edge(&here, to_a));
-            }
+            self.offer(a, along_edge(&here, to_a));
             for (known, sought, base, left) in [(a, b, to_a, to_b), (b, a, to_b, to_a)] {
-                if self.state[known as usize] == DONE && self.state[sought as usize] != DONE {
+                if self.state[known as usize] != UNSEEN {
                     let j = self.reach[known as usize];
                     if let Some(k) = unfold(&here, &j, base, left, across) {
                         self.offer(sought, k);
@@ -181,11 +195,11 @@ impl LogMap {
     fn offer(&mut self, vertex: u32, reach: Reach) {
         let v = vertex as usize;
         if self.state[v] == UNSEEN {
-            self.state[v] = SEEN;
             self.visited.push(vertex);
-        } else if reach.distance >= self.reach[v].distance {
+        } else if reach.distance * SHORTER >= self.reach[v].distance {
             return;
         }
+        self.state[v] = SEEN;
         self.reach[v] = reach;
         self.queue.push(queue_key(reach.distance, vertex));
     }
@@ -242,7 +256,7 @@ mod tests {
     #[test]
     fn distances_on_a_flat_side_are_straight_ones() {
         let domain = flat_sided();
-        let mut map = LogMap::new(domain.vertices.len());
+        let mut map = LogMap::over(&domain);
         // 256 triangles on each side; those of side 0 are the first.
         for t in [0, 37, 100, 200, 255] {
             let source = centre(t);
@@ -260,7 +274,7 @@ mod tests {
     #[test]
     fn distances_over_an_edge_are_those_of_the_unrolled_sides() {
         let domain = flat_sided();
-        let mut map = LogMap::new(domain.vertices.len());
+        let mut map = LogMap::over(&domain);
         let source = SurfacePoint {
             triangle: 255,
             barycentric: [1.0 / 3.0; 3],
@@ -310,7 +324,7 @@ mod tests {
     fn distances_on_a_sphere_are_arcs() {
         let radius = 20.0;
         let domain = domain(shapes::icosphere(radius, 5));
-        let mut map = LogMap::new(domain.vertices.len());
+        let mut map = LogMap::over(&domain);
         let (mut worst, mut sum, mut count) = (0.0f64, 0.0, 0);
         for t in [0u32, 1234, 5000, 17_000] {
             let source = centre(t);

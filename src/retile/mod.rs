@@ -6,8 +6,8 @@
 //!
 //! [`Method::Paper`]
 //! 1. [`placement`]: random points, uniform by area.
-//! 2. [`repulsion`]: they push each other apart along the surface (geodesics: [`log_map`],
-//!    straight moves: [`trace`]).
+//! 2. [`repulsion`]: they push each other apart along the surface ([`geodesics`]: [`log_map`],
+//!    or [`exact`] for validation; straight moves: [`trace`]).
 //! 3. [`tessellate`]: mutual tessellation by constrained Delaunay, old vertices removed.
 //!
 //! [`Method::Refined`]
@@ -29,6 +29,8 @@ mod cells;
 mod clipping;
 mod domain;
 mod dual;
+mod exact;
+pub mod geodesics;
 mod log_map;
 mod paper;
 mod placement;
@@ -45,6 +47,8 @@ use crate::mesh::TriMesh;
 use crate::mesh::topology::Defect;
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::surface::Surface;
+
+pub use geodesics::Geodesics;
 
 /// Fewest points a model may have: an icosahedron's.
 pub const LEAST_POINTS: usize = 12;
@@ -82,6 +86,9 @@ pub struct RetileParameters {
     pub repulsion_iterations: usize,
     /// Share of the overlap that one round of repulsion moves, (0, 1]. Default 0.15 (Turk).
     pub repulsion_strength: f64,
+    /// Distances that repulsion goes by ([`Method::Paper`]). Default
+    /// [`Geodesics::Approximate`]; exact ones are for validation.
+    pub geodesics: Geodesics,
     /// Most rounds of centroidal relaxation ([`Method::Refined`]), 0..=1000. Default 80.
     pub relaxation_iterations: usize,
 }
@@ -96,6 +103,7 @@ impl Default for RetileParameters {
             adaptive_from: 0.8,
             repulsion_iterations: 40,
             repulsion_strength: 0.15,
+            geodesics: Geodesics::Approximate,
             relaxation_iterations: 80,
         }
     }

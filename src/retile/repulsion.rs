@@ -12,6 +12,8 @@
 use rayon::prelude::*;
 
 use super::domain::Domain;
+use super::exact::ExactMap;
+use super::geodesics::{GeodesicMap, Geodesics};
 use super::log_map::LogMap;
 use super::trace::walk;
 use super::{RetileParameters, SurfacePoint};
@@ -34,6 +36,19 @@ pub(crate) fn repel(
     parameters: &RetileParameters,
     tick: impl Fn(f64) -> Result<(), Cancelled> + Sync,
 ) -> Result<(), Cancelled> {
+    match parameters.geodesics {
+        Geodesics::Approximate => repel_by::<LogMap>(domain, spacing, points, parameters, tick),
+        Geodesics::Exact => repel_by::<ExactMap>(domain, spacing, points, parameters, tick),
+    }
+}
+
+fn repel_by<M: GeodesicMap>(
+    domain: &Domain,
+    spacing: &[f64],
+    points: &mut Vec<SurfacePoint>,
+    parameters: &RetileParameters,
+    tick: impl Fn(f64) -> Result<(), Cancelled> + Sync,
+) -> Result<(), Cancelled> {
     let rounds = parameters.repulsion_iterations;
     let radius = 2.0 * (domain.area / points.len() as f64).sqrt();
     for round in 0..rounds {
@@ -43,7 +58,7 @@ pub(crate) fn repel(
         *points = (0..points.len())
             .into_par_iter()
             .map_init(
-                || LogMap::new(domain.vertices.len()),
+                || M::over(domain),
                 |map, p| {
                     tick(share)?;
                     let step = neighbourhood.push(map, p, strength);
@@ -89,7 +104,7 @@ impl<'a> Neighbourhood<'a> {
     }
 
     /// The move of point `p`, in the frame of its triangle.
-    fn push(&self, map: &mut LogMap, p: usize, strength: f64) -> Vec2 {
+    fn push(&self, map: &mut impl GeodesicMap, p: usize, strength: f64) -> Vec2 {
         let own = &self.points[p];
         let reach = (self.radii[p] + self.largest) / 2.0;
         map.spread(self.domain, own, reach * 1.05);
@@ -101,14 +116,14 @@ impl<'a> Neighbourhood<'a> {
                 step -= towards * (strength * (range - distance) / distance);
             }
         };
-        let flat = self.domain.flat(own.triangle);
-        let here = combine(&flat, own.barycentric);
-        for q in self.on_triangle(own.triangle) {
-            add(
-                q,
-                combine(&flat, self.points[q as usize].barycentric) - here,
-            );
-        }
+        let mut add_all_on = |t: u32| {
+            for q in self.on_triangle(t) {
+                if let Some(towards) = map.reach_point(self.domain, &self.points[q as usize]) {
+                    add(q, towards.vector);
+                }
+            }
+        };
+        add_all_on(own.triangle);
         for &v in map.visited() {
             if map.reach(v).is_none() {
                 continue;
@@ -120,16 +135,12 @@ impl<'a> Neighbourhood<'a> {
             {
                 let t = h / 3;
                 let corners = self.domain.triangles[t as usize];
-                let ours = corners.iter().all(|c| *c >= v) && t != own.triangle;
-                if !ours || self.first[t as usize] == NONE {
+                if self.first[t as usize] == NONE || t == own.triangle {
                     continue;
                 }
-                let [Some(a), Some(b), Some(c)] = corners.map(|c| map.reach(c)) else {
-                    continue;
-                };
-                let vectors = [a.vector, b.vector, c.vector];
-                for q in self.on_triangle(t) {
-                    add(q, combine(&vectors, self.points[q as usize].barycentric));
+                // Each triangle once, and only those that lie wholly within the radius.
+                if corners.iter().all(|c| *c >= v && map.reach(*c).is_some()) {
+                    add_all_on(t);
                 }
             }
         }
@@ -152,8 +163,4 @@ impl<'a> Neighbourhood<'a> {
             Some(this)
         })
     }
-}
-
-fn combine(corners: &[Vec2; 3], [u, v, w]: [f64; 3]) -> Vec2 {
-    corners[0] * u + corners[1] * v + corners[2] * w
 }
