@@ -21,9 +21,9 @@
 //! barycentric coordinates) lies on both.
 //!
 //! **Guaranteed** for what is returned: exactly N vertices, closed, edge- and vertex-manifold,
-//! outward, components and Euler characteristic of S, no self-intersection (checked exactly).
-//! **Not** guaranteed: that N points can carry every surface; [`RetileError::TooFewPoints`]
-//! says how many would do. The same input gives the same bytes on any number of threads.
+//! components and Euler characteristic of S, each component facing as on S ([`orientation`]),
+//! no self-intersection (checked exactly). **Not** guaranteed: that N points can carry every
+//! surface; [`RetileError::TooFewPoints`] names a number that does. The same input gives the same bytes on any number of threads.
 
 mod cells;
 mod clipping;
@@ -32,6 +32,7 @@ mod dual;
 mod exact;
 pub mod geodesics;
 mod log_map;
+mod orientation;
 mod paper;
 mod placement;
 mod quotas;
@@ -165,12 +166,20 @@ pub enum RetileError {
     #[error("the surface has no finite, positive area")]
     NoArea,
     /// N points cannot carry the surface's handles and components.
-    #[error("{points} points cannot carry the surface's topology; about {needed} would")]
+    #[error("{points} points cannot carry the surface's topology; {needed} do")]
     TooFewPoints {
         /// Points asked for.
         points: usize,
-        /// Points that would do.
+        /// Points that do, with the same method and seed.
         needed: usize,
+    },
+    /// Nor can any larger number that was tried.
+    #[error("{points} points cannot carry the surface's topology, nor do up to {tried}")]
+    NotCarried {
+        /// Points asked for.
+        points: usize,
+        /// The largest number tried.
+        tried: usize,
     },
     /// More points than the surface can carry.
     #[error("{points} points are more than the surface can carry; at most {limit}")]
@@ -211,6 +220,10 @@ impl RetileError {
             RetileError::Cancelled(_) => "Ask again if the result is still wanted.".into(),
             RetileError::TooFewPoints { needed, .. } => {
                 format!("Set `points` to {needed} or more, or `topology` to genus0.")
+            }
+            RetileError::NotCarried { .. } => {
+                "Set `topology` to genus0, or `isolate` to one component, or smooth the volume."
+                    .into()
             }
             RetileError::TooManyPoints { limit, .. } => {
                 format!("Set `points` to {limit} or fewer.")

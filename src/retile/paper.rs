@@ -1,6 +1,7 @@
 //! The paper's route: repulsion, mutual tessellation, removal of the old vertices.
 
 use super::domain::Domain;
+use super::refined::{LEAST_TRIED, NEEDED_FACTOR};
 use super::samples::Samples;
 use super::tessellate::{TessellateError, tessellate};
 use super::{
@@ -123,18 +124,27 @@ fn refusal(job: &Job, last: Option<TessellateError>) -> Result<RetileError, Canc
             })
         }
         _ => {
-            let mut needed = asked.max(quotas::least_points(&job.surface.mesh) * 2 / 3);
-            while needed < super::MOST_POINTS {
-                needed = (needed * 3 / 2).min(super::MOST_POINTS);
+            let least = quotas::least_points(&job.surface.mesh);
+            let mut needed = least.max(asked + 1);
+            let mut tried = asked;
+            let most = LEAST_TRIED.max(NEEDED_FACTOR * needed);
+            while needed <= most.min(super::MOST_POINTS) {
                 match spread(job, needed, 0) {
-                    Ok(points) if join(job, &points).is_ok() => break,
+                    Ok(points) if join(job, &points).is_ok() => {
+                        return Ok(RetileError::TooFewPoints {
+                            points: asked,
+                            needed,
+                        });
+                    }
                     Err(RetileError::Cancelled(cancelled)) => return Err(cancelled),
                     _ => {}
                 }
+                tried = needed;
+                needed *= 2;
             }
-            Ok(RetileError::TooFewPoints {
+            Ok(RetileError::NotCarried {
                 points: asked,
-                needed,
+                tried,
             })
         }
     }

@@ -9,7 +9,12 @@ use crate::mesh::{TriMesh, topology};
 
 /// The fewest vertices of any triangulation with the mesh's components and handles.
 pub(super) fn least_points(mesh: &TriMesh) -> usize {
-    characteristics(mesh).into_iter().map(heawood).sum()
+    least_of_components(mesh).iter().sum()
+}
+
+/// The same for each component, numbered as [`topology::components`] does.
+pub(super) fn least_of_components(mesh: &TriMesh) -> Vec<usize> {
+    characteristics(mesh).into_iter().map(heawood).collect()
 }
 
 /// Heawood's bound for a closed orientable surface, attained but for genus 2, which takes one
@@ -39,7 +44,7 @@ fn characteristics(mesh: &TriMesh) -> Vec<i64> {
 /// Shares `points` among the components by `load`, each with what its topology needs; the sum
 /// is `points`, which must be at least [`least_points`].
 pub(super) fn share(mesh: &TriMesh, load: &[f64], points: usize) -> Vec<usize> {
-    let least: Vec<usize> = characteristics(mesh).into_iter().map(heawood).collect();
+    let least = least_of_components(mesh);
     let total: f64 = load.iter().sum();
     let fair: Vec<f64> = load.iter().map(|l| l / total * points as f64).collect();
     let mut quotas: Vec<usize> = (least.iter().zip(&fair))

@@ -12,7 +12,10 @@
 
 use super::cells::Cells;
 use super::samples::Samples;
-use super::{RetileError, RetileFacts, RetileParameters, Tiled, dual, quotas, sizing};
+use super::{
+    MOST_POINTS, RetileError, RetileFacts, RetileParameters, Tiled, dual, orientation, quotas,
+    sizing,
+};
 use crate::geometry::random::{Purpose, stream};
 use crate::geometry::{Vec3, triangle};
 use crate::mesh::intersections::self_intersections;
@@ -38,8 +41,11 @@ const THICKENING: f64 = 3.0;
 const STARTS: u64 = 3;
 /// Parts in which all triangles are looked through; each keeps a place for every cell.
 const MOST_TASKS: usize = 8;
-/// Largest multiple of N that is tried to tell which N would do.
-const NEEDED_FACTOR: usize = 64;
+/// To tell which N would do, N is doubled as long as it stays below this multiple of the number
+/// asked for (or this number), with so many repairs each.
+pub(super) const NEEDED_FACTOR: usize = 16;
+pub(super) const LEAST_TRIED: usize = 2000;
+const HURRIED_REPAIRS: usize = 6;
 
 /// Re-tiles `surface` by centroidal cells.
 pub(super) fn retile(
@@ -50,15 +56,12 @@ pub(super) fn retile(
     let points = parameters.points;
     let least = quotas::least_points(&surface.mesh);
     if points < least {
-        return Err(RetileError::TooFewPoints {
-            points,
-            needed: needed_points(surface, parameters, least, monitor)?,
-        });
+        return Err(refusal(surface, parameters, least, monitor)?);
     }
     let job = Job::new(surface, parameters, points);
     let mut facts = RetileFacts::default();
     for start in 0..STARTS {
-        if let Some((mesh, sizing)) = job.attempt(start, &mut facts, monitor)? {
+        if let Some((mesh, sizing)) = job.attempt(start, REPAIRS, &mut facts, monitor)? {
             return Ok(Tiled {
                 mesh,
                 sizing,
@@ -66,33 +69,36 @@ pub(super) fn retile(
             });
         }
     }
-    Err(RetileError::TooFewPoints {
-        points,
-        needed: needed_points(surface, parameters, points + 1, monitor)?,
-    })
+    Err(refusal(surface, parameters, points + 1, monitor)?)
 }
 
-/// A number of points that carries the topology, found by trying; at least `from`.
-fn needed_points(
+/// The error to give up with. It names a number of points, at least `from`, that does: what
+/// is tried here is how [`retile`] would begin with that number.
+fn refusal(
     surface: &Surface,
     parameters: &RetileParameters,
     from: usize,
     monitor: &Monitor,
-) -> Result<usize, RetileError> {
-    let mut points = from;
-    while points < from * NEEDED_FACTOR {
-        let quick = RetileParameters {
-            relaxation_iterations: SETTLING_ROUNDS,
-            ..parameters.clone()
-        };
-        let job = Job::new(surface, &quick, points);
+) -> Result<RetileError, RetileError> {
+    let asked = parameters.points;
+    let mut tried = asked;
+    let mut needed = from;
+    while needed <= MOST_POINTS.min(LEAST_TRIED.max(NEEDED_FACTOR * from)) {
+        let job = Job::new(surface, parameters, needed);
         let mut ignored = RetileFacts::default();
-        if job.attempt(0, &mut ignored, monitor)?.is_some() {
-            break;
+        if (job.attempt(0, HURRIED_REPAIRS, &mut ignored, monitor)?).is_some() {
+            return Ok(RetileError::TooFewPoints {
+                points: asked,
+                needed,
+            });
         }
-        points += points / 2 + 1;
+        tried = needed;
+        needed *= 2;
     }
-    Ok(points)
+    Ok(RetileError::NotCarried {
+        points: asked,
+        tried,
+    })
 }
 
 /// What every attempt shares.
@@ -103,6 +109,12 @@ struct Job<'a> {
     samples: Samples,
     /// Relative spacing wanted at every sample.
     spacing: Vec<f64>,
+    /// Component of the surface of every sample.
+    components: Vec<u32>,
+    /// The fewest points that each component takes.
+    least: Vec<usize>,
+    /// Signed volume of each component of S, mm³.
+    volumes: Vec<f64>,
     /// Area times density: h^-4 makes centroidal cells as large as h² (Du et al. 1999).
     weights: Vec<f64>,
 }
@@ -119,10 +131,14 @@ impl<'a> Job<'a> {
         let weights = (samples.area.iter().zip(&spacing))
             .map(|(area, h)| area * h.powi(-4))
             .collect();
+        let components = topology::components(samples.len(), &samples.triangles);
         Self {
             surface,
             parameters,
             points,
+            volumes: orientation::volumes(&surface.mesh, &components),
+            components,
+            least: quotas::least_of_components(&surface.mesh),
             samples,
             spacing,
             weights,
@@ -134,6 +150,7 @@ impl<'a> Job<'a> {
     fn attempt(
         &self,
         start: u64,
+        repairs: usize,
         facts: &mut RetileFacts,
         monitor: &Monitor,
     ) -> Result<Option<(TriMesh, Vec<f64>)>, RetileError> {
@@ -144,24 +161,28 @@ impl<'a> Job<'a> {
         facts.relaxation_rounds += cells.relax(&self.samples, &self.weights, rounds, monitor)?;
         let mut weights = self.weights.clone();
         let mut moved = Vec::new();
-        for _ in 0..=REPAIRS {
+        for _ in 0..=repairs {
             facts.attempts += 1;
             monitor.report(Stage::Retile, 0.8)?;
             cells.tidy(&self.samples);
             let crowded = match dual::triangulate(&self.samples, &cells.labels, self.points) {
                 Err(offence) => offence.sites,
                 Ok(triangles) => {
-                    let mesh = TriMesh {
+                    let mut mesh = TriMesh {
                         vertices: self.vertices(&cells),
                         triangles,
                     };
                     let crossing = self_intersections(&mesh);
-                    if crossing.is_empty() {
-                        // With very few points a mesh may come out inside out.
-                        let outward = mesh.volume() > 0.0;
-                        return Ok(outward.then(|| (mesh, self.sizing(&cells))));
+                    let component = self.components_of_sites(&cells);
+                    if !crossing.is_empty() {
+                        sites_of(&mesh, &crossing)
+                    } else if let Err(inside_out) =
+                        orientation::face_alike(&mut mesh, &component, &self.volumes)
+                    {
+                        inside_out
+                    } else {
+                        return Ok(Some((mesh, self.sizing(&cells))));
                     }
-                    sites_of(&mesh, &crossing)
                 }
             };
             if crowded.is_empty() {
@@ -169,7 +190,8 @@ impl<'a> Job<'a> {
             }
             self.thicken(&cells, &crowded, &mut weights);
             for &site in crowded.iter().take(TRANSPLANTS) {
-                let Some(light) = self.least_loaded(&cells, &weights, &crowded, &moved) else {
+                let Some(light) = self.least_loaded(&cells, &weights, &crowded, site, &moved)
+                else {
                     return Ok(None);
                 };
                 moved.push(light);
@@ -210,9 +232,8 @@ impl<'a> Job<'a> {
             self.parameters.seed ^ start.rotate_left(32),
             Purpose::Placement,
         );
-        let components = topology::components(self.samples.len(), &self.samples.triangles);
         let mut load = Vec::new();
-        for (v, &c) in components.iter().enumerate() {
+        for (v, &c) in self.components.iter().enumerate() {
             let c = c as usize;
             load.resize(load.len().max(c + 1), 0.0);
             load[c] += self.samples.area[v] / self.spacing[v].powi(2);
@@ -221,7 +242,7 @@ impl<'a> Job<'a> {
         let mut seeds = Vec::with_capacity(self.points);
         for (component, quota) in (0u32..).zip(quotas) {
             let mut members: Vec<u32> = (0..self.samples.len() as u32)
-                .filter(|&v| components[v as usize] == component)
+                .filter(|&v| self.components[v as usize] == component)
                 .collect();
             // Weighted sampling without replacement (Efraimidis and Spirakis 2006).
             let mut keyed: Vec<(f64, u32)> = members
@@ -238,21 +259,41 @@ impl<'a> Job<'a> {
         seeds
     }
 
-    /// The site with the lightest cell that is not crowded and was not moved lately.
+    /// The site with the lightest cell that may go to the cell of `to`: not crowded
+    /// itself, not moved lately, and none that its component cannot do without.
     fn least_loaded(
         &self,
         cells: &Cells,
         weights: &[f64],
         crowded: &[u32],
+        to: u32,
         moved: &[u32],
     ) -> Option<u32> {
         let mut load = vec![0.0; self.points];
         for (&site, weight) in cells.labels.iter().zip(weights) {
             load[site as usize] += weight;
         }
+        let component = self.components_of_sites(cells);
+        let mut sites = vec![0; self.least.len()];
+        for &c in &component {
+            sites[c as usize] += 1;
+        }
+        let spared = |site: u32| {
+            let c = component[site as usize] as usize;
+            c == component[to as usize] as usize || sites[c] > self.least[c]
+        };
         (0..self.points as u32)
-            .filter(|site| !crowded.contains(site) && !moved.contains(site))
+            .filter(|site| !crowded.contains(site) && !moved.contains(site) && spared(*site))
             .min_by(|a, b| load[*a as usize].total_cmp(&load[*b as usize]))
+    }
+
+    /// The component of the surface that each site's cell lies on.
+    fn components_of_sites(&self, cells: &Cells) -> Vec<u32> {
+        let mut component = vec![0; self.points];
+        for (&site, &c) in cells.labels.iter().zip(&self.components) {
+            component[site as usize] = c;
+        }
+        component
     }
 
     /// For every site the point of its cell's part of S closest to the cell's centroid on S.

@@ -38,7 +38,7 @@ use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
 use crate::mesh::topology::{self, Census, Defect};
 use crate::progress::{Cancelled, Monitor};
-use crate::retile::SurfacePoint;
+use crate::retile::{SurfacePoint, orientation};
 
 use patchwork::Patchwork;
 
@@ -93,6 +93,12 @@ pub enum TessellateError {
         /// The mesh.
         after: Census,
     },
+    /// A component faces the other way than on the surface: too few points for its shape.
+    #[error("the triangles of {} points face the wrong way", points.len())]
+    InsideOut {
+        /// The component's points, ascending.
+        points: Vec<u32>,
+    },
     /// Triangles pierce each other: too few points where walls are thin or bent.
     #[error("{} pairs of triangles pierce each other", pairs.len())]
     SelfIntersecting {
@@ -136,8 +142,18 @@ pub fn tessellate(
         return Err(TessellateError::Stuck { vertices });
     }
     repair::end_self_intersections(&mut mesh, monitor)?;
-    let mesh = finished(mesh, points.len());
-    verify(mesh, &census)
+    let mut mesh = verify(finished(mesh, points.len()), &census)?;
+    let component = topology::components(vertices.len(), triangles);
+    let surface = TriMesh {
+        vertices: vertices.to_vec(),
+        triangles: triangles.to_vec(),
+    };
+    let of_point = |p: &SurfacePoint| component[triangles[p.triangle as usize][0] as usize];
+    let of_points: Vec<u32> = points.iter().map(of_point).collect();
+    let volumes = orientation::volumes(&surface, &component);
+    orientation::face_alike(&mut mesh, &of_points, &volumes)
+        .map_err(|points| TessellateError::InsideOut { points })?;
+    Ok(mesh)
 }
 
 fn check_points(triangles: &[[u32; 3]], points: &[SurfacePoint]) -> Result<(), TessellateError> {
@@ -377,9 +393,11 @@ mod tests {
                 Ok(mesh) => demand_guarantees(&surface, n, seed, &mesh),
                 // Points are scattered blindly: the small sphere may go without.
                 Err(TessellateError::TooFewPoints { .. }) => {}
-                Err(TessellateError::SelfIntersecting { .. } | TessellateError::Stuck { .. }) => {
-                    refused += 1;
-                }
+                Err(
+                    TessellateError::SelfIntersecting { .. }
+                    | TessellateError::Stuck { .. }
+                    | TessellateError::InsideOut { .. },
+                ) => refused += 1,
                 Err(other) => panic!("seed {seed}: {other}"),
             }
         }
@@ -426,6 +444,7 @@ mod tests {
                 match outcome {
                     Ok(mesh) => assert!(topology::check(&mesh).is_ok()),
                     Err(TessellateError::Stuck { vertices }) => assert!(!vertices.is_empty()),
+                    Err(TessellateError::InsideOut { points }) => assert!(!points.is_empty()),
                     Err(TessellateError::SelfIntersecting { pairs, mesh, .. }) => {
                         assert_eq!(self_intersections(&mesh), pairs);
                     }
