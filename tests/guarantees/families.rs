@@ -162,7 +162,7 @@ pub fn thin_sheets(seed: u64) -> Surface {
         let q = (p - up * along).norm().hypot(along * stretch);
         LEVEL + (wall / 2.0 - (q - radius).abs()).min(open - along)
     });
-    if seed % 3 != 0 {
+    if !seed.is_multiple_of(3) {
         return kept(&field, Isolate::Largest);
     }
     for v in &mut field.voxels {
