@@ -129,8 +129,17 @@ fn refusal(job: &Job, last: Option<TessellateError>) -> Result<RetileError, Canc
             let mut tried = asked;
             let most = LEAST_TRIED.max(NEEDED_FACTOR * needed);
             while needed <= most.min(super::MOST_POINTS) {
-                match spread(job, needed, 0) {
-                    Ok(points) if join(job, &points).is_ok() => {
+                let larger = RetileParameters {
+                    points: needed,
+                    ..job.parameters.clone()
+                };
+                // As [`retile`] begins with that number.
+                let job = match Job::new(job.surface, &larger, job.monitor) {
+                    Ok(larger) => larger,
+                    Err(error) => return Ok(error),
+                };
+                match spread(&job, needed, 0) {
+                    Ok(points) if join(&job, &points).is_ok() => {
                         return Ok(RetileError::TooFewPoints {
                             points: asked,
                             needed,
