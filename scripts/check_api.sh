@@ -2,6 +2,8 @@
 # Exercises the running service with schemathesis: no 500, no undocumented status or body.
 # One check is left out: arbitrary bytes are rarely a volume, and what was erased is 410, so
 # requests that satisfy the schema are rightly refused.
+# One worker: CPython 3.11 fails now and then where two threads parse at once ("AST constructor
+# recursion depth mismatch").
 # PYTHON names an interpreter that has schemathesis.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -18,6 +20,6 @@ for _ in $(seq 100); do
 done
 [ -n "$url" ] || { cat "$data/log"; exit 1; }
 "$(dirname "$python")/schemathesis" run "$url/openapi.json" --max-examples "${EXAMPLES:-15}" \
-  --workers 2 --seed 1 --suppress-health-check all \
+  --workers 1 --seed 1 --suppress-health-check all \
   --exclude-checks positive_data_acceptance --no-color
 kill -0 "$service"
