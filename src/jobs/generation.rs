@@ -1,9 +1,10 @@
 //! The work of kind `model`: [`crate::pipeline`] from files to every download.
 
+use super::checked::{self, unusable};
 use super::reader::{refusal, sentence, volume_files};
 use super::{Failure, Fault, Input, Output, OutputFile, Resource, Work, WorkError};
 use crate::export::{self, Format};
-use crate::parameters::{ModelParameters, ParameterError, Parameters};
+use crate::parameters::ModelParameters;
 use crate::pipeline::{self, Model, PipelineError};
 use crate::progress::{Monitor, Plan, Stage};
 use crate::surface::SurfaceError;
@@ -30,17 +31,14 @@ impl Work for Generation {
         &self,
         pairs: &[(String, String)],
     ) -> Result<Map<String, Value>, Failure> {
-        let pairs = pairs
-            .iter()
-            .map(|(name, text)| (name.as_str(), text.as_str()));
-        written_out(ModelParameters::from_pairs(pairs))
+        checked::from_text::<ModelParameters>(pairs)
     }
 
     fn parameters_from_json(
         &self,
         object: &Map<String, Value>,
     ) -> Result<Map<String, Value>, Failure> {
-        written_out(ModelParameters::from_json(object))
+        checked::from_json::<ModelParameters>(object)
     }
 
     fn run(&self, input: &Input, monitor: &Monitor<'_>) -> Result<Output, WorkError> {
@@ -53,23 +51,6 @@ impl Work for Generation {
             summary: summary(&model),
         })
     }
-}
-
-fn written_out(
-    parameters: Result<ModelParameters, ParameterError>,
-) -> Result<Map<String, Value>, Failure> {
-    Ok(parameters.map_err(unusable)?.to_json())
-}
-
-/// A parameter that cannot be used, for whoever gave it.
-pub(super) fn unusable(error: ParameterError) -> Failure {
-    Failure::new(
-        Fault::Request,
-        "invalid-parameter",
-        format!("`{}`: {}.", error.field, error.message),
-    )
-    .at(error.field)
-    .fix(error.fix)
 }
 
 fn explain(error: &PipelineError) -> WorkError {

@@ -22,6 +22,7 @@
 //! fulfils.
 
 mod blobs;
+mod checked;
 mod clock;
 mod failure;
 mod generation;
@@ -47,7 +48,6 @@ pub use blobs::{BlobError, BlobStore, BlobStream, Staged};
 pub use clock::{Clock, ManualClock, SystemClock, Timestamp};
 pub use failure::{Failure, Fault};
 pub use generation::Generation;
-use generation::unusable;
 pub use ids::{content_id, random_id};
 pub use job::{Filed, Idempotency, Job, NewJob, State};
 pub use page::{Page, PageRequest};

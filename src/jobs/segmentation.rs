@@ -1,9 +1,8 @@
 //! The work of kind `segmentation`: [`crate::pipeline::segment`] over stored models.
 
+use super::checked::{self, unusable};
 use super::reader::{refusal, sentence, volume_files};
-use super::{
-    Failure, Fault, Input, Needs, Output, OutputFile, Resource, Stored, Work, WorkError, unusable,
-};
+use super::{Failure, Fault, Input, Needs, Output, OutputFile, Resource, Stored, Work, WorkError};
 use crate::deform::DeformError;
 use crate::deform::localise::LocaliseError;
 use crate::export::{Format, read_json};
@@ -36,19 +35,14 @@ impl Work for Fitting {
         &self,
         pairs: &[(String, String)],
     ) -> Result<Map<String, Value>, Failure> {
-        let pairs = pairs
-            .iter()
-            .map(|(name, text)| (name.as_str(), text.as_str()));
-        let parameters = FitParameters::from_pairs(pairs).map_err(unusable)?;
-        Ok(parameters.to_json())
+        checked::from_text::<FitParameters>(pairs)
     }
 
     fn parameters_from_json(
         &self,
         object: &Map<String, Value>,
     ) -> Result<Map<String, Value>, Failure> {
-        let parameters = FitParameters::from_json(object).map_err(unusable)?;
-        Ok(parameters.to_json())
+        checked::from_json::<FitParameters>(object)
     }
 
     fn needs(&self, parameters: &Map<String, Value>) -> Needs {
