@@ -47,7 +47,8 @@ struct Sample {
     along: f64,
     /// Share of the length away from the axis.
     across: f64,
-    angle: f64,
+    /// Cosine and sine of the angle about the axis.
+    round: (f64, f64),
     /// Millimetres outward from that place (the wall's blurred half and a gap).
     outward: f64,
     /// The outward direction: its part across the axis (the rest points along).
@@ -73,7 +74,7 @@ impl Default for Pattern {
             let at = Sample {
                 along: along - CENTRE,
                 across,
-                angle: 0.0,
+                round: (1.0, 0.0),
                 outward: 0.0,
                 tilt: (1.0, 0.0),
                 expected: 1.0,
@@ -95,7 +96,7 @@ impl Default for Pattern {
         let tip = Sample {
             along: APEX - CENTRE,
             across: 0.0,
-            angle: 0.0,
+            round: (1.0, 0.0),
             outward: 0.0,
             tilt: (0.0, 1.0),
             expected: 1.0,
@@ -132,9 +133,12 @@ impl Default for Pattern {
 /// `count` copies of `at` round the axis; odd rows stand in the gaps of the even ones.
 fn ring(samples: &mut Vec<Sample>, count: usize, row: usize, at: &Sample) {
     let stagger = 0.5 * (row % 2) as f64;
-    samples.extend((0..count).map(|step| Sample {
-        angle: TAU * (step as f64 + stagger) / count as f64,
-        ..*at
+    samples.extend((0..count).map(|step| {
+        let (sin, cos) = (TAU * (step as f64 + stagger) / count as f64).sin_cos();
+        Sample {
+            round: (cos, sin),
+            ..*at
+        }
     }));
 }
 
@@ -149,6 +153,12 @@ impl Cup {
         self.centre + self.axis * ((1.0 - CENTRE) * self.length)
     }
 
+    /// Whether a search that starts at `other` would find this place again: 12 mm and 25
+    /// degrees, about half of what the search moves in its first steps.
+    pub fn is_near(&self, other: &Self) -> bool {
+        (self.centre - other.centre).norm() < 12.0 && self.axis.dot(&other.axis) > 0.906
+    }
+
     /// Weighted correlation, -1..=1, of the image with a ventricle at this place. Hot
     /// neighbours are cut off at 1.3 times the wall's mean, so that they cannot outshout
     /// the wall.
@@ -161,7 +171,7 @@ impl Cup {
         for s in &pattern.0 {
             let along = s.along * self.length + s.outward * s.tilt.1;
             let across = s.across * self.length * self.breadth + s.outward * s.tilt.0;
-            let (sin, cos) = s.angle.sin_cos();
+            let (cos, sin) = s.round;
             let value = field
                 .at_index(&(centre + axis * along + e1 * (across * cos) + e2 * (across * sin)));
             scratch.push(value);
@@ -255,13 +265,24 @@ impl Moments {
         self.yy += w * y * y;
     }
 
+    /// Takes many pairs with the same `x` in, whose weights sum to 1, by the mean of their `y`
+    /// and of its square.
+    pub fn add_group(&mut self, x: f64, mean: f64, square: f64) {
+        self.w += 1.0;
+        self.x += x;
+        self.y += mean;
+        self.xx += x * x;
+        self.xy += x * mean;
+        self.yy += square;
+    }
+
     /// Pearson's coefficient; 0 where either variable is constant.
     pub fn correlation(&self) -> f64 {
         let xx = self.xx - self.x * self.x / self.w;
         let yy = self.yy - self.y * self.y / self.w;
         let xy = self.xy - self.x * self.y / self.w;
-        // A constant image has rounding for its variance.
-        if yy > 1e-12 * self.yy {
+        // A constant image has rounding for its variance, that of f32 where sums were f32.
+        if yy > 1e-6 * self.yy {
             xy / (xx * yy).sqrt()
         } else {
             0.0

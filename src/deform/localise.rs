@@ -2,8 +2,10 @@
 //!
 //! 1. A coarse picture (blocks of about 6.5 mm, blurred) of the whole volume.
 //! 2. Hollow balls of three sizes are correlated with it at every place; local maxima stay.
-//! 3. At each of these, [`Cup`]s of all axis directions and three lengths are tried.
-//! 4. The best ones are moved, turned and scaled until their correlation stops to rise.
+//! 3. At each of these, [`Cup`]s of all axis directions are tried, the promising ones in three
+//!    lengths.
+//! 4. The best ones are moved, turned and scaled until their correlation stops to rise; one
+//!    that starts where another has come to rest is left out.
 //!
 //! Correlation does not care how hot a structure is, so liver, gut or gallbladder win only
 //! if they look like a cup. Two weak priors break ties: the long axis of the human heart in
@@ -12,8 +14,9 @@
 //! skull) are passed over. [`Localisation::confidence`] weighs the
 //! correlation itself and its margin over the best candidate elsewhere.
 
-use super::cup::{Cup, Moments, Pattern, perpendicular};
+use super::cup::{Cup, Pattern, perpendicular};
 use super::field::Field;
+use super::hollows;
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::mesh::shapes;
@@ -111,8 +114,6 @@ pub enum LocaliseError {
 
 /// Voxels of the coarse picture, mm.
 const COARSE: f64 = 6.5;
-/// Distance of the places where hollow balls are tried, mm.
-const STRIDE: f64 = 8.0;
 /// The blur of the coarse picture, mm.
 const BLUR: f64 = 4.0;
 /// Mean direction base to apex over the simulated hearts; anatomy books agree (LPS).
@@ -123,11 +124,12 @@ const AXIS_PRIOR: f64 = 0.06;
 const USUAL_LENGTH: (f64, f64) = (75.0, 0.25);
 /// Lengths tried first, mm.
 const LENGTHS: [f64; 3] = [60.0, 74.0, 92.0];
-/// Places and cups that go on to the next step.
-const PLACES: usize = 60;
+/// Cups that go on to the next step.
 const STARTS: usize = 40;
+/// Directions that are also tried with the other lengths.
+const PROMISING: usize = 14;
 /// Candidates nearer than this are the same one, mm.
-const DISTINCT: f64 = 25.0;
+pub(super) const DISTINCT: f64 = 25.0;
 /// Below this correlation nothing is called a heart. Simulated and clinical hearts reach 0.76 to
 /// 0.99; where the heart was erased from five scans, the best other structure had 0.61 to 0.66.
 const NEEDED: f64 = 0.6;
@@ -156,15 +158,15 @@ pub fn localise(
         return Err(LocaliseError::Blank);
     }
     monitor.check()?;
-    let places = places(&field, hints, f64::from(brightest));
+    let places = hollows::places(&field, hints, f64::from(brightest), monitor)?;
     if places.is_empty() {
         return Err(LocaliseError::HintOutside);
     }
-    let pattern = Pattern::default();
     let search = Search {
         field: &field,
-        pattern: &pattern,
+        pattern: &Pattern::default(),
         hints,
+        directions: &shapes::icosphere(1.0, 1).vertices,
     };
     let mut starts = Vec::new();
     for centre in places {
@@ -176,7 +178,11 @@ pub fn localise(
     let mut found: Vec<Scored> = Vec::new();
     for start in &starts {
         monitor.check()?;
-        found.push(search.climb(start));
+        // Neighbouring places climb the same hill.
+        let climbed = found.iter().any(|f| f.cup.is_near(&start.cup));
+        if !climbed {
+            found.push(search.climb(start));
+        }
     }
     found.sort_by(|a, b| b.score.total_cmp(&a.score));
     search.conclude(&found)
@@ -184,11 +190,11 @@ pub fn localise(
 
 /// Moves `cup` to the nearest best agreement with `field`.
 pub fn refine(field: &Field, cup: &Cup) -> Localisation {
-    let pattern = Pattern::default();
     let search = Search {
         field,
-        pattern: &pattern,
+        pattern: &Pattern::default(),
         hints: &Hints::default(),
+        directions: &[],
     };
     let start = search.score(*cup);
     let best = search.climb(&start);
@@ -222,6 +228,8 @@ struct Search<'a> {
     field: &'a Field,
     pattern: &'a Pattern,
     hints: &'a Hints,
+    /// The axis directions that are tried.
+    directions: &'a [Vec3],
 }
 
 impl Search<'_> {
@@ -258,16 +266,20 @@ impl Search<'_> {
 
     /// The two best cups about `centre` among all directions and lengths.
     fn orient(&self, centre: Vec3) -> Vec<Scored> {
-        let mut best: Vec<Scored> = Vec::new();
-        for axis in shapes::icosphere(1.0, 1).vertices {
-            for length in LENGTHS {
-                best.push(self.score(Cup {
-                    centre,
-                    axis,
-                    length,
-                    breadth: 1.0,
-                }));
-            }
+        let turned = |axis: Vec3, length: f64| {
+            self.score(Cup {
+                centre,
+                axis,
+                length,
+                breadth: 1.0,
+            })
+        };
+        let [short, usual, long] = LENGTHS;
+        let mut best: Vec<Scored> = self.directions.iter().map(|d| turned(*d, usual)).collect();
+        best.sort_by(|a, b| b.score.total_cmp(&a.score));
+        for n in 0..PROMISING {
+            let axis = best[n].cup.axis;
+            best.extend([turned(axis, short), turned(axis, long)]);
         }
         best.sort_by(|a, b| b.score.total_cmp(&a.score));
         let first = best[0].cup.axis;
@@ -356,171 +368,4 @@ fn moved(cup: &Cup, coordinate: usize, amount: f64) -> Cup {
         _ => cup.breadth *= (0.08 * amount).exp(),
     }
     cup
-}
-
-/// Where hollow balls fit best: local maxima of their correlation, best first.
-fn places(field: &Field, hints: &Hints, brightest: f64) -> Vec<Vec3> {
-    let padded = Padded::new(field);
-    let balls: Vec<Ball> = [22.0, 27.0, 33.0]
-        .iter()
-        .map(|radius| Ball::new(*radius, field, &padded))
-        .collect();
-    let [nx, ny, nz] = field.shape();
-    let mut scores = vec![f64::NEG_INFINITY; nx * ny * nz];
-    let stride = [0, 1, 2].map(|a| {
-        let n = (STRIDE / field.spacing()[a]).round();
-        if n >= 1.0 { n as usize } else { 1 }
-    });
-    for k in (0..nz).step_by(stride[2]) {
-        for j in (0..ny).step_by(stride[1]) {
-            for i in (0..nx).step_by(stride[0]) {
-                let p = field.to_patient(&Vec3::new(i as f64, j as f64, k as f64));
-                if !admitted(&p, hints) {
-                    continue;
-                }
-                let at = padded.index(i, j, k);
-                scores[i + nx * (j + ny * k)] = balls
-                    .iter()
-                    .map(|ball| ball.correlation(&padded.values, at, 0.08 * brightest))
-                    .fold(f64::NEG_INFINITY, f64::max);
-            }
-        }
-    }
-    let mut maxima: Vec<(f64, Vec3)> = Vec::new();
-    for k in 0..nz {
-        for j in 0..ny {
-            for i in 0..nx {
-                let own = scores[i + nx * (j + ny * k)];
-                if own > f64::NEG_INFINITY && is_maximum(&scores, [nx, ny, nz], [i, j, k], stride) {
-                    let p = field.to_patient(&Vec3::new(i as f64, j as f64, k as f64));
-                    maxima.push((own, p));
-                }
-            }
-        }
-    }
-    maxima.sort_by(|a, b| b.0.total_cmp(&a.0));
-    maxima.truncate(PLACES);
-    let mut places: Vec<Vec3> = maxima.into_iter().map(|m| m.1).collect();
-    places.extend(hints.centre);
-    places
-}
-
-fn admitted(p: &Vec3, hints: &Hints) -> bool {
-    let near = hints
-        .centre
-        .is_none_or(|centre| (p - centre).norm() <= DISTINCT);
-    let inside = hints
-        .region
-        .as_ref()
-        .is_none_or(|region| region.squared_distance(p) == 0.0);
-    near && inside
-}
-
-fn is_maximum(
-    scores: &[f64],
-    [nx, ny, nz]: [usize; 3],
-    [i, j, k]: [usize; 3],
-    reach: [usize; 3],
-) -> bool {
-    let own = i + nx * (j + ny * k);
-    for z in k.saturating_sub(reach[2])..(k + reach[2] + 1).min(nz) {
-        for y in j.saturating_sub(reach[1])..(j + reach[1] + 1).min(ny) {
-            for x in i.saturating_sub(reach[0])..(i + reach[0] + 1).min(nx) {
-                let other = x + nx * (y + ny * z);
-                // Equal neighbours: the first one counts.
-                if scores[other] > scores[own] || (scores[other] == scores[own] && other < own) {
-                    return false;
-                }
-            }
-        }
-    }
-    true
-}
-
-/// The coarse picture with its border continued, so that every ball fits everywhere.
-struct Padded {
-    shape: [usize; 3],
-    margin: [usize; 3],
-    values: Vec<f32>,
-}
-
-/// The largest ball's outer samples, mm.
-const REACH: f64 = 33.0 + 17.0;
-
-impl Padded {
-    fn new(field: &Field) -> Self {
-        let inner = field.shape();
-        let margin = [0, 1, 2].map(|a| (REACH / field.spacing()[a] * 1.5).ceil() as usize + 1);
-        let shape = [0, 1, 2].map(|a| inner[a] + 2 * margin[a]);
-        let clamped = |x: usize, a: usize| x.saturating_sub(margin[a]).min(inner[a] - 1);
-        let mut values = Vec::with_capacity(shape.iter().product());
-        for k in 0..shape[2] {
-            for j in 0..shape[1] {
-                let row = inner[0] * (clamped(j, 1) + inner[1] * clamped(k, 2));
-                values.extend((0..shape[0]).map(|i| field.values()[row + clamped(i, 0)]));
-            }
-        }
-        Self {
-            shape,
-            margin,
-            values,
-        }
-    }
-
-    fn index(&self, i: usize, j: usize, k: usize) -> usize {
-        i + self.margin[0]
-            + self.shape[0] * (j + self.margin[1] + self.shape[1] * (k + self.margin[2]))
-    }
-}
-
-/// A hollow ball as lists of voxel offsets.
-struct Ball {
-    groups: [Vec<isize>; 3],
-}
-
-/// What the wall, the hollow and the outside of the ball show.
-const EXPECTED: [f64; 3] = [1.0, 0.45, 0.3];
-
-impl Ball {
-    fn new(radius: f64, field: &Field, padded: &Padded) -> Self {
-        let directions = shapes::icosphere(1.0, 1).vertices;
-        let few = shapes::icosphere(1.0, 0).vertices;
-        let offset = |p: &Vec3| {
-            let step = field.step(p);
-            let n = |a: usize| {
-                let reach = padded.margin[a] as f64;
-                step[a].round().clamp(-reach, reach) as isize
-            };
-            n(0) + padded.shape[0] as isize * (n(1) + padded.shape[1] as isize * n(2))
-        };
-        let shell = |directions: &[Vec3], r: f64| -> Vec<isize> {
-            directions.iter().map(|d| offset(&(d * r))).collect()
-        };
-        let mut hollow = shell(&few, 0.4 * radius);
-        hollow.push(0);
-        Self {
-            groups: [
-                shell(&directions, radius),
-                hollow,
-                shell(&directions, radius + 17.0),
-            ],
-        }
-    }
-
-    fn correlation(&self, values: &[f32], at: usize, least: f64) -> f64 {
-        let value = |o: isize| f64::from(values[at.wrapping_add_signed(o)]);
-        let wall = &self.groups[0];
-        let mean = wall.iter().map(|o| value(*o)).sum::<f64>() / wall.len() as f64;
-        if mean < least {
-            return f64::NEG_INFINITY;
-        }
-        let mut moments = Moments::default();
-        for (group, expected) in self.groups.iter().zip(EXPECTED) {
-            let weight = 1.0 / group.len() as f64;
-            for o in group {
-                moments.add(weight, expected, value(*o).min(1.3 * mean));
-            }
-        }
-        moments.correlation()
-    }
 }

@@ -29,6 +29,7 @@ pub mod dynamics;
 pub mod elastic;
 pub mod field;
 pub mod flags;
+mod hollows;
 pub mod localise;
 mod profile;
 pub mod sensors;

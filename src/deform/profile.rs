@@ -9,7 +9,7 @@ const STEP: f64 = 1.0;
 /// Half the distance between the readings of a difference quotient, in steps.
 const HALF: usize = 2;
 /// The ridge and the trough beside an edge are looked for this far from it, in steps.
-const FLANK: f64 = 14.0;
+const FLANK: isize = 14;
 /// The half-way point lies at most this far from the steepest slope, in steps; what seems to
 /// lie farther away belongs to other structures.
 const NEAR: f64 = 2.0;
@@ -29,6 +29,8 @@ pub struct Edge {
 pub struct Profile {
     look: Look,
     half: usize,
+    /// exp(-t²/2(reach/2)²) of every slope's place.
+    nearness: Vec<f64>,
     values: Vec<f64>,
     slopes: Vec<f64>,
 }
@@ -36,9 +38,13 @@ pub struct Profile {
 impl Profile {
     /// A profile for sensors that look like this.
     pub fn new(look: &Look) -> Self {
+        let half = (look.reach / STEP).ceil().max(1.0) as usize;
         Self {
             look: *look,
-            half: (look.reach / STEP).ceil().max(1.0) as usize,
+            half,
+            nearness: (0..=2 * half)
+                .map(|s| look.nearness((s as f64 - half as f64) * STEP))
+                .collect(),
             values: Vec::new(),
             slopes: Vec::new(),
         }
@@ -57,7 +63,6 @@ impl Profile {
         if self.look.kind == SensorKind::Level {
             return self.crossing(reach);
         }
-        let spread = 2.0 * (self.look.reach / 2.0).powi(2);
         self.slopes.clear();
         self.slopes.extend((0..=2 * self.half).map(|s| {
             let slope = (self.values[s] - self.values[s + 2 * HALF]) / (2.0 * HALF as f64 * STEP);
@@ -66,10 +71,7 @@ impl Profile {
                 _ => slope.max(0.0),
             }
         }));
-        let score = |s: usize| {
-            let t = (s as f64 - self.half as f64) * STEP;
-            self.slopes[s] * (-t * t / spread).exp()
-        };
+        let score = |s: usize| self.slopes[s] * self.nearness[s];
         let mut best = 0;
         for s in 1..self.slopes.len() {
             if score(s) > score(best) {
@@ -82,9 +84,14 @@ impl Profile {
         let top = climb(&self.slopes, best);
         let steepest = top as f64 - self.half as f64;
         let half_way = (self.look.kind == SensorKind::HalfMaximum && seen > 0.0).then(|| {
-            let value = |s: f64| {
-                let index = start + step * (steepest + s);
-                field.at_index(&index).min(self.look.ceiling)
+            // Most of what is asked for was read above.
+            let middle = (top + HALF) as isize;
+            let value = |s: isize| match usize::try_from(middle + s) {
+                Ok(known) if known < self.values.len() => self.values[known],
+                _ => {
+                    let index = start + step * (steepest + s as f64);
+                    field.at_index(&index).min(self.look.ceiling)
+                }
             };
             half_way(value)
         });
@@ -112,10 +119,9 @@ impl Profile {
             }
         }
         let (t, slope) = best.unwrap_or((0.0, 0.0));
-        let spread = 2.0 * (self.look.reach / 2.0).powi(2);
         Edge {
             offset: t * STEP,
-            score: slope / STEP * (-t * STEP * t * STEP / spread).exp(),
+            score: slope / STEP * self.look.nearness(t * STEP),
             half_width: None,
         }
     }
@@ -123,38 +129,39 @@ impl Profile {
 
 /// Steps from the steepest fall (0) to where `value` passes half-way from the ridge before it
 /// to the trough behind it, at most [`NEAR`] either way, and from the ridge to there.
-fn half_way(value: impl Fn(f64) -> f64) -> (f64, f64) {
-    let ridge = turning(&value, -1.0);
-    let trough = turning(&value, 1.0);
+fn half_way(value: impl Fn(isize) -> f64) -> (f64, f64) {
+    let ridge = turning(&value, -1);
+    let trough = turning(&value, 1);
     let level = 0.5 * (ridge.1 + trough.1);
-    let towards = if value(0.0) > level { 1.0 } else { -1.0 };
-    let (mut s, mut last) = (0.0, value(0.0));
+    let towards = if value(0) > level { 1 } else { -1 };
+    let sign = towards as f64;
+    let mut last = value(0);
     let mut crossing = 0.0;
-    while s < FLANK {
-        let next = value((s + 1.0) * towards);
-        if (next - level) * towards <= 0.0 {
+    for s in 0..FLANK {
+        let next = value((s + 1) * towards);
+        if (next - level) * sign <= 0.0 {
             // `last` lies strictly on the other side, or s is 0 and the level is here.
             let share = (last - level) / (last - next);
-            crossing = towards * (s + if share.is_finite() { share } else { 0.0 });
+            crossing = sign * (s as f64 + if share.is_finite() { share } else { 0.0 });
             break;
         }
-        (s, last) = (s + 1.0, next);
+        last = next;
     }
     (crossing.clamp(-NEAR, NEAR), crossing + ridge.0)
 }
 
 /// Where a falling profile stops to rise backward (`towards` = -1) or to fall forward (1):
 /// steps from 0 and value.
-fn turning(value: impl Fn(f64) -> f64, towards: f64) -> (f64, f64) {
-    let (mut s, mut last) = (0.0, value(0.0));
+fn turning(value: impl Fn(isize) -> f64, towards: isize) -> (f64, f64) {
+    let (mut s, mut last) = (0, value(0));
     while s < FLANK {
-        let next = value((s + 1.0) * towards);
-        if (next - last) * towards >= 0.0 {
+        let next = value((s + 1) * towards);
+        if (next - last) * towards as f64 >= 0.0 {
             break;
         }
-        (s, last) = (s + 1.0, next);
+        (s, last) = (s + 1, next);
     }
-    (s, last)
+    (s as f64, last)
 }
 
 /// The local maximum above `start`.
@@ -198,7 +205,7 @@ mod tests {
     fn half_way_down_a_ramp_is_its_middle() {
         // A plateau of 9, a fall of 1.5 a step from -3 to 3, a plateau of 0; seen from the
         // steepest slope half a step off the middle.
-        let value = |s: f64| (4.5 - 1.5 * (s - 0.5)).clamp(0.0, 9.0);
+        let value = |s: isize| (4.5 - 1.5 * (s as f64 - 0.5)).clamp(0.0, 9.0);
         let (crossing, width) = half_way(value);
         assert!((crossing - 0.5).abs() < 1e-12, "{crossing}");
         assert!((width - 3.5).abs() < 0.51, "{width}");
@@ -206,7 +213,7 @@ mod tests {
 
     #[test]
     fn a_profile_without_end_stays_near() {
-        let (crossing, width) = half_way(|s| -s * s * s);
+        let (crossing, width) = half_way(|s| -(s * s * s) as f64);
         assert!(crossing.abs() <= NEAR && width.is_finite());
         assert_eq!(half_way(|_| 1.0), (0.0, 0.0));
     }

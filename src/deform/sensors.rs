@@ -57,6 +57,13 @@ pub struct Look {
     pub shift: Shift,
 }
 
+impl Look {
+    /// exp(-t²/2(reach/2)²), t mm away from the sensor.
+    pub(super) fn nearness(&self, t: f64) -> f64 {
+        (-t * t / (2.0 * (self.reach / 2.0).powi(2))).exp()
+    }
+}
+
 /// The edge that a reader draws against the one that the sensors find, mm outward.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shift {
