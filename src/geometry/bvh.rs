@@ -36,8 +36,8 @@ impl Aabb {
     pub fn of<'a>(points: impl IntoIterator<Item = &'a Vec3>) -> Self {
         let mut aabb = Self::empty();
         for p in points {
-            aabb.min = aabb.min.inf(p);
-            aabb.max = aabb.max.sup(p);
+            aabb.min = aabb.min.zip_map(p, lesser);
+            aabb.max = aabb.max.zip_map(p, greater);
         }
         aabb
     }
@@ -45,8 +45,8 @@ impl Aabb {
     /// The smallest box around two.
     pub fn union(&self, other: &Self) -> Self {
         Self {
-            min: self.min.inf(&other.min),
-            max: self.max.sup(&other.max),
+            min: self.min.zip_map(&other.min, lesser),
+            max: self.max.zip_map(&other.max, greater),
         }
     }
 
@@ -57,9 +57,23 @@ impl Aabb {
 
     /// Squared distance from `p` to the box, 0 inside.
     pub fn squared_distance(&self, p: &Vec3) -> f64 {
-        let outside = (self.min - p).sup(&(p - self.max)).sup(&Vec3::zeros());
-        outside.norm_squared()
+        let outside = |r: usize| greater(greater(self.min[r] - p[r], p[r] - self.max[r]), 0.0);
+        let [x, y, z] = [outside(0), outside(1), outside(2)];
+        x * x + y * y + z * z
     }
+}
+
+/// The lesser of two, the second where they cannot be compared: one instruction, where
+/// nalgebra's `inf` and `sup` branch.
+#[inline]
+fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two, the second where they cannot be compared.
+#[inline]
+fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// The answer of a closest-point query.
@@ -90,6 +104,8 @@ struct Node {
 pub struct Bvh {
     nodes: Vec<Node>,
     order: Vec<u32>,
+    /// Where in `order` each triangle stands.
+    slots: Vec<u32>,
     corners: Vec<[Vec3; 3]>,
 }
 
@@ -110,9 +126,14 @@ impl Bvh {
             build(&mut nodes, &mut order, 0, &corners, &centroids);
         }
         let corners = order.iter().map(|&t| corners[t as usize]).collect();
+        let mut slots = vec![0; order.len()];
+        for (slot, &t) in (0..).zip(&order) {
+            slots[t as usize] = slot;
+        }
         Self {
             nodes,
             order,
+            slots,
             corners,
         }
     }
@@ -125,8 +146,21 @@ impl Bvh {
     /// The closest point among the triangles that `admits` lets through: give it to keep,
     /// for example, the opposite side of a thin wall out. `None` where none is admitted.
     pub fn closest_where(&self, p: &Vec3, admits: impl Fn(u32) -> bool) -> Option<Closest> {
-        let mut best: Option<Closest> = None;
-        let mut bound = f64::INFINITY;
+        self.closest_from(p, None, admits)
+    }
+
+    /// [`closest_where`](Self::closest_where) with a guess: a triangle that is likely near `p`,
+    /// such as the answer for a point beside it. The answer does not depend on the guess, the
+    /// time does. A guess that is no triangle of the tree is none.
+    pub fn closest_from(
+        &self,
+        p: &Vec3,
+        guess: Option<u32>,
+        admits: impl Fn(u32) -> bool,
+    ) -> Option<Closest> {
+        let guessed = guess.filter(|t| (*t as usize) < self.slots.len() && admits(*t));
+        let mut best = guessed.map(|t| self.closest_in(self.slots[t as usize] as usize, p));
+        let mut bound = best.map_or(f64::INFINITY, |found| found.squared_distance);
         // Depth is at most log2 of 2^32 triangles, and each level leaves one node waiting.
         let mut stack = [(0u32, 0.0f64); 64];
         let mut height = 0;
@@ -166,29 +200,35 @@ impl Bvh {
                 if !admits(triangle) {
                     continue;
                 }
-                let [a, b, c] = &self.corners[slot];
-                let [u, v, w] = triangle::closest_barycentric(p, a, b, c);
-                let point = a * u + b * v + c * w;
-                let squared_distance = (point - p).norm_squared();
+                let found = self.closest_in(slot, p);
                 let nearer = match &best {
                     None => true,
                     Some(b) => {
-                        squared_distance < b.squared_distance
-                            || (squared_distance == b.squared_distance && triangle < b.triangle)
+                        found.squared_distance < b.squared_distance
+                            || (found.squared_distance == b.squared_distance
+                                && triangle < b.triangle)
                     }
                 };
                 if nearer {
-                    bound = squared_distance;
-                    best = Some(Closest {
-                        triangle,
-                        barycentric: [u, v, w],
-                        point,
-                        squared_distance,
-                    });
+                    bound = found.squared_distance;
+                    best = Some(found);
                 }
             }
         }
         best
+    }
+
+    /// The closest point of the triangle in a slot.
+    fn closest_in(&self, slot: usize, p: &Vec3) -> Closest {
+        let [a, b, c] = &self.corners[slot];
+        let [u, v, w] = triangle::closest_barycentric(p, a, b, c);
+        let point = a * u + b * v + c * w;
+        Closest {
+            triangle: self.order[slot],
+            barycentric: [u, v, w],
+            point,
+            squared_distance: (point - p).norm_squared(),
+        }
     }
 
     /// Calls `visit` with every triangle whose box overlaps `aabb`, in tree order.
@@ -301,6 +341,9 @@ mod tests {
                 })
                 .fold(f64::INFINITY, f64::min);
             assert_eq!(found.squared_distance, brute);
+            for guess in [0, i as u32 * 4, 1359, u32::MAX] {
+                assert_eq!(bvh.closest_from(&p, Some(guess), |_| true), Some(found));
+            }
         }
     }
 

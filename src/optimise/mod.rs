@@ -81,7 +81,8 @@ pub struct OptimiseParameters {
 /// Parameters of the least-squares fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitParameters {
-    /// Rounds, 0..=200; 0 leaves the vertices on the surface, as the paper does. Default 20.
+    /// Rounds, 0..=200; 0 leaves the vertices on the surface, as the paper does. Default 16: four
+    /// more change no figure of shape or distance by 1 %.
     pub rounds: usize,
     /// Weight of triangle shape against squared distance, (0, 10]. Default 0.062.
     pub shape_weight: f64,
@@ -116,7 +117,7 @@ pub struct FitParameters {
 impl Default for FitParameters {
     fn default() -> Self {
         Self {
-            rounds: 20,
+            rounds: 16,
             shape_weight: 0.062,
             coarse_bend: 24.0,
             worst_weight: 3.0,

@@ -320,7 +320,7 @@ pub const SPECS: &[ParameterSpec] = &[
         kind: Kind::Integer { min: 0, max: 200 },
         default: "",
         summary: "Rounds of the least-squares fit; 0 leaves the points on the surface (default \
-                  20 for refined, 0 for paper)",
+                  16 for refined, 0 for paper)",
         read: |d, v| {
             d.fit_rounds = Some(v.usize());
             Ok(())

@@ -230,12 +230,29 @@ fn distances(points: &[Vec3], to: &Bvh, monitor: &Monitor) -> Result<Vec<f64>, C
 
 /// The closest point of `to` for each point, in the points' order; none where `to` is empty.
 fn closest_points(points: &[Vec3], to: &Bvh, monitor: &Monitor) -> Result<Vec<Closest>, Cancelled> {
+    in_order(points, monitor, |points| {
+        // Points follow each other over the surface: the last answer is near the next.
+        let mut last = None;
+        let find = |p: &Vec3| {
+            let found = to.closest_from(p, last, |_| true)?;
+            last = Some(found.triangle);
+            Some(found)
+        };
+        points.iter().filter_map(find).collect()
+    })
+}
+
+/// What `look` finds for the points, some hundred in one task, in the points' order.
+fn in_order(
+    points: &[Vec3],
+    monitor: &Monitor,
+    look: impl Fn(&[Vec3]) -> Vec<Closest> + Sync,
+) -> Result<Vec<Closest>, Cancelled> {
     let mut closest = Vec::with_capacity(points.len());
-    for chunk in points.chunks(CHUNK) {
+    for block in points.chunks(CHUNK) {
         monitor.check()?;
-        // One task takes some hundred queries, so that handing out costs nothing.
-        let found = chunk.par_iter().with_min_len(256);
-        closest.par_extend(found.filter_map(|p| to.closest(p)));
+        let parts: Vec<Vec<Closest>> = block.par_chunks(256).map(&look).collect();
+        closest.extend(parts.into_iter().flatten());
     }
     Ok(closest)
 }
@@ -249,7 +266,7 @@ fn close_points(
     near: f64,
     monitor: &Monitor,
 ) -> Result<Vec<Closest>, Cancelled> {
-    let look = |points: &[Vec3]| -> Vec<Closest> {
+    in_order(points, monitor, |points| {
         let mut recent: VecDeque<u32> = VecDeque::with_capacity(RECENT);
         let find = |p: &Vec3| {
             let known = recent.iter().map(|&t| closest_on(to, t, p));
@@ -257,20 +274,13 @@ fn close_points(
             if let Some(found) = known.next() {
                 return Some(found);
             }
-            let found = tree.closest(p)?;
+            let found = tree.closest_from(p, recent.front().copied(), |_| true)?;
             recent.truncate(RECENT - 1);
             recent.push_front(found.triangle);
             Some(found)
         };
         points.iter().filter_map(find).collect()
-    };
-    let mut closest = Vec::with_capacity(points.len());
-    for block in points.chunks(CHUNK) {
-        monitor.check()?;
-        let parts: Vec<Vec<Closest>> = block.par_chunks(256).map(look).collect();
-        closest.extend(parts.into_iter().flatten());
-    }
-    Ok(closest)
+    })
 }
 
 /// The point of triangle `t` closest to `p`.

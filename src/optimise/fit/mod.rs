@@ -43,6 +43,9 @@ struct Model<'a> {
     vertices: Vec<Vec3>,
     connectivity: Connectivity,
     samples: Vec<Sample>,
+    /// For each edge's midpoint and triangle's centre the triangle of the reference that was
+    /// closest in the last round: where the next search begins.
+    near: Vec<Option<u32>>,
     sizing: &'a [f64],
     reference: &'a Reference,
     /// That of the reference, mm³.
@@ -84,6 +87,7 @@ pub fn fit(
         vertices: start.to_vec(),
         connectivity,
         samples: spread(reference, count),
+        near: Vec::new(),
         sizing,
         reference,
         volume: reference.mesh.volume(),
@@ -96,7 +100,7 @@ pub fn fit(
     for round in 0..parameters.rounds {
         let fraction = round as f64 / (parameters.rounds + 1) as f64;
         monitor.report(Stage::Optimise, fraction)?;
-        let mut step = terms::displacement(&model, monitor)?;
+        let mut step = terms::displacement(&mut model, monitor)?;
         if round + CALM_ROUNDS < parameters.rounds {
             for (step, velocity) in step.iter_mut().zip(&velocity) {
                 *step += velocity * parameters.momentum;
@@ -108,7 +112,6 @@ pub fn fit(
             *velocity = vertex - *velocity;
         }
         monitor.check()?;
-        follow_partners(&mut model);
         if round % 2 == 1 && round + 1 < parameters.rounds {
             // Early, so that enough rounds are left to even the triangles out.
             if 2 * round < parameters.rounds {
@@ -116,8 +119,8 @@ pub fn fit(
             }
             flips += polish::flip(&mut model);
             monitor.check()?;
-            follow_partners(&mut model);
         }
+        follow_partners(&mut model);
     }
     Ok(Fitted {
         mesh: TriMesh {
@@ -273,6 +276,7 @@ mod tests {
             vertices: mesh.vertices.clone(),
             connectivity: Connectivity::new(mesh.vertices.len(), mesh.triangles.clone()).unwrap(),
             samples: spread(reference, 5000),
+            near: Vec::new(),
             sizing,
             reference,
             volume: reference.mesh.volume(),

@@ -30,7 +30,7 @@ const MOST_STEPS: usize = 200;
 ///
 /// # Errors
 /// [`Cancelled`].
-pub fn displacement(model: &Model, monitor: &Monitor) -> Result<Vec<Vec3>, Cancelled> {
+pub fn displacement(model: &mut Model, monitor: &Monitor) -> Result<Vec<Vec3>, Cancelled> {
     let vertices = model.vertices.len();
     let mut equations = NormalEquations::new(vertices, &model.connectivity);
     add_distances(&mut equations, model);
@@ -84,12 +84,13 @@ fn add_distances(equations: &mut NormalEquations, model: &Model) {
 
 /// Draws the model's own points, its edges' midpoints and triangles' centres, to S: samples of
 /// S alone would not notice a triangle that strays.
-fn add_midpoints(equations: &mut NormalEquations, model: &Model) {
+fn add_midpoints(equations: &mut NormalEquations, model: &mut Model) {
     let Model {
         connectivity,
         vertices,
         reference,
         parameters,
+        near: guesses,
         ..
     } = model;
     let edges = connectivity.edges().map(|h| {
@@ -99,19 +100,21 @@ fn add_midpoints(equations: &mut NormalEquations, model: &Model) {
     });
     let centres = (0..connectivity.triangles().len() as u32).map(|t| (t, [1.0 / 3.0; 3]));
     let places: Vec<(u32, [f64; 3])> = edges.chain(centres).collect();
+    guesses.resize(places.len(), None);
     let rows: Vec<Option<(Vec3, f64)>> = places
         .par_iter()
+        .zip(guesses)
         .with_min_len(64)
-        .map(|(t, b)| {
+        .map(|((t, b), guess)| {
             let ids = connectivity.triangles()[*t as usize];
             let corners = ids.map(|v| vertices[v as usize]);
             let place: Vec3 = (0..3).map(|k| corners[k] * b[k]).sum();
             let facing =
                 triangle::area_normal(&corners[0], &corners[1], &corners[2]).try_normalize(0.0)?;
             let normals = &reference.normals;
-            let found = reference
-                .bvh
-                .closest_where(&place, |s| normals[s as usize].dot(&facing) > LEAST_FACING)?;
+            let faces = |s: u32| normals[s as usize].dot(&facing) > LEAST_FACING;
+            let found = reference.bvh.closest_from(&place, *guess, faces)?;
+            *guess = Some(found.triangle);
             let n = normals[found.triangle as usize];
             Some((n, n.dot(&(found.point - place))))
         })
