@@ -97,7 +97,7 @@ pub struct FitParameters {
     /// wanted relative spacing), 1 to the size that each has. Default 1.
     pub free_size: f64,
     /// How much more a distant sample counts: its weight is 1 + this · r²/mean r², 0..=10.
-    /// Lowers the largest distance, from about 0.1 on at the cost of the mean. Default 0.04.
+    /// Lowers the largest distance and, by less, the mean, at the cost of shapes. Default 0.05.
     pub peak_weight: f64,
     /// Share of the last round's step that a round adds to its own, 0..=0.9. Default 0.6.
     pub momentum: f64,
@@ -122,7 +122,7 @@ impl Default for FitParameters {
             coarse_bend: 24.0,
             worst_weight: 3.0,
             free_size: 1.0,
-            peak_weight: 0.04,
+            peak_weight: 0.05,
             momentum: 0.6,
             damping: 0.0005,
             samples_per_triangle: 16,

@@ -359,7 +359,7 @@ pub const SPECS: &[ParameterSpec] = &[
         "fit_peak_weight",
         peak_weight,
         0.0..=10.0,
-        "0.04",
+        "0.05",
         "How much more a distant sample counts in the fit: lowers the largest distance"
     ),
     fit_spec!(

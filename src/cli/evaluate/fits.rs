@@ -171,7 +171,7 @@ impl Desk<'_> {
             patient.fits.push(fitted);
             advance();
         }
-        patient.note_problems();
+        patient.note_problems(models);
         Ok(patient)
     }
 
@@ -188,12 +188,12 @@ impl Desk<'_> {
 }
 
 impl Patient {
-    /// Says once what every fit of the patient complains of.
-    fn note_problems(&mut self) {
-        for fitted in &self.fits {
+    /// Says which fits were lost, and once what every fit of the patient complains of.
+    fn note_problems(&mut self, models: &[Model]) {
+        for (model, fitted) in models.iter().zip(&self.fits) {
             let problem = match &fitted.outcome {
                 Outcome::Fitted(_) => None,
-                Outcome::Lost(reason) => Some(format!("lost: {reason}")),
+                Outcome::Lost(reason) => Some(format!("{} lost: {reason}", model.name())),
                 Outcome::Unreadable(reason) => Some(format!("not read: {reason}")),
             };
             let gold = Gold::ALL.into_iter().filter_map(|gold| {
