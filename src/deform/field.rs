@@ -107,6 +107,12 @@ impl Field {
         }
     }
 
+    /// The same places with other values, in the order of [`Self::values`].
+    pub fn with_values(self, values: Vec<f32>) -> Self {
+        assert_eq!(values.len(), self.values.len(), "one value for every place");
+        Self { values, ..self }
+    }
+
     /// Number of samples along i, j, k.
     pub fn shape(&self) -> [usize; 3] {
         self.shape

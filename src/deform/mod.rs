@@ -31,6 +31,7 @@ pub mod field;
 pub mod flags;
 mod hollows;
 pub mod localise;
+pub mod posture;
 mod profile;
 pub mod sensors;
 pub mod system;
@@ -50,6 +51,7 @@ use elastic::{Elastic, Stiffness};
 use field::Field;
 pub use flags::Flag;
 use localise::{Hints, Localisation, LocaliseError, NotAHeart};
+use posture::{Posture, Superior};
 use sensors::{Look, SensorKind, Shift};
 use template::{Organ, Pose, Template};
 use wall::Wall;
@@ -62,6 +64,8 @@ pub struct DeformParameters {
     /// Turn of the template about the long axis beyond the least turn that brings the axes
     /// together, degrees. Default 0: patients lie in the scanner as they lie in the frame.
     pub roll: f64,
+    /// What says which way is up in the patient; ventricles only. Default [`Superior::Body`].
+    pub superior: Superior,
     /// Whether the model is aligned as a whole (step 3) before it moves. Default true; without,
     /// as in models that are placed by hand, the rest state is the posed template.
     pub align: bool,
@@ -90,6 +94,7 @@ impl Default for DeformParameters {
         Self {
             hints: Hints::default(),
             roll: 0.0,
+            superior: Superior::Body,
             align: true,
             stiffness: Stiffness::default(),
             sensor: SensorKind::HalfMaximum,
@@ -244,6 +249,8 @@ pub struct Fit {
     pub turned_triangles: usize,
     /// Wall volume, ml (enclosed by the model).
     pub wall_ml: f64,
+    /// Which way is up in the patient; ventricles only.
+    pub posture: Option<Posture>,
     /// The wall seen from the long axis; ventricles only.
     pub wall: Option<Wall>,
     /// What gives reason to doubt.
@@ -347,6 +354,7 @@ fn supports_fit(template: &Template, stiffness: &Stiffness) -> Result<(), Deform
 /// The template put in its place, and the image to fit it to.
 struct Start {
     localisation: Option<Localisation>,
+    posture: Posture,
     pose: Pose,
     posed: TriMesh,
     axis: Vec3,
@@ -384,6 +392,10 @@ impl Start {
                 (None, pose, Vec3::z(), [blob.centre; 2], blob.uptake)
             }
         };
+        let posture = match (&localisation, parameters.superior) {
+            (Some(found), Superior::Body) => Posture::of_body(volume, &found.cup.centre, monitor)?,
+            _ => Posture::FRAME,
+        };
         let mut posed = template.mesh.clone();
         posed.vertices.iter_mut().for_each(|p| *p = pose.apply(p));
         let mut region = Aabb::of(&posed.vertices);
@@ -394,6 +406,7 @@ impl Start {
         let field = Field::new(volume, Some(&region), parameters.blur);
         Ok(Self {
             localisation,
+            posture,
             pose,
             posed,
             axis,
@@ -509,7 +522,7 @@ impl Attempt {
         let cup = template
             .cup
             .map(|cup| wall::carried(&cup, &template.mesh, &mesh));
-        let wall = cup.map(|cup| Wall::new(&mesh, &cup));
+        let wall = cup.map(|cup| Wall::new(&mesh, &cup, &start.posture.superior));
         let posed = &start.posed.vertices;
         let mut fit = Fit {
             displacements: mesh
@@ -538,6 +551,7 @@ impl Attempt {
             self_intersections: self.intersections,
             turned_triangles: turned(aligned, &mesh),
             wall_ml: mesh.volume() / 1000.0,
+            posture: cup.map(|_| start.posture),
             wall,
             mesh,
             flags: Vec::new(),

@@ -59,7 +59,7 @@ pub fn png(volume: &Volume, fit: &TriMesh, cup: &Cup, expert: Option<&Mask>) -> 
 struct Plane(VoxelToPatient);
 
 fn planes(cup: &Cup) -> [Plane; 3] {
-    let up = anterior(&cup.axis);
+    let up = anterior(&cup.axis, &Vec3::z());
     let lateral = up.cross(&cup.axis);
     // Right on the picture, then down.
     let sides = [(lateral, -up), (lateral, -cup.axis), (cup.axis, -up)];

@@ -3,6 +3,7 @@
 use super::fit::FitParameters;
 use super::{Kind, ParameterSpec};
 use crate::deform::Edge;
+use crate::deform::posture::Superior;
 use crate::deform::sensors::SensorKind;
 use crate::deform::template::Organ;
 use crate::geometry::Vec3;
@@ -155,6 +156,27 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "Turn of the model about the long axis beyond the least turn that brings the axes \
          together, degrees"
     ),
+    ParameterSpec {
+        name: "superior",
+        kind: Kind::Choice(&["body", "frame"]),
+        default: "body",
+        summary: "Which way is up in the patient, from where the polar map's segments are counted: \
+                  as the body's outline shows (where it is seen well enough), or as the volume's \
+                  frame says",
+        read: |d, v| {
+            d.0.deform.superior = match v.text() {
+                "frame" => Superior::Frame,
+                _ => Superior::Body,
+            };
+            Ok(())
+        },
+        write: |p| {
+            json!(match p.deform.superior {
+                Superior::Body => "body",
+                Superior::Frame => "frame",
+            })
+        },
+    },
     ParameterSpec {
         name: "sensor",
         kind: Kind::Choice(&["half_maximum", "gradient", "unsigned", "level"]),

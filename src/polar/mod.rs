@@ -289,7 +289,7 @@ mod tests {
             length: 65.0,
             breadth: 1.0,
         };
-        (volume, Wall::new(&mesh, &cup))
+        (volume, Wall::new(&mesh, &cup, &Vec3::z()))
     }
 
     #[test]
