@@ -160,6 +160,7 @@ impl Blob {
         Pose::between(
             &place(centroid, mesh.volume()),
             &place(self.centre, self.volume),
+            &nalgebra::Rotation3::identity(),
             0.0,
         )
     }

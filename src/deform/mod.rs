@@ -5,7 +5,8 @@
 //! everything needed to judge whether to believe it.
 //!
 //! 1. [`localise`] finds the ventricle in the volume, with nobody's help.
-//! 2. [`template::Pose`] puts the template there: centre, axis, roll, lengths.
+//! 2. [`template::Pose`] puts the template there: centre, axis, roll, lengths, in a patient
+//!    who may lie askew in the frame ([`posture`]).
 //! 3. [`align`] moves, turns, stretches and thickens it as a whole.
 //! 4. [`dynamics`] lets it move under [`elastic`] forces and [`sensors`] until it rests.
 //! 5. Folds and self-intersections are looked for; if there are any, 4 is repeated with a
@@ -64,7 +65,9 @@ pub struct DeformParameters {
     /// Turn of the template about the long axis beyond the least turn that brings the axes
     /// together, degrees. Default 0: patients lie in the scanner as they lie in the frame.
     pub roll: f64,
-    /// What says which way is up in the patient; ventricles only. Default [`Superior::Body`].
+    /// What says which way is up in the patient: so the model is put into it, and from there
+    /// the wall's columns and segments are counted. Ventricles only. Default
+    /// [`Superior::Body`].
     pub superior: Superior,
     /// Whether the model is aligned as a whole (step 3) before it moves. Default true; without,
     /// as in models that are placed by hand, the rest state is the posed template.
@@ -377,24 +380,39 @@ impl Start {
             None => blob::one_label(volume, &parameters.hints, monitor)?,
         };
         let volume = picked.as_ref().unwrap_or(volume);
-        let (localisation, pose, axis, cavity_axis, uptake) = match &template.cup {
+        let (localisation, posture, pose, axis, cavity_axis, uptake) = match &template.cup {
             Some(from) => {
                 let found = localise::localise(volume, &parameters.hints, monitor)?;
                 let to = found.cup;
-                let pose = Pose::between(from, &to, parameters.roll.to_radians());
+                let posture = match parameters.superior {
+                    Superior::Body => Posture::of_body(volume, &to.centre, monitor)?,
+                    Superior::Frame => Posture::FRAME,
+                };
+                let roll = parameters.roll.to_radians();
+                let pose = Pose::between(from, &to, &posture.turn(), roll);
                 let inner_end = to.base() + to.axis * (0.6 * to.length);
                 let wall = found.wall;
-                (Some(found), pose, to.axis, [to.base(), inner_end], wall)
+                (
+                    Some(found),
+                    posture,
+                    pose,
+                    to.axis,
+                    [to.base(), inner_end],
+                    wall,
+                )
             }
             None => {
                 let blob = blob::find(volume, &parameters.hints, monitor)?;
                 let pose = blob.pose(&template.mesh);
-                (None, pose, Vec3::z(), [blob.centre; 2], blob.uptake)
+                (
+                    None,
+                    Posture::FRAME,
+                    pose,
+                    Vec3::z(),
+                    [blob.centre; 2],
+                    blob.uptake,
+                )
             }
-        };
-        let posture = match (&localisation, parameters.superior) {
-            (Some(found), Superior::Body) => Posture::of_body(volume, &found.cup.centre, monitor)?,
-            _ => Posture::FRAME,
         };
         let mut posed = template.mesh.clone();
         posed.vertices.iter_mut().for_each(|p| *p = pose.apply(p));

@@ -20,7 +20,7 @@
 //! outline is no cylinder's ([`DISORDER`]), or the answer is more than [`CONE`] degrees away, the
 //! frame's superior is taken. Not seen: a turn by more than that, or patients lying head down.
 
-use nalgebra::{SMatrix, Vector6};
+use nalgebra::{Rotation3, SMatrix, Vector6};
 
 use super::cup::perpendicular;
 use super::field::Field;
@@ -82,6 +82,12 @@ impl Posture {
     /// Angle to the frame's superior, degrees.
     pub fn tilt(&self) -> f64 {
         self.superior.z.clamp(-1.0, 1.0).acos().to_degrees()
+    }
+
+    /// The least turn from the frame's superior direction to the patient's.
+    pub fn turn(&self) -> Rotation3<f64> {
+        // None for opposite directions only, which are beyond the cone.
+        Rotation3::rotation_between(&Vec3::z(), &self.superior).unwrap_or_else(Rotation3::identity)
     }
 
     /// Reads the body's outline in `volume`; `heart` is a point in the cavity, LPS mm.
@@ -244,5 +250,95 @@ impl Outline {
             }
         }
         best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::frame::VoxelToPatient;
+
+    /// A torso with lungs, liver and heart, cut off above and below, that is turned by `turn`;
+    /// seen in a cube with edges of `edge` mm.
+    fn torso(turn: &Rotation3<f64>, edge: f64) -> Volume {
+        const SPACING: f64 = 6.0;
+        let n = (edge / SPACING) as usize;
+        let shape = [n; 3];
+        let frame = VoxelToPatient::centred(shape, [SPACING; 3], Vec3::zeros()).unwrap();
+        let ball = |p: &Vec3, at: [f64; 3], radius: f64| (p - Vec3::from(at)).norm() < radius;
+        let voxels = (0..n * n * n)
+            .map(|v| {
+                let index = [v % n, v / n % n, v / (n * n)].map(|x| x as f64);
+                let p = turn.inverse() * frame.to_patient(&Vec3::from(index));
+                let inside = (p.x / 170.0).powi(2) + (p.y / 115.0).powi(2) < 1.0;
+                match (inside, p.z.abs() < 150.0) {
+                    (true, true) if ball(&p, HEART, 35.0) => 10.0,
+                    (true, true) if ball(&p, [-80.0, 0.0, -60.0], 70.0) => 6.0,
+                    (true, true) if p.z > -20.0 && ball(&p, [-85.0, 0.0, 60.0], 80.0) => 0.4,
+                    (true, true) if p.z > 20.0 && ball(&p, [90.0, 20.0, 80.0], 70.0) => 0.4,
+                    (true, true) => 1.0,
+                    _ => 0.0,
+                }
+            })
+            .collect();
+        Volume {
+            shape,
+            voxels,
+            frame,
+            integral: false,
+        }
+    }
+
+    const HEART: [f64; 3] = [40.0, -30.0, -20.0];
+
+    fn seen(volume: &Volume, turn: &Rotation3<f64>) -> Posture {
+        let heart = turn * Vec3::from(HEART);
+        Posture::of_body(volume, &heart, &Monitor::silent()).unwrap()
+    }
+
+    #[test]
+    fn a_tilted_torso_is_seen_as_tilted() {
+        for lean in [
+            [0.0, 0.0, 0.0],
+            [30.0, 0.0, 0.0],
+            [-30.0, 0.0, 0.0],
+            [0.0, 30.0, 0.0],
+            [0.0, -15.0, 0.0],
+            [20.0, 20.0, 5.0],
+            [0.0, 0.0, 30.0],
+            [-18.0, 16.0, 14.0],
+        ] {
+            let turn = Rotation3::from_scaled_axis(Vec3::from(lean.map(f64::to_radians)));
+            let posture = seen(&torso(&turn, 480.0), &turn);
+            assert_eq!(posture.source, Superior::Body, "{lean:?}");
+            let up = turn * Vec3::z();
+            let off = posture.superior.angle(&up).to_degrees();
+            assert!(off < 3.0, "{lean:?}: off by {off}");
+            assert!((posture.turn() * Vec3::z() - posture.superior).norm() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_frame_is_believed_where_too_little_of_the_body_is_in_view() {
+        let turn = Rotation3::from_scaled_axis(Vec3::new(0.4, 0.0, 0.0));
+        assert_eq!(seen(&torso(&turn, 180.0), &turn), Posture::FRAME);
+        let mut nothing = torso(&turn, 180.0);
+        nothing.voxels.fill(0.0);
+        assert_eq!(seen(&nothing, &turn), Posture::FRAME);
+        nothing.voxels.fill(f32::NAN);
+        assert_eq!(seen(&nothing, &turn), Posture::FRAME);
+        nothing.voxels.fill(1.0);
+        assert_eq!(seen(&nothing, &turn), Posture::FRAME);
+        // A heart in the dark.
+        let volume = torso(&turn, 480.0);
+        let heart = turn * Vec3::from(HEART);
+        let mut alone = volume.clone();
+        alone
+            .voxels
+            .iter_mut()
+            .for_each(|v| *v *= f32::from(u8::from(*v == 10.0)));
+        let far = Posture::of_body(&alone, &(heart + Vec3::repeat(1e6)), &Monitor::silent());
+        assert_eq!(far.unwrap(), Posture::FRAME);
+        assert_eq!(seen(&alone, &turn), Posture::FRAME);
     }
 }

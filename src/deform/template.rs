@@ -186,8 +186,9 @@ fn cup_of(mesh: &TriMesh, monitor: &Monitor) -> Result<Cup, TemplateError> {
     }
 }
 
-/// The map from one cup to another: least turn from axis to axis, then `roll` radians about
-/// the axis, lengths along the axis by the lengths, across by the breadths.
+/// The map from one cup to another: the patient's own tilt, then the least turn from axis to
+/// axis, then `roll` radians about the axis, lengths along the axis by the lengths, across by
+/// the breadths. So a heart that is tilted with its patient meets the same side of the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pose {
     from: Cup,
@@ -196,12 +197,13 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The pose that takes `from` to `to`.
-    pub fn between(from: &Cup, to: &Cup, roll: f64) -> Self {
-        let least = nalgebra::Rotation3::rotation_between(&from.axis, &to.axis)
+    /// The pose that takes `from` to `to` in a patient who is turned by `tilt` in the frame.
+    pub fn between(from: &Cup, to: &Cup, tilt: &nalgebra::Rotation3<f64>, roll: f64) -> Self {
+        let tilted = tilt * from.axis;
+        let least = nalgebra::Rotation3::rotation_between(&tilted, &to.axis)
             // Opposite axes: half a turn about anything across.
             .unwrap_or_else(|| {
-                let (across, _) = perpendicular(&from.axis);
+                let (across, _) = perpendicular(&tilted);
                 nalgebra::Rotation3::from_axis_angle(
                     &nalgebra::Unit::new_normalize(across),
                     std::f64::consts::PI,
@@ -212,7 +214,7 @@ impl Pose {
         Self {
             from: *from,
             to: *to,
-            turn: about * least,
+            turn: about * least * tilt,
         }
     }
 

@@ -161,8 +161,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         kind: Kind::Choice(&["body", "frame"]),
         default: "body",
         summary: "Which way is up in the patient, from where the polar map's segments are counted: \
-                  as the body's outline shows (where it is seen well enough), or as the volume's \
-                  frame says",
+                  as the body's outline shows (where enough of it is in view), or as the \
+                  volume's frame says",
         read: |d, v| {
             d.0.deform.superior = match v.text() {
                 "frame" => Superior::Frame,
@@ -347,7 +347,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "polar_threshold",
         polar.threshold,
         0.0..=1.0,
-        "0.6",
+        "0.65",
         "Share of the wall's own reference uptake below which it counts as a defect"
     ),
     number!(
@@ -356,6 +356,13 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         0.0..=10.0,
         "3",
         "How far the polar map's samples go beyond the wall on both sides, millimetres"
+    ),
+    number!(
+        "polar_blur",
+        polar.blur,
+        0.0..=10.0,
+        "4.5",
+        "Gaussian blur of the image before the polar map is sampled, sigma in millimetres"
     ),
 ];
 

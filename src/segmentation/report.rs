@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::Segmentation;
+use crate::deform::posture::Superior;
 use crate::evaluate::masks::Agreement;
 use crate::geometry::Vec3;
 use crate::polar;
@@ -55,6 +56,15 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
             "runner_up": l.runner_up.map(round),
             "hollowness": round(l.hollowness),
             "confidence": round(l.confidence),
+        })),
+        "posture": fit.posture.as_ref().map(|p| json!({
+            "superior": point(&p.superior),
+            "source": match p.source {
+                Superior::Body => "body",
+                Superior::Frame => "frame",
+            },
+            "tilt_degrees": round(p.tilt()),
+            "confidence": round(p.confidence),
         })),
         "fit": {
             "reason": fit.reason.as_str(),
