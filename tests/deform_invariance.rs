@@ -174,7 +174,7 @@ fn so_do_tilted_scans_with_several_defects() {
     }
     let template = template();
     for case in ["p06", "p10"] {
-        let file = VolumeFile::at(&cohort.join(case).join("spect.nii.gz"));
+        let file = VolumeFile::at(cohort.join(case).join("spect.nii.gz"));
         let (options, limits) = (ReadOptions::default(), ReadLimits::default());
         let scan = read(&[file], &options, &limits, &Monitor::silent()).unwrap();
         let volume = scan.volume;

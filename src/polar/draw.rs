@@ -268,7 +268,7 @@ pub fn json(map: &PolarMap) -> Value {
         "reference": map.reference,
         "threshold_percent": 100.0 * map.threshold,
         "extent_percent": round(map.extent_percent),
-        "note": "relative to this scan's own maximum; no normal database, not TPD",
+        "note": "per cent of the hottest quarter of this scan's own wall; no normal database, not TPD",
         "segments": segments,
         "rows": ROWS,
         "columns": COLUMNS,
