@@ -264,6 +264,39 @@ pub fn retile(
     Ok(tiled)
 }
 
+/// To tell which N would do, N is doubled as long as it stays below this multiple of the first
+/// number tried (or this number).
+const NEEDED_FACTOR: usize = 16;
+const LEAST_TRIED: usize = 2000;
+
+/// The error to give up with where `parameters.points` do not carry the topology of `surface`.
+/// It names a larger number that does: `carries` begins as [`retile`] does with the parameters
+/// it is handed, and tells whether that went well.
+fn too_few(
+    surface: &Surface,
+    parameters: &RetileParameters,
+    carries: impl Fn(&RetileParameters) -> Result<bool, RetileError>,
+) -> RetileError {
+    let points = parameters.points;
+    let mut tried = points;
+    let mut needed = quotas::least_points(&surface.mesh).max(points + 1);
+    let most = MOST_POINTS.min(LEAST_TRIED.max(NEEDED_FACTOR * needed));
+    while needed <= most {
+        let larger = RetileParameters {
+            points: needed,
+            ..parameters.clone()
+        };
+        match carries(&larger) {
+            Ok(true) => return RetileError::TooFewPoints { points, needed },
+            Ok(false) => {}
+            Err(error) => return error,
+        }
+        tried = needed;
+        needed *= 2;
+    }
+    RetileError::NotCarried { points, tried }
+}
+
 fn validate(parameters: &RetileParameters) -> Result<(), RetileError> {
     let bad = |name, value, range| Err(RetileError::BadParameter { name, value, range });
     let p = parameters;
