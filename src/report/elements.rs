@@ -129,6 +129,8 @@ pub struct MeshFacts {
     pub oriented: bool,
     /// The triangles face outward (the enclosed volume is positive).
     pub outward: bool,
+    /// Components that face outward; the others bound cavities.
+    pub outward_components: usize,
     /// The first defect found, in words.
     pub defect: Option<String>,
     /// Pairs of triangles that meet in more than shared vertices and edges, found exactly.
@@ -277,6 +279,7 @@ pub(super) fn facts(mesh: &TriMesh, self_intersections: usize) -> (Elements, Mes
             _ => false,
         }),
         outward: volume > 0.0,
+        outward_components: outward_components(mesh, &components),
         defect: census.err().map(|d| d.to_string()),
         self_intersections,
         area_mm2: elements.area_mm2.iter().sum(),
@@ -285,6 +288,12 @@ pub(super) fn facts(mesh: &TriMesh, self_intersections: usize) -> (Elements, Mes
         max_mm: aabb.max.into(),
     };
     (elements, facts)
+}
+
+/// How many of the components face outward; `component` gives that of every vertex.
+pub(super) fn outward_components(mesh: &TriMesh, component: &[u32]) -> usize {
+    let volumes = topology::component_volumes(mesh, component);
+    volumes.iter().filter(|v| **v > 0.0).count()
 }
 
 /// Number of fans over all vertices: sets of corners at one vertex that are joined through
@@ -369,6 +378,25 @@ mod tests {
         assert!(turned.closed && turned.edge_manifold && !turned.oriented);
         let inward = with(&|m| m.triangles.iter_mut().for_each(|t| t.swap(0, 1)));
         assert!(inward.closed && inward.oriented && !inward.outward);
+        assert_eq!(inward.outward_components, 0);
+        // A small sphere far away faces inward: the whole still encloses a positive volume.
+        let stray = with(&|m| {
+            let n = m.vertices.len() as u32;
+            let turned: Vec<_> = m
+                .triangles
+                .iter()
+                .map(|t| [t[1] + n, t[0] + n, t[2] + n])
+                .collect();
+            let far: Vec<Vec3> = m
+                .vertices
+                .iter()
+                .map(|v| v / 5.0 + Vec3::x() * 40.0)
+                .collect();
+            m.triangles.extend(turned);
+            m.vertices.extend(far);
+        });
+        assert!(stray.oriented && stray.outward && stray.defect.is_none());
+        assert_eq!((stray.components, stray.outward_components), (2, 1));
         // Two spheres that share a vertex.
         let pinched = with(&|m| {
             let n = m.vertices.len() as u32;

@@ -86,6 +86,8 @@ pub struct SurfaceSection {
     pub euler_characteristic: i64,
     /// Connected components.
     pub components: usize,
+    /// Components that face outward; the others bound cavities.
+    pub outward_components: usize,
     /// Enclosed volume, millilitres.
     pub volume_ml: f64,
     /// Area, mm².
@@ -223,7 +225,8 @@ impl Report {
     }
 
     /// Whether the model is what was promised: a closed, oriented manifold that faces
-    /// outward, with the surface's topology and no self-intersection.
+    /// outward (walls of cavities inward, as on the surface), with the surface's topology and no
+    /// self-intersection.
     pub fn is_sound(&self) -> bool {
         let mesh = &self.mesh;
         mesh.defect.is_none()
@@ -231,6 +234,7 @@ impl Report {
             && mesh.self_intersections == 0
             && mesh.euler_characteristic == self.surface.euler_characteristic
             && mesh.components == self.surface.components
+            && mesh.outward_components == self.surface.outward_components
     }
 
     /// The report as indented JSON text.
@@ -299,6 +303,12 @@ fn doubts(mesh: &MeshFacts, surface: &SurfaceSection, tiled: &Tiled) -> Vec<Stri
         doubts.push(format!(
             "The model's Euler characteristic is {}, the surface's {}.",
             mesh.euler_characteristic, surface.euler_characteristic
+        ));
+    }
+    if mesh.outward_components != surface.outward_components {
+        doubts.push(format!(
+            "Components of the model that face outward: {}, of the surface: {}.",
+            mesh.outward_components, surface.outward_components
         ));
     }
     if mesh.vertices != tiled.mesh.vertices.len() {

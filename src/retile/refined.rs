@@ -112,7 +112,7 @@ impl<'a> Job<'a> {
             surface,
             parameters,
             points,
-            volumes: orientation::volumes(&surface.mesh, &components),
+            volumes: topology::component_volumes(&surface.mesh, &components),
             components,
             least: quotas::least_of_components(&surface.mesh),
             samples,

@@ -59,8 +59,11 @@ fn checks(report: &Report) -> Vec<(bool, String)> {
             "Manifold: two triangles at every edge, one fan at every point".to_owned(),
         ),
         (
-            mesh.oriented && mesh.outward,
-            "Every triangle faces outward".to_owned(),
+            mesh.oriented && mesh.outward && mesh.outward_components == surface.outward_components,
+            match mesh.components - mesh.outward_components {
+                0 => "Every triangle faces outward".to_owned(),
+                n => format!("Every triangle faces out of the wall, also about {n} cavities"),
+            },
         ),
         (
             mesh.self_intersections == 0,
