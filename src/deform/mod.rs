@@ -196,6 +196,17 @@ pub enum DeformError {
         /// Greatest value allowed.
         most: f64,
     },
+    /// Support springs were asked for, and the model has too many nodes for them.
+    #[error("support springs are for models of at most {limit} nodes; this one has {nodes}")]
+    TooManyNodes {
+        /// Nodes of the model.
+        nodes: usize,
+        /// Most nodes that a model with support springs may have.
+        limit: usize,
+    },
+    /// The place is another organ's than the template.
+    #[error("the template shows another organ than the one that was searched")]
+    OtherOrgan,
     /// A hinted centre, axis or region is not finite, or the axis has no length.
     #[error("the hinted centre, axis or region must be finite, and the axis not zero")]
     HintNotFinite,
@@ -333,13 +344,9 @@ pub fn fit(
 const MAX_SUPPORTED_NODES: usize = 1000;
 
 fn supports_fit(template: &Template, stiffness: &Stiffness) -> Result<(), DeformError> {
-    if stiffness.support > 0.0 && template.mesh.vertices.len() > MAX_SUPPORTED_NODES {
-        return Err(DeformError::Parameter {
-            field: "stiffness.support (of a model of more than 1000 nodes)",
-            value: stiffness.support,
-            least: 0.0,
-            most: 0.0,
-        });
+    let (nodes, limit) = (template.mesh.vertices.len(), MAX_SUPPORTED_NODES);
+    if stiffness.support > 0.0 && nodes > limit {
+        return Err(DeformError::TooManyNodes { nodes, limit });
     }
     Ok(())
 }

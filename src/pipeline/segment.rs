@@ -137,6 +137,7 @@ impl SegmentError {
             | SegmentError::Segmentation(SegmentationError::Expert(_)) => Some("expert"),
             SegmentError::Segmentation(SegmentationError::Deform(error)) => match error {
                 DeformError::Parameter { field, .. } => Some(field),
+                DeformError::TooManyNodes { .. } => Some("model"),
                 DeformError::Localise(LocaliseError::NoHeart { .. }) => Some("center"),
                 _ => None,
             },
@@ -196,6 +197,9 @@ impl SegmentError {
                 }
                 DeformError::Localise(LocaliseError::Blank) => {
                     "Look whether the file, and `frame` of a 4-D one, is the right one.".into()
+                }
+                DeformError::TooManyNodes { limit, .. } => {
+                    format!("Give a model of at most {limit} points, or no support springs.")
                 }
                 _ => "Give finite numbers within their ranges.".into(),
             },
