@@ -72,9 +72,14 @@ fn ventricle(mesh: TriMesh) -> Template {
 
 fn jaccard(mesh: &TriMesh, truth: &TriMesh, volume: &Volume) -> f64 {
     let mask = |m: &TriMesh| voxelise(m, volume.shape, &volume.frame);
-    compare(&mask(mesh), &mask(truth), volume.frame.spacing())
-        .unwrap()
-        .jaccard
+    compare(
+        &mask(mesh),
+        &mask(truth),
+        volume.frame.spacing(),
+        &Monitor::silent(),
+    )
+    .unwrap()
+    .jaccard
 }
 
 #[test]
@@ -114,7 +119,11 @@ fn a_sphere_grows_onto_a_sphere_and_a_shifted_one_comes_back() {
 #[test]
 fn energy_never_rises_without_external_forces() {
     let mesh = shapes::cup(60.0, 30.0, 12.0, 16);
-    let body = Elastic::new(&mesh, &struts(&mesh), Stiffness::default());
+    let body = Elastic::new(
+        &mesh,
+        &struts(&mesh, &Monitor::silent()).unwrap(),
+        Stiffness::default(),
+    );
     let mut start = mesh.clone();
     for (i, p) in start.vertices.iter_mut().enumerate() {
         let t = i as f64;

@@ -47,7 +47,11 @@ fn explicit(start: &TriMesh, body: &Elastic, field: &Field, look: &Look) -> TriM
     let mut velocity = vec![Vec3::zeros(); masses.len()];
     for _ in 0..250 {
         let mut forces = body.forces(&mesh.vertices);
-        for (s, r) in sensors::read(&mesh, field, look).iter().enumerate() {
+        for (s, r) in sensors::read(&mesh, field, look, &Monitor::silent())
+            .unwrap()
+            .iter()
+            .enumerate()
+        {
             let pull = r.normal * (r.share * r.weight * r.offset);
             let triangle = mesh.triangles[s / PER_TRIANGLE];
             for (node, w) in triangle.iter().zip(&corners[s % PER_TRIANGLE]) {
@@ -73,7 +77,11 @@ fn explicit_and_implicit_steps_end_in_the_same_state() {
     let volume = patient();
     let field = Field::new(&volume, None, 2.0);
     let start = shapes::cup(62.0, 30.0, 13.0, 10);
-    let body = Elastic::new(&start, &struts(&start), Stiffness::default());
+    let body = Elastic::new(
+        &start,
+        &struts(&start, &Monitor::silent()).unwrap(),
+        Stiffness::default(),
+    );
     for kind in [SensorKind::Gradient, SensorKind::HalfMaximum] {
         let look = Look {
             kind,

@@ -4,7 +4,8 @@
 //! comes the model in the patient's place and shape, on the same nodes and triangles, with
 //! everything needed to judge whether to believe it.
 //!
-//! 1. [`localise`] finds the ventricle in the volume, with nobody's help.
+//! 1. [`localise`] finds the ventricle in the volume, with nobody's help: once for all
+//!    templates ([`Place`]).
 //! 2. [`template::Pose`] puts the template there: centre, axis, roll, lengths.
 //! 3. [`align`] moves, turns, stretches and thickens it as a whole.
 //! 4. [`dynamics`] lets it move under [`elastic`] forces and [`sensors`] until it rests.
@@ -44,6 +45,7 @@ use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::volume::Volume;
+use blob::Blob;
 use cup::Cup;
 use dynamics::{Motion, Moved, StopReason};
 use elastic::{Elastic, Stiffness};
@@ -298,11 +300,27 @@ pub fn fit(
     parameters: &DeformParameters,
     monitor: &Monitor,
 ) -> Result<Fit, DeformError> {
+    supports_fit(template, &parameters.stiffness)?;
+    let place = Place::find(volume, template, parameters, monitor)?;
+    fit_at(&place, volume, template, parameters, monitor)
+}
+
+/// Fits `template` to the organ at its `place` in `volume`, which [`Place::find`] found there
+/// by the same parameters for this template or another one of the same organ.
+///
+/// # Errors
+/// [`DeformError`].
+pub fn fit_at(
+    place: &Place,
+    volume: &Volume,
+    template: &Template,
+    parameters: &DeformParameters,
+    monitor: &Monitor,
+) -> Result<Fit, DeformError> {
     parameters.validate()?;
     supports_fit(template, &parameters.stiffness)?;
-    monitor.report(Stage::Localise, 0.0)?;
-    let start = Start::find(volume, template, parameters, monitor)?;
     monitor.report(Stage::Align, 0.0)?;
+    let start = Start::new(place, volume, template, parameters, monitor)?;
     // From afar the ridge and the trough beside a slope may be another structure's: the model
     // is aligned by slopes.
     let far = match parameters.sensor {
@@ -323,7 +341,7 @@ pub fn fit(
     };
     monitor.report(Stage::Deform, 0.0)?;
     let attempt = Attempt::best(&aligned, template, &start, parameters, 0.0, monitor)?;
-    let fit = attempt.into_fit(volume, template, &start, &aligned);
+    let fit = attempt.into_fit(volume, template, &start, &aligned, monitor)?;
     fit.believe(&parameters.hints)?;
     let fit = match (&fit.cup, parameters.edge) {
         (Some(cup), Edge::Anatomical) => {
@@ -332,7 +350,7 @@ pub fn fit(
             let excess = anatomy::excess(apparent, parameters.resolution);
             let thin = -0.5 * excess;
             Attempt::best(&aligned, template, &start, parameters, thin, monitor)?
-                .into_fit(volume, template, &start, &aligned)
+                .into_fit(volume, template, &start, &aligned, monitor)?
         }
         _ => fit,
     };
@@ -351,6 +369,59 @@ fn supports_fit(template: &Template, stiffness: &Stiffness) -> Result<(), Deform
     Ok(())
 }
 
+/// Where an organ lies in a volume: the same for all templates of the organ.
+#[derive(Debug, Clone)]
+pub enum Place {
+    /// A left ventricle.
+    Ventricle(Localisation),
+    /// Any other organ.
+    Body {
+        /// The bright body.
+        blob: Blob,
+        /// The one label of a map of several that is meant, as a mask.
+        mask: Option<Volume>,
+    },
+}
+
+impl Place {
+    /// Looks in `volume` for the organ of `template`.
+    ///
+    /// # Errors
+    /// [`DeformError`].
+    pub fn find(
+        volume: &Volume,
+        template: &Template,
+        parameters: &DeformParameters,
+        monitor: &Monitor,
+    ) -> Result<Self, DeformError> {
+        parameters.validate()?;
+        monitor.report(Stage::Localise, 0.0)?;
+        let place = match template.cup {
+            Some(_) => Place::Ventricle(localise::localise(volume, &parameters.hints, monitor)?),
+            None => {
+                let mask = blob::one_label(volume, &parameters.hints, monitor)?;
+                let picture = mask.as_ref().unwrap_or(volume);
+                let blob = blob::find(picture, &parameters.hints, monitor)?;
+                Place::Body { blob, mask }
+            }
+        };
+        monitor.report(Stage::Localise, 1.0)?;
+        Ok(place)
+    }
+
+    /// Whether `template` can be fitted there.
+    pub fn suits(&self, template: &Template) -> bool {
+        matches!(self, Place::Ventricle(_)) == template.cup.is_some()
+    }
+
+    fn picture(&self) -> Option<&Volume> {
+        match self {
+            Place::Ventricle(_) => None,
+            Place::Body { mask, .. } => mask.as_ref(),
+        }
+    }
+}
+
 /// The template put in its place, and the image to fit it to.
 struct Start {
     localisation: Option<Localisation>,
@@ -365,31 +436,26 @@ struct Start {
 }
 
 impl Start {
-    fn find(
+    fn new(
+        place: &Place,
         volume: &Volume,
         template: &Template,
         parameters: &DeformParameters,
         monitor: &Monitor,
     ) -> Result<Self, DeformError> {
-        let picked = match template.cup {
-            Some(_) => None,
-            None => blob::one_label(volume, &parameters.hints, monitor)?,
-        };
-        let volume = picked.as_ref().unwrap_or(volume);
-        let (localisation, pose, axis, cavity_axis, uptake) = match &template.cup {
-            Some(from) => {
-                let found = localise::localise(volume, &parameters.hints, monitor)?;
+        let (localisation, pose, axis, cavity_axis, uptake) = match (place, &template.cup) {
+            (Place::Ventricle(found), Some(from)) => {
                 let to = found.cup;
                 let pose = Pose::between(from, &to, parameters.roll.to_radians());
                 let inner_end = to.base() + to.axis * (0.6 * to.length);
-                let wall = found.wall;
-                (Some(found), pose, to.axis, [to.base(), inner_end], wall)
+                let ends = [to.base(), inner_end];
+                (Some(found.clone()), pose, to.axis, ends, found.wall)
             }
-            None => {
-                let blob = blob::find(volume, &parameters.hints, monitor)?;
+            (Place::Body { blob, .. }, None) => {
                 let pose = blob.pose(&template.mesh);
                 (None, pose, Vec3::z(), [blob.centre; 2], blob.uptake)
             }
+            _ => return Err(DeformError::OtherOrgan),
         };
         let mut posed = template.mesh.clone();
         posed.vertices.iter_mut().for_each(|p| *p = pose.apply(p));
@@ -397,8 +463,8 @@ impl Start {
         let border = Vec3::repeat(parameters.reach + 4.0 * parameters.blur + 15.0);
         region.min -= border;
         region.max += border;
-        monitor.check()?;
-        let field = Field::new(volume, Some(&region), parameters.blur);
+        let picture = place.picture().unwrap_or(volume);
+        let field = Field::cut_out(picture, Some(&region), parameters.blur, monitor)?;
         Ok(Self {
             localisation,
             pose,
@@ -500,7 +566,8 @@ impl Attempt {
         template: &Template,
         start: &Start,
         aligned: &TriMesh,
-    ) -> Fit {
+        monitor: &Monitor,
+    ) -> Result<Fit, Cancelled> {
         let mesh = self.moved.mesh;
         let readings = &self.moved.readings;
         let seen: f64 = readings.iter().map(|r| r.share * r.weight).sum();
@@ -516,7 +583,7 @@ impl Attempt {
         let cup = template
             .cup
             .map(|cup| wall::carried(&cup, &template.mesh, &mesh));
-        let wall = cup.map(|cup| Wall::new(&mesh, &cup));
+        let wall = cup.map(|cup| Wall::new(&mesh, &cup, monitor)).transpose()?;
         let posed = &start.posed.vertices;
         let mut fit = Fit {
             displacements: mesh
@@ -550,7 +617,7 @@ impl Attempt {
             flags: Vec::new(),
         };
         fit.flags = flags::raise(&fit, volume, template.organ == Organ::LeftVentricle);
-        fit
+        Ok(fit)
     }
 }
 

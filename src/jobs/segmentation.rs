@@ -196,9 +196,8 @@ pub(super) fn explain(error: SegmentError) -> WorkError {
             _ => (Fault::Content, "no-heart"),
         },
         SegmentError::Segmentation(Deform(_)) => (Fault::Request, "invalid-parameter"),
-        SegmentError::Segmentation(Cancelled(_)) | SegmentError::Cancelled(_) => {
-            return WorkError::Cancelled;
-        }
+        SegmentError::Segmentation(Cancelled(_) | Expert(ExpertError::Cancelled(_)))
+        | SegmentError::Cancelled(_) => return WorkError::Cancelled,
     };
     let failure = Failure::new(fault, code, sentence(&error)).fix(error.fix());
     WorkError::Failed(match error.field() {

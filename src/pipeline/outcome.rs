@@ -69,7 +69,7 @@ impl Segmented {
         }
         monitor.report(Stage::Export, 0.9)?;
         files.push(json_file("report.json", &self.report()));
-        files.extend(self.polar()?);
+        files.extend(self.polar(monitor)?);
         monitor.report(Stage::Export, 1.0)?;
         Ok(files)
     }
@@ -120,7 +120,7 @@ impl Segmented {
         })
     }
 
-    fn polar(&self) -> Result<Vec<NamedFile>, OutcomeError> {
+    fn polar(&self, monitor: &Monitor<'_>) -> Result<Vec<NamedFile>, OutcomeError> {
         let Some(map) = &self.segmentation.polar else {
             return Ok(Vec::new());
         };
@@ -129,6 +129,7 @@ impl Segmented {
             media_type: "image/svg+xml",
             bytes: polar::svg(map).into_bytes(),
         };
+        monitor.check()?;
         let png = NamedFile {
             name: "polar.png".into(),
             media_type: "image/png",

@@ -289,7 +289,10 @@ mod tests {
             length: 65.0,
             breadth: 1.0,
         };
-        (volume, Wall::new(&mesh, &cup))
+        (
+            volume,
+            Wall::new(&mesh, &cup, &crate::progress::Monitor::silent()).unwrap(),
+        )
     }
 
     #[test]

@@ -130,7 +130,9 @@ impl<'a> Job<'a> {
         facts: &mut RetileFacts,
         monitor: &Monitor,
     ) -> Result<Option<(TriMesh, Vec<f64>)>, RetileError> {
+        monitor.check()?;
         let seeds = self.seeds(start);
+        monitor.check()?;
         let mut cells = Cells::grow(&self.samples, &seeds);
         let rounds = self.parameters.relaxation_iterations;
         monitor.report(Stage::Retile, 0.1)?;
