@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::summary::{Histogram, Summary};
 use crate::geometry::{Vec3, triangle};
@@ -105,7 +105,7 @@ fn angles_deg([a, b, c]: &[Vec3; 3]) -> [f64; 3] {
 }
 
 /// What a mesh is, whatever it looks like: counts and topology.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MeshFacts {
     /// Number of vertices.
     pub vertices: usize,
@@ -146,7 +146,7 @@ pub struct MeshFacts {
 }
 
 /// How well-shaped the triangles are.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Shape {
     /// Radius ratio 2r/R, 1 = equilateral.
     pub radius_ratio: Summary,
@@ -163,7 +163,7 @@ pub struct Shape {
 }
 
 /// How many edges meet at a vertex.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Valence {
     /// Number of vertices for each valence.
     pub counts: BTreeMap<u32, usize>,
@@ -174,7 +174,7 @@ pub struct Valence {
 }
 
 /// How smooth the mesh is.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Smoothness {
     /// Angle between the normals of neighbouring triangles, degrees, 0 = flat.
     pub dihedral_deg: Summary,
@@ -222,7 +222,7 @@ impl Smoothness {
 }
 
 /// Distributions before and after optimisation.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Histograms {
     /// Radius ratios 2r/R.
     pub radius_ratio: Histogram,

@@ -1,4 +1,5 @@
-//! A patient's segmentation from beginning to end: fit, mask, volumes, polar map, measures.
+//! A patient's segmentation from beginning to end: fit, mask, volumes, polar map, measures,
+//! pictures.
 //!
 //! Several templates may be given: each is fitted, and the fit with the greatest
 //! [`Fit::merit`](crate::deform::Fit::merit) is taken (the first of equals); the others'
@@ -15,6 +16,7 @@ use crate::deform::template::Template;
 use crate::deform::voxelise::{Mask, voxelise};
 use crate::deform::{DeformError, DeformParameters, Fit, Place, fit_at};
 use crate::evaluate::masks::{Agreement, compare};
+use crate::evaluate::slices::{self, Cut};
 use crate::polar::{self, PolarMap, PolarParameters};
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::volume::Volume;
@@ -72,6 +74,8 @@ pub struct Segmentation {
     pub polar: Option<PolarMap>,
     /// Against the expert's mask, where one was given.
     pub agreement: Option<Agreement>,
+    /// Slices of the volume with the contours of fit and expert: a PNG.
+    pub slices: Vec<u8>,
     /// Place of the taken template in `candidates`.
     pub chosen: usize,
     /// Every template fitted, in the order given.
@@ -141,12 +145,19 @@ pub fn segment(
         Some(expert) => compare(&mask, expert, volume.frame.spacing(), monitor).ok(),
         None => None,
     };
+    monitor.report(Stage::Report, 0.8)?;
+    let cut = fit
+        .cup
+        .as_ref()
+        .map_or_else(|| Cut::body(&fit.mesh), Cut::heart);
+    let slices = slices::png(volume, &fit.mesh, &cut, expert.as_ref(), monitor)?;
     monitor.report(Stage::Report, 1.0)?;
     Ok(Segmentation {
         fit,
         mask,
         polar,
         agreement,
+        slices,
         chosen,
         candidates,
         refused,

@@ -9,6 +9,7 @@ use crate::deform::voxelise::{Mask, voxelise};
 use crate::deform::{DeformError, DeformParameters, Place, fit_at};
 use crate::evaluate::masks::compare;
 use crate::evaluate::rows::{Agreed, Gold, Outcome, Row};
+use crate::evaluate::slices::{self, Cut};
 use crate::evaluate::table::rounded;
 use crate::export::{self, Format, Metadata};
 use crate::geometry::Vec3;
@@ -344,10 +345,7 @@ pub fn picture(
         .ok()
     });
     let mesh = fitted.mesh(model);
-    Ok(Some(crate::evaluate::slices::png(
-        &volume,
-        &mesh,
-        cup,
-        expert.as_ref(),
-    )))
+    let (cut, silent) = (Cut::heart(cup), Monitor::silent());
+    let png = slices::png(&volume, &mesh, &cut, expert.as_ref(), &silent)?;
+    Ok(Some(png))
 }

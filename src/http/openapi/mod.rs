@@ -11,7 +11,7 @@ mod inputs;
 pub use answers::{
     DownloadAnswers, EraseProblems, EventsAnswer, FileAnswer, FileProblems, ListProblems,
     LookupProblems, MeshAnswer, ReportAnswer, SegmentationAnswer, SegmentationFileAnswer,
-    SegmentationReportAnswer, UploadProblems,
+    UploadProblems,
 };
 pub use bodies::{JobRequest, MeshDocument, SegmentationForm, UploadForm};
 pub use inputs::{
