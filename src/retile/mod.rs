@@ -222,7 +222,9 @@ impl RetileError {
                 format!("Set `points` to {needed} or more, or `topology` to genus0.")
             }
             RetileError::NotCarried { .. } => {
-                "Set `topology` to genus0, or `isolate` to one component, or smooth the volume."
+                "More points do not help. Set `topology` to genus0, or `isolate` to one component; \
+                 where the object is only two or three voxels thick, choose another `iso` or \
+                 smooth the volume."
                     .into()
             }
             RetileError::TooManyPoints { limit, .. } => {
