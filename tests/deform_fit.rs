@@ -24,23 +24,8 @@ const SPACING: f64 = 3.5;
 /// A volume of `n`³ voxels about the origin with `value` at every centre, blurred by
 /// `sigma` mm.
 fn picture(n: usize, sigma: f64, value: impl Fn(&Vec3) -> f64) -> Volume {
-    let shape = [n; 3];
-    let frame = VoxelToPatient::centred(shape, [SPACING; 3], Vec3::zeros()).unwrap();
-    let mut voxels = Vec::with_capacity(n * n * n);
-    for k in 0..n {
-        for j in 0..n {
-            for i in 0..n {
-                let p = frame.to_patient(&Vec3::new(i as f64, j as f64, k as f64));
-                voxels.push(value(&p) as f32);
-            }
-        }
-    }
-    let mut volume = Volume {
-        shape,
-        voxels,
-        frame,
-        integral: false,
-    };
+    let frame = VoxelToPatient::centred([n; 3], [SPACING; 3], Vec3::zeros()).unwrap();
+    let mut volume = Volume::sampled([n; 3], frame, value);
     volume.voxels = Field::new(&volume, None, sigma).values().to_vec();
     volume
 }
@@ -87,9 +72,14 @@ fn ventricle(mesh: TriMesh) -> Template {
 
 fn jaccard(mesh: &TriMesh, truth: &TriMesh, volume: &Volume) -> f64 {
     let mask = |m: &TriMesh| voxelise(m, volume.shape, &volume.frame);
-    compare(&mask(mesh), &mask(truth), volume.frame.spacing())
-        .unwrap()
-        .jaccard
+    compare(
+        &mask(mesh),
+        &mask(truth),
+        volume.frame.spacing(),
+        &Monitor::silent(),
+    )
+    .unwrap()
+    .jaccard
 }
 
 #[test]
@@ -129,7 +119,11 @@ fn a_sphere_grows_onto_a_sphere_and_a_shifted_one_comes_back() {
 #[test]
 fn energy_never_rises_without_external_forces() {
     let mesh = shapes::cup(60.0, 30.0, 12.0, 16);
-    let body = Elastic::new(&mesh, &struts(&mesh), Stiffness::default());
+    let body = Elastic::new(
+        &mesh,
+        &struts(&mesh, &Monitor::silent()).unwrap(),
+        Stiffness::default(),
+    );
     let mut start = mesh.clone();
     for (i, p) in start.vertices.iter_mut().enumerate() {
         let t = i as f64;

@@ -25,23 +25,13 @@ fn patient() -> Volume {
     let shape = [32; 3];
     let frame = VoxelToPatient::centred(shape, [SPACING; 3], Vec3::new(0.0, 0.0, -25.0)).unwrap();
     let edge = |distance: f64| (0.5 + distance / 12.0).clamp(0.0, 1.0);
-    let voxels = (0..32usize.pow(3))
-        .map(|v| {
-            let index = [v % 32, v / 32 % 32, v / 1024].map(|x| x as f64);
-            let p = frame.to_patient(&Vec3::from(index));
-            let shell = |long: f64, wide: f64| {
-                let r = Vec3::new(p.x / wide, p.y / (0.93 * wide), p.z / long).norm();
-                edge((1.0 - r) * wide)
-            };
-            (shell(66.0, 33.0) - shell(53.0, 20.0)) as f32 * edge(2.0 - p.z) as f32
-        })
-        .collect();
-    let mut volume = Volume {
-        shape,
-        voxels,
-        frame,
-        integral: false,
-    };
+    let mut volume = Volume::sampled(shape, frame, |p| {
+        let shell = |long: f64, wide: f64| {
+            let r = Vec3::new(p.x / wide, p.y / (0.93 * wide), p.z / long).norm();
+            edge((1.0 - r) * wide)
+        };
+        (shell(66.0, 33.0) - shell(53.0, 20.0)) * edge(2.0 - p.z)
+    });
     volume.voxels = Field::new(&volume, None, 3.0).values().to_vec();
     volume
 }
@@ -57,7 +47,11 @@ fn explicit(start: &TriMesh, body: &Elastic, field: &Field, look: &Look) -> TriM
     let mut velocity = vec![Vec3::zeros(); masses.len()];
     for _ in 0..250 {
         let mut forces = body.forces(&mesh.vertices);
-        for (s, r) in sensors::read(&mesh, field, look).iter().enumerate() {
+        for (s, r) in sensors::read(&mesh, field, look, &Monitor::silent())
+            .unwrap()
+            .iter()
+            .enumerate()
+        {
             let pull = r.normal * (r.share * r.weight * r.offset);
             let triangle = mesh.triangles[s / PER_TRIANGLE];
             for (node, w) in triangle.iter().zip(&corners[s % PER_TRIANGLE]) {
@@ -83,7 +77,11 @@ fn explicit_and_implicit_steps_end_in_the_same_state() {
     let volume = patient();
     let field = Field::new(&volume, None, 2.0);
     let start = shapes::cup(62.0, 30.0, 13.0, 10);
-    let body = Elastic::new(&start, &struts(&start), Stiffness::default());
+    let body = Elastic::new(
+        &start,
+        &struts(&start, &Monitor::silent()).unwrap(),
+        Stiffness::default(),
+    );
     for kind in [SensorKind::Gradient, SensorKind::HalfMaximum] {
         let look = Look {
             kind,

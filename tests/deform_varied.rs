@@ -96,7 +96,7 @@ fn no_varied_patient_is_lost() {
             shape: truth.shape,
             voxels: truth.voxels.iter().map(|v| *v > 0.5).collect(),
         };
-        let agreement = compare(&mask, &truth, volume.frame.spacing()).unwrap();
+        let agreement = compare(&mask, &truth, volume.frame.spacing(), &Monitor::silent()).unwrap();
         assert!(agreement.jaccard > least, "{name}: {}", agreement.jaccard);
         assert_eq!(fit.self_intersections + fit.turned_triangles, 0, "{name}");
     }

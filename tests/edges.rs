@@ -15,16 +15,7 @@ use ventriform::volume::{ReadLimits, Volume, VolumeFile};
 
 fn volume(shape: [usize; 3], spacing: [f64; 3], value: impl Fn(Vec3) -> f64) -> Volume {
     let frame = VoxelToPatient::centred(shape, spacing, Vec3::zeros()).unwrap();
-    let [nx, ny, nz] = shape;
-    let place = |n: usize| Vec3::new((n % nx) as f64, (n / nx % ny) as f64, (n / nx / ny) as f64);
-    Volume {
-        shape,
-        voxels: (0..nx * ny * nz)
-            .map(|n| value(frame.to_patient(&place(n))) as f32)
-            .collect(),
-        frame,
-        integral: false,
-    }
+    Volume::sampled(shape, frame, |p| value(*p))
 }
 
 /// A file of the volume, read, surfaced, re-tiled, optimised and measured.

@@ -14,7 +14,7 @@ use ventriform::optimise::{
     FitnessForm, FitnessSummary, OptimiseFacts, OptimiseParameters, Optimised, Reference,
 };
 use ventriform::progress::Monitor;
-use ventriform::report::{MeasureParameters, Report, ReportInput, html, measure};
+use ventriform::report::{Closeness, MeasureParameters, Report, ReportInput, html, measure};
 use ventriform::retile::{RetileFacts, Tiled};
 use ventriform::surface::{Surface, SurfaceFacts};
 
@@ -78,6 +78,11 @@ fn report(model: &TriMesh) -> Report {
         measures,
         timings_ms: vec![("surface".to_owned(), 12.0), ("retile".to_owned(), 30.5)],
     })
+}
+
+/// How far `model` lies from the surface.
+fn closeness(model: &TriMesh) -> Closeness {
+    Closeness::of(model, &surface().mesh, &Monitor::silent()).unwrap()
 }
 
 fn model() -> TriMesh {
@@ -153,7 +158,7 @@ fn a_model_that_breaks_its_promises_is_told_so() {
 #[test]
 fn the_page_fetches_nothing_and_lets_no_text_become_markup() {
     let model = model();
-    let page = html(&report(&model), &model, Some(&surface().mesh));
+    let page = html(&report(&model), &model, Some(&closeness(&model)));
     for outside in ["http:", "https:", "src=\"/", "url(h", "@import", "<link"] {
         assert!(!page.contains(outside), "{outside}");
     }
@@ -216,7 +221,7 @@ fn measures_do_not_depend_on_the_number_of_threads() {
             .unwrap();
         pool.install(|| {
             let report = report(&model);
-            let page = html(&report, &model, Some(&surface().mesh));
+            let page = html(&report, &model, Some(&closeness(&model)));
             (serde_json::to_string(&report).unwrap(), page)
         })
     };

@@ -15,21 +15,7 @@ use ventriform::volume::Volume;
 
 fn volume(shape: [usize; 3], spacing: [f64; 3], value: impl Fn(Vec3) -> f64) -> Volume {
     let frame = VoxelToPatient::centred(shape, spacing, Vec3::zeros()).unwrap();
-    let mut voxels = Vec::new();
-    for k in 0..shape[2] {
-        for j in 0..shape[1] {
-            for i in 0..shape[0] {
-                let p = frame.to_patient(&Vec3::new(i as f64, j as f64, k as f64));
-                voxels.push(value(p) as f32);
-            }
-        }
-    }
-    Volume {
-        shape,
-        voxels,
-        frame,
-        integral: false,
-    }
+    Volume::sampled(shape, frame, |p| value(*p))
 }
 
 /// A blurred wall round the origin, open towards +z; 1 in its middle.

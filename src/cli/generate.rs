@@ -57,7 +57,7 @@ pub fn run(args: &GenerateArgs) -> Result<()> {
         write(path, &bytes)?;
     }
     for path in &args.report {
-        write(path, report_text(path, &model).as_bytes())?;
+        write(path, report_text(path, &model, &monitor)?.as_bytes())?;
     }
     if !args.quiet {
         print_summary(&model.report);
@@ -88,11 +88,11 @@ fn check_report_names(reports: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-fn report_text(path: &Path, model: &Model) -> String {
-    match extension(path).as_str() {
-        "html" => model.report_html(),
+fn report_text(path: &Path, model: &Model, monitor: &Monitor) -> Result<String> {
+    Ok(match extension(path).as_str() {
+        "html" => model.report_html(Some(&model.closeness(monitor)?)),
         _ => model.report.to_json_text(),
-    }
+    })
 }
 
 fn extension(path: &Path) -> String {

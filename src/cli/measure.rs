@@ -42,8 +42,8 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
             args.a.display()
         );
     }
-    let reference = on_grid(&b, &a).with_context(|| format!("{}", args.b.display()))?;
-    let agreement = compare(&judged, &reference, a.frame.spacing())?;
+    let reference = on_grid(&b, &a, &monitor).with_context(|| format!("{}", args.b.display()))?;
+    let agreement = compare(&judged, &reference, a.frame.spacing(), &monitor)?;
     println!(
         "{}",
         serde_json::to_string_pretty(&agreement_json(&agreement))?

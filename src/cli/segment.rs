@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
   ventriform segment scan.nii.gz --model lv.json -o out
   ventriform segment scan.dcm --model a.json --model b.json -o out --expert mask.nii.gz
   ventriform segment scan.nii.gz --model auto -o out --seed 60,70,55 --format ply
-Writes mask.nii.gz, mesh.glb, mesh.stl, mesh.json (or the formats asked for), report.json and,
-for the left ventricle, polar.json, polar.svg and polar.png")]
+Writes mask.nii.gz, mesh.glb, mesh.stl, mesh.json (or the formats asked for), report.json,
+report.html, slices.png and, for the left ventricle, polar.json, polar.svg and polar.png")]
 pub struct SegmentArgs {
     /// The volume: NIfTI (.nii, .nii.gz, or a .hdr and .img pair) or DICOM NM
     #[arg(value_name = "IN", required = true, num_args = 1..=2)]
@@ -88,7 +88,8 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
         .map_err(|error| anyhow!("{error}. {}", error.fix()))
         .and_then(|made| Ok((made.files(&args.formats, None, &monitor)?, made)));
     bar.finish();
-    let (files, made) = made?;
+    let (mut files, made) = made?;
+    files.push(made.page(&files));
     write_all(&args.output, &files)?;
     eprintln!("{}", headline(&made.segmentation));
     for flag in &made.segmentation.fit.flags {

@@ -1,6 +1,6 @@
 //! `ventriform templates`: the library of models that segmentations start from.
 
-use super::evaluate::cohort::{Cohort, read_volume};
+use super::evaluate::cohort::{CohortArgs, read_volume};
 use crate::export::{self, Format};
 use crate::parameters::ModelParameters;
 use crate::pipeline;
@@ -20,28 +20,19 @@ pub struct TemplatesArgs {
 enum TemplatesAction {
     /// Makes the models of a cohort's template cases: scans by threshold, one from the expert's
     /// mask
-    Build {
-        /// The cohort's folder
-        #[arg(long, value_name = "DIR")]
-        cohort: PathBuf,
-        /// Numbers of points
-        #[arg(
-            long,
-            value_name = "N,...",
-            value_delimiter = ',',
-            default_value = "150"
-        )]
-        points: Vec<usize>,
-        /// The template whose model comes from its expert's mask [default: the third, if it
-        /// has one]
-        #[arg(long, value_name = "CASE")]
-        manual: Option<String>,
-        /// Where the models go, as CASE_N.json (made where missing)
-        #[arg(short, long = "output", value_name = "DIR")]
-        output: PathBuf,
-    },
+    Build(BuildArgs),
     /// Adds models to the library of a service that does not run just now
     Import(super::library::ImportArgs),
+}
+
+#[derive(Debug, Args)]
+#[command(mut_arg("points", |arg| arg.default_value("150")))]
+struct BuildArgs {
+    #[command(flatten)]
+    cohort: CohortArgs,
+    /// Where the models go, as CASE_N.json (made where missing)
+    #[arg(short, long = "output", value_name = "DIR")]
+    output: PathBuf,
 }
 
 /// Runs `ventriform templates`.
@@ -49,21 +40,19 @@ enum TemplatesAction {
 /// # Errors
 /// What reading, generating or the file system says.
 pub fn run(args: &TemplatesArgs) -> Result<()> {
-    let (cohort, points, manual, output) = match &args.action {
-        TemplatesAction::Build {
-            cohort,
-            points,
-            manual,
-            output,
-        } => (cohort, points, manual, output),
-        TemplatesAction::Import(args) => return super::library::import(args),
-    };
-    let cohort = Cohort::open(cohort, manual.as_deref())?;
+    match &args.action {
+        TemplatesAction::Build(args) => build(args),
+        TemplatesAction::Import(args) => super::library::import(args),
+    }
+}
+
+fn build(args: &BuildArgs) -> Result<()> {
+    let (cohort, output) = (args.cohort.open()?, &args.output);
     std::fs::create_dir_all(output).with_context(|| format!("cannot make {}", output.display()))?;
     for case in &cohort.templates {
         let (path, what) = cohort.source(case).context("its files are gone")?;
         let reading = read_volume(&path)?;
-        for n in points {
+        for n in args.cohort.points() {
             let context = || format!("the model of {case} with {n} points");
             let pairs = [("points", n.to_string())];
             let parameters =

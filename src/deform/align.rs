@@ -35,10 +35,9 @@ pub fn align(
     let mut mesh = mesh.clone();
     let shares = area_shares(&mesh);
     for round in 0..ROUNDS {
-        monitor.check()?;
         let progress = round as f64 / (ROUNDS - 1) as f64;
         let reach = look.reach * (last_reach / look.reach).powf(progress);
-        let readings = sensors::read(&mesh, field, &Look { reach, ..*look });
+        let readings = sensors::read(&mesh, field, &Look { reach, ..*look }, monitor)?;
         let centre: Vec3 = mesh.vertices.iter().zip(&shares).map(|(p, s)| p * *s).sum();
         let basis = Basis {
             axis: *axis,

@@ -40,8 +40,7 @@ pub struct Blob {
 /// [`LocaliseError::Blank`] where nothing is bright, [`LocaliseError::HintOutside`] where the
 /// hints leave nothing of it.
 pub fn find(volume: &Volume, hints: &Hints, monitor: &Monitor) -> Result<Blob, LocaliseError> {
-    let field = Field::coarse(volume, COARSE);
-    monitor.check()?;
+    let field = Field::coarse(volume, COARSE, monitor)?;
     let level = LEVEL * field.values().iter().fold(0f32, |a, b| a.max(*b));
     if !(level > 0.0) {
         return Err(LocaliseError::Blank);

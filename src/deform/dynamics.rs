@@ -123,7 +123,7 @@ pub fn run(
         let settled = reach <= motion.last_reach;
         if !memory.is_certain() {
             memory.hear(
-                sensors::read(&state.mesh, field, &Look { reach, ..*look }),
+                sensors::read(&state.mesh, field, &Look { reach, ..*look }, monitor)?,
                 settled,
             );
         }
@@ -149,7 +149,7 @@ pub fn run(
             break;
         }
     }
-    let readings = sensors::read(&state.mesh, field, &Look { reach, ..*look });
+    let readings = sensors::read(&state.mesh, field, &Look { reach, ..*look }, monitor)?;
     Ok(Moved {
         mesh: state.mesh,
         reason,

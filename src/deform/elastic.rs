@@ -32,6 +32,7 @@ use nalgebra::Matrix3;
 use super::system::BlockMatrix;
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
+use crate::progress::{Cancelled, Monitor};
 
 /// Stiffness of each kind of force.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -344,11 +345,15 @@ pub fn area_shares(mesh: &TriMesh) -> Vec<f64> {
 /// Pairs of nodes across the wall: for every node the one that lies against its inner side,
 /// looks the other way, and is nearest (length over squared cosine). Pairs longer than 2.5
 /// times the middle one bridge something else than the wall and are left out.
-pub fn struts(mesh: &TriMesh) -> Vec<Strut> {
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn struts(mesh: &TriMesh, monitor: &Monitor) -> Result<Vec<Strut>, Cancelled> {
     let normals = mesh.vertex_normals();
     let shares = area_shares(mesh);
     let mut found: Vec<(f64, Strut)> = Vec::new();
     for (i, (p, n)) in mesh.vertices.iter().zip(&normals).enumerate() {
+        monitor.check()?;
         let opposite = mesh
             .vertices
             .iter()
@@ -382,7 +387,7 @@ pub fn struts(mesh: &TriMesh) -> Vec<Strut> {
         }
         same
     });
-    struts
+    Ok(struts)
 }
 
 #[cfg(test)]
@@ -393,7 +398,11 @@ mod tests {
 
     fn cup() -> (TriMesh, Elastic) {
         let mesh = shapes::cup(70.0, 30.0, 12.0, 16);
-        let body = Elastic::new(&mesh, &struts(&mesh), Stiffness::default());
+        let body = Elastic::new(
+            &mesh,
+            &struts(&mesh, &Monitor::silent()).unwrap(),
+            Stiffness::default(),
+        );
         (mesh, body)
     }
 
@@ -483,7 +492,7 @@ mod tests {
     #[test]
     fn struts_span_the_wall() {
         let (mesh, _) = cup();
-        let struts = struts(&mesh);
+        let struts = struts(&mesh, &Monitor::silent()).unwrap();
         let spanning = struts.iter().map(|s| s.share).sum::<f64>();
         assert!(spanning > 0.6, "{spanning}");
         for s in struts {

@@ -8,6 +8,7 @@ use nalgebra::Matrix3;
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
+use crate::progress::{Cancelled, Monitor};
 use crate::volume::Volume;
 
 /// Blurred voxel values with their place in the patient.
@@ -23,9 +24,23 @@ pub struct Field {
 }
 
 impl Field {
+    /// [`Field::cut_out`] without anybody who could end it.
+    pub fn new(volume: &Volume, region: Option<&Aabb>, sigma: f64) -> Self {
+        Self::cut_out(volume, region, sigma, &Monitor::silent())
+            .expect("a silent monitor is never cancelled")
+    }
+
     /// Blurs `volume` by a Gaussian of `sigma` mm inside `region` (whole volume if `None`).
     /// Values that are not finite count as 0.
-    pub fn new(volume: &Volume, region: Option<&Aabb>, sigma: f64) -> Self {
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn cut_out(
+        volume: &Volume,
+        region: Option<&Aabb>,
+        sigma: f64,
+        monitor: &Monitor,
+    ) -> Result<Self, Cancelled> {
         let window = region.map_or_else(
             || [0, 1, 2].map(|a| (0, volume.shape[a])),
             |region| index_window(volume, region),
@@ -33,6 +48,7 @@ impl Field {
         let shape = window.map(|(first, end)| end - first);
         let mut values = Vec::with_capacity(shape.iter().product());
         for k in window[2].0..window[2].1 {
+            monitor.check()?;
             for j in window[1].0..window[1].1 {
                 let row = volume.shape[0] * (j + volume.shape[1] * k);
                 let row = &volume.voxels[row + window[0].0..row + window[0].1];
@@ -41,12 +57,15 @@ impl Field {
         }
         let offset = Vec3::from_fn(|a, _| window[a].0 as f64);
         let mut field = Self::from_parts(shape, values, volume, &offset, 1.0);
-        field.blur(sigma);
-        field
+        field.blur(sigma, monitor)?;
+        Ok(field)
     }
 
     /// The mean of every block of about `spacing` mm: a small picture of the whole volume.
-    pub fn coarse(volume: &Volume, spacing: f64) -> Self {
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn coarse(volume: &Volume, spacing: f64, monitor: &Monitor) -> Result<Self, Cancelled> {
         let block = volume.frame.spacing().map(|s| {
             let n = (spacing / s).round();
             if n >= 1.0 { n as usize } else { 1 }
@@ -55,6 +74,7 @@ impl Field {
         let mut values = vec![0f32; shape.iter().product()];
         let used = [0, 1, 2].map(|a| (shape[a] * block[a]).min(volume.shape[a]));
         for k in 0..used[2] {
+            monitor.check()?;
             for j in 0..used[1] {
                 let row = volume.shape[0] * (j + volume.shape[1] * k);
                 let out = shape[0] * (j / block[1] + shape[1] * (k / block[2]));
@@ -72,7 +92,7 @@ impl Field {
         let step = Matrix3::from_diagonal(&Vec3::from_fn(|a, _| block[a] as f64));
         // The centre of a block of n voxels stands (n - 1) / 2 behind its first voxel.
         let offset = Vec3::from_fn(|a, _| (block[a] as f64 - 1.0) / 2.0);
-        Self::assemble(shape, values, volume, &offset, &step)
+        Ok(Self::assemble(shape, values, volume, &offset, &step))
     }
 
     fn from_parts(
@@ -173,13 +193,17 @@ impl Field {
     }
 
     /// Separable Gaussian of `sigma` mm, borders continued.
-    pub fn blur(&mut self, sigma: f64) {
+    ///
+    /// # Errors
+    /// [`Cancelled`]; the values are then blurred in part.
+    pub fn blur(&mut self, sigma: f64, monitor: &Monitor) -> Result<(), Cancelled> {
         for axis in 0..3 {
             let kernel = gaussian(sigma / self.spacing()[axis]);
             if kernel.len() > 1 {
-                self.values = convolve(&self.values, self.shape, axis, &kernel);
+                self.values = convolve(&self.values, self.shape, axis, &kernel, monitor)?;
             }
         }
+        Ok(())
     }
 }
 
@@ -229,7 +253,13 @@ fn gaussian(sigma: f64) -> Vec<f32> {
     half.iter().map(|w| (w / sum) as f32).collect()
 }
 
-fn convolve(values: &[f32], shape: [usize; 3], axis: usize, kernel: &[f32]) -> Vec<f32> {
+fn convolve(
+    values: &[f32],
+    shape: [usize; 3],
+    axis: usize,
+    kernel: &[f32],
+    monitor: &Monitor,
+) -> Result<Vec<f32>, Cancelled> {
     let stride = [1, shape[0], shape[0] * shape[1]][axis];
     let n = shape[axis];
     let mut out = vec![0f32; values.len()];
@@ -237,6 +267,10 @@ fn convolve(values: &[f32], shape: [usize; 3], axis: usize, kernel: &[f32]) -> V
     // runs along memory for j and k.
     for (block, target) in values.chunks(stride * n).zip(out.chunks_mut(stride * n)) {
         for line in 0..n {
+            // Along i the lines are single samples, and a block is a short row of them.
+            if line == 0 || axis > 0 {
+                monitor.check()?;
+            }
             let target = &mut target[line * stride..(line + 1) * stride];
             for (t, weight) in kernel.iter().enumerate() {
                 let above = (line + t).min(n - 1) * stride;
@@ -255,7 +289,7 @@ fn convolve(values: &[f32], shape: [usize; 3], axis: usize, kernel: &[f32]) -> V
             }
         }
     }
-    out
+    Ok(out)
 }
 
 #[cfg(test)]
@@ -296,7 +330,7 @@ mod tests {
             Field::new(&v, None, 0.0),
             Field::new(&v, None, 3.0),
             Field::new(&v, Some(&around), 2.0),
-            Field::coarse(&v, 6.0),
+            Field::coarse(&v, 6.0, &Monitor::silent()).unwrap(),
         ] {
             assert!(
                 (field.at(&p) - f(&p)).abs() < 0.01,

@@ -289,8 +289,8 @@ mod tests {
             ..PhantomParameters::default()
         };
         let scan = phantom(&parameters, &Monitor::silent()).expect("a usual phantom");
-        let mut field = Field::coarse(&scan.volume, 5.0);
-        field.blur(4.0);
+        let mut field = Field::coarse(&scan.volume, 5.0, &Monitor::silent()).unwrap();
+        field.blur(4.0, &Monitor::silent()).unwrap();
         let padded = Padded::new(&field);
         let balls = [22.0, 33.0].map(|radius| Ball::new(radius, &field, &padded));
         let least = (FAINT as f32) * field.values().iter().fold(0f32, |a, b| a.max(*b));

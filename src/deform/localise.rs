@@ -150,14 +150,13 @@ pub fn localise(
     hints: &Hints,
     monitor: &Monitor,
 ) -> Result<Localisation, LocaliseError> {
-    let mut field = Field::coarse(volume, COARSE);
-    field.blur(BLUR);
+    let mut field = Field::coarse(volume, COARSE, monitor)?;
+    field.blur(BLUR, monitor)?;
     let brightest = field.values().iter().fold(0f32, |a, b| a.max(*b));
     let darkest = field.values().iter().fold(f32::INFINITY, |a, b| a.min(*b));
     if !(brightest > 0.0 && brightest > darkest) {
         return Err(LocaliseError::Blank);
     }
-    monitor.check()?;
     let places = hollows::places(&field, hints, f64::from(brightest), monitor)?;
     if places.is_empty() {
         return Err(LocaliseError::HintOutside);

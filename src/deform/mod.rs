@@ -4,7 +4,8 @@
 //! comes the model in the patient's place and shape, on the same nodes and triangles, with
 //! everything needed to judge whether to believe it.
 //!
-//! 1. [`localise`] finds the ventricle in the volume, with nobody's help.
+//! 1. [`localise`] finds the ventricle in the volume, with nobody's help: once for all
+//!    templates ([`Place`]).
 //! 2. [`template::Pose`] puts the template there: centre, axis, roll, lengths, in a patient
 //!    who may lie askew in the frame ([`posture`]).
 //! 3. [`align`] moves, turns, stretches and thickens it as a whole.
@@ -46,6 +47,7 @@ use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::volume::Volume;
+use blob::Blob;
 use cup::Cup;
 use dynamics::{Motion, Moved, StopReason};
 use elastic::{Elastic, Stiffness};
@@ -204,6 +206,17 @@ pub enum DeformError {
         /// Greatest value allowed.
         most: f64,
     },
+    /// Support springs were asked for, and the model has too many nodes for them.
+    #[error("support springs are for models of at most {limit} nodes; this one has {nodes}")]
+    TooManyNodes {
+        /// Nodes of the model.
+        nodes: usize,
+        /// Most nodes that a model with support springs may have.
+        limit: usize,
+    },
+    /// The place is another organ's than the template.
+    #[error("the template shows another organ than the one that was searched")]
+    OtherOrgan,
     /// A hinted centre, axis or region is not finite, or the axis has no length.
     #[error("the hinted centre, axis or region must be finite, and the axis not zero")]
     HintNotFinite,
@@ -297,11 +310,27 @@ pub fn fit(
     parameters: &DeformParameters,
     monitor: &Monitor,
 ) -> Result<Fit, DeformError> {
+    supports_fit(template, &parameters.stiffness)?;
+    let place = Place::find(volume, template, parameters, monitor)?;
+    fit_at(&place, volume, template, parameters, monitor)
+}
+
+/// Fits `template` to the organ at its `place` in `volume`, which [`Place::find`] found there
+/// by the same parameters for this template or another one of the same organ.
+///
+/// # Errors
+/// [`DeformError`].
+pub fn fit_at(
+    place: &Place,
+    volume: &Volume,
+    template: &Template,
+    parameters: &DeformParameters,
+    monitor: &Monitor,
+) -> Result<Fit, DeformError> {
     parameters.validate()?;
     supports_fit(template, &parameters.stiffness)?;
-    monitor.report(Stage::Localise, 0.0)?;
-    let start = Start::find(volume, template, parameters, monitor)?;
     monitor.report(Stage::Align, 0.0)?;
+    let start = Start::new(place, volume, template, parameters, monitor)?;
     // From afar the ridge and the trough beside a slope may be another structure's: the model
     // is aligned by slopes.
     let far = match parameters.sensor {
@@ -322,7 +351,7 @@ pub fn fit(
     };
     monitor.report(Stage::Deform, 0.0)?;
     let attempt = Attempt::best(&aligned, template, &start, parameters, 0.0, monitor)?;
-    let fit = attempt.into_fit(volume, template, &start, &aligned);
+    let fit = attempt.into_fit(volume, template, &start, &aligned, monitor)?;
     fit.believe(&parameters.hints)?;
     let fit = match (&fit.cup, parameters.edge) {
         (Some(cup), Edge::Anatomical) => {
@@ -331,7 +360,7 @@ pub fn fit(
             let excess = anatomy::excess(apparent, parameters.resolution);
             let thin = -0.5 * excess;
             Attempt::best(&aligned, template, &start, parameters, thin, monitor)?
-                .into_fit(volume, template, &start, &aligned)
+                .into_fit(volume, template, &start, &aligned, monitor)?
         }
         _ => fit,
     };
@@ -343,15 +372,83 @@ pub fn fit(
 const MAX_SUPPORTED_NODES: usize = 1000;
 
 fn supports_fit(template: &Template, stiffness: &Stiffness) -> Result<(), DeformError> {
-    if stiffness.support > 0.0 && template.mesh.vertices.len() > MAX_SUPPORTED_NODES {
-        return Err(DeformError::Parameter {
-            field: "stiffness.support (of a model of more than 1000 nodes)",
-            value: stiffness.support,
-            least: 0.0,
-            most: 0.0,
-        });
+    let (nodes, limit) = (template.mesh.vertices.len(), MAX_SUPPORTED_NODES);
+    if stiffness.support > 0.0 && nodes > limit {
+        return Err(DeformError::TooManyNodes { nodes, limit });
     }
     Ok(())
+}
+
+/// Where an organ lies in a volume: the same for all templates of the organ.
+#[derive(Debug, Clone)]
+pub enum Place {
+    /// A left ventricle.
+    Ventricle {
+        /// Where it was found.
+        found: Localisation,
+        /// How the patient lies in the frame.
+        posture: Posture,
+    },
+    /// Any other organ.
+    Body {
+        /// The bright body.
+        blob: Blob,
+        /// The one label of a map of several that is meant, as a mask.
+        mask: Option<Volume>,
+    },
+}
+
+impl Place {
+    /// Looks in `volume` for the organ of `template`.
+    ///
+    /// # Errors
+    /// [`DeformError`].
+    pub fn find(
+        volume: &Volume,
+        template: &Template,
+        parameters: &DeformParameters,
+        monitor: &Monitor,
+    ) -> Result<Self, DeformError> {
+        parameters.validate()?;
+        monitor.report(Stage::Localise, 0.0)?;
+        let place = match template.cup {
+            Some(_) => {
+                let found = localise::localise(volume, &parameters.hints, monitor)?;
+                let posture = match parameters.superior {
+                    Superior::Body => Posture::of_body(volume, &found.cup.centre, monitor)?,
+                    Superior::Frame => Posture::FRAME,
+                };
+                Place::Ventricle { found, posture }
+            }
+            None => {
+                let mask = blob::one_label(volume, &parameters.hints, monitor)?;
+                let picture = mask.as_ref().unwrap_or(volume);
+                let blob = blob::find(picture, &parameters.hints, monitor)?;
+                Place::Body { blob, mask }
+            }
+        };
+        monitor.report(Stage::Localise, 1.0)?;
+        Ok(place)
+    }
+
+    /// Whether `template` can be fitted there.
+    pub fn suits(&self, template: &Template) -> bool {
+        matches!(self, Place::Ventricle { .. }) == template.cup.is_some()
+    }
+
+    fn posture(&self) -> Posture {
+        match self {
+            Place::Ventricle { posture, .. } => *posture,
+            Place::Body { .. } => Posture::FRAME,
+        }
+    }
+
+    fn picture(&self) -> Option<&Volume> {
+        match self {
+            Place::Ventricle { .. } => None,
+            Place::Body { mask, .. } => mask.as_ref(),
+        }
+    }
 }
 
 /// The template put in its place, and the image to fit it to.
@@ -369,50 +466,27 @@ struct Start {
 }
 
 impl Start {
-    fn find(
+    fn new(
+        place: &Place,
         volume: &Volume,
         template: &Template,
         parameters: &DeformParameters,
         monitor: &Monitor,
     ) -> Result<Self, DeformError> {
-        let picked = match template.cup {
-            Some(_) => None,
-            None => blob::one_label(volume, &parameters.hints, monitor)?,
-        };
-        let volume = picked.as_ref().unwrap_or(volume);
-        let (localisation, posture, pose, axis, cavity_axis, uptake) = match &template.cup {
-            Some(from) => {
-                let found = localise::localise(volume, &parameters.hints, monitor)?;
+        let (localisation, pose, axis, cavity_axis, uptake) = match (place, &template.cup) {
+            (Place::Ventricle { found, posture }, Some(from)) => {
                 let to = found.cup;
-                let posture = match parameters.superior {
-                    Superior::Body => Posture::of_body(volume, &to.centre, monitor)?,
-                    Superior::Frame => Posture::FRAME,
-                };
                 let roll = parameters.roll.to_radians();
                 let pose = Pose::between(from, &to, &posture.turn(), roll);
                 let inner_end = to.base() + to.axis * (0.6 * to.length);
-                let wall = found.wall;
-                (
-                    Some(found),
-                    posture,
-                    pose,
-                    to.axis,
-                    [to.base(), inner_end],
-                    wall,
-                )
+                let ends = [to.base(), inner_end];
+                (Some(found.clone()), pose, to.axis, ends, found.wall)
             }
-            None => {
-                let blob = blob::find(volume, &parameters.hints, monitor)?;
+            (Place::Body { blob, .. }, None) => {
                 let pose = blob.pose(&template.mesh);
-                (
-                    None,
-                    Posture::FRAME,
-                    pose,
-                    Vec3::z(),
-                    [blob.centre; 2],
-                    blob.uptake,
-                )
+                (None, pose, Vec3::z(), [blob.centre; 2], blob.uptake)
             }
+            _ => return Err(DeformError::OtherOrgan),
         };
         let mut posed = template.mesh.clone();
         posed.vertices.iter_mut().for_each(|p| *p = pose.apply(p));
@@ -420,11 +494,11 @@ impl Start {
         let border = Vec3::repeat(parameters.reach + 4.0 * parameters.blur + 15.0);
         region.min -= border;
         region.max += border;
-        monitor.check()?;
-        let field = Field::new(volume, Some(&region), parameters.blur);
+        let picture = place.picture().unwrap_or(volume);
+        let field = Field::cut_out(picture, Some(&region), parameters.blur, monitor)?;
         Ok(Self {
             localisation,
-            posture,
+            posture: place.posture(),
             pose,
             posed,
             axis,
@@ -524,7 +598,8 @@ impl Attempt {
         template: &Template,
         start: &Start,
         aligned: &TriMesh,
-    ) -> Fit {
+        monitor: &Monitor,
+    ) -> Result<Fit, Cancelled> {
         let mesh = self.moved.mesh;
         let readings = &self.moved.readings;
         let seen: f64 = readings.iter().map(|r| r.share * r.weight).sum();
@@ -540,7 +615,9 @@ impl Attempt {
         let cup = template
             .cup
             .map(|cup| wall::carried(&cup, &template.mesh, &mesh));
-        let wall = cup.map(|cup| Wall::new(&mesh, &cup, &start.posture.superior));
+        let wall = cup
+            .map(|cup| Wall::new(&mesh, &cup, &start.posture.superior, monitor))
+            .transpose()?;
         let posed = &start.posed.vertices;
         let mut fit = Fit {
             displacements: mesh
@@ -575,7 +652,7 @@ impl Attempt {
             flags: Vec::new(),
         };
         fit.flags = flags::raise(&fit, volume, template.organ == Organ::LeftVentricle);
-        fit
+        Ok(fit)
     }
 }
 

@@ -96,15 +96,15 @@ impl Posture {
     /// # Errors
     /// [`Cancelled`].
     pub fn of_body(volume: &Volume, heart: &Vec3, monitor: &Monitor) -> Result<Self, Cancelled> {
-        let mut field = Field::coarse(volume, COARSE);
+        let mut field = Field::coarse(volume, COARSE, monitor)?;
         monitor.check()?;
-        field.blur(BLUR);
+        field.blur(BLUR, monitor)?;
         let Some(body) = Body::around(&field, heart) else {
             return Ok(Self::FRAME);
         };
         monitor.check()?;
         let mut mask = field.with_values(body.mask);
-        mask.blur(BLUR);
+        mask.blur(BLUR, monitor)?;
         let outline = Outline::of(&mask);
         let superior = outline.axis();
         let disorder = outline.disorder(&superior);

@@ -18,6 +18,7 @@ use super::field::Field;
 use super::profile::Profile;
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
+use crate::progress::{Cancelled, Monitor};
 
 /// Sensors on each triangle: the centroids of its nine congruent parts.
 pub const PER_TRIANGLE: usize = 9;
@@ -155,8 +156,19 @@ fn centroid(a: usize, b: usize, shift: usize) -> [f64; 3] {
 /// gains 0.04 of Jaccard, and the simulated cohort's mean does not change.
 const TRUST: f64 = 1.5;
 
+/// Triangles whose sensors look between two looks at the cancel token.
+const PORTION: usize = 64;
+
 /// Lets all sensors look. Ordered by triangle, [`PER_TRIANGLE`] each.
-pub fn read(mesh: &TriMesh, field: &Field, look: &Look) -> Vec<Reading> {
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn read(
+    mesh: &TriMesh,
+    field: &Field,
+    look: &Look,
+    monitor: &Monitor,
+) -> Result<Vec<Reading>, Cancelled> {
     let normals = mesh.vertex_normals();
     let weights = barycentric();
     let total = mesh.area() * 2.0 * PER_TRIANGLE as f64;
@@ -168,6 +180,9 @@ pub fn read(mesh: &TriMesh, field: &Field, look: &Look) -> Vec<Reading> {
     let mut readings = Vec::with_capacity(mesh.triangles.len() * PER_TRIANGLE);
     let mut widths = Vec::with_capacity(readings.capacity());
     for (t, triangle) in mesh.triangles.iter().enumerate() {
+        if t % PORTION == 0 {
+            monitor.check()?;
+        }
         let share = mesh.area_normal(t).norm() / total;
         let corners = mesh.corners(t);
         let sides = triangle.map(|v| normals[v as usize]);
@@ -196,7 +211,7 @@ pub fn read(mesh: &TriMesh, field: &Field, look: &Look) -> Vec<Reading> {
     for surface in [Surface::Inner, Surface::Outer, Surface::Rim] {
         doubt_odd_widths(&mut readings, &widths, surface);
     }
-    readings
+    Ok(readings)
 }
 
 /// Turns scores into weights.

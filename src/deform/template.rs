@@ -130,7 +130,10 @@ impl Template {
             return Err(TemplateError::NoVolume { volume_ml });
         }
         let (cup, struts) = match organ {
-            Organ::LeftVentricle => (Some(cup_of(&mesh, monitor)?), elastic::struts(&mesh)),
+            Organ::LeftVentricle => (
+                Some(cup_of(&mesh, monitor)?),
+                elastic::struts(&mesh, monitor)?,
+            ),
             Organ::Liver | Organ::Kidney | Organ::Generic => (None, Vec::new()),
         };
         Ok(Self {
@@ -171,8 +174,8 @@ fn cup_of(mesh: &TriMesh, monitor: &Monitor) -> Result<Cup, TemplateError> {
     };
     match localise::localise(&picture, &Hints::default(), monitor) {
         Ok(found) if found.correlation > 0.6 => {
-            let mut sharper = Field::coarse(&picture, SPACING);
-            sharper.blur(5.5);
+            let mut sharper = Field::coarse(&picture, SPACING, monitor)?;
+            sharper.blur(5.5, monitor)?;
             Ok(localise::refine(&sharper, &found.cup).cup)
         }
         Ok(found) => Err(TemplateError::NoCup {

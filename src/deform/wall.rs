@@ -12,6 +12,7 @@ use super::cup::Cup;
 use super::elastic::rotation_of;
 use crate::geometry::{Vec3, triangle};
 use crate::mesh::TriMesh;
+use crate::progress::{Cancelled, Monitor};
 
 /// Rows of rays, apex to base.
 pub const ROWS: usize = 32;
@@ -78,28 +79,38 @@ pub fn carried(cup: &Cup, before: &TriMesh, after: &TriMesh) -> Cup {
 impl Wall {
     /// Looks at `mesh` from the axis of `cup` in a patient whose `superior` direction (unit
     /// vector) is given.
-    pub fn new(mesh: &TriMesh, cup: &Cup, superior: &Vec3) -> Self {
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn new(
+        mesh: &TriMesh,
+        cup: &Cup,
+        superior: &Vec3,
+        monitor: &Monitor,
+    ) -> Result<Self, Cancelled> {
         let frame = Frame::new(mesh, cup, superior);
-        let rays: Vec<Ray> = (0..ROWS * COLUMNS)
-            .map(|index| {
-                let (start, direction) = frame.ray(index / COLUMNS, index % COLUMNS);
-                Ray {
-                    start,
-                    direction,
-                    wall: crossing(mesh, &start, &direction),
-                }
+        let ray = |index: usize| {
+            monitor.check()?;
+            let (start, direction) = frame.ray(index / COLUMNS, index % COLUMNS);
+            Ok(Ray {
+                start,
+                direction,
+                wall: crossing(mesh, &start, &direction),
             })
-            .collect();
+        };
+        let rays = (0..ROWS * COLUMNS)
+            .map(ray)
+            .collect::<Result<Vec<_>, _>>()?;
         let met: Vec<[f64; 2]> = rays.iter().filter_map(|r| r.wall).collect();
         let basal = &rays[ROWS / 2 * COLUMNS..];
-        Self {
+        Ok(Self {
             cavity_ml: frame.cavity(&rays) / 1000.0,
             thickness: met.iter().map(|w| w[1] - w[0]).sum::<f64>() / met.len().max(1) as f64,
             gaps: basal.iter().filter(|r| r.wall.is_none()).count() as f64 / basal.len() as f64,
             row_spacing: frame.row_spacing(),
             extent: [frame.rim, frame.apex],
             rays,
-        }
+        })
     }
 }
 

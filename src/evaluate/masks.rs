@@ -14,6 +14,7 @@
 //! 2012) over the box that holds both masks.
 
 use crate::deform::voxelise::Mask;
+use crate::progress::{Cancelled, Monitor};
 
 /// How two masks agree. A is the first, B the reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,16 +52,32 @@ pub struct GridsDiffer {
     pub b: [usize; 3],
 }
 
+/// Why two masks were not compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum CompareError {
+    /// They cannot be.
+    #[error(transparent)]
+    GridsDiffer(#[from] GridsDiffer),
+    /// The caller asked for an end.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
 /// Compares `a` with the reference `b`; both on the grid with `spacing` mm.
 ///
 /// # Errors
-/// [`GridsDiffer`].
-pub fn compare(a: &Mask, b: &Mask, spacing: [f64; 3]) -> Result<Agreement, GridsDiffer> {
+/// [`CompareError`].
+pub fn compare(
+    a: &Mask,
+    b: &Mask,
+    spacing: [f64; 3],
+    monitor: &Monitor,
+) -> Result<Agreement, CompareError> {
     if a.shape != b.shape {
-        return Err(GridsDiffer {
+        return Err(CompareError::GridsDiffer(GridsDiffer {
             a: a.shape,
             b: b.shape,
-        });
+        }));
     }
     let (mut na, mut nb, mut both) = (0usize, 0usize, 0usize);
     for (x, y) in a.voxels.iter().zip(&b.voxels) {
@@ -77,33 +94,47 @@ pub fn compare(a: &Mask, b: &Mask, spacing: [f64; 3]) -> Result<Agreement, Grids
         }
     };
     let voxel_ml = spacing.iter().product::<f64>() / 1000.0;
+    let contours = match na > 0 && nb > 0 {
+        true => Some(contour_distances(a, b, spacing, monitor)?),
+        false => None,
+    };
     Ok(Agreement {
         jaccard: share(both, either),
         dice: share(2 * both, na + nb),
-        contours: (na > 0 && nb > 0).then(|| contour_distances(a, b, spacing)),
+        contours,
         volumes_ml: [na as f64 * voxel_ml, nb as f64 * voxel_ml],
     })
 }
 
-fn contour_distances(a: &Mask, b: &Mask, spacing: [f64; 3]) -> ContourDistances {
-    let window = Window::around(a, b);
-    let contours = [window.contour(a), window.contour(b)];
+fn contour_distances(
+    a: &Mask,
+    b: &Mask,
+    spacing: [f64; 3],
+    monitor: &Monitor,
+) -> Result<ContourDistances, Cancelled> {
+    let window = Window::around(a, b, monitor)?;
+    let contours = [window.contour(a, monitor)?, window.contour(b, monitor)?];
     let distances = |scale: [f64; 3]| {
-        let to = [&contours[1], &contours[0]].map(|c| window.squared_distances(c, scale));
-        [0, 1].map(|side| -> Vec<f64> {
-            contours[side].iter().map(|v| to[side][*v].sqrt()).collect()
-        })
+        let between = |from: &[usize], to: &[usize]| {
+            let squared = window.squared_distances(to, scale, monitor)?;
+            Ok(from
+                .iter()
+                .map(|v| squared[*v].sqrt())
+                .collect::<Vec<f64>>())
+        };
+        let [a, b] = &contours;
+        Ok::<_, Cancelled>([between(a, b)?, between(b, a)?])
     };
     let mean = |d: &[Vec<f64>; 2]| {
         (d[0].iter().sum::<f64>() + d[1].iter().sum::<f64>()) / (d[0].len() + d[1].len()) as f64
     };
-    let mut mm = distances(spacing);
-    ContourDistances {
-        mean_voxels: mean(&distances([1.0; 3])),
+    let mut mm = distances(spacing)?;
+    Ok(ContourDistances {
+        mean_voxels: mean(&distances([1.0; 3])?),
         mean_mm: mean(&mm),
         hausdorff_mm: mm.iter().flatten().fold(0.0, |a, b| a.max(*b)),
         hausdorff95_mm: mm.iter_mut().map(|d| quantile(d, 0.95)).fold(0.0, f64::max),
-    }
+    })
 }
 
 /// The q-quantile by linear interpolation between order statistics.
@@ -122,10 +153,11 @@ struct Window {
 }
 
 impl Window {
-    fn around(a: &Mask, b: &Mask) -> Self {
+    fn around(a: &Mask, b: &Mask, monitor: &Monitor) -> Result<Self, Cancelled> {
         let mut first = a.shape;
         let mut last = [0; 3];
         for k in 0..a.shape[2] {
+            monitor.check()?;
             for j in 0..a.shape[1] {
                 for i in 0..a.shape[0] {
                     let v = i + a.shape[0] * (j + a.shape[1] * k);
@@ -138,17 +170,18 @@ impl Window {
                 }
             }
         }
-        Self {
+        Ok(Self {
             first,
             shape: [0, 1, 2].map(|axis| last[axis] + 1 - first[axis]),
-        }
+        })
     }
 
     /// Indices in the window of the mask's contour voxels.
-    fn contour(&self, mask: &Mask) -> Vec<usize> {
+    fn contour(&self, mask: &Mask, monitor: &Monitor) -> Result<Vec<usize>, Cancelled> {
         let stride = [1, mask.shape[0], mask.shape[0] * mask.shape[1]];
         let mut contour = Vec::new();
         for k in 0..self.shape[2] {
+            monitor.check()?;
             for j in 0..self.shape[1] {
                 for i in 0..self.shape[0] {
                     let place = [i + self.first[0], j + self.first[1], k + self.first[2]];
@@ -165,11 +198,16 @@ impl Window {
                 }
             }
         }
-        contour
+        Ok(contour)
     }
 
     /// Squared distance of every voxel of the window to the nearest of `seeds`.
-    fn squared_distances(&self, seeds: &[usize], scale: [f64; 3]) -> Vec<f64> {
+    fn squared_distances(
+        &self,
+        seeds: &[usize],
+        scale: [f64; 3],
+        monitor: &Monitor,
+    ) -> Result<Vec<f64>, Cancelled> {
         let mut field = vec![f64::INFINITY; self.shape.iter().product()];
         for s in seeds {
             field[*s] = 0.0;
@@ -182,6 +220,7 @@ impl Window {
                 if (start / stride) % n != 0 {
                     continue;
                 }
+                monitor.check()?;
                 line.clear();
                 line.extend((0..n).map(|x| field[start + x * stride]));
                 let out = lower_envelope(&line, scale[axis]);
@@ -190,7 +229,7 @@ impl Window {
                 }
             }
         }
-        field
+        Ok(field)
     }
 }
 
@@ -248,7 +287,7 @@ mod tests {
         let b = mask([9, 9, 9], |i, j, k| {
             (4..7).contains(&i) && (3..6).contains(&j) && (3..6).contains(&k)
         });
-        let m = compare(&a, &b, [2.0, 3.0, 4.0]).unwrap();
+        let m = compare(&a, &b, [2.0, 3.0, 4.0], &Monitor::silent()).unwrap();
         assert_eq!(m.jaccard, 0.5);
         assert!((m.dice - 36.0 / 54.0).abs() < 1e-15);
         let c = m.contours.unwrap();
@@ -270,7 +309,10 @@ mod tests {
         let a = mask(shape, |i, j, k| noise(1, i, j, k));
         let b = mask(shape, |i, j, k| noise(2, i, j, k) && i > 3);
         let scale = [1.5, 2.0, 3.1];
-        let m = compare(&a, &b, scale).unwrap().contours.unwrap();
+        let m = compare(&a, &b, scale, &Monitor::silent())
+            .unwrap()
+            .contours
+            .unwrap();
         let contour = |m: &Mask| -> Vec<[f64; 3]> {
             let at = |p: [isize; 3]| {
                 let inside = (0..3).all(|x| p[x] >= 0 && p[x] < shape[x] as isize);
@@ -314,12 +356,12 @@ mod tests {
     fn empty_masks_have_no_distance() {
         let none = Mask::empty([4, 4, 4]);
         let one = mask([4, 4, 4], |i, j, k| i + j + k == 0);
-        let both = compare(&none, &none, [1.0; 3]).unwrap();
+        let both = compare(&none, &none, [1.0; 3], &Monitor::silent()).unwrap();
         assert_eq!((both.jaccard, both.dice, both.contours), (1.0, 1.0, None));
-        let half = compare(&one, &none, [1.0; 3]).unwrap();
+        let half = compare(&one, &none, [1.0; 3], &Monitor::silent()).unwrap();
         assert_eq!((half.jaccard, half.contours), (0.0, None));
-        let same = compare(&one, &one, [1.0; 3]).unwrap();
+        let same = compare(&one, &one, [1.0; 3], &Monitor::silent()).unwrap();
         assert_eq!(same.contours.unwrap().mean_mm, 0.0);
-        assert!(compare(&one, &Mask::empty([4, 4, 5]), [1.0; 3]).is_err());
+        assert!(compare(&one, &Mask::empty([4, 4, 5]), [1.0; 3], &Monitor::silent()).is_err());
     }
 }

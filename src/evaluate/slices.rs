@@ -1,11 +1,13 @@
-//! Three slices through a fitted ventricle with the contours of fit and expert.
+//! Three slices through a fitted organ with the contours of fit and expert.
 //!
-//! From left to right, as cardiologists look at it: a short-axis slice through the middle of
-//! the cavity (anterior on top, septum left), a horizontal long-axis slice (apex on top,
-//! septum left), a vertical long-axis slice (base left, anterior on top). A slice is a plane
-//! of the patient, sampled every [`STEP`] millimetres: the scan by trilinear interpolation,
-//! the fitted mesh by the same rule that makes masks of it, the expert's mask by its nearest
-//! voxel. Grey runs from 0 to the greatest value within the fitted wall.
+//! Of a ventricle ([`Cut::heart`]), from left to right as cardiologists look at it: a
+//! short-axis slice through the middle of the cavity (anterior on top, septum left), a
+//! horizontal long-axis slice (apex on top, septum left), a vertical long-axis slice (base
+//! left, anterior on top). Of any other organ ([`Cut::body`]), as radiologists do: axial
+//! (anterior on top), coronal, sagittal (anterior left), the patient's right on the left. A
+//! slice is a plane of the patient, sampled in equal steps: the scan by trilinear
+//! interpolation, the fitted mesh by the same rule that makes masks of it, the expert's mask
+//! by its nearest voxel. Grey runs from 0 to the greatest value within the fit.
 
 use nalgebra::Matrix3;
 
@@ -17,12 +19,15 @@ use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::geometry::frame::VoxelToPatient;
 use crate::mesh::TriMesh;
+use crate::progress::{Cancelled, Monitor};
 use crate::volume::Volume;
 
-/// Millimetres per pixel.
+/// Millimetres per pixel of a ventricle.
 pub const STEP: f64 = 0.6;
-/// Pixels along both sides of a slice: 132 mm.
+/// Pixels along both sides of a slice: 132 mm of a ventricle.
 pub const SIDE: usize = 220;
+/// Largest share of a slice's side that an organ takes.
+const FILL: f64 = 0.8;
 /// Black columns between the slices.
 const GAP: usize = 4;
 
@@ -32,8 +37,20 @@ pub const FIT: [u8; 3] = [255, 150, 0];
 pub const EXPERT: [u8; 3] = [0, 210, 255];
 
 /// The three slices of one patient as a PNG file.
-pub fn png(volume: &Volume, fit: &TriMesh, cup: &Cup, expert: Option<&Mask>) -> Vec<u8> {
-    let slices = planes(cup).map(|plane| slice(&plane, volume, fit, expert));
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn png(
+    volume: &Volume,
+    fit: &TriMesh,
+    cut: &Cut,
+    expert: Option<&Mask>,
+    monitor: &Monitor,
+) -> Result<Vec<u8>, Cancelled> {
+    let mut slices = Vec::with_capacity(3);
+    for plane in &cut.planes {
+        slices.push(slice(plane, volume, fit, expert, monitor)?);
+    }
     let width = 3 * SIDE + 2 * GAP;
     let mut pixels = Vec::with_capacity(3 * width * SIDE);
     for row in 0..SIDE {
@@ -52,35 +69,61 @@ pub fn png(volume: &Volume, fit: &TriMesh, cup: &Cup, expert: Option<&Mask>) -> 
         .write_header()
         .and_then(|mut writer| writer.write_image_data(&pixels))
         .expect("the picture has as many pixels as it says, and memory does not fail");
-    bytes
+    Ok(bytes)
 }
 
-/// Places of pixels: index (column, row, 0) to patient.
-struct Plane(VoxelToPatient);
-
-fn planes(cup: &Cup) -> [Plane; 3] {
-    let up = anterior(&cup.axis, &Vec3::z());
-    let lateral = up.cross(&cup.axis);
-    // Right on the picture, then down.
-    let sides = [(lateral, -up), (lateral, -cup.axis), (cup.axis, -up)];
-    sides.map(|(right, down)| {
-        let half = (SIDE - 1) as f64 / 2.0;
-        let origin = cup.centre - (right + down) * (half * STEP);
-        let linear = Matrix3::from_columns(&[right, down, right.cross(&down)]) * STEP;
-        let frame = VoxelToPatient::new(linear, origin);
-        Plane(frame.expect("three unit vectors at right angles span the space"))
-    })
+/// Where to cut: for each slice the places of its pixels, index (column, row, 0) to patient.
+#[derive(Debug, Clone)]
+pub struct Cut {
+    planes: [VoxelToPatient; 3],
 }
 
-fn slice(plane: &Plane, volume: &Volume, fit: &TriMesh, expert: Option<&Mask>) -> Vec<[u8; 3]> {
-    let frame = &plane.0;
+impl Cut {
+    /// Through a ventricle, in a patient whose `superior` direction (unit vector) is given.
+    pub fn heart(cup: &Cup, superior: &Vec3) -> Self {
+        let up = anterior(&cup.axis, superior);
+        let lateral = up.cross(&cup.axis);
+        let sides = [(lateral, -up), (lateral, -cup.axis), (cup.axis, -up)];
+        Self::through(&cup.centre, sides, STEP)
+    }
+
+    /// Through the middle of any organ.
+    pub fn body(mesh: &TriMesh) -> Self {
+        let bounds = Aabb::of(&mesh.vertices);
+        let longest = (bounds.max - bounds.min).amax();
+        let (x, y, z) = (Vec3::x(), Vec3::y(), Vec3::z());
+        let step = (longest / (FILL * SIDE as f64)).max(0.1);
+        let middle = (bounds.min + bounds.max) / 2.0;
+        Self::through(&middle, [(x, y), (x, -z), (y, -z)], step)
+    }
+
+    /// Slices about `middle`; of each the directions right and down on the picture.
+    fn through(middle: &Vec3, sides: [(Vec3, Vec3); 3], step: f64) -> Self {
+        let planes = sides.map(|(right, down)| {
+            let half = (SIDE - 1) as f64 / 2.0;
+            let origin = middle - (right + down) * (half * step);
+            let linear = Matrix3::from_columns(&[right, down, right.cross(&down)]) * step;
+            let frame = VoxelToPatient::new(linear, origin);
+            frame.expect("three unit vectors at right angles span the space")
+        });
+        Self { planes }
+    }
+}
+
+fn slice(
+    frame: &VoxelToPatient,
+    volume: &Volume,
+    fit: &TriMesh,
+    expert: Option<&Mask>,
+    monitor: &Monitor,
+) -> Result<Vec<[u8; 3]>, Cancelled> {
     let place = |pixel: usize| {
         let (column, row) = (pixel % SIDE, pixel / SIDE);
         frame.to_patient(&Vec3::new(column as f64, row as f64, 0.0))
     };
     let corners = [0, SIDE - 1, SIDE * (SIDE - 1), SIDE * SIDE - 1].map(place);
     let region = Aabb::of(&corners);
-    let field = Field::new(volume, Some(&region), 0.0);
+    let field = Field::cut_out(volume, Some(&region), 0.0, monitor)?;
     let values: Vec<f64> = (0..SIDE * SIDE).map(|p| field.at(&place(p))).collect();
 
     let inside = voxelise(fit, [SIDE, SIDE, 1], frame).voxels;
@@ -99,7 +142,7 @@ fn slice(plane: &Plane, volume: &Volume, fit: &TriMesh, expert: Option<&Mask>) -
         outline(&mut pixels, &drawn, EXPERT);
     }
     outline(&mut pixels, &inside, FIT);
-    pixels
+    Ok(pixels)
 }
 
 fn at_nearest(mask: &Mask, index: &Vec3) -> bool {
@@ -160,7 +203,8 @@ mod tests {
             length: 60.0,
             breadth: 1.0,
         };
-        let bytes = png(&volume, &mesh, &cup, Some(&wall));
+        let cut = Cut::heart(&cup, &Vec3::z());
+        let bytes = png(&volume, &mesh, &cut, Some(&wall), &Monitor::silent()).unwrap();
         let mut reader = ::png::Decoder::new(std::io::Cursor::new(&bytes))
             .read_info()
             .unwrap();

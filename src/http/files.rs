@@ -3,24 +3,61 @@
 use super::app::App;
 use super::problem::{Answer, Problem};
 use super::wire::path_of;
-use crate::jobs::{Product, ProductFile};
-use axum::body::Body;
+use crate::jobs::{Product, ProductFile, hex};
+use axum::body::{Body, Bytes};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::IntoResponse;
+use sha2::{Digest, Sha256};
 use std::ops::Range;
+
+/// The page for people, which is made when it is asked for.
+pub const PAGE: &str = "report.html";
 
 /// Results never change under their name; only the one who asked may keep them.
 const CACHE_CONTROL: &str = "private, max-age=31536000, immutable";
 
+/// Pages are the same for a day; a later version of the program may draw them better.
+const PAGE_CACHE_CONTROL: &str = "private, max-age=86400";
+
 /// Answers with a product's file, or the part of it that `Range` asks for, or 304.
 pub async fn send(app: &App, product: &Product, file: &ProductFile, headers: &HeaderMap) -> Answer {
+    let read = async |span| {
+        let content = app.queue.blobs.read(&product.id, &file.name, span).await?;
+        Ok(Body::from_stream(content))
+    };
+    respond(product, file, headers, CACHE_CONTROL, read).await
+}
+
+/// Answers with the page of a product, made for this answer, in the same way.
+pub async fn send_page(product: &Product, page: String, headers: &HeaderMap) -> Answer {
+    let page = Bytes::from(page);
+    let file = ProductFile {
+        name: PAGE.into(),
+        media_type: "text/html; charset=utf-8".into(),
+        bytes: page.len() as u64,
+        sha256: hex(&Sha256::digest(&page)),
+    };
+    // The span lies within the page, whose length is a `usize`.
+    let read =
+        async |span: Range<u64>| Ok(page.slice(span.start as usize..span.end as usize).into());
+    respond(product, &file, headers, PAGE_CACHE_CONTROL, read).await
+}
+
+/// Answers with what `read` gives of `file`.
+async fn respond(
+    product: &Product,
+    file: &ProductFile,
+    headers: &HeaderMap,
+    cache_control: &str,
+    read: impl AsyncFnOnce(Range<u64>) -> Answer<Body>,
+) -> Answer {
     let etag = format!("\"{}\"", file.sha256);
     if matches_any(headers, &header::IF_NONE_MATCH, &etag) {
         return Ok((
             StatusCode::NOT_MODIFIED,
             [
                 (header::ETAG, etag),
-                (header::CACHE_CONTROL, CACHE_CONTROL.into()),
+                (header::CACHE_CONTROL, cache_control.into()),
             ],
         )
             .into_response());
@@ -31,18 +68,14 @@ pub async fn send(app: &App, product: &Product, file: &ProductFile, headers: &He
         None => (StatusCode::OK, 0..file.bytes),
     };
     let length = span.end - span.start;
-    let content = app
-        .queue
-        .blobs
-        .read(&product.id, &file.name, span.clone())
-        .await?;
+    let content = read(span.clone()).await?;
     let mut response = (
         status,
         [
             (header::CONTENT_TYPE, file.media_type.clone()),
             (header::CONTENT_LENGTH, length.to_string()),
             (header::ETAG, etag),
-            (header::CACHE_CONTROL, CACHE_CONTROL.into()),
+            (header::CACHE_CONTROL, cache_control.into()),
             (header::ACCEPT_RANGES, "bytes".into()),
             (header::CONTENT_LOCATION, path(product, file)),
             (
@@ -50,7 +83,7 @@ pub async fn send(app: &App, product: &Product, file: &ProductFile, headers: &He
                 format!("inline; filename=\"{}-{}\"", product.id, file.name),
             ),
         ],
-        Body::from_stream(content),
+        content,
     )
         .into_response();
     if range.is_some()

@@ -1,6 +1,7 @@
 //! `/v1/models`: what was made, and the one-line way to make it.
 
 use super::app::App;
+use super::files;
 use super::jobs::{self, order};
 use super::openapi::{EraseProblems, FileProblems, ListProblems, LookupProblems, UploadProblems};
 use super::pagination::next_cursor;
@@ -53,6 +54,8 @@ struct ModelLinks {
     mesh: String,
     /// Its quality report.
     report: String,
+    /// The report as a page for people.
+    page: String,
     /// Its volume.
     volume: String,
 }
@@ -78,6 +81,7 @@ impl From<Product> for Model {
             links: ModelLinks {
                 mesh: format!("{itself}/mesh"),
                 report: format!("{itself}/report"),
+                page: format!("{itself}/{}", files::PAGE),
                 volume: path_of(&volume),
                 itself,
             },
@@ -198,14 +202,14 @@ pub async fn get_report(
     RawQuery(query): RawQuery,
     headers: HeaderMap,
 ) -> Answer {
-    let offers = [
-        Offer::new("application/json", "report.json"),
-        Offer::new("text/html", "report.html"),
-    ];
+    let offers = Offer::reports();
     products::get_offered(&app, KIND, &id, query.as_deref(), &headers, &offers).await
 }
 
 /// A model's file by name
+///
+/// The mesh in each format, `report.json`, `distance.json` (signed distances of the model's parts
+/// to the surface) and `report.html`, which is made when it is asked for.
 #[utoipa::path(get, path = "/v1/models/{id}/{file}", tag = "models",
     params(("id" = String, Path, description = "The model's id"),
         ("file" = super::openapi::FileName, Path, description = "The file's name"),

@@ -53,7 +53,7 @@ how far the jobs are:
   curl -fsS '{url}/v1/jobs'
 what was made:
   curl -fsS '{url}/v1/models'; curl -fsS '{url}/v1/segmentations'
-a model's quality, for a person:
+what is known of a model (or of a segmentation), for a person:
   curl -fsS '{url}/v1/models/ID/report.html' -o report.html
 
 all of it: {url}/docs, {url}/openapi.json

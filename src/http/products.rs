@@ -86,6 +86,14 @@ impl Offer {
         }
     }
 
+    /// The report for programs and for people.
+    pub fn reports() -> [Self; 2] {
+        [
+            Self::new("application/json", "report.json"),
+            Self::new("text/html", files::PAGE),
+        ]
+    }
+
     /// The mesh in every format, GLB first.
     pub fn meshes() -> Vec<Self> {
         Format::ALL
@@ -203,11 +211,27 @@ async fn send_named(
 ) -> Answer<Response> {
     match product.file(name) {
         Some(file) => files::send(app, product, file, headers).await,
+        None if name == files::PAGE => {
+            let page = make_page(app, product).await?;
+            files::send_page(product, page, headers).await
+        }
         None => {
             let names: Vec<_> = product.files.iter().map(|file| file.name.clone()).collect();
             Err(no_such_file(product.resource(), name, &names))
         }
     }
+}
+
+/// The page of a product, of its own files.
+async fn make_page(app: &App, product: &Product) -> Answer<String> {
+    let resource = product.resource();
+    let Some(work) = app.engine.work(resource.noun()).cloned() else {
+        return Err(no_such_file(resource, files::PAGE, &file_names(resource)));
+    };
+    let stored = app.queue.shelved(product.clone());
+    let _permit = app.inspections.acquire().await.map_err(Problem::internal)?;
+    let page = tokio::task::spawn_blocking(move || work.page(&stored));
+    Ok(page.await.map_err(Problem::internal)??)
 }
 
 fn no_such_file(resource: Resource, name: &str, names: &[String]) -> Problem {

@@ -1,6 +1,7 @@
 //! `/v1/segmentations`: models fitted to volumes, and the one-line way to fit one.
 
 use super::app::App;
+use super::files;
 use super::jobs::{self, order};
 use super::openapi::{EraseProblems, FileProblems, ListProblems, LookupProblems, UploadProblems};
 use super::pagination::next_cursor;
@@ -60,6 +61,8 @@ struct SegmentationLinks {
     mesh: String,
     /// The report.
     report: String,
+    /// The report as a page for people.
+    page: String,
     /// The polar map; ventricles only.
     #[serde(skip_serializing_if = "Option::is_none")]
     polar: Option<String>,
@@ -90,6 +93,7 @@ impl From<Product> for Segmentation {
                 mask: format!("{itself}/mask.nii.gz"),
                 mesh: format!("{itself}/mesh"),
                 report: format!("{itself}/report"),
+                page: format!("{itself}/{}", files::PAGE),
                 polar: polar.map(|file| format!("{itself}/{}", file.name)),
                 volume: path_of(&volume),
                 itself,
@@ -218,11 +222,13 @@ pub async fn get_mesh(
 }
 
 /// A segmentation's report
+///
+/// JSON, or a page for a person where `Accept` prefers `text/html`.
 #[utoipa::path(get, path = "/v1/segmentations/{id}/report", tag = "segmentations",
     params(("id" = String, Path, description = "The segmentation's id"),
         super::openapi::ConditionalHeaders),
     responses(
-        super::openapi::SegmentationReportAnswer,
+        super::openapi::ReportAnswer,
         super::openapi::DownloadAnswers, LookupProblems))]
 pub async fn get_report(
     State(app): State<App>,
@@ -230,13 +236,14 @@ pub async fn get_report(
     RawQuery(query): RawQuery,
     headers: HeaderMap,
 ) -> Answer {
-    let offers = [Offer::new("application/json", "report.json")];
+    let offers = Offer::reports();
     products::get_offered(&app, KIND, &id, query.as_deref(), &headers, &offers).await
 }
 
 /// A segmentation's file by name
 ///
-/// `mask.nii.gz`, `mesh.glb` and the other formats, `report.json`; of a ventricle also
+/// `mask.nii.gz`, `mesh.glb` and the other formats, `report.json`, `report.html` (made when it is
+/// asked for), `slices.png` (three slices with the contour of the fit); of a ventricle also
 /// `polar.json`, `polar.svg` and `polar.png`.
 #[utoipa::path(get, path = "/v1/segmentations/{id}/{file}", tag = "segmentations",
     params(("id" = String, Path, description = "The segmentation's id"),

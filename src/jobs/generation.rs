@@ -1,11 +1,11 @@
 //! The work of kind `model`: [`crate::pipeline`] from files to every download.
 
 use super::checked::{self, unusable};
-use super::reader::{refusal, sentence, volume_files};
-use super::{Failure, Fault, Input, Output, OutputFile, Resource, Work, WorkError};
+use super::reader::{no_page, refusal, sentence, volume_files};
+use super::{Failure, Fault, Input, Output, OutputFile, Resource, Stored, Work, WorkError};
 use crate::export::{self, Format};
 use crate::parameters::ModelParameters;
-use crate::pipeline::{self, Model, PipelineError};
+use crate::pipeline::{self, Model, PipelineError, pages};
 use crate::progress::{Monitor, Plan, Stage};
 use crate::surface::SurfaceError;
 use crate::volume::ReadLimits;
@@ -50,6 +50,10 @@ impl Work for Generation {
             files: downloads(&model, input, monitor)?,
             summary: summary(&model),
         })
+    }
+
+    fn page(&self, stored: &Stored) -> Result<String, Failure> {
+        pages::model_page(&|name| stored.read(name)).map_err(|error| no_page(&error))
     }
 }
 
@@ -109,10 +113,11 @@ fn downloads(
         media_type: "application/json",
         bytes: model.report.to_json_text().into_bytes(),
     });
+    let closeness = model.closeness(monitor)?;
     files.push(OutputFile {
-        name: "report.html".into(),
-        media_type: "text/html; charset=utf-8",
-        bytes: model.report_html().into_bytes(),
+        name: "distance.json".into(),
+        media_type: "application/json",
+        bytes: serde_json::to_vec(&closeness).expect("numbers always serialise"),
     });
     monitor.report(Stage::Export, 1.0)?;
     Ok(files)

@@ -46,7 +46,8 @@ impl Queue {
         }))
     }
 
-    fn shelved(&self, product: Product) -> Stored {
+    /// A product with the files that are kept of it.
+    pub fn shelved(&self, product: Product) -> Stored {
         let names: Vec<String> = product.files.into_iter().map(|file| file.name).collect();
         Stored {
             files: self.blobs.paths(&product.id, &names),

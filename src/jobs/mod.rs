@@ -48,6 +48,7 @@ pub use blobs::{BlobError, BlobStore, BlobStream, Staged};
 pub use clock::{Clock, ManualClock, SystemClock, Timestamp};
 pub use failure::{Failure, Fault};
 pub use generation::Generation;
+pub(crate) use ids::hex;
 pub use ids::{content_id, random_id};
 pub use job::{Filed, Idempotency, Job, NewJob, State};
 pub use page::{Page, PageRequest};

@@ -29,7 +29,7 @@ pub struct Product {
 /// One download of a product.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ProductFile {
-    /// `mesh.glb`, `report.html` ...
+    /// `mesh.glb`, `report.json` ...
     pub name: String,
     /// Its `Content-Type`.
     pub media_type: String,

@@ -3,6 +3,7 @@
 use super::{Failure, Fault, Intensity, Output, OutputFile, VolumeFacts, VolumeReader};
 use crate::deform::template::{Organ, Template};
 use crate::export::{self, Format, Metadata, read_json};
+use crate::pipeline::pages::PageError;
 use crate::progress::Monitor;
 use crate::volume::{self, ReadLimits, ReadOptions, VolumeError, VolumeFile};
 use serde_json::json;
@@ -143,6 +144,12 @@ pub(super) fn refusal(error: &VolumeError) -> Failure {
         Some(field) => failure.at(field),
         None => failure,
     }
+}
+
+/// Why a page cannot be made, for whoever asked for it.
+pub(super) fn no_page(error: &PageError) -> Failure {
+    Failure::new(Fault::Service, "unreadable", sentence(error))
+        .fix("The report itself can still be had: GET report.json.")
 }
 
 /// An error's words as a sentence.

@@ -1,19 +1,18 @@
 //! The work of kind `segmentation`: [`crate::pipeline::segment`] over stored models.
 
 use super::checked::{self, unusable};
-use super::reader::{refusal, sentence, volume_files};
+use super::reader::{no_page, refusal, sentence, volume_files};
 use super::{Failure, Fault, Input, Needs, Output, OutputFile, Resource, Stored, Work, WorkError};
 use crate::deform::DeformError;
 use crate::deform::localise::LocaliseError;
 use crate::export::{Format, read_json};
 use crate::parameters::{FitParameters, Parameters};
 use crate::pipeline::segment::{NamedMesh, Order, SegmentError, segment};
-use crate::pipeline::{NamedFile, OutcomeError};
+use crate::pipeline::{NamedFile, OutcomeError, pages};
 use crate::progress::{Monitor, Plan};
 use crate::segmentation::{ExpertError, SegmentationError};
 use crate::volume::ReadLimits;
 use serde_json::{Map, Value};
-use std::io::ErrorKind;
 
 /// Fits models.
 #[derive(Debug, Clone, Copy)]
@@ -89,6 +88,10 @@ impl Work for Fitting {
             files: files.into_iter().map(OutputFile::from).collect(),
         })
     }
+
+    fn page(&self, stored: &Stored) -> Result<String, Failure> {
+        pages::segmentation_page(&|name| stored.read(name)).map_err(|error| no_page(&error))
+    }
 }
 
 impl From<NamedFile> for OutputFile {
@@ -136,13 +139,8 @@ fn mesh(stored: &Stored) -> Result<Option<NamedMesh>, WorkError> {
         Some(name) => format!("{name} ({})", stored.id),
         None => stored.id.clone(),
     };
-    let Some(path) = stored.file("mesh.json") else {
+    let Some(bytes) = stored.read("mesh.json").map_err(|e| unreadable(&e))? else {
         return Ok(None);
-    };
-    let bytes = match std::fs::read(path) {
-        Ok(bytes) => bytes,
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(unreadable(&error).into()),
     };
     match read_json::decode(&bytes) {
         Ok(mesh) => Ok(Some(NamedMesh { name, mesh })),
@@ -196,9 +194,8 @@ pub(super) fn explain(error: SegmentError) -> WorkError {
             _ => (Fault::Content, "no-heart"),
         },
         SegmentError::Segmentation(Deform(_)) => (Fault::Request, "invalid-parameter"),
-        SegmentError::Segmentation(Cancelled(_)) | SegmentError::Cancelled(_) => {
-            return WorkError::Cancelled;
-        }
+        SegmentError::Segmentation(Cancelled(_) | Expert(ExpertError::Cancelled(_)))
+        | SegmentError::Cancelled(_) => return WorkError::Cancelled,
     };
     let failure = Failure::new(fault, code, sentence(&error)).fix(error.fix());
     WorkError::Failed(match error.field() {

@@ -5,6 +5,7 @@ use crate::progress::{Cancelled, Monitor, Plan};
 use crate::volume::ReadLimits;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -66,6 +67,13 @@ pub trait Work: Send + Sync + 'static {
     /// # Errors
     /// [`WorkError::Cancelled`] if the token was raised, else the reason.
     fn run(&self, input: &Input, monitor: &Monitor<'_>) -> Result<Output, WorkError>;
+
+    /// The report on what it made as a page for people, of the files that are kept of it.
+    /// Called on blocking threads.
+    ///
+    /// # Errors
+    /// If the files cannot be read or are not understood.
+    fn page(&self, stored: &Stored) -> Result<String, Failure>;
 }
 
 /// What work calls for besides its volume.
@@ -92,6 +100,21 @@ impl Stored {
     /// The file of that name.
     pub fn file(&self, name: &str) -> Option<&PathBuf> {
         self.files.iter().find(|path| path.ends_with(name))
+    }
+
+    /// The content of the file of that name; `None` where there is none (any more).
+    ///
+    /// # Errors
+    /// If it is there but cannot be read.
+    pub fn read(&self, name: &str) -> std::io::Result<Option<Vec<u8>>> {
+        let Some(path) = self.file(name) else {
+            return Ok(None);
+        };
+        match std::fs::read(path) {
+            Ok(bytes) => Ok(Some(bytes)),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(error),
+        }
     }
 }
 

@@ -32,7 +32,16 @@ pub struct FitParameters {
 
 impl Default for FitParameters {
     fn default() -> Self {
-        Self::finish(FitDraft::default()).expect("the defaults contradict nothing")
+        Self {
+            frame: None,
+            model: FitParameters::AUTO.into(),
+            expert: None,
+            organ: Organ::LeftVentricle,
+            place: Place::default(),
+            margin: None,
+            deform: DeformParameters::default(),
+            polar: PolarParameters::default(),
+        }
     }
 }
 
@@ -49,27 +58,8 @@ pub struct Place {
     pub region: Option<[[usize; 3]; 2]>,
 }
 
-/// Parameters of a fit on their way in.
-#[derive(Debug)]
-pub struct FitDraft(pub(super) FitParameters);
-
-impl Default for FitDraft {
-    fn default() -> Self {
-        Self(FitParameters {
-            frame: None,
-            model: FitParameters::AUTO.into(),
-            expert: None,
-            organ: Organ::LeftVentricle,
-            place: Place::default(),
-            margin: None,
-            deform: DeformParameters::default(),
-            polar: PolarParameters::default(),
-        })
-    }
-}
-
 impl Parameters for FitParameters {
-    type Draft = FitDraft;
+    type Draft = Self;
 
     const SPECS: &'static [ParameterSpec<Self>] = FIT_SPECS;
 
@@ -79,7 +69,7 @@ impl Parameters for FitParameters {
         ("seed", "seed_point"),
     ];
 
-    fn finish(FitDraft(parameters): FitDraft) -> Result<Self, ParameterError> {
+    fn finish(parameters: Self) -> Result<Self, ParameterError> {
         if parameters.place.centre.is_some() && parameters.place.seed.is_some() {
             return Err(ParameterError {
                 field: "seed_point".into(),

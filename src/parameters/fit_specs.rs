@@ -1,6 +1,7 @@
 //! The table of a fit's parameters.
 
 use super::fit::FitParameters;
+use super::table::number;
 use super::{Kind, ParameterSpec};
 use crate::deform::Edge;
 use crate::deform::posture::Superior;
@@ -8,26 +9,6 @@ use crate::deform::sensors::SensorKind;
 use crate::deform::template::Organ;
 use crate::geometry::Vec3;
 use serde_json::{Value, json};
-
-/// A row for one number at a path within [`FitParameters`].
-macro_rules! number {
-    ($name:literal, $($path:ident).+, $min:literal..=$max:literal, $default:literal, $summary:literal) => {
-        ParameterSpec {
-            name: $name,
-            kind: Kind::Number {
-                min: $min,
-                max: $max,
-            },
-            default: $default,
-            summary: $summary,
-            read: |d, v| {
-                d.0.$($path).+ = v.f64();
-                Ok(())
-            },
-            write: |p| json!(p.$($path).+),
-        }
-    };
-}
 
 /// Every parameter of a fit, in the order in which the stages use them.
 pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
@@ -42,7 +23,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
                   every template of the organ is tried and the best fit taken; without templates \
                   a built-in ventricle is fitted. Also understood as template",
         read: |d, v| {
-            d.0.model = v.text().into();
+            d.model = v.text().into();
             Ok(())
         },
         write: |p| json!(p.model),
@@ -56,7 +37,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         default: "",
         summary: "Id of a volume with an expert's mask (above 0.5) to measure against",
         read: |d, v| {
-            d.0.expert = Some(v.text().into());
+            d.expert = Some(v.text().into());
             Ok(())
         },
         write: |p| json!(p.expert),
@@ -70,7 +51,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         default: "",
         summary: "Which frame of a 4-D volume, counted from 0",
         read: |d, v| {
-            d.0.frame = Some(v.usize());
+            d.frame = Some(v.usize());
             Ok(())
         },
         write: |p| json!(p.frame),
@@ -82,7 +63,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         summary: "What the model shows; all but the left ventricle start at the largest bright \
                   body and have no polar map",
         read: |d, v| {
-            d.0.organ = Organ::parse(v.text()).unwrap_or(Organ::LeftVentricle);
+            d.organ = Organ::parse(v.text()).unwrap_or(Organ::LeftVentricle);
             Ok(())
         },
         write: |p| json!(p.organ.as_str()),
@@ -94,7 +75,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         summary: "A point in the cavity, x,y,z in LPS millimetres: the search keeps within 25 mm \
                   of it and believes it; else the organ is searched",
         read: |d, v| {
-            d.0.place.centre = Some(point(v.numbers()));
+            d.place.centre = Some(point(v.numbers()));
             Ok(())
         },
         write: |p| json!(p.place.centre.map(|c| [c.x, c.y, c.z])),
@@ -107,7 +88,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
                   as seed",
         read: |d, v| {
             let list = v.indices()?;
-            d.0.place.seed = Some([list[0], list[1], list[2]]);
+            d.place.seed = Some([list[0], list[1], list[2]]);
             Ok(())
         },
         write: |p| json!(p.place.seed),
@@ -123,7 +104,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
             if !(axis.norm() > 1e-6 && axis.norm().is_finite()) {
                 return Err("a direction needs a length".into());
             }
-            d.0.place.axis = Some(axis);
+            d.place.axis = Some(axis);
             Ok(())
         },
         write: |p| json!(p.place.axis.map(|a| [a.x, a.y, a.z])),
@@ -140,7 +121,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
             if (0..3).any(|axis| ends[0][axis] > ends[1][axis]) {
                 return Err("the first corner lies beyond the last one".into());
             }
-            d.0.place.region = Some(ends);
+            d.place.region = Some(ends);
             Ok(())
         },
         write: |p| match p.place.region {
@@ -164,7 +145,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
                   as the body's outline shows (where enough of it is in view), or as the \
                   volume's frame says",
         read: |d, v| {
-            d.0.deform.superior = match v.text() {
+            d.deform.superior = match v.text() {
                 "frame" => Superior::Frame,
                 _ => Superior::Body,
             };
@@ -185,7 +166,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
                   that fall's steepest point, the steepest change whichever way, or the crossing \
                   of half the organ's uptake",
         read: |d, v| {
-            d.0.deform.sensor = match v.text() {
+            d.deform.sensor = match v.text() {
                 "unsigned" => SensorKind::Unsigned,
                 "level" => SensorKind::Level,
                 "gradient" => SensorKind::Gradient,
@@ -240,7 +221,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         summary: "How far outside the edge found the edge is drawn, millimetres (default 2.5 for \
                   DICOM NM, whose readers draw wide: measured on one expert's mask; else 0)",
         read: |d, v| {
-            d.0.margin = Some(v.f64());
+            d.margin = Some(v.f64());
             Ok(())
         },
         write: |p| json!(p.margin),
@@ -252,7 +233,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         summary: "Which edge of a ventricle's wall is wanted: the one seen in the blurred image, or \
                   the wall's own, with blur's share of the thickness taken off",
         read: |d, v| {
-            d.0.deform.edge = match v.text() {
+            d.deform.edge = match v.text() {
                 "anatomical" => Edge::Anatomical,
                 _ => Edge::Apparent,
             };
@@ -338,7 +319,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         default: "100",
         summary: "Most steps of the motion",
         read: |d, v| {
-            d.0.deform.motion.max_iterations = v.usize();
+            d.deform.motion.max_iterations = v.usize();
             Ok(())
         },
         write: |p| json!(p.deform.motion.max_iterations),

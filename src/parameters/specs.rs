@@ -1,50 +1,11 @@
 //! The table of a model's parameters.
 
+use super::table::number;
 use super::{Kind, ParameterSpec};
 use crate::optimise::{FitnessForm, Gain};
 use crate::retile::{Geodesics, Method};
 use crate::surface::{IsoLevel, Isolate, TopologyMode};
 use serde_json::{Value, json};
-
-/// A row for one of the four weights.
-macro_rules! weight_spec {
-    ($name:literal, $index:literal, $summary:literal) => {
-        ParameterSpec {
-            name: $name,
-            kind: Kind::Number {
-                min: 0.0,
-                max: 1000.0,
-            },
-            default: "1",
-            summary: $summary,
-            read: |d, v| {
-                d.optimise.weights[$index] = v.f64();
-                Ok(())
-            },
-            write: |p| json!(p.optimise.weights[$index]),
-        }
-    };
-}
-
-/// A row for one number of the fit.
-macro_rules! fit_spec {
-    ($name:literal, $field:ident, $min:literal..=$max:literal, $default:literal, $summary:literal) => {
-        ParameterSpec {
-            name: $name,
-            kind: Kind::Number {
-                min: $min,
-                max: $max,
-            },
-            default: $default,
-            summary: $summary,
-            read: |d, v| {
-                d.optimise.fit.$field = v.f64();
-                Ok(())
-            },
-            write: |p| json!(p.optimise.fit.$field),
-        }
-    };
-}
 
 /// Every parameter of a model, in the order in which the stages use them.
 pub const SPECS: &[ParameterSpec] = &[
@@ -201,17 +162,13 @@ pub const SPECS: &[ParameterSpec] = &[
             })
         },
     },
-    ParameterSpec {
-        name: "mask_smoothing",
-        kind: Kind::Number { min: 0.0, max: 3.0 },
-        default: "0.8",
-        summary: "Gaussian sigma in voxels that smooths label maps before surfacing",
-        read: |d, v| {
-            d.surface.mask_smoothing = v.f64();
-            Ok(())
-        },
-        write: |p| json!(p.surface.mask_smoothing),
-    },
+    number!(
+        "mask_smoothing",
+        surface.mask_smoothing,
+        0.0..=3.0,
+        "0.8",
+        "Gaussian sigma in voxels that smooths label maps before surfacing"
+    ),
     ParameterSpec {
         name: "method",
         kind: Kind::Choice(&["paper", "refined"]),
@@ -244,21 +201,14 @@ pub const SPECS: &[ParameterSpec] = &[
         },
         write: |p| json!(p.retile.adaptive),
     },
-    ParameterSpec {
-        name: "adaptive_from",
-        kind: Kind::Number {
-            min: 0.0,
-            max: 100.0,
-        },
-        default: "0.8",
-        summary: "Rise of the surface over one edge of even spacing, in percent of its size, from \
-                  which on `adaptive` acts; 0 adapts everywhere",
-        read: |d, v| {
-            d.retile.adaptive_from = v.f64();
-            Ok(())
-        },
-        write: |p| json!(p.retile.adaptive_from),
-    },
+    number!(
+        "adaptive_from",
+        retile.adaptive_from,
+        0.0..=100.0,
+        "0.8",
+        "Rise of the surface over one edge of even spacing, in percent of its size, from \
+         which on `adaptive` acts; 0 adapts everywhere"
+    ),
     ParameterSpec {
         name: "repulsion_iterations",
         kind: Kind::Integer { min: 0, max: 1000 },
@@ -270,20 +220,13 @@ pub const SPECS: &[ParameterSpec] = &[
         },
         write: |p| json!(p.retile.repulsion_iterations),
     },
-    ParameterSpec {
-        name: "repulsion_strength",
-        kind: Kind::Number {
-            min: 0.001,
-            max: 1.0,
-        },
-        default: "0.15",
-        summary: "Share of an overlap that one round of repulsion moves",
-        read: |d, v| {
-            d.retile.repulsion_strength = v.f64();
-            Ok(())
-        },
-        write: |p| json!(p.retile.repulsion_strength),
-    },
+    number!(
+        "repulsion_strength",
+        retile.repulsion_strength,
+        0.001..=1.0,
+        "0.15",
+        "Share of an overlap that one round of repulsion moves"
+    ),
     ParameterSpec {
         name: "geodesics",
         kind: Kind::Choice(&["approximate", "exact"]),
@@ -327,58 +270,58 @@ pub const SPECS: &[ParameterSpec] = &[
         },
         write: |p| json!(p.optimise.fit.rounds),
     },
-    fit_spec!(
+    number!(
         "fit_shape_weight",
-        shape_weight,
+        optimise.fit.shape_weight,
         0.0001..=10.0,
         "0.062",
         "Weight of triangle shape against squared distance in the fit"
     ),
-    fit_spec!(
+    number!(
         "fit_coarse_bend",
-        coarse_bend,
+        optimise.fit.coarse_bend,
         1.0..=180.0,
         "24",
         "Mean bend of the start in degrees from which on shapes weigh more in the fit"
     ),
-    fit_spec!(
+    number!(
         "fit_worst_weight",
-        worst_weight,
+        optimise.fit.worst_weight,
         0.0..=100.0,
         "3",
         "How much more a misshapen triangle counts in the fit"
     ),
-    fit_spec!(
+    number!(
         "fit_free_size",
-        free_size,
+        optimise.fit.free_size,
         0.0..=1.0,
         "1",
         "How far the fit lets triangles choose their own size"
     ),
-    fit_spec!(
+    number!(
         "fit_peak_weight",
-        peak_weight,
+        optimise.fit.peak_weight,
         0.0..=10.0,
         "0.05",
         "How much more a distant sample counts in the fit: lowers the largest distance"
     ),
-    fit_spec!(
+    number!(
         "fit_momentum",
-        momentum,
+        optimise.fit.momentum,
         0.0..=0.9,
         "0.6",
         "Share of its last step that a vertex repeats in a round of the fit"
     ),
-    fit_spec!(
+    number!(
         "fit_midpoint_weight",
-        midpoint_weight,
+        optimise.fit.midpoint_weight,
         0.0..=10.0,
         "1",
         "Weight of the model's own edge midpoints in the fit"
     ),
-    fit_spec!(
+    number!(
         "fit_damping",
-        damping,
+        optimise.fit.damping,
         0.000001..=1.0,
         "0.0005",
         "Weight of staying put in a round of the fit"
@@ -427,18 +370,34 @@ pub const SPECS: &[ParameterSpec] = &[
             })
         },
     },
-    weight_spec!(
+    number!(
         "w1",
-        0,
+        optimise.weights[0],
+        0.0..=1000.0,
+        "1",
         "Weight of smoothness between an edge's two triangles"
     ),
-    weight_spec!(
+    number!(
         "w2",
-        1,
+        optimise.weights[1],
+        0.0..=1000.0,
+        "1",
         "Weight of smoothness to the neighbouring triangles"
     ),
-    weight_spec!("w3", 2, "Weight of the triangles' aspect ratio"),
-    weight_spec!("w4", 3, "Weight of the distance to the original surface"),
+    number!(
+        "w3",
+        optimise.weights[2],
+        0.0..=1000.0,
+        "1",
+        "Weight of the triangles' aspect ratio"
+    ),
+    number!(
+        "w4",
+        optimise.weights[3],
+        0.0..=1000.0,
+        "1",
+        "Weight of the distance to the original surface"
+    ),
     ParameterSpec {
         name: "gain",
         kind: Kind::Choice(&["local", "total"]),
@@ -458,18 +417,14 @@ pub const SPECS: &[ParameterSpec] = &[
             })
         },
     },
-    ParameterSpec {
-        name: "guard",
-        kind: Kind::Number { min: 0.0, max: 1.0 },
-        default: "0.9",
-        summary: "Radius ratio 2r/R below which a flip may not make a triangle, unless it \
-                  replaces one as bad; 0 lets slivers pass",
-        read: |d, v| {
-            d.optimise.guard = v.f64();
-            Ok(())
-        },
-        write: |p| json!(p.optimise.guard),
-    },
+    number!(
+        "guard",
+        optimise.guard,
+        0.0..=1.0,
+        "0.9",
+        "Radius ratio 2r/R below which a flip may not make a triangle, unless it \
+         replaces one as bad; 0 lets slivers pass"
+    ),
 ];
 
 fn parse_iso(text: &str) -> Result<IsoLevel, String> {

@@ -63,6 +63,31 @@ pub struct ParameterSpec<P: Parameters = ModelParameters> {
     pub(super) write: fn(&P) -> Value,
 }
 
+/// A row for one number: its name, where it stands among the parameters (and, on its way in,
+/// their draft), range, default and summary.
+macro_rules! number {
+    (
+        $name:literal, $($field:ident).+ $([$index:literal])?,
+        $min:literal..=$max:literal, $default:literal, $summary:literal
+    ) => {
+        ParameterSpec {
+            name: $name,
+            kind: Kind::Number {
+                min: $min,
+                max: $max,
+            },
+            default: $default,
+            summary: $summary,
+            read: |draft, value| {
+                draft.$($field).+ $([$index])? = value.f64();
+                Ok(())
+            },
+            write: |parameters| json!(parameters.$($field).+ $([$index])?),
+        }
+    };
+}
+pub(super) use number;
+
 /// Parameters with a table of names.
 pub trait Parameters: Sized + 'static {
     /// Parameters on their way in.

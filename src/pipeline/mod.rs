@@ -6,6 +6,7 @@
 
 mod built_in;
 mod outcome;
+pub mod pages;
 pub mod segment;
 
 pub use outcome::{NamedFile, OutcomeError};
@@ -15,7 +16,7 @@ use crate::mesh::TriMesh;
 use crate::optimise::{self, OptimiseError, Reference};
 use crate::parameters::{ModelParameters, Parameters};
 use crate::progress::{Cancelled, Monitor, Stage};
-use crate::report::{self, MeasureParameters, Report, ReportInput};
+use crate::report::{self, Closeness, MeasureParameters, Report, ReportInput};
 use crate::retile::{self, RetileError};
 use crate::surface::{self, SurfaceError};
 use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeFile};
@@ -40,9 +41,17 @@ impl Model {
         }
     }
 
-    /// The report as a self-contained page.
-    pub fn report_html(&self) -> String {
-        report::html(&self.report, &self.mesh, Some(&self.reference))
+    /// How far it lies from its surface, place by place: what the page is coloured by.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn closeness(&self, monitor: &Monitor) -> Result<Closeness, Cancelled> {
+        Closeness::of(&self.mesh, &self.reference, monitor)
+    }
+
+    /// The report as a self-contained page; with `closeness`, also coloured by it.
+    pub fn report_html(&self, closeness: Option<&Closeness>) -> String {
+        report::html(&self.report, &self.mesh, closeness)
     }
 }
 

@@ -5,6 +5,8 @@ use crate::export::{self, ExportError, Format, Metadata};
 use crate::parameters::Parameters;
 use crate::polar;
 use crate::progress::{Cancelled, Monitor, Stage};
+use crate::report;
+use crate::report::html::{Pictured, segmentation};
 use crate::segmentation::report_json;
 use crate::volume::nifti::{self, MaskError};
 use serde_json::{Map, Value, json};
@@ -40,8 +42,8 @@ pub enum OutcomeError {
 }
 
 impl Segmented {
-    /// The mask on the input's grid, the mesh in `formats`, the report and, of a ventricle,
-    /// the polar map. `volume_id` names the volume in the mesh files.
+    /// The mask on the input's grid, the mesh in `formats`, the report, slices and, of a
+    /// ventricle, the polar map. `volume_id` names the volume in the mesh files.
     ///
     /// # Errors
     /// See [`OutcomeError`].
@@ -69,7 +71,12 @@ impl Segmented {
         }
         monitor.report(Stage::Export, 0.9)?;
         files.push(json_file("report.json", &self.report()));
-        files.extend(self.polar()?);
+        files.push(NamedFile {
+            name: "slices.png".into(),
+            media_type: "image/png",
+            bytes: self.segmentation.slices.clone(),
+        });
+        files.extend(self.polar(monitor)?);
         monitor.report(Stage::Export, 1.0)?;
         Ok(files)
     }
@@ -80,10 +87,30 @@ impl Segmented {
         if let Some(object) = report.as_object_mut() {
             let parameters = self.parameters.to_json();
             object.insert("parameters".into(), parameters.into());
+            object.insert("input".into(), report::input(&self.reading.facts));
             let warnings = self.reading.facts.warnings.clone();
             object.insert("warnings".into(), warnings.into());
         }
         report
+    }
+
+    /// The report as a self-contained page; `files` are those of [`Segmented::files`].
+    pub fn page(&self, files: &[NamedFile]) -> NamedFile {
+        let bytes = |name: &str| {
+            let found = files.iter().find(|file| file.name == name);
+            found.map(|file| file.bytes.as_slice())
+        };
+        let page = segmentation(&Pictured {
+            report: &self.report(),
+            mesh: &self.segmentation.fit.mesh,
+            slices: bytes("slices.png"),
+            polar: bytes("polar.svg"),
+        });
+        NamedFile {
+            name: "report.html".into(),
+            media_type: "text/html; charset=utf-8",
+            bytes: page.into_bytes(),
+        }
     }
 
     /// The figures one looks at first.
@@ -120,7 +147,7 @@ impl Segmented {
         })
     }
 
-    fn polar(&self) -> Result<Vec<NamedFile>, OutcomeError> {
+    fn polar(&self, monitor: &Monitor<'_>) -> Result<Vec<NamedFile>, OutcomeError> {
         let Some(map) = &self.segmentation.polar else {
             return Ok(Vec::new());
         };
@@ -129,6 +156,7 @@ impl Segmented {
             media_type: "image/svg+xml",
             bytes: polar::svg(map).into_bytes(),
         };
+        monitor.check()?;
         let png = NamedFile {
             name: "polar.png".into(),
             media_type: "image/png",

@@ -109,6 +109,9 @@ pub enum SegmentError {
     Cancelled(#[from] Cancelled),
 }
 
+/// What to do about work that was ended on demand.
+const AGAIN: &str = "Ask again if the result is still wanted.";
+
 impl SegmentError {
     /// Whether the work ended because it was asked to, in whichever stage.
     pub fn is_cancelled(&self) -> bool {
@@ -137,6 +140,7 @@ impl SegmentError {
             | SegmentError::Segmentation(SegmentationError::Expert(_)) => Some("expert"),
             SegmentError::Segmentation(SegmentationError::Deform(error)) => match error {
                 DeformError::Parameter { field, .. } => Some(field),
+                DeformError::TooManyNodes { .. } => Some("model"),
                 DeformError::Localise(LocaliseError::NoHeart { .. }) => Some("center"),
                 _ => None,
             },
@@ -184,6 +188,7 @@ impl SegmentError {
                     "Give a mask of this very scan, with its place in the patient in the header."
                         .into()
                 }
+                ExpertError::Cancelled(_) => AGAIN.into(),
             },
             SegmentError::Segmentation(SegmentationError::Deform(error)) => match error {
                 DeformError::Localise(LocaliseError::NoHeart { .. }) => {
@@ -197,10 +202,13 @@ impl SegmentError {
                 DeformError::Localise(LocaliseError::Blank) => {
                     "Look whether the file, and `frame` of a 4-D one, is the right one.".into()
                 }
+                DeformError::TooManyNodes { limit, .. } => {
+                    format!("Give a model of at most {limit} points, or no support springs.")
+                }
                 _ => "Give finite numbers within their ranges.".into(),
             },
             SegmentError::Segmentation(SegmentationError::Cancelled(_))
-            | SegmentError::Cancelled(_) => "Ask again if the result is still wanted.".into(),
+            | SegmentError::Cancelled(_) => AGAIN.into(),
         }
     }
 }

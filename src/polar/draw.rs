@@ -143,6 +143,8 @@ fn tile(row: usize, column: usize) -> String {
 /// Only those of the encoder, which writes to memory.
 pub fn png(map: &PolarMap) -> Result<Vec<u8>, png::EncodingError> {
     let mut canvas = vec![PAPER; SIZE * SIZE];
+    // The segment of each pixel, 0 beside the map.
+    let mut segments = vec![0; SIZE * SIZE];
     for y in 0..SIZE {
         for x in 0..SIZE {
             let (dx, dy) = (x as f64 + 0.5 - CENTRE, CENTRE - y as f64 - 0.5);
@@ -152,10 +154,11 @@ pub fn png(map: &PolarMap) -> Result<Vec<u8>, png::EncodingError> {
                 let row = ((share * ROWS as f64) as usize).min(ROWS - 1);
                 let column = ((turns * COLUMNS as f64) as usize).min(COLUMNS - 1);
                 canvas[x + SIZE * y] = shade(map, row, column);
+                segments[x + SIZE * y] = segment_at(share, 360.0 * turns);
             }
         }
     }
-    draw_borders(&mut canvas);
+    draw_borders(&mut canvas, &segments);
     for s in &map.segments {
         let (share, turns) = label_place(s.number);
         let (x, y) = screen(share, turns);
@@ -179,22 +182,12 @@ pub fn png(map: &PolarMap) -> Result<Vec<u8>, png::EncodingError> {
 }
 
 /// A border runs where the segment changes from one pixel to the next.
-fn draw_borders(canvas: &mut [[u8; 3]]) {
-    let segment = |x: usize, y: usize| {
-        let (dx, dy) = (x as f64 + 0.5 - CENTRE, CENTRE - y as f64 - 0.5);
-        let share = dx.hypot(dy) / RADIUS;
-        let angle = dy.atan2(dx).to_degrees().rem_euclid(360.0);
-        if share < 1.0 {
-            segment_at(share, angle)
-        } else {
-            0
-        }
-    };
+fn draw_borders(canvas: &mut [[u8; 3]], segments: &[usize]) {
     for y in 0..SIZE - 1 {
-        for x in 0..SIZE - 1 {
-            let own = segment(x, y);
-            if own != segment(x + 1, y) || own != segment(x, y + 1) {
-                canvas[x + SIZE * y] = INK;
+        for at in SIZE * y..SIZE * y + SIZE - 1 {
+            let own = segments[at];
+            if own != segments[at + 1] || own != segments[at + SIZE] {
+                canvas[at] = INK;
             }
         }
     }

@@ -308,7 +308,8 @@ mod tests {
             length: 65.0,
             breadth: 1.0,
         };
-        (volume, Wall::new(&mesh, &cup, &Vec3::z()))
+        let wall = Wall::new(&mesh, &cup, &Vec3::z(), &crate::progress::Monitor::silent());
+        (volume, wall.unwrap())
     }
 
     #[test]

@@ -11,7 +11,7 @@
 //! samples and some vertices have to do, and the bound is absent.
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 use super::summary::Summary;
@@ -32,7 +32,7 @@ const MOST_REFINED: usize = 40;
 const RECENT: usize = 6;
 
 /// How far model and surface lie apart.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Distance {
     /// Mean of the two directions' means, mm.
     pub mean_mm: f64,
@@ -65,7 +65,7 @@ pub struct Distance {
 }
 
 /// Distances of one side's points to the other side.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Direction {
     /// Even samples taken.
     pub samples: usize,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::summary::{Histogram, Summary};
 use crate::geometry::{Vec3, triangle};
@@ -105,7 +105,7 @@ fn angles_deg([a, b, c]: &[Vec3; 3]) -> [f64; 3] {
 }
 
 /// What a mesh is, whatever it looks like: counts and topology.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MeshFacts {
     /// Number of vertices.
     pub vertices: usize,
@@ -129,6 +129,8 @@ pub struct MeshFacts {
     pub oriented: bool,
     /// The triangles face outward (the enclosed volume is positive).
     pub outward: bool,
+    /// Components that face outward; the others bound cavities.
+    pub outward_components: usize,
     /// The first defect found, in words.
     pub defect: Option<String>,
     /// Pairs of triangles that meet in more than shared vertices and edges, found exactly.
@@ -144,7 +146,7 @@ pub struct MeshFacts {
 }
 
 /// How well-shaped the triangles are.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Shape {
     /// Radius ratio 2r/R, 1 = equilateral.
     pub radius_ratio: Summary,
@@ -161,7 +163,7 @@ pub struct Shape {
 }
 
 /// How many edges meet at a vertex.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Valence {
     /// Number of vertices for each valence.
     pub counts: BTreeMap<u32, usize>,
@@ -172,7 +174,7 @@ pub struct Valence {
 }
 
 /// How smooth the mesh is.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Smoothness {
     /// Angle between the normals of neighbouring triangles, degrees, 0 = flat.
     pub dihedral_deg: Summary,
@@ -220,7 +222,7 @@ impl Smoothness {
 }
 
 /// Distributions before and after optimisation.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Histograms {
     /// Radius ratios 2r/R.
     pub radius_ratio: Histogram,
@@ -277,6 +279,7 @@ pub(super) fn facts(mesh: &TriMesh, self_intersections: usize) -> (Elements, Mes
             _ => false,
         }),
         outward: volume > 0.0,
+        outward_components: outward_components(mesh, &components),
         defect: census.err().map(|d| d.to_string()),
         self_intersections,
         area_mm2: elements.area_mm2.iter().sum(),
@@ -285,6 +288,12 @@ pub(super) fn facts(mesh: &TriMesh, self_intersections: usize) -> (Elements, Mes
         max_mm: aabb.max.into(),
     };
     (elements, facts)
+}
+
+/// How many of the components face outward; `component` gives that of every vertex.
+pub(super) fn outward_components(mesh: &TriMesh, component: &[u32]) -> usize {
+    let volumes = topology::component_volumes(mesh, component);
+    volumes.iter().filter(|v| **v > 0.0).count()
 }
 
 /// Number of fans over all vertices: sets of corners at one vertex that are joined through
@@ -369,6 +378,25 @@ mod tests {
         assert!(turned.closed && turned.edge_manifold && !turned.oriented);
         let inward = with(&|m| m.triangles.iter_mut().for_each(|t| t.swap(0, 1)));
         assert!(inward.closed && inward.oriented && !inward.outward);
+        assert_eq!(inward.outward_components, 0);
+        // A small sphere far away faces inward: the whole still encloses a positive volume.
+        let stray = with(&|m| {
+            let n = m.vertices.len() as u32;
+            let turned: Vec<_> = m
+                .triangles
+                .iter()
+                .map(|t| [t[1] + n, t[0] + n, t[2] + n])
+                .collect();
+            let far: Vec<Vec3> = m
+                .vertices
+                .iter()
+                .map(|v| v / 5.0 + Vec3::x() * 40.0)
+                .collect();
+            m.triangles.extend(turned);
+            m.vertices.extend(far);
+        });
+        assert!(stray.oriented && stray.outward && stray.defect.is_none());
+        assert_eq!((stray.components, stray.outward_components), (2, 1));
         // Two spheres that share a vertex.
         let pinched = with(&|m| {
             let n = m.vertices.len() as u32;

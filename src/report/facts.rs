@@ -5,6 +5,7 @@
 
 use serde_json::{Map, Value, json};
 
+use super::elements::outward_components;
 use super::{Forms, SurfaceSection};
 use crate::mesh::topology;
 use crate::optimise::fitness::{Lengths, Scales};
@@ -31,6 +32,7 @@ pub fn surface(surface: &Surface) -> SurfaceSection {
         euler_characteristic: mesh.vertices.len() as i64 - edges as i64
             + mesh.triangles.len() as i64,
         components: components.iter().max().map_or(0, |m| *m as usize + 1),
+        outward_components: outward_components(mesh, &components),
         volume_ml: mesh.volume() / 1000.0,
         area_mm2: mesh.area(),
         voxel_mm: surface.spacing,

@@ -4,12 +4,14 @@
 //! what it is (counts, topology, self-intersections), how well-shaped (radius ratios,
 //! angles, edge lengths, valences), how smooth (angles between neighbouring triangles) and
 //! how close (two-sided distances, volume, area). [`Report::new`] joins these to what the
-//! stages say of themselves. [`html()`] makes one self-contained page of it.
+//! stages say of themselves. [`html()`] makes one self-contained page of it, coloured by
+//! [`Closeness`]; [`html::segmentation()`] one of a segmentation's report.
 //!
 //! A report is JSON with stable names: lengths in millimetres, angles in degrees, volumes in
 //! millilitres, as the names' endings say. Everything but `timings_ms` is the same for the
 //! same input, parameters and seed, whatever the number of threads.
 
+pub mod closeness;
 pub mod distance;
 pub mod elements;
 mod facts;
@@ -18,9 +20,10 @@ mod input;
 pub mod measure;
 pub mod summary;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+pub use closeness::Closeness;
 pub use html::html;
 pub use input::input;
 pub use measure::{MeasureParameters, Measures, measure};
@@ -31,8 +34,10 @@ use crate::surface::Surface;
 use distance::Distance;
 use elements::{Elements, Histograms, MeshFacts, Shape, Smoothness};
 
-/// The report: `serde_json::to_value(&report)` is what the service answers.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// The report: `serde_json::to_value(&report)` is what the service answers. The page is made of
+/// it when it is asked for, perhaps by a later version: a field that is added takes
+/// `#[serde(default)]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Who made the model.
     pub software: Software,
@@ -65,16 +70,26 @@ pub struct Report {
 }
 
 /// Name and version.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Software {
     /// Always `ventriform`.
-    pub name: &'static str,
+    pub name: String,
     /// The version.
-    pub version: &'static str,
+    pub version: String,
+}
+
+impl Software {
+    /// This program.
+    pub fn this() -> Self {
+        Self {
+            name: env!("CARGO_PKG_NAME").into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+        }
+    }
 }
 
 /// The iso-surface's figures.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceSection {
     /// The iso-value, in the volume's units.
     pub iso_value: f64,
@@ -86,6 +101,8 @@ pub struct SurfaceSection {
     pub euler_characteristic: i64,
     /// Connected components.
     pub components: usize,
+    /// Components that face outward; the others bound cavities.
+    pub outward_components: usize,
     /// Enclosed volume, millilitres.
     pub volume_ml: f64,
     /// Area, mm².
@@ -98,7 +115,7 @@ pub struct SurfaceSection {
 }
 
 /// The re-tiled mesh's figures.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RetileSection {
     /// What the stage says of itself.
     #[serde(flatten)]
@@ -110,7 +127,7 @@ pub struct RetileSection {
 }
 
 /// The paper's fitness: mean over all edges.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Fitness {
     /// The form that drove the flips; `retiled`, `fitted`, `optimised` speak it.
     pub form: String,
@@ -133,7 +150,7 @@ pub struct Fitness {
 }
 
 /// The same figures after each stage.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stages<T> {
     /// After re-tiling.
     pub retiled: T,
@@ -144,7 +161,7 @@ pub struct Stages<T> {
 }
 
 /// Mean fitness in every form.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Forms {
     /// The paper's reciprocal terms, capped.
     pub raw: f64,
@@ -156,7 +173,7 @@ pub struct Forms {
 }
 
 /// Means of the four terms over all edges.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Terms {
     /// A: angle between the edge's triangles' normals, degrees.
     pub a_deg: f64,
@@ -198,10 +215,7 @@ impl Report {
         let mut warnings = facts::warnings(input.surface, input.tiled, input.optimised);
         warnings.extend(doubts(&measures.mesh, &surface, input.tiled));
         Self {
-            software: Software {
-                name: env!("CARGO_PKG_NAME"),
-                version: env!("CARGO_PKG_VERSION"),
-            },
+            software: Software::this(),
             input: input.input,
             parameters: input.parameters,
             surface,
@@ -223,7 +237,8 @@ impl Report {
     }
 
     /// Whether the model is what was promised: a closed, oriented manifold that faces
-    /// outward, with the surface's topology and no self-intersection.
+    /// outward (walls of cavities inward, as on the surface), with the surface's topology and no
+    /// self-intersection.
     pub fn is_sound(&self) -> bool {
         let mesh = &self.mesh;
         mesh.defect.is_none()
@@ -231,6 +246,7 @@ impl Report {
             && mesh.self_intersections == 0
             && mesh.euler_characteristic == self.surface.euler_characteristic
             && mesh.components == self.surface.components
+            && mesh.outward_components == self.surface.outward_components
     }
 
     /// The report as indented JSON text.
@@ -299,6 +315,12 @@ fn doubts(mesh: &MeshFacts, surface: &SurfaceSection, tiled: &Tiled) -> Vec<Stri
         doubts.push(format!(
             "The model's Euler characteristic is {}, the surface's {}.",
             mesh.euler_characteristic, surface.euler_characteristic
+        ));
+    }
+    if mesh.outward_components != surface.outward_components {
+        doubts.push(format!(
+            "Components of the model that face outward: {}, of the surface: {}.",
+            mesh.outward_components, surface.outward_components
         ));
     }
     if mesh.vertices != tiled.mesh.vertices.len() {

@@ -1,9 +1,9 @@
 //! Many numbers in a few: summaries and histograms.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What a list of numbers is like. All zero for an empty list.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     /// Arithmetic mean.
     pub mean: f64,
@@ -62,7 +62,7 @@ fn percentile(sorted: &[f64], p: f64) -> f64 {
 
 /// Counts over equal bins, before and after optimisation side by side. The bin [lower,
 /// lower + width) is the first; the last one includes its upper end.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Histogram {
     /// Lower end of the first bin.
     pub lower: f64,

@@ -222,7 +222,9 @@ impl RetileError {
                 format!("Set `points` to {needed} or more, or `topology` to genus0.")
             }
             RetileError::NotCarried { .. } => {
-                "Set `topology` to genus0, or `isolate` to one component, or smooth the volume."
+                "More points do not help. Set `topology` to genus0, or `isolate` to one component; \
+                 where the object is only two or three voxels thick, choose another `iso` or \
+                 smooth the volume."
                     .into()
             }
             RetileError::TooManyPoints { limit, .. } => {
@@ -262,6 +264,39 @@ pub fn retile(
     }?;
     monitor.report(Stage::Retile, 1.0)?;
     Ok(tiled)
+}
+
+/// To tell which N would do, N is doubled as long as it stays below this multiple of the first
+/// number tried (or this number).
+const NEEDED_FACTOR: usize = 16;
+const LEAST_TRIED: usize = 2000;
+
+/// The error to give up with where `parameters.points` do not carry the topology of `surface`.
+/// It names a larger number that does: `carries` begins as [`retile`] does with the parameters
+/// it is handed, and tells whether that went well.
+fn too_few(
+    surface: &Surface,
+    parameters: &RetileParameters,
+    carries: impl Fn(&RetileParameters) -> Result<bool, RetileError>,
+) -> RetileError {
+    let points = parameters.points;
+    let mut tried = points;
+    let mut needed = quotas::least_points(&surface.mesh).max(points + 1);
+    let most = MOST_POINTS.min(LEAST_TRIED.max(NEEDED_FACTOR * needed));
+    while needed <= most {
+        let larger = RetileParameters {
+            points: needed,
+            ..parameters.clone()
+        };
+        match carries(&larger) {
+            Ok(true) => return RetileError::TooFewPoints { points, needed },
+            Ok(false) => {}
+            Err(error) => return error,
+        }
+        tried = needed;
+        needed *= 2;
+    }
+    RetileError::NotCarried { points, tried }
 }
 
 fn validate(parameters: &RetileParameters) -> Result<(), RetileError> {

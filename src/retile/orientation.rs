@@ -6,22 +6,7 @@
 //! anything larger that faces the wrong way has too few points for its shape.
 
 use crate::mesh::TriMesh;
-
-/// Signed volume of each component, mm³; `component` gives that of every vertex.
-pub(super) fn volumes(mesh: &TriMesh, component: &[u32]) -> Vec<f64> {
-    let count = component.iter().max().map_or(0, |c| *c as usize + 1);
-    // About a vertex of its own, to keep digits far from the origin.
-    let mut origin = vec![None; count];
-    let mut volumes = vec![0.0; count];
-    for t in 0..mesh.triangles.len() {
-        let corners = mesh.corners(t);
-        let c = component[mesh.triangles[t][0] as usize] as usize;
-        let origin = *origin[c].get_or_insert(corners[0]);
-        let [a, b, c_] = corners.map(|p| p - origin);
-        volumes[c] += a.dot(&b.cross(&c_)) / 6.0;
-    }
-    volumes
-}
+use crate::mesh::topology::component_volumes;
 
 /// Makes every component of `mesh` face as the surface's does, whose volumes are `wanted`;
 /// `component` gives the component on the surface of every vertex of `mesh`.
@@ -33,7 +18,7 @@ pub(super) fn face_alike(
     component: &[u32],
     wanted: &[f64],
 ) -> Result<(), Vec<u32>> {
-    let found = volumes(mesh, component);
+    let found = component_volumes(mesh, component);
     let is_turned = |c: u32| !(found[c as usize] * wanted[c as usize] > 0.0);
     let mut vertices = vec![0; found.len()];
     for &c in component {
@@ -69,7 +54,11 @@ mod tests {
         let component: Vec<u32> = (0..count + 4).map(|v| u32::from(v >= count)).collect();
         let mut outward = ball.clone();
         assert_eq!(face_alike(&mut outward, &component, &[1.0, 1.0]), Ok(()));
-        assert!(volumes(&outward, &component).iter().all(|v| *v > 0.0));
+        assert!(
+            component_volumes(&outward, &component)
+                .iter()
+                .all(|v| *v > 0.0)
+        );
         // A cavity faces inward.
         let all: Vec<u32> = (0..count).collect();
         assert_eq!(face_alike(&mut ball, &component, &[-1.0, 1.0]), Err(all));

@@ -1,15 +1,14 @@
 //! The paper's route: repulsion, mutual tessellation, removal of the old vertices.
 
 use super::domain::Domain;
-use super::refined::{LEAST_TRIED, NEEDED_FACTOR};
 use super::samples::Samples;
 use super::tessellate::{TessellateError, tessellate};
 use super::{
     RetileError, RetileFacts, RetileParameters, SurfacePoint, Tiled, placement, quotas, repulsion,
-    sizing,
+    sizing, too_few,
 };
 use crate::mesh::TriMesh;
-use crate::progress::{Cancelled, Monitor, Stage};
+use crate::progress::{Monitor, Stage};
 use crate::surface::Surface;
 
 /// Seeds tried before the surface is refused.
@@ -27,7 +26,7 @@ pub(super) fn retile(
     let least = quotas::least_points(&surface.mesh);
     let job = Job::new(surface, parameters, monitor)?;
     if parameters.points < least {
-        return Err(refusal(&job, None)?);
+        return Err(refusal(&job, None));
     }
     let mut last = None;
     for attempt in 0..SEEDS {
@@ -53,7 +52,7 @@ pub(super) fn retile(
             Err(error) => last = Some(error),
         }
     }
-    Err(refusal(&job, last)?)
+    Err(refusal(&job, last))
 }
 
 struct Job<'a> {
@@ -111,50 +110,24 @@ fn join(job: &Job, points: &[SurfacePoint]) -> Result<TriMesh, TessellateError> 
 }
 
 /// The error to give up with: for a topology that N points do not carry, a number that does.
-fn refusal(job: &Job, last: Option<TessellateError>) -> Result<RetileError, Cancelled> {
-    let asked = job.parameters.points;
+fn refusal(job: &Job, last: Option<TessellateError>) -> RetileError {
     match last {
-        Some(TessellateError::OpenSurface(defect)) => Ok(RetileError::OpenSurface(defect)),
+        Some(TessellateError::OpenSurface(defect)) => RetileError::OpenSurface(defect),
         Some(TessellateError::SelfIntersecting { pairs, mesh, .. }) => {
             let [t, _] = pairs[0];
             let [a, b, c] = mesh.corners(t as usize);
-            Ok(RetileError::SelfIntersecting {
-                points: asked,
+            RetileError::SelfIntersecting {
+                points: job.parameters.points,
                 place: ((a + b + c) / 3.0).into(),
-            })
-        }
-        _ => {
-            let least = quotas::least_points(&job.surface.mesh);
-            let mut needed = least.max(asked + 1);
-            let mut tried = asked;
-            let most = LEAST_TRIED.max(NEEDED_FACTOR * needed);
-            while needed <= most.min(super::MOST_POINTS) {
-                let larger = RetileParameters {
-                    points: needed,
-                    ..job.parameters.clone()
-                };
-                // As [`retile`] begins with that number.
-                let job = match Job::new(job.surface, &larger, job.monitor) {
-                    Ok(larger) => larger,
-                    Err(error) => return Ok(error),
-                };
-                match spread(&job, needed, 0) {
-                    Ok(points) if join(&job, &points).is_ok() => {
-                        return Ok(RetileError::TooFewPoints {
-                            points: asked,
-                            needed,
-                        });
-                    }
-                    Err(RetileError::Cancelled(cancelled)) => return Err(cancelled),
-                    _ => {}
-                }
-                tried = needed;
-                needed *= 2;
             }
-            Ok(RetileError::NotCarried {
-                points: asked,
-                tried,
-            })
         }
+        _ => too_few(job.surface, job.parameters, |larger| {
+            let job = Job::new(job.surface, larger, job.monitor)?;
+            match join(&job, &spread(&job, larger.points, 0)?) {
+                Ok(_) => Ok(true),
+                Err(TessellateError::Cancelled(cancelled)) => Err(cancelled.into()),
+                Err(_) => Ok(false),
+            }
+        }),
     }
 }

@@ -13,8 +13,7 @@
 use super::cells::Cells;
 use super::samples::Samples;
 use super::{
-    MOST_POINTS, RetileError, RetileFacts, RetileParameters, Tiled, dual, orientation, quotas,
-    sizing,
+    RetileError, RetileFacts, RetileParameters, Tiled, dual, orientation, quotas, sizing, too_few,
 };
 use crate::geometry::random::{Purpose, stream};
 use crate::geometry::{Vec3, triangle};
@@ -41,10 +40,7 @@ const THICKENING: f64 = 3.0;
 const STARTS: u64 = 3;
 /// Parts in which all triangles are looked through; each keeps a place for every cell.
 const MOST_TASKS: usize = 8;
-/// To tell which N would do, N is doubled as long as it stays below this multiple of the number
-/// asked for (or this number), with so many repairs each.
-pub(super) const NEEDED_FACTOR: usize = 16;
-pub(super) const LEAST_TRIED: usize = 2000;
+/// Repairs of each number that is tried to tell which N would do.
 const HURRIED_REPAIRS: usize = 6;
 
 /// Re-tiles `surface` by centroidal cells.
@@ -53,12 +49,10 @@ pub(super) fn retile(
     parameters: &RetileParameters,
     monitor: &Monitor,
 ) -> Result<Tiled, RetileError> {
-    let points = parameters.points;
-    let least = quotas::least_points(&surface.mesh);
-    if points < least {
-        return Err(refusal(surface, parameters, least, monitor)?);
+    if parameters.points < quotas::least_points(&surface.mesh) {
+        return Err(refusal(surface, parameters, monitor));
     }
-    let job = Job::new(surface, parameters, points);
+    let job = Job::new(surface, parameters);
     let mut facts = RetileFacts::default();
     for start in 0..STARTS {
         if let Some((mesh, sizing)) = job.attempt(start, REPAIRS, &mut facts, monitor)? {
@@ -69,35 +63,16 @@ pub(super) fn retile(
             });
         }
     }
-    Err(refusal(surface, parameters, points + 1, monitor)?)
+    Err(refusal(surface, parameters, monitor))
 }
 
-/// The error to give up with. It names a number of points, at least `from`, that does: what
-/// is tried here is how [`retile`] would begin with that number.
-fn refusal(
-    surface: &Surface,
-    parameters: &RetileParameters,
-    from: usize,
-    monitor: &Monitor,
-) -> Result<RetileError, RetileError> {
-    let asked = parameters.points;
-    let mut tried = asked;
-    let mut needed = from;
-    while needed <= MOST_POINTS.min(LEAST_TRIED.max(NEEDED_FACTOR * from)) {
-        let job = Job::new(surface, parameters, needed);
+/// The error to give up with, which names a number of points that does.
+fn refusal(surface: &Surface, parameters: &RetileParameters, monitor: &Monitor) -> RetileError {
+    too_few(surface, parameters, |larger| {
+        let job = Job::new(surface, larger);
         let mut ignored = RetileFacts::default();
-        if (job.attempt(0, HURRIED_REPAIRS, &mut ignored, monitor)?).is_some() {
-            return Ok(RetileError::TooFewPoints {
-                points: asked,
-                needed,
-            });
-        }
-        tried = needed;
-        needed *= 2;
-    }
-    Ok(RetileError::NotCarried {
-        points: asked,
-        tried,
+        let made = job.attempt(0, HURRIED_REPAIRS, &mut ignored, monitor)?;
+        Ok(made.is_some())
     })
 }
 
@@ -120,7 +95,8 @@ struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
-    fn new(surface: &'a Surface, parameters: &'a RetileParameters, points: usize) -> Self {
+    fn new(surface: &'a Surface, parameters: &'a RetileParameters) -> Self {
+        let points = parameters.points;
         let samples = Samples::new(
             &surface.mesh.vertices,
             &surface.working,
@@ -136,7 +112,7 @@ impl<'a> Job<'a> {
             surface,
             parameters,
             points,
-            volumes: orientation::volumes(&surface.mesh, &components),
+            volumes: topology::component_volumes(&surface.mesh, &components),
             components,
             least: quotas::least_of_components(&surface.mesh),
             samples,
@@ -154,7 +130,9 @@ impl<'a> Job<'a> {
         facts: &mut RetileFacts,
         monitor: &Monitor,
     ) -> Result<Option<(TriMesh, Vec<f64>)>, RetileError> {
+        monitor.check()?;
         let seeds = self.seeds(start);
+        monitor.check()?;
         let mut cells = Cells::grow(&self.samples, &seeds);
         let rounds = self.parameters.relaxation_iterations;
         monitor.report(Stage::Retile, 0.1)?;

@@ -2,6 +2,7 @@
 
 use crate::deform::voxelise::Mask;
 use crate::geometry::Vec3;
+use crate::progress::{Cancelled, Monitor};
 use crate::volume::Volume;
 
 /// The mask cannot be measured against.
@@ -21,14 +22,20 @@ pub enum ExpertError {
         /// All mask voxels.
         all: usize,
     },
+    /// The caller asked for an end.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
+
+/// Voxels between two looks at the cancel token.
+const PORTION: usize = 1 << 14;
 
 /// `expert` (anything above 0.5) on the grid of `volume`: as it is where the grids agree
 /// within a hundredth of a voxel, else by the nearest voxel in the patient.
 ///
 /// # Errors
 /// [`ExpertError`].
-pub fn on_grid(expert: &Volume, volume: &Volume) -> Result<Mask, ExpertError> {
+pub fn on_grid(expert: &Volume, volume: &Volume, monitor: &Monitor) -> Result<Mask, ExpertError> {
     let all = expert.voxels.iter().filter(|v| **v > 0.5).count();
     if all == 0 {
         return Err(ExpertError::Empty);
@@ -39,14 +46,21 @@ pub fn on_grid(expert: &Volume, volume: &Volume) -> Result<Mask, ExpertError> {
             voxels: expert.voxels.iter().map(|v| *v > 0.5).collect(),
         });
     }
-    let inside = (0..expert.voxels.len())
-        .filter(|v| expert.voxels[*v] > 0.5 && contains(volume, &place(expert, *v)))
-        .count();
+    let mut inside = 0;
+    for (v, value) in expert.voxels.iter().enumerate() {
+        if v % PORTION == 0 {
+            monitor.check()?;
+        }
+        inside += usize::from(*value > 0.5 && contains(volume, &place(expert, v)));
+    }
     if inside * 100 < all * 99 {
         return Err(ExpertError::Elsewhere { inside, all });
     }
     let mut mask = Mask::empty(volume.shape);
     for (v, voxel) in mask.voxels.iter_mut().enumerate() {
+        if v % PORTION == 0 {
+            monitor.check()?;
+        }
         *voxel = value_at(expert, &place(volume, v)) > 0.5;
     }
     Ok(mask)
@@ -105,8 +119,8 @@ mod tests {
     fn a_mask_on_another_grid_is_taken_over_by_place() {
         let image = volume([30; 3], 2.0, Vec3::zeros(), 10.0);
         let fine = volume([50; 3], 1.0, Vec3::new(1.0, 0.5, 0.0), 10.0);
-        let taken = on_grid(&fine, &image).unwrap();
-        let own = on_grid(&image, &image).unwrap();
+        let taken = on_grid(&fine, &image, &Monitor::silent()).unwrap();
+        let own = on_grid(&image, &image, &Monitor::silent()).unwrap();
         let differing = taken.voxels.iter().zip(&own.voxels).filter(|(a, b)| a != b);
         // Half a fine voxel of displacement on a ball of five coarse ones.
         assert!(differing.count() * 8 < own.count());
@@ -116,11 +130,14 @@ mod tests {
     fn empty_and_distant_masks_are_refused() {
         let image = volume([30; 3], 2.0, Vec3::zeros(), 10.0);
         let none = volume([30; 3], 2.0, Vec3::zeros(), 0.0);
-        assert_eq!(on_grid(&none, &image), Err(ExpertError::Empty));
+        assert_eq!(
+            on_grid(&none, &image, &Monitor::silent()),
+            Err(ExpertError::Empty)
+        );
         let mut far = image.clone();
         far.frame = VoxelToPatient::centred([30; 3], [2.0; 3], Vec3::new(400.0, 0.0, 0.0)).unwrap();
         assert!(matches!(
-            on_grid(&far, &image),
+            on_grid(&far, &image, &Monitor::silent()),
             Err(ExpertError::Elsewhere { inside: 0, .. })
         ));
     }

@@ -1,9 +1,10 @@
-//! A patient's segmentation from beginning to end: fit, mask, volumes, polar map, measures.
+//! A patient's segmentation from beginning to end: fit, mask, volumes, polar map, measures,
+//! pictures.
 //!
 //! Several templates may be given: each is fitted, and the fit with the greatest
 //! [`Fit::merit`](crate::deform::Fit::merit) is taken (the first of equals); the others'
 //! figures are kept to say why. A template that cannot be fitted is left out with its reason,
-//! unless none can.
+//! unless none can. The organ is searched once for all of them.
 
 mod expert;
 mod report;
@@ -13,8 +14,9 @@ pub use report::{agreement_json, report_json};
 
 use crate::deform::template::Template;
 use crate::deform::voxelise::{Mask, voxelise};
-use crate::deform::{DeformError, DeformParameters, Fit, fit};
+use crate::deform::{DeformError, DeformParameters, Fit, Place, fit_at};
 use crate::evaluate::masks::{Agreement, compare};
+use crate::evaluate::slices::{self, Cut};
 use crate::polar::{self, PolarMap, PolarParameters};
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::volume::Volume;
@@ -72,6 +74,8 @@ pub struct Segmentation {
     pub polar: Option<PolarMap>,
     /// Against the expert's mask, where one was given.
     pub agreement: Option<Agreement>,
+    /// Slices of the volume with the contours of fit and expert: a PNG.
+    pub slices: Vec<u8>,
     /// Place of the taken template in `candidates`.
     pub chosen: usize,
     /// Every template fitted, in the order given.
@@ -91,10 +95,19 @@ pub enum SegmentationError {
     Deform(#[from] DeformError),
     /// The expert's mask cannot be used.
     #[error(transparent)]
-    Expert(#[from] ExpertError),
+    Expert(ExpertError),
     /// The caller asked for an end.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl From<ExpertError> for SegmentationError {
+    fn from(error: ExpertError) -> Self {
+        match error {
+            ExpertError::Cancelled(cancelled) => cancelled.into(),
+            other => SegmentationError::Expert(other),
+        }
+    }
 }
 
 /// Segments `volume` by the best of `templates`; measures against `expert` if given.
@@ -108,7 +121,7 @@ pub fn segment(
     expert: Option<&Volume>,
     monitor: &Monitor,
 ) -> Result<Segmentation, SegmentationError> {
-    let expert = expert.map(|e| on_grid(e, volume)).transpose()?;
+    let expert = expert.map(|e| on_grid(e, volume, monitor)).transpose()?;
     let Trials {
         mut fits,
         candidates,
@@ -129,15 +142,22 @@ pub fn segment(
     monitor.report(Stage::Report, 0.5)?;
     let agreement = match &expert {
         // One grid by construction: `on_grid` made the mask on the volume's.
-        Some(expert) => compare(&mask, expert, volume.frame.spacing()).ok(),
+        Some(expert) => compare(&mask, expert, volume.frame.spacing(), monitor).ok(),
         None => None,
     };
+    monitor.report(Stage::Report, 0.8)?;
+    let cut = match (&fit.cup, &fit.posture) {
+        (Some(cup), Some(posture)) => Cut::heart(cup, &posture.superior),
+        _ => Cut::body(&fit.mesh),
+    };
+    let slices = slices::png(volume, &fit.mesh, &cut, expert.as_ref(), monitor)?;
     monitor.report(Stage::Report, 1.0)?;
     Ok(Segmentation {
         fit,
         mask,
         polar,
         agreement,
+        slices,
         chosen,
         candidates,
         refused,
@@ -160,10 +180,15 @@ fn try_all(
 ) -> Result<Trials, SegmentationError> {
     let mut trials = Trials::default();
     let mut first = None;
+    let mut place: Option<Place> = None;
     for (index, NamedTemplate { name, template }) in templates.iter().enumerate() {
+        let place = match place.take().filter(|place| place.suits(template)) {
+            Some(found) => place.insert(found),
+            None => place.insert(Place::find(volume, template, parameters, monitor)?),
+        };
         let monitor = monitor.piece(index, templates.len());
         let name = name.clone();
-        match fit(volume, template, parameters, &monitor) {
+        match fit_at(place, volume, template, parameters, &monitor) {
             Ok(fit) => {
                 trials.candidates.push(Candidate {
                     name,

@@ -7,6 +7,7 @@ use std::borrow::Cow;
 
 use super::survey::Survey;
 use crate::geometry::Vec3;
+use crate::progress::{Cancelled, Monitor};
 use crate::volume::Volume;
 
 /// Block means of a volume.
@@ -30,7 +31,15 @@ pub struct Coarse<'a> {
 impl<'a> Coarse<'a> {
     /// Averages `volume` to blocks of at most `size` mm, or of one voxel where that is larger; the
     /// minimum that `survey` found stands in for what is not finite.
-    pub fn new(volume: &'a Volume, size: f64, survey: &Survey) -> Self {
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn new(
+        volume: &'a Volume,
+        size: f64,
+        survey: &Survey,
+        monitor: &Monitor,
+    ) -> Result<Self, Cancelled> {
         let fine = volume.frame.spacing();
         let factor = [0, 1, 2].map(|r| ((size / fine[r]) as usize).clamp(1, volume.shape[r]));
         let shape = [0, 1, 2].map(|r| volume.shape[r] / factor[r]);
@@ -38,11 +47,11 @@ impl<'a> Coarse<'a> {
         let (values, maximum): (Cow<[f32]>, f32) = if factor == [1; 3] && survey.not_finite == 0 {
             (Cow::Borrowed(&volume.voxels), survey.maximum)
         } else {
-            let means = block_means(volume, shape, factor, survey.minimum);
+            let means = block_means(volume, shape, factor, survey.minimum, monitor)?;
             let maximum = means.iter().copied().fold(survey.minimum, f32::max);
             (Cow::Owned(means), maximum)
         };
-        Self {
+        Ok(Self {
             values,
             shape,
             spacing,
@@ -50,7 +59,7 @@ impl<'a> Coarse<'a> {
             maximum,
             inverse_spacing: Vec3::from(spacing.map(|s| 1.0 / s)),
             shift: Vec3::from_fn(|r, _| (spacing[r] - fine[r]) / 2.0),
-        }
+        })
     }
 
     /// The value of the block at `p` (mm along the array's axes); 0 beyond the border.
@@ -86,7 +95,13 @@ impl<'a> Coarse<'a> {
     }
 }
 
-fn block_means(volume: &Volume, shape: [usize; 3], factor: [usize; 3], missing: f32) -> Vec<f32> {
+fn block_means(
+    volume: &Volume,
+    shape: [usize; 3],
+    factor: [usize; 3],
+    missing: f32,
+    monitor: &Monitor,
+) -> Result<Vec<f32>, Cancelled> {
     use rayon::prelude::*;
     let share = 1.0 / factor.iter().product::<usize>() as f32;
     let width = shape[0] * factor[0];
@@ -94,7 +109,8 @@ fn block_means(volume: &Volume, shape: [usize; 3], factor: [usize; 3], missing: 
     means
         .par_chunks_mut(shape[0] * shape[1])
         .enumerate()
-        .for_each(|(k, plane)| {
+        .try_for_each(|(k, plane)| {
+            monitor.check()?;
             let mut line = vec![0f32; width];
             for (j, row) in plane.chunks_mut(shape[0]).enumerate() {
                 line.fill(0.0);
@@ -110,6 +126,7 @@ fn block_means(volume: &Volume, shape: [usize; 3], factor: [usize; 3], missing: 
                     *mean = block.iter().sum::<f32>() * share;
                 }
             }
-        });
-    means
+            Ok(())
+        })?;
+    Ok(means)
 }

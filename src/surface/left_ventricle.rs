@@ -98,15 +98,15 @@ pub fn find(
     survey: &Survey,
     monitor: &Monitor,
 ) -> Result<Option<Ventricle>, Cancelled> {
-    let blocks = Coarse::new(volume, PART_BLOCK, survey);
+    let blocks = Coarse::new(volume, PART_BLOCK, survey, monitor)?;
     if !(blocks.maximum > 0.0) {
         return Ok(None);
     }
     let (parts, grid) = rayon::join(
         || parts(&blocks, monitor),
-        || Coarse::new(volume, RAY_BLOCK, survey),
+        || Coarse::new(volume, RAY_BLOCK, survey, monitor),
     );
-    let parts = parts?;
+    let (parts, grid) = (parts?, grid?);
     let table = directions();
     let best = best_of(&grid, &table, &parts, monitor)?;
     if best.as_ref().is_some_and(|b| b.score >= DOUBTFUL) {

@@ -61,6 +61,7 @@ pub use read::{ReadLimits, ReadOptions, Reading, inspect, read};
 pub use source::VolumeFile;
 pub use summary::summarise;
 
+use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
 
 /// Voxel values on a regular grid with its place in the patient.
@@ -80,6 +81,19 @@ pub struct Volume {
 }
 
 impl Volume {
+    /// The values of a function of place (LPS mm) at the centres of the voxels; not integral.
+    pub fn sampled(shape: [usize; 3], frame: VoxelToPatient, value: impl Fn(&Vec3) -> f64) -> Self {
+        let [nx, ny, nz] = shape;
+        let centre = |v: usize| [v % nx, v / nx % ny, v / nx / ny].map(|index| index as f64);
+        let at = |v: usize| value(&frame.to_patient(&Vec3::from(centre(v)))) as f32;
+        Self {
+            shape,
+            voxels: (0..nx * ny * nz).map(at).collect(),
+            frame,
+            integral: false,
+        }
+    }
+
     /// The value of voxel (i, j, k).
     ///
     /// # Panics

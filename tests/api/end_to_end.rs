@@ -54,6 +54,23 @@ async fn a_scan_becomes_a_closed_mesh_of_exactly_the_points_asked_for() {
         .await
         .unwrap();
     assert!(preview.starts_with(b"\x89PNG"));
+
+    // The page is made of what is kept of the model, with the volume or without it.
+    let page = async || {
+        let page = service
+            .get(&format!("{model}/report.html"))
+            .send()
+            .await
+            .unwrap();
+        assert_eq!(page.status(), 200);
+        page.text().await.unwrap()
+    };
+    let before = page().await;
+    assert!(before.contains("every promise") && before.contains("How close the model is"));
+    let volume = text(&facts["volumes"][0]["links"]["self"]);
+    let erased = service.delete(&volume).send().await.unwrap();
+    assert_eq!(erased.status(), 204);
+    assert_eq!(page().await, before);
 }
 
 #[tokio::test]
@@ -181,6 +198,18 @@ async fn a_scan_is_segmented_and_measured_against_an_expert() {
         let bytes = answer.bytes().await.unwrap();
         assert_eq!(bytes.len() as u64, file["bytes"].as_u64().unwrap());
     }
+    let page = service.0.get(&format!("{path}/report"));
+    let page = page.header("accept", "text/html").send().await.unwrap();
+    let page = page.text().await.unwrap();
+    for shown in [
+        "Short axis",
+        "Uptake of the wall",
+        "the expert's mask",
+        "The fitted model",
+    ] {
+        assert!(page.contains(shown), "{shown}");
+    }
+    assert!(page.matches("data:image/png").count() == 4 && page.contains("data:image/svg+xml"));
     let polar = service.json(&format!("{path}/polar.json")).await;
     assert_eq!(polar["segments"].as_array().unwrap().len(), 17);
 

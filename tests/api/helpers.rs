@@ -12,8 +12,8 @@ use ventriform::config::Settings;
 use ventriform::export::{self, Format, Metadata};
 use ventriform::http::{Running, start};
 use ventriform::jobs::{
-    Engine, Failure, Fault, Input, Intensity, Needs, Output, OutputFile, Resource, VolumeFacts,
-    VolumeReader, Work, WorkError,
+    Engine, Failure, Fault, Input, Intensity, Needs, Output, OutputFile, Resource, Stored,
+    VolumeFacts, VolumeReader, Work, WorkError,
 };
 use ventriform::mesh::TriMesh;
 use ventriform::mesh::shapes::icosphere;
@@ -306,7 +306,6 @@ impl Work for FakeWork {
         }
         let mut output = sphere();
         if self.makes() == Resource::Segmentation {
-            output.files.retain(|file| file.name != "report.html");
             output.files.push(OutputFile {
                 name: "mask.nii.gz".into(),
                 media_type: "application/gzip",
@@ -319,6 +318,12 @@ impl Work for FakeWork {
             output.summary.insert("seen".into(), seen);
         }
         Ok(output)
+    }
+
+    fn page(&self, stored: &Stored) -> Result<String, Failure> {
+        let report = stored.read("report.json").unwrap().unwrap();
+        let report = String::from_utf8(report).unwrap();
+        Ok(format!("<!doctype html><title>report</title>{report}"))
     }
 }
 
@@ -357,11 +362,6 @@ fn sphere() -> Output {
         name: "report.json".into(),
         media_type: "application/json",
         bytes: json!({"mesh": {"vertices": 42}}).to_string().into_bytes(),
-    });
-    files.push(OutputFile {
-        name: "report.html".into(),
-        media_type: "text/html; charset=utf-8",
-        bytes: b"<!doctype html><title>report</title>".to_vec(),
     });
     Output {
         summary: [("vertices".to_owned(), json!(42))].into_iter().collect(),
@@ -447,6 +447,10 @@ impl Service {
 
     pub fn post(&self, path: &str) -> RequestBuilder {
         self.client.post(format!("{}{path}", self.url))
+    }
+
+    pub fn delete(&self, path: &str) -> RequestBuilder {
+        self.client.delete(format!("{}{path}", self.url))
     }
 
     /// Ends it as a power cut would.

@@ -87,6 +87,45 @@ async fn the_report_is_json_for_programs_and_a_page_for_people() {
 }
 
 #[tokio::test]
+async fn the_page_is_made_on_demand_and_served_like_a_file() {
+    let app = TestApp::start().await;
+    let model = app.model("sphere").await;
+    let names: Vec<String> = model["files"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|f| text(&f["name"]))
+        .collect();
+    assert!(!names.contains(&"report.html".into()), "{names:?}");
+    let path = text(&model["links"]["page"]);
+    let whole = app.get(&path).send().await.unwrap();
+    let headers = whole.headers().clone();
+    assert_eq!(headers["content-type"], "text/html; charset=utf-8");
+    assert_eq!(headers["content-location"], path.as_str());
+    let whole = whole.bytes().await.unwrap();
+    assert_eq!(headers["content-length"], whole.len().to_string());
+    let unchanged = app.get(&path).header("if-none-match", &headers["etag"]);
+    assert_eq!(
+        unchanged.send().await.unwrap().status(),
+        StatusCode::NOT_MODIFIED
+    );
+    let part = app
+        .get(&path)
+        .header("range", "bytes=2-8")
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(part.status(), StatusCode::PARTIAL_CONTENT);
+    assert_eq!(part.bytes().await.unwrap(), whole[2..9]);
+    let template = app
+        .get("/v1/templates/tpl_0/report.html")
+        .send()
+        .await
+        .unwrap();
+    problem(template, 404, "not-found").await;
+}
+
+#[tokio::test]
 async fn results_carry_strong_validators_and_come_in_parts() {
     let app = TestApp::start().await;
     let model = app.model("sphere").await;

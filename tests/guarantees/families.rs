@@ -32,16 +32,7 @@ fn direction(random: &mut impl Rng) -> Vec3 {
 
 fn volume(shape: [usize; 3], spacing: f64, value: impl Fn(Vec3) -> f64) -> Volume {
     let frame = VoxelToPatient::centred(shape, [spacing; 3], Vec3::zeros()).unwrap();
-    let [nx, ny, nz] = shape;
-    let place = |n: usize| Vec3::new((n % nx) as f64, (n / nx % ny) as f64, (n / nx / ny) as f64);
-    Volume {
-        shape,
-        voxels: (0..nx * ny * nz)
-            .map(|n| value(frame.to_patient(&place(n))) as f32)
-            .collect(),
-        frame,
-        integral: false,
-    }
+    Volume::sampled(shape, frame, |p| value(*p))
 }
 
 /// The surface of everything at or above [`LEVEL`], with all its handles and components.

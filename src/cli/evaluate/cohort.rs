@@ -11,9 +11,46 @@ use crate::evaluate::rows::Gold;
 use crate::progress::Monitor;
 use crate::volume::Reading;
 use anyhow::{Context, Result, bail};
+use clap::Args;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+
+/// Which cohort, and how its templates' models are made. A command that takes these sets the
+/// default of `points`.
+#[derive(Debug, Args)]
+pub struct CohortArgs {
+    /// The cohort's folder: one folder for each case with spect.nii.gz, lv_expert_img.nii.gz
+    /// and lv_truth.nii.gz; manifest.json says which are templates (else: names with t)
+    #[arg(long, value_name = "DIR")]
+    cohort: PathBuf,
+    /// Numbers of points of our models
+    #[arg(long, value_name = "N,...", value_delimiter = ',')]
+    points: Vec<usize>,
+    /// The template whose model comes from its expert's mask [default: the third, if it has one]
+    #[arg(long, value_name = "CASE")]
+    manual: Option<String>,
+}
+
+impl CohortArgs {
+    /// Looks at the folder.
+    pub fn open(&self) -> Result<Cohort> {
+        Cohort::open(&self.cohort, self.manual.as_deref())
+    }
+
+    /// The numbers of points, each once, rising.
+    pub fn points(&self) -> Vec<usize> {
+        sorted(&self.points)
+    }
+}
+
+/// The numbers, each once, rising.
+pub fn sorted(numbers: &[usize]) -> Vec<usize> {
+    let mut numbers = numbers.to_vec();
+    numbers.sort_unstable();
+    numbers.dedup();
+    numbers
+}
 
 /// A cohort's folder and who is who in it.
 pub struct Cohort {
@@ -35,7 +72,7 @@ impl Cohort {
     /// Looks at `folder`. `manual` names the template whose model is to come from the expert's
     /// mask; otherwise, as in the paper (two scans by threshold, one manual mask, one
     /// phantom), it is the third template, where it has such a mask.
-    pub fn open(folder: &Path, manual: Option<&str>) -> Result<Self> {
+    fn open(folder: &Path, manual: Option<&str>) -> Result<Self> {
         let mut cohort = Self {
             folder: folder.to_path_buf(),
             templates: Vec::new(),

@@ -6,9 +6,10 @@ use super::record::{self, Key};
 use crate::cli::Bar;
 use crate::deform::cup::Cup;
 use crate::deform::voxelise::{Mask, voxelise};
-use crate::deform::{DeformParameters, fit};
+use crate::deform::{DeformError, DeformParameters, Place, fit_at};
 use crate::evaluate::masks::compare;
 use crate::evaluate::rows::{Agreed, Gold, Outcome, Row};
+use crate::evaluate::slices::{self, Cut};
 use crate::evaluate::table::rounded;
 use crate::export::{self, Format, Metadata};
 use crate::geometry::Vec3;
@@ -18,6 +19,7 @@ use crate::segmentation::on_grid;
 use crate::volume::Volume;
 use anyhow::{Context, Result};
 use rayon::prelude::*;
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -235,6 +237,8 @@ impl Fitted {
 pub struct Scene {
     volume: std::result::Result<Volume, String>,
     golds: [Option<Mask>; 2],
+    /// Where the ventricle is, once it was looked for.
+    place: OnceCell<std::result::Result<Place, DeformError>>,
 }
 
 impl Scene {
@@ -250,9 +254,13 @@ impl Scene {
         };
         let golds = golds.each_ref().map(|path| {
             let mask = read_volume(path.as_ref()?).ok()?.volume;
-            on_grid(&mask, volume.as_ref().ok()?).ok()
+            on_grid(&mask, volume.as_ref().ok()?, &Monitor::silent()).ok()
         });
-        Self { volume, golds }
+        Self {
+            volume,
+            golds,
+            place: OnceCell::new(),
+        }
     }
 
     fn fit(&self, model: &Model, parameters: &DeformParameters) -> Fitted {
@@ -260,14 +268,22 @@ impl Scene {
             Ok(volume) => volume,
             Err(reason) => return Fitted::without_fit(Outcome::Unreadable(reason.clone())),
         };
-        let found = match fit(volume, &model.ready, parameters, &Monitor::silent()) {
+        let silent = Monitor::silent();
+        let place = self
+            .place
+            .get_or_init(|| Place::find(volume, &model.ready, parameters, &silent));
+        let found = match place
+            .as_ref()
+            .map_err(Clone::clone)
+            .and_then(|place| fit_at(place, volume, &model.ready, parameters, &silent))
+        {
             Ok(found) => found,
             Err(error) => return Fitted::without_fit(Outcome::Lost(error.to_string())),
         };
         let mask = voxelise(&found.mesh, volume.shape, &volume.frame);
         let spacing = volume.frame.spacing();
         let agreed = self.golds.each_ref().map(|gold| {
-            let a = compare(&mask, gold.as_ref()?, spacing).ok()?;
+            let a = compare(&mask, gold.as_ref()?, spacing, &silent).ok()?;
             Some(Agreed {
                 jaccard: rounded(a.jaccard),
                 contour_voxels: a.contours.map(|c| rounded(c.mean_voxels)),
@@ -320,14 +336,16 @@ pub fn picture(
     let volume = read_volume(&scan)
         .context("the scan was readable a moment ago")?
         .volume;
-    let expert = cohort
-        .gold(case, Gold::Expert)
-        .and_then(|path| on_grid(&read_volume(&path).ok()?.volume, &volume).ok());
+    let expert = cohort.gold(case, Gold::Expert).and_then(|path| {
+        on_grid(
+            &read_volume(&path).ok()?.volume,
+            &volume,
+            &Monitor::silent(),
+        )
+        .ok()
+    });
     let mesh = fitted.mesh(model);
-    Ok(Some(crate::evaluate::slices::png(
-        &volume,
-        &mesh,
-        cup,
-        expert.as_ref(),
-    )))
+    let (cut, silent) = (Cut::heart(cup, &Vec3::z()), Monitor::silent());
+    let png = slices::png(&volume, &mesh, &cut, expert.as_ref(), &silent)?;
+    Ok(Some(png))
 }

@@ -25,7 +25,7 @@ use crate::evaluate::table::{self, Evaluation, Picture};
 use crate::parameters::ModelParameters;
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use cohort::Cohort;
+use cohort::{Cohort, CohortArgs, sorted};
 use fits::Patient;
 use models::Model;
 use rayon::prelude::*;
@@ -38,19 +38,10 @@ use std::path::{Path, PathBuf};
 Writes evaluation.html, evaluation.json, table1.csv, figure3.csv and fits.csv; models/ holds the
 models, fits/ the result and the fitted mesh of every fit. Fits that are there already are not
 made again unless model, files, options or program have changed.")]
+#[command(mut_arg("points", |arg| arg.default_value("67,110,150,200,300")))]
 pub struct EvaluateArgs {
-    /// The cohort's folder: one folder for each case with spect.nii.gz, lv_expert_img.nii.gz
-    /// and lv_truth.nii.gz; manifest.json says which are templates (else: names with t)
-    #[arg(long, value_name = "DIR")]
-    cohort: PathBuf,
-    /// Numbers of points of our models
-    #[arg(
-        long,
-        value_name = "N,...",
-        value_delimiter = ',',
-        default_value = "67,110,150,200,300"
-    )]
-    points: Vec<usize>,
+    #[command(flatten)]
+    cohort: CohortArgs,
     /// Numbers of points of the reference model
     #[arg(
         long,
@@ -71,9 +62,6 @@ pub struct EvaluateArgs {
     /// How our models are made: as by `generate --method`
     #[arg(long, value_name = "WORD", default_value = "refined")]
     method: String,
-    /// The template whose model comes from its expert's mask [default: the third, if it has one]
-    #[arg(long, value_name = "CASE")]
-    manual: Option<String>,
     /// Stiffness of support springs between all nodes within a radius, to see what they do
     #[arg(
         long,
@@ -126,10 +114,6 @@ enum ScalingName {
 }
 
 impl EvaluateArgs {
-    fn points(&self) -> Vec<usize> {
-        sorted(&self.points)
-    }
-
     fn reference_points(&self) -> Vec<usize> {
         sorted(&self.reference_points)
     }
@@ -177,7 +161,7 @@ impl EvaluateArgs {
         };
         let mut settings = vec![
             ("patients".to_owned(), cohort.patients.join(", ")),
-            ("points".to_owned(), list(&self.points())),
+            ("points".to_owned(), list(&self.cohort.points())),
             (
                 "reference model".to_owned(),
                 format!(
@@ -212,13 +196,6 @@ impl EvaluateArgs {
     }
 }
 
-fn sorted(numbers: &[usize]) -> Vec<usize> {
-    let mut numbers = numbers.to_vec();
-    numbers.sort_unstable();
-    numbers.dedup();
-    numbers
-}
-
 /// Runs `ventriform evaluate`.
 ///
 /// # Errors
@@ -227,7 +204,7 @@ fn sorted(numbers: &[usize]) -> Vec<usize> {
 pub fn run(args: &EvaluateArgs) -> Result<()> {
     let parameters = args.deform_parameters()?;
     args.model_parameters(None)?;
-    let cohort = Cohort::open(&args.cohort, args.manual.as_deref())?;
+    let cohort = args.cohort.open()?;
     let (models_folder, fits_folder) = (args.out.join("models"), args.out.join("fits"));
     make_folder(&models_folder)?;
     make_folder(&fits_folder)?;

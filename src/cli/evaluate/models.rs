@@ -78,7 +78,7 @@ fn of_template(cohort: &Cohort, case: &str, args: &EvaluateArgs) -> Result<Vec<R
             models.push(workshop.thin_out(points));
         }
     }
-    for points in args.points() {
+    for points in args.cohort.points() {
         let made = args
             .model_parameters(Some(points))
             .and_then(|p| workshop.retile(points, &p));

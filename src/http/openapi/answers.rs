@@ -119,16 +119,6 @@ impl IntoResponses for SegmentationAnswer {
     }
 }
 
-/// 200 with a segmentation's report.
-pub struct SegmentationReportAnswer;
-
-impl IntoResponses for SegmentationReportAnswer {
-    fn responses() -> Responses {
-        let json = ("application/json", Content::new(Some(object())));
-        file_answer("The report", [json].into())
-    }
-}
-
 /// 200 with any of a segmentation's files.
 pub struct SegmentationFileAnswer;
 
@@ -139,6 +129,7 @@ impl IntoResponses for SegmentationFileAnswer {
         for picture in ["image/svg+xml", "image/png"] {
             contents.insert(picture, Content::new(Some(binary())));
         }
+        contents.extend(report_contents());
         file_answer("The file", contents)
     }
 }

@@ -246,10 +246,12 @@ impl IntoParams for ConditionalHeaders {
 pub fn file_names(resource: Resource) -> Vec<String> {
     let meshes = Format::ALL.map(|format| format!("mesh.{}", format.extension()));
     let others: &[&str] = match resource {
-        Resource::Model => &["report.json", "report.html"],
+        Resource::Model => &["report.json", "report.html", "distance.json"],
         Resource::Segmentation => &[
             "mask.nii.gz",
             "report.json",
+            "report.html",
+            "slices.png",
             "polar.json",
             "polar.svg",
             "polar.png",

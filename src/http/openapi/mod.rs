@@ -11,7 +11,7 @@ mod inputs;
 pub use answers::{
     DownloadAnswers, EraseProblems, EventsAnswer, FileAnswer, FileProblems, ListProblems,
     LookupProblems, MeshAnswer, ReportAnswer, SegmentationAnswer, SegmentationFileAnswer,
-    SegmentationReportAnswer, UploadProblems,
+    UploadProblems,
 };
 pub use bodies::{JobRequest, MeshDocument, SegmentationForm, UploadForm};
 pub use inputs::{
@@ -21,6 +21,7 @@ pub use inputs::{
 };
 
 use utoipa::OpenApi;
+use utoipa::openapi::{RefOr, Required};
 
 /// Title, licence and tags.
 #[derive(OpenApi)]
@@ -47,7 +48,14 @@ pub struct Document;
 
 /// The whole document as it is published.
 pub fn document() -> utoipa::openapi::OpenApi {
-    super::router::routes().split_for_parts().1
+    let mut document = super::router::routes().split_for_parts().1;
+    let add = document.paths.paths.get_mut("/v1/templates");
+    let body = add.and_then(|path| path.post.as_mut()?.request_body.as_mut());
+    if let Some(RefOr::T(body)) = body {
+        // `model` may name the mesh instead. An optional type would allow the body `null`.
+        body.required = Some(Required::False);
+    }
+    document
 }
 
 /// The document's bytes, as committed under `openapi/`.

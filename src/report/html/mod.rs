@@ -1,4 +1,5 @@
-//! The report as one page for a person.
+//! Reports as pages for people: a model's ([`html()`]) and a segmentation's
+//! ([`segmentation()`]).
 //!
 //! Self-contained: style, pictures and a small script are inside; nothing is fetched, also
 //! not fonts. The page carries its own Content-Security-Policy, which allows just that
@@ -6,8 +7,10 @@
 //! [`content_security_policy`]. Without scripts all but the turning view is there.
 
 mod charts;
+mod parts;
 mod raster;
 mod sections;
+mod segmentation;
 mod text;
 mod views;
 
@@ -15,8 +18,10 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use sha2::{Digest, Sha256};
 
-use super::Report;
+use super::closeness::Closeness;
+use super::{Report, Software};
 use crate::mesh::TriMesh;
+pub use segmentation::{Pictured, segmentation};
 use text::escape;
 
 const STYLE: &str = include_str!("page.css");
@@ -32,25 +37,31 @@ pub fn content_security_policy() -> String {
     )
 }
 
-/// The page for `report` on `mesh`; with `reference`, the surface that the model was made
-/// from, also the model coloured by its distance to it.
-pub fn html(report: &Report, mesh: &TriMesh, reference: Option<&TriMesh>) -> String {
+/// The page for `report` on `mesh`; with `closeness`, the distances to the surface that the
+/// model was made from, also the model coloured by them.
+pub fn html(report: &Report, mesh: &TriMesh, closeness: Option<&Closeness>) -> String {
     let title = format!(
         "Left ventricle: surface model of {} points",
         report.mesh.vertices
     );
+    let closeness = closeness.filter(|c| c.suits(mesh.triangles.len()));
     let body = [
         sections::verdict(report),
         sections::figures(report),
-        sections::warnings(report),
-        sections::model(mesh),
-        reference.map_or_else(String::new, |s| sections::closeness(report, mesh, s)),
+        parts::warnings("Please note", report.warnings.iter().map(String::as_str)),
+        parts::model("The model", mesh),
+        closeness.map_or_else(String::new, |c| sections::closeness(report, mesh, c)),
         sections::fitness(report),
         sections::distributions(report),
         sections::measures(report),
         sections::particulars(report),
     ]
     .concat();
+    document(&title, &sections::origin(report), &body, &report.software)
+}
+
+/// A whole page.
+fn document(title: &str, origin: &str, body: &str, software: &Software) -> String {
     format!(
         r#"<!DOCTYPE html>
 <html lang="en">
@@ -75,9 +86,9 @@ pub fn html(report: &Report, mesh: &TriMesh, reference: Option<&TriMesh>) -> Str
 </html>
 "#,
         policy = content_security_policy(),
-        title = escape(&title),
-        origin = escape(&sections::origin(report)),
-        name = report.software.name,
-        version = report.software.version,
+        title = escape(title),
+        origin = escape(origin),
+        name = escape(&software.name),
+        version = escape(&software.version),
     )
 }

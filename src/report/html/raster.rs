@@ -4,9 +4,6 @@
 //! [`SUPERSAMPLING`] times the size and averaged, so that outlines are smooth; the
 //! background is transparent, so that the picture suits light and dark pages.
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
-
 use crate::geometry::Vec3;
 
 /// Rows and columns of rendered pixels for each of the picture's.
@@ -235,11 +232,6 @@ impl Sides {
         let to = |[x, y, offset]: [f64; 3]| (x * p.x + y * p.y + offset).abs();
         to(self.0[0]).min(to(self.0[1])).min(to(self.0[2]))
     }
-}
-
-/// A PNG as a `data:` URI.
-pub fn data_uri(png: &[u8]) -> String {
-    format!("data:image/png;base64,{}", STANDARD.encode(png))
 }
 
 #[cfg(test)]

@@ -1,21 +1,17 @@
 //! The page's sections, from the verdict to the particulars.
 
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::charts;
-use super::raster::View;
-use super::text::{escape, leaves, number, signed};
-use super::views::{self, Pictures};
-use crate::geometry::Vec3;
-use crate::geometry::bvh::Aabb;
+use super::parts::{self, Verdict, figure, shown};
+use super::text::{number, signed};
+use super::views;
 use crate::mesh::TriMesh;
 use crate::report::Report;
+use crate::report::closeness::Closeness;
 use crate::report::distance::Direction;
 use crate::report::elements::Shape;
 use crate::report::summary::Summary;
-
-/// Most triangles that a browser turns smoothly.
-const MOST_TURNED: usize = 20_000;
 
 /// One line on where the model comes from.
 pub fn origin(report: &Report) -> String {
@@ -59,8 +55,11 @@ fn checks(report: &Report) -> Vec<(bool, String)> {
             "Manifold: two triangles at every edge, one fan at every point".to_owned(),
         ),
         (
-            mesh.oriented && mesh.outward,
-            "Every triangle faces outward".to_owned(),
+            mesh.oriented && mesh.outward && mesh.outward_components == surface.outward_components,
+            match mesh.components - mesh.outward_components {
+                0 => "Every triangle faces outward".to_owned(),
+                n => format!("Every triangle faces out of the wall, also about {n} cavities"),
+            },
         ),
         (
             mesh.self_intersections == 0,
@@ -89,40 +88,20 @@ fn improvement(gain_percent: f64) -> String {
 pub fn verdict(report: &Report) -> String {
     let checks = checks(report);
     let failed = checks.iter().filter(|(holds, _)| !holds).count();
-    let (class, sign, headline) = match failed {
-        0 => ("", "✓", "The model keeps every promise.".to_owned()),
+    let (outcome, headline) = match failed {
+        0 => (Verdict::Good, "The model keeps every promise.".to_owned()),
         n => (
-            " bad",
-            "✗",
+            Verdict::Bad,
             format!("{n} of {} promises are broken.", checks.len()),
         ),
     };
-    let items: String = checks
-        .iter()
-        .map(|(holds, text)| {
-            let class = if *holds { "" } else { r#" class="no""# };
-            let spoken = if *holds { "yes" } else { "no" };
-            format!(
-                r#"<li{class} aria-label="{spoken}: {0}">{0}</li>"#,
-                escape(text)
-            )
-        })
-        .collect();
-    format!(
-        r#"<section class="verdict{class}"><div class="sign" aria-hidden="true">{sign}</div><div><h2>{headline}</h2><ul class="checks">{items}</ul></div></section>"#
-    )
+    parts::verdict(outcome, &headline, &checks)
 }
 
 /// The headline figures.
 pub fn figures(report: &Report) -> String {
     let distance = &report.distance;
     let total = report.timings_ms.get("total").and_then(Value::as_f64);
-    let figure = |value: String, unit: &str, label: String| {
-        format!(
-            r#"<div class="figure"><b>{value} <small>{unit}</small></b><span>{}</span></div>"#,
-            escape(&label)
-        )
-    };
     let mut figures = vec![
         figure(
             report.mesh.vertices.to_string(),
@@ -176,74 +155,12 @@ pub fn figures(report: &Report) -> String {
         let label = "from voxels to the measured model".to_owned();
         figures.push(figure(number(total, 0), "ms", label));
     }
-    format!(r#"<div class="figures">{}</div>"#, figures.concat())
-}
-
-/// What the user should know; nothing where there is nothing.
-pub fn warnings(report: &Report) -> String {
-    if report.warnings.is_empty() {
-        return String::new();
-    }
-    let items: String = report
-        .warnings
-        .iter()
-        .map(|w| format!("<li>{}</li>", escape(w)))
-        .collect();
-    format!(r#"<section><h2>Please note</h2><ul class="warnings">{items}</ul></section>"#)
-}
-
-/// The model from three sides, and one to turn.
-pub fn model(mesh: &TriMesh) -> String {
-    let turning = if mesh.triangles.len() <= MOST_TURNED {
-        turnable(mesh)
-    } else {
-        String::new()
-    };
-    format!(
-        r#"<section><h2>The model</h2><p class="hint">Every triangle as it is. Letters: L left, R right, A anterior, P posterior, S superior, I inferior side of the patient.</p><div class="row four">{}{turning}</div></section>"#,
-        shown(&views::plain(mesh), "The model")
-    )
-}
-
-fn shown(pictures: &Pictures, what: &str) -> String {
-    View::ALL
-        .iter()
-        .zip(pictures)
-        .map(|(view, uri)| {
-            let [east, north, west, south] = view.letters;
-            let name = view.name;
-            let marks = format!(
-                r#"<i class="east" aria-hidden="true">{east}</i><i class="north" aria-hidden="true">{north}</i><i class="west" aria-hidden="true">{west}</i><i class="south" aria-hidden="true">{south}</i>"#
-            );
-            format!(
-                r#"<figure><div class="view"><img src="{uri}" alt="{what}, {} view" width="500" height="500">{marks}</div><figcaption>{name}</figcaption></figure>"#,
-                name.to_lowercase()
-            )
-        })
-        .collect()
-}
-
-/// A canvas for the script, and the mesh about its centre, rounded to 0.01 mm.
-fn turnable(mesh: &TriMesh) -> String {
-    let aabb = Aabb::of(&mesh.vertices);
-    let centre = (aabb.min + aabb.max) / 2.0;
-    let about = |v: &Vec3| ((v - centre) * 100.0).map(f64::round) / 100.0;
-    let vertices: Vec<f64> = mesh
-        .vertices
-        .iter()
-        .flat_map(|v| <[f64; 3]>::from(about(v)))
-        .collect();
-    let triangles: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
-    // Numbers only: nothing in it can end the script element.
-    let data = json!({ "vertices": vertices, "triangles": triangles });
-    format!(
-        r#"<figure id="turnable" hidden><div class="view"><canvas id="turn" tabindex="0" role="img" aria-label="The model to turn by dragging or by the arrow keys"></canvas></div><figcaption>Drag to turn</figcaption></figure><script type="application/json" id="mesh">{data}</script>"#
-    )
+    parts::figures(&figures)
 }
 
 /// The model coloured by its distance to the surface.
-pub fn closeness(report: &Report, mesh: &TriMesh, reference: &TriMesh) -> String {
-    let (pictures, full) = views::by_distance(mesh, reference);
+pub fn closeness(report: &Report, mesh: &TriMesh, closeness: &Closeness) -> String {
+    let (pictures, full) = views::by_distance(mesh, closeness);
     let stops: String = (0..=10)
         .map(|i| {
             let [r, g, b] = views::diverging(f64::from(i) / 5.0 - 1.0).map(|c| (255.0 * c) as u8);
@@ -437,26 +354,5 @@ pub fn particulars(report: &Report) -> String {
         ("Optimisation", report.optimise.clone().into()),
         ("Milliseconds", report.timings_ms.clone().into()),
     ];
-    let tables: String = tables
-        .iter()
-        .filter(|(_, value)| value.as_object().is_some_and(|map| !map.is_empty()))
-        .map(|(title, value)| {
-            // Warnings stand at the top already.
-            let rows: String = leaves(value)
-                .iter()
-                .filter(|(path, _)| path != "warnings")
-                .map(|(path, text)| {
-                    format!(
-                        r#"<tr><th scope="row">{}</th><td>{}</td></tr>"#,
-                        escape(path),
-                        escape(text)
-                    )
-                })
-                .collect();
-            format!("<div><h3>{title}</h3><table><tbody>{rows}</tbody></table></div>")
-        })
-        .collect();
-    format!(
-        r#"<section><details open><summary>Particulars</summary><div class="row">{tables}</div></details></section>"#
-    )
+    parts::particulars(&tables)
 }

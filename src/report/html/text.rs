@@ -1,5 +1,7 @@
 //! Words and numbers for the page.
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
 /// `text` safe inside of HTML elements and quoted attributes.
@@ -16,6 +18,11 @@ pub fn escape(text: &str) -> String {
         }
     }
     escaped
+}
+
+/// A picture inside of the page.
+pub fn data_uri(media_type: &str, bytes: &[u8]) -> String {
+    format!("data:{media_type};base64,{}", STANDARD.encode(bytes))
 }
 
 /// `x` with so many decimals; a dash for what is no number. Zero has no sign.

@@ -8,6 +8,7 @@ use super::{Defect, PhantomError, PhantomParameters, Pose};
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
 use crate::geometry::random::{Purpose, stream};
+use crate::progress::{Cancelled, Monitor};
 use nalgebra::{Matrix3, Rotation3, Unit};
 use rand::Rng;
 use rayon::prelude::*;
@@ -159,18 +160,28 @@ impl<'a> Anatomy<'a> {
     }
 
     /// Uptake, and the mask of the wall, of every voxel.
-    pub(super) fn render(&self, shape: [usize; 3], frame: &VoxelToPatient) -> (Vec<f32>, Vec<f32>) {
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub(super) fn render(
+        &self,
+        shape: [usize; 3],
+        frame: &VoxelToPatient,
+        monitor: &Monitor,
+    ) -> Result<(Vec<f32>, Vec<f32>), Cancelled> {
         let slice = shape[0] * shape[1];
         let mut uptake = vec![0.0; slice * shape[2]];
         let mut wall = vec![0.0; slice * shape[2]];
         let slices = uptake.par_chunks_mut(slice).zip(wall.par_chunks_mut(slice));
-        slices.enumerate().for_each(|(k, (uptake, wall))| {
+        slices.enumerate().try_for_each(|(k, (uptake, wall))| {
+            monitor.check()?;
             for (n, (u, w)) in uptake.iter_mut().zip(wall).enumerate() {
                 let index = Vec3::new((n % shape[0]) as f64, (n / shape[0]) as f64, k as f64);
                 (*u, *w) = self.voxel(&index, frame);
             }
-        });
-        (uptake, wall)
+            Ok(())
+        })?;
+        Ok((uptake, wall))
     }
 
     /// Mean uptake of a voxel, and whether wall fills half of it.

@@ -2,6 +2,8 @@
 
 use rayon::prelude::*;
 
+use crate::progress::{Cancelled, Monitor};
+
 /// Standard deviations after which the kernel is cut off (6e-5 of its mass lies beyond).
 const CUT: f64 = 4.0;
 
@@ -30,32 +32,48 @@ impl Gaussian {
     }
 
     /// Blurs `voxels` in place.
-    pub(super) fn apply(&self, voxels: &mut Vec<f32>, [nx, ny, nz]: [usize; 3]) {
+    ///
+    /// # Errors
+    /// [`Cancelled`]; the values are then blurred in part.
+    pub(super) fn apply(
+        &self,
+        voxels: &mut Vec<f32>,
+        [nx, ny, nz]: [usize; 3],
+        monitor: &Monitor,
+    ) -> Result<(), Cancelled> {
         let [ki, kj, kk] = &self.kernels;
         if ki.len() > 1 {
-            voxels
-                .par_chunks_mut(nx)
-                .for_each_init(Vec::new, |line, row| {
-                    line.clear();
-                    line.extend_from_slice(row);
-                    blur_row(line, ki, row);
-                });
+            let rows = voxels.par_chunks_mut(nx);
+            rows.try_for_each_init(Vec::new, |line, row| {
+                monitor.check()?;
+                line.clear();
+                line.extend_from_slice(row);
+                blur_row(line, ki, row);
+                Ok(())
+            })?;
         }
         if kj.len() > 1 {
             let slices = voxels.par_chunks_mut(nx * ny);
-            slices.for_each_init(Vec::new, |before, slice| {
+            slices.try_for_each_init(Vec::new, |before, slice| {
+                monitor.check()?;
                 before.clear();
                 before.extend_from_slice(slice);
                 for (j, row) in slice.chunks_mut(nx).enumerate() {
                     add_lines(before, nx, ny, j, kj, row);
                 }
-            });
+                Ok(())
+            })?;
         }
         if kk.len() > 1 {
             let before = std::mem::replace(voxels, vec![0.0; nx * ny * nz]);
             let slices = voxels.par_chunks_mut(nx * ny).enumerate();
-            slices.for_each(|(k, slice)| add_lines(&before, nx * ny, nz, k, kk, slice));
+            slices.try_for_each(|(k, slice)| {
+                monitor.check()?;
+                add_lines(&before, nx * ny, nz, k, kk, slice);
+                Ok(())
+            })?;
         }
+        Ok(())
     }
 }
 
@@ -115,7 +133,10 @@ mod tests {
         let centre = 20 + 41 * (18 + 37 * 16);
         voxels[centre] = 1.0;
         let (fwhm, spacing) = (9.0, [2.0, 2.5, 3.0]);
-        Gaussian::new(fwhm, spacing).apply(&mut voxels, shape);
+        let silent = Monitor::silent();
+        Gaussian::new(fwhm, spacing)
+            .apply(&mut voxels, shape, &silent)
+            .unwrap();
         let at = |n: usize| [n % 41, n / 41 % 37, n / 41 / 37].map(|x| x as f64);
         let mass: f64 = voxels.iter().map(|&v| f64::from(v)).sum();
         assert!((mass - 1.0).abs() < 1e-5);
@@ -131,11 +152,16 @@ mod tests {
     #[test]
     fn a_constant_stays_and_no_width_changes_nothing() {
         let mut constant = vec![3.0; 16 * 16 * 16];
-        Gaussian::new(20.0, [2.0; 3]).apply(&mut constant, [16; 3]);
+        let silent = Monitor::silent();
+        Gaussian::new(20.0, [2.0; 3])
+            .apply(&mut constant, [16; 3], &silent)
+            .unwrap();
         assert!(constant.iter().all(|v| (v - 3.0).abs() < 1e-5));
         let mut any: Vec<f32> = (0..64).map(|n| n as f32).collect();
         let before = any.clone();
-        Gaussian::new(0.0, [2.0; 3]).apply(&mut any, [4; 3]);
+        Gaussian::new(0.0, [2.0; 3])
+            .apply(&mut any, [4; 3], &silent)
+            .unwrap();
         assert_eq!(any, before);
     }
 }

@@ -186,18 +186,18 @@ pub fn phantom(parameters: &PhantomParameters, monitor: &Monitor) -> Result<Phan
     anatomy.check_fits(p)?;
     let step = |fraction| monitor.report(Stage::Read, fraction);
     step(0.0)?;
-    let (mut voxels, wall) = anatomy.render(p.shape, &frame);
+    let (mut voxels, wall) = anatomy.render(p.shape, &frame, monitor)?;
     step(0.3)?;
     let filter = blur::Gaussian::new(p.post_filter_mm, p.spacing_mm);
     let system = (p.fwhm_mm.powi(2) - p.post_filter_mm.powi(2)).sqrt();
-    blur::Gaussian::new(system, p.spacing_mm).apply(&mut voxels, p.shape);
+    blur::Gaussian::new(system, p.spacing_mm).apply(&mut voxels, p.shape, monitor)?;
     step(0.6)?;
     if p.noise > 0.0 {
         let counts = filter.noise_gain() / p.noise.powi(2);
-        count(&mut voxels, p.shape, counts, p.seed);
+        count(&mut voxels, p.shape, counts, p.seed, monitor)?;
     }
     step(0.8)?;
-    filter.apply(&mut voxels, p.shape);
+    filter.apply(&mut voxels, p.shape, monitor)?;
     voxels
         .par_iter_mut()
         .for_each(|v| *v *= p.wall_value as f32);
@@ -222,17 +222,25 @@ pub fn phantom(parameters: &PhantomParameters, monitor: &Monitor) -> Result<Phan
 
 /// Replaces each uptake by what `counts` expected decays per unit of it come to. Each slice
 /// has its own stream, so that slices can be counted in parallel.
-fn count(voxels: &mut [f32], shape: [usize; 3], counts: f64, seed: u64) {
+fn count(
+    voxels: &mut [f32],
+    shape: [usize; 3],
+    counts: f64,
+    seed: u64,
+    monitor: &Monitor,
+) -> Result<(), Cancelled> {
     let mut seeds = stream(seed, Purpose::PhantomNoise);
     let seeds: Vec<u64> = (0..shape[2]).map(|_| seeds.next_u64()).collect();
     let slices = voxels.par_chunks_mut(shape[0] * shape[1]).zip(seeds);
-    slices.for_each(|(slice, seed)| {
+    slices.try_for_each(|(slice, seed)| {
+        monitor.check()?;
         let mut random = stream(seed, Purpose::PhantomNoise);
         for v in slice {
             let n = poisson::draw(f64::from(*v) * counts, &mut random);
             *v = (n / counts) as f32;
         }
-    });
+        Ok(())
+    })
 }
 
 impl PhantomParameters {

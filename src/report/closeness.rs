@@ -1,0 +1,136 @@
+//! How far the model lies from the surface, place by place.
+//!
+//! Every triangle is cut into `parts`² alike ones, as many as keep the whole below
+//! [`MOST_QUERIES`]; for the middle of each the signed distance to the surface is kept. A page
+//! is coloured by it when the surface itself is not at hand any more.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::Vec3;
+use crate::geometry::bvh::Bvh;
+use crate::mesh::TriMesh;
+use crate::progress::{Cancelled, Monitor};
+
+/// Most distance queries for a model.
+const MOST_QUERIES: usize = 20_000;
+/// Most parts that a triangle's side is cut into.
+const MOST_PARTS: usize = 12;
+
+/// Signed distances from the model to its surface.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Closeness {
+    /// Parts that each side of a triangle is cut into.
+    pub parts: usize,
+    /// Distance of the middle of each part, mm, to a thousandth; positive outside of the
+    /// surface. Triangle by triangle, `parts`² each, in the order of [`cut`].
+    pub distances_mm: Vec<f32>,
+}
+
+impl Closeness {
+    /// Measures `mesh` against `reference`.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn of(mesh: &TriMesh, reference: &TriMesh, monitor: &Monitor) -> Result<Self, Cancelled> {
+        let tree = Bvh::new(&reference.vertices, &reference.triangles);
+        let parts = subdivisions(mesh.triangles.len());
+        let distances = (0..mesh.triangles.len()).into_par_iter().map(|t| {
+            monitor.check()?;
+            let middles = cut(&mesh.corners(t), parts).map(|[a, b, c]| (a + b + c) / 3.0);
+            let distances = middles.map(|p| signed_distance(&p, reference, &tree));
+            Ok(distances.map(rounded).collect::<Vec<f32>>())
+        });
+        Ok(Self {
+            parts,
+            distances_mm: distances.collect::<Result<Vec<_>, _>>()?.concat(),
+        })
+    }
+
+    /// Whether these are distances of a mesh of so many triangles.
+    pub fn suits(&self, triangles: usize) -> bool {
+        (1..=MOST_PARTS).contains(&self.parts)
+            && self.distances_mm.len() == triangles * self.parts * self.parts
+    }
+}
+
+fn rounded(distance: f64) -> f32 {
+    ((1e3 * distance).round() / 1e3) as f32
+}
+
+/// How many parts to cut each side of a triangle into, so that colours follow the surface
+/// without more than [`MOST_QUERIES`] queries.
+fn subdivisions(triangles: usize) -> usize {
+    let fitting = (MOST_QUERIES as f64 / triangles.max(1) as f64).sqrt();
+    (fitting as usize).clamp(1, MOST_PARTS)
+}
+
+/// The triangle cut into `parts`² alike ones.
+pub fn cut(whole: &[Vec3; 3], parts: usize) -> impl Iterator<Item = [Vec3; 3]> + use<> {
+    let [a, b, c] = *whole;
+    let at = move |i: usize, j: usize| {
+        a + (b - a) * (i as f64 / parts as f64) + (c - a) * (j as f64 / parts as f64)
+    };
+    let rows = (0..parts).flat_map(move |j| (0..parts - j).map(move |i| (i, j)));
+    rows.flat_map(move |(i, j)| {
+        let upright = [at(i, j), at(i + 1, j), at(i, j + 1)];
+        let turned = (i + j + 1 < parts).then(|| [at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+        std::iter::once(upright).chain(turned)
+    })
+}
+
+/// Positive outside of the surface; the side is told by the closest triangle's normal.
+fn signed_distance(p: &Vec3, reference: &TriMesh, tree: &Bvh) -> f64 {
+    tree.closest(p).map_or(0.0, |closest| {
+        let normal = reference.area_normal(closest.triangle as usize);
+        let distance = closest.squared_distance.sqrt();
+        if (p - closest.point).dot(&normal) < 0.0 {
+            -distance
+        } else {
+            distance
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    #[test]
+    fn a_cut_triangle_keeps_its_area() {
+        let mesh = shapes::tetrahedron(3.0);
+        let corners = mesh.corners(1);
+        let area = |c: &[Vec3; 3]| (c[1] - c[0]).cross(&(c[2] - c[0]));
+        for parts in [1, 2, 7] {
+            let pieces: Vec<_> = cut(&corners, parts).collect();
+            assert_eq!(pieces.len(), parts * parts);
+            let sum: Vec3 = pieces.iter().map(area).sum();
+            assert!((sum - area(&corners)).norm() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_sign_tells_inside_from_outside() {
+        let sphere = shapes::icosphere(30.0, 4);
+        let tree = Bvh::new(&sphere.vertices, &sphere.triangles);
+        let at = |r: f64| signed_distance(&Vec3::new(r, 0.3, 0.2), &sphere, &tree);
+        assert!((at(32.0) - 2.0).abs() < 0.1 && (at(28.5) + 1.5).abs() < 0.1);
+    }
+
+    #[test]
+    fn distances_come_back_from_a_file_as_they_were() {
+        let (small, large) = (shapes::icosphere(29.0, 1), shapes::icosphere(30.0, 4));
+        let closeness = Closeness::of(&small, &large, &Monitor::silent()).unwrap();
+        assert!(closeness.suits(small.triangles.len()));
+        assert!(!closeness.suits(small.triangles.len() + 1));
+        assert!(
+            closeness
+                .distances_mm
+                .iter()
+                .all(|d| (-6.0..0.0).contains(d))
+        );
+        let text = serde_json::to_string(&closeness).unwrap();
+        assert_eq!(serde_json::from_str::<Closeness>(&text).unwrap(), closeness);
+    }
+}

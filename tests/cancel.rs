@@ -1,0 +1,163 @@
+//! Work that is told to stop does little more: wherever it is, the next look at the cancel
+//! token is near.
+//!
+//! Little is counted in processor time of the working thread, which other load on the machine
+//! does not lengthen as it does the time on the wall.
+
+#![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
+#![cfg(target_os = "linux")]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
+use std::sync::mpsc;
+use std::time::Duration;
+
+use serde_json::Map;
+use ventriform::jobs::{Engine, Input, Stored, Work, WorkError};
+use ventriform::progress::{CancelToken, Monitor, Silent};
+use ventriform::volume::nifti::{self, StoredType};
+use ventriform::volume::phantom::{PhantomParameters, phantom};
+use ventriform::volume::{ReadLimits, Volume};
+
+/// Most work after the token was raised. Promised are 100 ms; this build is not the fastest.
+const MOST: Duration = Duration::from_millis(100);
+
+/// Moments at which the work is told to stop, evenly over its length.
+const MOMENTS: u32 = 14;
+
+/// Processor time of a thread so far; `None` where the system does not tell.
+fn processor_time(thread: &str) -> Option<Duration> {
+    let text = fs::read_to_string(format!("{thread}/schedstat")).ok()?;
+    let nanoseconds = text.split(' ').next()?.parse().ok()?;
+    Some(Duration::from_nanos(nanoseconds))
+}
+
+/// Runs `work` on one thread and tells it to stop once that has worked for `limit`. How the
+/// work ended, and how long it worked in all and after it was told to.
+fn run(work: &dyn Work, input: &Input, limit: Duration) -> (Result<(), WorkError>, [Duration; 2]) {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .unwrap();
+    let cancel = CancelToken::new();
+    let (started, hear_start) = mpsc::channel();
+    let (ended, hear_end) = mpsc::channel::<()>();
+    std::thread::scope(|scope| {
+        let token = cancel.clone();
+        let told = scope.spawn(move || {
+            let (thread, before): (String, Duration) = hear_start.recv().unwrap();
+            while hear_end.recv_timeout(Duration::from_millis(1))
+                == Err(mpsc::RecvTimeoutError::Timeout)
+            {
+                let worked = processor_time(&thread).unwrap() - before;
+                if worked >= limit {
+                    token.cancel();
+                    return Some(worked);
+                }
+            }
+            None
+        });
+        let (outcome, worked) = pool.install(|| {
+            let own = fs::read_link("/proc/thread-self").unwrap();
+            let own = PathBuf::from("/proc")
+                .join(own)
+                .to_string_lossy()
+                .into_owned();
+            let before = processor_time(&own).unwrap();
+            started.send((own.clone(), before)).unwrap();
+            let outcome = work.run(input, &Monitor::new(&Silent, cancel.clone()));
+            (outcome.map(|_| ()), processor_time(&own).unwrap() - before)
+        });
+        drop(ended);
+        let told = told.join().unwrap();
+        (
+            outcome,
+            [
+                worked,
+                told.map_or(Duration::ZERO, |told| worked.saturating_sub(told)),
+            ],
+        )
+    })
+}
+
+fn stops_wherever_it_is(
+    kind: &str,
+    pairs: &[(&str, &str)],
+    things: &[(&str, &Volume)],
+    scan: &Volume,
+) {
+    if processor_time("/proc/thread-self").is_none() {
+        println!("skipped: this system does not tell a thread's processor time");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, volume: &Volume| {
+        let path = folder.path().join(format!("{name}.nii.gz"));
+        fs::write(
+            &path,
+            nifti::write(volume, StoredType::Float32, true).unwrap(),
+        )
+        .unwrap();
+        path
+    };
+    let engine = Engine::new(ReadLimits::default());
+    let work = engine.work(kind).unwrap();
+    let pairs: Vec<(String, String)> = pairs
+        .iter()
+        .map(|(n, t)| ((*n).into(), (*t).into()))
+        .collect();
+    let stored = |(field, volume): &(&str, &Volume)| {
+        let stored = Stored {
+            id: "vol_0".into(),
+            parameters: Map::new(),
+            files: vec![file(field, volume)],
+        };
+        ((*field).to_owned(), stored)
+    };
+    let input = Input {
+        volume: "vol_1".into(),
+        files: vec![file("scan", scan)],
+        parameters: work.parameters_from_text(&pairs).unwrap(),
+        things: things.iter().map(stored).collect::<BTreeMap<_, _>>(),
+        library: Vec::new(),
+    };
+    let never = Duration::from_secs(3600);
+    // The first run also makes what is kept for the life of the process.
+    let (outcome, _) = run(&**work, &input, never);
+    outcome.unwrap();
+    let (_, [whole, _]) = run(&**work, &input, never);
+    for moment in 0..MOMENTS {
+        let (outcome, [_, after]) = run(&**work, &input, whole * moment / MOMENTS);
+        assert!(
+            after < MOST,
+            "{kind}: {after:?} after moment {moment} of {MOMENTS}"
+        );
+        assert!(
+            moment > MOMENTS / 2 || matches!(outcome, Err(WorkError::Cancelled)),
+            "{outcome:?}"
+        );
+    }
+}
+
+fn heart() -> [Volume; 2] {
+    let parameters = PhantomParameters {
+        shape: [80; 3],
+        ..PhantomParameters::default()
+    };
+    let made = phantom(&parameters, &Monitor::silent()).unwrap();
+    [made.volume, made.truth]
+}
+
+#[test]
+fn generation_stops_wherever_it_is() {
+    let [scan, _] = heart();
+    stops_wherever_it_is("model", &[("points", "300")], &[], &scan);
+}
+
+#[test]
+fn segmentation_stops_wherever_it_is() {
+    let [scan, truth] = heart();
+    let expert = [("expert", &truth)];
+    stops_wherever_it_is("segmentation", &[("expert", "vol_0")], &expert, &scan);
+}
