@@ -55,8 +55,8 @@ pub fn routes() -> OpenApiRouter<App> {
 
 /// The whole service.
 pub fn router(app: App) -> Router {
-    let (api, document) = routes().split_for_parts();
-    let document = axum::Json(document);
+    let (api, _) = routes().split_for_parts();
+    let document = axum::Json(super::openapi::document());
     api.route("/", get(pages::welcome))
         .route(
             "/openapi.json",
