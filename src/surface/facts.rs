@@ -12,7 +12,7 @@ pub enum VolumeKind {
     Labels,
 }
 
-/// What [`extract`] saw and did; goes into the report.
+/// What [`extract`](super::extract) saw and did; goes into the report.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SurfaceFacts {
     /// The iso-value used, in the volume's units (for masks: level of the smoothed mask, 0..1).

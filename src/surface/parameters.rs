@@ -41,7 +41,7 @@ pub enum TopologyMode {
     Keep,
 }
 
-/// Parameters of [`extract`].
+/// Parameters of [`extract`](super::extract).
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceParameters {
     /// Default [`IsoLevel::Auto`].
