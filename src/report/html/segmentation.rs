@@ -285,7 +285,7 @@ fn polar(report: &Report, svg: &[u8]) -> String {
         0,
     );
     format!(
-        r#"<section><h2>Uptake of the wall</h2><p class="hint">Polar map of the 17 segments of the American Heart Association: apex in the centre, anterior on top, septum on the left. In per cent of this scan's own maximum; there is no normal database behind it.</p><div class="row beside"><figure class="paper"><img src="{}" alt="Polar map of the wall's uptake"></figure><div class="scroll"><table><thead><tr><th scope="col" class="n"></th><th scope="col">Segment</th><th scope="col">Artery</th><th scope="col" class="n">mean, %</th><th scope="col" class="n">below {threshold} %, % of area</th></tr></thead><tbody>{rows}</tbody></table></div></div></section>"#,
+        r#"<section><h2>Uptake of the wall</h2><p class="hint">Polar map of the 17 segments of the American Heart Association: apex in the centre, anterior on top, septum on the left. In per cent of the hottest quarter of this scan's own wall; there is no normal database behind it.</p><div class="row beside"><figure class="paper"><img src="{}" alt="Polar map of the wall's uptake"></figure><div class="scroll"><table><thead><tr><th scope="col" class="n"></th><th scope="col">Segment</th><th scope="col">Artery</th><th scope="col" class="n">mean, %</th><th scope="col" class="n">below {threshold} %, % of area</th></tr></thead><tbody>{rows}</tbody></table></div></div></section>"#,
         data_uri("image/svg+xml", svg)
     )
 }
