@@ -98,12 +98,9 @@ fn turned(scan: &Volume, heart: &Vec3, axis: Vec3) -> Vec<Volume> {
 /// What `scan` shows after a turn about `centre` and a shift, on the same voxels.
 fn moved(scan: &Volume, centre: &Vec3, turn: &Rotation3<f64>, shift: &Vec3) -> Volume {
     let field = Field::new(scan, None, 0.0);
-    let value = |p: Vec3| field.at(&(turn.inverse() * (p - centre - shift) + centre)) as f32;
-    let voxels = places(scan).map(value).collect();
-    Volume {
-        voxels,
-        ..scan.clone()
-    }
+    Volume::sampled(scan.shape, scan.frame.clone(), |p| {
+        field.at(&(turn.inverse() * (p - centre - shift) + centre))
+    })
 }
 
 /// `scan` with correlated noise of standard deviation `deviation`.
@@ -123,15 +120,6 @@ fn noisy(scan: &Volume, deviation: f64, seed: u64) -> Volume {
         voxels: scan.voxels.iter().zip(noise.values()).map(sum).collect(),
         ..scan.clone()
     }
-}
-
-/// The voxels' places in the patient.
-fn places(scan: &Volume) -> impl Iterator<Item = Vec3> + '_ {
-    let [nx, ny, _] = scan.shape;
-    (0..scan.voxels.len()).map(move |v| {
-        let index = [v % nx, v / nx % ny, v / (nx * ny)].map(|x| x as f64);
-        scan.frame.to_patient(&Vec3::from(index))
-    })
 }
 
 struct Study {

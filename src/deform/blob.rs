@@ -175,22 +175,14 @@ mod tests {
         let shape = [40, 24, 24];
         let frame = VoxelToPatient::centred(shape, [4.0; 3], Vec3::zeros()).unwrap();
         let inside = |p: &Vec3, x: f64, radius: f64| (p - Vec3::new(x, 0.0, 0.0)).norm() < radius;
-        let voxels = (0..shape.iter().product::<usize>())
-            .map(|v| {
-                let index = [v % 40, v / 40 % 24, v / 960].map(|x| x as f64);
-                let p = frame.to_patient(&Vec3::from(index));
-                match (inside(&p, 40.0, 24.0), inside(&p, -30.0, 36.0)) {
-                    (true, _) => 1.0,
-                    (_, true) => 3.0,
-                    _ => 0.0,
-                }
-            })
-            .collect();
+        let label = |p: &Vec3| match (inside(p, 40.0, 24.0), inside(p, -30.0, 36.0)) {
+            (true, _) => 1.0,
+            (_, true) => 3.0,
+            _ => 0.0,
+        };
         Volume {
-            shape,
-            voxels,
-            frame,
             integral: true,
+            ..Volume::sampled(shape, frame, label)
         }
     }
 

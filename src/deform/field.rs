@@ -300,21 +300,7 @@ mod tests {
     fn volume(shape: [usize; 3], f: impl Fn(&Vec3) -> f64) -> Volume {
         let linear = Matrix3::new(2.0, 0.3, 0.0, -0.2, 3.0, 0.1, 0.0, 0.0, -2.5);
         let frame = VoxelToPatient::new(linear, Vec3::new(5.0, -7.0, 11.0)).unwrap();
-        let mut voxels = Vec::new();
-        for k in 0..shape[2] {
-            for j in 0..shape[1] {
-                for i in 0..shape[0] {
-                    let p = frame.to_patient(&Vec3::new(i as f64, j as f64, k as f64));
-                    voxels.push(f(&p) as f32);
-                }
-            }
-        }
-        Volume {
-            shape,
-            voxels,
-            frame,
-            integral: false,
-        }
+        Volume::sampled(shape, frame, f)
     }
 
     #[test]

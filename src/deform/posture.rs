@@ -267,27 +267,18 @@ mod tests {
         let shape = [n; 3];
         let frame = VoxelToPatient::centred(shape, [SPACING; 3], Vec3::zeros()).unwrap();
         let ball = |p: &Vec3, at: [f64; 3], radius: f64| (p - Vec3::from(at)).norm() < radius;
-        let voxels = (0..n * n * n)
-            .map(|v| {
-                let index = [v % n, v / n % n, v / (n * n)].map(|x| x as f64);
-                let p = turn.inverse() * frame.to_patient(&Vec3::from(index));
-                let inside = (p.x / 170.0).powi(2) + (p.y / 115.0).powi(2) < 1.0;
-                match (inside, p.z.abs() < 150.0) {
-                    (true, true) if ball(&p, HEART, 35.0) => 10.0,
-                    (true, true) if ball(&p, [-80.0, 0.0, -60.0], 70.0) => 6.0,
-                    (true, true) if p.z > -20.0 && ball(&p, [-85.0, 0.0, 60.0], 80.0) => 0.4,
-                    (true, true) if p.z > 20.0 && ball(&p, [90.0, 20.0, 80.0], 70.0) => 0.4,
-                    (true, true) => 1.0,
-                    _ => 0.0,
-                }
-            })
-            .collect();
-        Volume {
-            shape,
-            voxels,
-            frame,
-            integral: false,
-        }
+        Volume::sampled(shape, frame, |p| {
+            let p = turn.inverse() * p;
+            let inside = (p.x / 170.0).powi(2) + (p.y / 115.0).powi(2) < 1.0;
+            match (inside, p.z.abs() < 150.0) {
+                (true, true) if ball(&p, HEART, 35.0) => 10.0,
+                (true, true) if ball(&p, [-80.0, 0.0, -60.0], 70.0) => 6.0,
+                (true, true) if p.z > -20.0 && ball(&p, [-85.0, 0.0, 60.0], 80.0) => 0.4,
+                (true, true) if p.z > 20.0 && ball(&p, [90.0, 20.0, 80.0], 70.0) => 0.4,
+                (true, true) => 1.0,
+                _ => 0.0,
+            }
+        })
     }
 
     const HEART: [f64; 3] = [40.0, -30.0, -20.0];
