@@ -79,6 +79,19 @@ pub fn media_type(headers: &HeaderMap) -> Option<String> {
     Some(essence.trim().to_ascii_lowercase())
 }
 
+/// The refusal of a body of the type `found`.
+pub fn unsupported_type(found: &str) -> Problem {
+    Problem::new(
+        StatusCode::UNSUPPORTED_MEDIA_TYPE,
+        "unsupported-media-type",
+        format!(
+            "A body of type `{}` is not understood here.",
+            shorten(found)
+        ),
+    )
+    .at("Content-Type")
+}
+
 /// Refuses a compressed transfer: a limit on what arrives would not be one on what it becomes.
 pub fn refuse_content_encoding(headers: &HeaderMap) -> Answer<()> {
     match headers.get(header::CONTENT_ENCODING) {
@@ -98,18 +111,7 @@ pub async fn json_bytes(app: &App, request: Request, limit: usize) -> Answer<Byt
     refuse_content_encoding(request.headers())?;
     match media_type(request.headers()).as_deref() {
         None | Some("application/json") => {}
-        Some(other) => {
-            return Err(Problem::new(
-                StatusCode::UNSUPPORTED_MEDIA_TYPE,
-                "unsupported-media-type",
-                format!(
-                    "A body of type `{}` is not understood here.",
-                    shorten(other)
-                ),
-            )
-            .at("Content-Type")
-            .fix("Send application/json."));
-        }
+        Some(other) => return Err(unsupported_type(other).fix("Send application/json.")),
     }
     let bytes = axum::body::to_bytes(request.into_body(), limit);
     tokio::time::timeout(app.settings.body_timeout.0, bytes)

@@ -7,7 +7,7 @@ pub use bundle::Bundle;
 
 use super::app::App;
 use super::problem::{Answer, Problem, shorten};
-use super::request::{media_type, refuse_content_encoding};
+use super::request::{media_type, refuse_content_encoding, unsupported_type};
 use axum::body::Body;
 use axum::extract::{FromRequest, Multipart, Request};
 use axum::http::{StatusCode, header};
@@ -65,16 +65,7 @@ pub async fn receive(app: &App, request: Request, apart: &[&'static str]) -> Ans
         None => receive_raw(request, guard, &mut upload).await?,
         Some(raw) if RAW_TYPES.contains(&raw) => receive_raw(request, guard, &mut upload).await?,
         Some(other) => {
-            return Err(Problem::new(
-                StatusCode::UNSUPPORTED_MEDIA_TYPE,
-                "unsupported-media-type",
-                format!(
-                    "A body of type `{}` is not understood here.",
-                    shorten(other)
-                ),
-            )
-            .at("Content-Type")
-            .fix(format!(
+            return Err(unsupported_type(other).fix(format!(
                 "Send the file as {} or as multipart/form-data.",
                 RAW_TYPES[0]
             )));
