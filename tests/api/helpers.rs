@@ -3,6 +3,7 @@
 use reqwest::{Client, RequestBuilder, Response, StatusCode};
 use serde_json::{Map, Value, json};
 use std::io::{BufRead, BufReader};
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
@@ -25,12 +26,44 @@ use ventriform::volume::phantom::{PhantomParameters, phantom};
 /// How long a test waits for what must happen.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// A running service and a client.
-pub struct TestApp {
+/// A client of one service.
+pub struct Api {
     pub client: Client,
     pub url: String,
+}
+
+impl Api {
+    fn new(url: String) -> Self {
+        let client = Client::new();
+        Self { client, url }
+    }
+
+    pub fn get(&self, path: &str) -> RequestBuilder {
+        self.client.get(format!("{}{path}", self.url))
+    }
+
+    pub fn post(&self, path: &str) -> RequestBuilder {
+        self.client.post(format!("{}{path}", self.url))
+    }
+
+    pub fn delete(&self, path: &str) -> RequestBuilder {
+        self.client.delete(format!("{}{path}", self.url))
+    }
+}
+
+/// A running service and a client.
+pub struct TestApp {
+    pub api: Api,
     pub running: Option<Running>,
     pub data: Arc<TempDir>,
+}
+
+impl Deref for TestApp {
+    type Target = Api;
+
+    fn deref(&self) -> &Api {
+        &self.api
+    }
 }
 
 impl TestApp {
@@ -62,8 +95,7 @@ impl TestApp {
         let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         let running = start(settings, engine, listener).await.unwrap();
         Self {
-            client: Client::new(),
-            url: format!("http://{}", running.address()),
+            api: Api::new(format!("http://{}", running.address())),
             running: Some(running),
             data,
         }
@@ -73,18 +105,6 @@ impl TestApp {
     pub async fn stop(mut self) -> Arc<TempDir> {
         self.running.take().unwrap().stop().await.unwrap();
         self.data.clone()
-    }
-
-    pub fn get(&self, path: &str) -> RequestBuilder {
-        self.client.get(format!("{}{path}", self.url))
-    }
-
-    pub fn post(&self, path: &str) -> RequestBuilder {
-        self.client.post(format!("{}{path}", self.url))
-    }
-
-    pub fn delete(&self, path: &str) -> RequestBuilder {
-        self.client.delete(format!("{}{path}", self.url))
     }
 
     /// The JSON under a path.
@@ -411,8 +431,15 @@ pub fn scan() -> Vec<u8> {
 /// The real program as a process of its own.
 pub struct Service {
     process: Child,
-    client: Client,
-    url: String,
+    api: Api,
+}
+
+impl Deref for Service {
+    type Target = Api;
+
+    fn deref(&self) -> &Api {
+        &self.api
+    }
 }
 
 impl Service {
@@ -436,21 +463,8 @@ impl Service {
             .expect("it says where it listens");
         Self {
             process,
-            client: Client::new(),
-            url: url.to_owned(),
+            api: Api::new(url.to_owned()),
         }
-    }
-
-    pub fn get(&self, path: &str) -> RequestBuilder {
-        self.client.get(format!("{}{path}", self.url))
-    }
-
-    pub fn post(&self, path: &str) -> RequestBuilder {
-        self.client.post(format!("{}{path}", self.url))
-    }
-
-    pub fn delete(&self, path: &str) -> RequestBuilder {
-        self.client.delete(format!("{}{path}", self.url))
     }
 
     /// Ends it as a power cut would.
