@@ -5,7 +5,7 @@ use ventriform::mesh::{TriMesh, shapes};
 use ventriform::optimise::{OptimiseParameters, Optimised, Reference, optimise};
 use ventriform::progress::Monitor;
 use ventriform::retile::{RetileFacts, Tiled};
-use ventriform::surface::{Surface, SurfaceFacts};
+use ventriform::surface::Surface;
 
 fn stretched(mut mesh: TriMesh) -> TriMesh {
     for v in &mut mesh.vertices {
@@ -34,12 +34,7 @@ fn run(start: &TriMesh, surface: &Surface, threads: usize) -> Optimised {
 #[test]
 fn the_outcome_does_not_depend_on_the_number_of_threads() {
     let mesh = stretched(shapes::icosphere(30.0, 4));
-    let surface = Surface {
-        working: mesh.vertices.clone(),
-        mesh,
-        spacing: 2.0,
-        facts: SurfaceFacts::default(),
-    };
+    let surface = Surface::exact(mesh, 2.0);
     let start = stretched(shapes::icosphere(30.0, 2));
     let one = run(&start, &surface, 1);
     assert!(one.facts.fit_rounds > 0 && one.optimised.robust > one.retiled.robust);

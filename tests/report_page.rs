@@ -16,22 +16,15 @@ use ventriform::optimise::{
 use ventriform::progress::Monitor;
 use ventriform::report::{Closeness, MeasureParameters, Report, ReportInput, html, measure};
 use ventriform::retile::{RetileFacts, Tiled};
-use ventriform::surface::{Surface, SurfaceFacts};
+use ventriform::surface::Surface;
 
 const HOSTILE: &str = "</script><img src=x onerror=alert(1)>\"'&";
 
 fn surface() -> Surface {
-    let mesh = shapes::cup(80.0, 32.0, 10.0, 48);
-    Surface {
-        working: mesh.vertices.clone(),
-        mesh,
-        spacing: 2.0,
-        facts: SurfaceFacts {
-            iso_value: 0.47,
-            warnings: vec![format!("A warning {HOSTILE}")],
-            ..SurfaceFacts::default()
-        },
-    }
+    let mut surface = Surface::exact(shapes::cup(80.0, 32.0, 10.0, 48), 2.0);
+    surface.facts.iso_value = 0.47;
+    surface.facts.warnings = vec![format!("A warning {HOSTILE}")];
+    surface
 }
 
 fn fitness(normalised: f64) -> FitnessSummary {

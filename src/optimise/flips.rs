@@ -288,7 +288,7 @@ mod tests {
     use crate::mesh::{TriMesh, shapes};
     use crate::optimise::connectivity::Quad;
     use crate::optimise::{FitnessForm, Reference, configurations};
-    use crate::surface::{Surface, SurfaceFacts};
+    use crate::surface::Surface;
 
     const LENGTHS: Lengths = Lengths {
         voxel: 2.0,
@@ -296,12 +296,7 @@ mod tests {
     };
 
     fn reference(mesh: TriMesh, spacing: f64) -> Reference {
-        Reference::new(&Surface {
-            working: mesh.vertices.clone(),
-            mesh,
-            spacing,
-            facts: SurfaceFacts::default(),
-        })
+        Reference::new(&Surface::exact(mesh, spacing))
     }
 
     /// `mesh` with its vertices jolted by up to `jolt` mm and `flips` random legal flips.

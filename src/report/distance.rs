@@ -335,15 +335,10 @@ fn some_vertices(mesh: &TriMesh, limit: usize) -> Vec<Vec3> {
 mod tests {
     use super::*;
     use crate::mesh::shapes;
-    use crate::surface::{Surface, SurfaceFacts};
+    use crate::surface::Surface;
 
     fn reference(mesh: TriMesh) -> Reference {
-        Reference::new(&Surface {
-            working: mesh.vertices.clone(),
-            mesh,
-            spacing: 2.0,
-            facts: SurfaceFacts::default(),
-        })
+        Reference::new(&Surface::exact(mesh, 2.0))
     }
 
     #[test]

@@ -64,6 +64,19 @@ pub struct Surface {
     pub facts: SurfaceFacts,
 }
 
+impl Surface {
+    /// A mesh that is exact, without the noise of a scan: it is its own working surface. `spacing`
+    /// is that of the volume it stands for, mm; the facts are left at their defaults.
+    pub fn exact(mesh: TriMesh, spacing: f64) -> Self {
+        Self {
+            working: mesh.vertices.clone(),
+            mesh,
+            spacing,
+            facts: SurfaceFacts::default(),
+        }
+    }
+}
+
 /// Passes of Taubin's smoothing that make the working surface.
 const WORKING_PASSES: usize = 15;
 /// Passes that take the rest of the staircase off a mask's surface.

@@ -159,15 +159,10 @@ mod tests {
     use super::*;
     use crate::mesh::intersections::self_intersections;
     use crate::mesh::shapes;
-    use crate::surface::{Surface, SurfaceFacts};
+    use crate::surface::Surface;
 
     fn reference(mesh: TriMesh) -> Reference {
-        Reference::new(&Surface {
-            working: mesh.vertices.clone(),
-            mesh,
-            spacing: 2.0,
-            facts: SurfaceFacts::default(),
-        })
+        Reference::new(&Surface::exact(mesh, 2.0))
     }
 
     fn fitted(start: &TriMesh, reference: &Reference, parameters: &FitParameters) -> Fitted {
