@@ -84,12 +84,8 @@ pub struct FitParameters {
     /// Rounds, 0..=200; 0 leaves the vertices on the surface, as the paper does. Default 16: four
     /// more change no figure of shape or distance by 1 %.
     pub rounds: usize,
-    /// Weight of triangle shape against squared distance, (0, 10]. Default 0.062.
+    /// Weight of triangle shape against squared distance, (0, 10]. Default 0.06.
     pub shape_weight: f64,
-    /// Mean bend between neighbouring triangles, degrees in 1..=180, from which on a start counts
-    /// as coarse: shapes and peaks then weigh more, shapes in proportion to the squared bend, up to
-    /// twice as much. Default 24; 180 for none.
-    pub coarse_bend: f64,
     /// How much more a misshapen triangle counts: its weight is 1 + this · (R/(2r) - 1), 0..=100.
     /// Default 3.
     pub worst_weight: f64,
@@ -97,7 +93,7 @@ pub struct FitParameters {
     /// wanted relative spacing), 1 to the size that each has. Default 1.
     pub free_size: f64,
     /// How much more a distant sample counts: its weight is 1 + this · r²/mean r², 0..=10.
-    /// Lowers the largest distance and, by less, the mean, at the cost of shapes. Default 0.05.
+    /// Lowers the largest distance and, by less, the mean, at the cost of shapes and F. Default 0.02.
     pub peak_weight: f64,
     /// Share of the last round's step that a round adds to its own, 0..=0.9. Default 0.6.
     pub momentum: f64,
@@ -118,11 +114,10 @@ impl Default for FitParameters {
     fn default() -> Self {
         Self {
             rounds: 16,
-            shape_weight: 0.062,
-            coarse_bend: 24.0,
+            shape_weight: 0.06,
             worst_weight: 3.0,
             free_size: 1.0,
-            peak_weight: 0.05,
+            peak_weight: 0.02,
             momentum: 0.6,
             damping: 0.0005,
             samples_per_triangle: 16,
@@ -445,7 +440,6 @@ impl OptimiseParameters {
         within("guard", self.guard, 0.0, 1.0)?;
         within("fit.rounds", fit.rounds as f64, 0.0, 200.0)?;
         within("fit.shape_weight", fit.shape_weight, 1e-6, 10.0)?;
-        within("fit.coarse_bend", fit.coarse_bend, 1.0, 180.0)?;
         within("fit.worst_weight", fit.worst_weight, 0.0, 100.0)?;
         within("fit.free_size", fit.free_size, 0.0, 1.0)?;
         within("fit.peak_weight", fit.peak_weight, 0.0, 10.0)?;

@@ -274,15 +274,8 @@ pub const SPECS: &[ParameterSpec] = &[
         "fit_shape_weight",
         optimise.fit.shape_weight,
         0.0001..=10.0,
-        "0.062",
+        "0.06",
         "Weight of triangle shape against squared distance in the fit"
-    ),
-    number!(
-        "fit_coarse_bend",
-        optimise.fit.coarse_bend,
-        1.0..=180.0,
-        "24",
-        "Mean bend of the start in degrees from which on shapes weigh more in the fit"
     ),
     number!(
         "fit_worst_weight",
@@ -302,7 +295,7 @@ pub const SPECS: &[ParameterSpec] = &[
         "fit_peak_weight",
         optimise.fit.peak_weight,
         0.0..=10.0,
-        "0.05",
+        "0.02",
         "How much more a distant sample counts in the fit: lowers the largest distance"
     ),
     number!(

@@ -31,7 +31,7 @@ use samples::{Sample, find_partners, follow_partners, spread};
 
 use super::connectivity::Connectivity;
 use super::{FitParameters, Reference};
-use crate::geometry::{Vec3, triangle};
+use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Monitor, Stage};
 
@@ -50,8 +50,6 @@ struct Model<'a> {
     reference: &'a Reference,
     /// That of the reference, mm³.
     volume: f64,
-    /// How much more shapes weigh in this model than in one of more points, 1 or more.
-    coarseness: f64,
     parameters: &'a FitParameters,
 }
 
@@ -82,7 +80,6 @@ pub fn fit(
     monitor: &Monitor,
 ) -> Result<Fitted, Cancelled> {
     let count = parameters.samples_per_triangle * connectivity.triangles().len();
-    let coarseness = coarseness(start, &connectivity, parameters.coarse_bend);
     let mut model = Model {
         vertices: start.to_vec(),
         connectivity,
@@ -91,7 +88,6 @@ pub fn fit(
         sizing,
         reference,
         volume: reference.mesh.volume(),
-        coarseness,
         parameters,
     };
     find_partners(&mut model);
@@ -131,27 +127,6 @@ pub fn fit(
         flips,
         shortened,
     })
-}
-
-/// Largest factor by which a coarse start raises the weight of shapes.
-const MOST_COARSENESS: f64 = 2.0;
-
-/// The square of the mean bend between neighbouring triangles against `usual` (degrees), 1..=2.
-/// Distances grow with the square of the bend: at a fixed weight the shapes of a coarse model
-/// would pay for every distance.
-fn coarseness(vertices: &[Vec3], connectivity: &Connectivity, usual: f64) -> f64 {
-    let normal = |t: u32| {
-        let [a, b, c] = connectivity.triangles()[t as usize].map(|v| vertices[v as usize]);
-        triangle::area_normal(&a, &b, &c)
-    };
-    let bends = connectivity
-        .edges()
-        .map(|h| triangle::angle_between(&normal(h / 3), &normal(connectivity.twin(h) / 3)));
-    let edges = connectivity.halfedges() / 2;
-    let mean = bends.sum::<f64>() / f64::from(edges.max(1));
-    (mean / usual.to_radians())
-        .powi(2)
-        .clamp(1.0, MOST_COARSENESS)
 }
 
 #[cfg(test)]
@@ -275,7 +250,6 @@ mod tests {
             sizing,
             reference,
             volume: reference.mesh.volume(),
-            coarseness: 1.0,
             parameters,
         };
         find_partners(&mut model);

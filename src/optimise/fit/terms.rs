@@ -62,9 +62,6 @@ fn add_distances(equations: &mut NormalEquations, model: &Model) {
         s.normal.dot(&(s.point - place))
     };
     let residuals: Vec<f64> = samples.iter().map(residual).collect();
-    // Cubed: a coarse model has few triangles at each bend, and one that strays is the worst
-    // of all.
-    let peak_weight = parameters.peak_weight * model.coarseness.powi(3);
     let admitted = samples.iter().filter(|s| s.admitted).count().max(1) as f64;
     let square = samples
         .iter()
@@ -76,7 +73,7 @@ fn add_distances(equations: &mut NormalEquations, model: &Model) {
     for (s, r) in samples.iter().zip(&residuals) {
         if s.admitted {
             let emphasis = (r * r / square.max(f64::MIN_POSITIVE)).min(PEAK_CAP);
-            let weight = (1.0 + peak_weight * emphasis) / admitted;
+            let weight = (1.0 + parameters.peak_weight * emphasis) / admitted;
             equations.add_plane(s.triangle, &s.barycentric, &s.normal, *r, weight);
         }
     }
@@ -185,7 +182,7 @@ fn add_shapes(equations: &mut NormalEquations, model: &Model) {
             continue;
         };
         let badness = 1.0 / triangle::radius_ratio(&p[0], &p[1], &p[2]).max(0.05) - 1.0;
-        let weight = parameters.shape_weight * model.coarseness / triangles.len() as f64
+        let weight = parameters.shape_weight / triangles.len() as f64
             * (1.0 + parameters.worst_weight * badness);
         equations.add_shape(index, &target.change, &target.projection, weight);
     }
