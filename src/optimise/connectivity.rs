@@ -75,6 +75,11 @@ impl Connectivity {
         self.triangles
     }
 
+    /// Number of vertices.
+    pub fn vertices(&self) -> u32 {
+        self.valence.len() as u32
+    }
+
     /// Number of half-edges: three for each triangle, two for each edge.
     pub fn halfedges(&self) -> u32 {
         self.twins.len() as u32

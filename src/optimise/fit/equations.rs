@@ -5,78 +5,139 @@
 //! for each vertex and one off it for each edge of the mesh; one further row, over all
 //! vertices at once, is kept apart as a rank-one update. It is solved by conjugate
 //! gradients with the inverted diagonal blocks as preconditioner. All sums run in a fixed
-//! order.
+//! order, on any number of threads.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector6};
+use rayon::prelude::*;
 
 use crate::geometry::Vec3;
 use crate::optimise::connectivity::Connectivity;
 use crate::progress::{Cancelled, Monitor};
 
+/// A symmetric 3×3 block: xx, yy, zz, xy, xz, yz.
+type Block = Vector6<f64>;
+
+/// Sums of fewer vertices or edges are not worth another thread.
+const LEAST_SHARED: usize = 512;
+
+/// What the terms of one triangle add to the system.
+#[derive(Debug, Clone, Default)]
+pub struct Element {
+    /// The block of each corner k with itself.
+    corners: [Block; 3],
+    /// The block of each corner k with corner k + 1, for one of both orders: blocks of a term
+    /// are symmetric.
+    edges: [Block; 3],
+    right: [Vec3; 3],
+}
+
+impl Element {
+    /// Adds weight·(n·Σ bₖ xₖ − r)² over the corners k: a plane with normal `n` from which the
+    /// point with barycentric coordinates `b` is to move by `r`.
+    pub fn add_plane(&mut self, b: &[f64; 3], n: &Vec3, r: f64, weight: f64) {
+        let nn = Block::new(
+            n.x * n.x,
+            n.y * n.y,
+            n.z * n.z,
+            n.x * n.y,
+            n.x * n.z,
+            n.y * n.z,
+        );
+        let pull = n * (weight * r);
+        for k in 0..3 {
+            self.corners[k] += nn * (weight * b[k] * b[k]);
+            self.edges[k] += nn * (weight * b[k] * b[(k + 1) % 3]);
+            self.right[k] += pull * b[k];
+        }
+    }
+
+    /// Adds weight·Σₖ |P((xₖ − x̄) − rₖ)|² over the corners k, where x̄ is their mean and P the
+    /// projection onto the plane with unit normal `n`: the triangle's shape is to change by r.
+    pub fn add_shape(&mut self, r: &[Vec3; 3], n: &Vec3, weight: f64) {
+        let projection = Block::new(
+            1.0 - n.x * n.x,
+            1.0 - n.y * n.y,
+            1.0 - n.z * n.z,
+            -n.x * n.y,
+            -n.x * n.z,
+            -n.y * n.z,
+        );
+        let mean = (r[0] + r[1] + r[2]) / 3.0;
+        for k in 0..3 {
+            self.corners[k] += projection * (weight * 2.0 / 3.0);
+            self.edges[k] -= projection * (weight / 3.0);
+            self.right[k] += times(&projection, &(r[k] - mean)) * weight;
+        }
+    }
+}
+
+fn times(block: &Block, x: &Vec3) -> Vec3 {
+    let [xx, yy, zz, xy, xz, yz] = block.data.0[0];
+    Vec3::new(
+        xx * x.x + xy * x.y + xz * x.z,
+        xy * x.x + yy * x.y + yz * x.z,
+        xz * x.x + yz * x.y + zz * x.z,
+    )
+}
+
+/// The inverse; the identity where there is none.
+fn inverse(block: &Block) -> Block {
+    let [xx, yy, zz, xy, xz, yz] = block.data.0[0];
+    let inverted = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz).try_inverse();
+    let m = inverted.unwrap_or_else(Matrix3::identity);
+    Block::new(
+        m.m11,
+        m.m22,
+        m.m33,
+        f64::midpoint(m.m12, m.m21),
+        f64::midpoint(m.m13, m.m31),
+        f64::midpoint(m.m23, m.m32),
+    )
+}
+
 /// A symmetric positive semidefinite system A x = g over 3-vectors at vertices.
 #[derive(Debug, Clone)]
 pub struct NormalEquations {
-    diagonal: Vec<Matrix3<f64>>,
-    /// The blocks (i, j) with i ≠ j, one for each edge; the block (j, i) is its transpose.
-    off_diagonal: Vec<(u32, u32, Matrix3<f64>)>,
+    diagonal: Vec<Block>,
+    /// The blocks (i, j) with i ≠ j, one for each edge, which stand at (j, i) as well.
+    off_diagonal: Vec<(u32, u32, Block)>,
     right: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
     /// The row over all vertices: its coefficients and weight.
     global: Option<(Vec<Vec3>, f64)>,
-    /// For every half-edge its edge's place in `off_diagonal`.
-    edge_of: Vec<u32>,
 }
 
 impl NormalEquations {
-    /// The empty system over `connectivity`'s vertices and edges.
-    pub fn new(vertices: usize, connectivity: &Connectivity) -> Self {
-        let mut edge_of = vec![0; connectivity.halfedges() as usize];
-        let mut off_diagonal = Vec::with_capacity(edge_of.len() / 2);
-        for h in connectivity.edges() {
-            for side in [h, connectivity.twin(h)] {
-                edge_of[side as usize] = off_diagonal.len() as u32;
-            }
-            let ends = (connectivity.origin(h), connectivity.target(h));
-            off_diagonal.push((ends.0, ends.1, Matrix3::zeros()));
-        }
+    /// The sum of the `elements` of all triangles, and damping·|x_v|² for every vertex. Each
+    /// vertex and edge gathers from the triangles round it in their cyclic order, whichever
+    /// thread does so.
+    pub fn new(elements: &[Element], connectivity: &Connectivity, damping: f64) -> Self {
+        let damping = Block::new(damping, damping, damping, 0.0, 0.0, 0.0);
+        let place = |h: u32| (&elements[h as usize / 3], h as usize % 3);
+        let gather = |v: u32| {
+            let start = (damping, Vec3::zeros());
+            connectivity.around(v).fold(start, |(block, right), h| {
+                let (element, k) = place(h);
+                (block + element.corners[k], right + element.right[k])
+            })
+        };
+        let (diagonal, right) = (0..connectivity.vertices())
+            .into_par_iter()
+            .with_min_len(LEAST_SHARED)
+            .map(gather)
+            .unzip();
+        let join = |h: u32| {
+            let ((here, k), (there, l)) = (place(h), place(connectivity.twin(h)));
+            let block = here.edges[k] + there.edges[l];
+            (connectivity.origin(h), connectivity.target(h), block)
+        };
+        let edges: Vec<u32> = connectivity.edges().collect();
+        let edges = edges.par_iter().with_min_len(LEAST_SHARED);
         Self {
-            diagonal: vec![Matrix3::zeros(); vertices],
-            off_diagonal,
-            right: vec![Vec3::zeros(); vertices],
+            diagonal,
+            off_diagonal: edges.map(|&h| join(h)).collect(),
+            right,
             global: None,
-            triangles: connectivity.triangles().to_vec(),
-            edge_of,
         }
-    }
-
-    /// Adds weight·(n·Σ bₖ xₖ − r)² over the corners k of triangle `t`: a plane with normal
-    /// `n` from which the point with barycentric coordinates `b` is to move by `r`.
-    pub fn add_plane(&mut self, t: u32, b: &[f64; 3], n: &Vec3, r: f64, weight: f64) {
-        let nn = n * n.transpose() * weight;
-        let pull = n * (weight * r);
-        self.add_blocks(t, |k, l| nn * (b[k] * b[l]));
-        for k in 0..3 {
-            self.right[self.triangles[t as usize][k] as usize] += pull * b[k];
-        }
-    }
-
-    /// Adds weight·Σₖ |P((xₖ − x̄) − rₖ)|² over the corners k of triangle `t`, where x̄ is their
-    /// mean and P the `projection`: the shape of the triangle is to change by r.
-    pub fn add_shape(&mut self, t: u32, r: &[Vec3; 3], projection: &Matrix3<f64>, weight: f64) {
-        let scaled = projection * weight;
-        self.add_blocks(t, |k, l| {
-            scaled * (if k == l { 2.0 / 3.0 } else { -1.0 / 3.0 })
-        });
-        let mean = (r[0] + r[1] + r[2]) / 3.0;
-        for k in 0..3 {
-            self.right[self.triangles[t as usize][k] as usize] += scaled * (r[k] - mean);
-        }
-    }
-
-    /// Adds weight·|x_v − r|².
-    pub fn add_anchor(&mut self, v: u32, r: &Vec3, weight: f64) {
-        self.diagonal[v as usize] += Matrix3::identity() * weight;
-        self.right[v as usize] += r * weight;
     }
 
     /// Sets the one row weight·(Σ_v c_v·x_v − r)² that couples all vertices.
@@ -85,16 +146,6 @@ impl NormalEquations {
             *right += c * (r * weight);
         }
         self.global = Some((coefficients, weight));
-    }
-
-    fn add_blocks(&mut self, t: u32, block: impl Fn(usize, usize) -> Matrix3<f64>) {
-        let triangle = self.triangles[t as usize];
-        for k in 0..3 {
-            self.diagonal[triangle[k] as usize] += block(k, k);
-            // Blocks of a term are symmetric, so (i, j) and (j, i) need not be told apart.
-            let edge = self.edge_of[3 * t as usize + k] as usize;
-            self.off_diagonal[edge].2 += block(k, (k + 1) % 3);
-        }
     }
 
     /// The solution, to a residual of `tolerance` times the right-hand side's norm (in the
@@ -108,13 +159,8 @@ impl NormalEquations {
         most: usize,
         monitor: &Monitor,
     ) -> Result<Vec<Vec3>, Cancelled> {
-        let inverse: Vec<Matrix3<f64>> = self
-            .diagonal
-            .iter()
-            .map(|d| d.try_inverse().unwrap_or_else(Matrix3::identity))
-            .collect();
-        let precondition =
-            |r: &[Vec3]| -> Vec<Vec3> { inverse.iter().zip(r).map(|(d, r)| d * r).collect() };
+        let inverse: Vec<Block> = self.diagonal.iter().map(inverse).collect();
+        let precondition = |r: &[Vec3]| products(&inverse, r);
         let mut x = vec![Vec3::zeros(); self.right.len()];
         let mut residual = self.right.clone();
         let mut z = precondition(&residual);
@@ -148,10 +194,10 @@ impl NormalEquations {
     }
 
     fn times(&self, x: &[Vec3]) -> Vec<Vec3> {
-        let mut y: Vec<Vec3> = self.diagonal.iter().zip(x).map(|(d, x)| d * x).collect();
+        let mut y = products(&self.diagonal, x);
         for (i, j, block) in &self.off_diagonal {
-            y[*i as usize] += block * x[*j as usize];
-            y[*j as usize] += block.tr_mul(&x[*i as usize]);
+            y[*i as usize] += times(block, &x[*j as usize]);
+            y[*j as usize] += times(block, &x[*i as usize]);
         }
         if let Some((coefficients, weight)) = &self.global {
             let along = weight * dot(coefficients, x);
@@ -161,6 +207,10 @@ impl NormalEquations {
         }
         y
     }
+}
+
+fn products(blocks: &[Block], x: &[Vec3]) -> Vec<Vec3> {
+    blocks.iter().zip(x).map(|(b, x)| times(b, x)).collect()
 }
 
 fn dot(x: &[Vec3], y: &[Vec3]) -> f64 {
@@ -178,7 +228,7 @@ mod tests {
         let mesh = shapes::icosphere(10.0, 1);
         let n = mesh.vertices.len();
         let connectivity = Connectivity::new(n, mesh.triangles.clone()).unwrap();
-        let mut equations = NormalEquations::new(n, &connectivity);
+        let mut elements = vec![Element::default(); mesh.triangles.len()];
         let mut rows: Vec<(Vec<f64>, f64)> = Vec::new();
         let mut number = 0.3f64;
         let mut draw = || {
@@ -190,7 +240,7 @@ mod tests {
                 let b = [0.2 + draw() / 5.0, 0.3, 0.4];
                 let normal = Vec3::new(draw(), draw(), draw()).normalize();
                 let (r, w) = (draw(), 1.0 + draw());
-                equations.add_plane(t as u32, &b, &normal, r, w);
+                elements[t].add_plane(&b, &normal, r, w);
                 let mut row = vec![0.0; 3 * n];
                 for k in 0..3 {
                     for c in 0..3 {
@@ -204,7 +254,7 @@ mod tests {
             let mut target = [0, 1, 2].map(|_| Vec3::new(draw(), draw(), draw()));
             let mean = (target[0] + target[1] + target[2]) / 3.0;
             target.iter_mut().for_each(|r| *r -= mean);
-            equations.add_shape(t as u32, &target, &projection, 0.7);
+            elements[t].add_shape(&target, &normal, 0.7);
             for k in 0..3 {
                 for c in 0..3 {
                     let mut row = vec![0.0; 3 * n];
@@ -219,15 +269,12 @@ mod tests {
                 }
             }
         }
-        for v in 0..n as u32 {
-            let r = Vec3::new(draw(), draw(), draw());
-            equations.add_anchor(v, &r, 0.05);
-            for c in 0..3 {
-                let mut row = vec![0.0; 3 * n];
-                row[3 * v as usize + c] = 0.05f64.sqrt();
-                rows.push((row, r[c] * 0.05f64.sqrt()));
-            }
+        for unknown in 0..3 * n {
+            let mut row = vec![0.0; 3 * n];
+            row[unknown] = 0.05f64.sqrt();
+            rows.push((row, 0.0));
         }
+        let mut equations = NormalEquations::new(&elements, &connectivity, 0.05);
         let coefficients: Vec<Vec3> = (0..n).map(|_| Vec3::new(draw(), draw(), draw())).collect();
         let row = coefficients
             .iter()

@@ -43,9 +43,9 @@ struct Model<'a> {
     vertices: Vec<Vec3>,
     connectivity: Connectivity,
     samples: Vec<Sample>,
-    /// For each edge's midpoint and triangle's centre the triangle of the reference that was
+    /// For the midpoints and the centre of each triangle the triangle of the reference that was
     /// closest in the last round: where the next search begins.
-    near: Vec<Option<u32>>,
+    near: Vec<[Option<u32>; 4]>,
     sizing: &'a [f64],
     reference: &'a Reference,
     /// That of the reference, mm³.

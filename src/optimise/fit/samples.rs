@@ -16,6 +16,9 @@ pub const LEAST_FACING: f64 = 0.2;
 /// Triangles that a walk may cross; one that is still going then has met a fold.
 const LONGEST_WALK: usize = 64;
 
+/// Samples that one task looks at.
+const SAMPLES_PER_TASK: usize = 256;
+
 /// A sample of S and its partner on the model M.
 #[derive(Debug, Clone, Copy)]
 pub struct Sample {
@@ -29,6 +32,8 @@ pub struct Sample {
     pub barycentric: [f64; 3],
     /// Whether the partner faces the same way.
     pub admitted: bool,
+    /// How far the sample lies from its partner along the normal, mm.
+    pub distance: f64,
 }
 
 /// `count` samples of `reference` at equal shares of its area, in the order of its triangles,
@@ -60,6 +65,7 @@ pub fn spread(reference: &Reference, count: usize) -> Vec<Sample> {
                 triangle: 0,
                 barycentric: [1.0, 0.0, 0.0],
                 admitted: false,
+                distance: 0.0,
             });
         }
     }
@@ -74,18 +80,23 @@ pub fn find_partners(model: &mut Model) {
         .iter()
         .map(|t| unit_normal(&t.map(|v| vertices[v as usize])))
         .collect();
+    // Each sample is judged by itself; only the time depends on its neighbours' answers.
     model
         .samples
-        .par_iter_mut()
-        .with_min_len(256)
-        .for_each(|sample| {
-            let faces = |t: u32| normals[t as usize].dot(&sample.normal) > LEAST_FACING;
-            if let Some(found) = bvh.closest_where(&sample.point, faces) {
-                sample.triangle = found.triangle;
-                sample.barycentric = found.barycentric;
-                sample.admitted = true;
-            } else {
-                sample.admitted = false;
+        .par_chunks_mut(SAMPLES_PER_TASK)
+        .for_each(|samples| {
+            // Samples follow each other over S: the last partner is near the next.
+            let mut last = None;
+            for sample in samples {
+                let faces = |t: u32| normals[t as usize].dot(&sample.normal) > LEAST_FACING;
+                let found = bvh.closest_from(&sample.point, last, faces);
+                sample.admitted = found.is_some();
+                if let Some(found) = found {
+                    last = Some(found.triangle);
+                    sample.triangle = found.triangle;
+                    sample.barycentric = found.barycentric;
+                    sample.distance = sample.normal.dot(&(sample.point - found.point));
+                }
             }
         });
 }
@@ -97,13 +108,15 @@ pub fn follow_partners(model: &mut Model) {
     model
         .samples
         .par_iter_mut()
-        .with_min_len(256)
+        .with_min_len(SAMPLES_PER_TASK)
         .for_each(|sample| {
             let (t, b) = walk(vertices, connectivity, &sample.point, sample.triangle);
             let corners = connectivity.triangles()[t as usize].map(|v| vertices[v as usize]);
             sample.triangle = t;
             sample.barycentric = b;
             sample.admitted = unit_normal(&corners).dot(&sample.normal) > LEAST_FACING;
+            let place: Vec3 = (0..3).map(|k| corners[k] * b[k]).sum();
+            sample.distance = sample.normal.dot(&(sample.point - place));
         });
 }
 
