@@ -186,6 +186,15 @@ impl Connectivity {
         self.valence[d as usize] += 1;
     }
 
+    /// Takes back the flip that gave triangle `t` its new edge. Both triangles get their indices
+    /// back, though perhaps begin at another corner.
+    pub fn unflip(&mut self, t: u32) {
+        // A flip turns the pair by a quarter: three more complete the turn.
+        for _ in 0..3 {
+            self.flip(3 * t + 2);
+        }
+    }
+
     fn pair(&mut self, g: u32, h: u32) {
         self.twins[g as usize] = h;
         self.twins[h as usize] = g;
@@ -218,6 +227,28 @@ mod tests {
         assert_eq!(fresh.valence, connectivity.valence);
         let census = topology::check_triangles(n, connectivity.triangles()).unwrap();
         assert_eq!(census.euler_characteristic, 2);
+    }
+
+    #[test]
+    fn a_flip_taken_back_leaves_every_triangle_in_its_place() {
+        let mesh = shapes::icosphere(1.0, 2);
+        let mut connectivity = Connectivity::new(mesh.vertices.len(), mesh.triangles).unwrap();
+        let from_lowest = |connectivity: &Connectivity| -> Vec<[u32; 3]> {
+            let lowest = |t: &[u32; 3]| (0..3).min_by_key(|&k| t[k]).unwrap();
+            let turned = |t: &[u32; 3]| [0, 1, 2].map(|k| t[(lowest(t) + k) % 3]);
+            connectivity.triangles().iter().map(turned).collect()
+        };
+        let before = from_lowest(&connectivity);
+        for h in 0..connectivity.halfedges() {
+            if connectivity.can_flip(h) {
+                connectivity.flip(h);
+                assert_ne!(from_lowest(&connectivity), before);
+                connectivity.unflip(h / 3);
+            }
+        }
+        assert_eq!(from_lowest(&connectivity), before);
+        let again = Connectivity::new(mesh.vertices.len(), connectivity.triangles.clone());
+        assert_eq!(again.unwrap().twins, connectivity.twins);
     }
 
     #[test]

@@ -136,7 +136,7 @@ fn run_sweep(
         }
         let pair = [h / 3, connectivity.twin(h) / 3];
         state.flip(h, candidate.distance);
-        legality::reindex(vertices, state.connectivity(), index, pair);
+        legality::reindex(vertices, state.connectivity(), index, &pair);
         for t in pair {
             is_changed[t as usize] = true;
             changed.push(t);

@@ -84,14 +84,36 @@ pub fn pierces(
         || triangles_intersect(first, &p, second, &q)
 }
 
-/// Tells `index` how the triangles of `pair` look after a flip.
+/// Whether any of the `changed` triangles, as they are now, meets another one in more than
+/// what they share. `index` must hold all others.
+pub fn have_pierced(
+    vertices: &[Vec3],
+    connectivity: &Connectivity,
+    index: &IntersectionIndex,
+    changed: &[u32],
+) -> bool {
+    let now = |t: u32| {
+        let ids = connectivity.triangles()[t as usize];
+        (ids, ids.map(|v| vertices[v as usize]))
+    };
+    changed.iter().enumerate().any(|(place, &t)| {
+        let (ids, corners) = now(t);
+        let meets = |s: &u32| {
+            let (others, p) = now(*s);
+            triangles_intersect(ids, &corners, others, &p)
+        };
+        index.pierces(ids, &corners, changed) || changed[..place].iter().any(meets)
+    })
+}
+
+/// Tells `index` how the `changed` triangles look now.
 pub fn reindex(
     vertices: &[Vec3],
     connectivity: &Connectivity,
     index: &mut IntersectionIndex,
-    pair: [u32; 2],
+    changed: &[u32],
 ) {
-    for t in pair {
+    for &t in changed {
         let ids = connectivity.triangles()[t as usize];
         index.set(t, ids, ids.map(|v| vertices[v as usize]));
     }

@@ -110,10 +110,9 @@ pub fn fit(
         monitor.check()?;
         if round % 2 == 1 && round + 1 < parameters.rounds {
             // Early, so that enough rounds are left to even the triangles out.
-            if 2 * round < parameters.rounds {
-                flips += polish::glide(&mut model, parameters.glide, monitor)?;
-            }
-            flips += polish::flip(&mut model);
+            let early = 2 * round < parameters.rounds;
+            let glide = if early { parameters.glide } else { 0 };
+            flips += polish::polish(&mut model, glide, monitor)?;
             monitor.check()?;
         }
         follow_partners(&mut model);
@@ -268,7 +267,7 @@ mod tests {
         }
         follow_partners(&mut model);
         assert!(irregularity(&model.connectivity) > 12);
-        assert!(polish::flip(&mut model) >= 5);
+        assert!(polish::polish(&mut model, 0, &Monitor::silent()).unwrap() >= 5);
         assert_eq!(irregularity(&model.connectivity), 12);
     }
 
@@ -318,7 +317,7 @@ mod tests {
         model.connectivity = torn.unwrap();
         follow_partners(&mut model);
         assert!(irregularity(&model.connectivity) > 12);
-        polish::glide(&mut model, 3, &Monitor::silent()).unwrap();
+        polish::polish(&mut model, 3, &Monitor::silent()).unwrap();
         assert_eq!(irregularity(&model.connectivity), 12);
     }
 }

@@ -30,97 +30,138 @@ const LEAST_RADIUS_RATIO: f64 = 1e-12;
 /// Gains below this are rounding.
 const LEAST_GAIN: f64 = 1e-9;
 
-/// Flips edges, in order, wherever that lowers Σ R/(2r) + Σ (valence - 6)² and is legal,
-/// until a pass finds none. Returns the number of flips.
-pub fn flip(model: &mut Model) -> usize {
-    let mut index = flips::intersection_index(&model.vertices, &model.connectivity);
-    let mut flipped = 0;
-    for _ in 0..MOST_PASSES {
-        let before = flipped;
-        for h in 0..model.connectivity.halfedges() {
-            if h < model.connectivity.twin(h)
-                && gain(model, h) > LEAST_GAIN
-                && model.connectivity.can_flip(h)
-                && !legality::pierces(&model.vertices, &model.connectivity, &index, h)
-            {
-                flip_edge(model, &mut index, h);
-                flipped += 1;
-            }
-        }
-        if flipped == before {
-            break;
-        }
-    }
-    flipped
-}
-
-/// Looks for short chains of flips that lower Σ (valence - 6)² although none of them but the
-/// last does: so a pair of irregular vertices travels until it meets another one and both
-/// vanish. A chain is one flip and at most `more` further ones; 0 looks for none. Returns the
-/// number of flips.
+/// Looks for chains of flips (see [`Polish::glide`]), unless `glide` is 0, and then for single
+/// ones ([`Polish::flip`]). Returns the number of flips.
 ///
 /// # Errors
 /// [`Cancelled`].
-pub fn glide(model: &mut Model, more: usize, monitor: &Monitor) -> Result<usize, Cancelled> {
-    if more == 0 {
-        return Ok(0);
-    }
-    let mut index = flips::intersection_index(&model.vertices, &model.connectivity);
-    let mut flipped = 0;
-    for v in 0..model.vertices.len() as u32 {
-        if model.connectivity.valence(v) == 6 {
-            continue;
-        }
-        monitor.check()?;
-        for edge in edges_near(&model.connectivity, &[v]) {
-            flipped += chain(model, &mut index, edge, more, 0).unwrap_or(0);
-        }
-    }
-    Ok(flipped)
+pub fn polish(model: &mut Model, glide: usize, monitor: &Monitor) -> Result<usize, Cancelled> {
+    let mut polish = Polish {
+        model,
+        index: None,
+        stale: Vec::new(),
+    };
+    let chained = if glide > 0 {
+        polish.glide(glide, monitor)?
+    } else {
+        0
+    };
+    Ok(chained + polish.flip())
 }
 
-/// Flips the edge and as many as `more` near it if that lowers Σ (valence - 6)²; else leaves
-/// the mesh as it was. `gained` is what the flips before have lowered it by.
-fn chain(
-    model: &mut Model,
-    index: &mut IntersectionIndex,
-    edge: [u32; 2],
-    more: usize,
-    gained: i32,
-) -> Option<usize> {
-    let h = model.connectivity.halfedge(edge)?;
-    let gained = gained + valence_gain(model, h);
-    let quad = model.connectivity.quad(h);
-    if gained < 0
-        || (gained == 0 && more == 0)
-        || !model.connectivity.can_flip(h)
-        || legality::replacement(&model.vertices, &quad, 0.0)
-            .is_none_or(|new| new.radius_ratios.iter().any(|&r| r < LEAST_GLIDING_RATIO))
-        || legality::pierces(&model.vertices, &model.connectivity, index, h)
-    {
-        return None;
-    }
-    flip_edge(model, index, h);
-    if gained > 0 {
-        return Some(1);
-    }
-    for next in edges_near(&model.connectivity, &[quad.a, quad.b, quad.c, quad.d]) {
-        if next == edge || next == [quad.c, quad.d] || next == [quad.d, quad.c] {
-            continue;
-        }
-        if let Some(flips) = chain(model, index, next, more - 1, gained) {
-            return Some(flips + 1);
-        }
-    }
-    let back = model.connectivity.halfedge([quad.c, quad.d])?;
-    flip_edge(model, index, back);
-    None
+struct Polish<'a, 'b> {
+    model: &'a mut Model<'b>,
+    /// Made when a flip is first about to be made: many calls find none.
+    index: Option<IntersectionIndex>,
+    /// Triangles that the index may hold otherwise than they are.
+    stale: Vec<u32>,
 }
 
-fn flip_edge(model: &mut Model, index: &mut IntersectionIndex, h: u32) {
-    let pair = [h / 3, model.connectivity.twin(h) / 3];
-    model.connectivity.flip(h);
-    legality::reindex(&model.vertices, &model.connectivity, index, pair);
+impl Polish<'_, '_> {
+    /// Flips edges, in order, wherever that lowers Σ R/(2r) + Σ (valence - 6)² and is legal,
+    /// until a pass finds none. Returns the number of flips.
+    fn flip(&mut self) -> usize {
+        let mut flipped = 0;
+        for _ in 0..MOST_PASSES {
+            let before = flipped;
+            for h in 0..self.model.connectivity.halfedges() {
+                if h < self.model.connectivity.twin(h)
+                    && gain(self.model, h) > LEAST_GAIN
+                    && self.model.connectivity.can_flip(h)
+                {
+                    let pair = [h / 3, self.model.connectivity.twin(h) / 3];
+                    self.model.connectivity.flip(h);
+                    if self.accepts(&pair) {
+                        flipped += 1;
+                    } else {
+                        self.model.connectivity.unflip(pair[0]);
+                    }
+                }
+            }
+            if flipped == before {
+                break;
+            }
+        }
+        flipped
+    }
+
+    /// Looks for short chains of flips that lower Σ (valence - 6)² although none of them but
+    /// the last does: so a pair of irregular vertices travels until it meets another one and
+    /// both vanish. A chain is one flip and at most `more` further ones. Returns the number of
+    /// flips.
+    fn glide(&mut self, more: usize, monitor: &Monitor) -> Result<usize, Cancelled> {
+        let mut flipped = 0;
+        for v in 0..self.model.vertices.len() as u32 {
+            if self.model.connectivity.valence(v) == 6 {
+                continue;
+            }
+            monitor.check()?;
+            for edge in edges_near(&self.model.connectivity, &[v]) {
+                let mut changed = Vec::new();
+                if self.chain(edge, more, 0, &mut changed) {
+                    flipped += changed.len() / 2;
+                }
+            }
+        }
+        Ok(flipped)
+    }
+
+    /// Flips the edge and as many as `more` near it if that lowers Σ (valence - 6)²; else
+    /// leaves the mesh as it was. `gained` is what the flips before have lowered it by,
+    /// `changed` the triangles that they changed, two for each. The flips as a whole must
+    /// pierce nothing.
+    fn chain(&mut self, edge: [u32; 2], more: usize, gained: i32, changed: &mut Vec<u32>) -> bool {
+        let connectivity = &self.model.connectivity;
+        let Some(h) = connectivity.halfedge(edge) else {
+            return false;
+        };
+        let gained = gained + valence_gain(self.model, h);
+        let quad = connectivity.quad(h);
+        if gained < 0
+            || (gained == 0 && more == 0)
+            || !connectivity.can_flip(h)
+            || legality::replacement(&self.model.vertices, &quad, 0.0)
+                .is_none_or(|new| new.radius_ratios.iter().any(|&r| r < LEAST_GLIDING_RATIO))
+        {
+            return false;
+        }
+        let pair = [h / 3, connectivity.twin(h) / 3];
+        self.model.connectivity.flip(h);
+        changed.extend(pair);
+        let found = if gained > 0 {
+            self.accepts(changed)
+        } else {
+            edges_near(&self.model.connectivity, &[quad.a, quad.b, quad.c, quad.d])
+                .into_iter()
+                .filter(|&next| {
+                    next != edge && next != [quad.c, quad.d] && next != [quad.d, quad.c]
+                })
+                .any(|next| self.chain(next, more - 1, gained, changed))
+        };
+        if !found {
+            self.model.connectivity.unflip(pair[0]);
+            changed.truncate(changed.len() - 2);
+        }
+        found
+    }
+
+    /// Whether the `changed` triangles, as they are now, pierce nothing.
+    fn accepts(&mut self, changed: &[u32]) -> bool {
+        let (vertices, connectivity) = (&self.model.vertices, &self.model.connectivity);
+        let index = self
+            .index
+            .get_or_insert_with(|| flips::intersection_index(vertices, connectivity));
+        let mut changed = changed.to_vec();
+        changed.sort_unstable();
+        changed.dedup();
+        for looks_new in [&self.stale, &changed] {
+            legality::reindex(vertices, connectivity, index, looks_new);
+        }
+        let accepted = !legality::have_pierced(vertices, connectivity, index, &changed);
+        // What is refused will be taken back.
+        self.stale = if accepted { Vec::new() } else { changed };
+        accepted
+    }
 }
 
 /// The edges at and across from `vertices`, as pairs of vertices: half-edges change their
