@@ -28,8 +28,8 @@ const MOMENTUM: f64 = 0.9;
 const COOLING_ROUNDS: usize = 10;
 /// Root mean square way to the centroid, in spacings, below which relaxation has settled.
 const SETTLED: f64 = 2e-4;
-/// Samples that one task looks at.
-const CHUNK: usize = 1024;
+/// Samples that one task looks at: few enough that the last of them keeps nobody waiting.
+const CHUNK: usize = 512;
 
 /// Which site each sample belongs to, and where the sites are.
 #[derive(Debug, Clone)]
@@ -72,8 +72,11 @@ impl Cells {
         for round in 0..rounds {
             monitor.check()?;
             self.reassign(samples, &mut following);
-            self.fill_empty_cells(samples, weights);
-            let centroids = patches.centroids(&self.labels, &self.sites);
+            let mut centroids = patches.centroids(&self.labels, &self.sites);
+            if centroids.contains(&None) {
+                self.fill_empty_cells(samples, weights);
+                centroids = patches.centroids(&self.labels, &self.sites);
+            }
             let (momentum, step) = if round + COOLING_ROUNDS < rounds {
                 (MOMENTUM, STEP)
             } else {
@@ -83,7 +86,7 @@ impl Cells {
             for (site, (centroid, velocity)) in
                 (self.sites.iter_mut()).zip(centroids.iter().zip(&mut velocities))
             {
-                let way = centroid - *site;
+                let way = centroid.map_or(Vec3::zeros(), |centroid| centroid - *site);
                 squares += way.norm_squared();
                 *velocity = *velocity * momentum + way * step;
                 *site += *velocity;

@@ -13,9 +13,13 @@ use super::samples::Samples;
 use crate::geometry::Vec3;
 use crate::geometry::triangle::area_normal;
 
-/// Triangles in one parallel task, and most tasks: each task sums up all cells.
-const LEAST_CHUNK: usize = 2048;
-const MOST_CHUNKS: usize = 8;
+/// Triangles in one parallel task, and most tasks: each task sums up all cells. They depend on
+/// the surface alone, and so does the order of all sums.
+const LEAST_CHUNK: usize = 1024;
+const MOST_CHUNKS: usize = 16;
+
+/// Three divisions by 3 cost more than all else at a triangle that is cut.
+const THIRD: f64 = 1.0 / 3.0;
 
 /// Moment (mass times place) and mass.
 #[derive(Debug, Clone, Copy)]
@@ -69,8 +73,8 @@ impl<'a> Patches<'a> {
         Self { samples, moments }
     }
 
-    /// The centroid of every cell; its site where the cell has no mass.
-    pub fn centroids(&self, labels: &[u32], sites: &[Vec3]) -> Vec<Vec3> {
+    /// The centroid of every cell; `None` where the cell has no mass.
+    pub fn centroids(&self, labels: &[u32], sites: &[Vec3]) -> Vec<Option<Vec3>> {
         let count = self.moments.len();
         let chunk = LEAST_CHUNK.max(count.div_ceil(MOST_CHUNKS));
         let partial: Vec<Vec<Moment>> = (0..count.div_ceil(chunk))
@@ -89,11 +93,7 @@ impl<'a> Patches<'a> {
                 for part in &partial {
                     sum.add(&part[site]);
                 }
-                if sum.mass > 0.0 {
-                    sum.first / sum.mass
-                } else {
-                    sites[site]
-                }
+                (sum.mass > 0.0).then(|| sum.first / sum.mass)
             })
             .collect()
     }
@@ -124,7 +124,8 @@ impl<'a> Patches<'a> {
         let (lone, rest) = ([a, b, c][k], [a, b, c][(k + 1) % 3]);
         let plane = Bisector::new(&sites[lone as usize], &sites[rest as usize]);
         let (s, u) = (plane.crossing(&p, &q), plane.crossing(&p, &r));
-        let piece = Moment::of(p + ((q - p) * s + (r - p) * u) / 3.0, whole.mass * s * u);
+        let way = (q - p) * (s * THIRD) + (r - p) * (u * THIRD);
+        let piece = Moment::of(p + way, whole.mass * s * u);
         sums[lone as usize].add(&piece);
         sums[rest as usize].add(&Moment {
             first: whole.first - piece.first,
@@ -266,7 +267,8 @@ mod tests {
             );
             let labels = nearest(&samples, &sites);
             let patches = Patches::new(&samples, &samples.area);
-            patches.centroids(&labels, &sites)
+            let centroids = patches.centroids(&labels, &sites).into_iter();
+            centroids.map(Option::unwrap).collect::<Vec<Vec3>>()
         };
         // The same flat triangles, cut in 64: counting samples would be off by 0.06.
         for (a, b) in of(0).iter().zip(of(40_000)) {
