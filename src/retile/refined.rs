@@ -231,8 +231,13 @@ impl<'a> Job<'a> {
                     (uniform.ln() / (area / (h * h)).max(f64::MIN_POSITIVE), v)
                 })
                 .collect();
-            keyed.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-            seeds.extend(keyed.iter().take(quota).map(|(_, v)| *v));
+            let order = |a: &(f64, u32), b: &(f64, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+            if quota < keyed.len() {
+                keyed.select_nth_unstable_by(quota, order);
+                keyed.truncate(quota);
+            }
+            keyed.sort_unstable_by(order);
+            seeds.extend(keyed.iter().map(|(_, v)| *v));
         }
         seeds
     }

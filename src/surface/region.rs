@@ -146,10 +146,11 @@ impl<'a> Wall<'a> {
             .collect();
         let maximum = wall.iter().copied().fold(0.0, f32::max);
         wall.retain(|&v| v > 0.3 * maximum);
-        wall.sort_unstable_by(f32::total_cmp);
-        wall.get(wall.len().saturating_sub(1) * 98 / 100)
-            .copied()
-            .unwrap_or(maximum)
+        if wall.is_empty() {
+            return maximum;
+        }
+        let place = (wall.len() - 1) * 98 / 100;
+        *wall.select_nth_unstable_by(place, f32::total_cmp).1
     }
 
     /// The region at `iso`; `None` where no voxel of the wall reaches it.
