@@ -197,7 +197,8 @@ impl Bvh {
             let first = node.first_or_right as usize;
             for slot in first..first + node.count as usize {
                 let triangle = self.order[slot];
-                if !admits(triangle) {
+                // A box of its own costs less than the closest point and rules most out.
+                if Aabb::of(&self.corners[slot]).squared_distance(p) > bound || !admits(triangle) {
                     continue;
                 }
                 let found = self.closest_in(slot, p);
