@@ -114,9 +114,11 @@ fn explicit_and_implicit_steps_end_in_the_same_state() {
             / start.vertices.len() as f64;
         let apart = pairs().map(|(p, q)| (p - q).norm()).sum::<f64>() / start.vertices.len() as f64;
         let farthest = pairs().map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
-        // A real journey, and the same end within a fifth of a voxel.
-        assert!(moved > 1.0, "{moved}");
-        assert!(apart < 0.2 * SPACING, "{kind:?}: {apart} mm in the mean");
-        assert!(farthest < SPACING, "{kind:?}: {farthest} mm at most");
+        // A real journey (4.7 and 4.1 mm), and the same end: 0.147 and 0.134 voxels apart in the
+        // mean, 0.31 at most. Nearer they cannot come, because they do not ask the same: one
+        // rests on the mean of twelve answers, the other on the last one.
+        assert!(moved > 4.0, "{moved}");
+        assert!(apart < 0.15 * SPACING, "{kind:?}: {apart} mm in the mean");
+        assert!(farthest < 0.35 * SPACING, "{kind:?}: {farthest} mm at most");
     }
 }

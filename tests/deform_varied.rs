@@ -47,6 +47,11 @@ fn patients() -> Vec<(&'static str, PhantomParameters, f64)> {
             0.6,
         ),
         of(
+            "the territory of the left anterior descending artery without any uptake",
+            &|p| p.defects = defects(&[7, 8, 13, 14, 15, 16, 17], 1.0),
+            0.5,
+        ),
+        of(
             "inferior defect beside a liver twice as hot",
             &|p| (p.liver, p.defects) = (2.0, defects(&[4, 10, 15], 1.0)),
             0.6,
@@ -87,10 +92,16 @@ fn no_varied_patient_is_lost() {
         let found = fit.localisation.as_ref().unwrap().cup;
         let off = (found.centre - (pose.apex + pose.base) / 2.0).norm();
         let angle = found.axis.angle(&pose.axis).to_degrees();
+        // 3.4 mm at most where the apex shows. Where it takes up nothing, how far it lies from
+        // the base is only known by the proportions of hearts, which differ by 8 % of the length,
+        // and the axis by what is left of the wall: 14.8 mm and 10.5 degrees.
+        let dark = fit.localisation.as_ref().unwrap().dark_apex.is_some();
+        let (far, askew) = if dark { (15.0, 11.0) } else { (4.0, 6.0) };
         assert!(
-            off < 20.0 && angle < 30.0,
+            off < far && angle < askew,
             "{name}: {off} mm, {angle} degrees"
         );
+        assert_eq!(dark, name.contains("without any uptake"), "{name}");
         let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
         let truth = Mask {
             shape: truth.shape,

@@ -116,7 +116,9 @@ mod tests {
             breadth: 1.0,
         };
         let found = thickness(&mesh, &cup);
-        assert!((10.8..12.3).contains(&found), "{found}");
+        // 10.9 of 12: no share of area tells the flanks of the rounded rim from the wall, and
+        // this cup is short.
+        assert!((10.8..11.0).contains(&found), "{found}");
     }
 
     #[test]

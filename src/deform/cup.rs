@@ -24,6 +24,13 @@ const MIDDLE: [(f64, f64, usize); 6] = [
 /// Where the middle of the wall crosses the axis at the apex.
 const APEX: f64 = 0.91;
 
+/// Rings up to this share of the length are basal: segments 1 to 6 and most of 7 to 12.
+const BASAL: f64 = 0.6;
+/// This share of the length before the base plane the wall has come to its end.
+const BEYOND: f64 = 0.18;
+/// Breadth of cups whose length is not seen: the mean of those found in simulated hearts.
+const USUAL_BREADTH: f64 = 1.08;
+
 /// The point on the axis about which poses turn and scale.
 const CENTRE: f64 = 0.45;
 
@@ -130,6 +137,27 @@ impl Default for Pattern {
     }
 }
 
+impl Pattern {
+    /// What the basal half shows: the wall's rings, their cavity and surroundings, and the end of
+    /// the wall at the base. For hearts whose apex does not show.
+    pub fn basal() -> Self {
+        let basal = |s: &Sample| s.along + CENTRE < BASAL;
+        let mut samples = Self::default().0;
+        samples.retain(basal);
+        let beyond = Sample {
+            along: -BEYOND - CENTRE,
+            across: MIDDLE[0].1,
+            round: (1.0, 0.0),
+            outward: 0.0,
+            tilt: (1.0, 0.0),
+            expected: OUTSIDE,
+            weight: 0.15 / 12.0,
+        };
+        ring(&mut samples, 12, 0, &beyond);
+        Self(samples)
+    }
+}
+
 /// `count` copies of `at` round the axis; odd rows stand in the gaps of the even ones.
 fn ring(samples: &mut Vec<Sample>, count: usize, row: usize, at: &Sample) {
     let stagger = 0.5 * (row % 2) as f64;
@@ -192,6 +220,47 @@ impl Cup {
             wall,
             hollowness: 1.0 - cavity.value() / wall,
         }
+    }
+
+    /// The cup of the same base and radius that is as long as hearts of this radius are.
+    pub fn in_proportion(&self) -> Self {
+        let length = self.length * self.breadth / USUAL_BREADTH;
+        Self {
+            centre: self.base() + self.axis * (CENTRE * length),
+            length,
+            breadth: USUAL_BREADTH,
+            ..*self
+        }
+    }
+
+    /// Uptake of the apical wall (segments 13 to 17) against that of the brighter half of the
+    /// basal rings: the median of the ridges on rays from the cavity through it. A ridge nearer
+    /// or farther than the cup's own wall is found as well; the median lets no organ that
+    /// touches the heart somewhere pass for the wall.
+    pub fn apex_uptake(&self, field: &Field) -> f64 {
+        let (e1, e2) = perpendicular(&self.axis);
+        let place = |along: f64, across: Vec3| {
+            self.axis * ((along - CENTRE) * self.length) + across * (self.length * self.breadth)
+        };
+        let ring = |&(along, radius, count): &(f64, f64, usize)| -> Vec<Vec3> {
+            let angles = (0..count).map(|n| TAU * n as f64 / count as f64);
+            angles
+                .map(|a| place(along, (e1 * a.cos() + e2 * a.sin()) * radius))
+                .collect()
+        };
+        let ridge = |p: Vec3| {
+            let far = (12..=24).map(|n| field.at(&(self.centre + p * (0.05 * f64::from(n)))));
+            far.fold(f64::NEG_INFINITY, f64::max)
+        };
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let tip = place(APEX, Vec3::zeros());
+        let apical = MIDDLE[4..].iter().flat_map(ring).chain([tip]).map(ridge);
+        let mut apical: Vec<f64> = apical.collect();
+        apical.sort_by(f64::total_cmp);
+        let basal = MIDDLE[..3].iter().flat_map(ring);
+        let mut basal: Vec<f64> = basal.map(|p| field.at(&(self.centre + p))).collect();
+        basal.sort_by(f64::total_cmp);
+        apical[apical.len() / 2] / mean(&basal[basal.len() / 2..])
     }
 
     /// How bright it is across the base, wall = 1: the brightest of the discs about the axis

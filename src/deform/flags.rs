@@ -13,6 +13,16 @@ pub enum Flag {
         /// 0..=1.
         confidence: f64,
     },
+    /// The apical wall does not show.
+    #[error(
+        "the apical wall takes up {:.0} % of the basal one: how far it reaches is the mean \
+         heart's proportion",
+        100.0 * uptake
+    )]
+    DarkApex {
+        /// Uptake of the apical wall, basal wall = 1.
+        uptake: f64,
+    },
     /// The motion did not come to rest.
     #[error("the model did not come to rest: {}", reason.as_str())]
     NotAtRest {
@@ -64,6 +74,7 @@ impl Flag {
     pub fn code(&self) -> &'static str {
         match self {
             Flag::UncertainPlace { .. } => "uncertain_place",
+            Flag::DarkApex { .. } => "dark_apex",
             Flag::NotAtRest { .. } => "not_at_rest",
             Flag::Folded { .. } => "folded",
             Flag::PoorContrast { .. } => "poor_contrast",
@@ -80,6 +91,9 @@ pub(super) fn raise(fit: &Fit, volume: &Volume, ventricle: bool) -> Vec<Flag> {
     if fit.confidence < 0.4 {
         let confidence = fit.confidence;
         flags.push(Flag::UncertainPlace { confidence });
+    }
+    if let Some(uptake) = fit.localisation.as_ref().and_then(|l| l.dark_apex) {
+        flags.push(Flag::DarkApex { uptake });
     }
     if matches!(fit.reason, StopReason::MaxIterations | StopReason::Diverged) {
         flags.push(Flag::NotAtRest { reason: fit.reason });

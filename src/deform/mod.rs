@@ -19,6 +19,9 @@
 //! look thicker than it is; with [`Edge::Anatomical`], [`anatomy`] takes the blur's share off
 //! and 4 is repeated with the edges moved into the wall by that much.
 //!
+//! Where the apex takes up nothing, the model keeps the length of its pose as far as its
+//! stiffness lets it; [`Flag::DarkApex`] says that the image did not tell it.
+//!
 //! Guaranteed: same volume, template and parameters give the same bytes; connectivity is the
 //! template's; a result is never invented where no heart was found. Not guaranteed: freedom
 //! from self-intersection ([`Fit::self_intersections`] counts them, [`Flag::Folded`] says so).
@@ -291,12 +294,30 @@ impl Fit {
         }
     }
 
-    /// A figure to rank templates by: share of area with edges, less strain and misfit.
+    /// A figure to rank templates by: share of area with edges, less strain and misfit, and,
+    /// where the apex does not show, less the change of its reach. A model that shrinks to what
+    /// is seen has edges on more of its area, but nothing in the image asks it to.
     pub fn merit(&self) -> f64 {
         self.active
+            - 0.5 * self.unasked_reach().abs()
             - 0.5 * self.strain.sqrt()
             - 0.05 * self.residual
             - 0.02 * self.flags.len() as f64
+    }
+
+    /// Logarithm of the apex's distance from the base plane that was found, against that of the
+    /// posed template; 0 where the apex shows.
+    fn unasked_reach(&self) -> f64 {
+        let Some(found) = self.localisation.as_ref().filter(|l| l.dark_apex.is_some()) else {
+            return 0.0;
+        };
+        let (base, axis) = (found.cup.base(), found.cup.axis);
+        let along = |p: Vec3| (p - base).dot(&axis);
+        let nodes = self.mesh.vertices.iter().zip(&self.displacements);
+        let (now, posed) = nodes.fold((0f64, 0f64), |(now, posed), (p, moved)| {
+            (now.max(along(*p)), posed.max(along(p - moved)))
+        });
+        (now / posed).ln()
     }
 }
 

@@ -10,6 +10,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::cup::Cup;
 use super::elastic::rotation_of;
+use crate::geometry::bvh::Bvh;
 use crate::geometry::{Vec3, triangle};
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Monitor};
@@ -89,13 +90,14 @@ impl Wall {
         monitor: &Monitor,
     ) -> Result<Self, Cancelled> {
         let frame = Frame::new(mesh, cup, superior);
+        let tree = Bvh::new(&mesh.vertices, &mesh.triangles);
         let ray = |index: usize| {
             monitor.check()?;
             let (start, direction) = frame.ray(index / COLUMNS, index % COLUMNS);
             Ok(Ray {
                 start,
                 direction,
-                wall: crossing(mesh, &start, &direction),
+                wall: crossing(mesh, &tree, &start, &direction),
             })
         };
         let rays = (0..ROWS * COLUMNS)
@@ -205,36 +207,21 @@ impl Frame {
 }
 
 /// Where a ray first enters the wall and then leaves it.
-fn crossing(mesh: &TriMesh, start: &Vec3, direction: &Vec3) -> Option<[f64; 2]> {
-    let mut hits: Vec<(f64, bool)> = (0..mesh.triangles.len())
-        .filter_map(|t| {
-            let [a, b, c] = mesh.corners(t);
-            let distance = hit(start, direction, &a, &b, &c)?;
+fn crossing(mesh: &TriMesh, tree: &Bvh, start: &Vec3, direction: &Vec3) -> Option<[f64; 2]> {
+    let mut hits: Vec<(f64, bool)> = Vec::new();
+    tree.for_each_along(start, direction, |t| {
+        let [a, b, c] = mesh.corners(t as usize);
+        if let Some(distance) = triangle::ray_distance(start, direction, &a, &b, &c) {
             let enters = triangle::area_normal(&a, &b, &c).dot(direction) < 0.0;
-            Some((distance, enters))
-        })
-        .collect();
-    hits.sort_by(|a, b| a.0.total_cmp(&b.0));
+            hits.push((distance, enters));
+        }
+    });
+    // Where an edge is met that is seen from its side, the ray enters before it leaves.
+    hits.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
     let (enters, leaves) = match hits.first()? {
         (_, true) => (hits[0].0, hits.iter().find(|h| !h.1)?.0),
         // The axis itself runs through the wall here.
         (leaves, false) => (0.0, *leaves),
     };
     Some([enters, leaves])
-}
-
-/// Distance along a ray to a triangle (Möller and Trumbore 1997).
-fn hit(start: &Vec3, direction: &Vec3, a: &Vec3, b: &Vec3, c: &Vec3) -> Option<f64> {
-    let (ab, ac) = (b - a, c - a);
-    let p = direction.cross(&ac);
-    let determinant = ab.dot(&p);
-    if determinant == 0.0 {
-        return None;
-    }
-    let s = start - a;
-    let u = s.dot(&p) / determinant;
-    let q = s.cross(&ab);
-    let v = direction.dot(&q) / determinant;
-    let t = ac.dot(&q) / determinant;
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some(t)
 }

@@ -1,4 +1,4 @@
-//! A bounding-volume hierarchy over triangles: closest point and box overlap.
+//! A bounding-volume hierarchy over triangles: closest point, box overlap and rays.
 //!
 //! Built top down by splitting the longest axis of the centroids' box at the median; queries
 //! are exact, and ties are broken by the lower triangle index, so answers do not depend on
@@ -60,6 +60,31 @@ impl Aabb {
         let outside = |r: usize| greater(greater(self.min[r] - p[r], p[r] - self.max[r]), 0.0);
         let [x, y, z] = [outside(0), outside(1), outside(2)];
         x * x + y * y + z * z
+    }
+}
+
+/// How much boxes are widened where rays are cast at them, mm: rounding of coordinates up to
+/// metres loses no triangle.
+const SLACK: f64 = 1e-9;
+
+/// A ray that boxes are asked for.
+struct Ray {
+    start: Vec3,
+    /// One over the direction's components.
+    inverse: Vec3,
+}
+
+impl Ray {
+    /// Whether it meets the box, whose slabs it crosses one after the other.
+    fn meets(&self, aabb: &Aabb) -> bool {
+        let (mut enters, mut leaves) = (0.0, f64::INFINITY);
+        for a in 0..3 {
+            let one = (aabb.min[a] - self.start[a] - SLACK) * self.inverse[a];
+            let other = (aabb.max[a] - self.start[a] + SLACK) * self.inverse[a];
+            enters = greater(lesser(one, other), enters);
+            leaves = lesser(greater(one, other), leaves);
+        }
+        enters <= leaves
     }
 }
 
@@ -234,13 +259,28 @@ impl Bvh {
 
     /// Calls `visit` with every triangle whose box overlaps `aabb`, in tree order.
     pub fn for_each_overlapping(&self, aabb: &Aabb, mut visit: impl FnMut(u32)) {
+        self.for_each_where(|other| other.overlaps(aabb), &mut visit);
+    }
+
+    /// Calls `visit` with every triangle that the ray from `start` on in `direction` may meet,
+    /// in tree order: those whose box it meets.
+    pub fn for_each_along(&self, start: &Vec3, direction: &Vec3, mut visit: impl FnMut(u32)) {
+        let ray = Ray {
+            start: *start,
+            inverse: direction.map(|x| 1.0 / x),
+        };
+        self.for_each_where(|aabb| ray.meets(aabb), &mut visit);
+    }
+
+    /// Calls `visit` with every triangle whose box `admits` lets through, in tree order.
+    fn for_each_where(&self, admits: impl Fn(&Aabb) -> bool, visit: &mut impl FnMut(u32)) {
         let mut stack = [0u32; 64];
         let mut height = usize::from(!self.nodes.is_empty());
         while height > 0 {
             height -= 1;
             let index = stack[height];
             let node = &self.nodes[index as usize];
-            if !node.aabb.overlaps(aabb) {
+            if !admits(&node.aabb) {
                 continue;
             }
             if node.count == 0 {
@@ -251,7 +291,7 @@ impl Bvh {
             }
             let first = node.first_or_right as usize;
             for slot in first..first + node.count as usize {
-                if Aabb::of(&self.corners[slot]).overlaps(aabb) {
+                if admits(&Aabb::of(&self.corners[slot])) {
                     visit(self.order[slot]);
                 }
             }
@@ -366,6 +406,34 @@ mod tests {
             let found = many.closest(&((a + b + c) / 3.0)).unwrap();
             assert_eq!(found.triangle, t as u32);
         }
+    }
+
+    #[test]
+    fn no_triangle_that_a_ray_meets_is_left_out() {
+        let mesh = shapes::torus(9.0, 3.0, 40, 17);
+        let bvh = Bvh::new(&mesh.vertices, &mesh.triangles);
+        let (mut met, mut asked) = (0, 0);
+        for i in 0..300 {
+            let t = f64::from(i);
+            let start = Vec3::new((t * 1.7).sin(), (t * 0.9).cos(), (t * 2.3).sin()) * 12.0;
+            // Along the axes too, where a component of the direction is 0.
+            let direction = match i % 4 {
+                3 => Vec3::new((t * 0.3).cos(), (t * 1.1).sin(), (t * 0.7).cos()).normalize(),
+                axis => Vec3::ith(axis as usize, 1.0),
+            };
+            let mut near = Vec::new();
+            bvh.for_each_along(&start, &direction, |t| near.push(t));
+            asked += near.len();
+            for triangle in 0..mesh.triangles.len() {
+                let [a, b, c] = mesh.corners(triangle);
+                if triangle::ray_distance(&start, &direction, &a, &b, &c).is_some() {
+                    assert!(near.contains(&(triangle as u32)), "{i}: {triangle}");
+                    met += 1;
+                }
+            }
+        }
+        assert!(met > 80, "{met}");
+        assert!(asked < 300 * mesh.triangles.len() / 20, "{asked}");
     }
 
     #[test]

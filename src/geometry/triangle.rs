@@ -64,6 +64,23 @@ pub fn closest_barycentric(p: &Vec3, a: &Vec3, b: &Vec3, c: &Vec3) -> [f64; 3] {
     [1.0 - v - w, v, w]
 }
 
+/// Distance from `start` along a ray to the triangle `a`, `b`, `c`, in lengths of `direction`;
+/// `None` where the ray passes it by (Möller and Trumbore 1997).
+pub fn ray_distance(start: &Vec3, direction: &Vec3, a: &Vec3, b: &Vec3, c: &Vec3) -> Option<f64> {
+    let (ab, ac) = (b - a, c - a);
+    let p = direction.cross(&ac);
+    let determinant = ab.dot(&p);
+    if determinant == 0.0 {
+        return None;
+    }
+    let s = start - a;
+    let u = s.dot(&p) / determinant;
+    let q = s.cross(&ab);
+    let v = direction.dot(&q) / determinant;
+    let t = ac.dot(&q) / determinant;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some(t)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -148,6 +148,7 @@ fn checks(report: &Report) -> Vec<(bool, String)> {
                 "uncertain_place",
                 format!("The heart's place: {} % sure", percent("/fit/confidence")),
             ),
+            ("dark_apex", "The apical wall is seen".to_owned()),
             (
                 "implausible_shape",
                 "Volumes, thickness and length as hearts have them".to_owned(),
