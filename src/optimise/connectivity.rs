@@ -186,13 +186,15 @@ impl Connectivity {
         self.valence[d as usize] += 1;
     }
 
-    /// Takes back the flip that gave triangle `t` its new edge. Both triangles get their indices
-    /// back, though perhaps begin at another corner.
-    pub fn unflip(&mut self, t: u32) {
+    /// Takes back the flip that made the edge of `h`, if every later one has been taken back.
+    /// Both triangles get their indices back, though perhaps begin at another corner: so an
+    /// earlier flip's edge is found by its ends, not by its number.
+    pub fn unflip(&mut self, h: u32) {
         // A flip turns the pair by a quarter: three more complete the turn.
-        for _ in 0..3 {
-            self.flip(3 * t + 2);
-        }
+        let t = h / 3;
+        self.flip(h);
+        self.flip(3 * t + 2);
+        self.flip(3 * t + 2);
     }
 
     fn pair(&mut self, g: u32, h: u32) {
@@ -204,7 +206,9 @@ impl Connectivity {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::random::{Purpose, stream};
     use crate::mesh::{shapes, topology};
+    use rand::RngExt;
 
     #[test]
     fn flips_keep_a_closed_manifold_and_its_neighbours() {
@@ -229,8 +233,9 @@ mod tests {
         assert_eq!(census.euler_characteristic, 2);
     }
 
+    /// Chains of flips, each taken back last to first, also where they share triangles.
     #[test]
-    fn a_flip_taken_back_leaves_every_triangle_in_its_place() {
+    fn flips_taken_back_leave_every_triangle_in_its_place() {
         let mesh = shapes::icosphere(1.0, 2);
         let mut connectivity = Connectivity::new(mesh.vertices.len(), mesh.triangles).unwrap();
         let from_lowest = |connectivity: &Connectivity| -> Vec<[u32; 3]> {
@@ -239,14 +244,29 @@ mod tests {
             connectivity.triangles().iter().map(turned).collect()
         };
         let before = from_lowest(&connectivity);
-        for h in 0..connectivity.halfedges() {
-            if connectivity.can_flip(h) {
-                connectivity.flip(h);
-                assert_ne!(from_lowest(&connectivity), before);
-                connectivity.unflip(h / 3);
+        let mut random = stream(5, Purpose::Measure);
+        for length in (1..=5).cycle().take(400) {
+            let mut start = random.random_range(0..connectivity.halfedges());
+            let mut made = Vec::new();
+            while made.len() < length {
+                if connectivity.can_flip(start) {
+                    let Quad { a, c, d, .. } = connectivity.quad(start);
+                    connectivity.flip(start);
+                    made.push([c, d]);
+                    // On in one of the two new triangles, or else at one of the ends.
+                    let around: Vec<u32> = connectivity.around(a).collect();
+                    start = around[random.random_range(0..around.len())];
+                    start = [start, next(start)][random.random_range(0..2)];
+                } else {
+                    start = random.random_range(0..connectivity.halfedges());
+                }
             }
+            assert_ne!(from_lowest(&connectivity), before);
+            while let Some(edge) = made.pop() {
+                connectivity.unflip(connectivity.halfedge(edge).unwrap());
+            }
+            assert_eq!(from_lowest(&connectivity), before);
         }
-        assert_eq!(from_lowest(&connectivity), before);
         let again = Connectivity::new(mesh.vertices.len(), connectivity.triangles.clone());
         assert_eq!(again.unwrap().twins, connectivity.twins);
     }

@@ -70,11 +70,12 @@ impl Polish<'_, '_> {
                     && self.model.connectivity.can_flip(h)
                 {
                     let pair = [h / 3, self.model.connectivity.twin(h) / 3];
+                    let quad = self.model.connectivity.quad(h);
                     self.model.connectivity.flip(h);
                     if self.accepts(&pair) {
                         flipped += 1;
                     } else {
-                        self.model.connectivity.unflip(pair[0]);
+                        self.unflip([quad.c, quad.d]);
                     }
                 }
             }
@@ -139,10 +140,17 @@ impl Polish<'_, '_> {
                 .any(|next| self.chain(next, more - 1, gained, changed))
         };
         if !found {
-            self.model.connectivity.unflip(pair[0]);
+            self.unflip([quad.c, quad.d]);
             changed.truncate(changed.len() - 2);
         }
         found
+    }
+
+    /// Takes back the flip that made `edge`, the last of those that still stand.
+    fn unflip(&mut self, edge: [u32; 2]) {
+        if let Some(h) = self.model.connectivity.halfedge(edge) {
+            self.model.connectivity.unflip(h);
+        }
     }
 
     /// Whether the `changed` triangles, as they are now, pierce nothing.
