@@ -14,7 +14,7 @@ use ventriform::optimise::{
     FitnessForm, FitnessSummary, OptimiseFacts, OptimiseParameters, Optimised, Reference,
 };
 use ventriform::progress::Monitor;
-use ventriform::report::{Closeness, MeasureParameters, Report, ReportInput, html, measure};
+use ventriform::report::{Closeness, MeasureParameters, Report, ReportInput, Start, html, measure};
 use ventriform::retile::{RetileFacts, Tiled};
 use ventriform::surface::Surface;
 
@@ -68,6 +68,7 @@ fn report(model: &TriMesh) -> Report {
             fitness: FitnessForm::Normalised,
             ..OptimiseParameters::default()
         },
+        starts: vec![Start::new(&tiled, &measures)],
         measures,
         timings_ms: vec![("surface".to_owned(), 12.0), ("retile".to_owned(), 30.5)],
     })

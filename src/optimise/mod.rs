@@ -95,6 +95,10 @@ pub struct FitParameters {
     /// How much more a distant sample counts: its weight is 1 + this · r²/mean r², 0..=10.
     /// Lowers the largest distance and, by less, the mean, at the cost of shapes and F. Default 0.02.
     pub peak_weight: f64,
+    /// Weight of an even bend against squared distance, for triangles as small as a voxel; larger
+    /// ones follow less noise and weigh in proportion less. 0..=10, default 0.07: lowers the
+    /// largest distance and the angles between neighbours at the same mean distance.
+    pub bend_weight: f64,
     /// Share of the last round's step that a round adds to its own, 0..=0.9. Default 0.6.
     pub momentum: f64,
     /// Weight of staying put, a share of the distances' weight spread over the vertices,
@@ -118,6 +122,7 @@ impl Default for FitParameters {
             worst_weight: 3.0,
             free_size: 1.0,
             peak_weight: 0.02,
+            bend_weight: 0.07,
             momentum: 0.6,
             damping: 0.0005,
             samples_per_triangle: 16,
@@ -443,6 +448,7 @@ impl OptimiseParameters {
         within("fit.worst_weight", fit.worst_weight, 0.0, 100.0)?;
         within("fit.free_size", fit.free_size, 0.0, 1.0)?;
         within("fit.peak_weight", fit.peak_weight, 0.0, 10.0)?;
+        within("fit.bend_weight", fit.bend_weight, 0.0, 10.0)?;
         within("fit.momentum", fit.momentum, 0.0, 0.9)?;
         within("fit.glide", fit.glide as f64, 0.0, 4.0)?;
         within("fit.midpoint_weight", fit.midpoint_weight, 0.0, 10.0)?;

@@ -38,6 +38,18 @@ pub const SPECS: &[ParameterSpec] = &[
         write: |p| json!(p.retile.seed),
     },
     ParameterSpec {
+        name: "starts",
+        kind: Kind::Integer { min: 1, max: 16 },
+        default: "",
+        summary: "How many models are made, each from another seed, of which the best is kept \
+                  (default for refined: 200 points in all, 1 to 4 models; 1 for paper)",
+        read: |d, v| {
+            d.starts = Some(v.usize());
+            Ok(())
+        },
+        write: |p| json!(p.starts),
+    },
+    ParameterSpec {
         name: "frame",
         kind: Kind::Integer {
             min: 0,
@@ -297,6 +309,14 @@ pub const SPECS: &[ParameterSpec] = &[
         0.0..=10.0,
         "0.02",
         "How much more a distant sample counts in the fit: lowers the largest distance"
+    ),
+    number!(
+        "fit_bend_weight",
+        optimise.fit.bend_weight,
+        0.0..=10.0,
+        "0.07",
+        "Weight of an even bend in the fit, for triangles as small as a voxel: lowers the largest \
+         distance and the angles between neighbours"
     ),
     number!(
         "fit_momentum",

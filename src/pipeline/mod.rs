@@ -8,16 +8,17 @@ mod built_in;
 mod outcome;
 pub mod pages;
 pub mod segment;
+pub mod starts;
 
 pub use outcome::{NamedFile, OutcomeError};
 
 use crate::export::Metadata;
 use crate::mesh::TriMesh;
-use crate::optimise::{self, OptimiseError, Reference};
+use crate::optimise::{OptimiseError, Reference};
 use crate::parameters::{ModelParameters, Parameters};
 use crate::progress::{Cancelled, Monitor, Stage};
-use crate::report::{self, Closeness, MeasureParameters, Report, ReportInput};
-use crate::retile::{self, RetileError};
+use crate::report::{self, Closeness, Report, ReportInput};
+use crate::retile::RetileError;
 use crate::surface::{self, SurfaceError};
 use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeFile};
 
@@ -154,29 +155,24 @@ pub fn from_reading(
     laps.end(Stage::Surface);
     // Neither needs the other.
     let (tiled, reference) = rayon::join(
-        || retile::retile(&surface, &parameters.retile, monitor),
+        || starts::tile(&surface, parameters, monitor),
         || Reference::new(&surface),
     );
     let tiled = tiled.map_err(PipelineError::Retile)?;
     laps.end(Stage::Retile);
-    let optimised = optimise::optimise(&tiled, &reference, &parameters.optimise, monitor)
-        .map_err(PipelineError::Optimise)?;
-    laps.end(Stage::Optimise);
-    let measures = report::measure(
-        &optimised.mesh,
-        &reference,
-        &MeasureParameters::default(),
-        monitor,
-    )?;
-    laps.end(Stage::Report);
+    let made = starts::best(tiled, &reference, parameters, monitor, |stage| {
+        laps.end(stage)
+    })
+    .map_err(PipelineError::Optimise)?;
     let mut report = Report::new(ReportInput {
         input: report::input(&reading.facts),
         parameters: parameters.to_json().into(),
         surface: &surface,
-        tiled: &tiled,
-        optimised: &optimised,
+        tiled: &made.tiled,
+        optimised: &made.optimised,
         optimise_parameters: &parameters.optimise,
-        measures,
+        measures: made.measures,
+        starts: made.starts,
         timings_ms: laps.times,
     });
     if !report.is_sound() {
@@ -188,7 +184,7 @@ pub fn from_reading(
         .warnings
         .splice(0..0, reading.facts.warnings.iter().cloned());
     Ok(Model {
-        mesh: optimised.mesh,
+        mesh: made.optimised.mesh,
         reference: surface.mesh,
         report,
     })

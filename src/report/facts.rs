@@ -6,7 +6,7 @@
 use serde_json::{Map, Value, json};
 
 use super::elements::outward_components;
-use super::{Forms, SurfaceSection};
+use super::{Forms, Start, SurfaceSection};
 use crate::mesh::topology;
 use crate::optimise::fitness::{Lengths, Scales};
 use crate::optimise::{Ended, FitnessForm, FitnessSummary, OptimiseFacts, Optimised};
@@ -68,11 +68,13 @@ fn surface_facts(facts: &SurfaceFacts) -> Map<String, Value> {
     }))
 }
 
-pub fn retile(facts: &RetileFacts) -> Map<String, Value> {
+pub fn retile(facts: &RetileFacts, starts: &[Start]) -> Map<String, Value> {
     object(json!({
+        "seed": facts.seed,
         "repulsion_rounds": facts.repulsion_rounds,
         "relaxation_rounds": facts.relaxation_rounds,
         "attempts": facts.attempts,
+        "starts": starts,
     }))
 }
 

@@ -185,6 +185,31 @@ pub struct Terms {
     pub d_mm: f64,
 }
 
+/// One of the models of which the best was kept.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Start {
+    /// Seed of its random choices.
+    pub seed: u64,
+    /// Mean 2r/R of its triangles.
+    pub radius_ratio_mean: f64,
+    /// Mean distance to the surface, two-sided, mm.
+    pub distance_mean_mm: f64,
+    /// Largest distance to the surface, two-sided, mm.
+    pub hausdorff_mm: f64,
+}
+
+impl Start {
+    /// The model made of `tiled`.
+    pub fn new(tiled: &Tiled, measures: &Measures) -> Self {
+        Self {
+            seed: tiled.facts.seed,
+            radius_ratio_mean: measures.shape.radius_ratio.mean,
+            distance_mean_mm: measures.distance.mean_mm,
+            hausdorff_mm: measures.distance.hausdorff_mm,
+        }
+    }
+}
+
 /// What [`Report::new`] joins.
 #[derive(Debug)]
 pub struct ReportInput<'a> {
@@ -202,6 +227,8 @@ pub struct ReportInput<'a> {
     pub optimise_parameters: &'a OptimiseParameters,
     /// Measures of `optimised.mesh`.
     pub measures: Measures,
+    /// The models of which it is the best, itself among them.
+    pub starts: Vec<Start>,
     /// Milliseconds by stage, in order.
     pub timings_ms: Vec<(String, f64)>,
 }
@@ -220,7 +247,7 @@ impl Report {
             parameters: input.parameters,
             surface,
             retile: RetileSection {
-                facts: facts::retile(&input.tiled.facts),
+                facts: facts::retile(&input.tiled.facts, &input.starts),
                 shape: Shape::of(&retiled),
                 smoothness: Smoothness::of(&retiled),
             },

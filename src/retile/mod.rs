@@ -143,6 +143,8 @@ pub struct Tiled {
 /// What [`retile`] did; goes into the report.
 #[derive(Debug, Clone, Default)]
 pub struct RetileFacts {
+    /// Seed of every random choice.
+    pub seed: u64,
     /// Rounds of repulsion run.
     pub repulsion_rounds: usize,
     /// Rounds of centroidal relaxation run.
@@ -258,10 +260,11 @@ pub fn retile(
     if !(area > 0.0 && area.is_finite()) {
         return Err(RetileError::NoArea);
     }
-    let tiled = match parameters.method {
+    let mut tiled = match parameters.method {
         Method::Paper => paper::retile(surface, parameters, monitor),
         Method::Refined => refined::retile(surface, parameters, monitor),
     }?;
+    tiled.facts.seed = parameters.seed;
     monitor.report(Stage::Retile, 1.0)?;
     Ok(tiled)
 }

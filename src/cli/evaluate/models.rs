@@ -11,8 +11,8 @@ use crate::geometry::triangle::radius_ratio;
 use crate::mesh::TriMesh;
 use crate::optimise::{self, Reference};
 use crate::parameters::ModelParameters;
+use crate::pipeline::starts;
 use crate::progress::Monitor;
-use crate::retile;
 use crate::surface::{self, Surface};
 use anyhow::{Context, Result};
 use rayon::prelude::*;
@@ -111,13 +111,12 @@ impl Workshop<'_> {
     fn retile(&self, points: usize, parameters: &ModelParameters) -> Result<[Model; 2]> {
         let monitor = Monitor::silent();
         let context = || format!("{points} points");
-        let tiled =
-            retile::retile(&self.surface, &parameters.retile, &monitor).with_context(context)?;
-        let optimised = optimise::optimise(&tiled, &self.reference, &parameters.optimise, &monitor)
+        let tiled = starts::tile(&self.surface, parameters, &monitor).with_context(context)?;
+        let best = starts::best(tiled, &self.reference, parameters, &monitor, |_| {})
             .with_context(context)?;
         Ok([
-            self.finish(tiled.mesh, Variant::Retiled, points)?,
-            self.finish(optimised.mesh, Variant::Optimised, points)?,
+            self.finish(best.tiled.mesh, Variant::Retiled, points)?,
+            self.finish(best.optimised.mesh, Variant::Optimised, points)?,
         ])
     }
 

@@ -7,8 +7,9 @@
 //! 2. the model's own edge midpoints and triangle centres are drawn to S alike;
 //! 3. shape: every triangle is drawn to the equilateral triangle that fits it best, within
 //!    its own plane;
-//! 4. volume: the whole is to enclose what S encloses;
-//! 5. damping: a little weight on staying put.
+//! 4. bends: how the model bends is to change little from vertex to vertex;
+//! 5. volume: the whole is to enclose what S encloses;
+//! 6. damping: a little weight on staying put.
 //!
 //! Steps have momentum (Polyak's heavy ball): vertices slide slowly along S, where only the
 //! triangles' shapes and far samples pull, and momentum gets them further in as many rounds.
@@ -21,6 +22,7 @@
 //! step would do so, the vertices concerned make half of it, or less, or none.
 
 mod advance;
+mod bends;
 mod equations;
 mod polish;
 mod samples;
@@ -50,6 +52,9 @@ struct Model<'a> {
     reference: &'a Reference,
     /// That of the reference, mm³.
     volume: f64,
+    /// A voxel's size against the model's edges, at most 1: how much of what it could follow is
+    /// the grid's and the noise's.
+    fineness: f64,
     parameters: &'a FitParameters,
 }
 
@@ -80,6 +85,7 @@ pub fn fit(
     monitor: &Monitor,
 ) -> Result<Fitted, Cancelled> {
     let count = parameters.samples_per_triangle * connectivity.triangles().len();
+    let lengths = reference.lengths(connectivity.triangles().len());
     let mut model = Model {
         vertices: start.to_vec(),
         connectivity,
@@ -88,6 +94,7 @@ pub fn fit(
         sizing,
         reference,
         volume: reference.mesh.volume(),
+        fineness: (lengths.voxel / lengths.edge).min(1.0),
         parameters,
     };
     find_partners(&mut model);
@@ -249,6 +256,7 @@ mod tests {
             sizing,
             reference,
             volume: reference.mesh.volume(),
+            fineness: 0.2,
             parameters,
         };
         find_partners(&mut model);

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::Model;
+use super::bends::Bends;
 use super::equations::{Element, NormalEquations};
 use super::samples::{LEAST_FACING, Sample};
 use crate::geometry::{Vec3, triangle};
@@ -37,6 +38,7 @@ pub fn displacement(model: &mut Model, monitor: &Monitor) -> Result<Vec<Vec3>, C
     monitor.check()?;
     let distances = Distances::new(model);
     let shapes = Shapes::new(model);
+    let bends = Bends::new(model);
     // A triangle's terms are its own: which thread sums them up does not matter.
     let elements: Vec<Element> = (0..model.connectivity.triangles().len())
         .into_par_iter()
@@ -46,6 +48,7 @@ pub fn displacement(model: &mut Model, monitor: &Monitor) -> Result<Vec<Vec3>, C
             distances.add_to(&mut element, t);
             midpoints.add_to(&mut element, t);
             shapes.add_to(&mut element, t);
+            bends.add_to(&mut element, t);
             element
         })
         .collect();
