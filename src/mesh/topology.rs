@@ -7,6 +7,7 @@
 
 use super::TriMesh;
 use super::adjacency::Adjacency;
+use crate::geometry::Vec3;
 
 /// What keeps a triangle list from being a closed, oriented 2-manifold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -163,14 +164,14 @@ pub fn components(vertices: usize, triangles: &[[u32; 3]]) -> Vec<u32> {
 
 /// Signed volume of each component, mm³: positive where it faces outward, negative where it
 /// bounds a cavity. `component` gives that of every vertex, as [`components`] does.
-pub fn component_volumes(mesh: &TriMesh, component: &[u32]) -> Vec<f64> {
+pub fn component_volumes(vertices: &[Vec3], triangles: &[[u32; 3]], component: &[u32]) -> Vec<f64> {
     let count = component.iter().max().map_or(0, |c| *c as usize + 1);
     // About a vertex of its own, to keep digits far from the origin.
     let mut origin = vec![None; count];
     let mut volumes = vec![0.0; count];
-    for t in 0..mesh.triangles.len() {
-        let corners = mesh.corners(t);
-        let c = component[mesh.triangles[t][0] as usize] as usize;
+    for t in triangles {
+        let corners = t.map(|v| vertices[v as usize]);
+        let c = component[t[0] as usize] as usize;
         let origin = *origin[c].get_or_insert(corners[0]);
         let [p, q, r] = corners.map(|p| p - origin);
         volumes[c] += p.dot(&q.cross(&r)) / 6.0;

@@ -292,7 +292,7 @@ pub(super) fn facts(mesh: &TriMesh, self_intersections: usize) -> (Elements, Mes
 
 /// How many of the components face outward; `component` gives that of every vertex.
 pub(super) fn outward_components(mesh: &TriMesh, component: &[u32]) -> usize {
-    let volumes = topology::component_volumes(mesh, component);
+    let volumes = topology::component_volumes(&mesh.vertices, &mesh.triangles, component);
     volumes.iter().filter(|v| **v > 0.0).count()
 }
 

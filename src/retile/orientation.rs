@@ -18,7 +18,7 @@ pub(super) fn face_alike(
     component: &[u32],
     wanted: &[f64],
 ) -> Result<(), Vec<u32>> {
-    let found = component_volumes(mesh, component);
+    let found = component_volumes(&mesh.vertices, &mesh.triangles, component);
     let is_turned = |c: u32| !(found[c as usize] * wanted[c as usize] > 0.0);
     let mut vertices = vec![0; found.len()];
     for &c in component {
@@ -55,7 +55,7 @@ mod tests {
         let mut outward = ball.clone();
         assert_eq!(face_alike(&mut outward, &component, &[1.0, 1.0]), Ok(()));
         assert!(
-            component_volumes(&outward, &component)
+            component_volumes(&outward.vertices, &outward.triangles, &component)
                 .iter()
                 .all(|v| *v > 0.0)
         );

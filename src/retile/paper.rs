@@ -28,31 +28,48 @@ pub(super) fn retile(
     if parameters.points < least {
         return Err(refusal(&job, None));
     }
-    let mut last = None;
-    for attempt in 0..SEEDS {
-        let points = spread(&job, parameters.points, attempt)?;
-        match join(&job, &points) {
+    tile(&job, SEEDS)?.map_err(|error| refusal(&job, Some(error)))
+}
+
+/// The same where another route gave up: `None` where this one must, too, with so many seeds.
+pub(super) fn attempt(
+    surface: &Surface,
+    parameters: &RetileParameters,
+    seeds: u64,
+    monitor: &Monitor,
+) -> Result<Option<Tiled>, RetileError> {
+    let job = Job::new(surface, parameters, monitor)?;
+    Ok(tile(&job, seeds)?.ok())
+}
+
+/// Tries one seed after the other, at least one; the last one's failure where all fail.
+fn tile(job: &Job, seeds: u64) -> Result<Result<Tiled, TessellateError>, RetileError> {
+    let mut attempt = 0;
+    loop {
+        let points = spread(job, job.parameters.points, attempt)?;
+        attempt += 1;
+        match join(job, &points) {
             Ok(mesh) => {
                 let facts = RetileFacts {
-                    repulsion_rounds: parameters.repulsion_iterations,
-                    attempts: attempt as usize + 1,
+                    repulsion_rounds: job.parameters.repulsion_iterations,
+                    attempts: attempt as usize,
                     ..RetileFacts::default()
                 };
                 let sizing = points
                     .iter()
                     .map(|p| job.domain.interpolate(&job.spacing, p))
                     .collect();
-                return Ok(Tiled {
+                return Ok(Ok(Tiled {
                     mesh,
                     sizing,
                     facts,
-                });
+                }));
             }
             Err(TessellateError::Cancelled(cancelled)) => return Err(cancelled.into()),
-            Err(error) => last = Some(error),
+            Err(error) if attempt >= seeds => return Ok(Err(error)),
+            Err(_) => {}
         }
     }
-    Err(refusal(&job, last))
 }
 
 struct Job<'a> {

@@ -8,12 +8,15 @@
 //!
 //! Where a cell is too large for the shape of the surface (it runs round a handle, or the
 //! two sides of a thin wall would touch), the least loaded site elsewhere is transplanted
-//! there and the cells settle again; N never changes.
+//! there and the cells settle again; N never changes. Where that does not end well (necks no
+//! wider than a few samples), the points are spread and joined as the [paper](super::paper)
+//! does, on the surface itself.
 
 use super::cells::Cells;
 use super::samples::Samples;
 use super::{
-    RetileError, RetileFacts, RetileParameters, Tiled, dual, orientation, quotas, sizing, too_few,
+    RetileError, RetileFacts, RetileParameters, Tiled, dual, orientation, paper, quotas, sizing,
+    too_few,
 };
 use crate::geometry::random::{Purpose, stream};
 use crate::geometry::{Vec3, triangle};
@@ -38,6 +41,8 @@ const TRANSPLANTS: usize = 4;
 const THICKENING: f64 = 3.0;
 /// Random starts before giving up on N.
 const STARTS: u64 = 3;
+/// Seeds of the paper's route before giving up on N.
+const PAPER_SEEDS: u64 = 2;
 /// Parts in which all triangles are looked through; each keeps a place for every cell.
 const MOST_TASKS: usize = 8;
 /// Repairs of each number that is tried to tell which N would do.
@@ -63,12 +68,24 @@ pub(super) fn retile(
             });
         }
     }
+    if let Some(mut tiled) = paper::attempt(surface, parameters, PAPER_SEEDS, monitor)? {
+        tiled.facts.relaxation_rounds = facts.relaxation_rounds;
+        tiled.facts.attempts += facts.attempts;
+        let warning = "the surface is too narrow somewhere for centroidal cells: the points \
+                       were spread by repulsion and joined by mutual tessellation instead";
+        tiled.facts.warnings.push(warning.to_owned());
+        return Ok(tiled);
+    }
     Err(refusal(surface, parameters, monitor))
 }
 
 /// The error to give up with, which names a number of points that does.
 fn refusal(surface: &Surface, parameters: &RetileParameters, monitor: &Monitor) -> RetileError {
     too_few(surface, parameters, |larger| {
+        // The quicker of the two first.
+        if paper::attempt(surface, larger, 1, monitor)?.is_some() {
+            return Ok(true);
+        }
         let job = Job::new(surface, larger);
         let mut ignored = RetileFacts::default();
         let made = job.attempt(0, HURRIED_REPAIRS, &mut ignored, monitor)?;
@@ -112,7 +129,11 @@ impl<'a> Job<'a> {
             surface,
             parameters,
             points,
-            volumes: topology::component_volumes(&surface.mesh, &components),
+            volumes: topology::component_volumes(
+                &surface.mesh.vertices,
+                &surface.mesh.triangles,
+                &components,
+            ),
             components,
             least: quotas::least_of_components(&surface.mesh),
             samples,

@@ -150,7 +150,7 @@ pub fn tessellate(
     };
     let of_point = |p: &SurfacePoint| component[triangles[p.triangle as usize][0] as usize];
     let of_points: Vec<u32> = points.iter().map(of_point).collect();
-    let volumes = topology::component_volumes(&surface, &component);
+    let volumes = topology::component_volumes(&surface.vertices, &surface.triangles, &component);
     orientation::face_alike(&mut mesh, &of_points, &volumes)
         .map_err(|points| TessellateError::InsideOut { points })?;
     Ok(mesh)
