@@ -9,7 +9,9 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 python=${PYTHON:-python3}
 data=$(mktemp -d)
-cargo build --quiet
+# A test is named so that the libraries have the features that `cargo test` gives them: without
+# it they and the program would be compiled once more.
+cargo build --quiet --bins --test layering
 target/debug/ventriform serve --listen 127.0.0.1:0 --data-dir "$data" >"$data/log" 2>&1 &
 service=$!
 trap 'kill $service 2>/dev/null; wait $service 2>/dev/null; rm -rf "$data"' EXIT

@@ -4,6 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
-cargo run --quiet -- demo --exit --listen 127.0.0.1:0 --output "$out"
+cargo build --quiet --bins --test layering # as `cargo test` does, see check_api.sh
+target/debug/ventriform demo --exit --listen 127.0.0.1:0 --output "$out"
 [ "$(head -c 4 "$out/lv.glb")" = glTF ]
 grep -q '</html>' "$out/report.html"

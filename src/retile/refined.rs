@@ -9,7 +9,7 @@
 //! Where a cell is too large for the shape of the surface (it runs round a handle, or the
 //! two sides of a thin wall would touch), the least loaded site elsewhere is transplanted
 //! there and the cells settle again; N never changes. Where that does not end well (necks no
-//! wider than a few samples), the points are spread and joined as the [paper](super::paper)
+//! wider than a few samples), the points are spread and joined as the route of [`paper`]
 //! does, on the surface itself.
 
 use super::cells::Cells;
