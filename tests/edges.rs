@@ -104,6 +104,21 @@ fn any_shape_from_three_to_a_thousand_voxels_an_axis() {
     }
 }
 
+/// Points on a rod three voxels thin are ten times farther apart than it is thick.
+#[test]
+fn a_model_that_cannot_follow_its_surface_says_so() {
+    for (shape, coarse) in [([3, 3, 1024], true), ([30, 30, 40], false)] {
+        let report = model(&filling(shape, [2.0; 3]), &[HALF, ("points", "150")]).report;
+        let lost = report.distance.volume_error_percent;
+        assert_eq!(lost < -10.0, coarse, "{shape:?} lost {lost} %");
+        let said = report
+            .warnings
+            .iter()
+            .any(|w| w.contains("too few to follow"));
+        assert_eq!(said, coarse, "{shape:?}: {:?}", report.warnings);
+    }
+}
+
 #[test]
 fn fewer_than_three_voxels_an_axis_are_a_model_or_an_error() {
     for shape in [[1, 1, 1], [2, 2, 2], [1, 30, 30], [2, 40, 9]] {

@@ -10,7 +10,7 @@
 //! two sides of a thin wall would touch), the least loaded site elsewhere is transplanted
 //! there and the cells settle again; N never changes. Where that does not end well (necks no
 //! wider than a few samples), the points are spread and joined as the route of [`paper`]
-//! does, on the surface itself.
+//! does, on the surface itself, if that is not too large.
 
 use super::cells::Cells;
 use super::samples::Samples;
@@ -43,6 +43,9 @@ const THICKENING: f64 = 3.0;
 const STARTS: u64 = 3;
 /// Seeds of the paper's route before giving up on N.
 const PAPER_SEEDS: u64 = 2;
+/// Triangles of a surface on which that route is tried. Each point's repulsion looks at all
+/// triangles about it, and each old vertex is removed: a plate of 260 000 took minutes.
+const PAPER_TRIANGLES: usize = 40_000;
 /// Parts in which all triangles are looked through; each keeps a place for every cell.
 const MOST_TASKS: usize = 8;
 /// Repairs of each number that is tried to tell which N would do.
@@ -68,7 +71,7 @@ pub(super) fn retile(
             });
         }
     }
-    if let Some(mut tiled) = paper::attempt(surface, parameters, PAPER_SEEDS, monitor)? {
+    if let Some(mut tiled) = by_repulsion(surface, parameters, PAPER_SEEDS, monitor)? {
         tiled.facts.relaxation_rounds = facts.relaxation_rounds;
         tiled.facts.attempts += facts.attempts;
         let warning = "the surface is too narrow somewhere for centroidal cells: the points \
@@ -83,7 +86,7 @@ pub(super) fn retile(
 fn refusal(surface: &Surface, parameters: &RetileParameters, monitor: &Monitor) -> RetileError {
     too_few(surface, parameters, |larger| {
         // The quicker of the two first.
-        if paper::attempt(surface, larger, 1, monitor)?.is_some() {
+        if by_repulsion(surface, larger, 1, monitor)?.is_some() {
             return Ok(true);
         }
         let job = Job::new(surface, larger);
@@ -91,6 +94,19 @@ fn refusal(surface: &Surface, parameters: &RetileParameters, monitor: &Monitor) 
         let made = job.attempt(0, HURRIED_REPAIRS, &mut ignored, monitor)?;
         Ok(made.is_some())
     })
+}
+
+/// The paper's way with so many seeds, where the surface is not too large for it.
+fn by_repulsion(
+    surface: &Surface,
+    parameters: &RetileParameters,
+    seeds: u64,
+    monitor: &Monitor,
+) -> Result<Option<Tiled>, RetileError> {
+    if surface.mesh.triangles.len() > PAPER_TRIANGLES {
+        return Ok(None);
+    }
+    paper::attempt(surface, parameters, seeds, monitor)
 }
 
 /// What every attempt shares.
