@@ -36,10 +36,11 @@ pub struct Best {
     pub starts: Vec<Start>,
 }
 
-/// Re-tiles the surface from each start.
+/// Re-tiles the surface from each start. Where one has to warn of the surface, there are no more:
+/// they would find the same, and take long to.
 ///
 /// # Errors
-/// Those of the first start; a later one that fails is left out.
+/// Those of the first start; a later one that fails is left out, and is the last.
 pub fn tile(
     surface: &Surface,
     parameters: &ModelParameters,
@@ -53,10 +54,16 @@ pub fn tile(
             ..parameters.retile.clone()
         };
         match retile::retile(surface, &own, &monitor.piece(start, parameters.starts)) {
-            Ok(made) => tiled.push(made),
+            Ok(made) => {
+                let warned = !made.facts.warnings.is_empty();
+                tiled.push(made);
+                if warned {
+                    break;
+                }
+            }
             Err(RetileError::Cancelled(cancelled)) => return Err(cancelled.into()),
             Err(error) if start == 0 => return Err(error),
-            Err(_) => {}
+            Err(_) => break,
         }
     }
     Ok(tiled)
