@@ -53,17 +53,16 @@ pub fn tile(
             seed,
             ..parameters.retile.clone()
         };
-        match retile::retile(surface, &own, &monitor.piece(start, parameters.starts)) {
-            Ok(made) => {
-                let warned = !made.facts.warnings.is_empty();
-                tiled.push(made);
-                if warned {
-                    break;
-                }
-            }
+        let made = match retile::retile(surface, &own, &monitor.piece(start, parameters.starts)) {
+            Ok(made) => made,
             Err(RetileError::Cancelled(cancelled)) => return Err(cancelled.into()),
             Err(error) if start == 0 => return Err(error),
             Err(_) => break,
+        };
+        let warned = !made.facts.warnings.is_empty();
+        tiled.push(made);
+        if warned {
+            break;
         }
     }
     Ok(tiled)

@@ -361,17 +361,15 @@ fn doubts(mesh: &MeshFacts, surface: &SurfaceSection, tiled: &Tiled) -> Vec<Stri
     doubts
 }
 
-/// Share of the surface's volume by which a model may differ without a word. Models of left
-/// ventricles differ by less than a thousandth.
+/// Percent of the surface's volume by which a model may differ without a word. Models of left
+/// ventricles differ by less than a tenth of one.
 const VOLUME_DOUBT_PERCENT: f64 = 10.0;
 
 /// What a sound model lacks that has too few points for its surface: plates and rods of a
 /// thousand voxels fall in between points that are farther apart than they are thick.
 fn coarseness(measures: &Measures) -> Option<String> {
-    let (percent, points) = (
-        measures.distance.volume_error_percent,
-        measures.mesh.vertices,
-    );
+    let percent = measures.distance.volume_error_percent;
+    let points = measures.mesh.vertices;
     (percent.abs() > VOLUME_DOUBT_PERCENT).then(|| {
         format!(
             "The model's volume differs from the surface's by {percent:+.0} %: {points} points \

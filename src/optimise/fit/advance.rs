@@ -9,7 +9,8 @@ use crate::optimise::connectivity::Connectivity;
 const MOST_HALVINGS: usize = 5;
 
 /// Adds `step` to `vertices`, as much of it as turns no triangle over and no component inside
-/// out, and makes no triangle pierce another that it did not pierce before. Returns whether that was less than asked for.
+/// out, and makes no triangle pierce another that it did not pierce before. Returns whether that
+/// was less than asked for.
 pub fn advance(vertices: &mut [Vec3], connectivity: &Connectivity, step: &[Vec3]) -> bool {
     let triangles = connectivity.triangles();
     let component = topology::components(vertices.len(), triangles);
