@@ -113,15 +113,22 @@ impl<'a> VoxelReader<'a> {
         voxels: &mut Vec<f32>,
         report: &mut dyn FnMut(f64) -> Result<(), Cancelled>,
     ) -> Result<(), VolumeError> {
+        let size = self.format.data_type.size();
+        let end = begin + count as u64 * size as u64;
+        self.source.prepare(end)?;
+        self.source.skip_to(begin)?;
+        if size == size_of::<f32>()
+            && voxels.is_empty()
+            && let Some((words, place)) = self.source.give_up(count * size)
+        {
+            *voxels = self.in_place(words, place, count, report)?;
+            return Ok(report(1.0)?);
+        }
         voxels
             .try_reserve_exact(count)
             .map_err(|_| VolumeError::Memory {
                 bytes: 4 * count as u64,
             })?;
-        let size = self.format.data_type.size();
-        let end = begin + count as u64 * size as u64;
-        self.source.prepare(end)?;
-        self.source.skip_to(begin)?;
         let mut done = 0;
         while done < count {
             report(done as f64 / count as f64)?;
@@ -136,12 +143,38 @@ impl<'a> VoxelReader<'a> {
             };
             let start = voxels.len();
             decode(bytes, &self.format, voxels);
-            self.odd.settle(bytes, &self.format, voxels, start)?;
+            let decoded = &mut voxels[start..];
+            self.odd.settle(bytes, &self.format, decoded, start)?;
             // While they are still in the cache.
-            self.tally.add_portion(&voxels[start..]);
+            self.tally.add_portion(decoded);
             done += portion;
         }
         Ok(report(1.0)?)
+    }
+
+    /// Decodes the `count` voxels that are stored in `words`, from byte `place` on, within these words.
+    /// No voxel goes to a place behind its own: none is overwritten before it was decoded.
+    fn in_place(
+        &mut self,
+        mut words: Vec<f32>,
+        place: usize,
+        count: usize,
+        report: &mut dyn FnMut(f64) -> Result<(), Cancelled>,
+    ) -> Result<Vec<f32>, VolumeError> {
+        let mut decoded = Vec::with_capacity(PORTION.min(count));
+        for done in (0..count).step_by(PORTION) {
+            report(done as f64 / count as f64)?;
+            let portion = (count - done).min(PORTION);
+            let begin = place + size_of::<f32>() * done;
+            let bytes = &bytemuck::cast_slice(&words)[begin..begin + size_of::<f32>() * portion];
+            decoded.clear();
+            decode(bytes, &self.format, &mut decoded);
+            self.odd.settle(bytes, &self.format, &mut decoded, done)?;
+            self.tally.add_portion(&decoded);
+            words[done..done + portion].copy_from_slice(&decoded);
+        }
+        words.truncate(count);
+        Ok(words)
     }
 
     /// The figures of all voxels so far.
@@ -175,16 +208,17 @@ impl<'a> VoxelReader<'a> {
 }
 
 impl Odd {
-    /// Looks for values that `f32` cannot hold.
+    /// Looks for values that `f32` cannot hold among `voxels`, the first of which is number `first`
+    /// of the volume.
     fn settle(
         &mut self,
         bytes: &[u8],
         format: &VoxelFormat,
         voxels: &mut [f32],
-        start: usize,
+        first: usize,
     ) -> Result<(), VolumeError> {
         let (mut infinite, mut large) = (false, false);
-        for v in &voxels[start..] {
+        for v in &*voxels {
             // Without their sign bit, floats are ordered as their bits are.
             let size = v.to_bits() & !SIGN;
             infinite |= size == INFINITY;
@@ -192,7 +226,7 @@ impl Odd {
         }
         self.inexact |= large && format.data_type != DataType::F32;
         match infinite {
-            true => self.settle_infinite(bytes, format, voxels, start),
+            true => self.settle_infinite(bytes, format, voxels, first),
             false => Ok(()),
         }
     }
@@ -203,10 +237,10 @@ impl Odd {
         bytes: &[u8],
         format: &VoxelFormat,
         voxels: &mut [f32],
-        start: usize,
+        first: usize,
     ) -> Result<(), VolumeError> {
         let stored = bytes.chunks_exact(format.data_type.size());
-        for ((n, v), bytes) in (start..).zip(&mut voxels[start..]).zip(stored) {
+        for ((n, v), bytes) in (first..).zip(voxels).zip(stored) {
             if v.is_infinite() {
                 let value = exact(bytes, format);
                 if value.is_finite() {

@@ -4,7 +4,8 @@
 //! read as one stream. Whatever follows the last member is not part of it, as for `gzip -d`.
 //! Small files of one member are unpacked [at once](super::unpack), which is faster.
 
-use super::{VolumeError, unpack};
+use super::VolumeError;
+use super::unpack::{self, Unpacked};
 use flate2::bufread::GzDecoder;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, ErrorKind, Read, Seek, SeekFrom};
@@ -93,7 +94,7 @@ enum Body {
     Plain(BufReader<Box<dyn ReadSeek>>),
     Gzip(Box<Members>),
     /// All that the file unpacks to.
-    Unpacked(Cursor<Vec<u8>>),
+    Unpacked(Unpacked),
 }
 
 pub(super) trait ReadSeek: Read + Seek {}
@@ -164,11 +165,7 @@ impl Source {
         };
         let unpacked = unpack::at_once(&mut packed, self.stored, end, self.limit);
         let restarted = unpacked.and_then(|unpacked| match unpacked {
-            Some(bytes) => {
-                let mut cursor = Cursor::new(bytes);
-                cursor.set_position(self.position);
-                Ok(Body::Unpacked(cursor))
-            }
+            Some(unpacked) => Ok(Body::Unpacked(unpacked)),
             None => {
                 packed.rewind()?;
                 let mut members = Members::new(packed);
@@ -182,16 +179,27 @@ impl Source {
 
     /// The next `length` bytes from where they lie, if they are in memory.
     pub(super) fn lend(&mut self, length: usize) -> Option<&[u8]> {
-        let Body::Unpacked(cursor) = &mut self.body else {
+        let Body::Unpacked(unpacked) = &self.body else {
             return None;
         };
-        let begin = cursor.position() as usize;
-        if cursor.get_ref().len() < begin + length {
+        let begin = usize::try_from(self.position).ok()?;
+        let lent = unpacked.bytes().get(begin..begin.checked_add(length)?)?;
+        self.position += length as u64;
+        Some(lent)
+    }
+
+    /// Gives the memory away in which the next `length` bytes lie, if they are the last of the file
+    /// and most of it; nothing can be read after that. Returns it with the place of the first of them.
+    pub(super) fn give_up(&mut self, length: usize) -> Option<(Vec<f32>, usize)> {
+        let Body::Unpacked(unpacked) = &mut self.body else {
+            return None;
+        };
+        let begin = usize::try_from(self.position).ok()?;
+        if begin > length || begin.checked_add(length) != Some(unpacked.bytes().len()) {
             return None;
         }
-        cursor.set_position((begin + length) as u64);
         self.position += length as u64;
-        cursor.get_ref().get(begin..begin + length)
+        Some((std::mem::take(unpacked).into_words(), begin))
     }
 
     /// Fills `buffer` as far as the file reaches and says how far that was.
@@ -202,7 +210,10 @@ impl Source {
             let got = match &mut self.body {
                 Body::Plain(reader) => reader.read(part),
                 Body::Gzip(members) => members.read(part),
-                Body::Unpacked(bytes) => bytes.read(part),
+                Body::Unpacked(unpacked) => {
+                    let begin = self.position as usize + filled;
+                    unpacked.bytes().get(begin..).unwrap_or_default().read(part)
+                }
             };
             match got {
                 Ok(0) => break,

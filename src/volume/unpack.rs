@@ -7,17 +7,52 @@
 //! of what is wrong with a damaged file, hence whatever is not as it should be is left to the
 //! portions.
 //!
+//! The memory that they are unpacked to is that of 32-bit words: voxels of four bytes become `f32`
+//! where they lie, and no second volume is written.
+//!
 //! Guaranteed: the bytes are those that reading in portions would have given, their checksum is
 //! right, and no more memory is taken than [`MOST`] and the file's own size.
 
+use flate2::bufread::GzDecoder;
 use libdeflater::Decompressor;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, Cursor, Read, Seek};
 
 /// Most bytes to unpack at once: some 40 ms of work, in which nobody looks at the cancel token.
 const MOST: u64 = 16 << 20;
 
 /// A gzip member ends with the checksum and the length of what it holds, four bytes each.
 const TRAILER: usize = 8;
+
+/// All bytes of a file, in words.
+#[derive(Default)]
+pub(super) struct Unpacked {
+    words: Vec<f32>,
+    length: usize,
+}
+
+impl Unpacked {
+    /// As many zeros.
+    fn zeros(length: usize) -> Self {
+        Self {
+            words: vec![0.0; length.div_ceil(size_of::<f32>())],
+            length,
+        }
+    }
+
+    /// The bytes.
+    pub(super) fn bytes(&self) -> &[u8] {
+        &bytemuck::cast_slice(&self.words)[..self.length]
+    }
+
+    fn bytes_mut(&mut self) -> &mut [u8] {
+        &mut bytemuck::cast_slice_mut(&mut self.words)[..self.length]
+    }
+
+    /// The memory in which they lie, the last word filled up with zeros.
+    pub(super) fn into_words(self) -> Vec<f32> {
+        self.words
+    }
+}
 
 /// Unpacks `packed`, a gzipped file of `stored` bytes, if it is one member of at least `least`
 /// bytes and at most `limit`.
@@ -29,26 +64,36 @@ pub(super) fn at_once(
     stored: u64,
     least: u64,
     limit: u64,
-) -> io::Result<Option<Vec<u8>>> {
-    if stored > MOST || stored < TRAILER as u64 {
-        return Ok(None);
-    }
-    let mut trailer = [0; TRAILER];
-    packed.seek(SeekFrom::End(-(TRAILER as i64)))?;
-    packed.read_exact(&mut trailer)?;
-    let word = |at: usize| [0, 1, 2, 3].map(|k| trailer[at + k]);
-    let (checksum, length) = (u32::from_le_bytes(word(0)), u32::from_le_bytes(word(4)));
-    if u64::from(length) < least || u64::from(length) > limit.min(MOST) {
+) -> io::Result<Option<Unpacked>> {
+    if stored > MOST {
         return Ok(None);
     }
     let mut file = Vec::with_capacity(stored as usize);
     packed.rewind()?;
     packed.take(stored).read_to_end(&mut file)?;
-    let mut bytes = vec![0; length as usize];
-    let unpacked = Decompressor::new().gzip_decompress(&file, &mut bytes);
-    // Only the first member was unpacked and checked: it must be the one that ends the file.
-    let whole = unpacked == Ok(bytes.len()) && libdeflater::crc32(&bytes) == checksum;
-    Ok(whole.then_some(bytes))
+    let Some((rest, &[c0, c1, c2, c3, l0, l1, l2, l3])) = file.split_last_chunk::<TRAILER>() else {
+        return Ok(None);
+    };
+    let checksum = u32::from_le_bytes([c0, c1, c2, c3]);
+    let length = u32::from_le_bytes([l0, l1, l2, l3]);
+    let wanted = least..=limit.min(MOST);
+    let Some(deflated) = after_header(rest).filter(|_| wanted.contains(&u64::from(length))) else {
+        return Ok(None);
+    };
+    let mut unpacked = Unpacked::zeros(length as usize);
+    let bytes = unpacked.bytes_mut();
+    // Only the first member is unpacked: what the file's end says is true of it if no other follows.
+    let whole = Decompressor::new().deflate_decompress(deflated, bytes) == Ok(bytes.len())
+        && libdeflater::crc32(bytes) == checksum;
+    Ok(whole.then_some(unpacked))
+}
+
+/// What follows the header of the member with which `file` begins.
+fn after_header(file: &[u8]) -> Option<&[u8]> {
+    let member = GzDecoder::new(Cursor::new(file));
+    // Nothing but the header has been read so far.
+    member.header()?;
+    file.get(member.get_ref().position() as usize..)
 }
 
 #[cfg(test)]
@@ -64,7 +109,8 @@ mod tests {
     }
 
     fn try_at_once(packed: &[u8], least: u64, limit: u64) -> Option<Vec<u8>> {
-        at_once(&mut Cursor::new(packed), packed.len() as u64, least, limit).unwrap()
+        let unpacked = at_once(&mut Cursor::new(packed), packed.len() as u64, least, limit);
+        Some(unpacked.unwrap()?.bytes().to_vec())
     }
 
     #[test]

@@ -487,6 +487,59 @@ fn without_forms_the_assumption_is_told() {
     assert_eq!(facts.affine_ras[(0, 3)], 3.0);
 }
 
+/// Packed voxels of four bytes are decoded within the memory that they were unpacked to, plain ones
+/// on their way from the file.
+#[test]
+fn packed_voxels_of_four_bytes_are_what_plain_ones_are() {
+    // More than one portion, the last one not full; numbers that `f32` does not hold in the last.
+    let shape = [60, 40, 30];
+    let count = shape.iter().map(|n| *n as usize).product::<usize>();
+    let odd = 70_001;
+    for (code, at_odd) in [
+        (16, f32::INFINITY.to_bits()),
+        (8, 20_000_001),
+        (768, u32::MAX),
+    ] {
+        for big_endian in [false, true] {
+            for begin in [352, 353, 368] {
+                let mut file = File::new(big_endian);
+                file.dim(&shape);
+                file.data_type(code, 32);
+                file.reals(108, &[begin as f32]);
+                file.bytes.resize(begin, 0);
+                for n in 0..count {
+                    let bits = match n {
+                        _ if n == odd => at_odd,
+                        _ if code == 16 => (n as f32).sqrt().to_bits(),
+                        _ => n as u32,
+                    };
+                    file.push(bits.to_le_bytes());
+                }
+                let plain = file.read().unwrap();
+                let packed = read_bytes(&gzip(&file.bytes)).unwrap();
+                let bits = |reading: &Reading| -> Vec<u32> {
+                    reading.volume.voxels.iter().map(|v| v.to_bits()).collect()
+                };
+                assert_eq!(bits(&plain), bits(&packed));
+                assert_eq!(plain.facts.intensity, packed.facts.intensity);
+                assert_eq!(plain.facts.warnings, packed.facts.warnings);
+                assert_eq!(packed.facts.warnings.len(), 1, "of the odd voxel");
+                if code != 16 {
+                    file.reals(112, &[1e32, 0.0]);
+                    let expected = [odd % 60, odd / 60 % 40, odd / 2400];
+                    for bytes in [file.bytes.clone(), gzip(&file.bytes)] {
+                        let overflow = read_bytes(&bytes);
+                        assert!(
+                            matches!(overflow, Err(VolumeError::Overflow { voxel, .. }) if voxel == expected),
+                            "{overflow:?}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn infinities_are_missing_and_emptiness_is_refused() {
     let mut file = File::new(false);
