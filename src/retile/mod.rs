@@ -191,10 +191,10 @@ pub enum RetileError {
         /// Most points possible.
         limit: usize,
     },
-    /// The triangles pierce each other whatever is tried: the wall is too thin for N points.
+    /// The surface's own triangles pierce each other: the model's would, too.
     #[error(
-        "with {points} points the mesh pierces itself near ({:.1}, {:.1}, {:.1}) mm (LPS); \
-         the wall is too thin there: use more points",
+        "the surface pierces itself near ({:.1}, {:.1}, {:.1}) mm (LPS), and so would \
+         {points} points",
         place[0], place[1], place[2]
     )]
     SelfIntersecting {
@@ -235,8 +235,8 @@ impl RetileError {
             RetileError::OpenSurface(_) | RetileError::NoArea => {
                 "Give a closed surface of finite size.".into()
             }
-            RetileError::SelfIntersecting { points, .. } => {
-                format!("Set `points` to more than {points}, or choose another `seed`.")
+            RetileError::SelfIntersecting { .. } => {
+                "Choose another `iso`, or smooth the volume.".into()
             }
             RetileError::BadParameter { name, range, .. } => {
                 format!("Set `{name}` to a value in {range}.")

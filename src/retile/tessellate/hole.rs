@@ -13,15 +13,14 @@ use super::planar::constrained_delaunay;
 use crate::geometry::{Vec2, Vec3, triangle};
 use crate::mesh::intersections::triangles_intersect;
 
-/// What a new triangle must satisfy besides keeping the mesh a manifold of its kind.
+/// What a new triangle must satisfy besides piercing nothing and keeping the mesh a manifold of
+/// its kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Demand {
-    /// It faces as the surface did, folds nowhere by more than 120° and pierces nothing.
+    /// It faces as the surface did and folds nowhere by more than 120°.
     Smooth,
-    /// It pierces nothing.
-    Embedded,
     /// Nothing more.
-    Topology,
+    Embedded,
 }
 
 /// Cosine under which a new triangle has turned away from the old star.
@@ -145,7 +144,7 @@ impl<'a> Hole<'a> {
         let n = triangle::area_normal(&a, &b, &c);
         let size = n.norm();
         if !(size > 0.0) {
-            return (demand == Demand::Topology).then_some(1e3);
+            return None;
         }
         let n = n / size;
         let facing = n.dot(&self.normal);
@@ -178,9 +177,6 @@ impl<'a> Hole<'a> {
         let named = self.named(triangles);
         if self.closes_a_tetrahedron(&named) {
             return triangles.to_vec();
-        }
-        if self.demand == Demand::Topology {
-            return Vec::new();
         }
         let meets_earlier = |k: usize| {
             let corners = self.mesh.corners(named[k]);

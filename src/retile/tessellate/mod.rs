@@ -8,12 +8,10 @@
 //!    Delaunay, sides fixed). Same surface, old vertices and points together.
 //! 2. [`removal`]: the old vertices go one by one, lowest valence first; the [`hole`] that each
 //!    leaves is triangulated anew.
-//! 3. [`repair`]: should removal have had to let triangles pierce each other, edges are flipped
-//!    until none does.
 //!
 //! Beyond the paper: holes whose ring has no simple projection are closed in space; every new
 //! triangle is tested exactly against all others, so that an embedded surface stays embedded;
-//! stuck vertices lose edges by flips before any demand is lowered.
+//! stuck vertices lose edges by flips.
 //!
 //! **Guaranteed** for what is returned: exactly N vertices in order, closed, edge- and
 //! vertex-manifold, components, genus and orientation of the surface, no self-intersection.
@@ -29,7 +27,6 @@ mod mutual;
 mod patchwork;
 mod planar;
 mod removal;
-mod repair;
 #[cfg(test)]
 mod samples;
 
@@ -84,8 +81,8 @@ pub enum TessellateError {
         /// The vertices, ascending.
         vertices: Vec<u32>,
     },
-    /// The mesh is not of the surface's kind. Steps two and three cannot do that; were there a
-    /// mistake in them, the mesh would end here.
+    /// The mesh is not of the surface's kind. Step two cannot do that; were there a mistake in it,
+    /// the mesh would end here.
     #[error("the mesh has another topology than the surface: {after:?} instead of {before:?}")]
     TopologyChanged {
         /// The surface.
@@ -99,7 +96,7 @@ pub enum TessellateError {
         /// The component's points, ascending.
         points: Vec<u32>,
     },
-    /// Triangles pierce each other: too few points where walls are thin or bent.
+    /// Triangles pierce each other, as they did on the surface: removal adds none.
     #[error("{} pairs of triangles pierce each other", pairs.len())]
     SelfIntersecting {
         /// Pairs of triangles of `mesh`.
@@ -141,7 +138,6 @@ pub fn tessellate(
         let vertices = stuck.into_iter().map(|v| v - kept).collect();
         return Err(TessellateError::Stuck { vertices });
     }
-    repair::end_self_intersections(&mut mesh, monitor)?;
     let mut mesh = verify(finished(mesh, points.len()), &census)?;
     let component = topology::components(vertices.len(), triangles);
     let surface = TriMesh {

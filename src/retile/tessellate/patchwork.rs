@@ -86,16 +86,6 @@ impl Patchwork {
         self.triangles.iter().copied().filter(|t| *t != DEAD)
     }
 
-    /// Their numbers.
-    pub(super) fn live_ids(&self) -> impl Iterator<Item = u32> {
-        (0..self.triangles.len() as u32).filter(|t| self.triangle(*t) != DEAD)
-    }
-
-    /// Whether triangle `t` meets another beyond shared corners and sides.
-    pub(super) fn is_pierced(&self, t: u32) -> bool {
-        self.pierces(self.triangle(t), &[t])
-    }
-
     pub(super) fn has_edge(&self, a: u32, b: u32) -> bool {
         let at = |v: u32| &self.incident[v as usize];
         let (fewer, other) = if at(a).len() <= at(b).len() {
