@@ -78,9 +78,14 @@ pub(super) struct VoxelFormat {
 
 /// Reads the voxels of a file, front to back.
 pub(super) struct VoxelReader<'a> {
-    format: VoxelFormat,
+    decoder: Decoder,
     source: &'a mut Source,
     buffer: Vec<u8>,
+}
+
+/// Decodes portions and keeps what is to be told of them.
+struct Decoder {
+    format: VoxelFormat,
     odd: Odd,
     tally: Tally,
 }
@@ -96,11 +101,13 @@ impl<'a> VoxelReader<'a> {
     /// A reader for the voxels in `source`, which holds as many as will be asked for.
     pub(super) fn new(format: VoxelFormat, source: &'a mut Source) -> Self {
         Self {
-            format,
+            decoder: Decoder {
+                format,
+                odd: Odd::default(),
+                tally: Tally::default(),
+            },
             source,
             buffer: Vec::new(),
-            odd: Odd::default(),
-            tally: Tally::default(),
         }
     }
 
@@ -113,7 +120,7 @@ impl<'a> VoxelReader<'a> {
         voxels: &mut Vec<f32>,
         report: &mut dyn FnMut(f64) -> Result<(), Cancelled>,
     ) -> Result<(), VolumeError> {
-        let size = self.format.data_type.size();
+        let size = self.decoder.format.data_type.size();
         let end = begin + count as u64 * size as u64;
         self.source.prepare(end)?;
         self.source.skip_to(begin)?;
@@ -141,12 +148,7 @@ impl<'a> VoxelReader<'a> {
                     &self.buffer
                 }
             };
-            let start = voxels.len();
-            decode(bytes, &self.format, voxels);
-            let decoded = &mut voxels[start..];
-            self.odd.settle(bytes, &self.format, decoded, start)?;
-            // While they are still in the cache.
-            self.tally.add_portion(decoded);
+            self.decoder.append(bytes, voxels.len(), voxels)?;
             done += portion;
         }
         Ok(report(1.0)?)
@@ -168,9 +170,7 @@ impl<'a> VoxelReader<'a> {
             let begin = place + size_of::<f32>() * done;
             let bytes = &bytemuck::cast_slice(&words)[begin..begin + size_of::<f32>() * portion];
             decoded.clear();
-            decode(bytes, &self.format, &mut decoded);
-            self.odd.settle(bytes, &self.format, &mut decoded, done)?;
-            self.tally.add_portion(&decoded);
+            self.decoder.append(bytes, done, &mut decoded)?;
             words[done..done + portion].copy_from_slice(&decoded);
         }
         words.truncate(count);
@@ -179,20 +179,20 @@ impl<'a> VoxelReader<'a> {
 
     /// The figures of all voxels so far.
     pub(super) fn tally(&self) -> Tally {
-        self.tally
+        self.decoder.tally
     }
 
     /// What happened to the values.
     pub(super) fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
-        if self.odd.infinite > 0 {
-            let n = self.odd.infinite;
+        if self.decoder.odd.infinite > 0 {
+            let n = self.decoder.odd.infinite;
             warnings.push(format!(
                 "{n} voxels are infinite and were taken as missing (NaN)."
             ));
         }
-        if self.odd.inexact {
-            let name = self.format.data_type.name();
+        if self.decoder.odd.inexact {
+            let name = self.decoder.format.data_type.name();
             warnings.push(format!(
                 "Some {name} values exceed 2^24 and were rounded to 24 binary digits."
             ));
@@ -204,6 +204,25 @@ impl<'a> VoxelReader<'a> {
     pub(super) fn finish(&mut self) -> Result<Option<String>, VolumeError> {
         let left_over = self.source.finish()?;
         Ok(left_over.then(|| "Bytes that follow the last voxel were left aside.".into()))
+    }
+}
+
+impl Decoder {
+    /// Appends the voxels stored in `bytes` to `out`; the first of them is number `first` of the
+    /// volume.
+    fn append(
+        &mut self,
+        bytes: &[u8],
+        first: usize,
+        out: &mut Vec<f32>,
+    ) -> Result<(), VolumeError> {
+        let start = out.len();
+        decode(bytes, &self.format, out);
+        let decoded = &mut out[start..];
+        self.odd.settle(bytes, &self.format, decoded, first)?;
+        // While they are still in the cache.
+        self.tally.add_portion(decoded);
+        Ok(())
     }
 }
 

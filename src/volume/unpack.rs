@@ -15,7 +15,7 @@
 
 use flate2::bufread::GzDecoder;
 use libdeflater::Decompressor;
-use std::io::{self, Cursor, Read, Seek};
+use std::io::{self, Cursor, Read, Seek, SeekFrom};
 
 /// Most bytes to unpack at once: some 40 ms of work, in which nobody looks at the cancel token.
 const MOST: u64 = 16 << 20;
@@ -65,19 +65,22 @@ pub(super) fn at_once(
     least: u64,
     limit: u64,
 ) -> io::Result<Option<Unpacked>> {
-    if stored > MOST {
+    if stored > MOST || stored < TRAILER as u64 {
+        return Ok(None);
+    }
+    let mut trailer = [0; TRAILER];
+    packed.seek(SeekFrom::End(-(TRAILER as i64)))?;
+    packed.read_exact(&mut trailer)?;
+    let [c0, c1, c2, c3, l0, l1, l2, l3] = trailer;
+    let checksum = u32::from_le_bytes([c0, c1, c2, c3]);
+    let length = u32::from_le_bytes([l0, l1, l2, l3]);
+    if !(least..=limit.min(MOST)).contains(&u64::from(length)) {
         return Ok(None);
     }
     let mut file = Vec::with_capacity(stored as usize);
     packed.rewind()?;
     packed.take(stored).read_to_end(&mut file)?;
-    let Some((rest, &[c0, c1, c2, c3, l0, l1, l2, l3])) = file.split_last_chunk::<TRAILER>() else {
-        return Ok(None);
-    };
-    let checksum = u32::from_le_bytes([c0, c1, c2, c3]);
-    let length = u32::from_le_bytes([l0, l1, l2, l3]);
-    let wanted = least..=limit.min(MOST);
-    let Some(deflated) = after_header(rest).filter(|_| wanted.contains(&u64::from(length))) else {
+    let Some(deflated) = after_header(&file) else {
         return Ok(None);
     };
     let mut unpacked = Unpacked::zeros(length as usize);
