@@ -101,8 +101,6 @@ pub enum TessellateError {
     SelfIntersecting {
         /// Pairs of triangles of `mesh`.
         pairs: Vec<[u32; 2]>,
-        /// The points at their corners, ascending: more points are needed around them.
-        points: Vec<u32>,
         /// The mesh, right in all but this.
         mesh: Box<TriMesh>,
     },
@@ -256,16 +254,8 @@ fn verify(mesh: TriMesh, surface: &Census) -> Result<TriMesh, TessellateError> {
     if pairs.is_empty() {
         return Ok(mesh);
     }
-    let mut points: Vec<u32> = pairs
-        .iter()
-        .flatten()
-        .flat_map(|t| mesh.triangles[*t as usize])
-        .collect();
-    points.sort_unstable();
-    points.dedup();
     Err(TessellateError::SelfIntersecting {
         pairs,
-        points,
         mesh: Box::new(mesh),
     })
 }
