@@ -5,8 +5,9 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use ventriform::deform::template::{Organ, Template};
-use ventriform::deform::voxelise::voxelise;
-use ventriform::deform::{DeformParameters, fit, localise};
+use ventriform::deform::{DeformParameters, fit};
+use ventriform::grid::voxelise::voxelise;
+use ventriform::locate::localisation as localise;
 use ventriform::parameters::ModelParameters;
 use ventriform::progress::Monitor;
 use ventriform::volume::Volume;

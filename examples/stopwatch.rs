@@ -16,11 +16,11 @@ use anyhow::{Context, Result, bail};
 use serde_json::{Value, json};
 use std::io::{BufRead, Write};
 use std::time::Instant;
+use ventriform::grid::labels::Labels;
 use ventriform::parameters::ModelParameters;
 use ventriform::pipeline;
 use ventriform::progress::{CancelToken, Monitor, Observer, Stage};
 use ventriform::surface::IsoLevel;
-use ventriform::surface::labels::Labels;
 use ventriform::surface::marching_cubes::{Samples, marching_cubes};
 use ventriform::volume::{self, ReadLimits, ReadOptions, Reading, VolumeFile};
 

@@ -18,9 +18,14 @@
 
 pub mod geometry;
 pub mod mesh;
+pub mod numeric;
 pub mod progress;
 
+pub mod grid;
+
 pub mod volume;
+
+pub mod locate;
 
 pub mod surface;
 
@@ -36,14 +41,14 @@ pub mod polar;
 
 pub mod report;
 
-pub mod evaluate;
-
-pub mod segmentation;
-
 pub mod export;
 
 pub mod parameters;
 pub mod pipeline;
+
+pub mod segmentation;
+
+pub mod evaluate;
 
 pub mod jobs;
 

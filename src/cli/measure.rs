@@ -1,8 +1,8 @@
 //! `ventriform measure`: how well two masks agree.
 
 use super::segment::read;
-use crate::deform::voxelise::Mask;
-use crate::evaluate::masks::compare;
+use crate::grid::agreement::compare;
+use crate::grid::voxelise::Mask;
 use crate::progress::Monitor;
 use crate::segmentation::{agreement_json, on_grid};
 use anyhow::{Context, Result, bail};

@@ -2,13 +2,13 @@
 
 mod bar;
 mod demo;
-mod evaluate;
+pub(crate) mod evaluate;
 mod generate;
 mod library;
 mod measure;
 mod parameter_args;
 mod phantom;
-mod segment;
+pub(crate) mod segment;
 mod serve;
 mod statistics;
 mod templates;

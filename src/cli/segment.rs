@@ -3,10 +3,9 @@
 use super::{Bar, FitArgs};
 use crate::export::{self, Format};
 use crate::parameters::FitParameters;
-use crate::pipeline::NamedFile;
-use crate::pipeline::segment::{NamedMesh, Order, segment};
 use crate::progress::{CancelToken, Monitor, Plan};
 use crate::segmentation::Segmentation;
+use crate::segmentation::{NamedFile, NamedMesh, Order, from_files};
 use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeFile};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
@@ -84,7 +83,7 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
     };
     let bar = Bar::over(Plan::SEGMENTATION);
     let monitor = Monitor::new(&bar, CancelToken::new());
-    let made = segment(&order, &ReadLimits::default(), &monitor)
+    let made = from_files(&order, &ReadLimits::default(), &monitor)
         .map_err(|error| anyhow!("{error}. {}", error.fix()))
         .and_then(|made| Ok((made.files(&args.formats, None, &monitor)?, made)));
     bar.finish();
@@ -99,7 +98,7 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
 }
 
 /// Reads one volume.
-pub(super) fn read(paths: &[PathBuf], frame: Option<usize>, monitor: &Monitor) -> Result<Reading> {
+pub(crate) fn read(paths: &[PathBuf], frame: Option<usize>, monitor: &Monitor) -> Result<Reading> {
     let files: Vec<VolumeFile> = paths.iter().map(VolumeFile::at).collect();
     volume::read(
         &files,

@@ -1,6 +1,6 @@
 //! `ventriform templates`: the library of models that segmentations start from.
 
-use super::evaluate::cohort::{CohortArgs, read_volume};
+use crate::evaluate::cohort::{CohortArgs, read_volume};
 use crate::export::{self, Format};
 use crate::parameters::ModelParameters;
 use crate::pipeline;

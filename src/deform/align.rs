@@ -8,11 +8,11 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::cup::perpendicular;
 use super::elastic::area_shares;
-use super::field::Field;
 use super::sensors::{self, Look, Reading};
 use crate::geometry::Vec3;
+use crate::grid::field::Field;
+use crate::locate::cup::perpendicular;
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Monitor};
 

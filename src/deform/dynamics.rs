@@ -14,11 +14,11 @@
 //! because the limit of steps is reached, and the result says which.
 
 use super::elastic::{Elastic, area_shares};
-use super::field::Field;
 use super::sensors::{self, Look, PER_TRIANGLE, Reading};
-use super::system::BlockMatrix;
 use crate::geometry::Vec3;
+use crate::grid::field::Field;
 use crate::mesh::TriMesh;
+use crate::numeric::conjugate_gradient::BlockMatrix;
 use crate::progress::{Cancelled, Monitor};
 
 /// Why the motion ended.

@@ -29,9 +29,9 @@
 
 use nalgebra::Matrix3;
 
-use super::system::BlockMatrix;
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
+use crate::numeric::conjugate_gradient::BlockMatrix;
 use crate::progress::{Cancelled, Monitor};
 
 /// Stiffness of each kind of force.

@@ -4,10 +4,10 @@
 //! comes the model in the patient's place and shape, on the same nodes and triangles, with
 //! everything needed to judge whether to believe it.
 //!
-//! 1. [`localise`] finds the ventricle in the volume, with nobody's help: once for all
+//! 1. [`localisation`] finds the ventricle in the volume, with nobody's help: once for all
 //!    templates ([`Place`]).
 //! 2. [`template::Pose`] puts the template there: centre, axis, roll, lengths, in a patient
-//!    who may lie askew in the frame ([`posture`]).
+//!    who may lie askew in the frame ([`crate::locate::patient_orientation`]).
 //! 3. [`align`] moves, turns, stretches and thickens it as a whole.
 //! 4. [`dynamics`] lets it move under [`elastic`] forces and [`sensors`] until it rests.
 //! 5. Folds and self-intersections are looked for; if there are any, 4 is repeated with a
@@ -16,7 +16,7 @@
 //! Which edge? The half-way point between the wall's ridge and the trough beside it, which
 //! does not depend on uptake: a wall of half the uptake has its edge in the same place.
 //! [`DeformParameters::margin`] moves it for readers who draw wider. Blur makes this wall
-//! look thicker than it is; with [`Edge::Anatomical`], [`anatomy`] takes the blur's share off
+//! look thicker than it is; with [`Edge::Anatomical`], [`blur_correction`] takes the blur's share off
 //! and 4 is repeated with the edges moved into the wall by that much.
 //!
 //! Where the apex takes up nothing, the model keeps the length of its pose as far as its
@@ -27,37 +27,30 @@
 //! from self-intersection ([`Fit::self_intersections`] counts them, [`Flag::Folded`] says so).
 
 pub mod align;
-pub mod anatomy;
-pub mod blob;
-pub mod cup;
+pub mod blur_correction;
 pub mod dynamics;
 pub mod elastic;
-pub mod field;
 pub mod flags;
-mod hollows;
-pub mod localise;
-pub mod posture;
 mod profile;
 pub mod sensors;
-pub mod system;
 pub mod template;
-pub mod voxelise;
 pub mod wall;
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
+use crate::grid::field::Field;
+use crate::locate::body::Blob;
+use crate::locate::cup::Cup;
+use crate::locate::localisation::{Hints, Localisation, LocaliseError, NotAHeart};
+use crate::locate::patient_orientation::{Posture, Superior};
+use crate::locate::{body, localisation};
 use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::volume::Volume;
-use blob::Blob;
-use cup::Cup;
 use dynamics::{Motion, Moved, StopReason};
 use elastic::{Elastic, Stiffness};
-use field::Field;
 pub use flags::Flag;
-use localise::{Hints, Localisation, LocaliseError, NotAHeart};
-use posture::{Posture, Superior};
 use sensors::{Look, SensorKind, Shift};
 use template::{Organ, Pose, Template};
 use wall::Wall;
@@ -377,8 +370,8 @@ pub fn fit_at(
     let fit = match (&fit.cup, parameters.edge) {
         (Some(cup), Edge::Anatomical) => {
             monitor.report(Stage::Deform, 0.5)?;
-            let apparent = anatomy::thickness(&fit.mesh, cup);
-            let excess = anatomy::excess(apparent, parameters.resolution);
+            let apparent = blur_correction::thickness(&fit.mesh, cup);
+            let excess = blur_correction::excess(apparent, parameters.resolution);
             let thin = -0.5 * excess;
             Attempt::best(&aligned, template, &start, parameters, thin, monitor)?
                 .into_fit(volume, template, &start, &aligned, monitor)?
@@ -434,7 +427,7 @@ impl Place {
         monitor.report(Stage::Localise, 0.0)?;
         let place = match template.cup {
             Some(_) => {
-                let found = localise::localise(volume, &parameters.hints, monitor)?;
+                let found = localisation::localise(volume, &parameters.hints, monitor)?;
                 let posture = match parameters.superior {
                     Superior::Body => Posture::of_body(volume, &found.cup.centre, monitor)?,
                     Superior::Frame => Posture::FRAME,
@@ -442,9 +435,9 @@ impl Place {
                 Place::Ventricle { found, posture }
             }
             None => {
-                let mask = blob::one_label(volume, &parameters.hints, monitor)?;
+                let mask = body::one_label(volume, &parameters.hints, monitor)?;
                 let picture = mask.as_ref().unwrap_or(volume);
-                let blob = blob::find(picture, &parameters.hints, monitor)?;
+                let blob = body::find(picture, &parameters.hints, monitor)?;
                 Place::Body { blob, mask }
             }
         };

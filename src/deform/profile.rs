@@ -1,8 +1,8 @@
 //! One sensor's profile: the image along a normal, and the edge on it.
 
-use super::field::Field;
 use super::sensors::{Look, SensorKind};
 use crate::geometry::Vec3;
+use crate::grid::field::Field;
 
 /// Distance of the readings along a profile, mm.
 const STEP: f64 = 1.0;

@@ -14,9 +14,9 @@
 //! insertion, the liver), the wall looks thicker than elsewhere: sensors whose half width
 //! (ridge to edge) departs from the usual one count less.
 
-use super::field::Field;
 use super::profile::Profile;
 use crate::geometry::Vec3;
+use crate::grid::field::Field;
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Monitor};
 

@@ -1,13 +1,14 @@
 //! A model made ready to be fitted: its place as a cup, its struts.
 
-use super::cup::{Cup, perpendicular};
 use super::elastic::{self, Strut};
-use super::field::Field;
-use super::localise::{self, Hints};
-use super::voxelise::voxelise;
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::geometry::frame::VoxelToPatient;
+use crate::grid::field::Field;
+use crate::grid::voxelise::voxelise;
+use crate::locate::cup::{Cup, perpendicular};
+use crate::locate::localisation as localise;
+use crate::locate::localisation::Hints;
 use crate::mesh::TriMesh;
 use crate::mesh::topology::{self, Defect};
 use crate::progress::{Cancelled, Monitor};

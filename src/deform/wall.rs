@@ -4,14 +4,14 @@
 //! basal of it they start on the axis and run across it. Rows follow each other at equal
 //! arc length from apex to base, columns at equal angles from the patient's lateral side
 //! (0 degrees) over anterior (90) and septal (180) to inferior (270). Anterior is where the
-//! patient's superior direction ([`super::posture`]) lies across the axis.
+//! patient's superior direction ([`crate::locate::patient_orientation`]) lies across the axis.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::cup::Cup;
 use super::elastic::rotation_of;
 use crate::geometry::bvh::Bvh;
 use crate::geometry::{Vec3, triangle};
+use crate::locate::cup::Cup;
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Monitor};
 
@@ -53,7 +53,7 @@ pub struct Wall {
 pub fn anterior(axis: &Vec3, superior: &Vec3) -> Vec3 {
     let up = superior - axis * axis.dot(superior);
     up.try_normalize(1e-6)
-        .unwrap_or_else(|| super::cup::perpendicular(axis).0)
+        .unwrap_or_else(|| crate::locate::cup::perpendicular(axis).0)
 }
 
 /// The place of `cup` after its model has moved from `before` to `after`: the similarity

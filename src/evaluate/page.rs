@@ -7,8 +7,8 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 
 use super::plot::{Series, escape, plot};
 use super::rows::{self, Cell, Gold, Kind, ModelRow, Row, Variant};
-use super::slices;
 use super::table::{Evaluation, table1};
+use crate::segmentation::slices;
 
 const STYLE: &str = "body{font:15px/1.45 system-ui,sans-serif;color:#1c2430;max-width:76em;\
 margin:2em auto;padding:0 1em}h1,h2,h3{line-height:1.2}table{border-collapse:collapse;\

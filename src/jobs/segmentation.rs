@@ -1,16 +1,17 @@
-//! The work of kind `segmentation`: [`crate::pipeline::segment`] over stored models.
+//! The work of kind `segmentation`: [`crate::segmentation::from_files`] over stored models.
 
 use super::checked::{self, unusable};
 use super::reader::{no_page, refusal, sentence, volume_files};
 use super::{Failure, Fault, Input, Needs, Output, OutputFile, Resource, Stored, Work, WorkError};
 use crate::deform::DeformError;
-use crate::deform::localise::LocaliseError;
 use crate::export::{Format, read_json};
+use crate::locate::localisation::LocaliseError;
 use crate::parameters::{FitParameters, Parameters};
-use crate::pipeline::segment::{NamedMesh, Order, SegmentError, segment};
-use crate::pipeline::{NamedFile, OutcomeError, pages};
+use crate::pipeline::pages;
 use crate::progress::{Monitor, Plan};
 use crate::segmentation::{ExpertError, SegmentationError};
+use crate::segmentation::{NamedFile, OutcomeError};
+use crate::segmentation::{NamedMesh, Order, SegmentError, from_files};
 use crate::volume::ReadLimits;
 use serde_json::{Map, Value};
 
@@ -72,7 +73,7 @@ impl Work for Fitting {
             named,
             parameters: &parameters,
         };
-        let made = segment(&order, &self.limits, monitor).map_err(explain)?;
+        let made = from_files(&order, &self.limits, monitor).map_err(explain)?;
         let files = made
             .files(&Format::ALL, Some(input.volume.clone()), monitor)
             .map_err(|error| match error {

@@ -4,10 +4,10 @@ use super::fit::FitParameters;
 use super::table::number;
 use super::{Kind, ParameterSpec};
 use crate::deform::Edge;
-use crate::deform::posture::Superior;
 use crate::deform::sensors::SensorKind;
 use crate::deform::template::Organ;
 use crate::geometry::Vec3;
+use crate::locate::patient_orientation::Superior;
 use serde_json::{Value, json};
 
 /// Every parameter of a fit, in the order in which the stages use them.

@@ -1,16 +1,11 @@
-//! A volume's way through every stage: to a model here, to a segmentation in [`segment`].
+//! The stages in order: from the files of a volume to a model.
 //!
 //! [`generate`] reads, surfaces, re-tiles, optimises and measures: the stage calls in order,
 //! nothing else. The stages guarantee what they hand on; the last look is
 //! [`Report::is_sound`], and a model that is not sound is an error, never a result.
 
-mod built_in;
-mod outcome;
 pub mod pages;
-pub mod segment;
 pub mod starts;
-
-pub use outcome::{NamedFile, OutcomeError};
 
 use crate::export::Metadata;
 use crate::mesh::TriMesh;

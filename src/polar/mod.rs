@@ -26,10 +26,10 @@ mod glyphs;
 
 pub use draw::{json, png, svg};
 
-use crate::deform::field::Field;
 use crate::deform::wall::{COLUMNS, ROWS, Ray, Wall};
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
+use crate::grid::field::Field;
 use crate::volume::Volume;
 
 /// Parameters of [`map`].
@@ -274,9 +274,9 @@ fn summarise(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::deform::cup::Cup;
-    use crate::deform::voxelise::voxelise;
     use crate::geometry::frame::VoxelToPatient;
+    use crate::grid::voxelise::voxelise;
+    use crate::locate::cup::Cup;
     use crate::mesh::shapes;
 
     /// A cup of revolution about an axis that points forward, with its wall hot but for the

@@ -1,7 +1,7 @@
 //! An expert's mask on the grid of the volume that it belongs to.
 
-use crate::deform::voxelise::Mask;
 use crate::geometry::Vec3;
+use crate::grid::voxelise::Mask;
 use crate::progress::{Cancelled, Monitor};
 use crate::volume::Volume;
 

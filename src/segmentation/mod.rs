@@ -6,19 +6,25 @@
 //! figures are kept to say why. A template that cannot be fitted is left out with its reason,
 //! unless none can. The organ is searched once for all of them.
 
+mod built_in;
 mod expert;
+mod files;
+mod from_files;
 mod report;
+pub mod slices;
 
 pub use expert::{ExpertError, on_grid};
+pub use files::{NamedFile, OutcomeError};
+pub use from_files::{NamedMesh, Order, SegmentError, Segmented, from_files};
 pub use report::{agreement_json, report_json};
 
 use crate::deform::template::Template;
-use crate::deform::voxelise::{Mask, voxelise};
 use crate::deform::{DeformError, DeformParameters, Fit, Place, fit_at};
-use crate::evaluate::masks::{Agreement, compare};
-use crate::evaluate::slices::{self, Cut};
+use crate::grid::agreement::{Agreement, compare};
+use crate::grid::voxelise::{Mask, voxelise};
 use crate::polar::{self, PolarMap, PolarParameters};
 use crate::progress::{Cancelled, Monitor, Stage};
+use crate::segmentation::slices::Cut;
 use crate::volume::Volume;
 
 /// Parameters of [`segment`].

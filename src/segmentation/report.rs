@@ -3,9 +3,9 @@
 use serde_json::{Value, json};
 
 use super::Segmentation;
-use crate::deform::posture::Superior;
-use crate::evaluate::masks::Agreement;
 use crate::geometry::Vec3;
+use crate::grid::agreement::Agreement;
+use crate::locate::patient_orientation::Superior;
 use crate::polar;
 
 fn round(x: f64) -> f64 {

@@ -4,12 +4,14 @@
 //! to. Where no ventricle is recognised, or something else was asked for, the reference is the
 //! box's own and connected parts are chosen.
 
-use super::components::Components;
-use super::labels::Labels;
-use super::left_ventricle::{self, DOUBTFUL, PLAUSIBLE};
 use super::object::{self, Object};
-use super::survey::{self, Survey};
 use super::{IsoLevel, Isolate, SurfaceError, SurfaceFacts, SurfaceParameters, region};
+use crate::grid::components::Components;
+use crate::grid::labels::Labels;
+use crate::grid::survey;
+use crate::grid::survey::Survey;
+use crate::locate::cavity as left_ventricle;
+use crate::locate::cavity::{DOUBTFUL, PLAUSIBLE};
 use crate::progress::Monitor;
 use crate::volume::Volume;
 

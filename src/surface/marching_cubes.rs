@@ -16,10 +16,10 @@
 
 use rayon::prelude::*;
 
-use super::labels::{Labels, following, set_bits};
 use super::table::{CASES, Case};
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
+use crate::grid::labels::{Labels, following, set_bits};
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Monitor};
 

@@ -7,8 +7,8 @@
 //! the smoothed object leaves more than a tenth of the mask, or falls into another number of
 //! parts (crumbs of less than 1 % aside), sigma is halved, down to the raw mask.
 
-use super::components::Components;
-use super::labels::Labels;
+use crate::grid::components::Components;
+use crate::grid::labels::Labels;
 
 /// A mask made grey, in a box around it.
 #[derive(Debug, Clone)]

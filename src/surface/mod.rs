@@ -3,14 +3,14 @@
 //! In: a [`Volume`] of intensities or labels. Out: a [`Surface`]: closed, oriented, manifold,
 //! LPS millimetres, and [`SurfaceFacts`] about everything that was seen and changed.
 //!
-//! 1. [`survey`]: range, missing values, label map or intensities.
+//! 1. [`survey`](mod@crate::grid::survey): range, missing values, label map or intensities.
 //! 2. Region ([`object`]). Intensities ([`intensity`]): the left ventricle is searched
-//!    ([`coarse`], [`component_tree`], [`left_ventricle`]) and cut from its neighbours
+//!    ([`crate::locate`]) and cut from its neighbours
 //!    ([`region`]), or taken as asked for. Labels: the mask is made grey ([`masks`]).
 //! 3. Iso-value: half the wall's reference intensity unless asked otherwise.
 //! 4. [`topology_control`]: one component without cavities and handles.
-//! 5. [`marching_cubes`] (with its generated [`table`]) on [`labels`].
-//! 6. [`working`]: the smoothed twin for geodesics and curvature.
+//! 5. [`marching_cubes`] (with its generated [`table`]) on [`labels`](crate::grid::labels).
+//! 6. [`smoothing`]: the smoothed twin for geodesics and curvature.
 //!
 //! Guaranteed: the mesh is a closed, oriented 2-manifold; with [`TopologyMode::Genus0`] it is a
 //! sphere; vertices lie at the linear crossings of the iso-value except where voxels were cut
@@ -18,23 +18,17 @@
 //! same bytes on any number of threads. Not guaranteed: that a doubtful ventricle is the right
 //! one - `facts.ventricle_score` and the warnings say how sure the search is.
 
-pub mod coarse;
-pub mod component_tree;
-pub mod components;
 mod error;
 mod facts;
 mod intensity;
-pub mod labels;
-pub mod left_ventricle;
 pub mod marching_cubes;
 pub mod masks;
 mod object;
 mod parameters;
 pub mod region;
-pub mod survey;
+pub mod smoothing;
 pub mod table;
 pub mod topology_control;
-pub mod working;
 
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
@@ -42,13 +36,13 @@ use crate::mesh::topology::{self, Census};
 use crate::progress::{Monitor, Stage};
 use crate::volume::Volume;
 
-use components::Components;
+use crate::grid::components::Components;
+use crate::grid::survey::Survey;
 pub use error::SurfaceError;
 pub use facts::{SurfaceFacts, VolumeKind};
 use marching_cubes::Samples;
 use object::Object;
 pub use parameters::{IsoLevel, Isolate, SurfaceParameters, TopologyMode};
-use survey::Survey;
 
 /// A closed, oriented surface in patient space and what was done to get it.
 #[derive(Debug, Clone)]
@@ -95,7 +89,7 @@ pub fn extract(
 ) -> Result<Surface, SurfaceError> {
     monitor.report(Stage::Surface, 0.0)?;
     parameters.check(volume)?;
-    let survey = survey::survey(volume, monitor)?;
+    let survey = crate::grid::survey::survey(volume, monitor)?;
     let mut facts = SurfaceFacts::default();
     let mut object = object::select(volume, parameters, &survey, &mut facts, monitor)?;
     monitor.report(Stage::Surface, 0.5)?;
@@ -118,7 +112,7 @@ pub fn extract(
     )?;
     monitor.report(Stage::Surface, 0.9)?;
     if object.is_mask {
-        mesh.vertices = working::taubin(&mesh.vertices, &mesh.triangles, MASK_PASSES);
+        mesh.vertices = smoothing::taubin(&mesh.vertices, &mesh.triangles, MASK_PASSES);
     }
     facts.iso_value = f64::from(object.iso);
     let spacing = object
@@ -156,7 +150,7 @@ pub fn from_mesh(mesh: TriMesh, spacing: f64) -> Result<Surface, SurfaceError> {
 }
 
 fn working_surface(mesh: &TriMesh) -> Vec<Vec3> {
-    working::taubin(&mesh.vertices, &mesh.triangles, WORKING_PASSES)
+    smoothing::taubin(&mesh.vertices, &mesh.triangles, WORKING_PASSES)
 }
 
 fn finish(

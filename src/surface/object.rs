@@ -4,13 +4,13 @@
 use std::borrow::Cow;
 
 use super::error::describe_labels;
-use super::labels::Labels;
-use super::survey::Survey;
 use super::{
     IsoLevel, Isolate, SurfaceError, SurfaceFacts, SurfaceParameters, VolumeKind, intensity, masks,
 };
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
+use crate::grid::labels::Labels;
+use crate::grid::survey::Survey;
 use crate::progress::Monitor;
 use crate::volume::Volume;
 

@@ -1,6 +1,6 @@
 //! The ventricle's voxels at the iso-value, cut from its neighbours.
 //!
-//! In: the place of the ventricle ([`super::left_ventricle`]) and the voxels. Out: its labels
+//! In: the place of the ventricle ([`crate::locate::cavity`]) and the voxels. Out: its labels
 //! at full resolution, and the reference intensity that fractions refer to.
 //!
 //! 1. The reference is the 98th percentile of the wall's voxels above 0.3 of its maximum (not
@@ -15,10 +15,10 @@ use std::collections::BinaryHeap;
 
 use rayon::prelude::*;
 
-use super::components::Components;
-use super::labels::Labels;
-use super::left_ventricle::{Compass, Ventricle};
 use crate::geometry::Vec3;
+use crate::grid::components::Components;
+use crate::grid::labels::Labels;
+use crate::locate::cavity::{Compass, Ventricle};
 use crate::progress::{Cancelled, Monitor};
 use crate::volume::Volume;
 

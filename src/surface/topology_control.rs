@@ -16,9 +16,9 @@
 
 use std::collections::BinaryHeap;
 
-use super::components::Components;
-use super::labels::Labels;
 use super::region::ordered;
+use crate::grid::components::Components;
+use crate::grid::labels::Labels;
 use crate::progress::{Cancelled, Monitor};
 
 /// The most voxels of a bounding box that is filled from outside; larger ones are only cut.

@@ -1,0 +1,293 @@
+//! A cohort's folder: who is in it, and in which files.
+//!
+//! One folder for each case with `spect.nii.gz` (or `.nii`, `.dcm`) and, where they are known,
+//! the gold standards of [`Gold`]. `manifest.json`, a list of `{"case", "role"}` (or an object
+//! with such a list under `cases`), says which cases are templates: those of the role
+//! `template`. Without it, cases whose names begin with `t` are. Whatever is missing becomes a
+//! sentence in [`Cohort::problems`] and not the end of the run.
+
+use crate::cli::segment::read;
+use crate::evaluate::rows::Gold;
+use crate::progress::Monitor;
+use crate::volume::Reading;
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Which cohort, and how its templates' models are made. A command that takes these sets the
+/// default of `points`.
+#[derive(Debug, Args)]
+pub struct CohortArgs {
+    /// The cohort's folder: one folder for each case with spect.nii.gz, lv_expert_img.nii.gz
+    /// and lv_truth.nii.gz; manifest.json says which are templates (else: names with t)
+    #[arg(long, value_name = "DIR")]
+    cohort: PathBuf,
+    /// Numbers of points of our models
+    #[arg(long, value_name = "N,...", value_delimiter = ',')]
+    points: Vec<usize>,
+    /// The template whose model comes from its expert's mask [default: the third, if it has one]
+    #[arg(long, value_name = "CASE")]
+    manual: Option<String>,
+}
+
+impl CohortArgs {
+    /// Looks at the folder.
+    pub fn open(&self) -> Result<Cohort> {
+        Cohort::open(&self.cohort, self.manual.as_deref())
+    }
+
+    /// The numbers of points, each once, rising.
+    pub fn points(&self) -> Vec<usize> {
+        sorted(&self.points)
+    }
+}
+
+/// The numbers, each once, rising.
+pub fn sorted(numbers: &[usize]) -> Vec<usize> {
+    let mut numbers = numbers.to_vec();
+    numbers.sort_unstable();
+    numbers.dedup();
+    numbers
+}
+
+/// A cohort's folder and who is who in it.
+pub struct Cohort {
+    folder: PathBuf,
+    /// Cases that models are made of, by name.
+    pub templates: Vec<String>,
+    /// Cases that models are fitted to, by name.
+    pub patients: Vec<String>,
+    /// The template whose model comes from its expert's mask, if any.
+    pub manual: Option<String>,
+    /// Cases, and what is the matter with them.
+    pub problems: Vec<(String, String)>,
+}
+
+/// Name of a scan's file without its ending.
+const SCAN: &str = "spect";
+
+impl Cohort {
+    /// Looks at `folder`. `manual` names the template whose model is to come from the expert's
+    /// mask; otherwise, as in the paper (two scans by threshold, one manual mask, one
+    /// phantom), it is the third template, where it has such a mask.
+    fn open(folder: &Path, manual: Option<&str>) -> Result<Self> {
+        let mut cohort = Self {
+            folder: folder.to_path_buf(),
+            templates: Vec::new(),
+            patients: Vec::new(),
+            manual: None,
+            problems: Vec::new(),
+        };
+        let roles = cohort.roles();
+        for name in cohort.names(&roles)? {
+            if cohort.file(&name, SCAN).is_none() {
+                cohort.problem(&name, "it has no spect.nii.gz");
+                continue;
+            }
+            let is_template = match &roles {
+                Some(roles) => roles.get(&name).is_some_and(|r| r == "template"),
+                None => name.starts_with('t'),
+            };
+            if is_template {
+                cohort.templates.push(name);
+            } else {
+                cohort.patients.push(name);
+            }
+        }
+        cohort.choose_manual(manual)?;
+        for name in cohort.patients.clone() {
+            for gold in Gold::ALL {
+                if cohort.gold(&name, gold).is_none() {
+                    cohort.problem(&name, &format!("it has no {}", gold.file()));
+                }
+            }
+        }
+        if cohort.templates.is_empty() || cohort.patients.is_empty() {
+            bail!(
+                "{}: {} template and {} other cases with a spect.nii.gz; both are needed",
+                folder.display(),
+                cohort.templates.len(),
+                cohort.patients.len()
+            );
+        }
+        Ok(cohort)
+    }
+
+    fn problem(&mut self, case: &str, what: &str) {
+        self.problems.push((case.to_owned(), what.to_owned()));
+    }
+
+    /// Every case that the manifest or a folder speaks of, by name.
+    fn names(&self, roles: &Option<BTreeMap<String, String>>) -> Result<Vec<String>> {
+        let mut names: Vec<String> = roles.iter().flat_map(|r| r.keys().cloned()).collect();
+        let entries = std::fs::read_dir(&self.folder)
+            .with_context(|| format!("{}", self.folder.display()))?;
+        for entry in entries {
+            let name = entry?.file_name().to_string_lossy().into_owned();
+            let stems = [SCAN, "lv_truth", "lv_expert_img"];
+            if stems.iter().any(|stem| self.file(&name, stem).is_some()) {
+                names.push(name);
+            }
+        }
+        names.sort();
+        names.dedup();
+        Ok(names)
+    }
+
+    /// The role of every case of the manifest, where there is a readable one.
+    fn roles(&mut self) -> Option<BTreeMap<String, String>> {
+        let path = self.folder.join("manifest.json");
+        if !path.is_file() {
+            return None;
+        }
+        let parsed = std::fs::read(&path)
+            .map_err(|e| e.to_string())
+            .and_then(|text| serde_json::from_slice(&text).map_err(|e| e.to_string()));
+        let manifest: Value = match parsed {
+            Ok(manifest) => manifest,
+            Err(error) => {
+                let what = format!("cannot be read ({error}); templates are told by their names");
+                self.problem("manifest.json", &what);
+                return None;
+            }
+        };
+        let Some(cases) = manifest.get("cases").unwrap_or(&manifest).as_array() else {
+            self.problem(
+                "manifest.json",
+                "holds no list of cases; templates are told by their names",
+            );
+            return None;
+        };
+        let role = |c: &Value| {
+            let name = c["case"].as_str()?;
+            // A name is the name of a folder in the cohort's, never a way out of it.
+            let plain = !name.is_empty() && !name.contains(['/', '\\']) && name != "..";
+            plain.then(|| {
+                (
+                    name.to_owned(),
+                    c["role"].as_str().unwrap_or_default().to_owned(),
+                )
+            })
+        };
+        Some(cases.iter().filter_map(role).collect())
+    }
+
+    fn choose_manual(&mut self, asked: Option<&str>) -> Result<()> {
+        let has_mask = |name: &String| self.gold(name, Gold::Expert).is_some();
+        self.manual = match asked {
+            Some(name) => {
+                let found = self.templates.iter().find(|t| *t == name).cloned();
+                let found = found.filter(has_mask);
+                if found.is_none() {
+                    bail!(
+                        "--manual {name}: there is no template of that name with a {}",
+                        Gold::Expert.file()
+                    );
+                }
+                found
+            }
+            None => self.templates.get(2).cloned().filter(has_mask),
+        };
+        Ok(())
+    }
+
+    /// The file `stem` of a case, in whichever format it is there.
+    fn file(&self, case: &str, stem: &str) -> Option<PathBuf> {
+        ["nii.gz", "nii", "dcm"]
+            .iter()
+            .map(|ending| self.folder.join(case).join(format!("{stem}.{ending}")))
+            .find(|path| path.is_file())
+    }
+
+    /// A case's scan.
+    pub fn scan(&self, case: &str) -> Option<PathBuf> {
+        self.file(case, SCAN)
+    }
+
+    /// A case's gold standard.
+    pub fn gold(&self, case: &str, gold: Gold) -> Option<PathBuf> {
+        self.file(case, gold.file().strip_suffix(".nii.gz")?)
+    }
+
+    /// What a template's model is made of: the file, and what that is.
+    pub fn source(&self, template: &str) -> Option<(PathBuf, &'static str)> {
+        if self.manual.as_deref() == Some(template) {
+            let mask = self.gold(template, Gold::Expert)?;
+            Some((mask, "the expert's manual mask"))
+        } else {
+            Some((self.scan(template)?, "the scan, by threshold"))
+        }
+    }
+}
+
+/// Reads a volume of a cohort.
+pub fn read_volume(path: &Path) -> Result<Reading> {
+    read(&[path.to_path_buf()], None, &Monitor::silent())
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::evaluate::cohort::*;
+
+    fn folder_of(files: &[&str], manifest: Option<&str>) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for file in files {
+            let path = folder.path().join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, b"").unwrap();
+        }
+        if let Some(text) = manifest {
+            std::fs::write(folder.path().join("manifest.json"), text).unwrap();
+        }
+        folder
+    }
+
+    const FILES: [&str; 6] = [
+        "t1/spect.nii.gz",
+        "t1/lv_expert_img.nii.gz",
+        "b/spect.nii",
+        "b/lv_truth.nii.gz",
+        "c/lv_truth.nii.gz",
+        "notes/readme.txt",
+    ];
+
+    #[test]
+    fn without_a_manifest_names_tell() {
+        let folder = folder_of(&FILES, None);
+        let cohort = Cohort::open(folder.path(), None).unwrap();
+        assert_eq!(
+            (&cohort.templates[..], &cohort.patients[..]),
+            (&["t1".to_owned()][..], &["b".to_owned()][..])
+        );
+        let cases: Vec<&str> = cohort.problems.iter().map(|p| p.0.as_str()).collect();
+        assert_eq!(cases, ["c", "b"], "{:?}", cohort.problems);
+        assert_eq!(cohort.manual, None);
+        let manual = Cohort::open(folder.path(), Some("t1")).unwrap().manual;
+        assert_eq!(manual.as_deref(), Some("t1"));
+        assert!(Cohort::open(folder.path(), Some("b")).is_err());
+    }
+
+    #[test]
+    fn a_manifest_is_believed_and_its_absentees_are_named() {
+        let text = r#"[{"case":"b","role":"template"},{"case":"t1","role":"test"},
+                       {"case":"gone","role":"test"},{"case":"../x","role":"test"}]"#;
+        let folder = folder_of(&FILES, Some(text));
+        let cohort = Cohort::open(folder.path(), None).unwrap();
+        assert_eq!(cohort.templates, ["b"]);
+        assert_eq!(cohort.patients, ["t1"]);
+        assert!(cohort.problems.iter().any(|p| p.0 == "gone"));
+        assert!(!cohort.problems.iter().any(|p| p.0.contains('x')));
+    }
+
+    #[test]
+    fn a_broken_manifest_is_a_problem_and_not_the_end() {
+        let folder = folder_of(&FILES, Some("{"));
+        let cohort = Cohort::open(folder.path(), None).unwrap();
+        assert_eq!(cohort.templates, ["t1"]);
+        assert_eq!(cohort.problems[0].0, "manifest.json");
+        let lone = folder_of(&FILES[..1], None);
+        assert!(Cohort::open(lone.path(), None).is_err());
+    }
+}

@@ -1,0 +1,367 @@
+//! Measures between two masks on one grid, as the paper defines them.
+//!
+//! - E_J (eq. 2), Jaccard: |A ∩ B| / |A ∪ B|; two empty masks agree (1).
+//! - E_CD (eq. 3), mean contour distance: (Σ_a d(a, B) + Σ_b d(b, A)) / (|∂A| + |∂B|) over
+//!   the *contour voxels*: voxels of the mask with a 6-neighbour outside it, beyond the
+//!   volume's border being outside. d is the Euclidean distance of voxel centres; in voxels
+//!   (steps of the grid) and in millimetres.
+//! - Dice: 2 |A ∩ B| / (|A| + |B|).
+//! - Hausdorff distance of the contours (100 %) and the larger of the two directed 95 %
+//!   quantiles, millimetres.
+//! - Volume difference: |A| - |B| in millilitres and as a share of |B|.
+//!
+//! Distances come from an exact Euclidean distance transform (Felzenszwalb and Huttenlocher
+//! 2012) over the box that holds both masks.
+
+use crate::grid::voxelise::Mask;
+use crate::progress::{Cancelled, Monitor};
+
+/// How two masks agree. A is the first, B the reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Agreement {
+    /// E_J, 0..=1.
+    pub jaccard: f64,
+    /// Dice, 0..=1.
+    pub dice: f64,
+    /// Distances; `None` where a mask is empty.
+    pub contours: Option<ContourDistances>,
+    /// Volumes of A and B, ml (voxel counts times voxel volume).
+    pub volumes_ml: [f64; 2],
+}
+
+/// Distances between the contours of two masks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContourDistances {
+    /// E_CD in voxels.
+    pub mean_voxels: f64,
+    /// E_CD in mm.
+    pub mean_mm: f64,
+    /// Hausdorff distance, mm.
+    pub hausdorff_mm: f64,
+    /// 95 % Hausdorff distance, mm.
+    pub hausdorff95_mm: f64,
+}
+
+/// The masks cannot be compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the masks have {a:?} and {b:?} voxels; they must lie on one grid")]
+pub struct GridsDiffer {
+    /// Shape of the first mask.
+    pub a: [usize; 3],
+    /// Shape of the second mask.
+    pub b: [usize; 3],
+}
+
+/// Why two masks were not compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum CompareError {
+    /// They cannot be.
+    #[error(transparent)]
+    GridsDiffer(#[from] GridsDiffer),
+    /// The caller asked for an end.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// Compares `a` with the reference `b`; both on the grid with `spacing` mm.
+///
+/// # Errors
+/// [`CompareError`].
+pub fn compare(
+    a: &Mask,
+    b: &Mask,
+    spacing: [f64; 3],
+    monitor: &Monitor,
+) -> Result<Agreement, CompareError> {
+    if a.shape != b.shape {
+        return Err(CompareError::GridsDiffer(GridsDiffer {
+            a: a.shape,
+            b: b.shape,
+        }));
+    }
+    let (mut na, mut nb, mut both) = (0usize, 0usize, 0usize);
+    for (x, y) in a.voxels.iter().zip(&b.voxels) {
+        na += usize::from(*x);
+        nb += usize::from(*y);
+        both += usize::from(*x && *y);
+    }
+    let either = na + nb - both;
+    let share = |part: usize, whole: usize| {
+        if whole == 0 {
+            1.0
+        } else {
+            part as f64 / whole as f64
+        }
+    };
+    let voxel_ml = spacing.iter().product::<f64>() / 1000.0;
+    let contours = match na > 0 && nb > 0 {
+        true => Some(contour_distances(a, b, spacing, monitor)?),
+        false => None,
+    };
+    Ok(Agreement {
+        jaccard: share(both, either),
+        dice: share(2 * both, na + nb),
+        contours,
+        volumes_ml: [na as f64 * voxel_ml, nb as f64 * voxel_ml],
+    })
+}
+
+fn contour_distances(
+    a: &Mask,
+    b: &Mask,
+    spacing: [f64; 3],
+    monitor: &Monitor,
+) -> Result<ContourDistances, Cancelled> {
+    let window = Window::around(a, b, monitor)?;
+    let contours = [window.contour(a, monitor)?, window.contour(b, monitor)?];
+    let distances = |scale: [f64; 3]| {
+        let between = |from: &[usize], to: &[usize]| {
+            let squared = window.squared_distances(to, scale, monitor)?;
+            Ok(from
+                .iter()
+                .map(|v| squared[*v].sqrt())
+                .collect::<Vec<f64>>())
+        };
+        let [a, b] = &contours;
+        Ok::<_, Cancelled>([between(a, b)?, between(b, a)?])
+    };
+    let mean = |d: &[Vec<f64>; 2]| {
+        (d[0].iter().sum::<f64>() + d[1].iter().sum::<f64>()) / (d[0].len() + d[1].len()) as f64
+    };
+    let mut mm = distances(spacing)?;
+    Ok(ContourDistances {
+        mean_voxels: mean(&distances([1.0; 3])?),
+        mean_mm: mean(&mm),
+        hausdorff_mm: mm.iter().flatten().fold(0.0, |a, b| a.max(*b)),
+        hausdorff95_mm: mm.iter_mut().map(|d| quantile(d, 0.95)).fold(0.0, f64::max),
+    })
+}
+
+/// The q-quantile by linear interpolation between order statistics.
+fn quantile(values: &mut [f64], q: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let at = q * (values.len() - 1) as f64;
+    let low = at.floor() as usize;
+    let high = (low + 1).min(values.len() - 1);
+    values[low] + (at - low as f64) * (values[high] - values[low])
+}
+
+/// The box of both masks inside the grid.
+struct Window {
+    first: [usize; 3],
+    shape: [usize; 3],
+}
+
+impl Window {
+    fn around(a: &Mask, b: &Mask, monitor: &Monitor) -> Result<Self, Cancelled> {
+        let mut first = a.shape;
+        let mut last = [0; 3];
+        for k in 0..a.shape[2] {
+            monitor.check()?;
+            for j in 0..a.shape[1] {
+                for i in 0..a.shape[0] {
+                    let v = i + a.shape[0] * (j + a.shape[1] * k);
+                    if a.voxels[v] || b.voxels[v] {
+                        for (axis, x) in [i, j, k].into_iter().enumerate() {
+                            first[axis] = first[axis].min(x);
+                            last[axis] = last[axis].max(x);
+                        }
+                    }
+                }
+            }
+        }
+        Ok(Self {
+            first,
+            shape: [0, 1, 2].map(|axis| last[axis] + 1 - first[axis]),
+        })
+    }
+
+    /// Indices in the window of the mask's contour voxels.
+    fn contour(&self, mask: &Mask, monitor: &Monitor) -> Result<Vec<usize>, Cancelled> {
+        let stride = [1, mask.shape[0], mask.shape[0] * mask.shape[1]];
+        let mut contour = Vec::new();
+        for k in 0..self.shape[2] {
+            monitor.check()?;
+            for j in 0..self.shape[1] {
+                for i in 0..self.shape[0] {
+                    let place = [i + self.first[0], j + self.first[1], k + self.first[2]];
+                    let v = place[0] + stride[1] * place[1] + stride[2] * place[2];
+                    let outside = |axis: usize| {
+                        place[axis] == 0
+                            || place[axis] + 1 == mask.shape[axis]
+                            || !mask.voxels[v - stride[axis]]
+                            || !mask.voxels[v + stride[axis]]
+                    };
+                    if mask.voxels[v] && (0..3).any(outside) {
+                        contour.push(i + self.shape[0] * (j + self.shape[1] * k));
+                    }
+                }
+            }
+        }
+        Ok(contour)
+    }
+
+    /// Squared distance of every voxel of the window to the nearest of `seeds`.
+    fn squared_distances(
+        &self,
+        seeds: &[usize],
+        scale: [f64; 3],
+        monitor: &Monitor,
+    ) -> Result<Vec<f64>, Cancelled> {
+        let mut field = vec![f64::INFINITY; self.shape.iter().product()];
+        for s in seeds {
+            field[*s] = 0.0;
+        }
+        let strides = [1, self.shape[0], self.shape[0] * self.shape[1]];
+        let mut line = Vec::new();
+        for axis in 0..3 {
+            let (n, stride) = (self.shape[axis], strides[axis]);
+            for start in 0..field.len() {
+                if (start / stride) % n != 0 {
+                    continue;
+                }
+                monitor.check()?;
+                line.clear();
+                line.extend((0..n).map(|x| field[start + x * stride]));
+                let out = lower_envelope(&line, scale[axis]);
+                for (x, value) in out.into_iter().enumerate() {
+                    field[start + x * stride] = value;
+                }
+            }
+        }
+        Ok(field)
+    }
+}
+
+/// min over q of f(q) + (step (p - q))² for every p.
+fn lower_envelope(f: &[f64], step: f64) -> Vec<f64> {
+    let mut hull: Vec<(usize, f64)> = Vec::with_capacity(f.len());
+    for (q, value) in f.iter().enumerate() {
+        if !value.is_finite() {
+            continue;
+        }
+        let height = |p: usize| f[p] / (step * step) + (p * p) as f64;
+        let meet = |p: usize| (height(q) - height(p)) / (2.0 * (q as f64 - p as f64));
+        while hull.last().is_some_and(|(p, from)| meet(*p) <= *from) {
+            hull.pop();
+        }
+        let from = hull.last().map_or(f64::NEG_INFINITY, |(p, _)| meet(*p));
+        hull.push((q, from));
+    }
+    let mut at = 0;
+    (0..f.len())
+        .map(|p| {
+            while at + 1 < hull.len() && hull[at + 1].1 <= p as f64 {
+                at += 1;
+            }
+            hull.get(at).map_or(f64::INFINITY, |(q, _)| {
+                f[*q] + (step * (p as f64 - *q as f64)).powi(2)
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::grid::agreement::*;
+
+    fn mask(shape: [usize; 3], inside: impl Fn(usize, usize, usize) -> bool) -> Mask {
+        let mut mask = Mask::empty(shape);
+        for k in 0..shape[2] {
+            for j in 0..shape[1] {
+                for i in 0..shape[0] {
+                    mask.voxels[i + shape[0] * (j + shape[1] * k)] = inside(i, j, k);
+                }
+            }
+        }
+        mask
+    }
+
+    #[test]
+    fn two_cubes_one_voxel_apart_by_hand() {
+        // Cubes of 3³ voxels, the second moved by one voxel along i. Common 2·9 = 18, union
+        // 36. All but the centre voxel are contour: 26 each.
+        let a = mask([9, 9, 9], |i, j, k| {
+            (3..6).contains(&i) && (3..6).contains(&j) && (3..6).contains(&k)
+        });
+        let b = mask([9, 9, 9], |i, j, k| {
+            (4..7).contains(&i) && (3..6).contains(&j) && (3..6).contains(&k)
+        });
+        let m = compare(&a, &b, [2.0, 3.0, 4.0], &Monitor::silent()).unwrap();
+        assert_eq!(m.jaccard, 0.5);
+        assert!((m.dice - 36.0 / 54.0).abs() < 1e-15);
+        let c = m.contours.unwrap();
+        // The nine voxels of A's outer face lie one voxel from B's contour, and so does the one
+        // voxel of A's contour that is B's centre; the rest is common. Likewise for B.
+        assert!((c.mean_voxels - 20.0 / 52.0).abs() < 1e-12);
+        assert!((c.mean_mm - 40.0 / 52.0).abs() < 1e-12);
+        assert_eq!((c.hausdorff_mm, c.hausdorff95_mm), (2.0, 2.0));
+        assert_eq!(m.volumes_ml, [27.0 * 0.024, 27.0 * 0.024]);
+    }
+
+    #[test]
+    fn distances_agree_with_brute_force() {
+        let shape = [14, 12, 10];
+        let noise = |seed: usize, i: usize, j: usize, k: usize| {
+            let x = (i * 73 + j * 179 + k * 283 + seed * 991) % 101;
+            x * x % 101 < 30
+        };
+        let a = mask(shape, |i, j, k| noise(1, i, j, k));
+        let b = mask(shape, |i, j, k| noise(2, i, j, k) && i > 3);
+        let scale = [1.5, 2.0, 3.1];
+        let m = compare(&a, &b, scale, &Monitor::silent())
+            .unwrap()
+            .contours
+            .unwrap();
+        let contour = |m: &Mask| -> Vec<[f64; 3]> {
+            let at = |p: [isize; 3]| {
+                let inside = (0..3).all(|x| p[x] >= 0 && p[x] < shape[x] as isize);
+                inside && m.voxels[p[0] as usize + 14 * (p[1] as usize + 12 * p[2] as usize)]
+            };
+            let mut out = Vec::new();
+            for k in 0..10 {
+                for j in 0..12 {
+                    for i in 0..14 {
+                        let around = [
+                            [i - 1, j, k],
+                            [i + 1, j, k],
+                            [i, j - 1, k],
+                            [i, j + 1, k],
+                            [i, j, k - 1],
+                            [i, j, k + 1],
+                        ];
+                        if at([i, j, k]) && around.iter().any(|p| !at(*p)) {
+                            out.push([i as f64, j as f64, k as f64]);
+                        }
+                    }
+                }
+            }
+            out
+        };
+        let (ca, cb) = (contour(&a), contour(&b));
+        let nearest = |p: &[f64; 3], c: &[[f64; 3]], s: [f64; 3]| {
+            c.iter()
+                .map(|q| (0..3).map(|x| (s[x] * (p[x] - q[x])).powi(2)).sum::<f64>())
+                .fold(f64::INFINITY, f64::min)
+                .sqrt()
+        };
+        for (s, found) in [([1.0; 3], m.mean_voxels), (scale, m.mean_mm)] {
+            let sum = ca.iter().map(|p| nearest(p, &cb, s)).sum::<f64>()
+                + cb.iter().map(|p| nearest(p, &ca, s)).sum::<f64>();
+            assert!((sum / (ca.len() + cb.len()) as f64 - found).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn empty_masks_have_no_distance() {
+        let none = Mask::empty([4, 4, 4]);
+        let one = mask([4, 4, 4], |i, j, k| i + j + k == 0);
+        let both = compare(&none, &none, [1.0; 3], &Monitor::silent()).unwrap();
+        assert_eq!((both.jaccard, both.dice, both.contours), (1.0, 1.0, None));
+        let half = compare(&one, &none, [1.0; 3], &Monitor::silent()).unwrap();
+        assert_eq!((half.jaccard, half.contours), (0.0, None));
+        let same = compare(&one, &one, [1.0; 3], &Monitor::silent()).unwrap();
+        assert_eq!(same.contours.unwrap().mean_mm, 0.0);
+        assert!(compare(&one, &Mask::empty([4, 4, 5]), [1.0; 3], &Monitor::silent()).is_err());
+    }
+}

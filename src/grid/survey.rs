@@ -1,0 +1,240 @@
+//! One look over a volume: range, missing values, label map or not.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::grid::volume::Volume;
+use crate::progress::{Cancelled, Monitor};
+
+/// More distinct values than this are intensities.
+const MOST_LABELS: usize = 256;
+/// Share of labelled voxels whose next voxel along i carries the same label: a label map is
+/// made of pieces, a picture with few counts is not.
+const PIECEWISE: f64 = 0.5;
+
+/// What a volume holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Survey {
+    /// Smallest value that is not NaN or infinite; 0 where there is none.
+    pub minimum: f32,
+    /// Largest value that is not NaN or infinite; 0 where there is none.
+    pub maximum: f32,
+    /// Voxels that are NaN or infinite.
+    pub not_finite: usize,
+    /// Number of voxels that are finite.
+    pub finite: usize,
+    /// Voxel counts of the labels other than 0, if this is a label map.
+    pub labels: Option<BTreeMap<i64, usize>>,
+}
+
+/// Looks at every voxel once.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn survey(volume: &Volume, monitor: &Monitor) -> Result<Survey, Cancelled> {
+    let parts: Vec<(f32, f32, usize)> = volume
+        .voxels
+        .par_chunks(1 << 18)
+        .map(|part| {
+            monitor.check()?;
+            Ok(range(part))
+        })
+        .collect::<Result<_, Cancelled>>()?;
+    let minimum = parts.iter().map(|p| p.0).fold(f32::INFINITY, f32::min);
+    let maximum = parts.iter().map(|p| p.1).fold(f32::NEG_INFINITY, f32::max);
+    let not_finite = parts.iter().map(|p| p.2).sum();
+    let finite = volume.voxels.len() - not_finite;
+    let (minimum, maximum) = if finite == 0 {
+        (0.0, 0.0)
+    } else {
+        (minimum, maximum)
+    };
+    Ok(Survey {
+        minimum,
+        maximum,
+        not_finite,
+        finite,
+        labels: label_map(volume, monitor)?,
+    })
+}
+
+/// Smallest and largest finite value, and how many are not finite.
+fn range(values: &[f32]) -> (f32, f32, usize) {
+    let (mut minimum, mut maximum) = (f32::INFINITY, f32::NEG_INFINITY);
+    let mut not_finite = 0;
+    for chunk in values.chunks(1 << 10) {
+        // Branchless and in lanes, so that it vectorises; 0 · NaN and 0 · ∞ are NaN and stay.
+        const LANES: usize = 16;
+        let mut lows = [f32::INFINITY; LANES];
+        let mut highs = [f32::NEG_INFINITY; LANES];
+        let mut sums = [0f32; LANES];
+        let (groups, rest) = chunk.as_chunks::<LANES>();
+        // What does not fill the lanes is looked at twice.
+        let mut last = [chunk[0]; LANES];
+        last[..rest.len()].copy_from_slice(rest);
+        for group in groups.iter().chain([&last]) {
+            for l in 0..LANES {
+                let v = group[l];
+                lows[l] = if v < lows[l] { v } else { lows[l] };
+                highs[l] = if v > highs[l] { v } else { highs[l] };
+                sums[l] += v * 0.0;
+            }
+        }
+        let mut low = lows.into_iter().fold(f32::INFINITY, f32::min);
+        let mut high = highs.into_iter().fold(f32::NEG_INFINITY, f32::max);
+        if sums.iter().any(|s| s.is_nan()) {
+            (low, high) = (f32::INFINITY, f32::NEG_INFINITY);
+            for &v in chunk {
+                if v.is_finite() {
+                    low = low.min(v);
+                    high = high.max(v);
+                } else {
+                    not_finite += 1;
+                }
+            }
+        }
+        minimum = minimum.min(low);
+        maximum = maximum.max(high);
+    }
+    (minimum, maximum, not_finite)
+}
+
+/// Counts the labels, or `None` as soon as a value shows that these are intensities.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn label_map(
+    volume: &Volume,
+    monitor: &Monitor,
+) -> Result<Option<BTreeMap<i64, usize>>, Cancelled> {
+    let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
+    let (mut labelled, mut same) = (0usize, 0usize);
+    for (index, row) in volume.voxels.chunks(volume.shape[0]).enumerate() {
+        if index.is_multiple_of(1024) {
+            monitor.check()?;
+        }
+        for run in row.chunk_by(|a, b| a == b) {
+            let value = run[0];
+            if value == 0.0 {
+                continue;
+            }
+            if value.fract() != 0.0 || !(value.abs() < 16_777_216.0) {
+                return Ok(None);
+            }
+            *counts.entry(value as i64).or_default() += run.len();
+            labelled += run.len();
+            same += run.len() - 1;
+            let grainy = labelled > 1000 && (same as f64) < 0.25 * labelled as f64;
+            if counts.len() > MOST_LABELS || grainy {
+                return Ok(None);
+            }
+        }
+    }
+    // A constant volume is no map of anything.
+    let everything = labelled == volume.voxels.len() && counts.len() == 1;
+    let piecewise = counts.len() <= 1 || same as f64 >= PIECEWISE * labelled as f64;
+    Ok((labelled > 0 && piecewise && !everything).then_some(counts))
+}
+
+/// Otsu's threshold of the values in `rows` (IEEE SMC 1979), 256 bins between minimum and
+/// maximum.
+pub fn otsu(rows: &[&[f32]], minimum: f32, maximum: f32) -> f32 {
+    const BINS: usize = 256;
+    let (low, width) = (f64::from(minimum), f64::from(maximum) - f64::from(minimum));
+    let scale = BINS as f64 / width;
+    let counted = |rows: &[&[f32]]| {
+        let mut histogram = [0u64; BINS];
+        for v in rows.iter().flat_map(|row| row.iter()) {
+            if v.is_finite() {
+                let bin = ((f64::from(*v) - low) * scale) as usize;
+                histogram[bin.min(BINS - 1)] += 1;
+            }
+        }
+        histogram
+    };
+    let histogram = rows.par_chunks(256).map(counted).reduce(
+        || [0; BINS],
+        |a, b| std::array::from_fn(|bin| a[bin] + b[bin]),
+    );
+    let total = histogram.iter().sum::<u64>() as f64;
+    let weighted = |(bin, n): (usize, &u64)| bin as f64 * *n as f64;
+    let all: f64 = histogram.iter().enumerate().map(weighted).sum();
+    let (mut below, mut sum) = (0.0, 0.0);
+    let mut best = (f64::NEG_INFINITY, 0);
+    for bin in 0..BINS {
+        below += histogram[bin] as f64;
+        sum += bin as f64 * histogram[bin] as f64;
+        let above = total - below;
+        if below > 0.0 && above > 0.0 {
+            let between = below * above * (sum / below - (all - sum) / above).powi(2);
+            if between > best.0 {
+                best = (between, bin);
+            }
+        }
+    }
+    (low + (best.1 as f64 + 1.0) / BINS as f64 * width) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::geometry::Vec3;
+    use crate::geometry::frame::VoxelToPatient;
+    use crate::grid::survey::*;
+
+    fn volume(shape: [usize; 3], value: impl Fn(usize) -> f32) -> Volume {
+        Volume {
+            shape,
+            voxels: (0..shape.iter().product()).map(value).collect(),
+            frame: VoxelToPatient::centred(shape, [1.0; 3], Vec3::zeros()).unwrap(),
+            integral: true,
+        }
+    }
+
+    #[test]
+    fn label_maps_are_told_from_counts() {
+        let map = volume([20, 4, 2], |n| ((n / 10) % 3) as f32);
+        let labels = survey(&map, &Monitor::silent()).unwrap().labels.unwrap();
+        assert_eq!(labels.keys().copied().collect::<Vec<_>>(), [1, 2]);
+        let labelled = map.voxels.iter().filter(|v| **v > 0.0).count();
+        assert_eq!(labels.values().sum::<usize>(), labelled);
+        let counts = volume([40, 40, 2], |n| ((n * 7919) % 23) as f32);
+        assert_eq!(survey(&counts, &Monitor::silent()).unwrap().labels, None);
+        assert_eq!(
+            survey(&volume([20, 4, 2], |n| n as f32 * 0.5), &Monitor::silent())
+                .unwrap()
+                .labels,
+            None
+        );
+        assert_eq!(
+            survey(&volume([20, 4, 2], |_| 3.0), &Monitor::silent())
+                .unwrap()
+                .labels,
+            None
+        );
+    }
+
+    #[test]
+    fn range_skips_what_is_not_finite() {
+        let odd = volume([50, 10, 10], |n| match n {
+            7 => f32::NAN,
+            4500 => f32::INFINITY,
+            n => 0.5 - n as f32,
+        });
+        let seen = survey(&odd, &Monitor::silent()).unwrap();
+        assert_eq!(
+            (seen.minimum, seen.maximum, seen.not_finite),
+            (-4998.5, 0.5, 2)
+        );
+    }
+
+    #[test]
+    fn otsu_parts_two_heaps() {
+        let values: Vec<f32> = (0..1000)
+            .map(|n| if n % 4 == 0 { 9.0 } else { 1.0 } + (n % 10) as f32 * 0.05)
+            .collect();
+        let rows: Vec<&[f32]> = values.chunks(100).collect();
+        let level = otsu(&rows, 1.0, 9.45);
+        assert!((1.45..=9.0).contains(&level), "{level}");
+    }
+}

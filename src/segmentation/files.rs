@@ -1,0 +1,182 @@
+//! What comes of a segmentation, as files.
+
+use crate::export::{self, ExportError, Format, Metadata};
+use crate::parameters::Parameters;
+use crate::polar;
+use crate::progress::{Cancelled, Monitor, Stage};
+use crate::report;
+use crate::report::html::{Pictured, segmentation};
+use crate::segmentation::from_files::Segmented;
+use crate::segmentation::report_json;
+use crate::volume::nifti::{self, MaskError};
+use serde_json::{Map, Value, json};
+
+/// One file of an outcome.
+#[derive(Debug, Clone)]
+pub struct NamedFile {
+    /// `mask.nii.gz`, `mesh.glb`, `report.json`, `polar.svg` ...
+    pub name: String,
+    /// Its media type.
+    pub media_type: &'static str,
+    /// Its content.
+    pub bytes: Vec<u8>,
+}
+
+/// Why an outcome cannot be written as files.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum OutcomeError {
+    /// A mesh format cannot hold the mesh.
+    #[error(transparent)]
+    Mesh(#[from] ExportError),
+    /// The mask or the polar map cannot be written.
+    #[error("{what}: {reason}")]
+    Other {
+        /// The file.
+        what: &'static str,
+        /// Why.
+        reason: String,
+    },
+    /// The caller asked for an end.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl Segmented {
+    /// The mask on the input's grid, the mesh in `formats`, the report, slices and, of a
+    /// ventricle, the polar map. `volume_id` names the volume in the mesh files.
+    ///
+    /// # Errors
+    /// See [`OutcomeError`].
+    pub fn files(
+        &self,
+        formats: &[Format],
+        volume_id: Option<String>,
+        monitor: &Monitor<'_>,
+    ) -> Result<Vec<NamedFile>, OutcomeError> {
+        monitor.report(Stage::Export, 0.0)?;
+        let mut files = vec![self.mask(monitor)?];
+        monitor.report(Stage::Export, 0.5)?;
+        let metadata = Metadata {
+            volume_id,
+            quality: self.summary(),
+            ..Metadata::new("Fitted model")
+        };
+        for format in formats {
+            monitor.check()?;
+            files.push(NamedFile {
+                name: format!("mesh.{}", format.extension()),
+                media_type: format.media_type(),
+                bytes: export::encode(*format, &self.segmentation.fit.mesh, &metadata)?,
+            });
+        }
+        monitor.report(Stage::Export, 0.9)?;
+        files.push(json_file("report.json", &self.report()));
+        files.push(NamedFile {
+            name: "slices.png".into(),
+            media_type: "image/png",
+            bytes: self.segmentation.slices.clone(),
+        });
+        files.extend(self.polar(monitor)?);
+        monitor.report(Stage::Export, 1.0)?;
+        Ok(files)
+    }
+
+    /// The report: everything known, with the parameters used.
+    pub fn report(&self) -> Value {
+        let mut report = report_json(&self.segmentation);
+        if let Some(object) = report.as_object_mut() {
+            let parameters = self.parameters.to_json();
+            object.insert("parameters".into(), parameters.into());
+            object.insert("input".into(), report::input(&self.reading.facts));
+            let warnings = self.reading.facts.warnings.clone();
+            object.insert("warnings".into(), warnings.into());
+        }
+        report
+    }
+
+    /// The report as a self-contained page; `files` are those of [`Segmented::files`].
+    pub fn page(&self, files: &[NamedFile]) -> NamedFile {
+        let bytes = |name: &str| {
+            let found = files.iter().find(|file| file.name == name);
+            found.map(|file| file.bytes.as_slice())
+        };
+        let page = segmentation(&Pictured {
+            report: &self.report(),
+            mesh: &self.segmentation.fit.mesh,
+            slices: bytes("slices.png"),
+            polar: bytes("polar.svg"),
+        });
+        NamedFile {
+            name: "report.html".into(),
+            media_type: "text/html; charset=utf-8",
+            bytes: page.into_bytes(),
+        }
+    }
+
+    /// The figures one looks at first.
+    pub fn summary(&self) -> Map<String, Value> {
+        let report = report_json(&self.segmentation);
+        let fit = &report["fit"];
+        [
+            ("template", report["template"].clone()),
+            ("choice", report["choice"].clone()),
+            ("candidates", report["candidates"].clone()),
+            ("reason", fit["reason"].clone()),
+            ("confidence", fit["confidence"].clone()),
+            ("volumes_ml", report["volumes_ml"].clone()),
+            ("measures", report["measures"].clone()),
+            ("flags", report["flags"].clone()),
+            ("vertices", json!(self.segmentation.fit.mesh.vertices.len())),
+        ]
+        .into_iter()
+        .map(|(key, value)| (key.to_owned(), value))
+        .collect()
+    }
+
+    fn mask(&self, monitor: &Monitor<'_>) -> Result<NamedFile, OutcomeError> {
+        let mask = &self.segmentation.mask;
+        let frame = &self.reading.volume.frame;
+        let bytes = nifti::write_mask(&mask.voxels, mask.shape, frame, monitor);
+        Ok(NamedFile {
+            name: "mask.nii.gz".into(),
+            media_type: "application/gzip",
+            bytes: bytes.map_err(|error| match error {
+                MaskError::Cancelled(cancelled) => cancelled.into(),
+                MaskError::TooLong(error) => other("mask.nii.gz", &error),
+            })?,
+        })
+    }
+
+    fn polar(&self, monitor: &Monitor<'_>) -> Result<Vec<NamedFile>, OutcomeError> {
+        let Some(map) = &self.segmentation.polar else {
+            return Ok(Vec::new());
+        };
+        let svg = NamedFile {
+            name: "polar.svg".into(),
+            media_type: "image/svg+xml",
+            bytes: polar::svg(map).into_bytes(),
+        };
+        monitor.check()?;
+        let png = NamedFile {
+            name: "polar.png".into(),
+            media_type: "image/png",
+            bytes: polar::png(map).map_err(|error| other("polar.png", &error))?,
+        };
+        Ok(vec![json_file("polar.json", &polar::json(map)), svg, png])
+    }
+}
+
+fn json_file(name: &str, value: &Value) -> NamedFile {
+    NamedFile {
+        name: name.into(),
+        media_type: "application/json",
+        bytes: format!("{value:#}\n").into_bytes(),
+    }
+}
+
+fn other(what: &'static str, error: &dyn std::error::Error) -> OutcomeError {
+    OutcomeError::Other {
+        what,
+        reason: error.to_string(),
+    }
+}

@@ -1,0 +1,229 @@
+//! Three slices through a fitted organ with the contours of fit and expert.
+//!
+//! Of a ventricle ([`Cut::heart`]), from left to right as cardiologists look at it: a
+//! short-axis slice through the middle of the cavity (anterior on top, septum left), a
+//! horizontal long-axis slice (apex on top, septum left), a vertical long-axis slice (base
+//! left, anterior on top). Of any other organ ([`Cut::body`]), as radiologists do: axial
+//! (anterior on top), coronal, sagittal (anterior left), the patient's right on the left. A
+//! slice is a plane of the patient, sampled in equal steps: the scan by trilinear
+//! interpolation, the fitted mesh by the same rule that makes masks of it, the expert's mask
+//! by its nearest voxel. Grey runs from 0 to the greatest value within the fit.
+
+use nalgebra::Matrix3;
+
+use crate::deform::wall::anterior;
+use crate::geometry::Vec3;
+use crate::geometry::bvh::Aabb;
+use crate::geometry::frame::VoxelToPatient;
+use crate::grid::field::Field;
+use crate::grid::voxelise::{Mask, voxelise};
+use crate::locate::cup::Cup;
+use crate::mesh::TriMesh;
+use crate::progress::{Cancelled, Monitor};
+use crate::volume::Volume;
+
+/// Millimetres per pixel of a ventricle.
+pub const STEP: f64 = 0.6;
+/// Pixels along both sides of a slice: 132 mm of a ventricle.
+pub const SIDE: usize = 220;
+/// Largest share of a slice's side that an organ takes.
+const FILL: f64 = 0.8;
+/// Black columns between the slices.
+const GAP: usize = 4;
+
+/// The fit's contour.
+pub const FIT: [u8; 3] = [255, 150, 0];
+/// The expert's contour.
+pub const EXPERT: [u8; 3] = [0, 210, 255];
+
+/// The three slices of one patient as a PNG file.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn png(
+    volume: &Volume,
+    fit: &TriMesh,
+    cut: &Cut,
+    expert: Option<&Mask>,
+    monitor: &Monitor,
+) -> Result<Vec<u8>, Cancelled> {
+    let mut slices = Vec::with_capacity(3);
+    for plane in &cut.planes {
+        slices.push(slice(plane, volume, fit, expert, monitor)?);
+    }
+    let width = 3 * SIDE + 2 * GAP;
+    let mut pixels = Vec::with_capacity(3 * width * SIDE);
+    for row in 0..SIDE {
+        for (place, slice) in slices.iter().enumerate() {
+            if place > 0 {
+                pixels.extend([0; 3 * GAP]);
+            }
+            pixels.extend(slice[row * SIDE..(row + 1) * SIDE].iter().flatten());
+        }
+    }
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width as u32, SIDE as u32);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder
+        .write_header()
+        .and_then(|mut writer| writer.write_image_data(&pixels))
+        .expect("the picture has as many pixels as it says, and memory does not fail");
+    Ok(bytes)
+}
+
+/// Where to cut: for each slice the places of its pixels, index (column, row, 0) to patient.
+#[derive(Debug, Clone)]
+pub struct Cut {
+    planes: [VoxelToPatient; 3],
+}
+
+impl Cut {
+    /// Through a ventricle, in a patient whose `superior` direction (unit vector) is given.
+    pub fn heart(cup: &Cup, superior: &Vec3) -> Self {
+        let up = anterior(&cup.axis, superior);
+        let lateral = up.cross(&cup.axis);
+        let sides = [(lateral, -up), (lateral, -cup.axis), (cup.axis, -up)];
+        Self::through(&cup.centre, sides, STEP)
+    }
+
+    /// Through the middle of any organ.
+    pub fn body(mesh: &TriMesh) -> Self {
+        let bounds = Aabb::of(&mesh.vertices);
+        let longest = (bounds.max - bounds.min).amax();
+        let (x, y, z) = (Vec3::x(), Vec3::y(), Vec3::z());
+        let step = (longest / (FILL * SIDE as f64)).max(0.1);
+        let middle = (bounds.min + bounds.max) / 2.0;
+        Self::through(&middle, [(x, y), (x, -z), (y, -z)], step)
+    }
+
+    /// Slices about `middle`; of each the directions right and down on the picture.
+    fn through(middle: &Vec3, sides: [(Vec3, Vec3); 3], step: f64) -> Self {
+        let planes = sides.map(|(right, down)| {
+            let half = (SIDE - 1) as f64 / 2.0;
+            let origin = middle - (right + down) * (half * step);
+            let linear = Matrix3::from_columns(&[right, down, right.cross(&down)]) * step;
+            let frame = VoxelToPatient::new(linear, origin);
+            frame.expect("three unit vectors at right angles span the space")
+        });
+        Self { planes }
+    }
+}
+
+fn slice(
+    frame: &VoxelToPatient,
+    volume: &Volume,
+    fit: &TriMesh,
+    expert: Option<&Mask>,
+    monitor: &Monitor,
+) -> Result<Vec<[u8; 3]>, Cancelled> {
+    let place = |pixel: usize| {
+        let (column, row) = (pixel % SIDE, pixel / SIDE);
+        frame.to_patient(&Vec3::new(column as f64, row as f64, 0.0))
+    };
+    let corners = [0, SIDE - 1, SIDE * (SIDE - 1), SIDE * SIDE - 1].map(place);
+    let region = Aabb::of(&corners);
+    let field = Field::cut_out(volume, Some(&region), 0.0, monitor)?;
+    let values: Vec<f64> = (0..SIDE * SIDE).map(|p| field.at(&place(p))).collect();
+
+    let inside = voxelise(fit, [SIDE, SIDE, 1], frame).voxels;
+    let white = (0..SIDE * SIDE)
+        .filter(|p| inside[*p])
+        .map(|p| values[p])
+        .fold(0.0, f64::max);
+    let mut pixels: Vec<[u8; 3]> = values
+        .iter()
+        .map(|v| [(255.0 * v / white.max(f64::MIN_POSITIVE)).clamp(0.0, 255.0) as u8; 3])
+        .collect();
+    if let Some(expert) = expert {
+        let drawn: Vec<bool> = (0..SIDE * SIDE)
+            .map(|p| at_nearest(expert, &volume.frame.to_voxel(&place(p))))
+            .collect();
+        outline(&mut pixels, &drawn, EXPERT);
+    }
+    outline(&mut pixels, &inside, FIT);
+    Ok(pixels)
+}
+
+fn at_nearest(mask: &Mask, index: &Vec3) -> bool {
+    let mut voxel = [0; 3];
+    for axis in 0..3 {
+        let nearest = index[axis].round();
+        if !(nearest >= 0.0 && nearest < mask.shape[axis] as f64) {
+            return false;
+        }
+        voxel[axis] = nearest as usize;
+    }
+    mask.voxels[voxel[0] + mask.shape[0] * (voxel[1] + mask.shape[1] * voxel[2])]
+}
+
+/// Colours the pixels of `inside` that have one of their four neighbours outside.
+fn outline(pixels: &mut [[u8; 3]], inside: &[bool], colour: [u8; 3]) {
+    let at = |column: usize, row: usize| {
+        // Steps beyond the left and upper border wrap to numbers that are out of range.
+        column < SIDE && row < SIDE && inside[row * SIDE + column]
+    };
+    for row in 0..SIDE {
+        for column in 0..SIDE {
+            let surrounded = at(column.wrapping_sub(1), row)
+                && at(column + 1, row)
+                && at(column, row.wrapping_sub(1))
+                && at(column, row + 1);
+            if at(column, row) && !surrounded {
+                pixels[row * SIDE + column] = colour;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::mesh::shapes;
+    use crate::segmentation::slices::*;
+
+    #[test]
+    fn the_cup_opens_downward_in_the_horizontal_slice() {
+        // Apex at -z; the cup's own axis therefore points down.
+        let mesh = shapes::cup(60.0, 30.0, 10.0, 32);
+        let frame = VoxelToPatient::centred([40; 3], [4.0; 3], Vec3::new(0.0, 0.0, -30.0)).unwrap();
+        let wall = voxelise(&mesh, [40; 3], &frame);
+        let volume = Volume {
+            shape: [40; 3],
+            voxels: wall
+                .voxels
+                .iter()
+                .map(|v| f32::from(u8::from(*v)))
+                .collect(),
+            frame,
+            integral: true,
+        };
+        let cup = Cup {
+            centre: Vec3::new(0.0, 0.0, -30.0),
+            axis: -Vec3::z(),
+            length: 60.0,
+            breadth: 1.0,
+        };
+        let cut = Cut::heart(&cup, &Vec3::z());
+        let bytes = png(&volume, &mesh, &cut, Some(&wall), &Monitor::silent()).unwrap();
+        let mut reader = ::png::Decoder::new(std::io::Cursor::new(&bytes))
+            .read_info()
+            .unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        assert_eq!(
+            (info.width as usize, info.height as usize),
+            (3 * SIDE + 2 * GAP, SIDE)
+        );
+        // Grey values on the axis, apical and basal of the centre: wall and nothing.
+        let at = |column: usize, row: usize| pixels[3 * (row * info.width as usize + column)];
+        let middle = SIDE + GAP + SIDE / 2;
+        let millimetres = |mm: f64| (SIDE as f64 / 2.0 + mm / STEP) as usize;
+        assert!(at(middle, millimetres(-25.0)) > 150, "the apex is on top");
+        assert!(
+            at(middle, millimetres(25.0)) < 100,
+            "the base is open below"
+        );
+        let count = |colour: [u8; 3]| pixels.chunks(3).filter(|p| **p == colour).count();
+        assert!(count(FIT) > 500 && count(EXPERT) > 100);
+    }
+}

@@ -1,0 +1,364 @@
+//! The spring-mass fit against shapes whose answer is known.
+
+// Helpers of a test state their expectations by panicking, as tests do.
+#![allow(clippy::unwrap_used)]
+
+use nalgebra::Rotation3;
+use ventriform::deform::dynamics::{self, Motion, StopReason};
+use ventriform::deform::elastic::{Elastic, Stiffness, struts};
+use ventriform::deform::sensors::{Look, SensorKind, Shift};
+use ventriform::deform::template::{Organ, Template, TemplateError};
+use ventriform::deform::{DeformError, DeformParameters, Edge, fit};
+use ventriform::geometry::Vec3;
+use ventriform::geometry::frame::VoxelToPatient;
+use ventriform::grid::agreement::compare;
+use ventriform::grid::field::Field;
+use ventriform::grid::voxelise::voxelise;
+use ventriform::locate::localisation::{Hints, LocaliseError};
+use ventriform::mesh::{TriMesh, shapes};
+use ventriform::progress::{CancelToken, Monitor, Silent};
+use ventriform::volume::Volume;
+
+const SPACING: f64 = 3.5;
+
+/// A volume of `n`³ voxels about the origin with `value` at every centre, blurred by
+/// `sigma` mm.
+fn picture(n: usize, sigma: f64, value: impl Fn(&Vec3) -> f64) -> Volume {
+    let frame = VoxelToPatient::centred([n; 3], [SPACING; 3], Vec3::zeros()).unwrap();
+    let mut volume = Volume::sampled([n; 3], frame, value);
+    volume.voxels = Field::new(&volume, None, sigma).values().to_vec();
+    volume
+}
+
+/// The value of a ball's indicator, antialiased over a voxel.
+fn ball(p: &Vec3, centre: &Vec3, radius: f64) -> f64 {
+    ((radius - (p - centre).norm()) / SPACING + 0.5).clamp(0.0, 1.0)
+}
+
+/// A ventricle-like cup at `centre` with its apex along `axis`.
+fn cup(centre: Vec3, axis: Vec3, scale: f64) -> TriMesh {
+    placed(shapes::cup(70.0, 31.0, 13.0, 14), centre, axis, scale)
+}
+
+fn placed(mut mesh: TriMesh, centre: Vec3, axis: Vec3, scale: f64) -> TriMesh {
+    let turn = Rotation3::rotation_between(&-Vec3::z(), &axis).unwrap();
+    for p in &mut mesh.vertices {
+        *p = centre + turn * (*p + Vec3::new(0.0, 0.0, 35.0)) * scale;
+    }
+    mesh
+}
+
+/// What a camera would show of `wall`: 1 in the wall, `uptake` scaling it by place.
+fn scan(wall: &TriMesh, n: usize, uptake: impl Fn(&Vec3) -> f64) -> Volume {
+    let frame = VoxelToPatient::centred([n; 3], [SPACING; 3], Vec3::zeros()).unwrap();
+    let mask = voxelise(wall, [n; 3], &frame);
+    let mut volume = picture(n, 0.0, |_| 0.0);
+    for (v, inside) in mask.voxels.iter().enumerate() {
+        let index = [v % n, v / n % n, v / (n * n)];
+        let p = frame.to_patient(&Vec3::from(index.map(|x| x as f64)));
+        volume.voxels[v] = (uptake(&p) * f64::from(u8::from(*inside)) + 0.08) as f32;
+    }
+    volume.voxels = Field::new(&volume, None, 4.5).values().to_vec();
+    volume
+}
+
+fn axis() -> Vec3 {
+    Vec3::new(0.64, -0.61, -0.44).normalize()
+}
+
+fn ventricle(mesh: TriMesh) -> Template {
+    Template::new(mesh, Organ::LeftVentricle, &Monitor::silent()).unwrap()
+}
+
+fn jaccard(mesh: &TriMesh, truth: &TriMesh, volume: &Volume) -> f64 {
+    let mask = |m: &TriMesh| voxelise(m, volume.shape, &volume.frame);
+    compare(
+        &mask(mesh),
+        &mask(truth),
+        volume.frame.spacing(),
+        &Monitor::silent(),
+    )
+    .unwrap()
+    .jaccard
+}
+
+#[test]
+fn a_sphere_grows_onto_a_sphere_and_a_shifted_one_comes_back() {
+    for (radius, centre, hint) in [
+        (30.0, Vec3::zeros(), None),
+        (
+            30.0,
+            Vec3::new(6.0, -4.0, 3.0),
+            Some(Vec3::new(1.0, 1.0, -2.0)),
+        ),
+    ] {
+        let volume = picture(40, 2.0, |p| ball(p, &centre, radius));
+        let model = shapes::icosphere(20.0, 2);
+        let template = Template::new(model, Organ::Generic, &Monitor::silent()).unwrap();
+        let parameters = DeformParameters {
+            blur: 0.0,
+            hints: Hints {
+                centre: hint,
+                ..Hints::default()
+            },
+            ..DeformParameters::default()
+        };
+        let fit = fit(&volume, &template, &parameters, &Monitor::silent()).unwrap();
+        assert_eq!(fit.reason, StopReason::Converged);
+        // A polyhedron that follows the sphere in the mean has corners outside and faces
+        // inside: compare the radius of equal volume.
+        let found = (3.0 * fit.mesh.volume() / (4.0 * std::f64::consts::PI)).cbrt();
+        // Blur of 2 mm moves the steepest slope of a ball inward by sigma²/R.
+        let edge = radius - 4.0 / radius;
+        assert!((found - edge).abs() < 0.1 * SPACING, "{found} for {edge}");
+        let middle: Vec3 = fit.mesh.vertices.iter().sum::<Vec3>() / 162.0;
+        assert!((middle - centre).norm() < 0.1 * SPACING, "{middle}");
+    }
+}
+
+#[test]
+fn energy_never_rises_without_external_forces() {
+    let mesh = shapes::cup(60.0, 30.0, 12.0, 16);
+    let body = Elastic::new(
+        &mesh,
+        &struts(&mesh, &Monitor::silent()).unwrap(),
+        Stiffness::default(),
+    );
+    let mut start = mesh.clone();
+    for (i, p) in start.vertices.iter_mut().enumerate() {
+        let t = i as f64;
+        *p += Vec3::new((t * 1.3).sin(), (t * 0.7).cos(), (t * 2.1).sin()) * 4.0;
+    }
+    let empty = Field::new(&picture(20, 0.0, |_| 1.0), None, 0.0);
+    let look = Look {
+        kind: SensorKind::Gradient,
+        reach: 8.0,
+        level: 0.5,
+        ceiling: 2.0,
+        shift: Shift {
+            inner: 0.0,
+            outer: 0.0,
+            rim: 0.0,
+            axis: [Vec3::zeros(); 2],
+        },
+    };
+    for damping in [0.0, 1.0] {
+        let motion = Motion {
+            damping,
+            ..Motion::default()
+        };
+        let moved =
+            dynamics::run(&start, &body, &empty, &look, &motion, &Monitor::silent()).unwrap();
+        assert!(moved.energy.len() > 5);
+        for pair in moved.energy.windows(2) {
+            assert!(pair[1] <= pair[0] * (1.0 + 1e-9), "{pair:?}");
+        }
+        assert!(moved.energy.last().unwrap() < &(0.05 * moved.energy[0]));
+    }
+}
+
+#[test]
+fn a_ventricle_is_found_and_fitted_beside_a_hotter_organ() {
+    let truth = cup(Vec3::new(25.0, -10.0, 12.0), axis(), 0.95);
+    let mut volume = scan(&truth, 64, |_| 1.0);
+    // A liver twice as hot whose edge touches the inferior wall.
+    let liver = Vec3::new(-30.0, 15.0, -58.0);
+    let hot = picture(64, 4.5, |p| 2.0 * ball(p, &liver, 50.0));
+    for (v, h) in volume.voxels.iter_mut().zip(&hot.voxels) {
+        *v += h;
+    }
+    let template = ventricle(cup(
+        Vec3::zeros(),
+        Vec3::new(0.2, -0.9, -0.3).normalize(),
+        1.1,
+    ));
+    let parameters = DeformParameters::default();
+    let first = fit(&volume, &template, &parameters, &Monitor::silent()).unwrap();
+    assert!(jaccard(&first.mesh, &truth, &volume) > 0.75);
+    assert!(first.confidence > 0.5, "{}", first.confidence);
+    assert_eq!(first.self_intersections + first.turned_triangles, 0);
+    let again = fit(&volume, &template, &parameters, &Monitor::silent()).unwrap();
+    assert_eq!(first.mesh, again.mesh);
+}
+
+#[test]
+fn a_defect_without_any_uptake_does_not_suck_the_surface_in() {
+    let centre = Vec3::new(10.0, -5.0, 8.0);
+    let truth = cup(centre, axis(), 1.0);
+    let healthy = scan(&truth, 56, |_| 1.0);
+    // Half the circumference for a third of the length: three segments and more.
+    let across = axis().cross(&Vec3::z()).normalize();
+    let defect = scan(&truth, 56, |p| {
+        let r = p - centre;
+        let along = r.dot(&axis());
+        let radial = r - axis() * along;
+        let facing = radial.normalize().dot(&across);
+        if facing > 0.0 && (-5.0..20.0).contains(&along) {
+            0.0
+        } else {
+            1.0
+        }
+    });
+    let template = ventricle(cup(
+        Vec3::zeros(),
+        Vec3::new(0.2, -0.9, -0.3).normalize(),
+        1.05,
+    ));
+    let parameters = DeformParameters::default();
+    let volumes = [&healthy, &defect].map(|v| {
+        let fit = fit(v, &template, &parameters, &Monitor::silent()).unwrap();
+        let agreement = jaccard(&fit.mesh, &truth, v);
+        assert!(agreement > 0.7, "{agreement}");
+        fit.wall_ml
+    });
+    assert!((volumes[1] / volumes[0] - 1.0).abs() < 0.1, "{volumes:?}");
+}
+
+#[test]
+fn a_turned_and_moved_patient_gives_the_same_volume() {
+    let template = ventricle(cup(Vec3::zeros(), axis(), 1.0));
+    let mut volumes = Vec::new();
+    for (degrees, shift) in [(0.0f64, 0.0), (15.0, 1.1), (30.0, 0.4), (-30.0, 2.3)] {
+        let turn = Rotation3::from_euler_angles(0.0, degrees.to_radians(), 0.0);
+        let truth = cup(
+            Vec3::new(5.0 + shift, -8.0, 3.0 - shift),
+            turn * axis(),
+            1.08,
+        );
+        let volume = scan(&truth, 56, |_| 1.0);
+        let fit = fit(
+            &volume,
+            &template,
+            &DeformParameters::default(),
+            &Monitor::silent(),
+        )
+        .unwrap();
+        volumes.push(fit.wall_ml);
+    }
+    let mean = volumes.iter().sum::<f64>() / 4.0;
+    let sd = (volumes.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 4.0).sqrt();
+    assert!(sd / mean < 0.05, "{volumes:?}");
+}
+
+#[test]
+fn the_anatomical_edge_takes_off_what_blur_adds() {
+    let thin = shapes::cup(70.0, 31.0, 8.0, 14);
+    let truth = placed(thin, Vec3::new(5.0, -8.0, 3.0), axis(), 1.05);
+    let volume = scan(&truth, 56, |_| 1.0);
+    let template = ventricle(cup(Vec3::zeros(), axis(), 1.0));
+    // `scan` blurs by 4.5 mm of standard deviation.
+    let agreement = [Edge::Apparent, Edge::Anatomical].map(|edge| {
+        let parameters = DeformParameters {
+            edge,
+            resolution: 4.5 * 2.355,
+            ..DeformParameters::default()
+        };
+        let fit = fit(&volume, &template, &parameters, &Monitor::silent()).unwrap();
+        assert_eq!(fit.self_intersections + fit.turned_triangles, 0);
+        jaccard(&fit.mesh, &truth, &volume)
+    });
+    assert!(agreement[1] > agreement[0] + 0.02, "{agreement:?}");
+}
+
+/// Noise that is alike over some voxels: a linear congruential generator, blurred.
+fn noise(seed: u64, sigma: f64) -> Volume {
+    let mut state = seed;
+    let mut volume = picture(40, 0.0, |_| 0.0);
+    for v in &mut volume.voxels {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        *v = (state >> 40) as f32 / (1u64 << 24) as f32;
+    }
+    volume.voxels = Field::new(&volume, None, sigma).values().to_vec();
+    volume
+}
+
+#[test]
+fn no_heart_is_said_and_not_made_up() {
+    let template = ventricle(cup(Vec3::zeros(), axis(), 1.0));
+    let parameters = DeformParameters::default();
+    let fit_to = |volume: &Volume| fit(volume, &template, &parameters, &Monitor::silent());
+    let blank = picture(40, 0.0, |_| 7.0);
+    assert!(matches!(
+        fit_to(&blank),
+        Err(DeformError::Localise(LocaliseError::Blank))
+    ));
+    let shell = |p: &Vec3, radius: f64, wall: f64| {
+        ball(p, &Vec3::zeros(), radius) - ball(p, &Vec3::zeros(), radius - wall)
+    };
+    // Solid; closed all round as a stomach is; larger, as a skull or a cortex is; a ring.
+    let others = [
+        ("ball", picture(40, 4.5, |p| ball(p, &Vec3::zeros(), 40.0))),
+        ("stomach", picture(40, 4.5, |p| shell(p, 38.0, 10.0))),
+        (
+            "brain",
+            picture(50, 4.5, |p| {
+                shell(&Vec3::new(p.x, 0.8 * p.y, p.z), 66.0, 16.0)
+            }),
+        ),
+        (
+            "torus",
+            picture(40, 4.5, |p| {
+                let tube = Vec3::new(p.x.hypot(p.y) - 35.0, 0.0, p.z);
+                ball(&tube, &Vec3::zeros(), 10.0)
+            }),
+        ),
+        ("noise", noise(1, 0.0)),
+        ("smooth noise", noise(2, 4.0)),
+        ("smoother noise", noise(3, 8.0)),
+    ];
+    for (name, volume) in &others {
+        match fit_to(volume) {
+            Err(DeformError::Localise(LocaliseError::NoHeart { .. })) => {}
+            other => panic!("{name}: {:?}", other.map(|f| f.localisation)),
+        }
+    }
+}
+
+#[test]
+fn bad_input_is_named() {
+    let template = ventricle(cup(Vec3::zeros(), axis(), 1.0));
+    let volume = picture(24, 0.0, |p| ball(p, &Vec3::zeros(), 20.0));
+    let try_with = |change: &dyn Fn(&mut DeformParameters)| {
+        let mut parameters = DeformParameters::default();
+        change(&mut parameters);
+        fit(&volume, &template, &parameters, &Monitor::silent()).unwrap_err()
+    };
+    assert!(matches!(
+        try_with(&|p| p.reach = f64::NAN),
+        DeformError::Parameter { field: "reach", .. }
+    ));
+    assert!(matches!(
+        try_with(&|p| p.motion.time_step = 0.0),
+        DeformError::Parameter {
+            field: "motion.time_step",
+            ..
+        }
+    ));
+    assert_eq!(
+        try_with(&|p| p.hints.centre = Some(Vec3::new(f64::INFINITY, 0.0, 0.0))),
+        DeformError::HintNotFinite
+    );
+    let sphere = shapes::icosphere(30.0, 2);
+    assert!(matches!(
+        Template::new(sphere, Organ::LeftVentricle, &Monitor::silent()),
+        Err(TemplateError::NoCup { .. })
+    ));
+    let mut open = shapes::icosphere(30.0, 2);
+    open.triangles.pop();
+    assert!(matches!(
+        Template::new(open, Organ::Generic, &Monitor::silent()),
+        Err(TemplateError::Topology(_))
+    ));
+}
+
+#[test]
+fn a_cancelled_fit_ends() {
+    let token = CancelToken::new();
+    token.cancel();
+    let monitor = Monitor::new(&Silent, token);
+    let template = ventricle(cup(Vec3::zeros(), axis(), 1.0));
+    let volume = picture(24, 0.0, |p| ball(p, &Vec3::zeros(), 20.0));
+    assert!(fit(&volume, &template, &DeformParameters::default(), &monitor).is_err());
+}

@@ -1,0 +1,30 @@
+//! The stages on real and simulated volumes, one file per stage or promise.
+//!
+//! One binary: linking the library once instead of nineteen times takes minutes off a build.
+
+mod volume_dicom;
+mod volume_odd_nifti;
+
+mod surface_cohort;
+mod surface_extract;
+
+mod retile_paper;
+mod retile_refined;
+
+mod optimise_determinism;
+
+mod export_formats;
+mod report_page;
+
+mod deform_cohort;
+mod deform_fit;
+mod deform_invariance;
+mod deform_oracle;
+mod deform_varied;
+
+mod edges;
+mod pipeline;
+mod segment;
+
+mod evaluate_cohort;
+mod evaluate_reference;

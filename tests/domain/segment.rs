@@ -1,0 +1,284 @@
+//! `ventriform segment` and `measure`: the files, keys and refusals that others rely on.
+
+// Helpers of a test state their expectations by panicking, as tests do.
+#![allow(clippy::unwrap_used)]
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+use ventriform::export::{self, Format, Metadata};
+use ventriform::geometry::Vec3;
+use ventriform::geometry::frame::VoxelToPatient;
+use ventriform::mesh::shapes;
+use ventriform::parameters::FitParameters;
+use ventriform::progress::{CancelToken, Gauge, Monitor, Observer, Plan, Stage};
+use ventriform::segmentation::OutcomeError;
+use ventriform::segmentation::{Order, from_files};
+use ventriform::volume::nifti::{self, StoredType};
+use ventriform::volume::phantom::{PhantomParameters, phantom};
+use ventriform::volume::{ReadLimits, Volume, VolumeFile};
+
+/// A folder with `scan.nii.gz`, its `truth.nii.gz`, and masks that do not suit it.
+fn folder() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let parameters = PhantomParameters {
+        shape: [64; 3],
+        ..PhantomParameters::default()
+    };
+    let made = phantom(&parameters, &Monitor::silent()).unwrap();
+    let write = |name: &str, volume: &Volume, stored| {
+        let bytes = nifti::write(volume, stored, true).unwrap();
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+    };
+    write("scan.nii.gz", &made.volume, StoredType::Int16);
+    write("truth.nii.gz", &made.truth, StoredType::Uint8);
+    let mut mask = made.truth.clone();
+    mask.frame = VoxelToPatient::centred(mask.shape, [3.2; 3], Vec3::repeat(900.0)).unwrap();
+    write("elsewhere.nii.gz", &mask, StoredType::Uint8);
+    mask = made.truth;
+    mask.voxels.fill(0.0);
+    write("empty.nii.gz", &mask, StoredType::Uint8);
+    mask.voxels.fill(3.0);
+    write("blank.nii.gz", &mask, StoredType::Uint8);
+    let sphere = shapes::icosphere(40.0, 2);
+    let sphere = export::encode(Format::Json, &sphere, &Metadata::new("sphere")).unwrap();
+    std::fs::write(folder.path().join("sphere.json"), sphere).unwrap();
+    folder
+}
+
+fn ventriform(folder: &Path, line: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_ventriform"))
+        .args(line.split_whitespace())
+        .current_dir(folder)
+        .output()
+        .unwrap()
+}
+
+fn succeeds(folder: &Path, line: &str) -> String {
+    let output = ventriform(folder, line);
+    let words = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{line}: {words}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn refusal(folder: &Path, line: &str) -> String {
+    let output = ventriform(folder, line);
+    assert!(!output.status.success(), "{line}");
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value}"))
+}
+
+#[test]
+fn a_model_of_one_scan_segments_it_with_names_that_others_rely_on() {
+    let folder = folder();
+    let here = folder.path();
+    succeeds(here, "generate scan.nii.gz -o lv.json --points 150");
+    succeeds(
+        here,
+        "segment scan.nii.gz --model lv.json -o out --expert truth.nii.gz",
+    );
+    for name in [
+        "mask.nii.gz",
+        "mesh.glb",
+        "mesh.stl",
+        "mesh.json",
+        "polar.svg",
+        "polar.png",
+    ] {
+        assert!(here.join("out").join(name).is_file(), "{name}");
+    }
+    let report = std::fs::read(here.join("out/report.json")).unwrap();
+    let report: Value = serde_json::from_slice(&report).unwrap();
+    assert_eq!(report["fit"]["reason"], "converged");
+    assert!(number(&report["fit"]["confidence"]) > 0.8);
+    assert!(number(&report["measures"]["jaccard"]) > 0.55);
+    assert!(number(&report["measures"]["contour_distance_voxels"]) < 1.5);
+    assert!(number(&report["volumes_ml"]["wall"]) > 80.0);
+    assert!(number(&report["volumes_ml"]["cavity"]) > 20.0);
+    assert!(report["flags"].is_array());
+
+    let measured = succeeds(here, "measure out/mask.nii.gz truth.nii.gz");
+    let measured: Value = serde_json::from_str(&measured).unwrap();
+    for key in ["jaccard", "contour_distance_voxels", "dice", "hausdorff_mm"] {
+        assert_eq!(measured[key], report["measures"][key], "{key}");
+    }
+}
+
+#[test]
+fn formats_hints_and_the_built_in_model_are_taken() {
+    let folder = folder();
+    let here = folder.path();
+    let all = Format::ALL.map(|format| format!(" --format {}", format.extension()));
+    let line = format!("segment scan.nii.gz --model auto -o all{}", all.concat());
+    succeeds(here, &line);
+    for format in Format::ALL {
+        let name = format!("all/mesh.{}", format.extension());
+        assert!(here.join(name).is_file());
+    }
+    let mask = std::fs::read(here.join("all/mask.nii.gz")).unwrap();
+    // The heart lies near the middle of its small field: hints that say so change nothing.
+    for hint in ["--box 12,12,12,52,52,52", "--axis 0.64,-0.6,-0.48"] {
+        succeeds(
+            here,
+            &format!("segment scan.nii.gz --model auto -o hinted {hint}"),
+        );
+        let hinted = std::fs::read(here.join("hinted/mask.nii.gz")).unwrap();
+        let agrees = hinted == mask
+            || number(
+                &serde_json::from_str::<Value>(&succeeds(
+                    here,
+                    "measure hinted/mask.nii.gz all/mask.nii.gz",
+                ))
+                .unwrap()["jaccard"],
+            ) > 0.9;
+        assert!(agrees, "{hint}");
+    }
+}
+
+#[test]
+fn what_cannot_be_done_is_refused_with_field_and_way_out() {
+    let folder = folder();
+    let here = folder.path();
+    let segment = "segment scan.nii.gz -o out --model auto";
+    for (line, words) in [
+        (format!("{segment} --expert empty.nii.gz"), "mask is empty"),
+        (
+            format!("{segment} --expert elsewhere.nii.gz"),
+            "voxels lie inside the volume",
+        ),
+        (format!("{segment} --center nan,0,0"), "3 finite numbers"),
+        (format!("{segment} --center 900,0,0"), "64 x 64 x 64 voxels"),
+        (format!("{segment} --seed 64,0,0"), "outside the volume"),
+        (format!("{segment} --center 0,0,0 --seed 1,1,1"), "not both"),
+        (format!("{segment} --margin inf"), "-5 to 5"),
+        (format!("{segment} --blur 11"), "0 to 10"),
+        (format!("{segment} --organ liver"), "no model of a liver"),
+        (format!("{segment} --model sphere.json"), "not both"),
+        (
+            "segment scan.nii.gz -o out --model sphere.json".into(),
+            "no ventricle",
+        ),
+        (
+            "segment blank.nii.gz -o out --model auto".into(),
+            "shows nothing",
+        ),
+        (
+            "segment truth.nii.gz -o out --model scan.nii.gz".into(),
+            "not a JSON mesh",
+        ),
+        ("measure empty.nii.gz truth.nii.gz".into(), "mask is empty"),
+        ("measure truth.nii.gz empty.nii.gz".into(), "mask is empty"),
+        (
+            "measure truth.nii.gz elsewhere.nii.gz".into(),
+            "inside the volume",
+        ),
+    ] {
+        let said = refusal(here, &line);
+        assert!(said.contains(words), "{line}: {said}");
+    }
+    assert!(!here.join("out").exists(), "nothing is written");
+}
+
+#[test]
+fn templates_are_imported_into_a_data_folder() {
+    let folder = folder();
+    let here = folder.path();
+    succeeds(here, "generate scan.nii.gz -o lv.json --points 110");
+    let first = succeeds(here, "templates import lv.json --data-dir data");
+    assert!(
+        first.starts_with("tpl_") && first.trim().ends_with(" lv"),
+        "{first}"
+    );
+    let again = succeeds(here, "templates import lv.json --data-dir data");
+    assert_eq!(first, again);
+    let ball = refusal(here, "templates import sphere.json --data-dir data");
+    assert!(ball.contains("no ventricle"), "{ball}");
+}
+
+/// Notes the stages and how the whole grows, and raises the token at one of them.
+struct Watcher {
+    gauge: Gauge,
+    stages: Mutex<Vec<Stage>>,
+    whole: Mutex<f64>,
+    stop_at: Option<Stage>,
+    token: CancelToken,
+    raised: Mutex<Option<Instant>>,
+}
+
+impl Watcher {
+    fn new(stop_at: Option<Stage>) -> Self {
+        Self {
+            gauge: Gauge::new(Plan::SEGMENTATION),
+            stages: Mutex::default(),
+            whole: Mutex::new(0.0),
+            stop_at,
+            token: CancelToken::new(),
+            raised: Mutex::default(),
+        }
+    }
+
+    /// Segments the scan to the last file; whether it ended because it was told to.
+    fn segment(&self, scan: &Path) -> bool {
+        let monitor = Monitor::new(self, self.token.clone());
+        let parameters = FitParameters::default();
+        let order = Order {
+            volume: &[VolumeFile::at(scan)],
+            expert: None,
+            models: Vec::new(),
+            named: false,
+            parameters: &parameters,
+        };
+        match from_files(&order, &ReadLimits::default(), &monitor) {
+            Ok(made) => match made.files(&Format::ALL, None, &monitor) {
+                Ok(_) => false,
+                Err(error) => matches!(error, OutcomeError::Cancelled(_)),
+            },
+            Err(error) => error.is_cancelled(),
+        }
+    }
+}
+
+impl Observer for Watcher {
+    fn progress(&self, stage: Stage, fraction: f64) {
+        let mut stages = self.stages.lock().unwrap();
+        if stages.last() != Some(&stage) {
+            stages.push(stage);
+        }
+        let now = self.gauge.advance(stage, fraction);
+        let mut whole = self.whole.lock().unwrap();
+        assert!(now >= *whole);
+        *whole = now;
+        if self.stop_at == Some(stage) {
+            self.token.cancel();
+            self.raised.lock().unwrap().get_or_insert_with(Instant::now);
+        }
+    }
+}
+
+#[test]
+fn every_stage_tells_where_it_is_and_ends_when_it_is_told_to() {
+    let folder = folder();
+    let scan = folder.path().join("scan.nii.gz");
+    let watcher = Watcher::new(None);
+    assert!(!watcher.segment(&scan));
+    let planned: Vec<Stage> = Plan::SEGMENTATION
+        .0
+        .iter()
+        .map(|(stage, _)| *stage)
+        .collect();
+    assert_eq!(*watcher.stages.lock().unwrap(), planned);
+    assert!((*watcher.whole.lock().unwrap() - 1.0).abs() < 1e-9);
+    for stage in planned {
+        let watcher = Watcher::new(Some(stage));
+        assert!(watcher.segment(&scan), "{stage:?}");
+        let raised = watcher.raised.lock().unwrap().unwrap();
+        // Generous: the machine may be busy. Alone, no stage takes a tenth of it.
+        assert!(raised.elapsed() < Duration::from_secs(1), "{stage:?}");
+    }
+}
