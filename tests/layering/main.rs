@@ -1,0 +1,206 @@
+//! Who may use whom: the imports of `src/` against the order of ARCHITECTURE.md.
+
+mod imports;
+
+use imports::{ModulePath, Sources, circles, rust_files};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Each module of the crate and the modules it uses, in reading order: a module uses only what
+/// stands above it.
+const USES: &[(&str, &[&str])] = &[];
+
+/// Crates that only the service and the command line may name: the domain knows no network,
+/// no database, no runtime, no terminal.
+const SERVICE_CRATES: &[&str] = &[
+    "axum",
+    "axum_server",
+    "tokio",
+    "tokio_util",
+    "tower",
+    "tower_http",
+    "sqlx",
+    "object_store",
+    "utoipa",
+    "utoipa_axum",
+    "utoipa_swagger_ui",
+    "reqwest",
+    "clap",
+    "indicatif",
+    "tracing",
+    "tracing_subscriber",
+    "uuid",
+    "time",
+    "futures",
+    "bytes",
+];
+
+/// The service: what stands here may name [`SERVICE_CRATES`].
+const SERVICE: &[&str] = &["jobs", "work", "store", "config", "http", "cli"];
+
+/// Standard-library facilities that would make a result depend on more than its input.
+const IMPURE: &[&str] = &["std::time", "std::env", "std::net", "HashMap", "HashSet"];
+
+fn src() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+/// The modules of `src/` that use each other, by the first word of their paths.
+fn used_modules() -> BTreeMap<String, BTreeSet<String>> {
+    let mut used: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for (file, others) in Sources::read(&src()).arrows() {
+        let Some(module) = file.first().filter(|m| *m != "main") else {
+            continue;
+        };
+        let entry = used.entry(module.clone()).or_default();
+        entry.extend(
+            others
+                .iter()
+                .filter_map(|o| o.first())
+                .filter(|o| *o != module)
+                .cloned(),
+        );
+    }
+    used
+}
+
+#[test]
+fn modules_use_exactly_what_the_table_says() {
+    let table: BTreeMap<String, BTreeSet<String>> = USES
+        .iter()
+        .map(|(module, uses)| {
+            (
+                module.to_string(),
+                uses.iter().map(|u| u.to_string()).collect(),
+            )
+        })
+        .collect();
+    assert_eq!(
+        table.len(),
+        USES.len(),
+        "a module stands in the table twice"
+    );
+    let used = used_modules();
+    let mut wrong = Vec::new();
+    for module in table.keys().chain(used.keys()).collect::<BTreeSet<_>>() {
+        let empty = BTreeSet::new();
+        let (said, found) = (
+            table.get(module).unwrap_or(&empty),
+            used.get(module).unwrap_or(&empty),
+        );
+        for extra in found.difference(said) {
+            wrong.push(format!(
+                "`{module}` uses `{extra}`, which the table does not allow"
+            ));
+        }
+        for unused in said.difference(found) {
+            wrong.push(format!(
+                "the table lets `{module}` use `{unused}`; it does not"
+            ));
+        }
+        if !table.contains_key(module) {
+            wrong.push(format!("`{module}` is not in the table"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn no_module_uses_one_that_stands_below_it() {
+    for (at, (module, uses)) in USES.iter().enumerate() {
+        for used in *uses {
+            assert!(
+                USES[..at].iter().any(|(above, _)| above == used),
+                "`{module}` uses `{used}`, which does not stand above it"
+            );
+        }
+    }
+}
+
+#[test]
+fn no_files_use_each_other_in_a_circle() {
+    let found = circles(&Sources::read(&src()).arrows());
+    let told: Vec<String> = found
+        .iter()
+        .map(|circle| {
+            circle
+                .iter()
+                .map(|m: &ModulePath| m.join("::"))
+                .collect::<Vec<_>>()
+                .join(", ")
+        })
+        .collect();
+    assert!(told.is_empty(), "{}", told.join("\n"));
+}
+
+#[test]
+fn the_domain_knows_no_service_and_no_clock() {
+    let mut violations = Vec::new();
+    for path in rust_files(&src()) {
+        let inside = path.strip_prefix(src()).expect("a path inside src");
+        let first = inside
+            .iter()
+            .next()
+            .map(Path::new)
+            .and_then(Path::file_stem);
+        let module = first
+            .map(|m| m.to_string_lossy().into_owned())
+            .unwrap_or_default();
+        if SERVICE.contains(&module.as_str()) || module == "lib" || module == "main" {
+            continue;
+        }
+        let text = fs::read_to_string(&path).expect("a source file");
+        let code = text.split("#[cfg(test)]\nmod tests").next().unwrap_or("");
+        for line in code.lines().map(str::trim).filter(|l| !l.starts_with("//")) {
+            let named = SERVICE_CRATES
+                .iter()
+                .map(|name| format!("{name}::"))
+                .chain(IMPURE.iter().map(|name| (*name).to_owned()));
+            for name in named {
+                let at_word = line.find(&name).is_some_and(|at| {
+                    !line[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':')
+                });
+                if at_word {
+                    violations.push(format!("{}: {line}", inside.display()));
+                }
+            }
+        }
+    }
+    assert!(violations.is_empty(), "{}", violations.join("\n"));
+}
+
+#[test]
+fn every_module_opens_with_its_method() {
+    for path in rust_files(&src()) {
+        let text = fs::read_to_string(&path).expect("a source file");
+        assert!(
+            text.starts_with("//!"),
+            "{} has no module page",
+            path.display()
+        );
+        assert!(!text.contains("STUB"), "{} is a stub", path.display());
+    }
+}
+
+/// Prints the rows of [`USES`] as they are, for pasting: `cargo test --test layering -- --ignored --show-output`.
+#[test]
+#[ignore = "prints the table"]
+fn print_the_table() {
+    let mut left = used_modules();
+    while !left.is_empty() {
+        let free: Vec<String> = left
+            .iter()
+            .filter(|(_, uses)| uses.iter().all(|u| !left.contains_key(u)))
+            .map(|(module, _)| module.clone())
+            .collect();
+        assert!(
+            !free.is_empty(),
+            "modules use each other in a circle: {left:?}"
+        );
+        for module in free {
+            let uses = left.remove(&module).unwrap_or_default();
+            println!("    (\"{module}\", &{:?}),", uses);
+        }
+    }
+}
