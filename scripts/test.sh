@@ -16,16 +16,35 @@ passed=0 failed=0 skipped=0
 
 say() { printf '\n== %s\n' "$*"; }
 
+# tell NAME STATUS: counts one check.
+tell() {
+  if [ "$2" -eq 0 ]; then
+    passed=$((passed + 1)) && echo "ok: $1"
+  else
+    failed=$((failed + 1)) && echo "FAILED: $1"
+  fi
+}
+
 # check NAME COMMAND...: one counted check.
 check() {
-  local name=$1
-  shift
-  say "$name"
-  if "$@"; then
-    passed=$((passed + 1)) && echo "ok: $name"
-  else
-    failed=$((failed + 1)) && echo "FAILED: $name"
-  fi
+  say "$1"
+  "${@:2}"
+  tell "$1" $?
+}
+
+# A check that runs beside others: `start ID COMMAND...` begins it, `settle ID NAME` waits for it,
+# shows what it printed and counts it.
+declare -A running
+start() {
+  "${@:2}" >"$tools/$1.log" 2>&1 &
+  running[$1]=$!
+}
+settle() {
+  wait "${running[$1]}"
+  local status=$?
+  say "$2"
+  cat "$tools/$1.log"
+  tell "$2" $status
 }
 
 finish() {
@@ -59,6 +78,8 @@ install_judges() {
 
 need cc build-essential
 command -v cargo >/dev/null || { echo "cargo is missing: install Rust 1.95 or newer"; failed=1; finish; }
+# Downloads need little of the processor: they run while the library compiles.
+[ "$quick" = --quick ] || start install install_judges
 
 # --- the project's own tests ------------------------------------------------------------
 check "format" cargo fmt --check
@@ -76,12 +97,18 @@ if [ "$cargo_status" -ne 0 ] && [ "$f" -eq 0 ]; then failed=$((failed + 1)); fi
 
 # --- outside judges ---------------------------------------------------------------------
 if [ "$quick" = --quick ]; then finish; fi
-if install_judges; then
+if wait "${running[install]}"; then
   export PYTHON=$tools/python/bin/python NODE_PATH=$tools/node_modules
-  check "formats read back by trimesh, vtk and the glTF validator" scripts/check_formats.sh
-  check "geodesics compared with pygeodesic" scripts/check_geodesics.sh
-  check "schemathesis against the running service" scripts/check_api.sh
+  # Built once, with the features that `cargo test` gives the libraries: the judges run side by side.
+  cargo build --quiet --bins --examples --test layering
+  start formats scripts/check_formats.sh
+  start geodesics scripts/check_geodesics.sh
+  start api scripts/check_api.sh
+  settle formats "formats read back by trimesh, vtk and the glTF validator"
+  settle geodesics "geodesics compared with pygeodesic"
+  settle api "schemathesis against the running service"
 else
+  cat "$tools/install.log"
   echo "the outside judges could not be installed"
   failed=$((failed + 1))
 fi
