@@ -1,8 +1,9 @@
-# The build: dependencies first, so that a change of our sources does not compile them again.
+# Build stage. Dependencies are compiled first, in a layer of their own, so that a change in src/ does not
+# compile them again.
 FROM rust:1-bookworm AS build
 WORKDIR /build
 COPY Cargo.toml Cargo.lock ./
-# Not built, but named by the manifest.
+# Not built, but Cargo.toml declares them and cargo looks for their files.
 COPY benches benches
 RUN mkdir src \
  && echo 'fn main() {}' > src/main.rs \
@@ -11,11 +12,11 @@ RUN mkdir src \
  && rm -rf src
 COPY src src
 COPY README.md ./
-# cargo goes by modification times: the sources must be newer than the stand-ins.
+# cargo compares modification times: the sources must be newer than the placeholders above.
 RUN find src -exec touch {} + \
  && cargo build --release --locked --bin ventriform
 
-# The image: the program, one volume, nobody's rights.
+# Runtime image: the program, one volume, an unprivileged user.
 FROM debian:bookworm-slim
 LABEL org.opencontainers.image.title="ventriform" \
       org.opencontainers.image.description="Surface models of the left ventricle from cardiac SPECT" \

@@ -1,5 +1,7 @@
-//! One fit of a 150-point model on a 128³ volume, beside the generation of such a model from
-//! such a volume in the same run: machines differ, their ratio hardly does. One core.
+//! Fits a 150-point model to a 128³ volume, on one core.
+//!
+//! The same run also generates such a model from such a volume. The ratio of the two times hardly
+//! depends on the machine; the times do.
 
 use std::hint::black_box;
 
@@ -15,7 +17,7 @@ use ventriform::volume::phantom::{PhantomParameters, phantom};
 use ventriform::{optimise, retile, surface};
 
 fn benchmarks(criterion: &mut Criterion) {
-    // One core: what is compared is work, not the number of cores.
+    // One thread, so that the times compare work and not the number of cores.
     rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build_global()

@@ -1,4 +1,4 @@
-//! The fit and the flips on a ventricle-like cup, from the points that re-tiling hands them.
+//! Fit and flips, and flips alone, of re-tiled models of a ventricle-shaped cup.
 
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use ventriform::mesh::shapes;
@@ -9,7 +9,7 @@ use ventriform::surface::from_mesh;
 
 fn bench(criterion: &mut Criterion) {
     let monitor = Monitor::silent();
-    // About as many triangles as Marching Cubes makes of a 128³ volume with 2 mm voxels.
+    // About as many triangles as Marching Cubes gives for a 128³ volume with 2 mm voxels.
     let surface = from_mesh(shapes::cup(75.0, 32.0, 11.0, 110), 2.0).expect("a closed cup");
     let reference = Reference::new(&surface);
     let fitted = OptimiseParameters::default();

@@ -1,4 +1,4 @@
-//! The whole way: reading a packed scan, and from its voxels to the measured model.
+//! The pipeline: reading a compressed scan, and going from its voxels to the measured model.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;

@@ -1,4 +1,4 @@
-//! Re-tiling a ventricle-like cup by both routes, from few points to many.
+//! Re-tiling a ventricle-shaped cup by both methods, for different numbers of points.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -9,7 +9,7 @@ use ventriform::surface::from_mesh;
 
 fn bench(criterion: &mut Criterion) {
     let monitor = Monitor::silent();
-    // About as many triangles as Marching Cubes makes of a 128³ volume with 2 mm voxels.
+    // About as many triangles as Marching Cubes gives for a 128³ volume with 2 mm voxels.
     let surface = from_mesh(shapes::cup(75.0, 32.0, 11.0, 110), 2.0).expect("a closed cup");
     let mut group = criterion.benchmark_group("retile");
     group.sample_size(10);

@@ -1,4 +1,4 @@
-//! From voxels to the surface: Marching Cubes alone, and the whole of `extract`.
+//! From voxels to the surface: Marching Cubes alone, and all of `extract`.
 
 use std::hint::black_box;
 
@@ -11,7 +11,7 @@ use ventriform::surface::marching_cubes::{Samples, marching_cubes};
 use ventriform::surface::{SurfaceParameters, extract};
 use ventriform::volume::Volume;
 
-/// A blurred, open wall in a dim background, `n` voxels a side over 256 mm.
+/// A blurred wall, open at the base, in a dim background: `n`³ voxels that span 256 mm.
 fn phantom(n: usize) -> Volume {
     let spacing = 256.0 / n as f64;
     let shape = [n; 3];
@@ -25,7 +25,7 @@ fn phantom(n: usize) -> Volume {
                 let q = Vec3::new(p.x, p.y, p.z * 0.75);
                 let open = ((p.z - 22.0) / 4.0).max(0.0);
                 let wall = (-((q.norm() - 26.0) / 6.0).powi(2) - open * open).exp();
-                // A ripple instead of noise: the same on every machine.
+                // A ripple instead of noise, so that every machine gets the same volume.
                 let ripple = 0.02 * ((i * 7 + j * 13 + k * 29) as f64).sin();
                 voxels.push((0.1 + 0.9 * wall + ripple) as f32);
             }

@@ -1,16 +1,18 @@
 #!/usr/bin/env bash
-# Exercises the running service with schemathesis: no 500, no undocumented status or body.
-# One check is left out: arbitrary bytes are rarely a volume, and what was erased is 410, so
-# requests that satisfy the schema are rightly refused.
-# One worker: CPython 3.11 fails now and then where two threads parse at once ("AST constructor
-# recursion depth mismatch").
-# PYTHON names an interpreter that has schemathesis.
+# Tests the running service with schemathesis: no 500, no undocumented status or body.
+#
+# The check positive_data_acceptance is off. The service correctly rejects some requests that satisfy the
+# schema: random bytes are rarely a volume, and erased resources answer 410.
+# One worker: CPython 3.11 sometimes fails when two threads parse at once ("AST constructor recursion
+# depth mismatch").
+#
+# PYTHON: an interpreter that has schemathesis. EXAMPLES: examples per operation (15).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 python=${PYTHON:-python3}
 data=$(mktemp -d)
-# A test is named so that the libraries have the features that `cargo test` gives them: without
-# it they and the program would be compiled once more.
+# Naming a test gives the libraries the same features as `cargo test` does. Without it cargo would
+# compile them and the program a second time.
 cargo build --quiet --bins --test layering
 target/debug/ventriform serve --listen 127.0.0.1:0 --data-dir "$data" >"$data/log" 2>&1 &
 service=$!

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Builds the image, starts the service by docker compose and makes a model through it.
-# Opt-in: needs docker with compose. To reach the published port from elsewhere than the
-# engine's own network, set IN_ENGINE to a command prefix.
+# Builds the image, starts the service with docker compose and makes a model through it.
+#
+# Not part of scripts/test.sh: it needs docker with compose. IN_ENGINE: a command prefix for curl, for
+# machines that cannot reach the published port from outside of the engine's network.
 #
 #   scripts/check_container.sh
 set -euo pipefail
@@ -18,7 +19,7 @@ ${IN_ENGINE:-} curl -fsS --data-binary @"$out/spect.nii.gz" -H 'Prefer: wait=60'
   -H 'Accept: model/gltf-binary' "$url/v1/models?points=150" -o "$out/lv.glb"
 [ "$(head -c 4 "$out/lv.glb")" = glTF ]
 
-# What was accepted survives the container.
+# The model survives a restart of the container.
 docker compose restart
 docker compose up -d --wait
 # shellcheck disable=SC2086

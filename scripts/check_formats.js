@@ -1,4 +1,4 @@
-// Khronos' validator over every .glb and .gltf of a folder: errors, warnings and hints fail.
+// Runs Khronos' validator on every .glb and .gltf in a folder. Errors, warnings, infos and hints all fail.
 const fs = require("fs");
 const path = require("path");
 const validator = require("gltf-validator");

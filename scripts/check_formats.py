@@ -1,9 +1,10 @@
-"""Reads exported meshes by trimesh and by VTK and compares them with the JSON beside them.
+"""Reads exported meshes with trimesh and VTK and compares them with the JSON of the same name.
 
 usage: check_formats.py DIR
 
-Vertices must come back in the same order (STL has none: there the set of places and the
-triangles over it), equal to the last bit of the precision that format and reader keep.
+Vertices must come back in the same order, equal to the last bit of the precision that format and
+reader keep. STL stores no shared vertices; there the distinct positions and the triangles over them
+are compared.
 """
 import json
 import sys
@@ -14,12 +15,12 @@ import trimesh
 import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
-# glTF world (metres, Y up) from LPS millimetres.
+# Node matrix: LPS millimetres to glTF's world (metres, Y up).
 WORLD = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1000]]) / 1000
 
 
 def by_trimesh(path):
-    """Vertices and triangles as stored; for glTF also the node's matrix."""
+    """Vertices and triangles as stored, and the node's matrix (None except for glTF)."""
     if path.suffix in (".glb", ".gltf"):
         scene = trimesh.load(path, process=False)
         (name,) = scene.graph.nodes_geometry
@@ -49,7 +50,7 @@ def by_vtk(path):
 
 
 def places(vertices, triangles):
-    """A triangle soup over its distinct vertices, in an order of their own."""
+    """A triangle soup as sorted distinct vertices and sorted triangles over them."""
     distinct, index = np.unique(vertices, axis=0, return_inverse=True)
     triangles = index.ravel()[triangles]
     first = triangles.argmin(axis=1)
@@ -58,12 +59,12 @@ def places(vertices, triangles):
 
 
 def compare(name, reader, expected, got):
-    """The first difference as text, or None."""
+    """The first difference found, as text; None if there is none."""
     vertices, triangles = expected
     found, faces, matrix = got
     found, faces = np.asarray(found), np.asarray(faces, np.int64)
     if reader == "vtk" and name.endswith((".ply", ".obj")):
-        found = found.astype(np.float32)  # these readers keep single precision
+        found = found.astype(np.float32)  # these VTK readers store single precision
     single = name.endswith((".stl", ".glb", ".gltf")) or found.dtype == np.float32
     if single:
         vertices = vertices.astype(np.float32)

@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
-# Shows exported meshes to the programs that people use.
+# Reads exported meshes with other programs and compares the result.
 #
-#   scripts/check_formats.sh [DIR]      DIR: target/tmp/formats, where `cargo test` leaves one
+#   scripts/check_formats.sh [DIR]      default: target/tmp/formats, where `cargo test` writes one
 #                                       file of each format
 #
-# For every NAME.json in DIR its siblings NAME.{glb,gltf,stl,ply,obj,vtp} are read by Khronos'
-# glTF validator, trimesh and VTK, and compared with it. Ends with the number of files that
-# passed and failed; exits with 1 if any failed.
+# For every NAME.json in DIR, Khronos' glTF validator, trimesh and VTK read NAME.{glb,gltf,stl,ply,obj,vtp}
+# and the result is compared with NAME.json. Prints the number of files that passed and failed; exits with
+# 1 if any failed.
 #
-# PYTHON: an interpreter that has numpy, trimesh and vtk already; NODE_PATH: a folder that has
-# gltf-validator already. Without them both are installed under target/.
+# PYTHON: an interpreter that has numpy, trimesh and vtk. NODE_PATH: a folder that has gltf-validator.
+# Without these variables the script installs the packages under target/.
 set -euo pipefail
 
 root=$(cd "$(dirname "$0")/.." && pwd)

@@ -2,9 +2,9 @@
 
 usage: check_geodesics.py PROGRAM [SURFACES]
 
-PROGRAM is the example `geodesics`: it reads a mesh with points on it as JSON and prints their
-distances from one another. pygeodesic knows vertices only, so the points are made vertices of
-the mesh that it gets: a point inside a triangle cuts it in three, which changes no distance.
+PROGRAM is the example `geodesics`: it reads a mesh with points on it as JSON and prints the distances
+between all points. pygeodesic measures between vertices only, so the points become vertices of the
+mesh that it gets: a point inside a triangle splits it into three, which changes no distance.
 """
 import json
 import subprocess
@@ -17,7 +17,7 @@ TOLERANCE = 1e-9  # relative
 
 
 def sphere(rng, rows):
-    """A triangulated sphere: rings of latitude between two poles."""
+    """A triangulated unit sphere: rings of latitude between two poles."""
     around = 2 * rows
     vertices = [[0, 0, 1]]
     for i in range(1, rows):
@@ -50,7 +50,7 @@ def torus(rng, around, across, minor):
 
 
 def surface(rng, kind):
-    """Blobs, spiky balls, thin sheets and rings of up to some thousand triangles."""
+    """A random blob, spiky ball, thin sheet or ring of up to a few thousand triangles."""
     if kind == "ring":
         vertices, triangles = torus(rng, int(rng.integers(8, 40)), int(rng.integers(5, 20)), rng.uniform(0.2, 0.8))
         vertices *= 1 + 0.03 * rng.standard_normal((len(vertices), 1))
@@ -66,7 +66,7 @@ def surface(rng, kind):
 
 
 def random_points(rng, vertices, triangles, count):
-    """Rows of triangle and barycentric coordinates: corners and inner points, one a triangle."""
+    """Rows of (triangle, barycentric coordinates): corners and interior points, at most one per triangle."""
     rows = []
     for n, t in enumerate(rng.choice(len(triangles), count, replace=False)):
         weights = np.eye(3)[rng.integers(3)] if n % 3 == 0 else rng.dirichlet([1, 1, 1])
@@ -75,7 +75,7 @@ def random_points(rng, vertices, triangles, count):
 
 
 def with_points(vertices, triangles, points):
-    """The mesh with the points among its vertices, and their indices."""
+    """The mesh with the points inserted as vertices, and the indices of those."""
     vertices, triangles, indices = list(vertices), [list(t) for t in triangles], []
     for t, *weights in points:
         corners = triangles[t]
@@ -92,7 +92,7 @@ def with_points(vertices, triangles, points):
 
 
 def compare(program, vertices, triangles, points):
-    """The largest relative difference between the two programs."""
+    """The largest relative difference between the distances of the two programs."""
     document = {"vertices": vertices.tolist(), "triangles": triangles.tolist(), "points": points}
     answer = subprocess.run([program], input=json.dumps(document), text=True, capture_output=True, check=True)
     ours = np.array(json.loads(answer.stdout))

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Compares exact geodesics on random surfaces with pygeodesic.
+# Compares exact geodesic distances on random surfaces with pygeodesic's.
 #
 #   scripts/check_geodesics.sh [SURFACES]
 #

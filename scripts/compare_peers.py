@@ -1,4 +1,4 @@
-"""ventriform beside its peers: what scripts/compare_peers.sh runs."""
+"""Times ventriform against other tools. Run by scripts/compare_peers.sh."""
 import argparse
 import json
 import math
@@ -16,7 +16,7 @@ import plot
 from clock import Ours, in_turn, show, timed
 
 POINTS = 150
-# Sides of the volumes and numbers of points of the scaling plots; each volume spans 256 mm.
+# The scaling plots: sides of the volumes in voxels (each spans 256 mm) and numbers of points.
 SIDES = [64, 96, 128, 192, 256, 384, 512]
 COUNTS = [100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000]
 COUNTS_SIDE = 256
@@ -30,7 +30,7 @@ class Bench:
         self.stopwatch = str(arguments.binaries / "examples" / "stopwatch")
 
     def phantom(self, side, spacing):
-        """Folder of a simulated scan; made once."""
+        """The folder of a simulated scan, which is made on the first call."""
         folder = self.work / f"phantom-{side}-{spacing:g}"
         if not (folder / "params.json").exists():
             subprocess.run([self.ventriform, "phantom", "--size", str(side), "--spacing",
@@ -38,7 +38,7 @@ class Bench:
         return folder
 
     def as_float(self, scan, name):
-        """The same scan as float32, as nibabel writes it."""
+        """The path of the same scan as float32, written by nibabel."""
         path = scan.parent / name
         if not path.exists():
             loaded = nibabel.load(scan)
@@ -59,7 +59,7 @@ class Bench:
 
     # ------------------------------------------------------------------ parts
     def speed(self):
-        """Marching Cubes alone, and the way from voxels to 150 points."""
+        """Marching Cubes alone, then from voxels to 150 points."""
         import others
         self.pin()
         remeshers = {name: others.Remesher(str(self.work / f"{name}.so"))
@@ -79,8 +79,8 @@ class Bench:
                 "vtkFlyingEdges3D": timed(lambda: others.flying_edges(whole, iso)),
             }, 3 * self.a.rounds)
             show(name, result[name])
-            # The peers have nothing that finds the heart: they get a volume in which all else was
-            # painted out, and are not charged for that. ventriform gets the whole volume.
+            # The peers cannot find the heart. They get a volume in which everything else was set to
+            # 0, and that step is not timed. ventriform gets the whole volume.
             heart = nibabel.load(folder / "lv_truth.nii.gz")
             near = numpy.asarray(heart.dataobj) > 0
             for _ in range(round(8 / spacing)):
@@ -91,7 +91,7 @@ class Bench:
             def then(remesh, target):
                 return timed(lambda: remesh(others.flying_edges(alone, iso), target))
 
-            # The peers measure nothing: the first line is the model alone.
+            # The peers do not measure their result, so the first line leaves the report out.
             contestants = {
                 "ventriform": ours.turn("model", POINTS, lambda number: number, without="report"),
                 "ventriform with its report": ours.turn("model", POINTS, lambda number: number),
@@ -109,7 +109,7 @@ class Bench:
         self.keep("speed", result)
 
     def edge_for(self, cgal, others, data, iso):
-        """CGAL takes an edge length: the one that gives about POINTS points, found untimed."""
+        """The edge length at which CGAL makes about POINTS points. The search is not timed."""
         if cgal is None:
             return None
         surface = others.flying_edges(data, iso)
@@ -119,7 +119,7 @@ class Bench:
         return edge
 
     def reading(self):
-        """A compressed volume from the page cache to float32 in memory."""
+        """Reading a compressed volume from the page cache to float32 in memory."""
         self.pin()
         scan = self.phantom(128, 3.2) / "spect.nii.gz"
         result = {}
@@ -137,7 +137,7 @@ class Bench:
         self.keep("reading", result)
 
     def threads(self):
-        """Two threads against one, nothing pinned. Meaningful on an idle machine alone."""
+        """Two threads against one, not pinned to a core. Needs an idle machine."""
         result = {}
         for side, points in ((128, 150), (256, 1000), (256, 10_000)):
             scan = self.phantom(side, 256 / side) / "spect.nii.gz"
@@ -154,7 +154,7 @@ class Bench:
         self.keep("threads", result)
 
     def memory(self):
-        """Peak memory from the file to the model, against the size of the volume as float32."""
+        """Peak memory from file to model, against the size of the volume as float32."""
         result = {}
         print(f"\n{'Peak memory, file to 150 points':34} {'MiB':>9} {'volume':>9} {'ratio':>7}")
         for side in (128, 256, 512):
@@ -194,7 +194,7 @@ class Bench:
                 print(f"  {row[key]:9} {exponent:>6}  {stages}")
 
     def cost(self, side, points):
-        """Processor time of every stage: the stage's share of the wall time of the median run."""
+        """Processor time of each stage in the median run, split by the stages' share of wall time."""
         seeds = (1, 2, 3) if points < 10_000 else (1,)
         ours = Ours(self.stopwatch)
         ours.ask("read", self.phantom(side, 256 / side) / "spect.nii.gz")
@@ -210,7 +210,7 @@ class Bench:
 
 
 def dilated(mask):
-    """The mask and its six neighbours."""
+    """The mask and the 6-neighbours of its voxels (wraps around at the border)."""
     out = mask.copy()
     for axis in range(3):
         out |= numpy.roll(mask, 1, axis) | numpy.roll(mask, -1, axis)
@@ -218,6 +218,7 @@ def dilated(mask):
 
 
 def growth(before, row, key):
+    """The exponent of the cost between two rows: log of costs over log of sizes."""
     cost = row["stages_cpu_ms"]["total"] / before["stages_cpu_ms"]["total"]
     return f"{math.log(cost) / math.log(row[key] / before[key]):.2f}"
 

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Times ventriform beside the tools that people would use instead, on one core and in turn.
+# Times ventriform against other tools for the same jobs, in turns on one core.
 #
 #   scripts/compare_peers.sh [PART...]     PART: speed reading threads memory scaling (default: all)
 #
 # Prints tables and writes target/compare-peers/PART.json; `scaling` also writes docs/scaling-*.svg.
-# Under target/compare-peers it installs the peers' Python packages and builds those in C++ for
-# which the machine has the headers (Geogram comes with its wheel; CGAL: libcgal-dev).
+# Installs the peers' Python packages under target/compare-peers and builds the C++ peers whose headers
+# are on the machine (Geogram's come with its wheel; CGAL: libcgal-dev).
 #
-# PYTHON: an interpreter that has the packages already. ROUNDS: turns of each contestant (15).
+# PYTHON: an interpreter that has the packages. ROUNDS: turns of each program (15).
 # CORE: the core to run on (the last one).
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -22,13 +22,13 @@ if [ -z "${PYTHON:-}" ]; then
             numpy nibabel vtk pyvista pyacvd geogram
 fi
 
-cpp() { # cpp NAME FLAGS...: builds scripts/peers/NAME.cpp where that is possible
+cpp() { # cpp NAME FLAGS...: builds scripts/peers/NAME.cpp if it can
     local name=$1
     shift
     [ "$work/$name.so" -nt "scripts/peers/$name.cpp" ] && return
     g++ -O3 -march=native -DNDEBUG -std=c++17 -fPIC -shared "scripts/peers/$name.cpp" \
         -o "$work/$name.so" "$@" -Wl,--no-undefined 2>"$work/$name.log" ||
-        echo "$name is left out: it does not build here (see $work/$name.log)"
+        echo "skipping $name: it does not build here (see $work/$name.log)"
 }
 site=$("$PYTHON" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
 if [ -e "$site/lib64/libgeogram.a" ]; then

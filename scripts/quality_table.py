@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Prints the tables of docs/quality.md: what the paper's flips gain, what the refined route
-reaches, and what curvature-adaptive density does where the surface bends.
+"""Prints tables of docs/quality.md: the gain of the paper's flips, the figures of the refined
+route, and the effect of curvature-adaptive density where the surface is strongly curved.
 
     python3 scripts/quality_table.py [--binary PATH] [--seeds 5] [--points 67,110,150,200,300]
 
-Simulated scans (`ventriform phantom`) go through `ventriform generate`; fitness is read from
-the reports. Distances and dihedral angles are measured anew here, against an iso-surface by
-VTK's Flying Edges. Without --binary a release build is made. Packages that are missing
-(numpy, nibabel, vtk; versions in scripts/requirements.txt) are installed in a virtual
-environment under target/quality/.
+`ventriform generate` makes models of simulated scans (`ventriform phantom`). Fitness is read from
+its reports. Distances and dihedral angles are measured here, against an iso-surface from VTK's
+Flying Edges. Without --binary the script makes a release build. It installs missing packages
+(numpy, nibabel, vtk; versions in scripts/requirements.txt) in a virtual environment under
+target/quality/.
 """
 
 import argparse
@@ -25,12 +25,12 @@ NEEDED = ("numpy", "nibabel", "vtk")
 
 
 def with_packages():
-    """Starts this script again in an environment that has the packages, if this one lacks any."""
+    """Restarts the script in a virtual environment with the packages if any is missing."""
     if all(importlib.util.find_spec(name) for name in NEEDED):
         return
     python = WORK / "venv" / "bin" / "python"
     if Path(sys.prefix) == WORK / "venv":
-        sys.exit("the packages could not be installed")
+        sys.exit(f"could not install {', '.join(NEEDED)} in {WORK / 'venv'}")
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", WORK / "venv"], check=True)
     pinned = (ROOT / "scripts" / "requirements.txt").read_text().split()
@@ -46,7 +46,7 @@ import numpy as np
 import vtk
 from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
 
-# Voxel in mm, noise, seed of shape and noise; no liver, so that only one surface is there.
+# Voxel size in mm, noise, seed of shape and noise. Without a liver the scan has one surface only.
 PHANTOMS = [(3.2, 0.03, 1), (3.2, 0.07, 2), (2.0, 0.03, 3), (2.0, 0.07, 4)]
 SAMPLES = 20_000
 PAPER = {"method": "paper"}
@@ -79,7 +79,7 @@ def area_normals(vertices, triangles):
 
 
 def sampled(vertices, triangles, seed):
-    """Points at equal shares of the area, and the triangle of each."""
+    """Random points, one in each equal share of the area, and the triangle of each."""
     random = np.random.default_rng(seed)
     areas = np.linalg.norm(area_normals(vertices, triangles), axis=1).cumsum()
     shares = (np.arange(SAMPLES) + random.random(SAMPLES)) / SAMPLES * areas[-1]
@@ -90,7 +90,7 @@ def sampled(vertices, triangles, seed):
 
 
 def distances(points, data):
-    """Distance of every point to the surface."""
+    """The distance of every point to the surface."""
     implicit = vtk.vtkImplicitPolyDataDistance()
     implicit.SetInput(data)
     found = vtk.vtkDoubleArray()
@@ -98,11 +98,11 @@ def distances(points, data):
     return np.abs(vtk_to_numpy(found))
 
 
-# --- the surface that models are held against -----------------------------------------------
+# --- the reference surface ------------------------------------------------------------------
 
 
 class Reference:
-    """The iso-surface of a scan, in the models' frame (LPS), and where it bends most."""
+    """The iso-surface of a scan in the models' frame (LPS), and its most curved fifth."""
 
     def __init__(self, scan, iso):
         image = nibabel.load(scan)
@@ -126,8 +126,8 @@ class Reference:
         self.data = poly_data(self.vertices, self.triangles)
         self.volume = self.enclosed(self.vertices, self.triangles)
         self.points, owner = sampled(self.vertices, self.triangles, 1)
-        self.bent = self.most_bent_fifth()
-        self.bent_points = self.points[self.bent[owner]]
+        self.curved = self.most_curved_fifth()
+        self.curved_points = self.points[self.curved[owner]]
         self.locator = vtk.vtkStaticCellLocator()
         self.locator.SetDataSet(self.data)
         self.locator.BuildLocator()
@@ -137,8 +137,8 @@ class Reference:
         a, b, c = (vertices[triangles[:, k]] for k in range(3))
         return abs(np.einsum("ix,ix->", a, np.cross(b, c)) / 6)
 
-    def most_bent_fifth(self):
-        """For every triangle whether it lies in the fifth of the area of largest curvedness."""
+    def most_curved_fifth(self):
+        """For every triangle: whether it belongs to the fifth of the area with the largest curvedness."""
         smooth = vtk.vtkWindowedSincPolyDataFilter()
         smooth.SetInputData(self.data)
         smooth.SetNumberOfIterations(40)
@@ -155,21 +155,21 @@ class Reference:
         curvedness = np.sqrt(np.maximum(2 * mean**2 - gauss, 0))[self.triangles].mean(axis=1)
         areas = np.linalg.norm(area_normals(self.vertices, self.triangles), axis=1)
         order = np.argsort(-curvedness, kind="stable")
-        bent = np.zeros(len(order), bool)
-        bent[order[areas[order].cumsum() <= areas.sum() / 5]] = True
-        return bent
+        curved = np.zeros(len(order), bool)
+        curved[order[areas[order].cumsum() <= areas.sum() / 5]] = True
+        return curved
 
-    def near_bent(self, points):
-        """Which points lie nearest to the most bent fifth."""
+    def near_curved(self, points):
+        """For every point: whether the closest triangle belongs to the most curved fifth."""
         cell, part, square = vtk.reference(0), vtk.reference(0), vtk.reference(0.0)
         foot, found = [0.0] * 3, []
         for point in points:
             self.locator.FindClosestPoint(point, foot, cell, part, square)
-            found.append(self.bent[int(cell)])
+            found.append(self.curved[int(cell)])
         return np.array(found)
 
 
-# --- what is measured -----------------------------------------------------------------------
+# --- measures -------------------------------------------------------------------------------
 
 
 def judge(mesh, reference):
@@ -186,11 +186,11 @@ def judge(mesh, reference):
     _, edge = np.unique(np.sort(half, axis=1), axis=0, return_inverse=True)
     order = np.argsort(edge.ravel(), kind="stable").reshape(-1, 2)
     n, m = (normals[order[:, k] % len(triangles)] for k in range(2))
-    bends = np.degrees(
+    angles = np.degrees(
         np.arctan2(np.linalg.norm(np.cross(n, m), axis=1), np.einsum("ix,ix->i", n, m))
     )
     middles = vertices[half[order[:, 0]]].mean(axis=1)
-    bent = reference.near_bent(middles)
+    curved = reference.near_curved(middles)
     data = poly_data(vertices, triangles)
     there = distances(sampled(vertices, triangles, 2)[0], reference.data)
     back = distances(reference.points, data)
@@ -199,18 +199,18 @@ def judge(mesh, reference):
     return {
         "ratio": ratio.mean(),
         "least_ratio": ratio.min(),
-        "bend": bends.mean(),
+        "dihedral": angles.mean(),
         "distance": (there.mean() + back.mean()) / 2,
         "hausdorff": max(there.max(), back.max(), corners.max()),
         "volume": abs(100 * (volume / reference.volume - 1)),
-        "bent_bend": bends[bent].mean(),
-        "bent_most": bends[bent].max(),
-        "bent_distance": distances(reference.bent_points, data).mean(),
+        "curved_dihedral": angles[curved].mean(),
+        "curved_most": angles[curved].max(),
+        "curved_distance": distances(reference.curved_points, data).mean(),
     }
 
 
 class Bench:
-    """Makes scans and models, each once."""
+    """Makes the scans and the models and measures them."""
 
     def __init__(self, binary, seeds):
         self.binary, self.seeds = str(binary), seeds
@@ -243,7 +243,7 @@ class Bench:
                 yield *self.model(scan, points, seed, parameters), reference
 
     def judged(self, points, parameters):
-        """The mean of every measure."""
+        """The mean of every measure over all scans and seeds."""
         rows = [judge(mesh, reference) for mesh, _, reference in self.each(points, parameters)]
         return {name: np.mean([row[name] for row in rows]) for name in rows[0]}
 
@@ -263,7 +263,7 @@ def head(title, *cells):
 
 def flips_table(bench, title, form, parameters, sizes):
     head(title, "N", "F re-tiled", "F after flips", "gain % (least..most)", "mean 2r/R",
-         "least 2r/R")
+         "worst 2r/R")
     for points in sizes:
         before, after, gains, shapes = [], [], [], []
         for _, report, _ in bench.each(points, parameters):
@@ -304,21 +304,22 @@ def main():
     flips_table(bench, "Refined route (fit and flips), normalised fitness", "normalised", {},
                 sizes)
 
-    head("Refined route, measured by VTK", "N", "mean 2r/R", "least 2r/R", "mean bend °",
+    head("Refined route, measured by VTK", "N", "mean 2r/R", "worst 2r/R", "mean dihedral angle °",
          "mean distance mm", "Hausdorff mm", "volume %")
     for points in sizes:
         m = bench.judged(points, {})
-        row(points, f"{m['ratio']:.4f}", f"{m['least_ratio']:.3f}", f"{m['bend']:.1f}",
+        row(points, f"{m['ratio']:.4f}", f"{m['least_ratio']:.3f}", f"{m['dihedral']:.1f}",
             f"{m['distance']:.3f}", f"{m['hausdorff']:.2f}", f"{m['volume']:.2f}")
 
-    head("Curvature-adaptive density in the most bent fifth of the surface", "N", "adaptive",
-         "mean bend °", "largest bend °", "distance mm", "Hausdorff mm, whole",
-         "distance mm, whole", "mean 2r/R, whole")
+    head("Curvature-adaptive density in the most curved fifth of the surface", "N", "adaptive",
+         "mean dihedral angle °", "largest dihedral angle °", "mean distance mm",
+         "Hausdorff mm, whole surface", "mean distance mm, whole surface",
+         "mean 2r/R, whole model")
     for points in [n for n in sizes if n <= 110]:
         for adaptive in ("0", "0.25", "0.5"):
             m = bench.judged(points, {"adaptive": adaptive, "adaptive_from": "0"})
-            row(points, adaptive, f"{m['bent_bend']:.1f}", f"{m['bent_most']:.0f}",
-                f"{m['bent_distance']:.3f}", f"{m['hausdorff']:.2f}", f"{m['distance']:.3f}",
+            row(points, adaptive, f"{m['curved_dihedral']:.1f}", f"{m['curved_most']:.0f}",
+                f"{m['curved_distance']:.3f}", f"{m['hausdorff']:.2f}", f"{m['distance']:.3f}",
                 f"{m['ratio']:.4f}")
 
 

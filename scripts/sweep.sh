@@ -1,10 +1,12 @@
 #!/usr/bin/env bash
-# The long form of the tests on random surfaces: more seeds of each family than CI takes.
+# Tests the models' guarantees on more random surfaces of each family than CI does.
 #
-#   scripts/sweep.sh [SEEDS] [FAMILY]     100 surfaces of every family by default
+#   scripts/sweep.sh [SEEDS] [FAMILY]     default: 100 surfaces of every family
 #
-# Prints how many models were refused. Ends with 1 if any model breaks a promise. Takes hours for
-# all families at 100 seeds on two cores; DUMP=DIR writes some of the models there.
+# Prints how many models were refused. Exits with an error if a model breaks a guarantee. All families at
+# 100 seeds take hours on two cores.
+#
+# DUMP: a folder to write some of the models to.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 export VENTRIFORM_SEEDS=${1:-100}

@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# Installs what the tests need and passes them all. The last line counts:
+# Installs what the tests need and runs them all. The last line is the count:
 #   N passed, N failed, N skipped
 #
 #   scripts/test.sh            everything
-#   scripts/test.sh --quick    without the outside judges (trimesh, vtk, glTF validator, pygeodesic, schemathesis)
+#   scripts/test.sh --quick    without the demo and the external checks (trimesh, vtk, glTF validator,
+#                              pygeodesic, schemathesis)
 set -uo pipefail
 cd "$(dirname "$0")/.."
 
@@ -16,8 +17,8 @@ passed=0 failed=0 skipped=0
 
 say() { printf '\n== %s\n' "$*"; }
 
-# tell NAME STATUS: counts one check.
-tell() {
+# count NAME STATUS: prints the result of a check and counts it as passed or failed.
+count() {
   if [ "$2" -eq 0 ]; then
     passed=$((passed + 1)) && echo "ok: $1"
   else
@@ -25,26 +26,26 @@ tell() {
   fi
 }
 
-# check NAME COMMAND...: one counted check.
+# check NAME COMMAND...: runs the command and counts it.
 check() {
   say "$1"
   "${@:2}"
-  tell "$1" $?
+  count "$1" $?
 }
 
-# A check that runs beside others: `start ID COMMAND...` begins it, `settle ID NAME` waits for it,
-# shows what it printed and counts it.
+# Checks in parallel. `start ID COMMAND...` runs a check in the background. `collect ID NAME` waits for it,
+# prints its output and counts it.
 declare -A running
 start() {
   "${@:2}" >"$tools/$1.log" 2>&1 &
   running[$1]=$!
 }
-settle() {
+collect() {
   wait "${running[$1]}"
   local status=$?
   say "$2"
   cat "$tools/$1.log"
-  tell "$2" $status
+  count "$2" $status
 }
 
 finish() {
@@ -54,16 +55,16 @@ finish() {
   exit
 }
 
-# --- what the machine needs -------------------------------------------------------------
+# --- tools ------------------------------------------------------------------------------
 as_root() { if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo "$@"; fi; }
 
-need() { # need COMMAND PACKAGE...: installs the packages where the command is missing
+need() { # need COMMAND PACKAGE...: installs the packages if the command is missing
   command -v "$1" >/dev/null 2>&1 && return
   shift
   as_root apt-get update -qq && as_root apt-get install -y -qq --no-install-recommends "$@"
 }
 
-install_judges() {
+install_external_tools() {
   need node nodejs npm
   need npm npm
   python3 -c 'import ensurepip, venv' 2>/dev/null || need no-such-command python3 python3-venv python3-pip
@@ -77,9 +78,9 @@ install_judges() {
 }
 
 need cc build-essential
-command -v cargo >/dev/null || { echo "cargo is missing: install Rust 1.95 or newer"; failed=1; finish; }
-# Downloads need little of the processor: they run while the library compiles.
-[ "$quick" = --quick ] || start install install_judges
+command -v cargo >/dev/null || { echo "cargo not found: install Rust 1.95 or newer"; failed=1; finish; }
+# Downloads take little processor time, so they run while the library compiles.
+[ "$quick" = --quick ] || start install install_external_tools
 
 # --- the project's own tests ------------------------------------------------------------
 check "format" cargo fmt --check
@@ -90,27 +91,28 @@ say "cargo test"
 cargo test --no-fail-fast -- --show-output 2>&1 | tee "$log"
 cargo_status=${PIPESTATUS[0]}
 read -r p f i < <(awk '/^test result:/ { p += $4; f += $6; i += $8 } END { print p + 0, f + 0, i + 0 }' "$log")
-# A test that lacks its data says `skipped: why` and returns; the harness counts it as passed.
+# A test without its data prints `skipped: why` and returns. The harness counts it as passed.
 s=$(grep -c '^skipped: ' "$log")
 passed=$((passed + p - s)) failed=$((failed + f)) skipped=$((skipped + i + s))
 if [ "$cargo_status" -ne 0 ] && [ "$f" -eq 0 ]; then failed=$((failed + 1)); fi
 
-# --- outside judges ---------------------------------------------------------------------
+# --- external checks --------------------------------------------------------------------
 if [ "$quick" = --quick ]; then finish; fi
 if wait "${running[install]}"; then
   export PYTHON=$tools/python/bin/python NODE_PATH=$tools/node_modules
-  # Built once, with the features that `cargo test` gives the libraries: the judges run side by side.
+  # Build once before the checks run in parallel. Naming a test gives the libraries the same features as
+  # `cargo test` does.
   cargo build --quiet --bins --examples --test layering
   start formats scripts/check_formats.sh
   start geodesics scripts/check_geodesics.sh
   start api scripts/check_api.sh
-  settle formats "formats read back by trimesh, vtk and the glTF validator"
-  settle geodesics "geodesics compared with pygeodesic"
-  settle api "schemathesis against the running service"
+  collect formats "formats read by trimesh, vtk and the glTF validator"
+  collect geodesics "geodesics against pygeodesic"
+  collect api "service tested by schemathesis"
 else
   cat "$tools/install.log"
-  echo "the outside judges could not be installed"
+  echo "could not install the tools for the external checks"
   failed=$((failed + 1))
 fi
-check "the demo runs through" scripts/check_demo.sh
+check "demo" scripts/check_demo.sh
 finish

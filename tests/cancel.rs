@@ -1,8 +1,8 @@
-//! Work that is told to stop does little more: wherever it is, the next look at the cancel
-//! token is near.
+//! Cancelled work stops soon, at whichever point it is cancelled: the cancel token is checked often
+//! enough everywhere.
 //!
-//! Little is counted in processor time of the working thread, which other load on the machine
-//! does not lengthen as it does the time on the wall.
+//! The time until it stops is processor time of the working thread. Other load on the machine
+//! lengthens wall time, but not processor time.
 
 #![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
 #![cfg(target_os = "linux")]
@@ -20,34 +20,35 @@ use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
 use ventriform::volume::{ReadLimits, Volume};
 
-/// Most work after the token was raised. Promised are 100 ms; this build is not the fastest.
+/// Most processor time after cancellation. The promise is 100 ms, also in this build, which is not
+/// the fastest one.
 const MOST: Duration = Duration::from_millis(100);
 
-/// Moments at which the work is told to stop, evenly over its length.
+/// Number of moments of cancellation, spread evenly over the length of the work.
 const MOMENTS: u32 = 14;
 
-/// Processor time of a thread so far; `None` where the system does not tell.
+/// Processor time of a thread so far; `None` if the system does not report it.
 fn processor_time(thread: &str) -> Option<Duration> {
     let text = fs::read_to_string(format!("{thread}/schedstat")).ok()?;
     let nanoseconds = text.split(' ').next()?.parse().ok()?;
     Some(Duration::from_nanos(nanoseconds))
 }
 
-/// Runs `work` on one thread and tells it to stop once that has worked for `limit`. How the
-/// work ended, and how long it worked in all and after it was told to.
+/// Runs `work` on one thread and cancels it once that thread has used `limit` of processor time.
+/// Returns the outcome, the processor time in all, and that after the cancellation.
 fn run(work: &dyn Work, input: &Input, limit: Duration) -> (Result<(), WorkError>, [Duration; 2]) {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
         .unwrap();
     let cancel = CancelToken::new();
-    let (started, hear_start) = mpsc::channel();
-    let (ended, hear_end) = mpsc::channel::<()>();
+    let (started, start_of_work) = mpsc::channel();
+    let (ended, end_of_work) = mpsc::channel::<()>();
     std::thread::scope(|scope| {
         let token = cancel.clone();
         let told = scope.spawn(move || {
-            let (thread, before): (String, Duration) = hear_start.recv().unwrap();
-            while hear_end.recv_timeout(Duration::from_millis(1))
+            let (thread, before): (String, Duration) = start_of_work.recv().unwrap();
+            while end_of_work.recv_timeout(Duration::from_millis(1))
                 == Err(mpsc::RecvTimeoutError::Timeout)
             {
                 let worked = processor_time(&thread).unwrap() - before;
@@ -88,7 +89,7 @@ fn stops_wherever_it_is(
     scan: &Volume,
 ) {
     if processor_time("/proc/thread-self").is_none() {
-        println!("skipped: this system does not tell a thread's processor time");
+        println!("skipped: this system does not report a thread's processor time");
         return;
     }
     let folder = tempfile::tempdir().unwrap();
@@ -123,7 +124,7 @@ fn stops_wherever_it_is(
         library: Vec::new(),
     };
     let never = Duration::from_secs(3600);
-    // The first run also makes what is kept for the life of the process.
+    // The first run also fills the caches that live as long as the process.
     let (outcome, _) = run(&**work, &input, never);
     outcome.unwrap();
     let (_, [whole, _]) = run(&**work, &input, never);

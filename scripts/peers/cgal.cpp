@@ -1,5 +1,6 @@
-// CGAL's isotropic remeshing, tuned: 10 iterations with 3 steps of relaxation, projected onto the
-// surface. It takes an edge length, which the caller chooses for the number of points wanted.
+// CGAL's isotropic remeshing, tuned: 10 iterations with 3 relaxation steps, projected onto the surface.
+// It takes an edge length; the caller chooses the one that gives the wanted number of points. Returns
+// the number of vertices.
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/remesh.h>
 #include <CGAL/Surface_mesh.h>

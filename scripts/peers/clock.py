@@ -1,8 +1,9 @@
-"""Taking turns on one core, and what each turn cost.
+"""Runs contestants in turns and measures the time of each turn.
 
 A contestant is a function of the round's number that does its work once and returns
-(wall ms, processor ms). All run warm, one after the other, round after round, so that whatever else
-the machine does meets all of them alike; ratios are taken within a round and their median reported.
+(wall ms, processor ms). After a warm-up, all contestants run one after the other in every round, so
+that other load on the machine affects all of them alike. Ratios are taken within a round; their median
+is reported.
 """
 import json
 import os
@@ -12,7 +13,7 @@ import time
 
 
 class Ours:
-    """The example `stopwatch` as a long-lived process; see examples/stopwatch.rs."""
+    """The example `stopwatch` as a running process; see examples/stopwatch.rs."""
 
     def __init__(self, binary, threads=1):
         environment = dict(os.environ, RAYON_NUM_THREADS=str(threads))
@@ -20,19 +21,19 @@ class Ours:
             [binary], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment)
 
     def ask(self, *words):
-        """The answer to a command, with `cpu_ms` of all its threads."""
+        """Sends a command. Returns the answer, with `cpu_ms`, the processor time of all threads."""
         before = self.cpu_ms()
         self.process.stdin.write(" ".join(str(w) for w in words) + "\n")
         self.process.stdin.flush()
         line = self.process.stdout.readline()
         if not line:
-            raise RuntimeError(f"stopwatch ended at `{' '.join(map(str, words))}`")
+            raise RuntimeError(f"stopwatch ended without an answer to `{' '.join(map(str, words))}`")
         answer = json.loads(line)
         answer["cpu_ms"] = self.cpu_ms() - before
         return answer
 
     def cpu_ms(self):
-        """Processor time of every thread since it began, ms (getrusage counts in ticks)."""
+        """Processor time of all threads so far, ms. Read from schedstat: getrusage counts in ticks."""
         tasks = f"/proc/{self.process.pid}/task"
         total = 0
         for task in os.listdir(tasks):
@@ -41,14 +42,14 @@ class Ours:
         return total / 1e6
 
     def peak_mib(self):
-        """The most memory it ever held, MiB."""
+        """Peak resident memory of the process (VmHWM), MiB."""
         with open(f"/proc/{self.process.pid}/status") as file:
             line = next(line for line in file if line.startswith("VmHWM"))
         return int(line.split()[1]) / 1024
 
     def turn(self, *words, without=None):
-        """A contestant: `words` may hold functions of the round's number. The time of the stage
-        `without`, which runs on one thread then, is taken off."""
+        """A contestant that sends the command `words`, which may contain functions of the round's
+        number. The time of the stage `without` is subtracted; the process must have one thread."""
         def run(number):
             asked = [w(number) if callable(w) else w for w in words]
             answer = self.ask(*asked)
@@ -62,7 +63,7 @@ class Ours:
 
 
 def timed(work):
-    """A contestant out of a Python function without arguments."""
+    """A contestant that calls a Python function without arguments."""
     def run(_):
         wall, cpu = time.perf_counter(), time.process_time()
         work()
@@ -71,7 +72,8 @@ def timed(work):
 
 
 def in_turn(contestants, rounds):
-    """Medians of each contestant and, against the first one, median ratios within a round."""
+    """Runs all contestants `rounds` times. Returns the median times of each, and the median over the
+    rounds of its time over the first contestant's."""
     for run in contestants.values():
         run(0)
     seen = {name: [] for name in contestants}

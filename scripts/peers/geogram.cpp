@@ -1,7 +1,7 @@
-// Geogram's remesh_smooth (centroidal Voronoi points, restricted Delaunay) with its default amount of
-// work: 5 iterations of Lloyd and 30 of Newton. The Python wheel's library is built without the
-// optimiser that Newton needs, so 35 of Lloyd are run: an iteration of either costs one Voronoi
-// diagram at least, so this is no more than the default would take.
+// Geogram's remesh_smooth (centroidal Voronoi points, restricted Delaunay). Its default is 5 Lloyd and
+// 30 Newton iterations, but the Python wheel's library lacks the optimiser that Newton needs. This runs
+// 35 Lloyd iterations instead. That takes no longer than the default would: an iteration of either kind
+// computes at least one Voronoi diagram. Returns the number of vertices.
 #include <geogram/basic/command_line.h>
 #include <geogram/basic/command_line_args.h>
 #include <geogram/basic/common.h>

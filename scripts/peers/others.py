@@ -1,4 +1,4 @@
-"""The programs that users would pick instead, each as a function over what they have in memory."""
+"""Other tools for the same jobs, each as a function of data in memory."""
 import ctypes
 import warnings
 
@@ -8,12 +8,12 @@ import pyvista
 import vtk
 from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 
-# pyacvd 0.4 still asks pyvista for a name that the latter gave up.
+# pyacvd 0.4 uses a name that pyvista has deprecated.
 warnings.filterwarnings("ignore", category=Warning, module="pyacvd")
 
 
 def image(voxels, spacing):
-    """A volume (i fastest) as VTK holds it."""
+    """A vtkImageData of the voxels, i fastest."""
     data = vtk.vtkImageData()
     data.SetDimensions(*voxels.shape)
     data.SetSpacing(*spacing)
@@ -23,7 +23,7 @@ def image(voxels, spacing):
 
 
 def flying_edges(data, iso):
-    """vtkFlyingEdges3D without normals and gradients, the fastest it can be asked for."""
+    """vtkFlyingEdges3D without normals, gradients and scalars: its fastest setting."""
     contour = vtk.vtkFlyingEdges3D()
     contour.SetInputData(data)
     contour.SetValue(0, iso)
@@ -35,7 +35,7 @@ def flying_edges(data, iso):
 
 
 def acvd(surface, points):
-    """pyacvd on the surface subdivided twice, as its documentation advises for few points."""
+    """pyacvd on the surface, subdivided twice as its documentation recommends for few points."""
     clustering = pyacvd.Clustering(pyvista.wrap(surface))
     clustering.subdivide(2)
     clustering.cluster(points)
@@ -43,21 +43,22 @@ def acvd(surface, points):
 
 
 def arrays(surface):
-    """Vertices and triangles as the C++ libraries take them."""
+    """Vertices (float64) and triangles (int32), the types that the C++ libraries take."""
     vertices = vtk_to_numpy(surface.GetPoints().GetData()).astype(numpy.float64)
     triangles = vtk_to_numpy(surface.GetPolys().GetConnectivityArray())
     return vertices, triangles.reshape(-1, 3).astype(numpy.int32)
 
 
 def area(surface):
-    """Area of the surface, mm²."""
+    """The area of the surface, mm²."""
     vertices, triangles = arrays(surface)
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     return numpy.linalg.norm(numpy.cross(b - a, c - a), axis=1).sum() / 2
 
 
 class Remesher:
-    """A library of scripts/peers/*.cpp: `int remesh(V, nv, F, nf, target)` returns the vertices."""
+    """A library built from scripts/peers/*.cpp. `remesh(V, nv, F, nf, target)` returns the number of
+    vertices it made."""
 
     def __init__(self, library):
         self.call = ctypes.CDLL(library).remesh
@@ -70,5 +71,5 @@ class Remesher:
             triangles.ctypes.data_as(ctypes.c_void_p), ctypes.c_int64(len(triangles)),
             ctypes.c_double(target))
         if made <= 0:
-            raise RuntimeError("the peer made no mesh")
+            raise RuntimeError("remesh returned no vertices")
         return made

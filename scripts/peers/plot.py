@@ -1,4 +1,4 @@
-"""Small log-log plots as SVG, the same bytes for the same figures."""
+"""Log-log plots as SVG. The same figures give the same bytes."""
 import math
 
 WIDTH, HEIGHT = 720, 460
@@ -7,7 +7,7 @@ COLOURS = ["#222222", "#0072b2", "#009e73", "#d55e00", "#cc79a7"]
 
 
 def loglog(path, title, axes, series):
-    """Writes `series` (name -> [(x, y)]) and, for comparison, n log n through the first one's start."""
+    """Plots `series` (name -> [(x, y)]) and, dashed, n log n through the first point of the first."""
     points = [p for line in series.values() for p in line]
     x_range, y_range = decades(p[0] for p in points), decades(p[1] for p in points)
 
@@ -36,7 +36,7 @@ def loglog(path, title, axes, series):
     first = next(iter(series.values()))
     unit = first[0][1] / (first[0][0] * math.log(first[0][0]))
     ideal = [place(x, unit * x * math.log(x)) for x, _ in first]
-    # As much of it as the frame holds.
+    # Clipped at the top of the frame.
     ideal = [p for p in ideal if p[1] >= TOP]
     out.append(line(ideal, "#888", dash=True))
     out.append(text(ideal[-1][0] + 6, ideal[-1][1] + 4, "n log n", colour="#888"))
@@ -46,7 +46,7 @@ def loglog(path, title, axes, series):
         out.append(line(placed, colour, width=2))
         out += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{colour}"/>' for x, y in placed]
         ends.append([placed[-1][1], name, colour])
-    # Labels keep a line's height apart.
+    # Labels stay at least one line apart.
     ends.sort()
     for k, end in enumerate(ends):
         if k > 0:

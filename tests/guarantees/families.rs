@@ -1,6 +1,6 @@
-//! Families of random surfaces: one seed, one surface, the same for ever.
+//! Families of random surfaces. A seed always gives the same surface.
 //!
-//! Nearly all come through Marching Cubes, as models do.
+//! Nearly all are made by Marching Cubes, as those of real scans are.
 
 use rand::{Rng, RngExt};
 use ventriform::geometry::Vec3;
@@ -14,7 +14,7 @@ use ventriform::surface::{
 use ventriform::volume::Volume;
 use ventriform::volume::phantom::{PhantomParameters, phantom};
 
-/// Iso-value of all fields below, which count millimetres inward.
+/// Iso-value of the fields below. Most of them grow by 1 per millimetre towards the inside.
 const LEVEL: f64 = 50.0;
 
 fn between(random: &mut impl Rng, low: f64, high: f64) -> f64 {
@@ -35,7 +35,7 @@ fn volume(shape: [usize; 3], spacing: f64, value: impl Fn(Vec3) -> f64) -> Volum
     Volume::sampled(shape, frame, |p| value(*p))
 }
 
-/// The surface of everything at or above [`LEVEL`], with all its handles and components.
+/// The surface at [`LEVEL`] of the components that `isolate` keeps, with all handles.
 fn kept(volume: &Volume, isolate: Isolate) -> Surface {
     let parameters = SurfaceParameters {
         iso: IsoLevel::Absolute(LEVEL),
@@ -46,7 +46,7 @@ fn kept(volume: &Volume, isolate: Isolate) -> Surface {
     extract(volume, &parameters, &Monitor::silent()).unwrap()
 }
 
-/// A simulated scan: noise, resolution, wall and pose vary.
+/// Simulated scans of different noise, resolution, wall thickness and pose.
 pub fn phantoms(seed: u64) -> Surface {
     let mut random = stream(seed, Purpose::PhantomShape);
     let spacing = between(&mut random, 4.0, 6.5);
@@ -69,7 +69,7 @@ pub fn phantoms(seed: u64) -> Surface {
     .unwrap()
 }
 
-/// Smooth star shapes, from nearly round to deeply lobed.
+/// Smooth star-shaped surfaces, from nearly round to deeply lobed.
 pub fn organs(seed: u64) -> Surface {
     let mut random = stream(seed, Purpose::PhantomShape);
     let waves: Vec<(Vec3, f64)> = (0..8)
@@ -88,7 +88,7 @@ pub fn organs(seed: u64) -> Surface {
     from_mesh(mesh, 2.0).unwrap()
 }
 
-/// Balls that melt together.
+/// Sums of two to seven Gaussian blobs.
 pub fn metaballs(seed: u64) -> Surface {
     let mut random = stream(seed, Purpose::PhantomShape);
     let balls: Vec<(Vec3, f64)> = (0..2 + seed % 6)
@@ -104,7 +104,7 @@ pub fn metaballs(seed: u64) -> Surface {
     kept(&field, Isolate::Largest)
 }
 
-/// One to four rings hand in hand, tilted, thick or thin: genus one to four.
+/// Chains of one to four tilted rings, thick or thin: genus 1 to 4.
 pub fn rings(seed: u64) -> Surface {
     let mut random = stream(seed, Purpose::PhantomShape);
     let count = 1 + seed % 4;
@@ -137,7 +137,7 @@ pub fn rings(seed: u64) -> Surface {
     surface
 }
 
-/// Bowls whose wall is one to two voxels thick; every third one as a mask.
+/// Bowls with a wall of one to two voxels. Every third one is a mask.
 pub fn thin_sheets(seed: u64) -> Surface {
     let mut random = stream(seed, Purpose::PhantomShape);
     let spacing = 3.0;
@@ -164,7 +164,7 @@ pub fn thin_sheets(seed: u64) -> Surface {
     extract(&field, &parameters, &Monitor::silent()).unwrap()
 }
 
-/// Smooth noise cut at a level: handles, cavities, crumbs.
+/// Smoothed noise, cut at a level: many handles, cavities and small components.
 pub fn noise(seed: u64) -> Surface {
     let mut random = stream(seed, Purpose::PhantomNoise);
     let n = 10 + (seed % 5) as usize;
@@ -205,7 +205,7 @@ pub fn noise(seed: u64) -> Surface {
     kept(&field, isolate)
 }
 
-/// Balls, rings and shells apart from one another, also one inside the other.
+/// Two to five balls, rings and hollow shells, apart from one another. Each shell contains a ball.
 pub fn several(seed: u64) -> Surface {
     let mut random = stream(seed, Purpose::PhantomShape);
     let kinds: Vec<(Vec3, f64, u64)> = (0..2 + seed % 4)
@@ -227,7 +227,7 @@ pub fn several(seed: u64) -> Surface {
             match kind {
                 0 => r - q.norm(),
                 1 => 3.2 - (q.xy().norm() - r.max(7.0)).hypot(q.z),
-                // A cavity inside, and a core in that.
+                // A shell, and a ball in its cavity.
                 _ => (2.5 - (q.norm() - 10.0).abs()).max(3.0 - q.norm()),
             }
         };
@@ -236,7 +236,7 @@ pub fn several(seed: u64) -> Surface {
     kept(&field, Isolate::None)
 }
 
-/// Rough solids far from any voxel grid, stretched and bent.
+/// Rough solids that do not come from a voxel grid, stretched and curved.
 pub fn rough(seed: u64) -> Surface {
     let mut random = stream(seed, Purpose::PhantomShape);
     let mut mesh = match seed % 3 {

@@ -1,12 +1,13 @@
-//! What every model promises, on families of random surfaces, by both methods and for many N:
-//! exactly N vertices, closed, edge- and vertex-manifold, every component with the genus and
-//! the orientation that it has on the surface, no self-intersection, the same bytes on any
-//! number of threads; or an error that names the reason, and, where N is too small, an N that
-//! then really does.
+//! The guarantees of every model, tested on families of random surfaces, both methods and many N.
 //!
-//! `VENTRIFORM_SEEDS=200 cargo test --release --test guarantees -- --nocapture` runs more
-//! surfaces of each family than CI does and prints how many were refused. With
-//! `VENTRIFORM_DUMP=DIR` some of the models are written there for other programs to judge.
+//! A model has exactly N vertices. It is closed and edge- and vertex-manifold, and does not
+//! intersect itself. Every component has the same genus and orientation as on the surface. The
+//! bytes are the same on any number of threads. If no such model can be made, the error gives the
+//! reason; if N is too small, the error names an N that works.
+//!
+//! `VENTRIFORM_SEEDS=200 cargo test --release --test guarantees -- --nocapture` tests more surfaces
+//! of each family than CI does and prints how many models were refused. `VENTRIFORM_DUMP=DIR`
+//! writes some of the models to DIR, so that other programs can check them.
 
 #![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
 
@@ -24,10 +25,10 @@ use ventriform::progress::Monitor;
 use ventriform::retile::{RetileError, retile};
 use ventriform::surface::Surface;
 
-/// Numbers of points, one after the other.
+/// Numbers of points; the sweeps take them in turn.
 const POINTS: [usize; 9] = [12, 150, 35, 300, 67, 20, 110, 500, 200];
 
-/// Answers to "which N would do" are tried out up to this many points.
+/// An N that an error names is tested up to this many points.
 const TRIED: usize = 1500;
 
 fn parameters(method: &str, points: usize, seed: u64) -> ModelParameters {
@@ -36,7 +37,7 @@ fn parameters(method: &str, points: usize, seed: u64) -> ModelParameters {
     ModelParameters::from_pairs(pairs).unwrap()
 }
 
-/// The stages that follow the surface, as the pipeline calls them.
+/// Re-tiling and optimisation, called as the pipeline does.
 fn model(surface: &Surface, parameters: &ModelParameters) -> Result<TriMesh, RetileError> {
     let tiled = retile(surface, &parameters.retile, &Monitor::silent())?;
     let reference = Reference::new(surface);
@@ -44,7 +45,7 @@ fn model(surface: &Surface, parameters: &ModelParameters) -> Result<TriMesh, Ret
     Ok(optimised.unwrap().mesh)
 }
 
-/// Euler characteristic of each component, and whether it faces outward; sorted.
+/// For each component its Euler characteristic and whether its normals point outward; sorted.
 fn components(mesh: &TriMesh) -> Vec<(i64, bool)> {
     let component = topology::components(mesh.vertices.len(), &mesh.triangles);
     let count = component.iter().max().map_or(0, |c| *c as usize + 1);
@@ -82,8 +83,8 @@ fn demand(surface: &Surface, points: usize, mesh: &TriMesh, what: &str) {
     assert_eq!(self_intersections(mesh), Vec::<[u32; 2]>::new(), "{what}");
 }
 
-/// Runs a family, `seeds` surfaces of it in CI; `refusable` is the share of models that may be
-/// refused. Refusals take longest: an answer to which N would do is found by trying.
+/// Tests `seeds` surfaces of a family (or `VENTRIFORM_SEEDS`). `refusable` is the largest share of
+/// models that may be refused. Refusals take longest: the N that works is found by trying.
 fn sweep(name: &str, family: fn(u64) -> Surface, seeds: u64, refusable: f64) {
     let seeds = std::env::var("VENTRIFORM_SEEDS").map_or(seeds, |s| s.parse().unwrap());
     let dump = std::env::var("VENTRIFORM_DUMP").ok();
@@ -104,10 +105,11 @@ fn sweep(name: &str, family: fn(u64) -> Surface, seeds: u64, refusable: f64) {
                 }
                 Err(RetileError::TooFewPoints { needed, .. }) => {
                     *refused.entry("too few points").or_default() += 1;
-                    assert!(needed > points, "{what}: {needed} are said to do");
+                    assert!(needed > points, "{what}: the error names {needed} points");
                     if needed <= TRIED {
                         let more = model(&surface, &parameters(method, needed, seed));
-                        let mesh = more.unwrap_or_else(|e| panic!("{what}: {needed} do not: {e}"));
+                        let mesh = more
+                            .unwrap_or_else(|e| panic!("{what}: {needed} points fail too: {e}"));
                         demand(&surface, needed, &mesh, &what);
                     }
                 }
@@ -151,7 +153,7 @@ fn thin_sheets_keep_every_promise() {
 
 #[test]
 fn noise_keeps_every_promise() {
-    // Dozens of components and handles: most N are too few.
+    // These surfaces have dozens of components and handles, so most N are too small.
     sweep("noise", families::noise, 2, 1.0);
 }
 
