@@ -52,6 +52,8 @@ pub mod evaluate;
 
 pub mod jobs;
 
+pub mod work;
+
 pub mod store;
 
 pub mod config;

@@ -14,11 +14,12 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use serde_json::Map;
-use ventriform::jobs::{Engine, Input, Stored, Work, WorkError};
+use ventriform::jobs::{LocalFile, StoredItem, Work, WorkError, WorkInput};
 use ventriform::progress::{CancelToken, Monitor, Silent};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
 use ventriform::volume::{ReadLimits, Volume};
+use ventriform::work::Engine;
 
 /// Most processor time after cancellation. The promise is 100 ms, also in this build, which is not
 /// the fastest one.
@@ -36,7 +37,11 @@ fn processor_time(thread: &str) -> Option<Duration> {
 
 /// Runs `work` on one thread and cancels it once that thread has used `limit` of processor time.
 /// Returns the outcome, the processor time in all, and that after the cancellation.
-fn run(work: &dyn Work, input: &Input, limit: Duration) -> (Result<(), WorkError>, [Duration; 2]) {
+fn run(
+    work: &dyn Work,
+    input: &WorkInput,
+    limit: Duration,
+) -> (Result<(), WorkError>, [Duration; 2]) {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
@@ -100,7 +105,7 @@ fn stops_wherever_it_is(
             nifti::write(volume, StoredType::Float32, true).unwrap(),
         )
         .unwrap();
-        path
+        LocalFile::in_place(path)
     };
     let engine = Engine::new(ReadLimits::default());
     let work = engine.work(kind).unwrap();
@@ -109,18 +114,18 @@ fn stops_wherever_it_is(
         .map(|(n, t)| ((*n).into(), (*t).into()))
         .collect();
     let stored = |(field, volume): &(&str, &Volume)| {
-        let stored = Stored {
+        let stored = StoredItem {
             id: "vol_0".into(),
             parameters: Map::new(),
             files: vec![file(field, volume)],
         };
         ((*field).to_owned(), stored)
     };
-    let input = Input {
+    let input = WorkInput {
         volume: "vol_1".into(),
         files: vec![file("scan", scan)],
         parameters: work.parameters_from_text(&pairs).unwrap(),
-        things: things.iter().map(stored).collect::<BTreeMap<_, _>>(),
+        items: things.iter().map(stored).collect::<BTreeMap<_, _>>(),
         library: Vec::new(),
     };
     let never = Duration::from_secs(3600);

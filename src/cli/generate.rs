@@ -6,6 +6,7 @@ use crate::pipeline::{self, Model};
 use crate::progress::{CancelToken, Monitor};
 use crate::report::Report;
 use crate::volume::{ReadLimits, VolumeFile};
+use crate::work::problems::Explain;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -51,7 +52,7 @@ pub fn run(args: &GenerateArgs) -> Result<()> {
     let monitor = Monitor::new(&bar, CancelToken::new());
     let made = pipeline::generate(&files, &parameters, &ReadLimits::default(), &monitor);
     bar.finish();
-    let model = made?;
+    let model = made.map_err(|error| anyhow::anyhow!(error.with_advice()))?;
     for (path, format) in args.output.iter().zip(formats) {
         let bytes = export::encode(format, &model.mesh, &model.metadata())?;
         write(path, &bytes)?;

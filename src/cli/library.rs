@@ -1,9 +1,10 @@
 //! `ventriform templates import`: models into the library of a service's data folder.
 
 use crate::config::Settings;
-use crate::jobs::{Engine, Queue, QueueSettings, SystemClock};
+use crate::jobs::{Queue, QueueSettings, SystemClock};
 use crate::store::Store;
 use crate::volume::ReadLimits;
+use crate::work::Engine;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use std::path::{Path, PathBuf};

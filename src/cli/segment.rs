@@ -7,6 +7,7 @@ use crate::progress::{CancelToken, Monitor, Plan};
 use crate::segmentation::Segmentation;
 use crate::segmentation::{NamedFile, NamedMesh, Order, from_files};
 use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeFile};
+use crate::work::problems::Explain;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -84,7 +85,7 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
     let bar = Bar::over(Plan::SEGMENTATION);
     let monitor = Monitor::new(&bar, CancelToken::new());
     let made = from_files(&order, &ReadLimits::default(), &monitor)
-        .map_err(|error| anyhow!("{error}. {}", error.fix()))
+        .map_err(|error| anyhow!(error.with_advice()))
         .and_then(|made| Ok((made.files(&args.formats, None, &monitor)?, made)));
     bar.finish();
     let (mut files, made) = made?;

@@ -2,8 +2,8 @@
 
 use crate::config::{Flags, LogFormat, Settings};
 use crate::http::{self, Running};
-use crate::jobs::Engine;
 use crate::volume::ReadLimits;
+use crate::work::Engine;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::net::{SocketAddr, TcpListener};

@@ -1,7 +1,8 @@
 //! What every handler can reach.
 
 use crate::config::Settings;
-use crate::jobs::{Engine, Queue};
+use crate::jobs::Queue;
+use crate::work::Engine;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Instant;

@@ -2,7 +2,7 @@
 
 use super::problem::{Answer, Problem};
 use super::request::{query_pairs, refuse_unknown};
-use crate::jobs::{Page, PageRequest};
+use crate::jobs::{ListPage, ListRequest};
 
 /// Entries of a page where nobody asks.
 const USUAL: u32 = 20;
@@ -13,7 +13,7 @@ const MOST: u32 = 100;
 pub fn list_query<const N: usize>(
     query: Option<&str>,
     own: [&'static str; N],
-) -> Answer<(PageRequest, [Option<String>; N])> {
+) -> Answer<(ListRequest, [Option<String>; N])> {
     let pairs = query_pairs(query);
     let known: Vec<&str> = ["limit", "cursor"].into_iter().chain(own).collect();
     refuse_unknown(&pairs, &known)?;
@@ -23,7 +23,7 @@ pub fn list_query<const N: usize>(
             .find(|(n, _)| n == name)
             .map(|(_, value)| value.clone())
     };
-    let page = PageRequest {
+    let page = ListRequest {
         before: value("cursor").map(|c| parse_cursor(&c)).transpose()?,
         limit: value("limit").map_or(Ok(USUAL), |l| parse_limit(&l))?,
     };
@@ -57,6 +57,6 @@ fn parse_cursor(text: &str) -> Answer<i64> {
 }
 
 /// The cursor of the page that follows.
-pub fn next_cursor<T>(page: &Page<T>) -> Option<String> {
+pub fn next_cursor<T>(page: &ListPage<T>) -> Option<String> {
     page.next.map(|sequence| sequence.to_string())
 }

@@ -10,7 +10,7 @@ use super::problem::{Answer, Problem, shorten};
 use super::request::{query_pairs, refuse_unknown};
 use super::wire::missing;
 use crate::export::Format;
-use crate::jobs::{Deleted, Page, Product, Resource};
+use crate::jobs::{Deleted, ListPage, Product, Resource};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
@@ -144,7 +144,7 @@ pub async fn get(app: &App, resource: Resource, id: &str, query: Option<&str>) -
 }
 
 /// A page of products.
-pub async fn list(app: &App, resource: Resource, query: Option<&str>) -> Answer<Page<Product>> {
+pub async fn list(app: &App, resource: Resource, query: Option<&str>) -> Answer<ListPage<Product>> {
     let (page, []) = list_query(query, [])?;
     Ok(app.queue.catalogue.products(resource, page).await?)
 }
@@ -228,7 +228,10 @@ async fn make_page(app: &App, product: &Product) -> Answer<String> {
     let Some(work) = app.engine.work(resource.noun()).cloned() else {
         return Err(no_such_file(resource, files::PAGE, &file_names(resource)));
     };
-    let stored = app.queue.shelved(product.clone());
+    let stored = app
+        .queue
+        .with_files(product.clone(), work.page_files())
+        .await?;
     let _permit = app.inspections.acquire().await.map_err(Problem::internal)?;
     let page = tokio::task::spawn_blocking(move || work.page(&stored));
     Ok(page.await.map_err(Problem::internal)??)

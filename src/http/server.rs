@@ -4,10 +4,11 @@ use super::app::App;
 use super::router::router;
 use crate::config::{Retention, Settings};
 use crate::jobs::{
-    Engine, Queue, QueueSettings, StoreError, SystemClock, Upkeep, WorkerSettings, Workers,
-    settle_after_a_crash,
+    Queue, QueueSettings, StoreError, SystemClock, Upkeep, WorkerSettings, Workers,
+    recover_after_crash,
 };
 use crate::store::{OpenError, Store};
+use crate::work::Engine;
 use axum_server::accept::Accept;
 use hyper_util::rt::TokioTimer;
 use std::io;
@@ -90,7 +91,7 @@ pub async fn start(
             workers: workers.workers,
         },
     ));
-    settle_after_a_crash(&queue, workers.attempt_limit).await?;
+    recover_after_crash(&queue, workers.attempt_limit).await?;
     let closing = CancellationToken::new();
     let app = App::new(
         queue.clone(),
@@ -112,7 +113,7 @@ pub async fn start(
         every: UPKEEP_EVERY,
     };
     tokio::spawn(upkeep.run(closing.clone()));
-    let workers = Workers::start(&queue, &engine, workers)?;
+    let workers = Workers::start(&queue, &engine.works, workers)?;
     tracing::info!(%address, "listening");
     Ok(Running {
         address,

@@ -8,7 +8,7 @@ use super::problem::{Answer, Problem};
 use super::products::{self, Download, Offer, Software};
 use super::request::{self, Path, query_pairs, refuse_unknown};
 use super::wire::{path_of, rfc3339};
-use crate::jobs::{PageRequest, Product, Resource};
+use crate::jobs::{ListRequest, Product, Resource};
 use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{RawQuery, Request, State};
@@ -173,7 +173,7 @@ fn check_name(name: &str) -> Answer<()> {
 
 async fn refuse_when_full(app: &App) -> Answer<()> {
     let limit = app.settings.template_limit;
-    let page = PageRequest {
+    let page = ListRequest {
         before: None,
         limit,
     };

@@ -7,7 +7,8 @@ use super::problem::{Answer, Problem};
 use super::request::{Path, query_pairs, refuse_unknown, unknown};
 use super::wire::{missing, path_of, rfc3339};
 use super::{products, upload};
-use crate::jobs::{self, Resource};
+use crate::jobs::{Resource, StoreError, StoredVolume};
+use crate::work::UploadFacts;
 use axum::Json;
 use axum::extract::{RawQuery, Request, State};
 use axum::http::{StatusCode, header};
@@ -94,11 +95,13 @@ pub struct VolumeList {
     next_cursor: Option<String>,
 }
 
-impl From<jobs::Volume> for Volume {
-    fn from(volume: jobs::Volume) -> Self {
+impl TryFrom<StoredVolume> for Volume {
+    type Error = StoreError;
+
+    fn try_from(volume: StoredVolume) -> Result<Self, StoreError> {
         let itself = path_of(&volume.id);
-        let facts = volume.facts;
-        Self {
+        let facts = UploadFacts::of(&volume)?;
+        Ok(Self {
             created_at: rfc3339(volume.created_at),
             bytes: volume.bytes,
             files: volume.files.len(),
@@ -124,7 +127,7 @@ impl From<jobs::Volume> for Volume {
                 itself,
             },
             id: volume.id,
-        }
+        })
     }
 }
 
@@ -164,7 +167,7 @@ pub async fn create_volume(
         StatusCode::OK
     };
     let location = [(header::LOCATION, path_of(&volume.id))];
-    Ok((status, location, Json(Volume::from(volume))).into_response())
+    Ok((status, location, Json(Volume::try_from(volume)?)).into_response())
 }
 
 /// List volumes
@@ -179,7 +182,11 @@ pub async fn list_volumes(
     let page = app.queue.catalogue.volumes(page).await?;
     Ok(Json(VolumeList {
         next_cursor: next_cursor(&page),
-        volumes: page.items.into_iter().map(Volume::from).collect(),
+        volumes: page
+            .items
+            .into_iter()
+            .map(Volume::try_from)
+            .collect::<Result<_, _>>()?,
     }))
 }
 
@@ -193,7 +200,7 @@ pub async fn get_volume(
     RawQuery(query): RawQuery,
 ) -> Answer<Json<Volume>> {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    Ok(Json(find(&app, &id).await?.into()))
+    Ok(Json(find(&app, &id).await?.try_into()?))
 }
 
 /// Look at a volume
@@ -210,10 +217,11 @@ pub async fn preview_volume(
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let volume = find(&app, &id).await?;
-    let paths = app.queue.blobs.paths(&volume.id, &volume.files);
+    let files = app.queue.volume_files(&id, &volume.files).await?;
+    let files = files.ok_or_else(|| Problem::internal(format!("a file of {id} is missing")))?;
     let _permit = app.inspections.acquire().await.map_err(Problem::internal)?;
     let reader = app.engine.reader.clone();
-    let png = tokio::task::spawn_blocking(move || reader.preview(&paths))
+    let png = tokio::task::spawn_blocking(move || reader.preview(&files))
         .await
         .map_err(Problem::internal)?
         .map_err(Problem::internal)?;
@@ -239,7 +247,7 @@ pub async fn delete_volume(
     products::erase(&app, Resource::Volume, &id, query.as_deref()).await
 }
 
-async fn find(app: &App, id: &str) -> Answer<jobs::Volume> {
+async fn find(app: &App, id: &str) -> Answer<StoredVolume> {
     match app.queue.catalogue.volume(id).await? {
         Some(volume) => Ok(volume),
         None => Err(missing(&*app.queue.catalogue, Resource::Volume, id).await),

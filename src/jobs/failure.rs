@@ -1,41 +1,42 @@
-//! Why something was refused or did not come to an end, in a form that outlives the process.
+//! Why a request was rejected or a job failed, in a form that is stored with the job.
 
 use serde::{Deserialize, Serialize};
 
-/// A reason with the way out. Kept with a failed job; becomes a problem object over HTTP.
+/// A reason with advice. It is stored with a failed job and becomes a problem object over HTTP.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[error("{detail}")]
 pub struct Failure {
-    /// A stable word for programs: `no-surface`, `job-time-limit` ...
+    /// A stable identifier for programs: `no-surface`, `job-time-limit` ...
     pub code: String,
-    /// Whose fault it is; decides the status.
+    /// Where the cause lies; this decides the HTTP status.
     pub fault: Fault,
-    /// What happened, with the values concerned. No patient data, no internals.
+    /// What happened, with the values involved, as a sentence. Contains neither patient data nor
+    /// internals of the service.
     pub detail: String,
-    /// The parameter or header field concerned.
+    /// The parameter, or the field of the file, that caused it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field: Option<String>,
-    /// What to do about it.
+    /// What to do about it, as a sentence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fix: Option<String>,
 }
 
-/// Whose fault a [`Failure`] is.
+/// Where the cause of a [`Failure`] lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fault {
-    /// The request: a parameter or the form of the call.
+    /// In the request: a parameter, or the form of the call.
     Request,
-    /// The file or what it shows.
+    /// In the uploaded file or its content.
     Content,
-    /// It is larger than the operator allows.
+    /// The file exceeds a limit set by the operator.
     TooLarge,
-    /// Ours.
+    /// In the service.
     Service,
 }
 
 impl Failure {
-    /// A failure without field and fix; add them with [`Failure::at`] and [`Failure::fix`].
+    /// A failure without field and advice; add them with [`Failure::at`] and [`Failure::fix`].
     pub fn new(fault: Fault, code: &str, detail: impl Into<String>) -> Self {
         Self {
             code: code.into(),
@@ -46,14 +47,14 @@ impl Failure {
         }
     }
 
-    /// Names the field concerned.
+    /// Sets the field that caused the failure.
     #[must_use]
     pub fn at(mut self, field: impl Into<String>) -> Self {
         self.field = Some(field.into());
         self
     }
 
-    /// Says what to do about it.
+    /// Sets the advice.
     #[must_use]
     pub fn fix(mut self, fix: impl Into<String>) -> Self {
         self.fix = Some(fix.into());

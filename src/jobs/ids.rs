@@ -1,9 +1,9 @@
-//! Names of things: by content, the same on every machine; jobs by chance, ordered by time.
+//! Ids: derived from the content, or random and ordered by time.
 
 use sha2::{Digest, Sha256};
 
-/// `prefix` and the first 128 bits of the SHA-256 over `parts`, each preceded by its length
-/// so that no two lists of parts read the same.
+/// `prefix` followed by the first 128 bits of the SHA-256 of `parts`, as 32 hexadecimal digits.
+/// Each part is hashed with its length, so `["ab", "c"]` and `["a", "bc"]` give different ids.
 pub fn content_id<'a>(prefix: &str, parts: impl IntoIterator<Item = &'a [u8]>) -> String {
     let mut hash = Sha256::new();
     for part in parts {
@@ -14,7 +14,7 @@ pub fn content_id<'a>(prefix: &str, parts: impl IntoIterator<Item = &'a [u8]>) -
     format!("{prefix}{}", hex(&digest[..16]))
 }
 
-/// `prefix` and a UUID of version 7.
+/// `prefix` followed by a UUID of version 7 (random, ordered by time).
 pub fn random_id(prefix: &str) -> String {
     format!("{prefix}{}", uuid::Uuid::now_v7().simple())
 }
@@ -32,7 +32,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_are_kept_apart() {
+    fn the_boundaries_of_parts_change_the_id() {
         let id = |parts: &[&str]| content_id("vol_", parts.iter().map(|p| p.as_bytes()));
         assert_eq!(id(&["ab", "c"]), id(&["ab", "c"]));
         assert_ne!(id(&["ab", "c"]), id(&["a", "bc"]));

@@ -1,91 +1,91 @@
-//! A job and its life: `queued -> running -> succeeded | failed | cancelled`, and back from
-//! `running` to `queued` when its worker was lost.
+//! A job and its states: `queued -> running -> succeeded | failed | cancelled`, and from
+//! `running` back to `queued` when its worker was lost.
 
 use super::{Failure, Timestamp};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
-/// Where a job is in its life.
+/// The state of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum State {
-    /// Waits for a worker.
+pub enum JobState {
+    /// Waiting for a worker.
     Queued,
-    /// A worker holds it.
+    /// Claimed by a worker.
     Running,
-    /// Its result is there.
+    /// Finished; the result is stored.
     Succeeded,
-    /// It ended with a [`Failure`].
+    /// Finished with a [`Failure`].
     Failed,
-    /// Somebody ended it.
+    /// Ended on request.
     Cancelled,
 }
 
-impl State {
-    /// Every state, in the order of a job's life.
-    pub const ALL: [State; 5] = [
-        State::Queued,
-        State::Running,
-        State::Succeeded,
-        State::Failed,
-        State::Cancelled,
+impl JobState {
+    /// Every state, in the order in which a job goes through them.
+    pub const ALL: [JobState; 5] = [
+        JobState::Queued,
+        JobState::Running,
+        JobState::Succeeded,
+        JobState::Failed,
+        JobState::Cancelled,
     ];
 
     /// The state's name in the database and over HTTP.
     pub fn as_str(self) -> &'static str {
         match self {
-            State::Queued => "queued",
-            State::Running => "running",
-            State::Succeeded => "succeeded",
-            State::Failed => "failed",
-            State::Cancelled => "cancelled",
+            JobState::Queued => "queued",
+            JobState::Running => "running",
+            JobState::Succeeded => "succeeded",
+            JobState::Failed => "failed",
+            JobState::Cancelled => "cancelled",
         }
     }
 
-    /// The state of that name.
+    /// The state with that name.
     pub fn parse(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|state| state.as_str() == name)
     }
 
-    /// Whether nothing will change any more.
+    /// Whether the job has ended. A job that has ended never changes again.
     pub fn is_final(self) -> bool {
-        !matches!(self, State::Queued | State::Running)
+        !matches!(self, JobState::Queued | JobState::Running)
     }
 }
 
-/// One row of the queue.
+/// One row of the jobs table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Job {
     /// `job_...`
     pub id: String,
-    /// Order of filing; grows by one with each job.
+    /// Position in the order of filing.
     pub sequence: i64,
-    /// What kind of work it is: `model`, `segmentation`.
+    /// The kind of work: `model`, `segmentation`.
     pub kind: String,
-    /// The volume it works on.
+    /// Id of the volume to work on.
     pub volume: String,
-    /// The parameters, checked, every default written out.
+    /// The validated parameters, with every default written out.
     pub parameters: Map<String, Value>,
-    /// Where it is in its life.
-    pub state: State,
-    /// The stage of the work, once one was reported.
+    /// The state.
+    pub state: JobState,
+    /// The current stage of the work, once one was reported.
     pub stage: Option<String>,
-    /// How much is done, 0..=1.
+    /// The completed fraction, 0..=1.
     pub progress: f64,
-    /// How often a worker took it.
+    /// How often a worker has claimed the job.
     pub attempts: u32,
-    /// Grows with every change; the id of its events.
+    /// Increases with every change; the id of the job's events.
     pub revision: i64,
-    /// Whether somebody asked for its end.
+    /// Whether cancellation was requested.
     pub cancel_requested: bool,
-    /// When it was accepted.
+    /// When the job was accepted.
     pub created_at: Timestamp,
-    /// When a worker last took it.
+    /// When a worker last claimed it.
     pub started_at: Option<Timestamp>,
-    /// When it came to its end.
+    /// When it ended.
     pub finished_at: Option<Timestamp>,
     /// Why it failed.
     pub failure: Option<Failure>,
-    /// What it made.
+    /// Id of the product it made.
     pub result: Option<String>,
 }
 
@@ -96,39 +96,39 @@ pub struct NewJob {
     pub kind: String,
     /// See [`Job::volume`].
     pub volume: String,
-    /// What the work needs besides the volume: field of the parameters and id.
+    /// Other stored items the work needs: parameter name to id.
     pub needs: BTreeMap<String, String>,
     /// See [`Job::parameters`].
     pub parameters: Map<String, Value>,
-    /// The caller's `Idempotency-Key` and what it stood for.
+    /// The client's `Idempotency-Key`, with a hash of the request.
     pub idempotency: Option<Idempotency>,
 }
 
-/// A caller's promise that two requests are one.
+/// Marks repeated requests as one: the same key with the same fingerprint files one job.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Idempotency {
     /// The key.
     pub key: String,
-    /// A hash of the request it came with.
+    /// A hash of the request sent with the key.
     pub fingerprint: String,
 }
 
-/// What became of an attempt to file a job.
+/// The result of filing a job.
 #[derive(Debug, Clone)]
 pub enum Filed {
-    /// Accepted and durable.
+    /// Accepted and on disk.
     New(Job),
-    /// Accepted earlier, under the same key with the same request.
+    /// Accepted earlier, under the same idempotency key with the same request.
     Same(Job),
-    /// The key was used for another request.
+    /// Rejected: the idempotency key was used for a different request.
     KeyReused,
-    /// As many wait as may wait.
+    /// Rejected: the queue is full.
     QueueFull,
-    /// Something that it needs does not exist (any more).
+    /// Rejected: an item that the job needs does not exist, or was deleted.
     Missing {
-        /// `volume`, or the field of the parameters.
+        /// `volume`, or the parameter that names the item.
         field: String,
-        /// The id in it.
+        /// The id given there.
         id: String,
     },
 }

@@ -1,64 +1,60 @@
-//! Jobs: what was asked for, who computes it, and what came of it.
+//! The job queue: durable jobs, leases, workers, and the interfaces to storage.
 //!
 //! ```text
-//! http ──file──> Queue ──JobStore──> rows, durable before the answer
-//!                  │ wakes
-//!                Worker ──claim──> Work::run ──publish──> blobs, then one commit
+//! client ──file──> Queue ──> JobStore      the row is on disk before the call returns
+//!                    │ wakes
+//!                 Workers ──claim──> Work::run ──> BlobStore, then one commit of the row
 //! ```
 //!
-//! The jobs table is the API's truth *and* the queue. A worker claims a job with one
-//! statement that counts the attempt and sets a lease: a token and an expiry. Whatever the
-//! worker writes later names the token, so a worker that lost its lease changes nothing.
+//! The queue does not know what its jobs compute. A job has an id, a kind, a lease, a state and
+//! parameters as JSON; a [`Work`] is registered for each kind and computes it.
 //!
-//! Guaranteed: a job is durable before anybody hears of it; after a crash at any moment every
-//! accepted job is computed again and committed once; a job that brings the process down is
-//! given up after a set number of attempts, and says so. A panic in the work fails the job and
-//! nothing else. Cancelling reaches the work through its token, as fast as the work looks.
+//! The jobs table is both the API's record and the queue. A worker claims a job with one
+//! statement, which counts the attempt and sets a lease: a secret token and an expiry time. Every
+//! later write of that worker names the token, so a worker that has lost its lease cannot change
+//! the job any more.
 //!
-//! Not guaranteed: that a job is *computed* once. It is at least once; the commit is once.
+//! Guaranteed:
+//! - a job is on disk before [`Queue::file`] returns;
+//! - after a crash at any moment, every accepted job is computed again, and its result is
+//!   committed once;
+//! - a job whose computation ends the process is failed after a set number of attempts;
+//! - a panic in the computation fails that job only;
+//! - cancelling raises the [`CancelToken`](crate::progress::CancelToken) of the computation.
 //!
-//! The traits that this needs of the outside are here: [`JobStore`], [`Catalogue`] and
-//! [`BlobStore`] (implemented in `store`), [`Clock`], and [`Work`], which the pipeline
-//! fulfils.
+//! Not guaranteed: that a job is computed only once. It is computed at least once.
+//!
+//! | where | what |
+//! |---|---|
+//! | `job`, `resource`, `ids`, `failure` | a job and its states, kinds of ids, reasons for failing |
+//! | `work` | what a kind of job must provide, its input and its output |
+//! | `queue` | filing, waiting for and cancelling jobs; publishing results; recovery, retention |
+//! | `worker` | claiming jobs, renewing leases, reporting progress, committing |
+//! | `storage` | the traits that a database and a file store implement |
 
-mod blobs;
-mod checked;
 mod clock;
 mod failure;
-mod generation;
 mod ids;
-mod input;
 mod job;
-mod page;
-mod product;
-mod progress;
-mod publish;
 mod queue;
-mod reader;
 mod resource;
-mod runner;
-mod segmentation;
-mod store;
-mod upkeep;
-mod volume;
+mod storage;
 mod work;
 mod worker;
 
-pub use blobs::{BlobError, BlobStore, BlobStream, Staged};
-pub use clock::{Clock, ManualClock, SystemClock, Timestamp};
+pub use clock::{Clock, SystemClock, Timestamp};
 pub use failure::{Failure, Fault};
-pub use generation::Generation;
 pub(crate) use ids::hex;
 pub use ids::{content_id, random_id};
-pub use job::{Filed, Idempotency, Job, NewJob, State};
-pub use page::{Page, PageRequest};
-pub use product::{Product, ProductFile};
-pub use queue::{Queue, QueueSettings, Standing};
-pub use reader::Reader;
+pub use job::{Filed, Idempotency, Job, JobState, NewJob};
+pub use queue::{Queue, QueuePosition, QueueSettings, Upkeep, recover_after_crash};
 pub use resource::Resource;
-pub use segmentation::Fitting;
-pub use store::{Catalogue, Deleted, Interrupted, JobStore, Lease, Load, Outcome, StoreError};
-pub use upkeep::{Upkeep, settle_after_a_crash};
-pub use volume::{Intensity, Volume, VolumeFacts};
-pub use work::{Engine, Input, Needs, Output, OutputFile, Stored, VolumeReader, Work, WorkError};
+pub use storage::{
+    BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Deleted, Interrupted, JobOutcome,
+    JobStore, Lease, ListPage, ListRequest, LocalFile, Product, ProductFile, QueueLoad,
+    StagedFiles, StoreError, StoredVolume,
+};
+pub use work::{
+    GivenParameters, Needs, OutputFile, StoredItem, Work, WorkError, WorkInput, WorkOutput, Works,
+};
 pub use worker::{WorkerSettings, Workers};

@@ -1,17 +1,17 @@
-//! The kinds of things that have an id, in one table.
+//! The kinds of items that have an id.
 
-/// A kind of thing. Its name is the start of its ids, its path over HTTP and its shelf.
+/// A kind of item. It decides the prefix of ids, the path over HTTP and the folder of files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Resource {
     /// An upload.
     Volume,
-    /// A surface model of a volume.
+    /// A surface model made from a volume.
     Model,
     /// A model fitted to a volume.
     Segmentation,
-    /// A model of the library: what `auto` tries.
+    /// A model of the library, tried by `model=auto`.
     Template,
-    /// Work that was asked for.
+    /// A job.
     Job,
 }
 
@@ -26,14 +26,14 @@ impl Resource {
     ];
 
     /// The kinds that have files.
-    pub const SHELVED: [Resource; 4] = [
+    pub const WITH_FILES: [Resource; 4] = [
         Resource::Volume,
         Resource::Model,
         Resource::Segmentation,
         Resource::Template,
     ];
 
-    /// What its ids begin with.
+    /// The prefix of its ids.
     pub fn prefix(self) -> &'static str {
         match self {
             Resource::Volume => "vol_",
@@ -44,7 +44,7 @@ impl Resource {
         }
     }
 
-    /// One of them.
+    /// Its name, singular. Also the kind of the jobs that make it.
     pub fn noun(self) -> &'static str {
         match self {
             Resource::Volume => "volume",
@@ -55,7 +55,7 @@ impl Resource {
         }
     }
 
-    /// Several of them: their path over HTTP and their shelf in the file store.
+    /// Its name, plural: the path over HTTP and the folder in the file store.
     pub fn plural(self) -> &'static str {
         match self {
             Resource::Volume => "volumes",
@@ -66,7 +66,7 @@ impl Resource {
         }
     }
 
-    /// The kind of thing that an id names.
+    /// The kind of item that `id` names, by its prefix.
     pub fn of(id: &str) -> Option<Self> {
         Self::ALL
             .into_iter()

@@ -1,116 +1,111 @@
-//! What the service asks of the domain: to look at a volume, and to do work on it.
+//! What a kind of job provides: its parameters, its computation, its input and output.
 
-use super::{Failure, Fitting, Generation, Reader, Resource, VolumeFacts};
+use super::{Failure, LocalFile, Resource};
 use crate::progress::{Cancelled, Monitor, Plan};
-use crate::volume::ReadLimits;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
-use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Looks at what was sent. Called on blocking threads.
-pub trait VolumeReader: Send + Sync + 'static {
-    /// Reads and checks the files of one volume.
-    ///
-    /// # Errors
-    /// Why the files are no volume that can be used.
-    fn inspect(&self, files: &[PathBuf]) -> Result<VolumeFacts, Failure>;
-
-    /// Three orthogonal middle slices as a PNG.
-    ///
-    /// # Errors
-    /// As [`VolumeReader::inspect`].
-    fn preview(&self, files: &[PathBuf]) -> Result<Vec<u8>, Failure>;
-
-    /// Reads and checks a JSON mesh that shall serve as a template of `organ`. The output is
-    /// the template: its main figures and every download.
-    ///
-    /// # Errors
-    /// Why the mesh cannot be fitted.
-    fn template(&self, mesh: &[u8], organ: &str) -> Result<Output, Failure>;
-}
-
-/// One kind of work. Called on a worker's threads.
+/// One kind of work. Its methods are called on blocking threads.
 pub trait Work: Send + Sync + 'static {
-    /// What it makes; also the kind's name in jobs.
+    /// What it makes. [`Resource::noun`] is the kind's name in jobs.
     fn makes(&self) -> Resource;
 
-    /// Its stages, and what share of the time each takes.
+    /// Its stages, with each stage's share of the time.
     fn plan(&self) -> Plan;
 
-    /// Checks parameters given as text and writes every default out.
+    /// Validates parameters and writes every default out.
+    ///
+    /// # Errors
+    /// The first parameter that cannot be used.
+    fn check_parameters(&self, given: GivenParameters<'_>) -> Result<Map<String, Value>, Failure>;
+
+    /// [`Work::check_parameters`] of text, as from a query string.
     ///
     /// # Errors
     /// The first parameter that cannot be used.
     fn parameters_from_text(
         &self,
         pairs: &[(String, String)],
-    ) -> Result<Map<String, Value>, Failure>;
+    ) -> Result<Map<String, Value>, Failure> {
+        self.check_parameters(GivenParameters::Text(pairs))
+    }
 
-    /// Checks parameters given as JSON and writes every default out.
+    /// [`Work::check_parameters`] of a JSON object.
     ///
     /// # Errors
     /// The first parameter that cannot be used.
     fn parameters_from_json(
         &self,
         object: &Map<String, Value>,
-    ) -> Result<Map<String, Value>, Failure>;
+    ) -> Result<Map<String, Value>, Failure> {
+        self.check_parameters(GivenParameters::Json(object))
+    }
 
-    /// What else of the store these parameters call for. Nothing, usually.
+    /// What the work needs besides the volume, given these parameters. Nothing by default.
     fn needs(&self, _parameters: &Map<String, Value>) -> Needs {
         Needs::default()
     }
 
-    /// Does the work. Reports progress, and looks at the token at least every 50 ms.
+    /// Does the work. Reports progress, and checks the cancel token at least every 50 ms.
     ///
     /// # Errors
     /// [`WorkError::Cancelled`] if the token was raised, else the reason.
-    fn run(&self, input: &Input, monitor: &Monitor<'_>) -> Result<Output, WorkError>;
+    fn run(&self, input: &WorkInput, monitor: &Monitor<'_>) -> Result<WorkOutput, WorkError>;
 
-    /// The report on what it made as a page for people, of the files that are kept of it.
-    /// Called on blocking threads.
+    /// Names of the product's files from which [`Work::page`] is made.
+    fn page_files(&self) -> &'static [&'static str];
+
+    /// The report on a product as an HTML page, made from the product's files.
     ///
     /// # Errors
-    /// If the files cannot be read or are not understood.
-    fn page(&self, stored: &Stored) -> Result<String, Failure>;
+    /// If a file is missing, cannot be read or cannot be parsed.
+    fn page(&self, product: &StoredItem) -> Result<String, Failure>;
 }
 
-/// What work calls for besides its volume.
+/// Parameters as they were given.
+#[derive(Debug, Clone, Copy)]
+pub enum GivenParameters<'a> {
+    /// Pairs of name and text.
+    Text(&'a [(String, String)]),
+    /// A JSON object; types are strict.
+    Json(&'a Map<String, Value>),
+}
+
+/// What work needs besides its volume.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Needs {
-    /// Field of the parameters and the id of the thing in it.
-    pub things: BTreeMap<String, String>,
-    /// Whether it wants the library of templates.
+    /// Volumes and products named by parameters: parameter name to id.
+    pub items: BTreeMap<String, String>,
+    /// Whether it needs every template of the library.
     pub library: bool,
+    /// Names of the files it reads of each product and template. All files of a volume are
+    /// provided.
+    pub files: &'static [&'static str],
 }
 
-/// A stored thing as work finds it.
+/// A stored volume or product, with local copies of its files.
 #[derive(Debug, Clone)]
-pub struct Stored {
+pub struct StoredItem {
     /// Its id.
     pub id: String,
-    /// The parameters that it was made by; none for a volume.
+    /// The parameters it was made with; empty for a volume.
     pub parameters: Map<String, Value>,
-    /// Its files.
-    pub files: Vec<PathBuf>,
+    /// The requested files, those that exist.
+    pub files: Vec<LocalFile>,
 }
 
-impl Stored {
-    /// The file of that name.
-    pub fn file(&self, name: &str) -> Option<&PathBuf> {
-        self.files.iter().find(|path| path.ends_with(name))
-    }
-
-    /// The content of the file of that name; `None` where there is none (any more).
+impl StoredItem {
+    /// The content of the file with that name; `None` if it does not exist or was deleted.
     ///
     /// # Errors
-    /// If it is there but cannot be read.
+    /// If the file exists but cannot be read.
     pub fn read(&self, name: &str) -> std::io::Result<Option<Vec<u8>>> {
-        let Some(path) = self.file(name) else {
+        let Some(file) = self.files.iter().find(|file| file.ends_with(name)) else {
             return Ok(None);
         };
-        match std::fs::read(path) {
+        match std::fs::read(file) {
             Ok(bytes) => Ok(Some(bytes)),
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
             Err(error) => Err(error),
@@ -120,34 +115,34 @@ impl Stored {
 
 /// What a job works on.
 #[derive(Debug, Clone)]
-pub struct Input {
-    /// The volume's id, for the result to name.
+pub struct WorkInput {
+    /// Id of the volume.
     pub volume: String,
-    /// The volume's files.
-    pub files: Vec<PathBuf>,
-    /// Parameters as the same [`Work`] wrote them out.
+    /// Files of the volume.
+    pub files: Vec<LocalFile>,
+    /// Parameters, as the same [`Work`] wrote them out.
     pub parameters: Map<String, Value>,
-    /// What [`Work::needs`] named, by field.
-    pub things: BTreeMap<String, Stored>,
-    /// The templates, by id, where [`Work::needs`] asked for them.
-    pub library: Vec<Stored>,
+    /// The items of [`Needs::items`], by parameter name.
+    pub items: BTreeMap<String, StoredItem>,
+    /// The templates in the order of their ids, if [`Needs::library`] asked for them.
+    pub library: Vec<StoredItem>,
 }
 
 /// What a job made.
 #[derive(Debug, Clone, Default)]
-pub struct Output {
+pub struct WorkOutput {
     /// Counts and main figures.
     pub summary: Map<String, Value>,
-    /// The downloads.
+    /// The files.
     pub files: Vec<OutputFile>,
 }
 
-/// One download.
+/// One file of a [`WorkOutput`].
 #[derive(Debug, Clone)]
 pub struct OutputFile {
     /// Its name: `mesh.glb`, `report.json` ...
     pub name: String,
-    /// Its `Content-Type`.
+    /// Its media type.
     pub media_type: &'static str,
     /// Its content.
     pub bytes: Vec<u8>,
@@ -156,10 +151,10 @@ pub struct OutputFile {
 /// Why work made nothing.
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum WorkError {
-    /// The token was raised.
+    /// The cancel token was raised.
     #[error("cancelled")]
     Cancelled,
-    /// A reason for the caller.
+    /// It failed.
     #[error(transparent)]
     Failed(#[from] Failure),
 }
@@ -170,29 +165,24 @@ impl From<Cancelled> for WorkError {
     }
 }
 
-/// All that the service can do with volumes.
+/// The kinds of work that this process can do.
 #[derive(Clone)]
-pub struct Engine {
-    /// Looks at what was sent.
-    pub reader: Arc<dyn VolumeReader>,
-    /// The kinds of work.
-    pub works: Vec<Arc<dyn Work>>,
-}
+pub struct Works(Vec<Arc<dyn Work>>);
 
-impl Engine {
-    /// The real one, within `limits`.
-    pub fn new(limits: ReadLimits) -> Self {
-        Self {
-            reader: Arc::new(Reader { limits }),
-            works: vec![
-                Arc::new(Generation { limits }),
-                Arc::new(Fitting { limits }),
-            ],
-        }
+impl Works {
+    /// The work of that kind.
+    pub fn of_kind(&self, kind: &str) -> Option<&Arc<dyn Work>> {
+        self.iter().find(|work| work.makes().noun() == kind)
     }
 
-    /// The work of that kind.
-    pub fn work(&self, kind: &str) -> Option<&Arc<dyn Work>> {
-        self.works.iter().find(|work| work.makes().noun() == kind)
+    /// Every kind of work.
+    pub fn iter(&self) -> std::slice::Iter<'_, Arc<dyn Work>> {
+        self.0.iter()
+    }
+}
+
+impl FromIterator<Arc<dyn Work>> for Works {
+    fn from_iter<I: IntoIterator<Item = Arc<dyn Work>>>(works: I) -> Self {
+        Self(works.into_iter().collect())
     }
 }

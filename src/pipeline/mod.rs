@@ -4,7 +4,6 @@
 //! nothing else. The stages guarantee what they hand on; the last look is
 //! [`Report::is_sound`], and a model that is not sound is an error, never a result.
 
-pub mod pages;
 pub mod starts;
 
 use crate::export::Metadata;
@@ -98,19 +97,6 @@ impl PipelineError {
             PipelineError::Retile(RetileError::Cancelled(_)) => None,
             PipelineError::Retile(_) => Some("points"),
             _ => None,
-        }
-    }
-
-    /// What the caller can do about it.
-    pub fn fix(&self) -> String {
-        match self {
-            PipelineError::Volume(e) => e.fix(),
-            PipelineError::Surface(e) => e.fix(),
-            PipelineError::Retile(e) => e.fix(),
-            PipelineError::Optimise(_) | PipelineError::Unsound { .. } => {
-                "Try another `seed`, more `points`, or `topology=genus0`.".into()
-            }
-            PipelineError::Cancelled(_) => "Ask again if the result is still wanted.".into(),
         }
     }
 }

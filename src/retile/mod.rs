@@ -215,36 +215,6 @@ pub enum RetileError {
     },
 }
 
-impl RetileError {
-    /// What the caller can do about it.
-    pub fn fix(&self) -> String {
-        match self {
-            RetileError::Cancelled(_) => "Ask again if the result is still wanted.".into(),
-            RetileError::TooFewPoints { needed, .. } => {
-                format!("Set `points` to {needed} or more, or `topology` to genus0.")
-            }
-            RetileError::NotCarried { .. } => {
-                "More points do not help. Set `topology` to genus0, or `isolate` to one component; \
-                 where the object is only two or three voxels thick, choose another `iso` or \
-                 smooth the volume."
-                    .into()
-            }
-            RetileError::TooManyPoints { limit, .. } => {
-                format!("Set `points` to {limit} or fewer.")
-            }
-            RetileError::OpenSurface(_) | RetileError::NoArea => {
-                "Give a closed surface of finite size.".into()
-            }
-            RetileError::SelfIntersecting { .. } => {
-                "Choose another `iso`, or smooth the volume.".into()
-            }
-            RetileError::BadParameter { name, range, .. } => {
-                format!("Set `{name}` to a value in {range}.")
-            }
-        }
-    }
-}
-
 /// Re-tiles `surface`.
 ///
 /// # Errors

@@ -17,8 +17,7 @@ use crate::parameters::{FitParameters, ParameterError};
 use crate::progress::{Cancelled, Monitor};
 use crate::segmentation::built_in;
 use crate::segmentation::{
-    self, ExpertError, NamedTemplate, Refused, Segmentation, SegmentationError,
-    SegmentationParameters,
+    self, NamedTemplate, Refused, Segmentation, SegmentationError, SegmentationParameters,
 };
 use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeFile};
 
@@ -109,9 +108,6 @@ pub enum SegmentError {
     Cancelled(#[from] Cancelled),
 }
 
-/// What to do about work that was ended on demand.
-const AGAIN: &str = "Ask again if the result is still wanted.";
-
 impl SegmentError {
     /// Whether the work ended because it was asked to, in whichever stage.
     pub fn is_cancelled(&self) -> bool {
@@ -151,64 +147,6 @@ impl SegmentError {
             | SegmentError::Segmentation(SegmentationError::NoTemplate) => Some("model"),
             SegmentError::Segmentation(SegmentationError::Cancelled(_))
             | SegmentError::Cancelled(_) => None,
-        }
-    }
-
-    /// What the caller can do about it.
-    pub fn fix(&self) -> String {
-        match self {
-            SegmentError::Volume(error) | SegmentError::ExpertVolume(error) => error.fix(),
-            SegmentError::Parameter(error) => error.fix.clone(),
-            SegmentError::Unreadable { .. } => {
-                "Give a JSON mesh as `generate` writes it (mesh.json).".into()
-            }
-            SegmentError::Model { error, .. } => match error {
-                TemplateError::NoCup { .. } => {
-                    "Give a model of a left ventricle, or `organ` the word for what this one \
-                     shows."
-                        .into()
-                }
-                TemplateError::TooLarge { limit, .. } => {
-                    format!("Give a model of at most {limit} points.")
-                }
-                _ => "Give a closed surface that faces outward, in LPS millimetres.".into(),
-            },
-            SegmentError::OtherOrgan { shows, .. } => {
-                format!("Give a model of that organ, or `organ` the word {shows}.")
-            }
-            SegmentError::NoModel { .. }
-            | SegmentError::Segmentation(SegmentationError::NoTemplate) => {
-                "Name a model in `model`, or add one to the library.".into()
-            }
-            SegmentError::Segmentation(SegmentationError::Expert(error)) => match error {
-                ExpertError::Empty => {
-                    "Give a mask whose voxels are above 0.5 where the organ is.".into()
-                }
-                ExpertError::Elsewhere { .. } => {
-                    "Give a mask of this very scan, with its place in the patient in the header."
-                        .into()
-                }
-                ExpertError::Cancelled(_) => AGAIN.into(),
-            },
-            SegmentError::Segmentation(SegmentationError::Deform(error)) => match error {
-                DeformError::Localise(LocaliseError::NoHeart { .. }) => {
-                    "Look whether the file is a reconstructed heart scan; if it is, say where \
-                     the heart is by `center` (x,y,z in LPS millimetres)."
-                        .into()
-                }
-                DeformError::Localise(LocaliseError::HintOutside) => {
-                    "Give `center` or `box` within the volume, or leave them out.".into()
-                }
-                DeformError::Localise(LocaliseError::Blank) => {
-                    "Look whether the file, and `frame` of a 4-D one, is the right one.".into()
-                }
-                DeformError::TooManyNodes { limit, .. } => {
-                    format!("Give a model of at most {limit} points, or no support springs.")
-                }
-                _ => "Give finite numbers within their ranges.".into(),
-            },
-            SegmentError::Segmentation(SegmentationError::Cancelled(_))
-            | SegmentError::Cancelled(_) => AGAIN.into(),
         }
     }
 }

@@ -1,10 +1,12 @@
-//! Files in folders: one folder per id, moved into sight whole.
+//! The file store in a folder: one folder per id, made visible by a rename.
 //!
-//! Everything of an id is written into a folder under `staging/`, forced to the disk, and
-//! then renamed to its place; a rename happens entirely or not at all. Reading, listing and
-//! erasing go through `object_store`, as they would for S3.
+//! The files of an id are written into a folder under `staging/`, forced to disk, and then moved
+//! to their place by renaming the folder, which succeeds as a whole or not at all. Reading and
+//! listing go through `object_store`.
 
-use crate::jobs::{BlobError, BlobStore, BlobStream, Resource, Staged, random_id};
+use crate::jobs::{
+    BlobError, BlobStore, BlobStream, BlobWriter, LocalFile, Resource, StagedFiles, random_id,
+};
 use async_trait::async_trait;
 use bytes::Bytes;
 use futures::{StreamExt, TryStreamExt};
@@ -25,7 +27,8 @@ pub struct FileBlobs {
 }
 
 impl FileBlobs {
-    /// Makes the folders where needed, and erases what an earlier process left in staging.
+    /// Makes the folders that do not exist yet, and deletes what an earlier process left in the
+    /// staging folder.
     ///
     /// # Errors
     /// If the folder cannot be written.
@@ -34,8 +37,8 @@ impl FileBlobs {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
             _ => {}
         }
-        let shelves = Resource::SHELVED.map(Resource::plural);
-        for name in shelves.into_iter().chain([STAGING]) {
+        let kinds = Resource::WITH_FILES.map(Resource::plural);
+        for name in kinds.into_iter().chain([STAGING]) {
             std::fs::create_dir_all(folder.join(name))?;
         }
         sync(folder)?;
@@ -49,57 +52,99 @@ impl FileBlobs {
     }
 
     fn place(&self, id: &str) -> PathBuf {
-        self.folder.join(shelf(id)).join(id)
+        self.folder.join(kind_folder(id)).join(id)
+    }
+
+    fn new_staging_folder(&self) -> PathBuf {
+        self.folder.join(STAGING).join(random_id(""))
     }
 }
 
-fn shelf(id: &str) -> &'static str {
+/// The folder for items of the kind of `id`.
+fn kind_folder(id: &str) -> &'static str {
     Resource::of(id).unwrap_or(Resource::Volume).plural()
 }
 
-/// Forces a folder's entries, or a file's content, to the disk.
+/// Forces a folder's entries, or a file's content, to disk.
 fn sync(path: &Path) -> std::io::Result<()> {
     File::open(path)?.sync_all()
 }
 
-fn publish_blocking(staged: &Staged, place: &Path) -> std::io::Result<()> {
-    for entry in std::fs::read_dir(staged.folder())? {
-        sync(&entry?.path())?;
+/// A folder under `staging/`.
+struct StagingFolder {
+    /// The folder; deleted on drop.
+    folder: PathBuf,
+    /// The root of the store.
+    root: PathBuf,
+}
+
+impl Drop for StagingFolder {
+    fn drop(&mut self) {
+        // Fails after publishing, when the folder has been moved.
+        let _ = std::fs::remove_dir_all(&self.folder);
     }
-    sync(staged.folder())?;
-    match std::fs::rename(staged.folder(), place) {
-        // The same content is there already, whole.
-        Err(error)
-            if matches!(
-                error.kind(),
-                ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists
-            ) =>
-        {
-            return Ok(());
+}
+
+impl StagingFolder {
+    fn publish_blocking(&self, place: &Path) -> std::io::Result<()> {
+        for entry in std::fs::read_dir(&self.folder)? {
+            sync(&entry?.path())?;
         }
-        other => other?,
+        sync(&self.folder)?;
+        match std::fs::rename(&self.folder, place) {
+            // The id has its files already.
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists
+                ) =>
+            {
+                return Ok(());
+            }
+            other => other?,
+        }
+        sync(place.parent().unwrap_or(place))
     }
-    sync(place.parent().unwrap_or(place))
 }
 
 #[async_trait]
-impl BlobStore for FileBlobs {
-    async fn stage(&self) -> Result<Staged, BlobError> {
-        let folder = self.folder.join(STAGING).join(random_id(""));
-        tokio::fs::create_dir(&folder).await?;
-        Ok(Staged::new(folder))
+impl StagedFiles for StagingFolder {
+    async fn create(&self, name: &str) -> Result<BlobWriter, BlobError> {
+        let file = tokio::fs::File::create(self.folder.join(name)).await?;
+        Ok(Box::pin(file))
     }
 
-    async fn publish(&self, id: &str, staged: Staged) -> Result<(), BlobError> {
-        let place = self.place(id);
-        tokio::task::spawn_blocking(move || publish_blocking(&staged, &place))
+    async fn rename(&self, from: &str, to: &str) -> Result<(), BlobError> {
+        tokio::fs::rename(self.folder.join(from), self.folder.join(to)).await?;
+        Ok(())
+    }
+
+    async fn local(&self, name: &str) -> Result<LocalFile, BlobError> {
+        Ok(LocalFile::in_place(self.folder.join(name)))
+    }
+
+    async fn publish(self: Box<Self>, id: &str) -> Result<(), BlobError> {
+        let place = self.root.join(kind_folder(id)).join(id);
+        tokio::task::spawn_blocking(move || self.publish_blocking(&place))
             .await
             .map_err(|e| BlobError(e.to_string()))??;
         Ok(())
     }
+}
+
+#[async_trait]
+impl BlobStore for FileBlobs {
+    async fn stage(&self) -> Result<Box<dyn StagedFiles>, BlobError> {
+        let folder = self.new_staging_folder();
+        tokio::fs::create_dir(&folder).await?;
+        Ok(Box::new(StagingFolder {
+            folder,
+            root: self.folder.clone(),
+        }))
+    }
 
     async fn read(&self, id: &str, name: &str, range: Range<u64>) -> Result<BlobStream, BlobError> {
-        let key = Key::from_iter([shelf(id), id, name]);
+        let key = Key::from_iter([kind_folder(id), id, name]);
         if range.is_empty() {
             return Ok(futures::stream::empty().boxed());
         }
@@ -111,28 +156,29 @@ impl BlobStore for FileBlobs {
         Ok(found.into_stream().map_err(failed).boxed())
     }
 
-    fn paths(&self, id: &str, names: &[String]) -> Vec<PathBuf> {
-        let place = self.place(id);
-        names.iter().map(|name| place.join(name)).collect()
+    async fn local(&self, id: &str, name: &str) -> Result<Option<LocalFile>, BlobError> {
+        let path = self.place(id).join(name);
+        let exists = tokio::fs::try_exists(&path).await?;
+        Ok(exists.then(|| LocalFile::in_place(path)))
     }
 
     async fn delete(&self, id: &str) -> Result<(), BlobError> {
-        // A rename first: what is half erased must not be seen as whole.
-        let grave = self.folder.join(STAGING).join(random_id(""));
-        match tokio::fs::rename(self.place(id), &grave).await {
+        // Renamed first, so that half the files are never seen as all of them.
+        let doomed = self.new_staging_folder();
+        match tokio::fs::rename(self.place(id), &doomed).await {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
             other => other?,
         }
-        tokio::fs::remove_dir_all(&grave).await?;
+        tokio::fs::remove_dir_all(&doomed).await?;
         Ok(())
     }
 
     async fn ids(&self) -> Result<Vec<String>, BlobError> {
         let mut ids = Vec::new();
-        for shelf in Resource::SHELVED.map(Resource::plural) {
+        for kind in Resource::WITH_FILES.map(Resource::plural) {
             let listed = self
                 .files
-                .list_with_delimiter(Some(&Key::from(shelf)))
+                .list_with_delimiter(Some(&Key::from(kind)))
                 .await
                 .map_err(failed)?;
             let names = listed.common_prefixes.iter();

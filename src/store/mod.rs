@@ -1,16 +1,17 @@
-//! Where jobs, volumes and products are kept: SQLite for the rows, a folder for the files.
+//! Storage of the service: SQLite for records, a folder for files.
 //!
 //! ```text
 //! DATA_DIR/
-//!   lock              held by the one process that works here
-//!   ventriform.db     rows (WAL, synchronous=FULL)
-//!   staging/          what nobody can see yet; emptied at every start
+//!   lock              held by the process that uses this folder
+//!   ventriform.db     jobs, volumes, products (WAL, synchronous=FULL)
+//!   staging/          files not yet published; emptied at every start
 //!   volumes/vol_.../  files of a volume
 //!   models/mdl_.../   files of a model; likewise segmentations/, templates/
 //! ```
 //!
-//! Files are published before their row is committed, and erased after it: at any moment a
-//! row's files are whole. What a crash leaves without a row is swept at the next start.
+//! Files are published before their record is committed, and deleted after it, so the files of a
+//! record are always complete. Files without a record, which a crash can leave behind, are
+//! deleted at the next start.
 
 mod blobs;
 mod rows;
@@ -25,9 +26,9 @@ use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The stores of one data folder, and the lock on it.
+/// The database and the files of one data folder, which is locked while this exists.
 pub struct Store {
-    /// The rows.
+    /// The database.
     pub rows: Arc<SqliteStore>,
     /// The files.
     pub blobs: Arc<FileBlobs>,
@@ -37,24 +38,26 @@ pub struct Store {
 /// Why a data folder cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// Another process holds it.
-    #[error("{0} is in use by another ventriform process; stop it or give another --data-dir")]
+    /// Another process uses it.
+    #[error(
+        "{0} is in use by another ventriform process; stop that process or choose another data folder"
+    )]
     InUse(PathBuf),
-    /// It cannot be made, read or written.
+    /// It cannot be created, read or written.
     #[error("{path}: {reason}")]
     Unusable {
         /// The folder or file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error message.
         reason: String,
     },
 }
 
 impl Store {
-    /// Opens or makes the data folder.
+    /// Opens the data folder, or creates it.
     ///
     /// # Errors
-    /// If another process holds it or it cannot be written.
+    /// If another process uses the folder, or it cannot be written.
     pub async fn open(folder: &Path) -> Result<Self, OpenError> {
         let unusable = |path: &Path, reason: String| OpenError::Unusable {
             path: path.to_owned(),

@@ -1,128 +1,90 @@
-//! Rows as SQLite gives them, and the records they stand for.
+//! From rows of SQLite to the records of `jobs`, and JSON columns both ways.
 
-use crate::jobs::{Job, Product, State, StoreError, Volume};
+use crate::jobs::{Job, JobState, ListPage, ListRequest, Product, StoreError, StoredVolume};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use sqlx::FromRow;
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
 
-#[derive(FromRow)]
-pub(super) struct JobRow {
-    id: String,
-    sequence: i64,
-    kind: String,
-    volume: String,
-    parameters: String,
-    state: String,
-    stage: Option<String>,
-    progress: f64,
-    attempts: i64,
-    revision: i64,
-    cancel_requested: bool,
-    created_at: i64,
-    started_at: Option<i64>,
-    finished_at: Option<i64>,
-    failure: Option<String>,
-    result: Option<String>,
-    pub(super) fingerprint: Option<String>,
+type Result<T> = std::result::Result<T, StoreError>;
+
+pub(super) fn job(row: SqliteRow) -> Result<Job> {
+    let state: &str = row.try_get("state")?;
+    let failure: Option<&str> = row.try_get("failure")?;
+    Ok(Job {
+        id: row.try_get("id")?,
+        sequence: row.try_get("sequence")?,
+        kind: row.try_get("kind")?,
+        volume: row.try_get("volume")?,
+        parameters: json(&row, "parameters")?,
+        state: JobState::parse(state)
+            .ok_or_else(|| StoreError::Database(format!("unknown job state `{state}`")))?,
+        stage: row.try_get("stage")?,
+        progress: row.try_get("progress")?,
+        attempts: u32::try_from(row.try_get::<i64, _>("attempts")?).unwrap_or(u32::MAX),
+        revision: row.try_get("revision")?,
+        cancel_requested: row.try_get("cancel_requested")?,
+        created_at: row.try_get("created_at")?,
+        started_at: row.try_get("started_at")?,
+        finished_at: row.try_get("finished_at")?,
+        failure: failure.map(from_json).transpose()?,
+        result: row.try_get("result")?,
+    })
 }
 
-impl TryFrom<JobRow> for Job {
-    type Error = StoreError;
-
-    fn try_from(row: JobRow) -> Result<Self, StoreError> {
-        Ok(Job {
-            parameters: from_json(&row.parameters)?,
-            state: State::parse(&row.state)
-                .ok_or_else(|| StoreError(format!("unknown state `{}`", row.state)))?,
-            failure: row.failure.as_deref().map(from_json).transpose()?,
-            id: row.id,
-            sequence: row.sequence,
-            kind: row.kind,
-            volume: row.volume,
-            stage: row.stage,
-            progress: row.progress,
-            attempts: u32::try_from(row.attempts).unwrap_or(u32::MAX),
-            revision: row.revision,
-            cancel_requested: row.cancel_requested,
-            created_at: row.created_at,
-            started_at: row.started_at,
-            finished_at: row.finished_at,
-            result: row.result,
-        })
-    }
+pub(super) fn volume(row: SqliteRow) -> Result<StoredVolume> {
+    Ok(StoredVolume {
+        id: row.try_get("id")?,
+        sequence: row.try_get("sequence")?,
+        created_at: row.try_get("created_at")?,
+        bytes: u64::try_from(row.try_get::<i64, _>("bytes")?).unwrap_or(0),
+        files: json(&row, "files")?,
+        facts: json(&row, "facts")?,
+    })
 }
 
-#[derive(FromRow)]
-pub(super) struct VolumeRow {
-    id: String,
-    sequence: i64,
-    created_at: i64,
-    bytes: i64,
-    files: String,
-    facts: String,
+pub(super) fn product(row: SqliteRow) -> Result<Product> {
+    Ok(Product {
+        id: row.try_get("id")?,
+        sequence: row.try_get("sequence")?,
+        created_at: row.try_get("created_at")?,
+        volume: row.try_get("volume")?,
+        parameters: json(&row, "parameters")?,
+        summary: json(&row, "summary")?,
+        software: row.try_get("software")?,
+        files: json(&row, "files")?,
+    })
 }
 
-impl TryFrom<VolumeRow> for Volume {
-    type Error = StoreError;
-
-    fn try_from(row: VolumeRow) -> Result<Self, StoreError> {
-        Ok(Volume {
-            files: from_json(&row.files)?,
-            facts: from_json(&row.facts)?,
-            id: row.id,
-            sequence: row.sequence,
-            created_at: row.created_at,
-            bytes: u64::try_from(row.bytes).unwrap_or(0),
-        })
-    }
+/// Converts the rows of a list by `record`.
+pub(super) fn all<T>(rows: Vec<SqliteRow>, record: fn(SqliteRow) -> Result<T>) -> Result<Vec<T>> {
+    rows.into_iter().map(record).collect()
 }
 
-#[derive(FromRow)]
-pub(super) struct ProductRow {
-    id: String,
-    sequence: i64,
-    created_at: i64,
-    volume: Option<String>,
-    parameters: String,
-    summary: String,
-    software: String,
-    files: String,
+/// A page of a list, from rows queried with a limit of one more than requested.
+pub(super) fn page<T>(
+    rows: Vec<SqliteRow>,
+    request: ListRequest,
+    record: fn(SqliteRow) -> Result<T>,
+    sequence: fn(&T) -> i64,
+) -> Result<ListPage<T>> {
+    Ok(ListPage::cut(all(rows, record)?, request.limit, sequence))
 }
 
-impl TryFrom<ProductRow> for Product {
-    type Error = StoreError;
-
-    fn try_from(row: ProductRow) -> Result<Self, StoreError> {
-        Ok(Product {
-            parameters: from_json(&row.parameters)?,
-            summary: from_json(&row.summary)?,
-            files: from_json(&row.files)?,
-            id: row.id,
-            sequence: row.sequence,
-            created_at: row.created_at,
-            volume: row.volume,
-            software: row.software,
-        })
-    }
+pub(super) fn to_json(value: &impl Serialize) -> Result<String> {
+    serde_json::to_string(value).map_err(|e| StoreError::Database(e.to_string()))
 }
 
-/// Converts the rows of a list.
-pub(super) fn all<R, T: TryFrom<R, Error = StoreError>>(
-    rows: Vec<R>,
-) -> Result<Vec<T>, StoreError> {
-    rows.into_iter().map(T::try_from).collect()
+fn json<T: DeserializeOwned>(row: &SqliteRow, column: &str) -> Result<T> {
+    from_json(row.try_get(column)?)
 }
 
-pub(super) fn to_json(value: &impl Serialize) -> Result<String, StoreError> {
-    serde_json::to_string(value).map_err(|e| StoreError(e.to_string()))
-}
-
-fn from_json<T: DeserializeOwned>(text: &str) -> Result<T, StoreError> {
-    serde_json::from_str(text).map_err(|e| StoreError(format!("a damaged row: {e}")))
+fn from_json<T: DeserializeOwned>(text: &str) -> Result<T> {
+    serde_json::from_str(text).map_err(|e| StoreError::Database(format!("damaged row: {e}")))
 }
 
 impl From<sqlx::Error> for StoreError {
     fn from(error: sqlx::Error) -> Self {
-        StoreError(error.to_string())
+        StoreError::Database(error.to_string())
     }
 }

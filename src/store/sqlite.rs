@@ -1,7 +1,7 @@
-//! The database file: one connection writes, a few read.
+//! The database file: one connection for writing, a few for reading.
 //!
-//! SQLite allows one writer at a time anyway; one connection makes the writers queue up in
-//! order instead of polling each other's lock.
+//! SQLite allows one writer at a time. With a single writing connection, writers wait for it in
+//! order instead of polling for the database lock.
 
 use sqlx::sqlite::{
     SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
@@ -12,17 +12,17 @@ use std::time::Duration;
 const READERS: u32 = 4;
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Rows in SQLite. Implements [`crate::jobs::JobStore`] and [`crate::jobs::Catalogue`].
+/// The database. Implements [`crate::jobs::JobStore`] and [`crate::jobs::Catalogue`].
 pub struct SqliteStore {
     pub(super) writer: SqlitePool,
     pub(super) readers: SqlitePool,
 }
 
 impl SqliteStore {
-    /// Opens or makes the file and brings its tables up to date.
+    /// Opens the file, or creates it, and migrates its tables to the current version.
     ///
     /// # Errors
-    /// If the file cannot be used or was made by a newer version.
+    /// If the file cannot be used, or was migrated by a newer version of the program.
     pub async fn open(path: &Path) -> Result<Self, sqlx::Error> {
         let options = SqliteConnectOptions::new()
             .filename(path)

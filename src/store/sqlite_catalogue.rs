@@ -1,9 +1,10 @@
 //! The tables of volumes and products in SQLite.
 
-use super::rows::{self, ProductRow, VolumeRow, to_json};
+use super::rows::{self, to_json};
 use super::sqlite::SqliteStore;
 use crate::jobs::{
-    Catalogue, Deleted, Page, PageRequest, Product, Resource, StoreError, Timestamp, Volume,
+    Catalogue, Deleted, ListPage, ListRequest, Product, Resource, StoreError, StoredVolume,
+    Timestamp,
 };
 use async_trait::async_trait;
 use sqlx::{Row, SqliteConnection};
@@ -12,7 +13,7 @@ type Result<T> = std::result::Result<T, StoreError>;
 
 #[async_trait]
 impl Catalogue for SqliteStore {
-    async fn add_volume(&self, volume: &Volume) -> Result<bool> {
+    async fn add_volume(&self, volume: &StoredVolume) -> Result<bool> {
         let mut transaction = self.writer.begin().await?;
         let done = sqlx::query(
             "INSERT INTO volumes (id, created_at, bytes, files, facts) VALUES (?, ?, ?, ?, ?)
@@ -25,21 +26,21 @@ impl Catalogue for SqliteStore {
         .bind(to_json(&volume.facts)?)
         .execute(&mut *transaction)
         .await?;
-        unbury(&mut transaction, &volume.id).await?;
+        forget_deletion(&mut transaction, &volume.id).await?;
         transaction.commit().await?;
         Ok(done.rows_affected() == 1)
     }
 
-    async fn volume(&self, id: &str) -> Result<Option<Volume>> {
-        let row: Option<VolumeRow> = sqlx::query_as("SELECT * FROM volumes WHERE id = ?")
+    async fn volume(&self, id: &str) -> Result<Option<StoredVolume>> {
+        let row = sqlx::query("SELECT * FROM volumes WHERE id = ?")
             .bind(id)
             .fetch_optional(&self.readers)
             .await?;
-        row.map(Volume::try_from).transpose()
+        row.map(rows::volume).transpose()
     }
 
-    async fn volumes(&self, page: PageRequest) -> Result<Page<Volume>> {
-        let rows: Vec<VolumeRow> = sqlx::query_as(
+    async fn volumes(&self, page: ListRequest) -> Result<ListPage<StoredVolume>> {
+        let rows = sqlx::query(
             "SELECT * FROM volumes WHERE ?1 IS NULL OR sequence < ?1
              ORDER BY sequence DESC LIMIT ?2",
         )
@@ -47,9 +48,7 @@ impl Catalogue for SqliteStore {
         .bind(i64::from(page.limit) + 1)
         .fetch_all(&self.readers)
         .await?;
-        Ok(Page::cut(rows::all(rows)?, page.limit, |v: &Volume| {
-            v.sequence
-        }))
+        rows::page(rows, page, rows::volume, |v| v.sequence)
     }
 
     async fn delete_volume(&self, id: &str, now: Timestamp) -> Result<Deleted> {
@@ -64,15 +63,15 @@ impl Catalogue for SqliteStore {
     }
 
     async fn product(&self, id: &str) -> Result<Option<Product>> {
-        let row: Option<ProductRow> = sqlx::query_as("SELECT * FROM products WHERE id = ?")
+        let row = sqlx::query("SELECT * FROM products WHERE id = ?")
             .bind(id)
             .fetch_optional(&self.readers)
             .await?;
-        row.map(Product::try_from).transpose()
+        row.map(rows::product).transpose()
     }
 
-    async fn products(&self, kind: Resource, page: PageRequest) -> Result<Page<Product>> {
-        let rows: Vec<ProductRow> = sqlx::query_as(
+    async fn products(&self, kind: Resource, page: ListRequest) -> Result<ListPage<Product>> {
+        let rows = sqlx::query(
             "SELECT * FROM products WHERE kind = ?1 AND (?2 IS NULL OR sequence < ?2)
              ORDER BY sequence DESC LIMIT ?3",
         )
@@ -81,9 +80,7 @@ impl Catalogue for SqliteStore {
         .bind(i64::from(page.limit) + 1)
         .fetch_all(&self.readers)
         .await?;
-        Ok(Page::cut(rows::all(rows)?, page.limit, |p: &Product| {
-            p.sequence
-        }))
+        rows::page(rows, page, rows::product, |p| p.sequence)
     }
 
     async fn delete_product(&self, id: &str, now: Timestamp) -> Result<Deleted> {
@@ -112,7 +109,7 @@ impl Catalogue for SqliteStore {
 }
 
 impl SqliteStore {
-    /// Erases a row of `table`, unless a job that has not ended needs it.
+    /// Deletes a row of `table`, unless a job that has not ended needs it.
     async fn delete_unneeded(
         &self,
         table: &'static str,
@@ -141,14 +138,14 @@ impl SqliteStore {
                 _ => Deleted::InUse,
             });
         }
-        bury(&mut transaction, id, now).await?;
+        record_deletion(&mut transaction, id, now).await?;
         transaction.commit().await?;
         Ok(Deleted::Done)
     }
 }
 
-/// Adds a product within a transaction; the one that is there already stays. Tells whether it
-/// is new.
+/// Adds a product within a transaction, unless its id exists already. Returns whether it was
+/// added.
 pub(super) async fn insert_product(to: &mut SqliteConnection, product: &Product) -> Result<bool> {
     let done = sqlx::query(
         "INSERT INTO products
@@ -165,12 +162,16 @@ pub(super) async fn insert_product(to: &mut SqliteConnection, product: &Product)
     .bind(to_json(&product.files)?)
     .execute(&mut *to)
     .await?;
-    unbury(to, &product.id).await?;
+    forget_deletion(to, &product.id).await?;
     Ok(done.rows_affected() == 1)
 }
 
-/// Remembers that something was here.
-pub(super) async fn bury(to: &mut SqliteConnection, id: &str, now: Timestamp) -> Result<()> {
+/// Records that the item with that id was deleted.
+pub(super) async fn record_deletion(
+    to: &mut SqliteConnection,
+    id: &str,
+    now: Timestamp,
+) -> Result<()> {
     sqlx::query("INSERT OR REPLACE INTO tombstones (id, erased_at) VALUES (?, ?)")
         .bind(id)
         .bind(now)
@@ -179,7 +180,8 @@ pub(super) async fn bury(to: &mut SqliteConnection, id: &str, now: Timestamp) ->
     Ok(())
 }
 
-async fn unbury(to: &mut SqliteConnection, id: &str) -> Result<()> {
+/// Removes the record of a deletion: the item exists again.
+async fn forget_deletion(to: &mut SqliteConnection, id: &str) -> Result<()> {
     sqlx::query("DELETE FROM tombstones WHERE id = ?")
         .bind(id)
         .execute(to)

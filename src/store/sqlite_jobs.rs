@@ -1,18 +1,18 @@
-//! The queue's table in SQLite. Every change is one statement, or one transaction that
-//! begins by writing.
+//! The jobs table in SQLite. Every change is a single statement, or a transaction that begins
+//! with a write: SQLite would not let two transactions that began by reading both write.
 
-use super::rows::{self, JobRow, to_json};
+use super::rows::{self, to_json};
 use super::sqlite::SqliteStore;
 use crate::jobs::{
-    Deleted, Failure, Filed, Interrupted, Job, JobStore, Lease, Load, NewJob, Outcome, Page,
-    PageRequest, Resource, State, StoreError, Timestamp, random_id,
+    Deleted, Failure, Filed, Interrupted, Job, JobOutcome, JobState, JobStore, Lease, ListPage,
+    ListRequest, NewJob, QueueLoad, Resource, StoreError, Timestamp, random_id,
 };
 use async_trait::async_trait;
 use sqlx::Row;
 
 type Result<T> = std::result::Result<T, StoreError>;
 
-/// Durations of this many jobs are averaged for the estimate.
+/// Number of last succeeded jobs whose durations are averaged.
 const JOBS_AVERAGED: i64 = 20;
 
 #[async_trait]
@@ -23,7 +23,7 @@ impl JobStore for SqliteStore {
         }
         let id = random_id(Resource::Job.prefix());
         let key = job.idempotency.as_ref();
-        let inserted: Option<JobRow> = sqlx::query_as(
+        let inserted = sqlx::query(
             "INSERT INTO jobs (id, kind, volume, parameters, created_at, idempotency_key,
                                fingerprint, needs)
              SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?9
@@ -48,9 +48,9 @@ impl JobStore for SqliteStore {
         .fetch_optional(&self.writer)
         .await?;
         if let Some(row) = inserted {
-            return Ok(Filed::New(row.try_into()?));
+            return Ok(Filed::New(rows::job(row)?));
         }
-        // Another request with the same key may have come in between.
+        // Another request with the same key may have been filed in the meantime.
         if let Some(earlier) = self.earlier(job).await? {
             return Ok(earlier);
         }
@@ -58,27 +58,25 @@ impl JobStore for SqliteStore {
     }
 
     async fn job(&self, id: &str) -> Result<Option<Job>> {
-        let row: Option<JobRow> = sqlx::query_as("SELECT * FROM jobs WHERE id = ?")
+        let row = sqlx::query("SELECT * FROM jobs WHERE id = ?")
             .bind(id)
             .fetch_optional(&self.readers)
             .await?;
-        row.map(Job::try_from).transpose()
+        row.map(rows::job).transpose()
     }
 
-    async fn jobs(&self, state: Option<State>, page: PageRequest) -> Result<Page<Job>> {
-        let rows: Vec<JobRow> = sqlx::query_as(
+    async fn jobs(&self, state: Option<JobState>, page: ListRequest) -> Result<ListPage<Job>> {
+        let rows = sqlx::query(
             "SELECT * FROM jobs
              WHERE (?1 IS NULL OR state = ?1) AND (?2 IS NULL OR sequence < ?2)
              ORDER BY sequence DESC LIMIT ?3",
         )
-        .bind(state.map(State::as_str))
+        .bind(state.map(JobState::as_str))
         .bind(page.before)
         .bind(i64::from(page.limit) + 1)
         .fetch_all(&self.readers)
         .await?;
-        Ok(Page::cut(rows::all(rows)?, page.limit, |job: &Job| {
-            job.sequence
-        }))
+        rows::page(rows, page, rows::job, |job| job.sequence)
     }
 
     async fn ahead_of(&self, job: &Job) -> Result<u64> {
@@ -89,7 +87,7 @@ impl JobStore for SqliteStore {
         Ok(u64::try_from(row.get::<i64, _>(0)).unwrap_or(0))
     }
 
-    async fn load(&self) -> Result<Load> {
+    async fn load(&self) -> Result<QueueLoad> {
         let row = sqlx::query(
             "SELECT (SELECT count(*) FROM jobs WHERE state = 'queued'),
                     (SELECT count(*) FROM jobs WHERE state = 'running'),
@@ -101,7 +99,7 @@ impl JobStore for SqliteStore {
         .fetch_one(&self.readers)
         .await?;
         let count = |column: usize| u64::try_from(row.get::<i64, _>(column)).unwrap_or(0);
-        Ok(Load {
+        Ok(QueueLoad {
             queued: count(0),
             running: count(1),
             mean_duration_ms: row.get(2),
@@ -115,7 +113,7 @@ impl JobStore for SqliteStore {
         now: Timestamp,
         until: Timestamp,
     ) -> Result<Option<Job>> {
-        let row: Option<JobRow> = sqlx::query_as(
+        let row = sqlx::query(
             "UPDATE jobs SET state = 'running', attempts = attempts + 1, lease_token = ?1,
                     lease_expires_at = ?2, started_at = ?3, stage = NULL, progress = 0,
                     revision = revision + 1
@@ -132,10 +130,10 @@ impl JobStore for SqliteStore {
         .bind(attempt_limit)
         .fetch_optional(&self.writer)
         .await?;
-        row.map(Job::try_from).transpose()
+        row.map(rows::job).transpose()
     }
 
-    async fn heartbeat(&self, lease: &Lease, until: Timestamp) -> Result<Option<bool>> {
+    async fn renew_lease(&self, lease: &Lease, until: Timestamp) -> Result<Option<bool>> {
         let row = sqlx::query(
             "UPDATE jobs SET lease_expires_at = ?
              WHERE id = ? AND lease_token = ? AND state = 'running'
@@ -150,7 +148,7 @@ impl JobStore for SqliteStore {
     }
 
     async fn progress(&self, lease: &Lease, stage: &str, progress: f64) -> Result<Option<Job>> {
-        let row: Option<JobRow> = sqlx::query_as(
+        let row = sqlx::query(
             "UPDATE jobs SET stage = ?, progress = max(progress, ?), revision = revision + 1
              WHERE id = ? AND lease_token = ? AND state = 'running'
              RETURNING *",
@@ -161,22 +159,22 @@ impl JobStore for SqliteStore {
         .bind(&lease.token)
         .fetch_optional(&self.writer)
         .await?;
-        row.map(Job::try_from).transpose()
+        row.map(rows::job).transpose()
     }
 
     async fn finish(
         &self,
         lease: &Lease,
-        outcome: &Outcome,
+        outcome: &JobOutcome,
         now: Timestamp,
     ) -> Result<Option<Job>> {
         let (state, failure, product) = match outcome {
-            Outcome::Succeeded(product) => (State::Succeeded, None, Some(product)),
-            Outcome::Failed(failure) => (State::Failed, Some(to_json(failure)?), None),
-            Outcome::Cancelled => (State::Cancelled, None, None),
+            JobOutcome::Succeeded(product) => (JobState::Succeeded, None, Some(product)),
+            JobOutcome::Failed(failure) => (JobState::Failed, Some(to_json(failure)?), None),
+            JobOutcome::Cancelled => (JobState::Cancelled, None, None),
         };
         let mut transaction = self.writer.begin().await?;
-        let row: Option<JobRow> = sqlx::query_as(
+        let row = sqlx::query(
             "UPDATE jobs SET state = ?1, failure = ?2, result = ?3, finished_at = ?4,
                     progress = CASE ?1 WHEN 'succeeded' THEN 1 ELSE progress END,
                     lease_token = NULL, lease_expires_at = NULL, revision = revision + 1
@@ -198,11 +196,11 @@ impl JobStore for SqliteStore {
             super::sqlite_catalogue::insert_product(&mut transaction, product).await?;
         }
         transaction.commit().await?;
-        Ok(Some(row.try_into()?))
+        Ok(Some(rows::job(row)?))
     }
 
     async fn hand_back(&self, lease: &Lease) -> Result<Option<Job>> {
-        let row: Option<JobRow> = sqlx::query_as(
+        let row = sqlx::query(
             "UPDATE jobs SET state = 'queued', attempts = attempts - 1, stage = NULL,
                     progress = 0, started_at = NULL, lease_token = NULL,
                     lease_expires_at = NULL, revision = revision + 1
@@ -213,7 +211,7 @@ impl JobStore for SqliteStore {
         .bind(&lease.token)
         .fetch_optional(&self.writer)
         .await?;
-        row.map(Job::try_from).transpose()
+        row.map(rows::job).transpose()
     }
 
     async fn release_all(&self) -> Result<u64> {
@@ -227,8 +225,13 @@ impl JobStore for SqliteStore {
         Ok(done.rows_affected())
     }
 
-    async fn bury(&self, attempt_limit: u32, reason: &Failure, now: Timestamp) -> Result<Vec<Job>> {
-        let rows: Vec<JobRow> = sqlx::query_as(
+    async fn end_unclaimable(
+        &self,
+        attempt_limit: u32,
+        reason: &Failure,
+        now: Timestamp,
+    ) -> Result<Vec<Job>> {
+        let rows = sqlx::query(
             "UPDATE jobs SET
                     state = CASE WHEN cancel_requested THEN 'cancelled' ELSE 'failed' END,
                     failure = CASE WHEN cancel_requested THEN NULL ELSE ?1 END,
@@ -243,11 +246,11 @@ impl JobStore for SqliteStore {
         .bind(attempt_limit)
         .fetch_all(&self.writer)
         .await?;
-        rows::all(rows)
+        rows::all(rows, rows::job)
     }
 
     async fn interrupt(&self, id: &str, now: Timestamp) -> Result<Interrupted> {
-        let row: Option<JobRow> = sqlx::query_as(
+        let row = sqlx::query(
             "UPDATE jobs SET cancel_requested = 1, revision = revision + 1,
                     finished_at = CASE state WHEN 'queued' THEN ?1 ELSE finished_at END,
                     state = CASE state WHEN 'queued' THEN 'cancelled' ELSE state END
@@ -259,9 +262,9 @@ impl JobStore for SqliteStore {
         .fetch_optional(&self.writer)
         .await?;
         if let Some(row) = row {
-            let job = Job::try_from(row)?;
+            let job = rows::job(row)?;
             return Ok(match job.state {
-                State::Cancelled => Interrupted::Cancelled(job),
+                JobState::Cancelled => Interrupted::Cancelled(job),
                 _ => Interrupted::Asked(job),
             });
         }
@@ -285,14 +288,14 @@ impl JobStore for SqliteStore {
                 None => Deleted::Unknown,
             });
         }
-        super::sqlite_catalogue::bury(&mut transaction, id, now).await?;
+        super::sqlite_catalogue::record_deletion(&mut transaction, id, now).await?;
         transaction.commit().await?;
         Ok(Deleted::Done)
     }
 }
 
 impl SqliteStore {
-    /// The first of the job's needs that is not there.
+    /// The first item the job needs that does not exist.
     async fn missing(&self, job: &NewJob) -> Result<Option<Filed>> {
         let volume = ("volume", &job.volume);
         let others = job.needs.iter().map(|(field, id)| (field.as_str(), id));
@@ -313,21 +316,24 @@ impl SqliteStore {
         Ok(None)
     }
 
-    /// What the job's idempotency key stands for already.
+    /// The job filed earlier under this job's idempotency key.
     async fn earlier(&self, job: &NewJob) -> Result<Option<Filed>> {
         let Some(key) = &job.idempotency else {
             return Ok(None);
         };
-        let row: Option<JobRow> = sqlx::query_as("SELECT * FROM jobs WHERE idempotency_key = ?")
+        let row = sqlx::query("SELECT * FROM jobs WHERE idempotency_key = ?")
             .bind(&key.key)
             .fetch_optional(&self.readers)
             .await?;
         row.map(|row| {
-            Ok(if row.fingerprint.as_ref() == Some(&key.fingerprint) {
-                Filed::Same(row.try_into()?)
-            } else {
-                Filed::KeyReused
-            })
+            Ok(
+                if row.try_get::<Option<&str>, _>("fingerprint")? == Some(key.fingerprint.as_str())
+                {
+                    Filed::Same(rows::job(row)?)
+                } else {
+                    Filed::KeyReused
+                },
+            )
         })
         .transpose()
     }

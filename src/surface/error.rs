@@ -1,4 +1,4 @@
-//! Why there is no surface, and what to do about it.
+//! Why there is no surface.
 
 use super::marching_cubes::{self, MarchingCubesError};
 use crate::mesh::topology::Defect;
@@ -118,37 +118,6 @@ impl SurfaceError {
             SurfaceError::OutsideVolume { .. } => Some("isolate"),
             SurfaceError::SeedOutside { .. } => Some("seed_point"),
             _ => None,
-        }
-    }
-
-    /// What the caller can do about it.
-    pub fn fix(&self) -> String {
-        match self {
-            SurfaceError::Cancelled(_) => "Ask again if the result is still wanted.".into(),
-            SurfaceError::NoFiniteVoxel { .. } | SurfaceError::Constant { .. } => {
-                "Look at the file in a viewer: there is nothing in it.".into()
-            }
-            SurfaceError::NoSurface {
-                minimum, maximum, ..
-            } => {
-                format!(
-                    "Set `iso` to auto or to an absolute value between {minimum} and {maximum}."
-                )
-            }
-            SurfaceError::BadIso { expected, .. } => format!("Set `iso` to {expected}."),
-            SurfaceError::BadSmoothing { .. } => "Set `mask_smoothing` from 0 to 3.".into(),
-            SurfaceError::NoSuchLabel { .. } => "Set `label` to one that occurs.".into(),
-            SurfaceError::OutsideVolume { shape, .. } => {
-                format!("Give voxel indices below {shape:?}, counted from 0.")
-            }
-            SurfaceError::EmptyBox { .. } => "Give the lower corner of the box first.".into(),
-            SurfaceError::SeedOutside { value, .. } => {
-                format!("Choose a voxel inside the wall, or an `iso` below {value}.")
-            }
-            SurfaceError::BadShape { .. }
-            | SurfaceError::TooManyVertices(_)
-            | SurfaceError::NotClosed(_)
-            | SurfaceError::BadVertex { .. } => "Send a smaller or a valid object.".into(),
         }
     }
 }

@@ -2,8 +2,7 @@
 
 use crate::progress::Cancelled;
 
-/// What is wrong with a file, as facts. [`VolumeError::field`] names the place and
-/// [`VolumeError::fix`] what its sender can do.
+/// What is wrong with a file. [`VolumeError::field`] names the field concerned.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum VolumeError {
     /// No file was given.
@@ -158,49 +157,6 @@ impl VolumeError {
             VolumeError::NotSlices { .. } => Some("Image Type (0008,0008)"),
             VolumeError::FrameNeeded { .. } | VolumeError::FrameOutOfRange { .. } => Some("frame"),
             _ => None,
-        }
-    }
-
-    /// What the sender can do about it.
-    pub fn fix(&self) -> String {
-        match self {
-            VolumeError::NoFile | VolumeError::Empty { .. } => "Send the volume's bytes.".into(),
-            VolumeError::Unsupported { fix, .. } => (*fix).into(),
-            VolumeError::NotSlices { .. } => {
-                "Send the reconstructed slices (Image Type RECON TOMO or RECON GATED TOMO).".into()
-            }
-            VolumeError::Unrecognised { .. } => {
-                "Send NIfTI (.nii, .nii.gz, or a .hdr/.img pair) or a multi-frame DICOM NM.".into()
-            }
-            VolumeError::Field { field, .. } => {
-                format!("Write the file anew with a valid {field}.")
-            }
-            VolumeError::Truncated { .. } | VolumeError::Corrupt { .. } => {
-                "Send the file again; if that fails too, write it anew.".into()
-            }
-            VolumeError::TooLarge { what, limit, .. } => {
-                format!("Crop or resample to at most {limit} {what}, or ask the operator.")
-            }
-            VolumeError::FrameNeeded { frames } | VolumeError::FrameOutOfRange { frames, .. } => {
-                format!(
-                    "Set `frame` to a number from 0 to {}.",
-                    frames.saturating_sub(1)
-                )
-            }
-            VolumeError::ImageMissing { .. } => {
-                "Send the .hdr and the .img together, or one .nii.".into()
-            }
-            VolumeError::NotOneVolume { .. } => {
-                "Send one file, or a .hdr with its .img, at a time; DICOM as one multi-frame file."
-                    .into()
-            }
-            VolumeError::Overflow { .. } => "Scale the values to below 3.4e38.".into(),
-            VolumeError::NoFiniteVoxel { .. } => {
-                "Look at the file in a viewer: there is nothing in it.".into()
-            }
-            VolumeError::Memory { .. } => "Try again later, or send a smaller volume.".into(),
-            VolumeError::Io { .. } => "Check that the file is there and may be read.".into(),
-            VolumeError::Cancelled(_) => "Ask again if the result is still wanted.".into(),
         }
     }
 }

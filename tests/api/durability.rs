@@ -4,8 +4,8 @@ use crate::helpers::{Service, fake_engine, heart, scan, text};
 use serde_json::{Value, json};
 use std::time::Duration;
 use ventriform::jobs::{
-    Catalogue, Failure, Fault, Filed, Intensity, JobStore, Lease, NewJob, Outcome, PageRequest,
-    Resource, State, Volume, VolumeFacts,
+    Catalogue, Failure, Fault, Filed, JobOutcome, JobState, JobStore, Lease, ListRequest, NewJob,
+    Resource, StoredVolume,
 };
 use ventriform::store::Store;
 
@@ -79,8 +79,8 @@ async fn a_job_that_brings_the_process_down_is_given_up_after_its_attempts() {
     }
     assert!(rows.claim("token", 3, 0, 10).await.unwrap().is_none());
     let reason = Failure::new(Fault::Service, "attempt-limit", "It never ends.");
-    let buried = rows.bury(3, &reason, 5).await.unwrap();
-    assert_eq!(buried[0].state, State::Failed);
+    let buried = rows.end_unclaimable(3, &reason, 5).await.unwrap();
+    assert_eq!(buried[0].state, JobState::Failed);
     assert_eq!(buried[0].failure.as_ref(), Some(&reason));
 }
 
@@ -100,7 +100,7 @@ async fn a_worker_that_lost_its_lease_changes_nothing() {
         "it is held"
     );
     rows.claim("second", 3, 10, 20).await.unwrap().unwrap();
-    assert_eq!(rows.heartbeat(&lease("first"), 99).await.unwrap(), None);
+    assert_eq!(rows.renew_lease(&lease("first"), 99).await.unwrap(), None);
     assert!(
         rows.progress(&lease("first"), "read", 0.5)
             .await
@@ -108,7 +108,7 @@ async fn a_worker_that_lost_its_lease_changes_nothing() {
             .is_none()
     );
     assert!(rows.hand_back(&lease("first")).await.unwrap().is_none());
-    let cancelled = Outcome::Cancelled;
+    let cancelled = JobOutcome::Cancelled;
     assert!(
         rows.finish(&lease("first"), &cancelled, 11)
             .await
@@ -120,7 +120,7 @@ async fn a_worker_that_lost_its_lease_changes_nothing() {
         .await
         .unwrap()
         .unwrap();
-    assert_eq!((ended.state, ended.attempts), (State::Cancelled, 2));
+    assert_eq!((ended.state, ended.attempts), (JobState::Cancelled, 2));
     assert!(
         rows.finish(&lease("second"), &cancelled, 13)
             .await
@@ -131,30 +131,13 @@ async fn a_worker_that_lost_its_lease_changes_nothing() {
 }
 
 async fn filed(store: &Store) -> String {
-    let volume = Volume {
+    let volume = StoredVolume {
         id: "vol_1".into(),
         sequence: 0,
         created_at: 0,
         bytes: 1,
         files: vec!["volume.nii".into()],
-        facts: VolumeFacts {
-            format: "words".into(),
-            compressed: false,
-            shape: [1; 3],
-            frames: 1,
-            spacing_mm: [1.0; 3],
-            affine: [[0.0; 4]; 4],
-            affine_source: "sform".into(),
-            dtype: "int16".into(),
-            intensity: Intensity {
-                min: 0.0,
-                max: 1.0,
-                mean: 0.5,
-                not_finite: 0,
-            },
-            labels: None,
-            warnings: Vec::new(),
-        },
+        facts: json!({}),
     };
     store.rows.add_volume(&volume).await.unwrap();
     let parameters = fake_engine()
@@ -202,7 +185,7 @@ async fn models_of_an_older_database_are_still_there() {
     let model = store.rows.product("mdl_1").await.unwrap().unwrap();
     assert_eq!(model.volume.as_deref(), Some("vol_1"));
     assert_eq!(model.created_at, 5);
-    let page = PageRequest {
+    let page = ListRequest {
         before: None,
         limit: 9,
     };

@@ -4,7 +4,7 @@ use reqwest::{Client, RequestBuilder, Response, StatusCode};
 use serde_json::{Map, Value, json};
 use std::io::{BufRead, BufReader};
 use std::ops::Deref;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -13,8 +13,8 @@ use ventriform::config::Settings;
 use ventriform::export::{self, Format, Metadata};
 use ventriform::http::{Running, start};
 use ventriform::jobs::{
-    Engine, Failure, Fault, Input, Intensity, Needs, Output, OutputFile, Resource, Stored,
-    VolumeFacts, VolumeReader, Work, WorkError,
+    Failure, Fault, GivenParameters, LocalFile, Needs, OutputFile, Resource, StoredItem, Work,
+    WorkError, WorkInput, WorkOutput,
 };
 use ventriform::mesh::TriMesh;
 use ventriform::mesh::shapes::icosphere;
@@ -22,6 +22,7 @@ use ventriform::progress::{Monitor, Plan, Stage};
 use ventriform::volume::ReadLimits;
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
+use ventriform::work::{Engine, IntensityFacts, UploadFacts, UploadReader};
 
 /// How long a test waits for what must happen.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -174,7 +175,7 @@ impl TestApp {
     /// Names of everything below the data folder's shelves and staging.
     pub fn stored(&self) -> Vec<String> {
         let mut names = Vec::new();
-        let shelves = Resource::SHELVED.map(Resource::plural);
+        let shelves = Resource::WITH_FILES.map(Resource::plural);
         for shelf in shelves.into_iter().chain(["staging"]) {
             for entry in std::fs::read_dir(self.data.path().join(shelf)).unwrap() {
                 names.push(entry.unwrap().file_name().into_string().unwrap());
@@ -227,9 +228,9 @@ pub fn fake_engine() -> Engine {
     }
 }
 
-struct FakeReader(Arc<dyn VolumeReader>);
+struct FakeReader(Arc<dyn UploadReader>);
 
-fn words(files: &[PathBuf]) -> Result<String, Failure> {
+fn words(files: &[LocalFile]) -> Result<String, Failure> {
     let content = std::fs::read(&files[0]).unwrap();
     match content.strip_prefix(b"VOLUME ") {
         Some(words) => Ok(String::from_utf8_lossy(&words[..words.len().min(64)]).into_owned()),
@@ -239,11 +240,11 @@ fn words(files: &[PathBuf]) -> Result<String, Failure> {
     }
 }
 
-impl VolumeReader for FakeReader {
-    fn inspect(&self, files: &[PathBuf]) -> Result<VolumeFacts, Failure> {
+impl UploadReader for FakeReader {
+    fn inspect(&self, files: &[LocalFile]) -> Result<UploadFacts, Failure> {
         words(files)?;
         let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
-        Ok(VolumeFacts {
+        Ok(UploadFacts {
             format: "words".into(),
             compressed: false,
             shape: [1, 2, 3],
@@ -257,7 +258,7 @@ impl VolumeReader for FakeReader {
             ],
             affine_source: "sform".into(),
             dtype: "int16".into(),
-            intensity: Intensity {
+            intensity: IntensityFacts {
                 min: 0.0,
                 max: 1.0,
                 mean: 0.5,
@@ -268,12 +269,12 @@ impl VolumeReader for FakeReader {
         })
     }
 
-    fn preview(&self, files: &[PathBuf]) -> Result<Vec<u8>, Failure> {
+    fn preview(&self, files: &[LocalFile]) -> Result<Vec<u8>, Failure> {
         words(files)?;
         Ok(b"\x89PNG\r\n\x1a\n".to_vec())
     }
 
-    fn template(&self, mesh: &[u8], organ: &str) -> Result<Output, Failure> {
+    fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure> {
         self.0.template(mesh, organ)
     }
 }
@@ -293,21 +294,15 @@ impl Work for FakeWork {
         self.0.needs(parameters)
     }
 
-    fn parameters_from_text(
-        &self,
-        pairs: &[(String, String)],
-    ) -> Result<Map<String, Value>, Failure> {
-        self.0.parameters_from_text(pairs)
+    fn check_parameters(&self, given: GivenParameters<'_>) -> Result<Map<String, Value>, Failure> {
+        self.0.check_parameters(given)
     }
 
-    fn parameters_from_json(
-        &self,
-        object: &Map<String, Value>,
-    ) -> Result<Map<String, Value>, Failure> {
-        self.0.parameters_from_json(object)
+    fn page_files(&self) -> &'static [&'static str] {
+        self.0.page_files()
     }
 
-    fn run(&self, input: &Input, monitor: &Monitor<'_>) -> Result<Output, WorkError> {
+    fn run(&self, input: &WorkInput, monitor: &Monitor<'_>) -> Result<WorkOutput, WorkError> {
         let words = words(&input.files)?;
         match words.split(' ').next().unwrap() {
             "slow" => work_for(Duration::from_secs(30), monitor)?,
@@ -332,7 +327,7 @@ impl Work for FakeWork {
                 bytes: b"\x1f\x8b a mask".to_vec(),
             });
             let seen = json!({
-                "things": input.things.keys().collect::<Vec<_>>(),
+                "things": input.items.keys().collect::<Vec<_>>(),
                 "library": input.library.len(),
             });
             output.summary.insert("seen".into(), seen);
@@ -340,7 +335,7 @@ impl Work for FakeWork {
         Ok(output)
     }
 
-    fn page(&self, stored: &Stored) -> Result<String, Failure> {
+    fn page(&self, stored: &StoredItem) -> Result<String, Failure> {
         let report = stored.read("report.json").unwrap().unwrap();
         let report = String::from_utf8(report).unwrap();
         Ok(format!("<!doctype html><title>report</title>{report}"))
@@ -357,7 +352,7 @@ fn work_for(time: Duration, monitor: &Monitor<'_>) -> Result<(), WorkError> {
     Ok(())
 }
 
-fn sphere() -> Output {
+fn sphere() -> WorkOutput {
     let mesh = icosphere(30.0, 1);
     let encoded = |format| export::encode(format, &mesh, &Metadata::new("sphere")).unwrap();
     let names = [
@@ -383,7 +378,7 @@ fn sphere() -> Output {
         media_type: "application/json",
         bytes: json!({"mesh": {"vertices": 42}}).to_string().into_bytes(),
     });
-    Output {
+    WorkOutput {
         summary: [("vertices".to_owned(), json!(42))].into_iter().collect(),
         files,
     }

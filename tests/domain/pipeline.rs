@@ -11,6 +11,7 @@ use ventriform::progress::{CancelToken, Monitor, Observer, Stage};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
 use ventriform::volume::{ReadLimits, VolumeFile};
+use ventriform::work::problems::advice;
 
 /// A simulated scan, small enough for many runs.
 fn scan() -> &'static [u8] {
@@ -115,7 +116,7 @@ fn refusals_name_the_field_and_a_way_out() {
     let refused = |pairs: &[(&str, &str)]| generate(pairs).unwrap_err();
     let high = refused(&[("iso", "absolute:1e9")]);
     assert_eq!(high.field(), Some("iso"));
-    assert!(high.fix().contains("between"), "{}", high.fix());
+    assert!(advice(&high).contains("between"), "{}", advice(&high));
     assert_eq!(refused(&[("label", "3")]).field(), Some("label"));
     let outside = refused(&[("seed_point", "900,1,1")]);
     assert!(outside.to_string().contains("72"), "{outside}");

@@ -24,6 +24,7 @@ use ventriform::parameters::ModelParameters;
 use ventriform::progress::Monitor;
 use ventriform::retile::{RetileError, retile};
 use ventriform::surface::Surface;
+use ventriform::work::problems::advice;
 
 /// Numbers of points; the sweeps take them in turn.
 const POINTS: [usize; 9] = [12, 150, 35, 300, 67, 20, 110, 500, 200];
@@ -115,7 +116,7 @@ fn sweep(name: &str, family: fn(u64) -> Surface, seeds: u64, refusable: f64) {
                 }
                 Err(error @ RetileError::NotCarried { .. }) => {
                     *refused.entry("not carried").or_default() += 1;
-                    assert!(error.fix().contains("topology"), "{what}");
+                    assert!(advice(&error).contains("topology"), "{what}");
                 }
                 Err(other) => panic!("{what}: {other}"),
             }

@@ -12,7 +12,7 @@ use super::pagination::{list_query, next_cursor};
 use super::problem::{Answer, Problem, shorten};
 use super::request::{self, Path, query_pairs, refuse_unknown, unknown};
 use super::wire::missing;
-use crate::jobs::{self, Deleted, Interrupted, NewJob, Resource, State as JobState};
+use crate::jobs::{self, Deleted, Interrupted, JobState, NewJob, Resource};
 use axum::Json;
 use axum::extract::{RawQuery, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};

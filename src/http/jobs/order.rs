@@ -7,7 +7,7 @@ use crate::http::products::{self, Offer};
 use crate::http::request::query_pairs;
 use crate::http::wire::{path_of, rfc3339};
 use crate::http::{idempotency, negotiate, upload};
-use crate::jobs::{self, Filed, NewJob, Resource, State, Work};
+use crate::jobs::{self, Filed, JobState, NewJob, Resource, Work};
 use axum::Json;
 use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
@@ -44,7 +44,7 @@ pub async fn one_line(
     // What can be refused without the body is refused before it is read.
     let mut pairs = query_pairs(query);
     let mut parameters = work.parameters_from_text(&pairs)?;
-    require(app, &work.needs(&parameters).things).await?;
+    require(app, &work.needs(&parameters).items).await?;
     if app.queue.is_full().await? {
         return Err(queue_full(app).await);
     }
@@ -78,7 +78,7 @@ pub fn new_job(
     NewJob {
         kind: kind.into(),
         idempotency: idempotency::promise(key, kind, &volume, &parameters),
-        needs: work.needs(&parameters).things,
+        needs: work.needs(&parameters).items,
         volume,
         parameters,
     }
@@ -100,7 +100,7 @@ async fn wait(
     let applied = HeaderValue::from_str(&format!("wait={}", patience.as_secs()))
         .unwrap_or(HeaderValue::from_static("wait"));
     let mut response = match (job.state, &job.result) {
-        (State::Succeeded, Some(id)) => {
+        (JobState::Succeeded, Some(id)) => {
             let product = products::find(app, id).await?;
             let offer = products::choose(headers, offers)?;
             // The headers of this request are about the upload, not about a part of the file.
@@ -202,7 +202,7 @@ fn retry_after(seconds: f64) -> String {
 /// 202 with the job.
 pub async fn accepted(app: &App, job: jobs::Job) -> Answer {
     let starts_in_ms = match job.state {
-        State::Queued => app.queue.standing(&job).await?.starts_in_ms,
+        JobState::Queued => app.queue.position(&job).await?.starts_in_ms,
         _ => None,
     };
     let headers = [

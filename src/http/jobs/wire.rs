@@ -3,7 +3,7 @@
 use crate::http::app::App;
 use crate::http::problem::{Answer, Problem, ProblemBody};
 use crate::http::wire::{path_of, rfc3339};
-use crate::jobs::{self, Resource, State};
+use crate::jobs::{self, JobState, Resource};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
@@ -104,14 +104,14 @@ struct JobLinks {
     report: Option<String>,
 }
 
-impl From<State> for JobStateName {
-    fn from(state: State) -> Self {
+impl From<JobState> for JobStateName {
+    fn from(state: JobState) -> Self {
         match state {
-            State::Queued => JobStateName::Queued,
-            State::Running => JobStateName::Running,
-            State::Succeeded => JobStateName::Succeeded,
-            State::Failed => JobStateName::Failed,
-            State::Cancelled => JobStateName::Cancelled,
+            JobState::Queued => JobStateName::Queued,
+            JobState::Running => JobStateName::Running,
+            JobState::Succeeded => JobStateName::Succeeded,
+            JobState::Failed => JobStateName::Failed,
+            JobState::Cancelled => JobStateName::Cancelled,
         }
     }
 }
@@ -119,7 +119,7 @@ impl From<State> for JobStateName {
 /// A job as a client sees it.
 pub async fn describe(app: &App, job: jobs::Job) -> Answer<Job> {
     let standing = match job.state {
-        State::Queued => Some(app.queue.standing(&job).await?),
+        JobState::Queued => Some(app.queue.position(&job).await?),
         _ => None,
     };
     let now = app.queue.clock.now();

@@ -2,11 +2,10 @@
 
 use crate::http::app::App;
 use crate::http::problem::{Answer, Problem};
-use crate::jobs::{Resource, Staged, Volume};
+use crate::jobs::{BlobError, Resource, StagedFiles, StoredVolume};
 use axum::body::Bytes;
 use futures::{Stream, StreamExt};
 use sha2::{Digest, Sha256};
-use std::path::Path;
 use tokio::io::AsyncWriteExt;
 
 /// Bytes gathered before one write.
@@ -14,7 +13,7 @@ const WRITE_BYTES: usize = 1 << 20;
 
 /// The files of one volume, which nobody can see yet.
 pub struct Bundle {
-    staged: Staged,
+    staged: Box<dyn StagedFiles>,
     files: Vec<Received>,
 }
 
@@ -36,13 +35,11 @@ impl Received {
 /// Writes a stream to a file, hashing it. Forced to the disk when it is published.
 async fn receive<E>(
     mut pieces: impl Stream<Item = Result<Bytes, E>> + Unpin,
-    folder: &Path,
+    staged: &dyn StagedFiles,
     name: &str,
     broken: impl FnOnce() -> Problem,
 ) -> Answer<Received> {
-    let mut file = tokio::fs::File::create(folder.join(name))
-        .await
-        .map_err(Problem::internal)?;
+    let mut file = staged.create(name).await?;
     let mut hash = Sha256::new();
     let mut waiting = Vec::with_capacity(64 << 10);
     let mut head = Vec::new();
@@ -65,7 +62,7 @@ async fn receive<E>(
         }
     }
     file.write_all(&waiting).await.map_err(Problem::internal)?;
-    file.flush().await.map_err(Problem::internal)?;
+    file.shutdown().await.map_err(Problem::internal)?;
     Ok(Received {
         name: name.to_owned(),
         kind: kind_by_content(&head),
@@ -111,7 +108,7 @@ impl Bundle {
         broken: impl FnOnce() -> Problem,
     ) -> Answer<&mut Received> {
         let name = self.files.len().to_string();
-        let file = receive(pieces, self.staged.folder(), &name, broken).await?;
+        let file = receive(pieces, &*self.staged, &name, broken).await?;
         self.files.push(file);
         let last = self.files.len() - 1;
         Ok(&mut self.files[last])
@@ -121,7 +118,7 @@ impl Bundle {
     ///
     /// # Errors
     /// 413 or 422 if the files are no volume that can be used.
-    pub async fn store(mut self, app: &App) -> Answer<(Volume, bool)> {
+    pub async fn store(mut self, app: &App) -> Answer<(StoredVolume, bool)> {
         // The order of parts carries no meaning, so it must not change the id.
         self.files
             .sort_by(|a, b| (a.kind, a.digest).cmp(&(b.kind, b.digest)));
@@ -129,28 +126,27 @@ impl Bundle {
         if let Some(known) = app.queue.catalogue.volume(&id).await? {
             return Ok((known, false));
         }
-        let names = self.name_files().await.map_err(Problem::internal)?;
-        let paths: Vec<_> = names.iter().map(|n| self.staged.folder().join(n)).collect();
+        let names = self.name_files().await?;
+        let mut files = Vec::with_capacity(names.len());
+        for name in &names {
+            files.push(self.staged.local(name).await?);
+        }
         let facts = {
             let _permit = app.inspections.acquire().await.map_err(Problem::internal)?;
             let reader = app.engine.reader.clone();
-            tokio::task::spawn_blocking(move || reader.inspect(&paths))
+            tokio::task::spawn_blocking(move || reader.inspect(&files))
                 .await
                 .map_err(Problem::internal)??
         };
-        let volume = Volume {
+        let volume = StoredVolume {
             sequence: 0,
             created_at: app.queue.clock.now(),
             bytes: self.files.iter().map(|f| f.bytes).sum(),
             files: names,
-            facts,
-            id: id.clone(),
+            facts: facts.to_json(),
+            id,
         };
-        let _shelving = app.queue.shelving.lock().await;
-        app.queue.blobs.publish(&id, self.staged).await?;
-        let new = app.queue.catalogue.add_volume(&volume).await?;
-        let stored = app.queue.catalogue.volume(&id).await?;
-        Ok((stored.unwrap_or(volume), new))
+        Ok(app.queue.add_volume(volume, self.staged).await?)
     }
 
     /// One file: its SHA-256, as `sha256sum` shows it, cut to 32 digits. Several: the same of
@@ -169,7 +165,7 @@ impl Bundle {
 
     /// Gives the files the names they keep: `volume.hdr` and `volume.img` for a pair, else
     /// numbers with the extension that the content speaks for.
-    async fn name_files(&self) -> std::io::Result<Vec<String>> {
+    async fn name_files(&self) -> Result<Vec<String>, BlobError> {
         let pair = self.files.len() == 2
             && self.files[0].kind.starts_with("hdr")
             && self.files[1].kind.starts_with("img");
@@ -179,8 +175,7 @@ impl Bundle {
                 (true, _) | (_, 1) => format!("volume.{}", file.kind),
                 _ => format!("{number:04}.{}", file.kind),
             };
-            let folder = self.staged.folder();
-            tokio::fs::rename(folder.join(&file.name), folder.join(&name)).await?;
+            self.staged.rename(&file.name, &name).await?;
             names.push(name);
         }
         Ok(names)

@@ -1,32 +1,25 @@
-//! The workers: each claims a job, has it computed, commits, and claims the next.
+//! Workers: each claims a job, computes it, commits the result, and claims the next.
 
-use super::runner::Runner;
-use super::{Engine, Queue};
+mod lease;
+mod progress;
+mod run;
+mod settings;
+
+pub use settings::WorkerSettings;
+
+use super::{Queue, Works};
+use run::JobRunner;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 
-/// A worker that nobody woke looks for work this often: leases run out in silence.
+/// An idle worker looks for jobs at least this often, because nothing wakes it when the lease of
+/// another process's worker expires.
 const POLL: Duration = Duration::from_secs(1);
 
-/// Deep enough for recursion over large meshes.
+/// Stack of the computing threads; recursion over large meshes needs it.
 const STACK_BYTES: usize = 16 << 20;
-
-/// How jobs are computed.
-#[derive(Debug, Clone, Copy)]
-pub struct WorkerSettings {
-    /// Jobs at the same time.
-    pub workers: usize,
-    /// Threads of each.
-    pub threads: usize,
-    /// How long a worker holds a job without a sign of life.
-    pub lease: Duration,
-    /// Starts of one job before it is given up.
-    pub attempt_limit: u32,
-    /// Longest computation of one job.
-    pub time_limit: Duration,
-}
 
 /// The running workers.
 pub struct Workers {
@@ -39,10 +32,10 @@ impl Workers {
     /// Starts the workers.
     ///
     /// # Errors
-    /// If the system refuses threads.
+    /// If the system cannot start the threads.
     pub fn start(
         queue: &Arc<Queue>,
-        engine: &Engine,
+        works: &Works,
         settings: WorkerSettings,
     ) -> std::io::Result<Self> {
         let (drain, halt) = (CancellationToken::new(), CancellationToken::new());
@@ -54,20 +47,20 @@ impl Workers {
                 .stack_size(STACK_BYTES)
                 .build()
                 .map_err(std::io::Error::other)?;
-            let runner = Runner {
+            let runner = JobRunner {
                 queue: queue.clone(),
-                engine: engine.clone(),
+                works: works.clone(),
                 settings,
                 threads: Arc::new(threads),
                 halt: halt.clone(),
             };
-            tasks.spawn(work(runner, drain.clone()));
+            tasks.spawn(run_jobs(runner, drain.clone()));
         }
         Ok(Self { tasks, drain, halt })
     }
 
-    /// Takes no new jobs; gives running ones `grace` to end; hands the rest back to the
-    /// queue.
+    /// Claims no new jobs, gives the running ones `grace` to end, and then returns those still
+    /// running to the queue.
     pub async fn stop(mut self, grace: Duration) {
         self.drain.cancel();
         let drained = async { while self.tasks.join_next().await.is_some() {} };
@@ -78,12 +71,12 @@ impl Workers {
     }
 }
 
-async fn work(runner: Runner, drain: CancellationToken) {
+async fn run_jobs(runner: JobRunner, drain: CancellationToken) {
     while !drain.is_cancelled() {
         match runner.run_next_job().await {
             Ok(true) => continue,
             Ok(false) => {}
-            Err(error) => tracing::error!(%error, "no job could be claimed"),
+            Err(error) => tracing::error!(%error, "the storage failed while a job was run"),
         }
         tokio::select! {
             () = runner.queue.woken() => {}

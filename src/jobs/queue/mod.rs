@@ -1,7 +1,13 @@
-//! The counter: where jobs are filed, watched and ended.
+//! The queue: filing, watching and cancelling jobs.
+
+mod input;
+mod publish;
+mod upkeep;
+
+pub use upkeep::{Upkeep, recover_after_crash};
 
 use super::{
-    BlobStore, Catalogue, Clock, Filed, Interrupted, Job, JobStore, Load, NewJob, StoreError,
+    BlobStore, Catalogue, Clock, Filed, Interrupted, Job, JobStore, NewJob, QueueLoad, StoreError,
 };
 use crate::progress::CancelToken;
 use std::collections::BTreeMap;
@@ -9,39 +15,41 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::sync::{Notify, broadcast};
 
-/// How many changes a slow listener may miss before it must look at the table again.
-const CHANGES_KEPT: usize = 256;
+/// How many changes are buffered for a slow subscriber. One that falls further behind misses
+/// changes and has to read the table.
+const CHANGES_BUFFERED: usize = 256;
 
 /// Limits of the queue.
 #[derive(Debug, Clone, Copy)]
 pub struct QueueSettings {
-    /// Jobs that may wait.
+    /// Largest number of waiting jobs.
     pub limit: usize,
-    /// Jobs computed at the same time.
+    /// Number of jobs computed at the same time.
     pub workers: usize,
 }
 
-/// Where a waiting job stands.
+/// The position of a waiting job.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Standing {
-    /// Jobs ahead of it, plus one.
+pub struct QueuePosition {
+    /// Position, the next job being 1.
     pub position: u64,
-    /// Milliseconds until it probably starts; absent before any job has ended.
+    /// Estimated milliseconds until it starts; `None` before any job has succeeded.
     pub starts_in_ms: Option<f64>,
 }
 
-/// The service's one door to its jobs and things.
+/// Jobs, volumes and products of one service.
 pub struct Queue {
-    /// The jobs.
+    /// The jobs table.
     pub jobs: Arc<dyn JobStore>,
-    /// The volumes and what was made.
+    /// The records of volumes and products.
     pub catalogue: Arc<dyn Catalogue>,
     /// Their files.
     pub blobs: Arc<dyn BlobStore>,
     /// The time of day.
     pub clock: Arc<dyn Clock>,
-    /// Held while files and rows of one thing are made or erased, so that both agree.
-    pub shelving: tokio::sync::Mutex<()>,
+    /// Held while the files and the record of one item are added or deleted, so that the two
+    /// always agree.
+    publishing: tokio::sync::Mutex<()>,
     settings: QueueSettings,
     filed: Notify,
     changes: broadcast::Sender<Arc<Job>>,
@@ -62,10 +70,10 @@ impl Queue {
             catalogue,
             blobs,
             clock,
-            shelving: tokio::sync::Mutex::new(()),
+            publishing: tokio::sync::Mutex::new(()),
             settings,
             filed: Notify::new(),
-            changes: broadcast::Sender::new(CHANGES_KEPT),
+            changes: broadcast::Sender::new(CHANGES_BUFFERED),
             running: Mutex::default(),
         }
     }
@@ -73,7 +81,7 @@ impl Queue {
     /// Accepts a job and wakes a worker. See [`JobStore::file`].
     ///
     /// # Errors
-    /// If the database cannot.
+    /// If the database fails.
     pub async fn file(&self, job: &NewJob) -> Result<Filed, StoreError> {
         let filed = self
             .jobs
@@ -85,18 +93,18 @@ impl Queue {
         Ok(filed)
     }
 
-    /// Whether one job more would be refused.
+    /// Whether the queue would reject another job.
     ///
     /// # Errors
-    /// If the database cannot.
+    /// If the database fails.
     pub async fn is_full(&self) -> Result<bool, StoreError> {
         Ok(self.jobs.load().await?.queued >= self.settings.limit as u64)
     }
 
-    /// Ends a job that waits, asks one that runs to stop.
+    /// Cancels a waiting job; asks a running one to stop.
     ///
     /// # Errors
-    /// If the database cannot.
+    /// If the database fails.
     pub async fn interrupt(&self, id: &str) -> Result<Interrupted, StoreError> {
         let outcome = self.jobs.interrupt(id, self.clock.now()).await?;
         match &outcome {
@@ -112,16 +120,16 @@ impl Queue {
         Ok(outcome)
     }
 
-    /// Changes of all jobs from now on.
+    /// Subscribes to the changes of all jobs.
     pub fn changes(&self) -> broadcast::Receiver<Arc<Job>> {
         self.changes.subscribe()
     }
 
-    /// Waits until the job has ended, at most `patience`. Returns the job as it then is.
+    /// Waits until the job has ended, for at most `limit`. Returns the job in its state then.
     ///
     /// # Errors
-    /// If the database cannot.
-    pub async fn wait(&self, id: &str, patience: Duration) -> Result<Option<Job>, StoreError> {
+    /// If the database fails.
+    pub async fn wait(&self, id: &str, limit: Duration) -> Result<Option<Job>, StoreError> {
         let mut changes = self.changes();
         let ended = async {
             loop {
@@ -136,52 +144,55 @@ impl Queue {
                 }
             }
         };
-        match tokio::time::timeout(patience, ended).await {
+        match tokio::time::timeout(limit, ended).await {
             Ok(job) => job,
             Err(_) => self.jobs.job(id).await,
         }
     }
 
-    /// Where a waiting job stands.
+    /// The position of a waiting job.
     ///
     /// # Errors
-    /// If the database cannot.
-    pub async fn standing(&self, job: &Job) -> Result<Standing, StoreError> {
+    /// If the database fails.
+    pub async fn position(&self, job: &Job) -> Result<QueuePosition, StoreError> {
         let ahead = self.jobs.ahead_of(job).await?;
-        let Load {
+        let QueueLoad {
             running,
             mean_duration_ms,
             ..
         } = self.jobs.load().await?;
         let workers = self.settings.workers as f64;
-        // Those that run are half done on average; each worker then takes its share.
+        // Running jobs are half done on average, and the workers share what is ahead.
         let work_ahead = (ahead as f64 + running as f64 / 2.0) / workers;
-        Ok(Standing {
+        Ok(QueuePosition {
             position: ahead + 1,
             starts_in_ms: mean_duration_ms.map(|mean| mean * work_ahead),
         })
     }
 
-    /// Waits for a job to be filed.
+    /// Waits until a job is filed.
     pub(super) async fn woken(&self) {
         self.filed.notified().await;
     }
 
+    /// Sends a changed job to all subscribers.
     pub(super) fn announce(&self, job: &Job) {
-        // Nobody listening is no failure.
+        // Sending fails if there is no subscriber.
         let _ = self.changes.send(Arc::new(job.clone()));
     }
 
+    /// Registers a running job, so that [`Queue::interrupt`] can stop it.
     pub(super) fn enter(&self, id: &str, token: CancelToken) {
         self.running().insert(id.to_owned(), token);
     }
 
+    /// Removes a job registered by [`Queue::enter`].
     pub(super) fn leave(&self, id: &str) {
         self.running().remove(id);
     }
 
     fn running(&self) -> std::sync::MutexGuard<'_, BTreeMap<String, CancelToken>> {
-        // The map is whole after any panic: each use of it is one call.
+        // A panic cannot leave the map half changed: each use is a single call.
         self.running.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,0 +1,142 @@
+//! Collecting the input of a job from the store.
+
+use super::Queue;
+use crate::jobs::{
+    BlobError, Failure, Fault, Job, ListRequest, LocalFile, Needs, Product, Resource, StoreError,
+    StoredItem, Work, WorkInput,
+};
+use serde_json::Map;
+use std::collections::BTreeMap;
+
+/// Templates read from the catalogue at a time.
+const LIBRARY_PAGE: u32 = 100;
+
+impl Queue {
+    /// The input of `job`, or why it cannot be computed.
+    ///
+    /// # Errors
+    /// If the storage fails.
+    pub(in crate::jobs) async fn input(
+        &self,
+        job: &Job,
+        work: &dyn Work,
+    ) -> Result<Result<WorkInput, Failure>, StoreError> {
+        let Needs {
+            items,
+            library,
+            files,
+        } = work.needs(&job.parameters);
+        let Some(volume) = self.item(&job.volume, files).await? else {
+            return Ok(Err(volume_missing(&job.volume)));
+        };
+        let mut found = BTreeMap::new();
+        for (field, id) in items {
+            if let Some(item) = self.item(&id, files).await? {
+                found.insert(field, item);
+            }
+        }
+        Ok(Ok(WorkInput {
+            volume: volume.id,
+            files: volume.files,
+            parameters: job.parameters.clone(),
+            items: found,
+            library: if library {
+                self.library(files).await?
+            } else {
+                Vec::new()
+            },
+        }))
+    }
+
+    /// A volume with all its files, or a product with the `wanted` ones. `None` if it does not
+    /// exist, or a file of a volume does not.
+    async fn item(&self, id: &str, wanted: &[&str]) -> Result<Option<StoredItem>, StoreError> {
+        if Resource::of(id) != Some(Resource::Volume) {
+            return Ok(match self.catalogue.product(id).await? {
+                Some(product) => Some(self.with_files(product, wanted).await?),
+                None => None,
+            });
+        }
+        let Some(volume) = self.catalogue.volume(id).await? else {
+            return Ok(None);
+        };
+        let files = self.volume_files(id, &volume.files).await?;
+        Ok(files.map(|files| StoredItem {
+            id: volume.id,
+            parameters: Map::new(),
+            files,
+        }))
+    }
+
+    /// The files of a volume on the local disk; `None` if one does not exist.
+    ///
+    /// # Errors
+    /// If the file store fails.
+    pub async fn volume_files(
+        &self,
+        id: &str,
+        names: &[String],
+    ) -> Result<Option<Vec<LocalFile>>, BlobError> {
+        let mut files = Vec::with_capacity(names.len());
+        for name in names {
+            match self.blobs.local(id, name).await? {
+                Some(file) => files.push(file),
+                None => return Ok(None),
+            }
+        }
+        Ok(Some(files))
+    }
+
+    /// A product with those of its files that are `wanted` and exist.
+    ///
+    /// # Errors
+    /// If the file store fails.
+    pub async fn with_files(
+        &self,
+        product: Product,
+        wanted: &[&str],
+    ) -> Result<StoredItem, BlobError> {
+        let mut files = Vec::new();
+        for file in &product.files {
+            if wanted.contains(&file.name.as_str()) {
+                files.extend(self.blobs.local(&product.id, &file.name).await?);
+            }
+        }
+        Ok(StoredItem {
+            id: product.id,
+            parameters: product.parameters,
+            files,
+        })
+    }
+
+    /// Every template in the order of ids, which does not depend on when they were added.
+    async fn library(&self, wanted: &[&str]) -> Result<Vec<StoredItem>, StoreError> {
+        let mut library = Vec::new();
+        let mut before = None;
+        loop {
+            let request = ListRequest {
+                before,
+                limit: LIBRARY_PAGE,
+            };
+            let page = self.catalogue.products(Resource::Template, request).await?;
+            for product in page.items {
+                library.push(self.with_files(product, wanted).await?);
+            }
+            before = page.next;
+            if before.is_none() {
+                break;
+            }
+        }
+        library.sort_by(|a, b| a.id.cmp(&b.id));
+        Ok(library)
+    }
+}
+
+fn volume_missing(id: &str) -> Failure {
+    Failure::new(
+        Fault::Service,
+        "unreadable",
+        format!("The volume `{id}` or one of its files is missing from the store."),
+    )
+    .fix("Upload the volume again, then start the job again.")
+}

@@ -1,0 +1,18 @@
+//! Settings of the workers.
+
+use std::time::Duration;
+
+/// How jobs are computed.
+#[derive(Debug, Clone, Copy)]
+pub struct WorkerSettings {
+    /// Number of jobs computed at the same time.
+    pub workers: usize,
+    /// Threads per job.
+    pub threads: usize,
+    /// How long a claim lasts without renewal.
+    pub lease: Duration,
+    /// Number of attempts after which a job is failed.
+    pub attempt_limit: u32,
+    /// Longest computation of one job.
+    pub time_limit: Duration,
+}

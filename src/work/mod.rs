@@ -1,0 +1,59 @@
+//! What jobs and uploads do with volumes and models: the bridge from the queue to the domain.
+//!
+//! | file | what |
+//! |---|---|
+//! | `model` | jobs of kind `model`: a volume's files to a surface model |
+//! | `segmentation` | jobs of kind `segmentation`: a stored model fitted to a volume |
+//! | `template` | a mesh to a template of the library |
+//! | `upload` | validating and previewing an uploaded volume |
+//! | `page` | the HTML page of a stored model or segmentation |
+//! | `problems` | errors of the domain to failures with status class, code, field and advice |
+//!
+//! Everything here is synchronous and runs on the threads of a worker or of a blocking pool. It
+//! reads local files and returns bytes; it neither stores anything nor sees the queue.
+
+mod files;
+mod model;
+mod page;
+mod parameters;
+pub mod problems;
+mod segmentation;
+mod template;
+mod upload;
+
+pub use model::ModelWork;
+pub use page::PageError;
+pub use segmentation::SegmentationWork;
+pub use upload::{DomainReader, IntensityFacts, UploadFacts, UploadReader};
+
+use crate::jobs::{Work, Works};
+use crate::volume::ReadLimits;
+use std::sync::Arc;
+
+/// All that the service can do with volumes and models. Tests replace its parts.
+#[derive(Clone)]
+pub struct Engine {
+    /// Validates uploads.
+    pub reader: Arc<dyn UploadReader>,
+    /// Computes jobs, by kind.
+    pub works: Works,
+}
+
+impl Engine {
+    /// The engine of the product; `limits` bound the volumes it reads.
+    pub fn new(limits: ReadLimits) -> Self {
+        let works: [Arc<dyn Work>; 2] = [
+            Arc::new(ModelWork { limits }),
+            Arc::new(SegmentationWork { limits }),
+        ];
+        Self {
+            reader: Arc::new(DomainReader { limits }),
+            works: works.into_iter().collect(),
+        }
+    }
+
+    /// The work that computes jobs of that kind.
+    pub fn work(&self, kind: &str) -> Option<&Arc<dyn Work>> {
+        self.works.of_kind(kind)
+    }
+}

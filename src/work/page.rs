@@ -1,0 +1,85 @@
+//! HTML pages of stored models and segmentations.
+//!
+//! A page consists mostly of pictures: it is ten times as large as the other files together and
+//! takes as long to make as the model, and few are ever looked at. Pages are therefore not stored.
+//! Each is made when it is requested, from the product's own files; the volume may have been
+//! deleted by then.
+
+use crate::export::read_json::{self, ReadMeshError};
+use crate::report::html::{Pictured, segmentation};
+use crate::report::{self, Closeness, Report};
+use std::io;
+
+/// Why there is no page.
+#[derive(Debug, thiserror::Error)]
+pub enum PageError {
+    /// A required file does not exist.
+    #[error("the file {0} is missing")]
+    Missing(&'static str),
+    /// A file cannot be read.
+    #[error("{0} cannot be read: {1}")]
+    Io(&'static str, io::Error),
+    /// A JSON file cannot be parsed.
+    #[error("{0} cannot be parsed: {1}")]
+    Json(&'static str, serde_json::Error),
+    /// The mesh cannot be parsed.
+    #[error("mesh.json cannot be used: {0}")]
+    Mesh(#[from] ReadMeshError),
+}
+
+/// Reads a product's file by name; `None` if it does not exist.
+pub type ReadFile<'a> = dyn Fn(&str) -> io::Result<Option<Vec<u8>>> + 'a;
+
+/// The files that [`model_page`] reads.
+pub(super) const MODEL_FILES: &[&str] = &["report.json", "mesh.json", "distance.json"];
+
+/// The files that [`segmentation_page`] reads.
+pub(super) const SEGMENTATION_FILES: &[&str] =
+    &["report.json", "mesh.json", "slices.png", "polar.svg"];
+
+/// The page of a model, made of `report.json`, `mesh.json` and, if it exists, `distance.json`.
+///
+/// # Errors
+/// [`PageError`].
+pub(super) fn model_page(read: &ReadFile<'_>) -> Result<String, PageError> {
+    let text = required(read, "report.json")?;
+    let report: Report = from_json("report.json", &text)?;
+    let mesh = read_json::decode(&required(read, "mesh.json")?)?;
+    let closeness: Option<Closeness> = optional(read, "distance.json")?
+        .map(|text| from_json("distance.json", &text))
+        .transpose()?;
+    Ok(report::html(&report, &mesh, closeness.as_ref()))
+}
+
+/// The page of a segmentation, made of `report.json`, `mesh.json` and, if they exist,
+/// `slices.png` and `polar.svg`.
+///
+/// # Errors
+/// [`PageError`].
+pub(super) fn segmentation_page(read: &ReadFile<'_>) -> Result<String, PageError> {
+    let report = from_json("report.json", &required(read, "report.json")?)?;
+    let mesh = read_json::decode(&required(read, "mesh.json")?)?;
+    let slices = optional(read, "slices.png")?;
+    let polar = optional(read, "polar.svg")?;
+    Ok(segmentation(&Pictured {
+        report: &report,
+        mesh: &mesh,
+        slices: slices.as_deref(),
+        polar: polar.as_deref(),
+    }))
+}
+
+fn optional(read: &ReadFile<'_>, name: &'static str) -> Result<Option<Vec<u8>>, PageError> {
+    read(name).map_err(|error| PageError::Io(name, error))
+}
+
+fn required(read: &ReadFile<'_>, name: &'static str) -> Result<Vec<u8>, PageError> {
+    optional(read, name)?.ok_or(PageError::Missing(name))
+}
+
+fn from_json<T: serde::de::DeserializeOwned>(
+    name: &'static str,
+    text: &[u8],
+) -> Result<T, PageError> {
+    serde_json::from_slice(text).map_err(|error| PageError::Json(name, error))
+}

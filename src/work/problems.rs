@@ -1,0 +1,432 @@
+//! Errors of the domain as failures for clients.
+//!
+//! Errors of the domain state facts. This is the one place that decides, for each of them, where
+//! the fault lies (which becomes the HTTP status), the stable code, the parameter or file field
+//! concerned, and the advice. The command line and HTTP both use it; the advice names parameters
+//! by their common names and fits both.
+
+use super::page::PageError;
+use crate::deform::DeformError;
+use crate::deform::template::{Organ, TemplateError};
+use crate::export::read_json::ReadMeshError;
+use crate::jobs::{Failure, Fault, WorkError};
+use crate::locate::localisation::LocaliseError;
+use crate::parameters::ParameterError;
+use crate::pipeline::PipelineError;
+use crate::retile::RetileError;
+use crate::segmentation::{ExpertError, SegmentError, SegmentationError};
+use crate::surface::SurfaceError;
+use crate::volume::VolumeError;
+use std::error::Error;
+
+/// Advice for work that was cancelled.
+const START_AGAIN: &str = "Start again if the result is still needed.";
+
+/// Code of a cancelled operation.
+const CANCELLED: (Fault, &str) = (Fault::Request, "cancelled");
+
+/// An error that can be explained to a client.
+pub trait Explain: Error {
+    /// The error with status class, code, field and advice.
+    fn explain(&self) -> Failure;
+
+    /// Whether this is no failure: the operation was cancelled.
+    fn is_cancelled(&self) -> bool {
+        false
+    }
+
+    /// The error and the advice as one line, for the command line.
+    fn with_advice(&self) -> String {
+        match self.explain().fix {
+            Some(fix) => format!("{self}. {fix}"),
+            None => self.to_string(),
+        }
+    }
+}
+
+/// The advice of [`Explain::explain`]; empty if there is none.
+pub fn advice(error: &impl Explain) -> String {
+    error.explain().fix.unwrap_or_default()
+}
+
+/// What a job that met `error` ends with.
+pub(super) fn work_error(error: &impl Explain) -> WorkError {
+    if error.is_cancelled() {
+        WorkError::Cancelled
+    } else {
+        WorkError::Failed(error.explain())
+    }
+}
+
+impl Explain for ParameterError {
+    fn explain(&self) -> Failure {
+        Failure::new(
+            Fault::Request,
+            "invalid-parameter",
+            format!("`{}`: {}.", self.field, self.message),
+        )
+        .at(&self.field)
+        .fix(&self.fix)
+    }
+}
+
+impl Explain for VolumeError {
+    fn explain(&self) -> Failure {
+        let kind = match self {
+            VolumeError::TooLarge { .. } => (Fault::TooLarge, "volume-too-large"),
+            VolumeError::FrameNeeded { .. } => (Fault::Request, "frame-needed"),
+            VolumeError::FrameOutOfRange { .. } => (Fault::Request, "frame-out-of-range"),
+            VolumeError::Unsupported { .. } => (Fault::Content, "unsupported-format"),
+            VolumeError::Unrecognised { .. } => (Fault::Content, "unrecognised-format"),
+            VolumeError::Truncated { .. } => (Fault::Content, "truncated-volume"),
+            VolumeError::Corrupt { .. } => (Fault::Content, "corrupt-volume"),
+            VolumeError::Field { .. } => (Fault::Content, "invalid-header"),
+            VolumeError::Io { .. } | VolumeError::Memory { .. } => (Fault::Service, "unreadable"),
+            VolumeError::Cancelled(_) => CANCELLED,
+            _ => (Fault::Content, "unusable-volume"),
+        };
+        failure(kind, self, self.field(), volume_advice(self))
+    }
+
+    fn is_cancelled(&self) -> bool {
+        matches!(self, VolumeError::Cancelled(_))
+    }
+}
+
+impl Explain for SurfaceError {
+    fn explain(&self) -> Failure {
+        let kind = match self {
+            SurfaceError::NoSurface { .. } => (Fault::Content, "no-surface"),
+            SurfaceError::Cancelled(_) => CANCELLED,
+            _ => (Fault::Content, "unusable-surface"),
+        };
+        failure(kind, self, self.field(), surface_advice(self))
+    }
+
+    fn is_cancelled(&self) -> bool {
+        matches!(self, SurfaceError::Cancelled(_))
+    }
+}
+
+impl Explain for RetileError {
+    fn explain(&self) -> Failure {
+        match self {
+            RetileError::Cancelled(_) => failure(CANCELLED, self, None, START_AGAIN.into()),
+            _ => failure(
+                (Fault::Request, "unsuitable-points"),
+                self,
+                Some("points"),
+                retile_advice(self),
+            ),
+        }
+    }
+
+    fn is_cancelled(&self) -> bool {
+        matches!(self, RetileError::Cancelled(_))
+    }
+}
+
+impl Explain for PipelineError {
+    fn explain(&self) -> Failure {
+        let code = match self {
+            PipelineError::Volume(error) => return error.explain(),
+            PipelineError::Surface(error) => return error.explain(),
+            PipelineError::Retile(error) => return error.explain(),
+            PipelineError::Cancelled(_) => {
+                return failure(CANCELLED, self, None, START_AGAIN.into());
+            }
+            PipelineError::Optimise(_) => "not-optimised",
+            PipelineError::Unsound { .. } => "unsound-model",
+        };
+        let advice = "Try another `seed`, more `points`, or `topology=genus0`.";
+        failure((Fault::Content, code), self, None, advice.into())
+    }
+
+    fn is_cancelled(&self) -> bool {
+        PipelineError::is_cancelled(self)
+    }
+}
+
+impl Explain for SegmentError {
+    fn explain(&self) -> Failure {
+        use SegmentationError::{Cancelled, Deform, Expert, NoTemplate};
+        let kind = match self {
+            SegmentError::Volume(volume) => return volume.explain(),
+            SegmentError::ExpertVolume(volume) => return volume.explain().at("expert"),
+            SegmentError::Parameter(parameter) => return parameter.explain(),
+            SegmentError::Unreadable { .. }
+            | SegmentError::Model { .. }
+            | SegmentError::OtherOrgan { .. } => (Fault::Request, "unsuitable-model"),
+            SegmentError::NoModel { .. } | SegmentError::Segmentation(NoTemplate) => {
+                (Fault::Request, "no-model")
+            }
+            SegmentError::Segmentation(Expert(ExpertError::Empty)) => {
+                (Fault::Content, "empty-mask")
+            }
+            SegmentError::Segmentation(Expert(ExpertError::Elsewhere { .. })) => {
+                (Fault::Content, "mask-elsewhere")
+            }
+            SegmentError::Segmentation(Deform(DeformError::Localise(localise))) => match localise {
+                LocaliseError::HintOutside => (Fault::Request, "hint-outside"),
+                LocaliseError::Blank => (Fault::Content, "blank-volume"),
+                _ => (Fault::Content, "no-heart"),
+            },
+            SegmentError::Segmentation(Deform(_)) => (Fault::Request, "invalid-parameter"),
+            SegmentError::Segmentation(Cancelled(_) | Expert(ExpertError::Cancelled(_)))
+            | SegmentError::Cancelled(_) => CANCELLED,
+        };
+        failure(kind, self, self.field(), segmentation_advice(self))
+    }
+
+    fn is_cancelled(&self) -> bool {
+        SegmentError::is_cancelled(self)
+    }
+}
+
+impl Explain for ReadMeshError {
+    fn explain(&self) -> Failure {
+        failure(UNSUITABLE_MODEL, self, None, GIVE_MESH_JSON.into())
+    }
+}
+
+impl Explain for TemplateError {
+    fn explain(&self) -> Failure {
+        failure(UNSUITABLE_MODEL, self, None, template_advice(self))
+    }
+
+    fn is_cancelled(&self) -> bool {
+        matches!(self, TemplateError::Cancelled(_))
+    }
+}
+
+impl Explain for PageError {
+    fn explain(&self) -> Failure {
+        failure(
+            (Fault::Service, "unreadable"),
+            self,
+            None,
+            "Use report.json, which contains the same figures.".into(),
+        )
+    }
+}
+
+const UNSUITABLE_MODEL: (Fault, &str) = (Fault::Content, "unsuitable-model");
+
+const GIVE_MESH_JSON: &str = "Give a JSON mesh as `generate` writes it (mesh.json).";
+
+/// A mesh that no file format can represent, or not one of them.
+pub(super) fn not_exportable(error: &dyn Error) -> Failure {
+    Failure::new(Fault::Content, "not-exportable", sentence(error))
+}
+
+/// A template that cannot be written in every format.
+pub(super) fn unsuitable_mesh(error: &dyn Error) -> Failure {
+    failure(
+        UNSUITABLE_MODEL,
+        error,
+        None,
+        "Give a mesh without coincident vertices.".into(),
+    )
+}
+
+/// A word that names no organ.
+pub(super) fn unknown_organ(organ: &str) -> Failure {
+    let words = Organ::ALL.map(Organ::as_str).join(", ");
+    Failure::new(
+        Fault::Request,
+        "invalid-parameter",
+        format!("There is no organ `{organ}`."),
+    )
+    .at("organ")
+    .fix(format!("Give one of {words}."))
+}
+
+/// A model that was chosen for a segmentation and has no mesh.
+pub(super) fn mesh_missing(id: &str) -> Failure {
+    Failure::new(
+        Fault::Request,
+        "invalid-field",
+        format!("The model `{id}` has no mesh any more."),
+    )
+    .at("model")
+    .fix("Choose another model; GET /v1/models and /v1/templates list them.")
+}
+
+/// A stored model whose file cannot be read.
+pub(super) fn unreadable_model(error: &std::io::Error) -> Failure {
+    Failure::new(
+        Fault::Service,
+        "unreadable",
+        format!("A stored model cannot be read: {error}."),
+    )
+}
+
+fn volume_advice(error: &VolumeError) -> String {
+    match error {
+        VolumeError::NoFile | VolumeError::Empty { .. } => {
+            "Give a file that contains the volume.".into()
+        }
+        VolumeError::Unsupported { fix, .. } => (*fix).into(),
+        VolumeError::NotSlices { .. } => {
+            "Give the reconstructed slices (Image Type RECON TOMO or RECON GATED TOMO).".into()
+        }
+        VolumeError::Unrecognised { .. } => {
+            "Give NIfTI (.nii, .nii.gz, or a .hdr/.img pair) or a multi-frame DICOM NM file.".into()
+        }
+        VolumeError::Field { field, .. } => format!("Write the file again with a valid {field}."),
+        VolumeError::Truncated { .. } | VolumeError::Corrupt { .. } => {
+            "Transfer the file again; if that does not help, export it again from its source."
+                .into()
+        }
+        VolumeError::TooLarge { what, limit, .. } => format!(
+            "Crop or resample the volume to at most {limit} {what}, or ask the operator to raise \
+             the limit."
+        ),
+        VolumeError::FrameNeeded { frames } | VolumeError::FrameOutOfRange { frames, .. } => {
+            let last = frames.saturating_sub(1);
+            format!("Set `frame` to a number from 0 to {last}.")
+        }
+        VolumeError::ImageMissing { .. } => {
+            "Give the .hdr and the .img together, or a single .nii.".into()
+        }
+        VolumeError::NotOneVolume { .. } => {
+            "Give one file, or a .hdr with its .img; DICOM as one multi-frame file.".into()
+        }
+        VolumeError::Overflow { .. } => "Scale the values to below 3.4e38.".into(),
+        VolumeError::NoFiniteVoxel { .. } => EMPTY_FILE.into(),
+        VolumeError::Memory { .. } => "Try again later, or use a smaller volume.".into(),
+        VolumeError::Io { .. } => "Check that the file exists and can be read.".into(),
+        VolumeError::Cancelled(_) => START_AGAIN.into(),
+    }
+}
+
+const EMPTY_FILE: &str = "Check the file in a viewer: it shows nothing.";
+
+fn surface_advice(error: &SurfaceError) -> String {
+    match error {
+        SurfaceError::Cancelled(_) => START_AGAIN.into(),
+        SurfaceError::NoFiniteVoxel { .. } | SurfaceError::Constant { .. } => EMPTY_FILE.into(),
+        SurfaceError::NoSurface {
+            minimum, maximum, ..
+        } => format!("Set `iso` to auto or to an absolute value between {minimum} and {maximum}."),
+        SurfaceError::BadIso { expected, .. } => format!("Set `iso` to {expected}."),
+        SurfaceError::BadSmoothing { .. } => "Set `mask_smoothing` to a number from 0 to 3.".into(),
+        SurfaceError::NoSuchLabel { .. } => "Set `label` to a label of the volume.".into(),
+        SurfaceError::OutsideVolume { shape, .. } => {
+            format!("Give voxel indices below {shape:?}, counted from 0.")
+        }
+        SurfaceError::EmptyBox { .. } => "Give the lower corner of the box first.".into(),
+        SurfaceError::SeedOutside { value, .. } => {
+            format!("Choose a voxel inside the wall, or an `iso` below {value}.")
+        }
+        SurfaceError::BadShape { .. }
+        | SurfaceError::TooManyVertices(_)
+        | SurfaceError::NotClosed(_)
+        | SurfaceError::BadVertex { .. } => "Give a smaller or a valid object.".into(),
+    }
+}
+
+fn retile_advice(error: &RetileError) -> String {
+    match error {
+        RetileError::Cancelled(_) => START_AGAIN.into(),
+        RetileError::TooFewPoints { needed, .. } => {
+            format!("Set `points` to {needed} or more, or `topology` to genus0.")
+        }
+        RetileError::NotCarried { .. } => "More points do not help. Set `topology` to genus0, or \
+             `isolate` to one component; if the object is only two or three voxels thick, choose \
+             another `iso` or smooth the volume."
+            .into(),
+        RetileError::TooManyPoints { limit, .. } => format!("Set `points` to {limit} or fewer."),
+        RetileError::OpenSurface(_) | RetileError::NoArea => {
+            "Give a closed surface of finite size.".into()
+        }
+        RetileError::SelfIntersecting { .. } => {
+            "Choose another `iso`, or smooth the volume.".into()
+        }
+        RetileError::BadParameter { name, range, .. } => {
+            format!("Set `{name}` to a value in {range}.")
+        }
+    }
+}
+
+fn template_advice(error: &TemplateError) -> String {
+    match error {
+        TemplateError::NoCup { .. } => {
+            "Give a model of a left ventricle, or set `organ` to what this one shows.".into()
+        }
+        TemplateError::TooLarge { limit, .. } => format!("Give a model of at most {limit} points."),
+        _ => "Give a closed surface that faces outward, in LPS millimetres.".into(),
+    }
+}
+
+fn segmentation_advice(error: &SegmentError) -> String {
+    use SegmentationError::{Cancelled, Deform, Expert, NoTemplate};
+    match error {
+        SegmentError::Volume(error) | SegmentError::ExpertVolume(error) => volume_advice(error),
+        SegmentError::Parameter(error) => error.fix.clone(),
+        SegmentError::Unreadable { .. } => GIVE_MESH_JSON.into(),
+        SegmentError::Model { error, .. } => template_advice(error),
+        SegmentError::OtherOrgan { shows, .. } => {
+            format!("Give a model of that organ, or set `organ` to {shows}.")
+        }
+        SegmentError::NoModel { .. } | SegmentError::Segmentation(NoTemplate) => {
+            "Name a model in `model`, or add one to the library.".into()
+        }
+        SegmentError::Segmentation(Expert(error)) => match error {
+            ExpertError::Empty => "Give a mask whose voxels are above 0.5 inside the organ.".into(),
+            ExpertError::Elsewhere { .. } => "Give a mask of the same scan whose header places it \
+                 correctly in the patient."
+                .into(),
+            ExpertError::Cancelled(_) => START_AGAIN.into(),
+        },
+        SegmentError::Segmentation(Deform(error)) => deform_advice(error),
+        SegmentError::Segmentation(Cancelled(_)) | SegmentError::Cancelled(_) => START_AGAIN.into(),
+    }
+}
+
+fn deform_advice(error: &DeformError) -> String {
+    match error {
+        DeformError::Localise(LocaliseError::NoHeart { .. }) => {
+            "Check that the file is a reconstructed heart scan; if it is, give the heart's centre \
+             as `center` (x,y,z in LPS millimetres)."
+                .into()
+        }
+        DeformError::Localise(LocaliseError::HintOutside) => {
+            "Give `center` or `box` inside the volume, or leave them out.".into()
+        }
+        DeformError::Localise(LocaliseError::Blank) => {
+            "Check that this is the right file and, for a 4-D one, the right `frame`.".into()
+        }
+        DeformError::TooManyNodes { limit, .. } => {
+            format!("Give a model of at most {limit} points, or use no support springs.")
+        }
+        _ => "Give finite numbers within their ranges.".into(),
+    }
+}
+
+fn failure(
+    (fault, code): (Fault, &str),
+    error: &dyn Error,
+    field: Option<&str>,
+    advice: String,
+) -> Failure {
+    let failure = Failure::new(fault, code, sentence(error)).fix(advice);
+    match field {
+        Some(field) => failure.at(field),
+        None => failure,
+    }
+}
+
+/// An error's message as a sentence.
+fn sentence(error: &dyn Error) -> String {
+    let text = error.to_string();
+    let mut letters = text.chars();
+    let mut sentence: String = letters
+        .next()
+        .map(|first| first.to_uppercase().chain(letters).collect())
+        .unwrap_or_default();
+    if !sentence.ends_with('.') {
+        sentence.push('.');
+    }
+    sentence
+}

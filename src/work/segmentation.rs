@@ -1,0 +1,146 @@
+//! Jobs of kind `segmentation`: [`crate::segmentation::from_files`] over stored models.
+
+use super::files::volume_files;
+use super::page;
+use super::parameters;
+use super::problems::{Explain, mesh_missing, not_exportable, unreadable_model, work_error};
+use crate::export::{Format, read_json};
+use crate::jobs::{
+    Failure, GivenParameters, Needs, OutputFile, Resource, StoredItem, Work, WorkError, WorkInput,
+    WorkOutput,
+};
+use crate::parameters::{FitParameters, Parameters};
+use crate::progress::{Monitor, Plan};
+use crate::segmentation::{NamedFile, NamedMesh, Order, OutcomeError, SegmentError, from_files};
+use crate::volume::ReadLimits;
+use serde_json::{Map, Value};
+
+/// The file of a model that is fitted.
+const MESH: &str = "mesh.json";
+
+/// Fits models to volumes.
+#[derive(Debug, Clone, Copy)]
+pub struct SegmentationWork {
+    /// Limits on the volume.
+    pub limits: ReadLimits,
+}
+
+impl Work for SegmentationWork {
+    fn makes(&self) -> Resource {
+        Resource::Segmentation
+    }
+
+    fn needs(&self, parameters: &Map<String, Value>) -> Needs {
+        let id = |field: &str| {
+            Some((
+                field.to_owned(),
+                parameters.get(field)?.as_str()?.to_owned(),
+            ))
+        };
+        let model = id("model").filter(|(_, id)| id != FitParameters::AUTO);
+        Needs {
+            library: model.is_none(),
+            items: model.into_iter().chain(id("expert")).collect(),
+            files: &[MESH],
+        }
+    }
+
+    fn check_parameters(&self, given: GivenParameters<'_>) -> Result<Map<String, Value>, Failure> {
+        parameters::check::<FitParameters>(given)
+    }
+
+    fn plan(&self) -> Plan {
+        Plan::SEGMENTATION
+    }
+
+    fn run(&self, input: &WorkInput, monitor: &Monitor<'_>) -> Result<WorkOutput, WorkError> {
+        let parameters =
+            FitParameters::from_json(&input.parameters).map_err(|error| error.explain())?;
+        let expert = input.items.get("expert");
+        let expert = expert.map(|expert| volume_files(&expert.files));
+        let (models, named) = models(input, &parameters)?;
+        let order = Order {
+            volume: &volume_files(&input.files),
+            expert: expert.as_deref(),
+            models,
+            named,
+            parameters: &parameters,
+        };
+        let made = from_files(&order, &self.limits, monitor).map_err(|error| work_error(&error))?;
+        let files = made.files(&Format::ALL, Some(input.volume.clone()), monitor);
+        let files = files.map_err(|error| match error {
+            OutcomeError::Cancelled(cancelled) => cancelled.into(),
+            error => WorkError::Failed(not_exportable(&error)),
+        })?;
+        Ok(WorkOutput {
+            summary: made.summary(),
+            files: files.into_iter().map(OutputFile::from).collect(),
+        })
+    }
+
+    fn page_files(&self) -> &'static [&'static str] {
+        page::SEGMENTATION_FILES
+    }
+
+    fn page(&self, segmentation: &StoredItem) -> Result<String, Failure> {
+        page::segmentation_page(&|name| segmentation.read(name)).map_err(|error| error.explain())
+    }
+}
+
+impl From<NamedFile> for OutputFile {
+    fn from(file: NamedFile) -> Self {
+        Self {
+            name: file.name,
+            media_type: file.media_type,
+            bytes: file.bytes,
+        }
+    }
+}
+
+/// The models to fit, and whether the client named them: the model of the parameters, or every
+/// template of the organ.
+fn models(
+    input: &WorkInput,
+    parameters: &FitParameters,
+) -> Result<(Vec<NamedMesh>, bool), WorkError> {
+    let organ = parameters.organ.as_str();
+    let organ_of = |item: &StoredItem| {
+        let organ = item.parameters.get("organ");
+        organ.and_then(Value::as_str).map(str::to_owned)
+    };
+    if let Some(item) = input.items.get("model") {
+        if let Some(other) = organ_of(item).filter(|shown| shown != organ) {
+            return Err(work_error(&SegmentError::OtherOrgan {
+                name: item.id.clone(),
+                shows: other,
+                wanted: organ,
+            }));
+        }
+        let model = mesh(item)?.ok_or_else(|| mesh_missing(&item.id))?;
+        return Ok((vec![model], true));
+    }
+    let mut models = Vec::new();
+    for item in &input.library {
+        if organ_of(item).is_some_and(|shown| shown == organ) {
+            // A template that was deleted a moment ago is left out.
+            models.extend(mesh(item)?);
+        }
+    }
+    Ok((models, false))
+}
+
+/// The mesh of a stored model, with the name under which reports mention it; `None` if its file
+/// does not exist.
+fn mesh(item: &StoredItem) -> Result<Option<NamedMesh>, WorkError> {
+    let name = match item.parameters.get("name").and_then(Value::as_str) {
+        Some(name) => format!("{name} ({})", item.id),
+        None => item.id.clone(),
+    };
+    let Some(bytes) = item.read(MESH).map_err(|e| unreadable_model(&e))? else {
+        return Ok(None);
+    };
+    match read_json::decode(&bytes) {
+        Ok(mesh) => Ok(Some(NamedMesh { name, mesh })),
+        Err(error) => Err(work_error(&SegmentError::Unreadable { name, error })),
+    }
+}

@@ -1,0 +1,137 @@
+//! Validating uploads: volumes by [`crate::volume`], templates by [`crate::deform`].
+
+use super::files::volume_files;
+use super::problems::Explain;
+use super::template;
+use crate::jobs::{Failure, LocalFile, StoreError, StoredVolume, WorkOutput};
+use crate::progress::Monitor;
+use crate::volume::{self, ReadLimits, ReadOptions};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// Validates uploads. Its methods are called on blocking threads.
+pub trait UploadReader: Send + Sync + 'static {
+    /// Reads and validates the files of one volume.
+    ///
+    /// # Errors
+    /// Why the files do not make up a usable volume.
+    fn inspect(&self, files: &[LocalFile]) -> Result<UploadFacts, Failure>;
+
+    /// The three orthogonal middle slices as a PNG.
+    ///
+    /// # Errors
+    /// As [`UploadReader::inspect`].
+    fn preview(&self, files: &[LocalFile]) -> Result<Vec<u8>, Failure>;
+
+    /// Reads and validates a JSON mesh that is to serve as a template of `organ`. Returns its main
+    /// figures and every download.
+    ///
+    /// # Errors
+    /// Why the mesh cannot be fitted.
+    fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure>;
+}
+
+/// What is known of a volume after reading it. Stored as JSON in [`StoredVolume::facts`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct UploadFacts {
+    /// `NIfTI-1`, `NIfTI-2` ...
+    pub format: String,
+    /// Whether it was gzipped.
+    pub compressed: bool,
+    /// Voxels along i, j, k of one frame.
+    pub shape: [usize; 3],
+    /// Number of frames, each a volume of that shape.
+    pub frames: usize,
+    /// Voxel spacing along the first three axes, mm.
+    pub spacing_mm: [f64; 3],
+    /// Voxel index to millimetres in the patient frame LPS, row by row.
+    pub affine: [[f64; 4]; 4],
+    /// The source of the affine: `sform`, `qform`, `pixdim`.
+    pub affine_source: String,
+    /// The file's data type, such as `int16`.
+    pub dtype: String,
+    /// Summary of the values.
+    pub intensity: IntensityFacts,
+    /// The labels, rising, if the volume looks like a label map.
+    pub labels: Option<Vec<i64>>,
+    /// Oddities of the file that do not prevent its use.
+    pub warnings: Vec<String>,
+}
+
+/// A summary of the voxel values, slope and intercept applied.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct IntensityFacts {
+    /// Smallest finite value.
+    pub min: f64,
+    /// Largest finite value.
+    pub max: f64,
+    /// Mean of the finite values.
+    pub mean: f64,
+    /// Number of voxels that are NaN or infinite.
+    pub not_finite: u64,
+}
+
+impl UploadFacts {
+    /// The facts as stored with a volume.
+    pub fn to_json(&self) -> Value {
+        serde_json::to_value(self).expect("facts always serialise")
+    }
+
+    /// The facts stored with `volume`.
+    ///
+    /// # Errors
+    /// If the record is damaged.
+    pub fn of(volume: &StoredVolume) -> Result<Self, StoreError> {
+        Self::deserialize(&volume.facts).map_err(|error| {
+            StoreError::Database(format!("volume {}: damaged facts: {error}", volume.id))
+        })
+    }
+}
+
+/// The reader of the product.
+#[derive(Debug, Clone, Copy)]
+pub struct DomainReader {
+    /// Limits on a volume.
+    pub limits: ReadLimits,
+}
+
+impl UploadReader for DomainReader {
+    fn inspect(&self, files: &[LocalFile]) -> Result<UploadFacts, Failure> {
+        let facts = volume::inspect(&volume_files(files), &self.limits, &Monitor::silent())
+            .map_err(|error| error.explain())?;
+        let affine = facts.affine_lps;
+        Ok(UploadFacts {
+            format: facts.format.as_str().into(),
+            compressed: facts.compressed,
+            shape: facts.shape,
+            frames: facts.frames,
+            spacing_mm: facts.spacing_mm,
+            affine: std::array::from_fn(|row| std::array::from_fn(|column| affine[(row, column)])),
+            affine_source: facts.affine_source.as_str().into(),
+            dtype: facts.data_type.into(),
+            intensity: IntensityFacts {
+                min: facts.intensity.minimum.into(),
+                max: facts.intensity.maximum.into(),
+                mean: facts.intensity.mean,
+                not_finite: facts.intensity.missing,
+            },
+            labels: facts
+                .intensity
+                .labels
+                .map(|labels| labels.iter().map(|l| l.label).collect()),
+            warnings: facts.warnings,
+        })
+    }
+
+    fn preview(&self, files: &[LocalFile]) -> Result<Vec<u8>, Failure> {
+        let options = ReadOptions { frame: Some(0) };
+        let files = volume_files(files);
+        let reading = volume::read(&files, &options, &self.limits, &Monitor::silent())
+            .map_err(|error| error.explain())?;
+        Ok(volume::preview_png(&reading.volume))
+    }
+
+    fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure> {
+        template::make(mesh, organ)
+    }
+}
