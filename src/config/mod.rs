@@ -1,9 +1,12 @@
-//! The service's settings: read once from four layers into one typed struct.
+//! The settings of the service, read once at start into a typed struct.
 //!
-//! A flag beats a `VENTRIFORM_*` variable, which beats the file of `--config` (TOML), which
-//! beats the default. One table below names every setting with its type, default and
-//! sentence; flags, variables, file keys, `--help` and `--print-config` all come from it.
-//! Nothing else in the program asks the environment.
+//! A setting comes from the first of these that has it: a command-line flag, a `VENTRIFORM_*`
+//! environment variable, the TOML file given by `--config`, the default. The table below lists
+//! every setting with its description, type and default; flags, variables, file keys, `--help`
+//! and `--print-config` are generated from it. Nothing else in the program reads the environment.
+//!
+//! The crate `config` is not used: it does not combine with flags of `clap`, does not say in an
+//! error which setting came from where, and cannot print the origins.
 
 mod units;
 
@@ -15,10 +18,10 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// The prefix of every variable.
+/// The prefix of every environment variable.
 pub const VARIABLE_PREFIX: &str = "VENTRIFORM_";
 
-/// A setting that cannot be used, with the layer it came from.
+/// Why the settings cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ConfigError {
     /// The file of `--config` could not be read.
@@ -26,20 +29,20 @@ pub enum ConfigError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What the system or the TOML parser said.
+        /// The message of the system or of the TOML parser.
         reason: String,
     },
-    /// A key of the file is no setting.
+    /// A key of the file is not a setting.
     #[error("{path}: unknown setting `{key}`{}", hint(nearest))]
     UnknownKey {
         /// The file.
         path: PathBuf,
         /// The key as written.
         key: String,
-        /// The setting most like it.
+        /// The setting with the most similar name.
         nearest: Option<String>,
     },
-    /// A value does not fit its setting.
+    /// A value is not valid for its setting.
     #[error("{setting} = `{value}` ({origin}): {reason}")]
     BadValue {
         /// The setting's name.
@@ -60,16 +63,16 @@ fn hint(nearest: &Option<String>) -> String {
         .unwrap_or_default()
 }
 
-/// The layer that decided a setting.
+/// Where the value of a setting came from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
     /// A command-line flag.
     Flag,
-    /// A `VENTRIFORM_*` variable.
+    /// A `VENTRIFORM_*` environment variable.
     Variable,
     /// The file of `--config`.
     File,
-    /// Nobody said anything.
+    /// The default.
     Default,
 }
 
@@ -84,16 +87,16 @@ impl Display for Origin {
     }
 }
 
-/// Makes the struct of settings, the flags and the resolver from one table.
+/// Generates the struct of settings, the flags and the resolver from one table.
 macro_rules! settings {
     ($($(#[doc = $doc:literal])+ $name:ident: $kind:ty = $default:literal;)+) => {
-        /// Every setting of the service, resolved.
+        /// Every setting of the service.
         #[derive(Debug, Clone, PartialEq)]
         pub struct Settings {
             $($(#[doc = $doc])+ pub $name: $kind,)+
         }
 
-        /// The settings as flags of `ventriform serve`. All optional: see the module.
+        /// The settings as flags of `ventriform serve`, all optional.
         #[derive(Debug, Clone, Default, clap::Args)]
         pub struct Flags {
             /// TOML file with settings, keys named like the flags with `_` [env: VENTRIFORM_CONFIG]
@@ -133,50 +136,50 @@ macro_rules! settings {
 settings! {
     /// Address and port to listen on; port 0 takes any free one
     listen: SocketAddr = "127.0.0.1:8080";
-    /// Folder for the database and the files; made if absent, used by one process at a time
+    /// Folder for the database and the files; created if missing, used by one process at a time
     data_dir: PathBuf = "ventriform-data";
     /// Jobs computed at the same time; `auto` is one per two cores
     workers: Count = "auto";
     /// Threads of one job; `auto` is two, or one on a single core
     threads: Count = "auto";
-    /// Jobs that may wait; beyond it new ones are answered 429
+    /// Largest number of waiting jobs; more are rejected with status 429
     queue_limit: usize = "1000";
-    /// Starts of one job before it is given up. A job that brings the process down looks like a
-    /// power cut: too few, and a bad day loses good jobs
+    /// Number of times a job is started before it is failed. A job that crashes the process
+    /// cannot be told from a power cut: if this is too small, power cuts fail good jobs
     attempt_limit: u32 = "10";
     /// Longest computation of one job
     job_time_limit: Span = "10m";
-    /// How long a worker holds a job without a sign of life
+    /// How long a worker's claim on a job lasts without renewal
     lease: Span = "30s";
     /// Largest upload
     body_limit: Size = "1GiB";
-    /// Most files of one upload (a DICOM series has one per slice)
+    /// Largest number of files in one upload (a DICOM series has one per slice)
     parts_limit: usize = "2048";
     /// Largest JSON body
     json_limit: Size = "256KiB";
-    /// Most voxels of one volume
+    /// Largest number of voxels of one volume
     voxel_limit: u64 = "268435456";
-    /// Largest volume once decompressed
+    /// Largest volume after decompression
     decompressed_limit: Size = "2GiB";
-    /// Longest wait that `Prefer: wait` is granted
+    /// Longest time a request with `Prefer: wait` waits
     wait_limit: Span = "60s";
-    /// Most templates of the library
+    /// Largest number of templates in the library
     template_limit: u32 = "50";
-    /// Age at which finished jobs, volumes, models and segmentations are erased; `off` keeps them
+    /// Age at which finished jobs, volumes, models and segmentations are deleted; `off` keeps them
     retention: Retention = "off";
-    /// Connections served at the same time; more are closed at once
+    /// Largest number of open connections; more are closed immediately
     connection_limit: usize = "4096";
-    /// Time for a request's head to arrive, and for which an idle connection is kept
+    /// Time limit for the headers of a request, and for an idle connection
     header_timeout: Span = "10s";
-    /// Longest pause between two pieces of an upload
+    /// Longest pause within an upload
     body_timeout: Span = "30s";
-    /// Longest upload from first to last byte
+    /// Longest time for an upload, from the first to the last byte
     upload_time_limit: Span = "1h";
-    /// On SIGTERM or Ctrl-C: time for running jobs to end before they go back to the queue
+    /// After SIGTERM or Ctrl-C: time for running jobs to end before they return to the queue
     shutdown_grace: Span = "30s";
     /// Log lines as `text` or `json`
     log_format: LogFormat = "text";
-    /// What is logged, in the form of RUST_LOG
+    /// Log filter, in the syntax of RUST_LOG
     log: String = "info";
 }
 
@@ -188,17 +191,16 @@ impl Default for Settings {
     }
 }
 
-/// Which layer decided each setting, in the order of [`Settings::NAMES`].
+/// The origin of each setting, in the order of [`Settings::NAMES`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Origins(Vec<Origin>);
 
 impl Settings {
-    /// Resolves the settings: `flags` first, then `variable` (asked by full name, usually
+    /// Resolves the settings: from `flags`, then `variable` (called with the full name, usually
     /// `std::env::var(..).ok()`), then the file, then the defaults.
     ///
     /// # Errors
-    /// The first value that does not fit, the first unknown key of the file, or a file that
-    /// cannot be read.
+    /// If a value is not valid, a key of the file is unknown, or the file cannot be read.
     pub fn load(
         flags: &Flags,
         variable: impl Fn(&str) -> Option<String>,
@@ -221,7 +223,7 @@ impl Settings {
         Ok((settings, Origins(origins)))
     }
 
-    /// What `serve --print-config` prints: TOML that reads back, with each origin as comment.
+    /// The settings as TOML that reads back, with the origin of each as a comment.
     pub fn print(&self, origins: &Origins) -> String {
         Self::NAMES
             .iter()
@@ -232,7 +234,7 @@ impl Settings {
     }
 }
 
-/// A setting's variable.
+/// The environment variable of a setting.
 pub fn variable_name(setting: &str) -> String {
     format!("{VARIABLE_PREFIX}{}", setting.to_uppercase())
 }
@@ -272,7 +274,7 @@ impl Layers {
     }
 }
 
-/// The file's settings as text: numbers and strings are written alike, so one parser does.
+/// The settings of the file as text, so that values of every origin go through one parser.
 fn read_file(path: &Path) -> Result<BTreeMap<String, String>, ConfigError> {
     let unreadable = |reason: String| ConfigError::Unreadable {
         path: path.to_owned(),
@@ -310,7 +312,7 @@ fn nearest(key: &str) -> Option<String> {
         .map(|(_, name)| name.to_owned())
 }
 
-/// A value as one would write it into the file. Paths have no `Display`; the rest has.
+/// A value as it is written in the file. Needed because paths do not implement `Display`.
 trait Shown {
     fn shown(&self) -> String;
 }

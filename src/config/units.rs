@@ -1,4 +1,7 @@
-//! Values with units, as an operator writes them: `30s`, `512MiB`, `auto`, `off`.
+//! Values of settings with units or keywords: `30s`, `512MiB`, `auto`, `off`.
+//!
+//! Each value is printed exactly as it may be written, so `--print-config` reads back unchanged.
+//! (`humantime` and `bytesize` print 90 s as `1m 30s` and round sizes to one decimal.)
 
 use std::fmt;
 use std::num::NonZeroUsize;
@@ -62,28 +65,20 @@ impl fmt::Display for Size {
 }
 
 impl Size {
-    /// As a length in memory.
+    /// The size as a length in memory.
     pub fn as_usize(self) -> usize {
         usize::try_from(self.0).unwrap_or(usize::MAX)
     }
 }
 
-/// How many of something: a number from 1, or what fits the machine.
+/// A number from 1, or `auto` (`None`): what fits the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Count {
-    /// What fits the machine.
-    Auto,
-    /// This many.
-    Exactly(NonZeroUsize),
-}
+pub struct Count(pub Option<NonZeroUsize>);
 
 impl Count {
-    /// The number, where `auto` says what fits the machine.
+    /// The number; `auto` is replaced by the given one, at least 1.
     pub fn or(self, auto: usize) -> usize {
-        match self {
-            Count::Auto => auto.max(1),
-            Count::Exactly(n) => n.get(),
-        }
+        self.0.map_or(auto.max(1), NonZeroUsize::get)
     }
 }
 
@@ -91,63 +86,44 @@ impl FromStr for Count {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "auto" => Ok(Count::Auto),
-            _ => text
-                .parse()
-                .map(Count::Exactly)
-                .map_err(|_| "give `auto` or a whole number from 1".into()),
-        }
+        parse_unless("auto", text)
+            .map(Self)
+            .ok_or("give `auto` or a whole number from 1".into())
     }
 }
 
 impl fmt::Display for Count {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Count::Auto => f.write_str("auto"),
-            Count::Exactly(n) => n.fmt(f),
-        }
+        write_unless("auto", self.0, f)
     }
 }
 
-/// How long results are kept.
+/// How long results are kept; `off` (`None`) keeps them until they are deleted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Retention {
-    /// Until somebody deletes them.
-    Off,
-    /// This long.
-    For(Span),
-}
+pub struct Retention(pub Option<Span>);
 
 impl FromStr for Retention {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "off" => Ok(Retention::Off),
-            _ => text
-                .parse()
-                .map(Retention::For)
-                .map_err(|_| "give `off` or a time such as 12h or 30d".into()),
-        }
+        parse_unless("off", text)
+            .map(Self)
+            .ok_or("give `off` or a time such as 12h or 30d".into())
     }
 }
 
 impl fmt::Display for Retention {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Retention::Off => f.write_str("off"),
-            Retention::For(span) => span.fmt(f),
-        }
+        write_unless("off", self.0, f)
     }
 }
 
-/// The form of log lines.
+/// The format of log lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LogFormat {
-    /// For a person.
+    /// Text for people.
     Text,
-    /// One JSON object a line.
+    /// One JSON object per line.
     Json,
 }
 
@@ -172,6 +148,25 @@ impl fmt::Display for LogFormat {
     }
 }
 
+/// `Some(None)` for the word, `Some(Some(value))` for a value, `None` for anything else.
+fn parse_unless<T: FromStr>(word: &str, text: &str) -> Option<Option<T>> {
+    if text == word {
+        return Some(None);
+    }
+    text.parse().ok().map(Some)
+}
+
+fn write_unless(
+    word: &str,
+    value: Option<impl fmt::Display>,
+    f: &mut fmt::Formatter<'_>,
+) -> fmt::Result {
+    match value {
+        Some(value) => value.fmt(f),
+        None => f.write_str(word),
+    }
+}
+
 fn scaled(text: &str, units: &[(&str, u64)]) -> Option<u64> {
     let digits = text.find(|c: char| !c.is_ascii_digit())?;
     let (number, unit) = text.split_at(digits);
@@ -179,7 +174,7 @@ fn scaled(text: &str, units: &[(&str, u64)]) -> Option<u64> {
     number.parse::<u64>().ok()?.checked_mul(*factor)
 }
 
-/// The largest unit that divides the value, so that it reads back exactly.
+/// Writes the value in the largest unit that divides it, so that it reads back exactly.
 fn write_scaled(f: &mut fmt::Formatter<'_>, value: u64, units: &[(&str, u64)]) -> fmt::Result {
     let (name, factor) = units
         .iter()

@@ -2,7 +2,7 @@
 
 use super::app::App;
 use super::router::router;
-use crate::config::{Retention, Settings};
+use crate::config::Settings;
 use crate::jobs::{
     Queue, QueueSettings, StoreError, SystemClock, Upkeep, WorkerSettings, Workers,
     recover_after_crash,
@@ -106,10 +106,7 @@ pub async fn start(
     let upkeep = Upkeep {
         queue: queue.clone(),
         attempt_limit: workers.attempt_limit,
-        retention: match settings.retention {
-            Retention::Off => None,
-            Retention::For(span) => Some(span.0),
-        },
+        retention: settings.retention.0.map(|span| span.0),
         every: UPKEEP_EVERY,
     };
     tokio::spawn(upkeep.run(closing.clone()));
