@@ -1,4 +1,4 @@
-//! Settings as the program takes them; see `src/config` for the rest.
+//! The settings of the program; more tests are in `src/config`.
 
 use std::process::{Command, Output};
 
@@ -31,7 +31,7 @@ fn print_config_shows_every_setting_with_its_origin() {
 }
 
 #[test]
-fn a_file_with_an_unknown_key_is_refused_by_name() {
+fn an_unknown_key_in_the_file_is_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("ventriform.toml");
     std::fs::write(&path, "body_limits = \"1GiB\"\n").unwrap();

@@ -1,4 +1,4 @@
-//! What survives a kill: the real program, killed with no warning.
+//! Crashes: the real program is killed without warning and started again.
 
 use crate::helpers::{Service, fake_engine, heart, scan, text};
 use serde_json::{Value, json};
@@ -10,7 +10,7 @@ use ventriform::jobs::{
 use ventriform::store::Store;
 
 #[tokio::test]
-async fn every_accepted_job_ends_once_whenever_the_service_is_killed() {
+async fn every_accepted_job_succeeds_once_although_the_service_is_killed() {
     let data = tempfile::tempdir().unwrap();
     let mut accepted = Vec::new();
     for round in 0..4u64 {
@@ -58,13 +58,13 @@ async fn every_accepted_job_ends_once_whenever_the_service_is_killed() {
         let made: Value = made.send().await.unwrap().json().await.unwrap();
         assert_eq!(made[list].as_array().unwrap().len(), count, "{list}");
     }
-    let shelves = ["staging", "volumes", "models", "segmentations", "templates"];
-    let stored = shelves.map(|shelf| std::fs::read_dir(data.path().join(shelf)).unwrap().count());
+    let folders = ["staging", "volumes", "models", "segmentations", "templates"];
+    let stored = folders.map(|name| std::fs::read_dir(data.path().join(name)).unwrap().count());
     assert_eq!(stored, [0, 2, 8, 4, 0], "no orphans");
 }
 
 #[tokio::test]
-async fn a_job_that_brings_the_process_down_is_given_up_after_its_attempts() {
+async fn a_job_that_crashes_the_process_is_failed_after_its_attempts() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     let rows = &store.rows;
@@ -78,14 +78,14 @@ async fn a_job_that_brings_the_process_down_is_given_up_after_its_attempts() {
         assert_eq!(rows.release_all().await.unwrap(), 1);
     }
     assert!(rows.claim("token", 3, 0, 10).await.unwrap().is_none());
-    let reason = Failure::new(Fault::Service, "attempt-limit", "It never ends.");
-    let buried = rows.end_unclaimable(3, &reason, 5).await.unwrap();
-    assert_eq!(buried[0].state, JobState::Failed);
-    assert_eq!(buried[0].failure.as_ref(), Some(&reason));
+    let reason = Failure::new(Fault::Service, "attempt-limit", "The job never ends.");
+    let ended_jobs = rows.end_unclaimable(3, &reason, 5).await.unwrap();
+    assert_eq!(ended_jobs[0].state, JobState::Failed);
+    assert_eq!(ended_jobs[0].failure.as_ref(), Some(&reason));
 }
 
 #[tokio::test]
-async fn a_worker_that_lost_its_lease_changes_nothing() {
+async fn a_worker_that_lost_its_lease_cannot_write() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     let rows = &store.rows;
@@ -159,7 +159,7 @@ async fn filed(store: &Store) -> String {
 }
 
 #[tokio::test]
-async fn models_of_an_older_database_are_still_there() {
+async fn models_of_an_older_database_are_migrated() {
     let folder = tempfile::tempdir().unwrap();
     let older = folder.path().join("migrations");
     std::fs::create_dir(&older).unwrap();

@@ -1,4 +1,4 @@
-//! The real work in the real program, from file to mesh.
+//! The real computation in the real program, from file to mesh.
 
 use crate::helpers::{Service, heart, problem, scan, text};
 use reqwest::Response;
@@ -55,7 +55,7 @@ async fn a_scan_becomes_a_closed_mesh_of_exactly_the_points_asked_for() {
         .unwrap();
     assert!(preview.starts_with(b"\x89PNG"));
 
-    // The page is made of what is kept of the model, with the volume or without it.
+    // The page is made of the model's files; the volume may have been deleted.
     let page = async || {
         let page = service
             .get(&format!("{model}/report.html"))
@@ -74,7 +74,7 @@ async fn a_scan_becomes_a_closed_mesh_of_exactly_the_points_asked_for() {
 }
 
 #[tokio::test]
-async fn what_is_wrong_with_a_file_or_a_wish_is_said() {
+async fn errors_name_the_problem_with_a_file_or_a_parameter() {
     let data = tempfile::tempdir().unwrap();
     let service = Service::start(data.path(), &[]).await;
     let scan = scan();
@@ -101,10 +101,10 @@ async fn what_is_wrong_with_a_file_or_a_wish_is_said() {
     assert!(body["fix"].is_string());
 }
 
-/// Uploads are streamed to the disk: what the service holds does not grow with them.
+/// Uploads are streamed to disk, so the memory of the service does not grow with their size.
 #[cfg(target_os = "linux")]
 #[tokio::test]
-async fn an_upload_takes_no_memory() {
+async fn uploads_are_not_held_in_memory() {
     const MIB: usize = 1 << 20;
     let data = tempfile::tempdir().unwrap();
     let service = Service::start(data.path(), &[]).await;
@@ -118,7 +118,8 @@ async fn an_upload_takes_no_memory() {
     assert!(grown < 32 << 10, "{grown} KiB for 256 MiB");
 }
 
-/// A cube of voxels of `value` by place in millimetres about `centre`, as a `.nii`.
+/// A cube of voxels around `centre` as a `.nii` file; `value` gives each voxel by its position in
+/// millimetres.
 fn cube(voxels: usize, spacing: f64, centre: Vec3, value: impl Fn(&Vec3) -> f32) -> Vec<u8> {
     let shape = [voxels; 3];
     let frame = VoxelToPatient::centred(shape, [spacing; 3], centre).unwrap();
@@ -142,7 +143,7 @@ fn ball(p: &Vec3) -> f32 {
 struct Segmenter(Service);
 
 impl Segmenter {
-    /// Sends a scan, perhaps with an expert's mask, and waits for the report.
+    /// Sends a scan, optionally with an expert's mask, and waits for the report.
     async fn report(&self, query: &str, scan: Vec<u8>, expert: Option<Vec<u8>>) -> Response {
         let part = |bytes: Vec<u8>| Part::bytes(bytes).file_name("volume.nii.gz");
         let mut form = Form::new().part("volume", part(scan));
@@ -180,7 +181,7 @@ async fn a_scan_is_segmented_and_measured_against_an_expert() {
     assert_eq!(report["template"], "built-in");
     assert_eq!(report["fit"]["reason"], "converged");
     assert!(report["fit"]["confidence"].as_f64().unwrap() > 0.8);
-    // The apparent edge lies outside the true one by the blur.
+    // Blur moves the apparent edge outward.
     assert!(report["measures"]["jaccard"].as_f64().unwrap() > 0.55);
     assert!(report["measures"]["contour_distance_voxels"].is_number());
     assert!(report["volumes_ml"]["wall"].as_f64().unwrap() > 80.0);
@@ -213,14 +214,14 @@ async fn a_scan_is_segmented_and_measured_against_an_expert() {
     let polar = service.json(&format!("{path}/polar.json")).await;
     assert_eq!(polar["segments"].as_array().unwrap().len(), 17);
 
-    // The mask lies on the scan's own grid: sent back as the expert's, it agrees with itself.
+    // The mask is on the scan's grid: sent back as the expert's mask, it agrees with itself.
     let mask = service.0.get(&format!("{path}/mask.nii.gz"));
     let mask = mask.send().await.unwrap().bytes().await.unwrap().to_vec();
     let again = service.report("model=auto", scan.clone(), Some(mask)).await;
     let again: Value = again.json().await.unwrap();
     assert_eq!(again["measures"]["jaccard"], 1.0);
 
-    // A model made by a job is fitted by its id, and from the library by auto.
+    // A model made by a job can be fitted by its id, and as a template by auto.
     let model = service.0.post("/v1/models?points=110").body(scan.clone());
     let model = model.header("prefer", "wait=60").send().await.unwrap();
     let model = model.headers()["location"].to_str().unwrap().to_owned();
@@ -254,7 +255,7 @@ async fn a_scan_is_segmented_and_measured_against_an_expert() {
 }
 
 #[tokio::test]
-async fn what_cannot_be_segmented_is_said_with_what_was_seen() {
+async fn a_scan_that_cannot_be_segmented_is_reported_with_the_reason() {
     let data = tempfile::tempdir().unwrap();
     let service = Segmenter(Service::start(data.path(), &[]).await);
     let (scan, _) = heart();
@@ -283,7 +284,7 @@ async fn what_cannot_be_segmented_is_said_with_what_was_seen() {
     let liver = service.report("organ=liver", scan.clone(), None).await;
     assert_eq!(problem(liver, 422, "no-model").await["field"], "model");
 
-    // A model of another organ: by its shape, and by what it was said to be.
+    // A model of another organ is rejected, by its shape and by its declared organ.
     let model = service
         .0
         .post("/v1/models?isolate=none")
@@ -307,7 +308,7 @@ async fn what_cannot_be_segmented_is_said_with_what_was_seen() {
     let refused = problem(refused, 422, "unsuitable-model").await;
     assert!(text(&refused["detail"]).contains("generic"), "{refused}");
 
-    // Where it belongs, it fits: the ball's model on the ball, with no polar map.
+    // The model of the ball fits the ball; there is no polar map.
     let own = cube(48, 4.0, Vec3::zeros(), |p| ball(p) - 5.0);
     let fitted = service
         .report(&format!("{other}&organ=generic"), solid, Some(own))

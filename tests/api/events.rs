@@ -4,7 +4,7 @@ use crate::helpers::{TestApp, problem, text};
 use reqwest::StatusCode;
 use serde_json::Value;
 
-/// (id, data) of every event of a stream that ended.
+/// The id and the data of every event in a complete stream.
 fn events(stream: &str) -> Vec<(i64, Value)> {
     stream
         .split("\n\n")
@@ -25,7 +25,7 @@ fn events(stream: &str) -> Vec<(i64, Value)> {
 }
 
 #[tokio::test]
-async fn events_tell_each_change_and_end_with_the_final_state() {
+async fn events_report_each_change_and_end_with_the_final_state() {
     let app = TestApp::start().await;
     let job = app.file("brief").await;
     let path = text(&job["links"]["events"]);
@@ -63,7 +63,7 @@ async fn events_tell_each_change_and_end_with_the_final_state() {
 }
 
 #[tokio::test]
-async fn events_of_nothing_are_refused() {
+async fn events_of_an_unknown_job_are_not_found() {
     let app = TestApp::start().await;
     let unknown = app.get("/v1/jobs/job_0/events").send().await.unwrap();
     problem(unknown, 404, "not-found").await;

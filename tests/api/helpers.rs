@@ -1,4 +1,4 @@
-//! A service of its own for each test, and the work it pretends to do.
+//! Starts a service for each test, with a fake computation.
 
 use reqwest::{Client, RequestBuilder, Response, StatusCode};
 use serde_json::{Map, Value, json};
@@ -24,7 +24,7 @@ use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
 use ventriform::work::{Engine, IntensityFacts, UploadFacts, UploadReader};
 
-/// How long a test waits for what must happen.
+/// How long a test waits for a job or another event before it fails.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// A client of one service.
@@ -68,12 +68,12 @@ impl Deref for TestApp {
 }
 
 impl TestApp {
-    /// A service with the stand-in for the work.
+    /// A service with the fake computation and default settings.
     pub async fn start() -> Self {
         Self::with(|_| {}).await
     }
 
-    /// The same with other settings.
+    /// A service with the fake computation and changed settings.
     pub async fn with(change: impl FnOnce(&mut Settings)) -> Self {
         let data = Arc::new(tempfile::tempdir().unwrap());
         Self::on(data, fake_engine(), change).await
@@ -102,20 +102,20 @@ impl TestApp {
         }
     }
 
-    /// Ends the service in order; its data stays.
+    /// Shuts the service down in order and returns its data folder.
     pub async fn stop(mut self) -> Arc<TempDir> {
         self.running.take().unwrap().stop().await.unwrap();
         self.data.clone()
     }
 
-    /// The JSON under a path.
+    /// GETs a path; returns the JSON.
     pub async fn json(&self, path: &str) -> Value {
         let answer = self.get(path).send().await.unwrap();
         assert_eq!(answer.status(), StatusCode::OK, "{path}");
         answer.json().await.unwrap()
     }
 
-    /// Stores a volume; its id.
+    /// Uploads a volume; returns its id.
     pub async fn volume(&self, words: &str) -> String {
         let answer = self
             .post("/v1/volumes")
@@ -132,7 +132,7 @@ impl TestApp {
         text(&volume["id"])
     }
 
-    /// Files a job by the one-line call; the job.
+    /// Uploads a volume and starts a model job in one request; returns the job.
     pub async fn file(&self, words: &str) -> Value {
         let answer = self
             .post("/v1/models")
@@ -144,7 +144,7 @@ impl TestApp {
         answer.json().await.unwrap()
     }
 
-    /// Waits until a job is in one of the states; the job.
+    /// Waits until a job is in one of the states; returns the job.
     pub async fn until(&self, job: &Value, states: &[&str]) -> Value {
         let path = text(&job["links"]["self"]);
         let deadline = Instant::now() + PATIENCE;
@@ -158,21 +158,21 @@ impl TestApp {
         }
     }
 
-    /// Files a job and sees it to its end.
+    /// Starts a model job and waits until it has ended; returns the job.
     pub async fn finished(&self, words: &str) -> Value {
         let job = self.file(words).await;
         self.until(&job, &["succeeded", "failed", "cancelled"])
             .await
     }
 
-    /// A model that was made.
+    /// Makes a model; returns it.
     pub async fn model(&self, words: &str) -> Value {
         let job = self.finished(words).await;
         assert_eq!(job["state"], "succeeded", "{job}");
         self.json(&text(&job["links"]["model"])).await
     }
 
-    /// Names of everything below the data folder's shelves and staging.
+    /// Names of all entries in the folders for files and in the staging folder.
     pub fn stored(&self) -> Vec<String> {
         let mut names = Vec::new();
         let shelves = Resource::WITH_FILES.map(Resource::plural);
@@ -194,7 +194,7 @@ pub fn text(value: &Value) -> String {
         .to_owned()
 }
 
-/// Checks that an answer is a whole problem object of that status and kind; the object.
+/// Asserts that a response is a complete problem object with that status and code; returns it.
 pub async fn problem(answer: Response, status: u16, code: &str) -> Value {
     assert_eq!(answer.status().as_u16(), status);
     let media_type = answer.headers()["content-type"].to_str().unwrap();
@@ -212,13 +212,13 @@ pub async fn problem(answer: Response, status: u16, code: &str) -> Value {
     body
 }
 
-/// A file that the stand-in takes for a volume. Its first word says what the work shall do:
-/// `sphere`, `slow`, `stubborn`, `panic`, `fail`, `abort`.
+/// A file that the fake reader accepts as a volume. Its first word decides what the fake
+/// computation does: `sphere`, `slow`, `brief`, `stubborn`, `panic`, `fail`.
 pub fn volume(words: &str) -> Vec<u8> {
     format!("VOLUME {words}").into_bytes()
 }
 
-/// The stand-in for each kind of work. Parameters and templates are judged by the real one.
+/// The engine with fake computations. Parameters and templates are validated by the real code.
 pub fn fake_engine() -> Engine {
     let real = Engine::new(ReadLimits::default());
     let stand_in = |work: &Arc<dyn Work>| -> Arc<dyn Work> { Arc::new(FakeWork(work.clone())) };
@@ -389,7 +389,7 @@ pub fn mesh_json(mesh: &TriMesh) -> Vec<u8> {
     export::encode(Format::Json, mesh, &Metadata::new("test")).unwrap()
 }
 
-/// A simulated scan of the heart alone with its true mask, as `.nii.gz` files, made once.
+/// A simulated scan of a heart and its true mask, as `.nii.gz` files; computed once.
 pub fn heart() -> (Vec<u8>, Vec<u8>) {
     static HEART: std::sync::OnceLock<(Vec<u8>, Vec<u8>)> = std::sync::OnceLock::new();
     HEART
@@ -408,7 +408,7 @@ pub fn heart() -> (Vec<u8>, Vec<u8>) {
         .clone()
 }
 
-/// A simulated scan as a `.nii.gz`, small enough to be quick and made once.
+/// A small simulated scan as `.nii.gz`; computed once.
 pub fn scan() -> Vec<u8> {
     static SCAN: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
     SCAN.get_or_init(|| {
@@ -423,7 +423,7 @@ pub fn scan() -> Vec<u8> {
     .clone()
 }
 
-/// The real program as a process of its own.
+/// The real program in a separate process.
 pub struct Service {
     process: Child,
     api: Api,
@@ -438,7 +438,7 @@ impl Deref for Service {
 }
 
 impl Service {
-    /// Starts it on a data folder and returns once it listens.
+    /// Starts the program on a data folder and returns once it listens.
     pub async fn start(data: &Path, arguments: &[&str]) -> Self {
         let mut process = Command::new(env!("CARGO_BIN_EXE_ventriform"))
             .args(["serve", "--listen", "127.0.0.1:0", "--data-dir"])
@@ -455,20 +455,20 @@ impl Service {
         let url = line
             .split_whitespace()
             .find(|word| word.starts_with("http://"))
-            .expect("it says where it listens");
+            .expect("the first line names the address");
         Self {
             process,
             api: Api::new(url.to_owned()),
         }
     }
 
-    /// Ends it as a power cut would.
+    /// Kills the process without warning, as a power cut would.
     pub fn kill(mut self) {
         self.process.kill().unwrap();
         self.process.wait().unwrap();
     }
 
-    /// Waits for the job's end; the job.
+    /// Waits until the job has ended; returns the job.
     pub async fn ended(&self, id: &str) -> Value {
         let deadline = Instant::now() + 3 * PATIENCE;
         loop {
@@ -483,7 +483,7 @@ impl Service {
         }
     }
 
-    /// The most memory it ever held.
+    /// The peak memory of the process.
     #[cfg(target_os = "linux")]
     pub fn peak_memory_kib(&self) -> u64 {
         let status =
@@ -498,7 +498,7 @@ impl Service {
 
 impl Drop for Service {
     fn drop(&mut self) {
-        // It may be gone already.
+        // The process may have ended already.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }

@@ -1,4 +1,4 @@
-//! Clients that mean no good, and clients that are merely broken.
+//! Malicious and broken clients.
 
 use crate::helpers::{TestApp, volume};
 use std::time::Duration;
@@ -11,17 +11,17 @@ async fn connect(app: &TestApp) -> TcpStream {
         .unwrap()
 }
 
-/// What the service says until it hangs up.
-async fn last_words(stream: &mut TcpStream) -> String {
+/// Everything the service sends until it closes the connection.
+async fn rest_of(stream: &mut TcpStream) -> String {
     let mut said = Vec::new();
     let read = tokio::time::timeout(Duration::from_secs(10), stream.read_to_end(&mut said));
-    // A reset is a way to hang up, too.
+    // The service may also reset the connection.
     let _ = read.await.expect("the service hangs up");
     String::from_utf8_lossy(&said).into_owned()
 }
 
 #[tokio::test]
-async fn connections_that_say_nothing_or_half_a_head_are_closed() {
+async fn idle_connections_and_partial_headers_are_closed() {
     let app = TestApp::with(|s| s.header_timeout = "300ms".parse().unwrap()).await;
     let mut silent = connect(&app).await;
     let mut slow = connect(&app).await;
@@ -30,9 +30,9 @@ async fn connections_that_say_nothing_or_half_a_head_are_closed() {
     idle.write_all(b"GET /healthz HTTP/1.1\r\nhost: x\r\n\r\n")
         .await
         .unwrap();
-    last_words(&mut silent).await;
-    last_words(&mut slow).await;
-    assert!(last_words(&mut idle).await.starts_with("HTTP/1.1 200"));
+    rest_of(&mut silent).await;
+    rest_of(&mut slow).await;
+    assert!(rest_of(&mut idle).await.starts_with("HTTP/1.1 200"));
     app.json("/healthz").await;
 }
 
@@ -46,7 +46,7 @@ async fn connections_beyond_the_limit_are_closed_at_once() {
         held.push(stream);
     }
     tokio::time::sleep(Duration::from_millis(100)).await;
-    assert_eq!(last_words(&mut connect(&app).await).await, "");
+    assert_eq!(rest_of(&mut connect(&app).await).await, "");
     drop(held);
     tokio::time::sleep(Duration::from_millis(100)).await;
     app.json("/healthz").await;
@@ -58,7 +58,7 @@ async fn an_upload_that_stalls_is_ended_and_leaves_nothing() {
     let mut stream = connect(&app).await;
     let head = "POST /v1/volumes HTTP/1.1\r\nhost: x\r\ncontent-length: 1000\r\n\r\nVOLUME ";
     stream.write_all(head.as_bytes()).await.unwrap();
-    assert!(last_words(&mut stream).await.starts_with("HTTP/1.1 408"));
+    assert!(rest_of(&mut stream).await.starts_with("HTTP/1.1 408"));
     assert!(app.stored().is_empty());
 }
 
@@ -80,7 +80,7 @@ async fn an_upload_that_breaks_off_leaves_nothing() {
 }
 
 #[tokio::test]
-async fn a_form_of_endless_headers_is_cut_short() {
+async fn a_form_with_endless_headers_is_rejected() {
     let app = TestApp::start().await;
     let start = b"--B\r\ncontent-disposition: form-data; name=\"".to_vec();
     let pieces = std::iter::once(start).chain((0..400).map(|_| vec![b'x'; 16 << 10]));
@@ -91,7 +91,7 @@ async fn a_form_of_endless_headers_is_cut_short() {
         .body(reqwest::Body::wrap_stream(pieces))
         .send()
         .await;
-    // The service may hang up while the client still sends.
+    // The service may close the connection while the client is still sending.
     if let Ok(answer) = answer {
         assert_eq!(answer.status(), 400);
     }
@@ -99,7 +99,7 @@ async fn a_form_of_endless_headers_is_cut_short() {
 }
 
 #[tokio::test]
-async fn odd_requests_are_refused_without_harm() {
+async fn malformed_requests_are_rejected() {
     let app = TestApp::start().await;
     for path in [
         "/v1/jobs/%00",

@@ -26,7 +26,7 @@ async fn a_job_goes_from_accepted_to_succeeded() {
 }
 
 #[tokio::test]
-async fn orders_that_make_no_sense_are_refused_by_field() {
+async fn invalid_job_requests_are_rejected_with_the_field() {
     let app = TestApp::start().await;
     let volume = app.volume("sphere").await;
     for (order, status, code, field) in [
@@ -77,7 +77,7 @@ async fn orders_that_make_no_sense_are_refused_by_field() {
 }
 
 #[tokio::test]
-async fn json_that_is_none_or_too_much_is_refused() {
+async fn malformed_or_oversized_json_is_rejected() {
     let app = TestApp::start().await;
     let post = |body: String| {
         app.post("/v1/jobs")
@@ -100,7 +100,7 @@ async fn json_that_is_none_or_too_much_is_refused() {
 }
 
 #[tokio::test]
-async fn a_key_makes_a_repeated_request_the_same_job() {
+async fn a_repeated_request_with_an_idempotency_key_is_the_same_job() {
     let app = TestApp::start().await;
     let post = |words: &str, key: &str| {
         app.post("/v1/models")
@@ -145,7 +145,7 @@ async fn a_key_makes_a_repeated_request_the_same_job() {
 }
 
 #[tokio::test]
-async fn a_full_queue_refuses_and_loses_nothing() {
+async fn a_full_queue_rejects_new_jobs_and_loses_none() {
     let app = TestApp::with(|s| {
         s.queue_limit = 2;
         s.workers = "1".parse().unwrap();
@@ -185,13 +185,13 @@ async fn a_running_job_stops_computing_within_100_ms() {
     let answer = app.delete(&path).send().await.unwrap();
     assert_eq!(answer.status(), StatusCode::ACCEPTED);
     let done = app.until(&job, &["cancelled"]).await;
-    // Generous: the machine may be busy. The worker itself needs no more than one look.
+    // The margin is for a busy machine; the worker stops at its next check of the token.
     assert!(asked.elapsed() < Duration::from_secs(2));
     assert!(done["model"].is_null());
 }
 
 #[tokio::test]
-async fn a_waiting_job_is_cancelled_at_once_and_an_ended_one_erased() {
+async fn deleting_cancels_a_waiting_job_and_erases_an_ended_one() {
     let app = TestApp::with(|s| s.workers = "1".parse().unwrap()).await;
     let running = app.file("slow").await;
     app.until(&running, &["running"]).await;
@@ -214,7 +214,7 @@ async fn a_waiting_job_is_cancelled_at_once_and_an_ended_one_erased() {
 }
 
 #[tokio::test]
-async fn a_panic_fails_the_job_and_nothing_else() {
+async fn a_panic_fails_only_its_job() {
     let app = TestApp::with(|s| s.workers = "1".parse().unwrap()).await;
     let job = app.finished("panic").await;
     assert_eq!(job["state"], "failed");
@@ -224,7 +224,7 @@ async fn a_panic_fails_the_job_and_nothing_else() {
 }
 
 #[tokio::test]
-async fn a_job_over_its_time_fails_with_the_limit_as_reason() {
+async fn a_job_that_takes_too_long_fails_with_the_time_limit() {
     let app = TestApp::with(|s| s.job_time_limit = "200ms".parse().unwrap()).await;
     let job = app.finished("slow").await;
     assert_eq!(job["state"], "failed");
@@ -257,8 +257,8 @@ async fn jobs_are_listed_by_state() {
 }
 
 #[tokio::test]
-async fn a_lease_that_runs_out_gives_the_job_to_another_worker() {
-    // The first service "dies" without telling anybody: its data folder is taken over as it is.
+async fn a_job_whose_lease_expired_is_claimed_again() {
+    // A copy of the data folder looks like one whose service died while the job was running.
     let app = TestApp::start().await;
     let job = app.file("slow").await;
     app.until(&job, &["running"]).await;

@@ -1,8 +1,7 @@
-//! The service over HTTP, as its clients meet it.
+//! Tests of the service over HTTP, one file per resource, in one binary.
 //!
-//! One binary; one file per resource. The work behind most tests is a stand-in that makes a
-//! sphere at once, or does what the first word of the volume says, so that these tests are
-//! about the service and not about geometry.
+//! Most tests replace the computation by a fake that returns a sphere at once, or behaves as the
+//! first word of the uploaded volume says. They test the service, not the geometry.
 
 #![allow(
     clippy::unwrap_used,
@@ -11,6 +10,7 @@
 
 mod helpers;
 
+mod blobs;
 mod config;
 mod durability;
 mod end_to_end;

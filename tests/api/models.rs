@@ -6,7 +6,7 @@ use reqwest::header::{ACCEPT, LOCATION};
 use serde_json::Value;
 
 #[tokio::test]
-async fn one_line_makes_a_model_and_waits_for_it() {
+async fn one_request_uploads_a_volume_and_waits_for_the_model() {
     let app = TestApp::start().await;
     let answer = app
         .post("/v1/models?points=150")
@@ -38,7 +38,7 @@ async fn one_line_makes_a_model_and_waits_for_it() {
 }
 
 #[tokio::test]
-async fn the_form_of_a_mesh_goes_by_accept_and_by_extension() {
+async fn the_mesh_format_is_chosen_by_accept_or_by_extension() {
     let app = TestApp::start().await;
     let model = app.model("sphere").await;
     let base = text(&model["links"]["self"]);
@@ -71,7 +71,7 @@ async fn the_form_of_a_mesh_goes_by_accept_and_by_extension() {
 }
 
 #[tokio::test]
-async fn the_report_is_json_for_programs_and_a_page_for_people() {
+async fn the_report_is_available_as_json_and_as_html() {
     let app = TestApp::start().await;
     let model = app.model("sphere").await;
     let path = text(&model["links"]["report"]);
@@ -126,7 +126,7 @@ async fn the_page_is_made_on_demand_and_served_like_a_file() {
 }
 
 #[tokio::test]
-async fn results_carry_strong_validators_and_come_in_parts() {
+async fn results_support_etags_and_byte_ranges() {
     let app = TestApp::start().await;
     let model = app.model("sphere").await;
     let path = format!("{}/mesh.stl", text(&model["links"]["self"]));
@@ -199,7 +199,7 @@ async fn the_same_volume_and_parameters_make_the_same_model() {
 }
 
 #[tokio::test]
-async fn an_erased_model_is_gone_until_it_is_made_again() {
+async fn a_deleted_model_is_gone_until_it_is_made_again() {
     let app = TestApp::start().await;
     let model = app.model("sphere").await;
     let path = text(&model["links"]["self"]);
@@ -220,7 +220,7 @@ async fn an_erased_model_is_gone_until_it_is_made_again() {
 }
 
 #[tokio::test]
-async fn parameters_are_refused_by_name_before_the_body_is_read() {
+async fn invalid_parameters_are_rejected_before_the_body_is_read() {
     let app = TestApp::start().await;
     for (query, field, hint) in [
         ("point=150", "point", "`points`"),
@@ -246,7 +246,7 @@ async fn parameters_are_refused_by_name_before_the_body_is_read() {
 }
 
 #[tokio::test]
-async fn a_form_carries_volume_and_parameters_together() {
+async fn a_form_can_carry_volume_and_parameters() {
     let app = TestApp::start().await;
     let part = reqwest::multipart::Part::bytes(volume("sphere")).file_name("spect.nii.gz");
     let form = reqwest::multipart::Form::new()
@@ -265,7 +265,7 @@ async fn a_form_carries_volume_and_parameters_together() {
 }
 
 #[tokio::test]
-async fn whoever_waits_is_told_why_it_failed() {
+async fn a_waiting_request_is_answered_with_the_reason_of_the_failure() {
     let app = TestApp::start().await;
     let wait = |words: &str| {
         app.post("/v1/models")
@@ -287,7 +287,7 @@ async fn whoever_waits_is_told_why_it_failed() {
 }
 
 #[tokio::test]
-async fn patience_that_runs_out_is_answered_with_the_job() {
+async fn a_wait_that_times_out_is_answered_with_the_job() {
     let app = TestApp::with(|s| s.wait_limit = "100ms".parse().unwrap()).await;
     let answer = app
         .post("/v1/models")

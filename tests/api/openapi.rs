@@ -6,11 +6,11 @@ use std::path::Path;
 use ventriform::http::openapi::document_json;
 use ventriform::parameters::{FIT_SPECS, SPECS};
 
-/// Set to write the document anew instead of comparing.
+/// If set, the test writes the document instead of comparing it.
 const UPDATE: &str = "UPDATE_OPENAPI";
 
 #[test]
-fn the_committed_document_is_what_the_code_says() {
+fn the_committed_document_matches_the_code() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("openapi/ventriform.json");
     let generated = document_json();
     if std::env::var_os(UPDATE).is_some() {
@@ -53,7 +53,7 @@ fn every_parameter_of_a_job_is_documented_twice() {
 }
 
 #[test]
-fn every_reference_leads_somewhere() {
+fn every_reference_resolves() {
     let document: Value = serde_json::from_str(&document_json()).unwrap();
     let mut open = vec![&document];
     while let Some(value) = open.pop() {

@@ -1,11 +1,11 @@
-//! What operators and passers-by see: health, pages, paths that do not exist.
+//! Health checks, the start page, the documentation, and unknown paths.
 
 use crate::helpers::{TestApp, problem, text};
 use reqwest::StatusCode;
 use reqwest::header::ACCEPT;
 
 #[tokio::test]
-async fn the_service_says_how_it_is() {
+async fn health_readiness_and_metrics_are_served() {
     let app = TestApp::start().await;
     assert_eq!(app.json("/healthz").await["status"], "ok");
     assert_eq!(app.json("/readyz").await["status"], "ok");
@@ -25,7 +25,7 @@ async fn the_service_says_how_it_is() {
 }
 
 #[tokio::test]
-async fn the_door_opens_for_people_and_for_curl() {
+async fn the_start_page_is_html_for_browsers_and_text_for_curl() {
     let app = TestApp::start().await;
     let page = app
         .get("/")
@@ -70,7 +70,7 @@ async fn the_documentation_needs_no_network() {
 }
 
 #[tokio::test]
-async fn wrong_paths_and_methods_are_problems_too() {
+async fn unknown_paths_and_methods_are_answered_with_problems() {
     let app = TestApp::start().await;
     problem(
         app.get("/v2/models").send().await.unwrap(),
@@ -85,7 +85,7 @@ async fn wrong_paths_and_methods_are_problems_too() {
 }
 
 #[tokio::test]
-async fn requests_keep_their_id_and_their_trace() {
+async fn request_ids_and_trace_headers_are_returned() {
     let app = TestApp::start().await;
     let parent = "00-0af7651916cd43dd8448eb211c80319c-b7ad6b7169203331-01";
     let answer = app

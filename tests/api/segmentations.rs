@@ -1,4 +1,4 @@
-//! `/v1/segmentations`, with the stand-in for the work.
+//! `/v1/segmentations`, with the fake computation.
 
 use crate::helpers::{TestApp, mesh_json, problem, text, volume};
 use reqwest::StatusCode;
@@ -12,7 +12,7 @@ fn part(words: &str) -> Part {
 }
 
 impl TestApp {
-    /// A segmentation that was made.
+    /// Makes a segmentation; returns it.
     async fn segmentation(&self, words: &str) -> Value {
         let answer = self
             .post("/v1/segmentations")
@@ -34,7 +34,7 @@ impl TestApp {
 }
 
 #[tokio::test]
-async fn whoever_waits_gets_the_form_that_accept_asks_for() {
+async fn a_waiting_request_is_answered_in_the_format_of_accept() {
     let app = TestApp::start().await;
     for (accept, media_type, start) in [
         ("*/*", "application/gzip", b"\x1f\x8b".as_slice()),
@@ -68,7 +68,7 @@ async fn whoever_waits_gets_the_form_that_accept_asks_for() {
 }
 
 #[tokio::test]
-async fn segmentations_are_listed_downloaded_and_erased_like_models() {
+async fn segmentations_are_listed_downloaded_and_deleted_like_models() {
     let app = TestApp::start().await;
     let made = app.segmentation("sphere").await;
     let path = text(&made["links"]["self"]);
@@ -115,7 +115,7 @@ async fn segmentations_are_listed_downloaded_and_erased_like_models() {
 }
 
 #[tokio::test]
-async fn a_form_carries_an_experts_mask_beside_the_volume() {
+async fn a_form_can_carry_an_experts_mask_beside_the_volume() {
     let app = TestApp::start().await;
     let form = Form::new()
         .part("expert", part("mask"))
@@ -154,7 +154,7 @@ async fn a_form_carries_an_experts_mask_beside_the_volume() {
 }
 
 #[tokio::test]
-async fn what_a_job_needs_must_be_there_and_stays_there() {
+async fn items_that_a_job_needs_must_exist_and_cannot_be_deleted() {
     let app = TestApp::with(|s| s.workers = "1".parse().unwrap()).await;
     let model = app.model("sphere").await;
     let (model_id, model_path) = (text(&model["id"]), text(&model["links"]["self"]));
@@ -205,7 +205,7 @@ async fn what_a_job_needs_must_be_there_and_stays_there() {
 }
 
 #[tokio::test]
-async fn parameters_of_a_fit_are_refused_by_name() {
+async fn invalid_fit_parameters_are_rejected_with_the_field() {
     let app = TestApp::start().await;
     for (query, field, hint) in [
         ("modle=auto", "modle", "`model`"),
@@ -239,7 +239,7 @@ async fn parameters_of_a_fit_are_refused_by_name() {
 }
 
 #[tokio::test]
-async fn a_key_and_a_cancelled_job_mean_what_they_mean_for_models() {
+async fn idempotency_keys_and_cancelling_work_as_for_models() {
     let app = TestApp::start().await;
     let post = |query: &str| {
         app.post(&format!("/v1/segmentations?{query}"))
@@ -262,7 +262,7 @@ async fn a_key_and_a_cancelled_job_mean_what_they_mean_for_models() {
 }
 
 #[tokio::test]
-async fn the_library_keeps_templates_and_auto_gets_all_of_them() {
+async fn auto_gets_every_template_of_the_library() {
     let app = TestApp::with(|s| s.template_limit = 2).await;
     let post = |query: &str, body: Vec<u8>| {
         app.post(&format!("/v1/templates{query}"))
@@ -302,7 +302,7 @@ async fn the_library_keeps_templates_and_auto_gets_all_of_them() {
 }
 
 #[tokio::test]
-async fn a_mesh_that_cannot_be_fitted_is_no_template() {
+async fn a_mesh_that_cannot_be_fitted_is_rejected_as_template() {
     let app = TestApp::start().await;
     let post = |query: &str, body: Vec<u8>| {
         app.post(&format!("/v1/templates{query}"))

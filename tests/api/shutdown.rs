@@ -1,9 +1,9 @@
-//! The end of the service, in order.
+//! Shutdown.
 
 use crate::helpers::{TestApp, fake_engine};
 
 #[tokio::test]
-async fn a_job_that_ends_within_the_grace_is_kept() {
+async fn a_job_that_ends_within_the_grace_period_is_committed() {
     let app = TestApp::start().await;
     let job = app.file("brief").await;
     app.until(&job, &["running"]).await;
@@ -14,7 +14,7 @@ async fn a_job_that_ends_within_the_grace_is_kept() {
 }
 
 #[tokio::test]
-async fn a_job_beyond_the_grace_goes_back_to_the_queue_and_its_attempt_does_not_count() {
+async fn a_job_that_outlasts_the_grace_period_returns_to_the_queue_uncounted() {
     let app = TestApp::with(|s| s.shutdown_grace = "50ms".parse().unwrap()).await;
     let job = app.file("slow").await;
     app.until(&job, &["running"]).await;
@@ -28,7 +28,7 @@ async fn a_job_beyond_the_grace_goes_back_to_the_queue_and_its_attempt_does_not_
 }
 
 #[tokio::test]
-async fn two_services_do_not_share_a_folder() {
+async fn a_second_service_cannot_use_the_same_folder() {
     let app = TestApp::start().await;
     let settings = ventriform::config::Settings {
         data_dir: app.data.path().to_owned(),

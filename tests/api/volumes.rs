@@ -30,7 +30,7 @@ async fn a_volume_is_named_by_the_hash_of_its_bytes() {
 }
 
 #[tokio::test]
-async fn the_same_bytes_again_are_the_same_volume() {
+async fn uploading_the_same_bytes_again_gives_the_same_volume() {
     let app = TestApp::start().await;
     let first = app.volume("sphere").await;
     let again = app
@@ -45,7 +45,7 @@ async fn the_same_bytes_again_are_the_same_volume() {
 }
 
 #[tokio::test]
-async fn the_parts_of_a_form_make_up_one_volume_whatever_their_order() {
+async fn the_order_of_form_parts_does_not_change_the_volume() {
     let app = TestApp::start().await;
     let part = |name: &str, words: &str| {
         reqwest::multipart::Part::bytes(volume(words)).file_name(name.to_owned())
@@ -74,7 +74,7 @@ async fn the_parts_of_a_form_make_up_one_volume_whatever_their_order() {
 }
 
 #[tokio::test]
-async fn what_is_no_volume_is_refused_and_leaves_nothing_behind() {
+async fn a_file_that_is_not_a_volume_is_rejected_and_not_stored() {
     let app = TestApp::start().await;
     let answer = app
         .post("/v1/volumes")
@@ -92,7 +92,7 @@ async fn what_is_no_volume_is_refused_and_leaves_nothing_behind() {
 }
 
 #[tokio::test]
-async fn bodies_that_cannot_be_taken_are_refused_by_their_reason() {
+async fn unacceptable_bodies_are_rejected_with_the_reason() {
     let app = TestApp::with(|s| s.body_limit = "1KiB".parse().unwrap()).await;
     let post = || app.post("/v1/volumes");
     problem(post().send().await.unwrap(), 400, "empty-body").await;
@@ -158,7 +158,7 @@ async fn a_form_over_the_limit_is_too_large_and_a_broken_one_is_malformed() {
 }
 
 #[tokio::test]
-async fn lists_go_on_where_the_cursor_says() {
+async fn lists_continue_at_the_cursor() {
     let app = TestApp::start().await;
     let mut all = Vec::new();
     for number in 0..5 {
@@ -196,7 +196,7 @@ async fn lists_go_on_where_the_cursor_says() {
 }
 
 #[tokio::test]
-async fn an_erased_volume_is_gone_until_it_is_sent_again() {
+async fn a_deleted_volume_is_gone_until_it_is_uploaded_again() {
     let app = TestApp::start().await;
     let path = format!("/v1/volumes/{}", app.volume("sphere").await);
     let erased = app.delete(&path).send().await.unwrap();
@@ -215,7 +215,7 @@ async fn an_erased_volume_is_gone_until_it_is_sent_again() {
 }
 
 #[tokio::test]
-async fn a_volume_that_a_job_needs_cannot_be_erased() {
+async fn a_volume_that_a_job_needs_cannot_be_deleted() {
     let app = TestApp::start().await;
     let job = app.file("slow").await;
     let path = text(&job["links"]["volume"]);
@@ -232,7 +232,7 @@ async fn a_volume_that_a_job_needs_cannot_be_erased() {
 }
 
 #[tokio::test]
-async fn a_volume_can_be_looked_at() {
+async fn a_volume_has_a_preview() {
     let app = TestApp::start().await;
     let id = app.volume("sphere").await;
     let answer = app

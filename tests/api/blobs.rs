@@ -1,0 +1,210 @@
+//! The queue on a file store that is not a folder: files are kept in memory and copied to the
+//! disk only for work that reads them.
+
+use crate::helpers::{fake_engine, volume};
+use async_trait::async_trait;
+use bytes::Bytes;
+use futures::{StreamExt, TryStreamExt};
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::io;
+use std::ops::Range;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex};
+use std::task::{Context, Poll};
+use std::time::Duration;
+use tokio::io::{AsyncWrite, AsyncWriteExt};
+use ventriform::jobs::{
+    BlobError, BlobStore, BlobStream, BlobWriter, Filed, JobState, LocalFile, NewJob, Queue,
+    QueueSettings, StagedFiles, StoredVolume, SystemClock, WorkerSettings, Workers,
+};
+use ventriform::store::Store;
+
+type Files = Arc<Mutex<BTreeMap<String, Vec<u8>>>>;
+
+#[derive(Clone, Default)]
+struct MemoryBlobs {
+    items: Arc<Mutex<BTreeMap<String, BTreeMap<String, Vec<u8>>>>>,
+}
+
+/// A copy in a temporary folder that is deleted with the last clone of the result.
+fn copy_to_disk(name: &str, bytes: &[u8]) -> Result<LocalFile, BlobError> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes)?;
+    Ok(LocalFile::copied(path, folder))
+}
+
+struct MemoryStaging {
+    store: MemoryBlobs,
+    files: Files,
+}
+
+struct MemoryWriter {
+    name: String,
+    content: Vec<u8>,
+    files: Files,
+}
+
+impl AsyncWrite for MemoryWriter {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        _: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        self.content.extend_from_slice(bytes);
+        Poll::Ready(Ok(bytes.len()))
+    }
+
+    fn poll_flush(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Poll::Ready(Ok(()))
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<io::Result<()>> {
+        let content = std::mem::take(&mut self.content);
+        self.files
+            .lock()
+            .unwrap()
+            .insert(self.name.clone(), content);
+        Poll::Ready(Ok(()))
+    }
+}
+
+#[async_trait]
+impl StagedFiles for MemoryStaging {
+    async fn create(&self, name: &str) -> Result<BlobWriter, BlobError> {
+        Ok(Box::pin(MemoryWriter {
+            name: name.to_owned(),
+            content: Vec::new(),
+            files: self.files.clone(),
+        }))
+    }
+
+    async fn rename(&self, from: &str, to: &str) -> Result<(), BlobError> {
+        let mut files = self.files.lock().unwrap();
+        let content = files.remove(from).unwrap();
+        files.insert(to.to_owned(), content);
+        Ok(())
+    }
+
+    async fn local(&self, name: &str) -> Result<LocalFile, BlobError> {
+        copy_to_disk(name, &self.files.lock().unwrap()[name])
+    }
+
+    async fn publish(self: Box<Self>, id: &str) -> Result<(), BlobError> {
+        let files = std::mem::take(&mut *self.files.lock().unwrap());
+        let mut items = self.store.items.lock().unwrap();
+        items.entry(id.to_owned()).or_insert(files);
+        Ok(())
+    }
+}
+
+#[async_trait]
+impl BlobStore for MemoryBlobs {
+    async fn stage(&self) -> Result<Box<dyn StagedFiles>, BlobError> {
+        Ok(Box::new(MemoryStaging {
+            store: self.clone(),
+            files: Files::default(),
+        }))
+    }
+
+    async fn read(&self, id: &str, name: &str, range: Range<u64>) -> Result<BlobStream, BlobError> {
+        let items = self.items.lock().unwrap();
+        let part = &items[id][name][range.start as usize..range.end as usize];
+        let chunk = Ok(Bytes::copy_from_slice(part));
+        Ok(futures::stream::iter([chunk]).boxed())
+    }
+
+    async fn local(&self, id: &str, name: &str) -> Result<Option<LocalFile>, BlobError> {
+        let items = self.items.lock().unwrap();
+        let content = items.get(id).and_then(|files| files.get(name));
+        content.map(|bytes| copy_to_disk(name, bytes)).transpose()
+    }
+
+    async fn delete(&self, id: &str) -> Result<(), BlobError> {
+        self.items.lock().unwrap().remove(id);
+        Ok(())
+    }
+
+    async fn ids(&self) -> Result<Vec<String>, BlobError> {
+        Ok(self.items.lock().unwrap().keys().cloned().collect())
+    }
+
+    async fn check(&self) -> Result<(), BlobError> {
+        Ok(())
+    }
+}
+
+#[tokio::test]
+async fn jobs_run_on_a_file_store_without_a_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let blobs = MemoryBlobs::default();
+    let queue = Arc::new(Queue::new(
+        store.rows.clone(),
+        store.rows.clone(),
+        Arc::new(blobs.clone()),
+        Arc::new(SystemClock),
+        QueueSettings {
+            limit: 10,
+            workers: 1,
+        },
+    ));
+    let staged = blobs.stage().await.unwrap();
+    let mut writer = staged.create("0").await.unwrap();
+    writer.write_all(&volume("sphere")).await.unwrap();
+    writer.shutdown().await.unwrap();
+    staged.rename("0", "volume.nii").await.unwrap();
+    let record = StoredVolume {
+        id: "vol_1".into(),
+        sequence: 0,
+        created_at: 0,
+        bytes: 13,
+        files: vec!["volume.nii".into()],
+        facts: json!({}),
+    };
+    let (_, new) = queue.add_volume(record, staged).await.unwrap();
+    assert!(new);
+
+    let engine = fake_engine();
+    let settings = WorkerSettings {
+        workers: 1,
+        threads: 1,
+        lease: Duration::from_secs(30),
+        attempt_limit: 1,
+        time_limit: Duration::from_secs(30),
+    };
+    let workers = Workers::start(&queue, &engine.works, settings).unwrap();
+    let work = engine.work("model").unwrap();
+    let job = NewJob {
+        kind: "model".into(),
+        volume: "vol_1".into(),
+        needs: BTreeMap::new(),
+        parameters: work.parameters_from_text(&[]).unwrap(),
+        idempotency: None,
+    };
+    let Filed::New(job) = queue.file(&job).await.unwrap() else {
+        panic!("the job was rejected");
+    };
+    let job = queue.wait(&job.id, Duration::from_secs(20)).await.unwrap();
+    let job = job.unwrap();
+    assert_eq!(job.state, JobState::Succeeded, "{:?}", job.failure);
+
+    let model = queue.catalogue.product(&job.result.unwrap()).await.unwrap();
+    let model = model.unwrap();
+    let report = model.file("report.json").unwrap();
+    let content = blobs
+        .read(&model.id, "report.json", 0..report.bytes)
+        .await
+        .unwrap();
+    let content: Vec<Bytes> = content.try_collect().await.unwrap();
+    assert_eq!(content.concat().len() as u64, report.bytes);
+
+    let stored = queue.with_files(model, work.page_files()).await.unwrap();
+    assert!(work.page(&stored).unwrap().contains("<title>"));
+    let path = stored.files[0].to_path_buf();
+    assert!(path.exists());
+    drop(stored);
+    assert!(!path.exists(), "the copy is deleted after use");
+    workers.stop(Duration::from_secs(5)).await;
+}
