@@ -77,6 +77,12 @@ install_external_tools() {
     npm install --silent --no-fund --no-audit --prefix "$tools" gltf-validator@2.0.0-dev.3.10
 }
 
+# The library without the service compiles, and depends on none of the service's crates.
+library_alone() {
+  cargo clippy --quiet --lib --no-default-features -- -D warnings &&
+    ! cargo tree --edges normal --no-default-features --prefix none | grep -E '^(axum|tokio|sqlx|reqwest) '
+}
+
 need cc build-essential
 command -v cargo >/dev/null || { echo "cargo not found: install Rust 1.95 or newer"; failed=1; finish; }
 # Downloads take little processor time, so they run while the library compiles.
@@ -85,6 +91,7 @@ command -v cargo >/dev/null || { echo "cargo not found: install Rust 1.95 or new
 # --- the project's own tests ------------------------------------------------------------
 check "format" cargo fmt --check
 check "clippy" cargo clippy --quiet --all-targets -- -D warnings
+check "library without the service" library_alone
 check "documentation" env RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc --quiet --no-deps --document-private-items
 
 say "cargo test"

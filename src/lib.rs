@@ -50,14 +50,20 @@ pub mod segmentation;
 
 pub mod evaluate;
 
+#[cfg(feature = "service")]
 pub mod jobs;
 
+#[cfg(feature = "service")]
 pub mod work;
 
+#[cfg(feature = "service")]
 pub mod store;
 
+#[cfg(feature = "service")]
 pub mod config;
 
+#[cfg(feature = "service")]
 pub mod http;
 
+#[cfg(feature = "service")]
 pub mod cli;
