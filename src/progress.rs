@@ -1,39 +1,43 @@
-//! How long work tells where it is, and how it is told to stop.
+//! Progress reports and cancellation.
 //!
-//! Every stage takes a [`Monitor`], reports fractions of itself through it and thereby looks
-//! at the cancel token. The domain knows no clock and no terminal: an [`Observer`] given by
-//! the caller does (a progress bar, a job row, a test).
+//! Every stage takes a [`Monitor`]. It reports its completed fraction through it, which also
+//! checks the cancel token: a report returns [`Cancelled`] once the token was raised. The library
+//! itself uses no clock and no terminal; the caller provides an [`Observer`] (a progress bar, a
+//! row of the jobs table, a test).
+//!
+//! Guaranteed: a stage checks the token at least every 50 ms. Progress of a whole job never
+//! decreases ([`Gauge`]).
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The stages of all work, in order; which of them a piece of work has is in its [`Plan`].
+/// Every stage that work can have, in order. A [`Plan`] lists the stages of one kind of work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Stage {
-    /// Decoding the files into voxels.
+    /// Decoding files into voxels.
     Read,
     /// Region, iso-value, Marching Cubes.
     Surface,
-    /// Points and their tessellation.
+    /// Placing points on the surface and joining them to triangles.
     Retile,
     /// Least-squares fit and edge flips.
     Optimise,
-    /// Finding the organ in the volume.
+    /// Searching for the organ in the volume.
     Localise,
-    /// Placing the model as a whole.
+    /// Placing the model as a rigid body.
     Align,
-    /// Letting the model move until it rests.
+    /// Deforming the model until it comes to rest.
     Deform,
     /// Sampling the wall for the polar map.
     Polar,
     /// Measuring the result.
     Report,
-    /// Writing the formats.
+    /// Encoding the files.
     Export,
 }
 
 impl Stage {
-    /// Every stage.
+    /// Every stage, in order.
     pub const ALL: [Stage; 10] = [
         Stage::Read,
         Stage::Surface,
@@ -64,13 +68,13 @@ impl Stage {
     }
 }
 
-/// The stages of one kind of work with the share of the time that each takes, roughly, on a
-/// 128³ volume and 150 points: for one bar over all of them. Shares add up to 1.
+/// The stages of one kind of work, each with its approximate share of the total time for a 128³
+/// volume and 150 points. The shares add up to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plan(pub &'static [(Stage, f64)]);
 
 impl Plan {
-    /// From a volume to a model.
+    /// Making a model from a volume.
     pub const GENERATION: Plan = Plan(&[
         (Stage::Read, 0.08),
         (Stage::Surface, 0.2),
@@ -80,7 +84,7 @@ impl Plan {
         (Stage::Export, 0.03),
     ]);
 
-    /// From a volume and models to a segmentation.
+    /// Segmenting a volume by fitting models.
     pub const SEGMENTATION: Plan = Plan(&[
         (Stage::Read, 0.1),
         (Stage::Localise, 0.35),
@@ -92,8 +96,8 @@ impl Plan {
     ]);
 }
 
-/// How much of a [`Plan`] is done. Never falls, though stages may come again: several models
-/// are fitted one after the other, each in all stages.
+/// The completed fraction of a [`Plan`]. It never decreases, although stages may be repeated: when
+/// several models are fitted one after the other, each goes through the same stages.
 #[derive(Debug)]
 pub struct Gauge {
     plan: Plan,
@@ -101,7 +105,7 @@ pub struct Gauge {
 }
 
 impl Gauge {
-    /// Nothing is done yet.
+    /// A gauge at zero.
     pub fn new(plan: Plan) -> Self {
         Self {
             done: Mutex::new(vec![0.0; plan.0.len()]),
@@ -109,10 +113,10 @@ impl Gauge {
         }
     }
 
-    /// `fraction` of `stage` is done, and so much of every stage before it. Returns how much
-    /// of the whole is, 0..=1.
+    /// Records that at least `fraction` of `stage` and of every stage before it is completed.
+    /// Returns the completed fraction of the whole, 0..=1.
     pub fn advance(&self, stage: Stage, fraction: f64) -> f64 {
-        // The list is whole after any panic: numbers are written one by one.
+        // A panic cannot leave the list half changed: its numbers are written one at a time.
         let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(at) = self.plan.0.iter().position(|(s, _)| *s == stage) {
             for part in &mut done[..=at] {
@@ -127,45 +131,45 @@ impl Gauge {
     }
 }
 
-/// The caller asked for an end; nothing was produced.
+/// The work was cancelled and produced nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("cancelled")]
 pub struct Cancelled;
 
-/// A flag that any thread may raise to end the work that holds a clone of it.
+/// A flag that any thread can raise to cancel the work that holds a clone of it.
 #[derive(Debug, Clone, Default)]
 pub struct CancelToken(Arc<AtomicBool>);
 
 impl CancelToken {
-    /// A token that nobody has raised yet.
+    /// A token that is not raised.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Asks the work to end. Cannot be taken back.
+    /// Raises the flag. This cannot be undone.
     pub fn cancel(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the end was asked for.
+    /// Whether the flag was raised.
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// Hears of progress. Called from whichever thread works, at most some hundred times a stage.
+/// Receives progress reports, from any of the computing threads, at most a few hundred per stage.
 pub trait Observer: Sync {
-    /// `fraction` of `stage` is done, 0..=1.
+    /// `fraction` (0..=1) of `stage` is completed.
     fn progress(&self, stage: Stage, fraction: f64);
 
-    /// Milliseconds since any fixed moment; the report's timings come from here. The
-    /// default has no clock, and all timings are zero.
+    /// Milliseconds since an arbitrary fixed moment, used for the timings in reports. By default
+    /// there is no clock, and all timings are zero.
     fn now_ms(&self) -> f64 {
         0.0
     }
 }
 
-/// An observer that hears nothing.
+/// An observer that ignores all reports.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Silent;
 
@@ -173,18 +177,18 @@ impl Observer for Silent {
     fn progress(&self, _: Stage, _: f64) {}
 }
 
-/// What a stage is handed: someone to tell, and a token to look at.
+/// The observer and the cancel token of a stage.
 #[derive(Clone)]
 pub struct Monitor<'a> {
     observer: &'a dyn Observer,
     cancel: CancelToken,
-    /// Share of every stage that was done before this monitor's work, and the share that is
-    /// this monitor's.
+    /// The fraction of every stage that was completed before this monitor's work, and the fraction
+    /// that is this monitor's work.
     span: (f64, f64),
 }
 
 impl<'a> Monitor<'a> {
-    /// A monitor that tells `observer` and obeys `cancel`.
+    /// A monitor with this observer and cancel token.
     pub fn new(observer: &'a dyn Observer, cancel: CancelToken) -> Self {
         Self {
             observer,
@@ -193,7 +197,7 @@ impl<'a> Monitor<'a> {
         }
     }
 
-    /// A monitor that tells nobody and is never cancelled.
+    /// A monitor without an observer that is never cancelled.
     pub fn silent() -> Monitor<'static> {
         Monitor {
             observer: &Silent,
@@ -202,8 +206,8 @@ impl<'a> Monitor<'a> {
         }
     }
 
-    /// A monitor that tells nobody and obeys the same token: for work that is no stage of
-    /// the whole's.
+    /// A monitor without an observer, with the same cancel token: for work that is not a stage of
+    /// the whole.
     #[must_use]
     pub fn untold(&self) -> Monitor<'static> {
         Monitor {
@@ -212,7 +216,8 @@ impl<'a> Monitor<'a> {
         }
     }
 
-    /// The monitor for piece `index` of `count` alike: its stages are that part of the whole's.
+    /// The monitor for piece `index` of `count` equal pieces: reports of its stages are scaled to
+    /// that part of each stage of the whole.
     #[must_use]
     pub fn piece(&self, index: usize, count: usize) -> Self {
         let own = self.span.1 / count.max(1) as f64;
@@ -223,10 +228,10 @@ impl<'a> Monitor<'a> {
         }
     }
 
-    /// Says that `fraction` (0..=1) of `stage` is done.
+    /// Reports that `fraction` (0..=1) of `stage` is completed.
     ///
     /// # Errors
-    /// [`Cancelled`] where the token was raised: return at once.
+    /// [`Cancelled`] if the token was raised; the stage must return at once.
     pub fn report(&self, stage: Stage, fraction: f64) -> Result<(), Cancelled> {
         self.check()?;
         let (before, own) = self.span;
@@ -235,11 +240,11 @@ impl<'a> Monitor<'a> {
         Ok(())
     }
 
-    /// Looks at the token alone; cheap enough for inner loops. A stage looks at least every
-    /// 50 ms.
+    /// Checks the token without a report; cheap enough for inner loops. A stage checks at least
+    /// every 50 ms.
     ///
     /// # Errors
-    /// [`Cancelled`] where the token was raised.
+    /// [`Cancelled`] if the token was raised.
     pub fn check(&self) -> Result<(), Cancelled> {
         if self.cancel.is_cancelled() {
             Err(Cancelled)
@@ -248,7 +253,7 @@ impl<'a> Monitor<'a> {
         }
     }
 
-    /// The observer's clock, milliseconds.
+    /// The time of the observer's clock in milliseconds.
     pub fn now_ms(&self) -> f64 {
         self.observer.now_ms()
     }
@@ -259,7 +264,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_whole_grows_from_nothing_to_everything() {
+    fn the_completed_fraction_grows_from_zero_to_one() {
         for plan in [Plan::GENERATION, Plan::SEGMENTATION] {
             let gauge = Gauge::new(plan);
             let mut last = 0.0;
@@ -275,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn pieces_go_through_the_stages_again_and_the_whole_never_falls() {
+    fn repeated_stages_never_decrease_the_completed_fraction() {
         struct Kept(Gauge, Mutex<Vec<f64>>);
         impl Observer for Kept {
             fn progress(&self, stage: Stage, fraction: f64) {

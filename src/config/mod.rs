@@ -10,7 +10,7 @@
 
 mod units;
 
-pub use units::{Count, LogFormat, Retention, Size, Span};
+pub use units::{Auto, Count, Keyword, LogFormat, Off, OrKeyword, Retention, Size, Span};
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -362,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flag_beats_a_variable_beats_the_file_beats_the_default() {
+    fn a_flag_overrides_a_variable_overrides_the_file_overrides_the_default() {
         let file = Some("queue_limit = 1\nlease = \"5s\"\nparts_limit = 7\n");
         let flags = || Flags {
             queue_limit: Some(3),
@@ -377,21 +377,21 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_key_of_the_file_is_refused_by_name_with_the_nearest() {
+    fn an_unknown_key_of_the_file_is_rejected_with_the_nearest_name() {
         let error = load(Flags::default(), &[], Some("queue_limits = 1")).unwrap_err();
         assert!(error.to_string().contains("`queue_limits`"));
         assert!(error.to_string().contains("`queue_limit`?"));
     }
 
     #[test]
-    fn a_bad_value_is_told_with_its_origin() {
+    fn an_invalid_value_is_reported_with_its_origin() {
         let error = load(Flags::default(), &[("VENTRIFORM_LEASE", "soon")], None).unwrap_err();
         let text = error.to_string();
         assert!(text.contains("lease") && text.contains("soon") && text.contains("variable"));
     }
 
     #[test]
-    fn what_is_printed_reads_back_the_same() {
+    fn printed_settings_read_back_unchanged() {
         let flags = Flags {
             retention: Some("30d".parse().unwrap()),
             body_limit: Some("3MiB".parse().unwrap()),

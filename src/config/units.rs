@@ -4,6 +4,7 @@
 //! (`humantime` and `bytesize` print 90 s as `1m 30s` and round sizes to one decimal.)
 
 use std::fmt;
+use std::marker::PhantomData;
 use std::num::NonZeroUsize;
 use std::str::FromStr;
 use std::time::Duration;
@@ -71,50 +72,69 @@ impl Size {
     }
 }
 
-/// A number from 1, or `auto` (`None`): what fits the machine.
+/// The word that stands for the absence of a value.
+pub trait Keyword {
+    /// The word.
+    const WORD: &'static str;
+    /// What may be written, for error messages.
+    const EXPECTED: &'static str;
+}
+
+/// A value, or a keyword if there is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Count(pub Option<NonZeroUsize>);
+pub struct OrKeyword<T, K>(pub Option<T>, PhantomData<K>);
+
+impl<T: FromStr, K: Keyword> FromStr for OrKeyword<T, K> {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == K::WORD {
+            return Ok(Self(None, PhantomData));
+        }
+        match text.parse() {
+            Ok(value) => Ok(Self(Some(value), PhantomData)),
+            Err(_) => Err(format!("give `{}` or {}", K::WORD, K::EXPECTED)),
+        }
+    }
+}
+
+impl<T: fmt::Display, K: Keyword> fmt::Display for OrKeyword<T, K> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.0 {
+            Some(value) => value.fmt(f),
+            None => f.write_str(K::WORD),
+        }
+    }
+}
+
+/// The keyword `auto`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Auto;
+
+impl Keyword for Auto {
+    const WORD: &'static str = "auto";
+    const EXPECTED: &'static str = "a whole number from 1";
+}
+
+/// The keyword `off`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Off;
+
+impl Keyword for Off {
+    const WORD: &'static str = "off";
+    const EXPECTED: &'static str = "a time such as 12h or 30d";
+}
+
+/// A number from 1, or `auto`: what fits the machine.
+pub type Count = OrKeyword<NonZeroUsize, Auto>;
+
+/// How long results are kept; `off` keeps them until they are deleted.
+pub type Retention = OrKeyword<Span, Off>;
 
 impl Count {
     /// The number; `auto` is replaced by the given one, at least 1.
     pub fn or(self, auto: usize) -> usize {
         self.0.map_or(auto.max(1), NonZeroUsize::get)
-    }
-}
-
-impl FromStr for Count {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        parse_unless("auto", text)
-            .map(Self)
-            .ok_or("give `auto` or a whole number from 1".into())
-    }
-}
-
-impl fmt::Display for Count {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_unless("auto", self.0, f)
-    }
-}
-
-/// How long results are kept; `off` (`None`) keeps them until they are deleted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Retention(pub Option<Span>);
-
-impl FromStr for Retention {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        parse_unless("off", text)
-            .map(Self)
-            .ok_or("give `off` or a time such as 12h or 30d".into())
-    }
-}
-
-impl fmt::Display for Retention {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_unless("off", self.0, f)
     }
 }
 
@@ -148,25 +168,6 @@ impl fmt::Display for LogFormat {
     }
 }
 
-/// `Some(None)` for the word, `Some(Some(value))` for a value, `None` for anything else.
-fn parse_unless<T: FromStr>(word: &str, text: &str) -> Option<Option<T>> {
-    if text == word {
-        return Some(None);
-    }
-    text.parse().ok().map(Some)
-}
-
-fn write_unless(
-    word: &str,
-    value: Option<impl fmt::Display>,
-    f: &mut fmt::Formatter<'_>,
-) -> fmt::Result {
-    match value {
-        Some(value) => value.fmt(f),
-        None => f.write_str(word),
-    }
-}
-
 fn scaled(text: &str, units: &[(&str, u64)]) -> Option<u64> {
     let digits = text.find(|c: char| !c.is_ascii_digit())?;
     let (number, unit) = text.split_at(digits);
@@ -189,7 +190,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_reads_back() {
+    fn values_read_back_as_printed() {
         for text in ["500ms", "30s", "90s", "10m", "7d", "0ms"] {
             assert_eq!(text.parse::<Span>().unwrap().to_string(), text);
         }
@@ -199,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_refused() {
+    fn invalid_values_are_rejected() {
         for text in [
             "",
             "10",

@@ -52,7 +52,7 @@ pub use resource::Resource;
 pub use storage::{
     BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Deleted, Interrupted, JobOutcome,
     JobStore, Lease, ListPage, ListRequest, LocalFile, Product, ProductFile, QueueLoad,
-    StagedFiles, StoreError, StoredVolume,
+    StagedFiles, StoreError, StoreResult, StoredVolume,
 };
 pub use work::{
     GivenParameters, Needs, OutputFile, StoredItem, Work, WorkError, WorkInput, WorkOutput, Works,

@@ -1,14 +1,14 @@
 //! From rows of SQLite to the records of `jobs`, and JSON columns both ways.
 
-use crate::jobs::{Job, JobState, ListPage, ListRequest, Product, StoreError, StoredVolume};
+use crate::jobs::{
+    Job, JobState, ListPage, ListRequest, Product, StoreError, StoreResult, StoredVolume,
+};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
-type Result<T> = std::result::Result<T, StoreError>;
-
-pub(super) fn job(row: SqliteRow) -> Result<Job> {
+pub(super) fn job(row: SqliteRow) -> StoreResult<Job> {
     let state: &str = row.try_get("state")?;
     let failure: Option<&str> = row.try_get("failure")?;
     Ok(Job {
@@ -32,7 +32,7 @@ pub(super) fn job(row: SqliteRow) -> Result<Job> {
     })
 }
 
-pub(super) fn volume(row: SqliteRow) -> Result<StoredVolume> {
+pub(super) fn volume(row: SqliteRow) -> StoreResult<StoredVolume> {
     Ok(StoredVolume {
         id: row.try_get("id")?,
         sequence: row.try_get("sequence")?,
@@ -43,7 +43,7 @@ pub(super) fn volume(row: SqliteRow) -> Result<StoredVolume> {
     })
 }
 
-pub(super) fn product(row: SqliteRow) -> Result<Product> {
+pub(super) fn product(row: SqliteRow) -> StoreResult<Product> {
     Ok(Product {
         id: row.try_get("id")?,
         sequence: row.try_get("sequence")?,
@@ -57,7 +57,10 @@ pub(super) fn product(row: SqliteRow) -> Result<Product> {
 }
 
 /// Converts the rows of a list by `record`.
-pub(super) fn all<T>(rows: Vec<SqliteRow>, record: fn(SqliteRow) -> Result<T>) -> Result<Vec<T>> {
+pub(super) fn all<T>(
+    rows: Vec<SqliteRow>,
+    record: fn(SqliteRow) -> StoreResult<T>,
+) -> StoreResult<Vec<T>> {
     rows.into_iter().map(record).collect()
 }
 
@@ -65,21 +68,21 @@ pub(super) fn all<T>(rows: Vec<SqliteRow>, record: fn(SqliteRow) -> Result<T>) -
 pub(super) fn page<T>(
     rows: Vec<SqliteRow>,
     request: ListRequest,
-    record: fn(SqliteRow) -> Result<T>,
+    record: fn(SqliteRow) -> StoreResult<T>,
     sequence: fn(&T) -> i64,
-) -> Result<ListPage<T>> {
+) -> StoreResult<ListPage<T>> {
     Ok(ListPage::cut(all(rows, record)?, request.limit, sequence))
 }
 
-pub(super) fn to_json(value: &impl Serialize) -> Result<String> {
+pub(super) fn to_json(value: &impl Serialize) -> StoreResult<String> {
     serde_json::to_string(value).map_err(|e| StoreError::Database(e.to_string()))
 }
 
-fn json<T: DeserializeOwned>(row: &SqliteRow, column: &str) -> Result<T> {
+fn json<T: DeserializeOwned>(row: &SqliteRow, column: &str) -> StoreResult<T> {
     from_json(row.try_get(column)?)
 }
 
-fn from_json<T: DeserializeOwned>(text: &str) -> Result<T> {
+fn from_json<T: DeserializeOwned>(text: &str) -> StoreResult<T> {
     serde_json::from_str(text).map_err(|e| StoreError::Database(format!("damaged row: {e}")))
 }
 

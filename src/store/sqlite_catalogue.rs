@@ -3,17 +3,15 @@
 use super::rows::{self, to_json};
 use super::sqlite::SqliteStore;
 use crate::jobs::{
-    Catalogue, Deleted, ListPage, ListRequest, Product, Resource, StoreError, StoredVolume,
+    Catalogue, Deleted, ListPage, ListRequest, Product, Resource, StoreResult, StoredVolume,
     Timestamp,
 };
 use async_trait::async_trait;
 use sqlx::{Row, SqliteConnection};
 
-type Result<T> = std::result::Result<T, StoreError>;
-
 #[async_trait]
 impl Catalogue for SqliteStore {
-    async fn add_volume(&self, volume: &StoredVolume) -> Result<bool> {
+    async fn add_volume(&self, volume: &StoredVolume) -> StoreResult<bool> {
         let mut transaction = self.writer.begin().await?;
         let done = sqlx::query(
             "INSERT INTO volumes (id, created_at, bytes, files, facts) VALUES (?, ?, ?, ?, ?)
@@ -31,7 +29,7 @@ impl Catalogue for SqliteStore {
         Ok(done.rows_affected() == 1)
     }
 
-    async fn volume(&self, id: &str) -> Result<Option<StoredVolume>> {
+    async fn volume(&self, id: &str) -> StoreResult<Option<StoredVolume>> {
         let row = sqlx::query("SELECT * FROM volumes WHERE id = ?")
             .bind(id)
             .fetch_optional(&self.readers)
@@ -39,7 +37,7 @@ impl Catalogue for SqliteStore {
         row.map(rows::volume).transpose()
     }
 
-    async fn volumes(&self, page: ListRequest) -> Result<ListPage<StoredVolume>> {
+    async fn volumes(&self, page: ListRequest) -> StoreResult<ListPage<StoredVolume>> {
         let rows = sqlx::query(
             "SELECT * FROM volumes WHERE ?1 IS NULL OR sequence < ?1
              ORDER BY sequence DESC LIMIT ?2",
@@ -51,18 +49,18 @@ impl Catalogue for SqliteStore {
         rows::page(rows, page, rows::volume, |v| v.sequence)
     }
 
-    async fn delete_volume(&self, id: &str, now: Timestamp) -> Result<Deleted> {
+    async fn delete_volume(&self, id: &str, now: Timestamp) -> StoreResult<Deleted> {
         self.delete_unneeded("volumes", id, now).await
     }
 
-    async fn add_product(&self, product: &Product) -> Result<bool> {
+    async fn add_product(&self, product: &Product) -> StoreResult<bool> {
         let mut transaction = self.writer.begin().await?;
         let new = insert_product(&mut transaction, product).await?;
         transaction.commit().await?;
         Ok(new)
     }
 
-    async fn product(&self, id: &str) -> Result<Option<Product>> {
+    async fn product(&self, id: &str) -> StoreResult<Option<Product>> {
         let row = sqlx::query("SELECT * FROM products WHERE id = ?")
             .bind(id)
             .fetch_optional(&self.readers)
@@ -70,7 +68,7 @@ impl Catalogue for SqliteStore {
         row.map(rows::product).transpose()
     }
 
-    async fn products(&self, kind: Resource, page: ListRequest) -> Result<ListPage<Product>> {
+    async fn products(&self, kind: Resource, page: ListRequest) -> StoreResult<ListPage<Product>> {
         let rows = sqlx::query(
             "SELECT * FROM products WHERE kind = ?1 AND (?2 IS NULL OR sequence < ?2)
              ORDER BY sequence DESC LIMIT ?3",
@@ -83,11 +81,11 @@ impl Catalogue for SqliteStore {
         rows::page(rows, page, rows::product, |p| p.sequence)
     }
 
-    async fn delete_product(&self, id: &str, now: Timestamp) -> Result<Deleted> {
+    async fn delete_product(&self, id: &str, now: Timestamp) -> StoreResult<Deleted> {
         self.delete_unneeded("products", id, now).await
     }
 
-    async fn erased_at(&self, id: &str) -> Result<Option<Timestamp>> {
+    async fn erased_at(&self, id: &str) -> StoreResult<Option<Timestamp>> {
         let row = sqlx::query("SELECT erased_at FROM tombstones WHERE id = ?")
             .bind(id)
             .fetch_optional(&self.readers)
@@ -95,7 +93,7 @@ impl Catalogue for SqliteStore {
         Ok(row.map(|row| row.get(0)))
     }
 
-    async fn older_than(&self, before: Timestamp) -> Result<Vec<String>> {
+    async fn older_than(&self, before: Timestamp) -> StoreResult<Vec<String>> {
         let rows = sqlx::query(
             "SELECT id FROM jobs WHERE finished_at < ?1
              UNION ALL SELECT id FROM products WHERE created_at < ?1 AND kind != 'template'
@@ -115,7 +113,7 @@ impl SqliteStore {
         table: &'static str,
         id: &str,
         now: Timestamp,
-    ) -> Result<Deleted> {
+    ) -> StoreResult<Deleted> {
         let mut transaction = self.writer.begin().await?;
         let delete = format!(
             "DELETE FROM {table} WHERE id = ?1 AND NOT EXISTS
@@ -146,7 +144,10 @@ impl SqliteStore {
 
 /// Adds a product within a transaction, unless its id exists already. Returns whether it was
 /// added.
-pub(super) async fn insert_product(to: &mut SqliteConnection, product: &Product) -> Result<bool> {
+pub(super) async fn insert_product(
+    to: &mut SqliteConnection,
+    product: &Product,
+) -> StoreResult<bool> {
     let done = sqlx::query(
         "INSERT INTO products
              (id, kind, created_at, volume, parameters, summary, software, files)
@@ -171,7 +172,7 @@ pub(super) async fn record_deletion(
     to: &mut SqliteConnection,
     id: &str,
     now: Timestamp,
-) -> Result<()> {
+) -> StoreResult<()> {
     sqlx::query("INSERT OR REPLACE INTO tombstones (id, erased_at) VALUES (?, ?)")
         .bind(id)
         .bind(now)
@@ -181,7 +182,7 @@ pub(super) async fn record_deletion(
 }
 
 /// Removes the record of a deletion: the item exists again.
-async fn forget_deletion(to: &mut SqliteConnection, id: &str) -> Result<()> {
+async fn forget_deletion(to: &mut SqliteConnection, id: &str) -> StoreResult<()> {
     sqlx::query("DELETE FROM tombstones WHERE id = ?")
         .bind(id)
         .execute(to)

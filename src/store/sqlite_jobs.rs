@@ -5,19 +5,17 @@ use super::rows::{self, to_json};
 use super::sqlite::SqliteStore;
 use crate::jobs::{
     Deleted, Failure, Filed, Interrupted, Job, JobOutcome, JobState, JobStore, Lease, ListPage,
-    ListRequest, NewJob, QueueLoad, Resource, StoreError, Timestamp, random_id,
+    ListRequest, NewJob, QueueLoad, Resource, StoreResult, Timestamp, random_id,
 };
 use async_trait::async_trait;
 use sqlx::Row;
-
-type Result<T> = std::result::Result<T, StoreError>;
 
 /// Number of last succeeded jobs whose durations are averaged.
 const JOBS_AVERAGED: i64 = 20;
 
 #[async_trait]
 impl JobStore for SqliteStore {
-    async fn file(&self, job: &NewJob, queue_limit: usize, now: Timestamp) -> Result<Filed> {
+    async fn file(&self, job: &NewJob, queue_limit: usize, now: Timestamp) -> StoreResult<Filed> {
         if let Some(earlier) = self.earlier(job).await? {
             return Ok(earlier);
         }
@@ -57,7 +55,7 @@ impl JobStore for SqliteStore {
         Ok(self.missing(job).await?.unwrap_or(Filed::QueueFull))
     }
 
-    async fn job(&self, id: &str) -> Result<Option<Job>> {
+    async fn job(&self, id: &str) -> StoreResult<Option<Job>> {
         let row = sqlx::query("SELECT * FROM jobs WHERE id = ?")
             .bind(id)
             .fetch_optional(&self.readers)
@@ -65,7 +63,7 @@ impl JobStore for SqliteStore {
         row.map(rows::job).transpose()
     }
 
-    async fn jobs(&self, state: Option<JobState>, page: ListRequest) -> Result<ListPage<Job>> {
+    async fn jobs(&self, state: Option<JobState>, page: ListRequest) -> StoreResult<ListPage<Job>> {
         let rows = sqlx::query(
             "SELECT * FROM jobs
              WHERE (?1 IS NULL OR state = ?1) AND (?2 IS NULL OR sequence < ?2)
@@ -79,7 +77,7 @@ impl JobStore for SqliteStore {
         rows::page(rows, page, rows::job, |job| job.sequence)
     }
 
-    async fn ahead_of(&self, job: &Job) -> Result<u64> {
+    async fn ahead_of(&self, job: &Job) -> StoreResult<u64> {
         let row = sqlx::query("SELECT count(*) FROM jobs WHERE state = 'queued' AND sequence < ?")
             .bind(job.sequence)
             .fetch_one(&self.readers)
@@ -87,7 +85,7 @@ impl JobStore for SqliteStore {
         Ok(u64::try_from(row.get::<i64, _>(0)).unwrap_or(0))
     }
 
-    async fn load(&self) -> Result<QueueLoad> {
+    async fn load(&self) -> StoreResult<QueueLoad> {
         let row = sqlx::query(
             "SELECT (SELECT count(*) FROM jobs WHERE state = 'queued'),
                     (SELECT count(*) FROM jobs WHERE state = 'running'),
@@ -112,7 +110,7 @@ impl JobStore for SqliteStore {
         attempt_limit: u32,
         now: Timestamp,
         until: Timestamp,
-    ) -> Result<Option<Job>> {
+    ) -> StoreResult<Option<Job>> {
         let row = sqlx::query(
             "UPDATE jobs SET state = 'running', attempts = attempts + 1, lease_token = ?1,
                     lease_expires_at = ?2, started_at = ?3, stage = NULL, progress = 0,
@@ -133,7 +131,7 @@ impl JobStore for SqliteStore {
         row.map(rows::job).transpose()
     }
 
-    async fn renew_lease(&self, lease: &Lease, until: Timestamp) -> Result<Option<bool>> {
+    async fn renew_lease(&self, lease: &Lease, until: Timestamp) -> StoreResult<Option<bool>> {
         let row = sqlx::query(
             "UPDATE jobs SET lease_expires_at = ?
              WHERE id = ? AND lease_token = ? AND state = 'running'
@@ -147,7 +145,12 @@ impl JobStore for SqliteStore {
         Ok(row.map(|row| row.get(0)))
     }
 
-    async fn progress(&self, lease: &Lease, stage: &str, progress: f64) -> Result<Option<Job>> {
+    async fn progress(
+        &self,
+        lease: &Lease,
+        stage: &str,
+        progress: f64,
+    ) -> StoreResult<Option<Job>> {
         let row = sqlx::query(
             "UPDATE jobs SET stage = ?, progress = max(progress, ?), revision = revision + 1
              WHERE id = ? AND lease_token = ? AND state = 'running'
@@ -167,7 +170,7 @@ impl JobStore for SqliteStore {
         lease: &Lease,
         outcome: &JobOutcome,
         now: Timestamp,
-    ) -> Result<Option<Job>> {
+    ) -> StoreResult<Option<Job>> {
         let (state, failure, product) = match outcome {
             JobOutcome::Succeeded(product) => (JobState::Succeeded, None, Some(product)),
             JobOutcome::Failed(failure) => (JobState::Failed, Some(to_json(failure)?), None),
@@ -199,7 +202,7 @@ impl JobStore for SqliteStore {
         Ok(Some(rows::job(row)?))
     }
 
-    async fn hand_back(&self, lease: &Lease) -> Result<Option<Job>> {
+    async fn hand_back(&self, lease: &Lease) -> StoreResult<Option<Job>> {
         let row = sqlx::query(
             "UPDATE jobs SET state = 'queued', attempts = attempts - 1, stage = NULL,
                     progress = 0, started_at = NULL, lease_token = NULL,
@@ -214,7 +217,7 @@ impl JobStore for SqliteStore {
         row.map(rows::job).transpose()
     }
 
-    async fn release_all(&self) -> Result<u64> {
+    async fn release_all(&self) -> StoreResult<u64> {
         let done = sqlx::query(
             "UPDATE jobs SET state = 'queued', stage = NULL, progress = 0, lease_token = NULL,
                     lease_expires_at = NULL, revision = revision + 1
@@ -230,7 +233,7 @@ impl JobStore for SqliteStore {
         attempt_limit: u32,
         reason: &Failure,
         now: Timestamp,
-    ) -> Result<Vec<Job>> {
+    ) -> StoreResult<Vec<Job>> {
         let rows = sqlx::query(
             "UPDATE jobs SET
                     state = CASE WHEN cancel_requested THEN 'cancelled' ELSE 'failed' END,
@@ -249,7 +252,7 @@ impl JobStore for SqliteStore {
         rows::all(rows, rows::job)
     }
 
-    async fn interrupt(&self, id: &str, now: Timestamp) -> Result<Interrupted> {
+    async fn interrupt(&self, id: &str, now: Timestamp) -> StoreResult<Interrupted> {
         let row = sqlx::query(
             "UPDATE jobs SET cancel_requested = 1, revision = revision + 1,
                     finished_at = CASE state WHEN 'queued' THEN ?1 ELSE finished_at END,
@@ -274,7 +277,7 @@ impl JobStore for SqliteStore {
             .map_or(Interrupted::Unknown, Interrupted::Finished))
     }
 
-    async fn delete_job(&self, id: &str, now: Timestamp) -> Result<Deleted> {
+    async fn delete_job(&self, id: &str, now: Timestamp) -> StoreResult<Deleted> {
         let mut transaction = self.writer.begin().await?;
         let done =
             sqlx::query("DELETE FROM jobs WHERE id = ? AND state NOT IN ('queued', 'running')")
@@ -296,7 +299,7 @@ impl JobStore for SqliteStore {
 
 impl SqliteStore {
     /// The first item the job needs that does not exist.
-    async fn missing(&self, job: &NewJob) -> Result<Option<Filed>> {
+    async fn missing(&self, job: &NewJob) -> StoreResult<Option<Filed>> {
         let volume = ("volume", &job.volume);
         let others = job.needs.iter().map(|(field, id)| (field.as_str(), id));
         for (field, id) in std::iter::once(volume).chain(others) {
@@ -317,7 +320,7 @@ impl SqliteStore {
     }
 
     /// The job filed earlier under this job's idempotency key.
-    async fn earlier(&self, job: &NewJob) -> Result<Option<Filed>> {
+    async fn earlier(&self, job: &NewJob) -> StoreResult<Option<Filed>> {
         let Some(key) = &job.idempotency else {
             return Ok(None);
         };

@@ -1,7 +1,7 @@
 //! The interface to the file store.
 //!
 //! Files are addressed by an item's id and a name. They are written as streams into a
-//! [`StagedFiles`] set that nobody else can see, and published under an id all at once. They are
+//! [`StagedFiles`] set that is not visible yet, and published under an id all at once. They are
 //! read as streams; code that needs a file on the local disk (the readers of volumes do) asks
 //! for a [`LocalFile`]. No method takes or returns the path of a stored file, so that a store
 //! may keep its files elsewhere than on a disk.

@@ -17,6 +17,9 @@ pub use listing::{ListPage, ListRequest};
 pub use product::{Product, ProductFile};
 pub use volume::StoredVolume;
 
+/// The result of an operation on the database.
+pub type StoreResult<T> = Result<T, StoreError>;
+
 /// The storage failed.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
