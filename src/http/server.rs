@@ -1,7 +1,7 @@
 //! Starting the service from its settings, and shutting it down.
 
 use super::app::App;
-use super::connections::LimitedAcceptor;
+use super::connections::{self, ConnectionLimits};
 use super::router::router;
 use crate::config::Settings;
 use crate::jobs::{
@@ -10,7 +10,6 @@ use crate::jobs::{
 };
 use crate::store::{OpenError, Store};
 use crate::work::Engine;
-use hyper_util::rt::TokioTimer;
 use std::io;
 use std::net::{SocketAddr, TcpListener};
 use std::num::NonZeroUsize;
@@ -40,8 +39,7 @@ pub enum ServeError {
 pub struct Running {
     address: SocketAddr,
     queue: Arc<Queue>,
-    server: JoinHandle<io::Result<()>>,
-    handle: axum_server::Handle<SocketAddr>,
+    server: JoinHandle<()>,
     workers: Workers,
     closing: CancellationToken,
     grace: Duration,
@@ -53,7 +51,7 @@ pub struct Running {
 /// running jobs get `shutdown_grace` to end, and unfinished ones go back to the queue.
 ///
 /// # Errors
-/// If the service cannot start, or the network fails.
+/// If the service cannot start, or the task that serves connections panics.
 pub async fn serve(
     settings: Settings,
     engine: Engine,
@@ -96,8 +94,14 @@ pub async fn start(
     );
     listener.set_nonblocking(true)?;
     let address = listener.local_addr()?;
-    let handle = axum_server::Handle::new();
-    let server = listen(listener, &settings, handle.clone(), app)?;
+    let limits = ConnectionLimits {
+        connections: settings.connection_limit,
+        head: settings.header_timeout.0,
+        grace: settings.shutdown_grace.0,
+    };
+    let listener = tokio::net::TcpListener::from_std(listener)?;
+    let server = connections::serve(listener, router(app), limits, closing.clone());
+    let server = tokio::spawn(server);
     let upkeep = Upkeep {
         queue: queue.clone(),
         attempt_limit: workers.attempt_limit,
@@ -111,7 +115,6 @@ pub async fn start(
         address,
         queue,
         server,
-        handle,
         workers,
         closing,
         grace: settings.shutdown_grace.0,
@@ -133,13 +136,12 @@ impl Running {
     /// Shuts the service down in order; see [`serve`].
     ///
     /// # Errors
-    /// If the network has failed.
+    /// If the task that serves connections has panicked.
     pub async fn stop(self) -> Result<(), ServeError> {
         tracing::info!("shutting down");
         self.closing.cancel();
-        self.handle.graceful_shutdown(Some(self.grace));
         let (server, ()) = tokio::join!(self.server, self.workers.stop(self.grace));
-        server.map_err(io::Error::other)??;
+        server.map_err(io::Error::other)?;
         Ok(())
     }
 }
@@ -153,25 +155,4 @@ fn worker_settings(settings: &Settings) -> WorkerSettings {
         attempt_limit: settings.attempt_limit,
         time_limit: settings.job_time_limit.0,
     }
-}
-
-/// Serves HTTP/1.1 with a limit on connections and a deadline on request heads, which also ends
-/// connections that send nothing or are idle between requests. HTTP/2 is left to a proxy: the
-/// server would read its preface before any deadline runs.
-fn listen(
-    listener: TcpListener,
-    settings: &Settings,
-    handle: axum_server::Handle<SocketAddr>,
-    app: App,
-) -> io::Result<JoinHandle<io::Result<()>>> {
-    let mut server = axum_server::from_tcp(listener)?
-        .handle(handle)
-        .acceptor(LimitedAcceptor::new(settings.connection_limit))
-        .http1_only();
-    server
-        .http_builder()
-        .http1()
-        .timer(TokioTimer::new())
-        .header_read_timeout(settings.header_timeout.0);
-    Ok(tokio::spawn(server.serve(router(app).into_make_service())))
 }
