@@ -1,4 +1,4 @@
-//! A progress bar on a terminal, silence elsewhere.
+//! A progress bar, shown only on a terminal.
 
 use crate::progress::{Gauge, Observer, Plan, Stage};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -7,7 +7,7 @@ use std::time::Instant;
 
 const STEPS: u64 = 1000;
 
-/// Shows stages and fractions on standard error, and keeps the time.
+/// Shows the stage and the progress on standard error, and measures the time.
 pub struct Bar {
     bar: ProgressBar,
     gauge: Gauge,
@@ -15,12 +15,12 @@ pub struct Bar {
 }
 
 impl Bar {
-    /// A bar over the making of a model.
+    /// A bar for the stages of making a model.
     pub fn start() -> Self {
         Self::over(Plan::GENERATION)
     }
 
-    /// A bar over the stages of `plan`. It hides itself where standard error is no terminal.
+    /// A bar for the stages of `plan`. It is hidden if standard error is not a terminal.
     pub fn over(plan: Plan) -> Self {
         let target = if std::io::stderr().is_terminal() {
             ProgressDrawTarget::stderr()
@@ -39,14 +39,14 @@ impl Bar {
         }
     }
 
-    /// Shows `fraction` (0..=1) of the whole under the name `stage`.
+    /// Shows the name of a stage, and `fraction` (0 to 1) of the whole as done.
     pub fn show(&self, stage: &str, fraction: f64) {
         self.bar.set_message(stage.to_owned());
         self.bar
             .set_position((fraction.clamp(0.0, 1.0) * STEPS as f64) as u64);
     }
 
-    /// Takes the bar off the screen.
+    /// Removes the bar from the screen.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }

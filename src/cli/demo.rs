@@ -1,5 +1,6 @@
-//! `ventriform demo`: the main job on a simulated scan, through HTTP as any client would.
+//! `ventriform demo`: starts the service, and uses it over HTTP to make a model of a simulated scan.
 
+use super::output::{create_folder, write_file};
 use super::{Bar, serve};
 use crate::progress::Monitor;
 use crate::volume::nifti::{self, StoredType};
@@ -12,16 +13,16 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Starts the service on this machine, sends it a simulated scan and fetches the model.
+/// Start the service here, send it a simulated scan, and fetch the model
 #[derive(Debug, Args)]
 pub struct DemoArgs {
-    /// Address to listen on; port 0 takes a free one
+    /// Address and port to listen on; port 0 takes any free one
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8080")]
     listen: SocketAddr,
-    /// Where the service keeps its data [default: a folder that goes when the demo ends]
+    /// Data folder of the service [default: a temporary folder, deleted when the demo ends]
     #[arg(long, value_name = "DIR")]
     data_dir: Option<PathBuf>,
-    /// Where lv.glb and report.html go
+    /// Folder for lv.glb and report.html
     #[arg(long, value_name = "DIR", default_value = ".")]
     output: PathBuf,
     /// Number of points of the model
@@ -32,7 +33,7 @@ pub struct DemoArgs {
     exit: bool,
 }
 
-/// The service as its clients see it.
+/// A client of the service.
 struct Remote {
     client: Client,
     base: String,
@@ -53,7 +54,7 @@ impl Remote {
         format!("{}{path}", self.base)
     }
 
-    /// Sends the volume and files a job for it; the job as JSON.
+    /// Uploads the volume and files a job; returns the job as JSON.
     async fn submit(&self, volume: Vec<u8>, points: u32) -> Result<Value> {
         let request = self
             .client
@@ -63,7 +64,7 @@ impl Remote {
         Ok(checked(request.send().await?).await?.json().await?)
     }
 
-    /// Follows the job to its end and shows how far it is; the finished job.
+    /// Shows the progress of the job until it ends; returns the finished job.
     async fn follow(&self, job: &str) -> Result<Value> {
         let bar = Bar::start();
         loop {
@@ -96,9 +97,10 @@ async fn checked(answer: reqwest::Response) -> Result<reqwest::Response> {
 /// Runs the demo.
 ///
 /// # Errors
-/// Where the address is taken, the folder cannot be written, or the job fails.
+/// If the address is in use, a folder cannot be written, or the job fails.
 pub fn run(args: &DemoArgs) -> Result<()> {
-    let runtime = tokio::runtime::Runtime::new().context("cannot start the runtime")?;
+    let runtime =
+        tokio::runtime::Runtime::new().context("cannot start the threads of the service")?;
     let scratch = Scratch::new(args.data_dir.clone())?;
     let outcome = runtime.block_on(demonstrate(args, &scratch.folder));
     runtime.shutdown_timeout(Duration::from_secs(5));
@@ -121,19 +123,17 @@ async fn demonstrate(args: &DemoArgs, data_dir: &Path) -> Result<()> {
     let job = remote.submit(volume, args.points).await?;
     let path = job["links"]["self"]
         .as_str()
-        .context("the job says where it is")?
+        .context("the answer of the service has no link to the job")?
         .to_owned();
     let done = remote.follow(&path).await?;
     let model = done["links"]["model"]
         .as_str()
-        .context("the finished job names its model")?;
+        .context("the finished job has no link to its model")?;
 
-    std::fs::create_dir_all(&args.output)
-        .with_context(|| format!("cannot make {}", args.output.display()))?;
+    create_folder(&args.output)?;
     for (remote_name, file) in [("mesh.glb", "lv.glb"), ("report.html", "report.html")] {
         let bytes = remote.bytes(&format!("{model}/{remote_name}")).await?;
-        let path = args.output.join(file);
-        std::fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
+        write_file(&args.output.join(file), &bytes)?;
     }
     print_figures(&remote.json(&format!("{model}/report")).await?);
     println!(
@@ -151,7 +151,7 @@ async fn demonstrate(args: &DemoArgs, data_dir: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The embedded default input: a phantom, as the bytes of a .nii.gz file.
+/// A phantom with the default parameters, as the bytes of a .nii.gz file.
 fn simulated_scan() -> Result<Vec<u8>> {
     let made = phantom(&PhantomParameters::default(), &Monitor::silent())?;
     Ok(nifti::write(&made.volume, StoredType::Int16, true)?)
@@ -203,7 +203,7 @@ In a browser: {base}/ and {base}/docs"
     );
 }
 
-/// The service's folder; one that was made for the demo goes with it.
+/// The data folder of the service; a temporary one is deleted at the end.
 struct Scratch {
     folder: PathBuf,
     temporary: bool,
@@ -215,8 +215,7 @@ impl Scratch {
         let folder = given.unwrap_or_else(|| {
             std::env::temp_dir().join(format!("ventriform-demo-{}", std::process::id()))
         });
-        std::fs::create_dir_all(&folder)
-            .with_context(|| format!("cannot make {}", folder.display()))?;
+        create_folder(&folder)?;
         Ok(Self { folder, temporary })
     }
 }
@@ -224,7 +223,7 @@ impl Scratch {
 impl Drop for Scratch {
     fn drop(&mut self) {
         if self.temporary {
-            // Nothing to be done where it fails: the system clears its temporary folder.
+            // If this fails, the system will clean up its temporary folder.
             let _ = std::fs::remove_dir_all(&self.folder);
         }
     }

@@ -1,5 +1,6 @@
-//! `ventriform generate`: the service's pipeline with no server.
+//! `ventriform generate`: a surface model from a volume.
 
+use super::output::write_file;
 use super::{Bar, ModelArgs};
 use crate::export::{self, Format};
 use crate::pipeline::{self, Model};
@@ -11,7 +12,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-/// Makes a surface model from a volume.
+/// Make a surface model from a volume
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   ventriform generate spect.nii.gz -o lv.glb
@@ -22,14 +23,14 @@ pub struct GenerateArgs {
     /// The volume: NIfTI (.nii, .nii.gz, or a .hdr and .img pair) or DICOM NM
     #[arg(value_name = "IN", required = true, num_args = 1..=2)]
     input: Vec<PathBuf>,
-    /// Where the model goes; format by extension: glb, gltf, stl, ply, obj, vtp, json
-    /// (repeatable)
+    /// File to write the model to; the extension chooses the format: glb, gltf, stl, ply, obj, vtp
+    /// or json (repeatable)
     #[arg(short, long = "output", value_name = "OUT", required = true)]
     output: Vec<PathBuf>,
-    /// Where the quality report goes; format by extension: json, html (repeatable)
+    /// File to write the quality report to: .json or .html (repeatable)
     #[arg(long, value_name = "FILE")]
     report: Vec<PathBuf>,
-    /// Print nothing but errors
+    /// Print only errors
     #[arg(short, long)]
     quiet: bool,
     #[command(flatten)]
@@ -39,14 +40,15 @@ pub struct GenerateArgs {
 /// Runs the command.
 ///
 /// # Errors
-/// What the pipeline or the file system says; nothing is written unless the model succeeded.
+/// If the volume cannot be read, no model can be made of it, or a file cannot be written. Nothing
+/// is written unless the model is complete.
 pub fn run(args: &GenerateArgs) -> Result<()> {
     let formats = output_formats(&args.output)?;
     check_report_names(&args.report)?;
     let parameters = args
         .model
         .parameters()
-        .map_err(|e| anyhow::anyhow!("{e}. {}", e.fix))?;
+        .map_err(|error| anyhow::anyhow!(error.with_advice()))?;
     let files: Vec<VolumeFile> = args.input.iter().map(VolumeFile::at).collect();
     let bar = Bar::start();
     let monitor = Monitor::new(&bar, CancelToken::new());
@@ -55,10 +57,10 @@ pub fn run(args: &GenerateArgs) -> Result<()> {
     let model = made.map_err(|error| anyhow::anyhow!(error.with_advice()))?;
     for (path, format) in args.output.iter().zip(formats) {
         let bytes = export::encode(format, &model.mesh, &model.metadata())?;
-        write(path, &bytes)?;
+        write_file(path, &bytes)?;
     }
     for path in &args.report {
-        write(path, report_text(path, &model, &monitor)?.as_bytes())?;
+        write_file(path, report_text(path, &model, &monitor)?.as_bytes())?;
     }
     if !args.quiet {
         print_summary(&model.report);
@@ -72,7 +74,8 @@ fn output_formats(outputs: &[PathBuf]) -> Result<Vec<Format>> {
         .map(|path| {
             Format::from_extension(&extension(path)).with_context(|| {
                 format!(
-                    "{}: the extension names no format; use glb, gltf, stl, ply, obj, vtp or json",
+                    "{}: the extension is not a known format; use glb, gltf, stl, ply, obj, vtp \
+                     or json",
                     path.display()
                 )
             })
@@ -83,7 +86,10 @@ fn output_formats(outputs: &[PathBuf]) -> Result<Vec<Format>> {
 fn check_report_names(reports: &[PathBuf]) -> Result<()> {
     for path in reports {
         if !matches!(extension(path).as_str(), "json" | "html") {
-            bail!("{}: a report is .json or .html", path.display());
+            bail!(
+                "{}: a report must end in .json or .html; rename the file",
+                path.display()
+            );
         }
     }
     Ok(())
@@ -102,11 +108,7 @@ fn extension(path: &Path) -> String {
         .unwrap_or_default()
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
-}
-
-/// The figures a person looks at first, and every warning, on standard error.
+/// Prints the main figures and all warnings on standard error.
 pub fn print_summary(report: &Report) {
     for line in report.headlines() {
         eprintln!("{line}");

@@ -1,4 +1,4 @@
-//! `ventriform templates import`: models into the library of a service's data folder.
+//! `ventriform templates import`: adds models to the library in a service's data folder.
 
 use crate::config::Settings;
 use crate::jobs::{Queue, QueueSettings, SystemClock};
@@ -11,22 +11,23 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tokio::runtime::Runtime;
 
-/// Where models go, and which.
+/// The arguments of `templates import`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   ventriform templates build --cohort cohort --points 150 -o templates
   ventriform templates import templates/*.json --data-dir ventriform-data
-While the service runs, send them to it instead:
+While the service runs, send the models to it instead:
   curl --data-binary @templates/t1_150.json -H 'content-type: application/json' \\
        'http://127.0.0.1:8080/v1/templates?name=t1_150'")]
 pub struct ImportArgs {
-    /// JSON meshes of `templates build` or `generate`; the file's name becomes the template's
+    /// JSON meshes written by `templates build` or `generate`; a file's name becomes the
+    /// template's name
     #[arg(value_name = "MODEL", required = true)]
     models: Vec<PathBuf>,
-    /// The service's data folder (made where missing)
+    /// Data folder of the service (created if missing)
     #[arg(long, value_name = "DIR")]
     data_dir: PathBuf,
-    /// What the models show: left_ventricle, liver, kidney or generic
+    /// Organ that the models show: left_ventricle, liver, kidney or generic
     #[arg(long, value_name = "WORD", default_value = "left_ventricle")]
     organ: String,
 }
@@ -34,7 +35,7 @@ pub struct ImportArgs {
 /// Runs the command.
 ///
 /// # Errors
-/// Where a model cannot be fitted, or the data folder is in use or cannot be written.
+/// If a mesh cannot serve as a template, or the data folder is in use or cannot be written.
 pub fn import(args: &ImportArgs) -> Result<()> {
     Runtime::new()?.block_on(async {
         let store = Store::open(&args.data_dir).await?;

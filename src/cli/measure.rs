@@ -1,4 +1,4 @@
-//! `ventriform measure`: how well two masks agree.
+//! `ventriform measure`: the agreement of two masks.
 
 use super::segment::read;
 use crate::grid::agreement::compare;
@@ -9,17 +9,17 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::path::PathBuf;
 
-/// Compares two masks: Jaccard E_J, mean contour distance E_CD, Dice, Hausdorff.
+/// Compare two masks: Jaccard E_J, mean contour distance E_CD, Dice, Hausdorff
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   ventriform measure out/mask.nii.gz expert.nii.gz
-prints JSON; B is the reference. A mask on another grid is taken over by its place in the
-patient.")]
+Prints JSON. If the masks lie on different grids, B is resampled to the grid of A by its position
+in the patient.")]
 pub struct MeasureArgs {
-    /// The mask to judge; voxels above 0.5 belong to it
+    /// Mask to judge; voxels above 0.5 belong to it
     #[arg(value_name = "A")]
     a: PathBuf,
-    /// The reference
+    /// Reference mask
     #[arg(value_name = "B")]
     b: PathBuf,
 }
@@ -27,7 +27,7 @@ pub struct MeasureArgs {
 /// Runs the command.
 ///
 /// # Errors
-/// Where a file cannot be read, or the masks lie in different places.
+/// If a file cannot be read, a mask is empty, or the masks do not overlap in space.
 pub fn run(args: &MeasureArgs) -> Result<()> {
     let monitor = Monitor::silent();
     let a = read(std::slice::from_ref(&args.a), None, &monitor)?.volume;
@@ -38,7 +38,7 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
     };
     if !judged.voxels.contains(&true) {
         bail!(
-            "{}: the mask is empty: no voxel is above 0.5",
+            "{}: the mask is empty, as no voxel is above 0.5; give a mask with values 0 and 1",
             args.a.display()
         );
     }

@@ -6,6 +6,7 @@ pub(crate) mod evaluate;
 mod generate;
 mod library;
 mod measure;
+mod output;
 mod parameter_args;
 mod phantom;
 pub(crate) mod segment;
@@ -19,12 +20,12 @@ pub use parameter_args::{FitArgs, ModelArgs};
 use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
-/// Surface models of the left ventricle from cardiac SPECT.
+/// Surface models of the left ventricle from cardiac SPECT
 #[derive(Debug, Parser)]
 #[command(
     version,
     after_help = "Start with:
-  ventriform demo                            the main job on a simulated scan
+  ventriform demo                            a model of a simulated scan, through the service
   ventriform generate scan.nii.gz -o lv.glb  a model of your own volume
   ventriform serve --data-dir data           the HTTP service"
 )]
@@ -45,15 +46,15 @@ enum Command {
     Serve(Box<serve::ServeArgs>),
     Phantom(phantom::PhantomArgs),
     Healthcheck(Box<serve::HealthcheckArgs>),
-    /// Prints a completion script for a shell
+    /// Print a completion script for a shell
     #[command(after_help = "Example: ventriform completions bash > ventriform.bash")]
     Completions {
-        /// The shell
+        /// Shell to write the script for
         shell: clap_complete::Shell,
     },
 }
 
-/// Runs the command that the process's arguments name.
+/// Runs the command that the arguments of the process name.
 pub fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Generate(args) => generate::run(&args),

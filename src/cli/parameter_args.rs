@@ -1,4 +1,4 @@
-//! Tables of parameters as command-line flags.
+//! The tables of parameters as command-line flags.
 
 use crate::parameters::{
     FitParameters, Kind, ModelParameters, ParameterError, ParameterSpec, Parameters,
@@ -6,12 +6,13 @@ use crate::parameters::{
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 use std::marker::PhantomData;
 
-/// The flags of a model.
+/// The flags of the parameters of a model.
 pub type ModelArgs = TableArgs<ModelParameters>;
-/// The flags of a fit; `--model` and `--expert` are files here, and the command's own.
+/// The flags of the parameters of a fit. `model` and `expert` are ids of stored files; the command
+/// has flags of its own for them, which take paths.
 pub type FitArgs = TableArgs<FitParameters>;
 
-/// The flags given, as name and text.
+/// The flags that were given, as names and texts.
 #[derive(Debug, Clone)]
 pub struct TableArgs<P>(Vec<(&'static str, String)>, PhantomData<P>);
 
@@ -30,13 +31,13 @@ impl<P: Parameters> TableArgs<P> {
         P::from_pairs(self.0.iter().map(|(name, text)| (*name, text.as_str())))
     }
 
-    /// The flags as a query string's pairs.
+    /// The names and texts of the flags.
     pub fn pairs(&self) -> &[(&'static str, String)] {
         &self.0
     }
 }
 
-/// The rows that are flags: all but those that name what only a service keeps.
+/// The parameters that are flags: all but those that are ids of what a service stores.
 fn rows<P: Parameters>() -> impl Iterator<Item = &'static ParameterSpec<P>> {
     P::SPECS
         .iter()
@@ -154,14 +155,14 @@ mod tests {
         let fit = FitArgs::augment_args(Command::new("test"));
         let line = [
             "test",
-            "--seed",
+            "--seed-point",
             "1,2,3",
             "--organ",
             "left-ventricle",
             "--axis=-1,0,0",
         ];
         let fit = FitArgs::from_arg_matches(&fit.try_get_matches_from(line).unwrap()).unwrap();
-        assert_eq!(fit.parameters().unwrap().place.seed, Some([1, 2, 3]));
+        assert_eq!(fit.parameters().unwrap().place.seed_point, Some([1, 2, 3]));
         let snake = parse(&["test", "--mask_smoothing", "1.5"]).unwrap();
         assert_eq!(snake.parameters().unwrap().surface.mask_smoothing, 1.5);
     }

@@ -1,40 +1,40 @@
-//! `ventriform phantom`: a simulated scan with its truth.
+//! `ventriform phantom`: a simulated scan with its true mask.
 
+use super::Bar;
+use super::output::{create_folder, write_file};
 use crate::progress::{CancelToken, Monitor};
 use crate::volume::Volume;
 use crate::volume::nifti::{self, StoredType};
 use crate::volume::phantom::{Defect, PhantomParameters, phantom};
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-use super::Bar;
-
-/// Writes a simulated SPECT volume, the true mask of the wall, and the parameters.
+/// Simulate a SPECT scan, with the true mask of the wall
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   ventriform phantom -o phantom --spacing 2 --seed 7 --defect 8:0.7
 writes phantom/spect.nii.gz, phantom/lv_truth.nii.gz and phantom/params.json")]
 pub struct PhantomArgs {
-    /// The folder to write to (made where missing)
+    /// Folder to write to (created if missing)
     #[arg(short, long = "output", value_name = "DIR", default_value = "phantom")]
     output: PathBuf,
     /// Voxels along each axis
     #[arg(long, value_name = "N", default_value_t = 128)]
     size: usize,
-    /// Distance of the voxels' centres in millimetres
+    /// Distance between voxel centres, millimetres
     #[arg(long, value_name = "MM", default_value_t = 3.2)]
     spacing: f64,
-    /// Counting noise: standard deviation over mean in healthy wall, 0 for none
+    /// Counting noise: standard deviation divided by the mean in healthy wall; 0 for none
     #[arg(long, value_name = "X", default_value_t = 0.05)]
     noise: f64,
-    /// Uptake of the liver against healthy wall; above 1 it outshines the heart
+    /// Uptake of the liver relative to healthy wall; above 1 it is brighter than the heart
     #[arg(long, value_name = "X", default_value_t = 0.5)]
     liver: f64,
     /// A perfusion defect: AHA segment 1 to 17 and severity 0 to 1 (repeatable)
     #[arg(long, value_name = "SEGMENT:SEVERITY", value_parser = parse_defect)]
     defect: Vec<Defect>,
-    /// Seed of shape and noise
+    /// Seed of the random numbers for shape and noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
@@ -48,13 +48,13 @@ fn parse_defect(text: &str) -> Result<Defect, String> {
                 severity: severity.parse().ok()?,
             })
         })
-        .ok_or_else(|| "a defect is SEGMENT:SEVERITY, for example 8:0.7".into())
+        .ok_or_else(|| "give SEGMENT:SEVERITY, for example 8:0.7".into())
 }
 
 /// Runs the command.
 ///
 /// # Errors
-/// Where a parameter is out of range or the folder cannot be written.
+/// If a parameter is out of range or a file cannot be written.
 pub fn run(args: &PhantomArgs) -> Result<()> {
     let parameters = PhantomParameters {
         shape: [args.size; 3],
@@ -69,13 +69,12 @@ pub fn run(args: &PhantomArgs) -> Result<()> {
     let made = phantom(&parameters, &Monitor::new(&bar, CancelToken::new()));
     bar.finish();
     let made = made?;
-    std::fs::create_dir_all(&args.output)
-        .with_context(|| format!("cannot make {}", args.output.display()))?;
+    create_folder(&args.output)?;
     let at = |name: &str| args.output.join(name);
     write_volume(&at("spect.nii.gz"), &made.volume, StoredType::Int16)?;
     write_volume(&at("lv_truth.nii.gz"), &made.truth, StoredType::Uint8)?;
     let text = serde_json::to_string_pretty(&made.parameters)?;
-    write(&at("params.json"), text.as_bytes())?;
+    write_file(&at("params.json"), text.as_bytes())?;
     eprintln!(
         "Written: spect.nii.gz, lv_truth.nii.gz and params.json in {}",
         args.output.display()
@@ -84,9 +83,5 @@ pub fn run(args: &PhantomArgs) -> Result<()> {
 }
 
 fn write_volume(path: &Path, volume: &Volume, stored: StoredType) -> Result<()> {
-    write(path, &nifti::write(volume, stored, true)?)
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+    write_file(path, &nifti::write(volume, stored, true)?)
 }

@@ -1,5 +1,6 @@
-//! `ventriform segment`: a model fitted to a patient.
+//! `ventriform segment`: fits a model to a patient's volume.
 
+use super::output::{create_folder, write_file};
 use super::{Bar, FitArgs};
 use crate::export::{self, Format};
 use crate::parameters::FitParameters;
@@ -12,29 +13,29 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-/// Fits a model to the left ventricle (or another organ) in a volume.
+/// Fit a model to the left ventricle (or another organ) in a volume
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   ventriform segment scan.nii.gz --model lv.json -o out
   ventriform segment scan.dcm --model a.json --model b.json -o out --expert mask.nii.gz
-  ventriform segment scan.nii.gz --model auto -o out --seed 60,70,55 --format ply
-Writes mask.nii.gz, mesh.glb, mesh.stl, mesh.json (or the formats asked for), report.json,
+  ventriform segment scan.nii.gz --model auto -o out --seed-point 60,70,55 --format ply
+Writes mask.nii.gz, mesh.glb, mesh.stl, mesh.json (or the formats given by --format), report.json,
 report.html, slices.png and, for the left ventricle, polar.json, polar.svg and polar.png")]
 pub struct SegmentArgs {
     /// The volume: NIfTI (.nii, .nii.gz, or a .hdr and .img pair) or DICOM NM
     #[arg(value_name = "IN", required = true, num_args = 1..=2)]
     input: Vec<PathBuf>,
-    /// The model to fit, a JSON mesh of `generate` (repeatable: the best fit is taken), or auto:
-    /// a built-in ventricle
+    /// Model to fit: a JSON mesh written by `generate`, or auto for the built-in ventricle
+    /// (repeatable: the best fit is kept)
     #[arg(long, value_name = "MODEL", required = true)]
     model: Vec<PathBuf>,
-    /// The folder to write to (made where missing)
+    /// Folder to write to (created if missing)
     #[arg(short, long = "output", value_name = "OUTDIR")]
     output: PathBuf,
-    /// An expert's mask to measure against
+    /// Expert's mask to measure the result against
     #[arg(long, value_name = "MASK")]
     expert: Option<PathBuf>,
-    /// Format of the mesh (repeatable)
+    /// Format of the fitted mesh (repeatable)
     #[arg(
         long = "format",
         value_name = "FORMAT",
@@ -46,7 +47,7 @@ pub struct SegmentArgs {
     fit: FitArgs,
 }
 
-/// The word for the models at hand: on the command line that is the built-in one.
+/// The word that stands for the built-in model.
 const AUTO: &str = FitParameters::AUTO;
 
 fn parse_format(text: &str) -> Result<Format, String> {
@@ -59,19 +60,20 @@ fn parse_format(text: &str) -> Result<Format, String> {
 /// Runs the command.
 ///
 /// # Errors
-/// What reading, fitting or the file system says; nothing is written unless the fit stands.
+/// If a file cannot be read, the model cannot be fitted, or a file cannot be written. Nothing is
+/// written unless the fit is complete.
 pub fn run(args: &SegmentArgs) -> Result<()> {
     let parameters = args
         .fit
         .parameters()
-        .map_err(|e| anyhow!("{e}. {}", e.fix))?;
+        .map_err(|error| anyhow!(error.with_advice()))?;
     let named: Vec<&PathBuf> = args
         .model
         .iter()
         .filter(|m| m.as_os_str() != AUTO)
         .collect();
     if !named.is_empty() && named.len() < args.model.len() {
-        bail!("--model {AUTO} takes the built-in model; give {AUTO} or files, not both");
+        bail!("--model {AUTO} stands for the built-in model; give either {AUTO} or files");
     }
     let volume: Vec<VolumeFile> = args.input.iter().map(VolumeFile::at).collect();
     let expert = args.expert.as_ref().map(|path| [VolumeFile::at(path)]);
@@ -142,11 +144,9 @@ fn headline(s: &Segmentation) -> String {
 }
 
 fn write_all(folder: &Path, files: &[NamedFile]) -> Result<()> {
-    std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    create_folder(folder)?;
     for file in files {
-        let path = folder.join(&file.name);
-        std::fs::write(&path, &file.bytes)
-            .with_context(|| format!("cannot write {}", path.display()))?;
+        write_file(&folder.join(&file.name), &file.bytes)?;
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! `ventriform serve` and `healthcheck`: settings, log, listener, signals.
+//! `ventriform serve` and `ventriform healthcheck`: settings, log, listener, signals.
 
 use crate::config::{Flags, LogFormat, Settings};
 use crate::http::{self, Running};
@@ -15,24 +15,24 @@ use tracing_subscriber::EnvFilter;
 /// How long the health check waits for an answer.
 const HEALTH_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// Runs the HTTP service until Ctrl-C or SIGTERM.
+/// Run the HTTP service until Ctrl-C or SIGTERM
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   ventriform serve --data-dir data
   ventriform serve --listen 127.0.0.1:0 --data-dir data --workers 2
   VENTRIFORM_QUEUE_LIMIT=50 ventriform serve --config ventriform.toml --print-config
 
-Every setting is also a variable (VENTRIFORM_DATA_DIR) and a key of the TOML file
-(data_dir); a flag beats a variable, a variable the file.")]
+Every setting can also be given as an environment variable (VENTRIFORM_DATA_DIR) or as a key of
+the TOML file (data_dir). A flag overrides a variable, and a variable overrides the file.")]
 pub struct ServeArgs {
     #[command(flatten)]
     flags: Flags,
-    /// Print every setting with where it came from, and end
+    /// Print all settings and where each came from, then exit
     #[arg(long)]
     print_config: bool,
 }
 
-/// Asks a running service whether it is ready, by the same settings; for containers.
+/// Check that a running service is ready (for containers); takes the settings of `serve`
 #[derive(Debug, Args)]
 pub struct HealthcheckArgs {
     #[command(flatten)]
@@ -42,7 +42,7 @@ pub struct HealthcheckArgs {
 /// Runs the service.
 ///
 /// # Errors
-/// Where a setting cannot be used, the address is taken, or the data folder is unusable.
+/// If a setting is invalid, the address is in use, or the data folder cannot be used.
 pub fn run(args: &ServeArgs) -> Result<()> {
     let (settings, origins) = Settings::load(&args.flags, variable)?;
     if args.print_config {
@@ -65,7 +65,7 @@ pub fn run(args: &ServeArgs) -> Result<()> {
 /// Asks `/readyz` of the service at the configured address.
 ///
 /// # Errors
-/// Where it does not answer 200 in time.
+/// If the service does not answer 200 within three seconds.
 pub fn check_health(args: &HealthcheckArgs) -> Result<()> {
     let (settings, _) = Settings::load(&args.flags, variable)?;
     let mut address = settings.listen;
@@ -82,7 +82,10 @@ pub fn check_health(args: &HealthcheckArgs) -> Result<()> {
             .send()
             .await?;
         if !answer.status().is_success() {
-            bail!("{} answers {}", address, answer.status());
+            bail!(
+                "the service at {address} is not ready: it answered {}",
+                answer.status()
+            );
         }
         Ok(())
     })
@@ -116,13 +119,17 @@ fn variable(name: &str) -> Option<String> {
 
 fn bind(listen: SocketAddr) -> Result<TcpListener> {
     TcpListener::bind(listen).with_context(|| {
-        format!("cannot listen on {listen}; give another address, or port 0 for a free one")
+        format!("cannot listen on {listen}; give another address, or port 0 for any free port")
     })
 }
 
 fn start_log(settings: &Settings) -> Result<()> {
-    let filter = EnvFilter::try_new(&settings.log)
-        .with_context(|| format!("log = `{}` is no log filter", settings.log))?;
+    let filter = EnvFilter::try_new(&settings.log).with_context(|| {
+        format!(
+            "log = `{}` is not a valid log filter; give one such as `info` or `ventriform=debug`",
+            settings.log
+        )
+    })?;
     let log = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr);
@@ -133,7 +140,7 @@ fn start_log(settings: &Settings) -> Result<()> {
     Ok(())
 }
 
-/// Returns at Ctrl-C, and at SIGTERM where there is such.
+/// Returns on Ctrl-C, and on SIGTERM where the system has it.
 async fn shutdown_signal() -> Result<()> {
     #[cfg(unix)]
     {
@@ -147,4 +154,28 @@ async fn shutdown_signal() -> Result<()> {
     #[cfg(not(unix))]
     tokio::signal::ctrl_c().await?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Command;
+
+    #[test]
+    fn help_describes_every_setting() {
+        let mut command = ServeArgs::augment_args(Command::new("serve"));
+        let help = command.render_help().to_string();
+        for name in Settings::NAMES {
+            let flag = command
+                .get_arguments()
+                .find(|flag| flag.get_id() == name)
+                .unwrap();
+            let text = flag.get_help().unwrap().to_string();
+            assert!(
+                text.len() > 20 && text.contains("[default: "),
+                "{name}: {text}"
+            );
+            assert!(help.contains(&format!("--{}", name.replace('_', "-"))));
+        }
+    }
 }

@@ -1,5 +1,6 @@
-//! `ventriform statistics`: what a set of fits has in common.
+//! `ventriform statistics`: mean shape and principal modes of a set of fits.
 
+use super::output::{create_folder, write_file};
 use crate::evaluate::statistics::{Statistics, statistics};
 use crate::export::{self, Format, Metadata};
 use crate::mesh::TriMesh;
@@ -8,20 +9,20 @@ use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Mean shape and principal modes of fits of one model.
+/// Compute mean shape and principal modes of fits of one model
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   ventriform statistics p*/mesh.json -o statistics
 Writes mean.json, mode1_minus.json, mode1_plus.json (2 standard deviations), ... and
 statistics.json")]
 pub struct StatisticsArgs {
-    /// Fitted meshes, mesh.json of `segment`
+    /// Fitted meshes: the mesh.json files that `segment` writes
     #[arg(value_name = "MESH", required = true, num_args = 2..)]
     meshes: Vec<PathBuf>,
-    /// The folder to write to (made where missing)
+    /// Folder to write to (created if missing)
     #[arg(short, long = "output", value_name = "DIR")]
     output: PathBuf,
-    /// Modes to write as meshes
+    /// Number of modes to write as meshes
     #[arg(long, value_name = "N", default_value_t = 3)]
     modes: usize,
 }
@@ -29,7 +30,7 @@ pub struct StatisticsArgs {
 /// Runs the command.
 ///
 /// # Errors
-/// Where a mesh cannot be read, or the meshes are no fits of one model.
+/// If a mesh cannot be read, or the meshes are not fits of the same model.
 pub fn run(args: &StatisticsArgs) -> Result<()> {
     let meshes: Vec<TriMesh> = args
         .meshes
@@ -41,8 +42,7 @@ pub fn run(args: &StatisticsArgs) -> Result<()> {
         })
         .collect::<Result<_>>()?;
     let found = statistics(&meshes)?;
-    std::fs::create_dir_all(&args.output)
-        .with_context(|| format!("cannot make {}", args.output.display()))?;
+    create_folder(&args.output)?;
     write_mesh(&args.output, "mean", &found.mean)?;
     for mode in 0..args.modes.min(found.modes.len()) {
         for (sign, word) in [(-2.0, "minus"), (2.0, "plus")] {
@@ -55,8 +55,7 @@ pub fn run(args: &StatisticsArgs) -> Result<()> {
 
 fn write_mesh(folder: &Path, name: &str, mesh: &TriMesh) -> Result<()> {
     let bytes = export::encode(Format::Json, mesh, &Metadata::new(name))?;
-    let path = folder.join(format!("{name}.json"));
-    std::fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))
+    write_file(&folder.join(format!("{name}.json")), &bytes)
 }
 
 fn write_summary(folder: &Path, found: &Statistics) -> Result<()> {
@@ -79,7 +78,6 @@ fn write_summary(folder: &Path, found: &Statistics) -> Result<()> {
         "total_variance_mm2": found.total_variance,
         "modes": modes,
     });
-    let path = folder.join("statistics.json");
-    std::fs::write(&path, serde_json::to_vec_pretty(&summary)?)
-        .with_context(|| format!("cannot write {}", path.display()))
+    let bytes = serde_json::to_vec_pretty(&summary)?;
+    write_file(&folder.join("statistics.json"), &bytes)
 }

@@ -1,15 +1,17 @@
-//! `ventriform templates`: the library of models that segmentations start from.
+//! `ventriform templates`: the library of models that `segment` and the service choose from.
 
+use super::output::{create_folder, write_file};
 use crate::evaluate::cohort::{CohortArgs, read_volume};
 use crate::export::{self, Format};
 use crate::parameters::ModelParameters;
 use crate::pipeline;
 use crate::progress::Monitor;
+use crate::work::problems::Explain;
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 
-/// Keeps the library of models.
+/// Build models for the library, or add them to a service's library
 #[derive(Debug, Args)]
 pub struct TemplatesArgs {
     #[command(subcommand)]
@@ -18,10 +20,9 @@ pub struct TemplatesArgs {
 
 #[derive(Debug, Subcommand)]
 enum TemplatesAction {
-    /// Makes the models of a cohort's template cases: scans by threshold, one from the expert's
-    /// mask
+    /// Make models of a cohort's template cases, from the scans and from an expert's mask
     Build(BuildArgs),
-    /// Adds models to the library of a service that does not run just now
+    /// Add models to the library of a service that is not running
     Import(super::library::ImportArgs),
 }
 
@@ -30,7 +31,7 @@ enum TemplatesAction {
 struct BuildArgs {
     #[command(flatten)]
     cohort: CohortArgs,
-    /// Where the models go, as CASE_N.json (made where missing)
+    /// Folder for the models, named CASE_N.json (created if missing)
     #[arg(short, long = "output", value_name = "DIR")]
     output: PathBuf,
 }
@@ -38,7 +39,7 @@ struct BuildArgs {
 /// Runs `ventriform templates`.
 ///
 /// # Errors
-/// What reading, generating or the file system says.
+/// If a case cannot be read, no model can be made of it, or a file cannot be written.
 pub fn run(args: &TemplatesArgs) -> Result<()> {
     match &args.action {
         TemplatesAction::Build(args) => build(args),
@@ -48,22 +49,23 @@ pub fn run(args: &TemplatesArgs) -> Result<()> {
 
 fn build(args: &BuildArgs) -> Result<()> {
     let (cohort, output) = (args.cohort.open()?, &args.output);
-    std::fs::create_dir_all(output).with_context(|| format!("cannot make {}", output.display()))?;
+    create_folder(output)?;
     for case in &cohort.templates {
-        let (path, what) = cohort.source(case).context("its files are gone")?;
+        let (path, what) = cohort.source(case).with_context(|| {
+            format!("the files of case {case} are missing from the cohort's folder")
+        })?;
         let reading = read_volume(&path)?;
         for n in args.cohort.points() {
             let context = || format!("the model of {case} with {n} points");
             let pairs = [("points", n.to_string())];
             let parameters =
                 ModelParameters::from_pairs(pairs.iter().map(|(n, t)| (*n, t.as_str())))
-                    .map_err(|e| anyhow::anyhow!("{e}. {}", e.fix))?;
+                    .map_err(|error| anyhow::anyhow!(error.with_advice()))?;
             let model = pipeline::from_reading(&reading, &parameters, 0.0, &Monitor::silent())
                 .with_context(context)?;
             let bytes = export::encode(Format::Json, &model.mesh, &model.metadata())?;
             let path = output.join(format!("{case}_{n}.json"));
-            std::fs::write(&path, bytes)
-                .with_context(|| format!("cannot write {}", path.display()))?;
+            write_file(&path, &bytes)?;
             eprintln!("{} written, made from {what}", path.display());
         }
     }

@@ -87,6 +87,12 @@ impl Display for Origin {
     }
 }
 
+/// The help of a flag: the setting's description and default.
+fn help(lines: &[&str], default: &str) -> String {
+    let lines: Vec<&str> = lines.iter().map(|line| line.trim()).collect();
+    format!("{} [default: {default}]", lines.join(" "))
+}
+
 /// Generates the struct of settings, the flags and the resolver from one table.
 macro_rules! settings {
     ($($(#[doc = $doc:literal])+ $name:ident: $kind:ty = $default:literal;)+) => {
@@ -99,12 +105,13 @@ macro_rules! settings {
         /// The settings as flags of `ventriform serve`, all optional.
         #[derive(Debug, Clone, Default, clap::Args)]
         pub struct Flags {
-            /// TOML file with settings, keys named like the flags with `_` [env: VENTRIFORM_CONFIG]
+            /// TOML file with settings; its keys are the names of the flags with `_` instead of `-`
+            /// [env: VENTRIFORM_CONFIG]
             #[arg(long, value_name = "FILE")]
             pub config: Option<PathBuf>,
             $(
-                #[doc = concat!($($doc, " ",)+ "[default: ", $default, "]")]
-                #[arg(long, value_name = "VALUE")]
+                $(#[doc = $doc])+
+                #[arg(long, value_name = "VALUE", help = help(&[$($doc),+], $default))]
                 pub $name: Option<$kind>,
             )+
         }

@@ -1,17 +1,17 @@
-//! What every handler can reach.
+//! The state that all handlers share.
 
+use super::metrics::Metrics;
+use super::problem::{Answer, Problem};
 use crate::config::Settings;
 use crate::jobs::Queue;
 use crate::work::Engine;
 use std::sync::Arc;
-use std::sync::atomic::AtomicU64;
-use std::time::Instant;
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
-/// Volumes decoded at the same time for a look at their header: each may take as much memory
-/// as the decompressed limit allows.
-const INSPECTIONS: usize = 2;
+/// Files decoded at the same time outside of jobs: each may take as much memory as the limit on
+/// decompressed volumes allows.
+const DECODING: usize = 2;
 
 /// The service's shared state.
 #[derive(Clone)]
@@ -19,24 +19,21 @@ pub struct App(Arc<Shared>);
 
 /// See [`App`].
 pub struct Shared {
-    /// Jobs, volumes, models.
+    /// Jobs, volumes and products.
     pub queue: Arc<Queue>,
-    /// What can be done with volumes.
+    /// The kinds of work, and the reader of uploads.
     pub engine: Engine,
-    /// The limits.
+    /// The operator's settings.
     pub settings: Settings,
-    /// Raised when the service is about to end: long answers end too.
+    /// Cancelled when the service shuts down, so that long answers end.
     pub closing: CancellationToken,
-    /// Permits to decode a volume.
-    pub inspections: Semaphore,
-    /// Answers so far, by class of status: 1xx to 5xx.
-    pub answers: [AtomicU64; 5],
-    /// When the service started.
-    pub started: Instant,
+    decoding: Semaphore,
+    /// Figures for operators.
+    pub metrics: Metrics,
 }
 
 impl App {
-    /// The state over a queue.
+    /// The state of a service that has just started.
     pub fn new(
         queue: Arc<Queue>,
         engine: Engine,
@@ -48,10 +45,24 @@ impl App {
             engine,
             settings,
             closing,
-            inspections: Semaphore::new(INSPECTIONS),
-            answers: Default::default(),
-            started: Instant::now(),
+            decoding: Semaphore::new(DECODING),
+            metrics: Metrics::new(),
         }))
+    }
+
+    /// Runs work that decodes files on a blocking thread, after waiting for its turn: only a few
+    /// run at the same time.
+    ///
+    /// # Errors
+    /// 500 if the work panics.
+    pub async fn decode<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Answer<T> {
+        let _turn = self.decoding.acquire().await.map_err(Problem::internal)?;
+        tokio::task::spawn_blocking(work)
+            .await
+            .map_err(Problem::internal)
     }
 }
 

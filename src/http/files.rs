@@ -1,4 +1,5 @@
-//! Downloads: immutable files with strong validators, in whole or in part.
+//! Downloads: immutable files with strong validators, whole or in part (RFC 9110, sections 13 and
+//! 14).
 
 use super::app::App;
 use super::problem::{Answer, Problem};
@@ -10,13 +11,13 @@ use axum::response::IntoResponse;
 use sha2::{Digest, Sha256};
 use std::ops::Range;
 
-/// The page for people, which is made when it is asked for.
+/// The report as an HTML page. It is made on request, of the other files.
 pub const PAGE: &str = "report.html";
 
-/// Results never change under their name; only the one who asked may keep them.
+/// Results never change; only the client that asked may cache them.
 const CACHE_CONTROL: &str = "private, max-age=31536000, immutable";
 
-/// Pages are the same for a day; a later version of the program may draw them better.
+/// A later version of the program may draw a page differently.
 const PAGE_CACHE_CONTROL: &str = "private, max-age=86400";
 
 /// Answers with a product's file, or the part of it that `Range` asks for, or 304.
@@ -28,7 +29,7 @@ pub async fn send(app: &App, product: &Product, file: &ProductFile, headers: &He
     respond(product, file, headers, CACHE_CONTROL, read).await
 }
 
-/// Answers with the page of a product, made for this answer, in the same way.
+/// Answers with the page of a product in the same way.
 pub async fn send_page(product: &Product, page: String, headers: &HeaderMap) -> Answer {
     let page = Bytes::from(page);
     let file = ProductFile {
@@ -37,13 +38,13 @@ pub async fn send_page(product: &Product, page: String, headers: &HeaderMap) -> 
         bytes: page.len() as u64,
         sha256: hex(&Sha256::digest(&page)),
     };
-    // The span lies within the page, whose length is a `usize`.
+    // The range lies within the page, whose length is a `usize`.
     let read =
         async |span: Range<u64>| Ok(page.slice(span.start as usize..span.end as usize).into());
     respond(product, &file, headers, PAGE_CACHE_CONTROL, read).await
 }
 
-/// Answers with what `read` gives of `file`.
+/// Answers with the range of `file` that `read` returns.
 async fn respond(
     product: &Product,
     file: &ProductFile,
@@ -99,7 +100,7 @@ async fn respond(
     Ok(response)
 }
 
-/// Where a product's file is found.
+/// The path of a product's file.
 pub fn path(product: &Product, file: &ProductFile) -> String {
     format!("{}/{}", path_of(&product.id), file.name)
 }
@@ -114,8 +115,9 @@ fn matches_any(headers: &HeaderMap, name: &HeaderName, etag: &str) -> bool {
         .any(|tag| tag == "*" || tag.strip_prefix("W/").unwrap_or(tag) == etag)
 }
 
-/// The bytes that `Range` asks for, end exclusive. Several ranges, other units and ranges
-/// under an `If-Range` that no longer holds mean the whole file, as RFC 9110 allows.
+/// The bytes that `Range` asks for, end exclusive. `None` is the whole file: RFC 9110 lets a
+/// server ignore several ranges and other units, and demands it if `If-Range` names another
+/// version.
 fn wanted_range(headers: &HeaderMap, etag: &str, length: u64) -> Answer<Option<Range<u64>>> {
     let text = |name: HeaderName| headers.get(name).and_then(|value| value.to_str().ok());
     let Some(spec) = text(header::RANGE).and_then(|range| range.strip_prefix("bytes=")) else {
@@ -125,42 +127,47 @@ fn wanted_range(headers: &HeaderMap, etag: &str, length: u64) -> Answer<Option<R
         return Ok(None);
     }
     match parse_range(spec.trim(), length) {
-        Parsed::Whole => Ok(None),
-        Parsed::Part(range) => Ok(Some(range)),
-        Parsed::Outside => Err(Problem::new(
+        ParsedRange::Whole => Ok(None),
+        ParsedRange::Part(range) => Ok(Some(range)),
+        ParsedRange::Outside => Err(Problem::new(
             StatusCode::RANGE_NOT_SATISFIABLE,
             "range-not-satisfiable",
-            format!("The file has {length} bytes."),
+            format!("The range begins after the end of the file, which has {length} bytes."),
         )
         .at("Range")
+        .fix("Ask for a range within the file.")
         .header(header::CONTENT_RANGE, format!("bytes */{length}"))),
     }
 }
 
 #[derive(Debug, PartialEq)]
-enum Parsed {
+enum ParsedRange {
     Whole,
     Part(Range<u64>),
     Outside,
 }
 
-fn parse_range(spec: &str, length: u64) -> Parsed {
+/// Our own, as `headers::Range` (0.4.2) drops a suffix that is longer than the file, which stands
+/// for the whole file, and does not tell a range outside of the file from one it cannot read.
+fn parse_range(spec: &str, length: u64) -> ParsedRange {
     let Some((first, last)) = spec.split_once('-') else {
-        return Parsed::Whole;
+        return ParsedRange::Whole;
     };
     match (first.parse::<u64>(), last.parse::<u64>()) {
         (Ok(first), Ok(last)) if first <= last && first < length => {
-            Parsed::Part(first..length.min(last.saturating_add(1)))
+            ParsedRange::Part(first..length.min(last.saturating_add(1)))
         }
-        (Ok(first), Err(_)) if last.is_empty() && first < length => Parsed::Part(first..length),
+        (Ok(first), Err(_)) if last.is_empty() && first < length => {
+            ParsedRange::Part(first..length)
+        }
         (Err(_), Ok(count)) if first.is_empty() && count > 0 && length > 0 => {
-            Parsed::Part(length.saturating_sub(count)..length)
+            ParsedRange::Part(length.saturating_sub(count)..length)
         }
-        (Ok(first), Ok(last)) if first > last => Parsed::Whole,
-        (Ok(_), Ok(_)) => Parsed::Outside,
-        (Ok(_), Err(_)) if last.is_empty() => Parsed::Outside,
-        (Err(_), Ok(_)) if first.is_empty() => Parsed::Outside,
-        _ => Parsed::Whole,
+        (Ok(first), Ok(last)) if first > last => ParsedRange::Whole,
+        (Ok(_), Ok(_)) => ParsedRange::Outside,
+        (Ok(_), Err(_)) if last.is_empty() => ParsedRange::Outside,
+        (Err(_), Ok(_)) if first.is_empty() => ParsedRange::Outside,
+        _ => ParsedRange::Whole,
     }
 }
 
@@ -171,19 +178,19 @@ mod tests {
     #[test]
     fn ranges_are_read_as_rfc_9110_writes_them() {
         for (spec, parsed) in [
-            ("0-99", Parsed::Part(0..100)),
-            ("90-1000", Parsed::Part(90..100)),
-            ("50-", Parsed::Part(50..100)),
-            ("-10", Parsed::Part(90..100)),
-            ("-1000", Parsed::Part(0..100)),
-            ("0-0", Parsed::Part(0..1)),
-            ("100-", Parsed::Outside),
-            ("100-200", Parsed::Outside),
-            ("-0", Parsed::Outside),
-            ("5-4", Parsed::Whole),
-            ("0-1,5-6", Parsed::Whole),
-            ("x-y", Parsed::Whole),
-            ("", Parsed::Whole),
+            ("0-99", ParsedRange::Part(0..100)),
+            ("90-1000", ParsedRange::Part(90..100)),
+            ("50-", ParsedRange::Part(50..100)),
+            ("-10", ParsedRange::Part(90..100)),
+            ("-1000", ParsedRange::Part(0..100)),
+            ("0-0", ParsedRange::Part(0..1)),
+            ("100-", ParsedRange::Outside),
+            ("100-200", ParsedRange::Outside),
+            ("-0", ParsedRange::Outside),
+            ("5-4", ParsedRange::Whole),
+            ("0-1,5-6", ParsedRange::Whole),
+            ("x-y", ParsedRange::Whole),
+            ("", ParsedRange::Whole),
         ] {
             assert_eq!(parse_range(spec, 100), parsed, "{spec}");
         }

@@ -2,15 +2,15 @@
 
 use super::problem::{Answer, Problem};
 use crate::jobs::{Idempotency, content_id};
-use axum::http::HeaderMap;
+use axum::http::{HeaderMap, HeaderName};
 use serde_json::{Map, Value};
 
 /// The header's name.
-pub const HEADER: &str = "idempotency-key";
+pub const HEADER: HeaderName = HeaderName::from_static("idempotency-key");
 
 const LONGEST: usize = 255;
 
-/// The key, if there is one. The draft's quoted form and a bare token mean the same.
+/// The key of a request, if it has one. The draft's quoted form and a bare token are equal.
 pub fn key(headers: &HeaderMap) -> Answer<Option<String>> {
     let Some(value) = headers.get(HEADER) else {
         return Ok(None);
@@ -19,15 +19,15 @@ pub fn key(headers: &HeaderMap) -> Answer<Option<String>> {
     if key.is_empty() || key.len() > LONGEST {
         return Err(Problem::bad_request(
             "invalid-idempotency-key",
-            format!("The key is no text of 1 to {LONGEST} visible ASCII characters."),
+            format!("The key must have 1 to {LONGEST} visible ASCII characters."),
         )
         .at("Idempotency-Key")
-        .fix("Send a random UUID."));
+        .fix("Send a random UUID as the key."));
     }
     Ok(Some(key.to_owned()))
 }
 
-/// The key together with what it stands for.
+/// The key with a fingerprint of the request that it stands for.
 pub fn promise(
     key: Option<String>,
     kind: &str,

@@ -1,30 +1,46 @@
 //! The service over HTTP: version 1 of the API.
 //!
-//! [`router`] is the map. There is one file per resource; each handler takes a request apart,
-//! calls [`crate::jobs`], and puts an answer together. Nothing is computed here.
+//! [`router`] is the map of all paths and the list of the layers that every request passes. There
+//! is one file per resource; a handler reads the request, calls [`crate::jobs`], and writes the
+//! answer. Nothing is computed here.
 //!
-//! Promised of every answer: an error is `application/problem+json` (RFC 9457) with a stable
-//! `type`, and `field` and `fix` where there are such; every body and list has a limit; what
-//! a client sends is streamed to the disk, never held in memory. `openapi` derives the
-//! published document from the same handlers.
-
-pub mod openapi;
-pub mod router;
+//! | what | where |
+//! |---|---|
+//! | the paths, the layers around them | [`router`] |
+//! | uploads, jobs, results | [`volumes`], [`jobs`], [`models`], [`segmentations`], [`templates`] |
+//! | what several of them share | [`collection`] (list, show, erase), [`products`] (meshes, reports, files), [`files`] (ranges, validators) |
+//! | errors and their wording | [`problem`]; 404 and 410 in [`problem::not_found`] |
+//! | limits on bodies and connections | [`limits`], [`connections`] |
+//! | reading requests | [`request`], [`negotiate`], [`pagination`], [`idempotency`], [`upload`] |
+//! | log, traces, metrics | [`observe`], [`metrics`] |
+//! | the published document | [`openapi`] |
+//!
+//! Guarantees: every error is a problem object (RFC 9457) with a stable `type`, and with `field`
+//! and `fix` where they apply; every body and list has a limit; uploads are streamed to the disk
+//! and never held in memory. The published document is derived from the handlers.
+//!
+//! Not guaranteed: authentication. The service has none, so it belongs on a loopback address or
+//! behind a proxy that has.
 
 mod app;
-mod events;
+mod collection;
+mod connections;
 mod files;
 mod health;
 mod idempotency;
 mod jobs;
+mod limits;
+mod metrics;
 mod models;
 mod negotiate;
 mod observe;
+mod openapi;
 mod pages;
 mod pagination;
 mod problem;
 mod products;
 mod request;
+mod router;
 mod segmentations;
 mod server;
 mod templates;
@@ -34,3 +50,15 @@ mod wire;
 
 pub use app::App;
 pub use server::{Running, ServeError, serve, start};
+
+/// The OpenAPI document, as committed under `openapi/`.
+///
+/// # Panics
+/// Never: the document is plain data.
+pub fn document_json() -> String {
+    let mut text = router::document()
+        .to_pretty_json()
+        .expect("the document is plain data");
+    text.push('\n');
+    text
+}

@@ -1,28 +1,37 @@
-//! `/v1/models`: what was made, and the one-line way to make it.
+//! `/v1/models`: surface models, and the request that uploads a volume and makes its model.
 
 use super::app::App;
 use super::files;
-use super::jobs::{self, order};
-use super::openapi::{EraseProblems, FileProblems, ListProblems, LookupProblems, UploadProblems};
-use super::pagination::next_cursor;
+use super::jobs::filing::{self, UploadJob};
+use super::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
 use super::problem::Answer;
-use super::products::{self, Download, Offer, Software};
-use super::request::Path;
+use super::products::{DownloadBody, Offer, ProductCollection, SoftwareBody};
 use super::wire::{path_of, rfc3339};
 use crate::jobs::{Product, Resource};
-use axum::Json;
 use axum::extract::{RawQuery, Request, State};
-use axum::http::HeaderMap;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 
-const KIND: Resource = Resource::Model;
+/// The collection of models.
+pub struct Models;
 
-/// A model: what it was made from, its main figures, and where its files are.
+impl ProductCollection for Models {
+    const RESOURCE: Resource = Resource::Model;
+    type Body = ModelBody;
+    const FILES: &'static [&'static str] = &["report.json", files::PAGE, "distance.json"];
+    const FILE_SCHEMA: &'static str = "FileName";
+    const FILE_HELP: &'static str = "The mesh in each format, `report.json`, `distance.json` \
+        (signed distances of the model's vertices and triangles to the surface) and \
+        `report.html`, which is made on request.";
+    type FileAnswer = openapi::ModelFileAnswer;
+}
+
+/// A model: what it was made from, its main figures, and its files.
 #[derive(Serialize, ToSchema)]
-pub struct Model {
-    /// From volume, parameters and mesh: the same everywhere.
+#[schema(as = Model)]
+pub struct ModelBody {
+    /// Derived from volume, parameters and mesh, so it is the same on every machine.
     #[schema(example = "mdl_2c26b46b68ffc68ff99b453c1d304134")]
     id: String,
     /// When it was made (RFC 3339).
@@ -30,17 +39,17 @@ pub struct Model {
     created_at: String,
     /// The volume it was made from.
     volume: String,
-    /// The parameters used, every default written out.
+    /// The parameters used, including every default.
     #[schema(value_type = Object)]
     parameters: Map<String, Value>,
-    /// Counts and main figures; the report has all of them.
+    /// Counts and main figures; the report has all figures.
     #[schema(value_type = Object)]
     summary: Map<String, Value>,
-    /// What made it.
-    software: Software,
-    /// Its downloads.
-    files: Vec<Download>,
-    /// Where to go from here.
+    /// The program that made it.
+    software: SoftwareBody,
+    /// Its files.
+    files: Vec<DownloadBody>,
+    /// Related paths.
     links: ModelLinks,
 }
 
@@ -54,30 +63,20 @@ struct ModelLinks {
     mesh: String,
     /// Its quality report.
     report: String,
-    /// The report as a page for people.
+    /// The report as an HTML page.
     page: String,
     /// Its volume.
     volume: String,
 }
 
-/// A page of models.
-#[derive(Serialize, ToSchema)]
-pub struct ModelList {
-    /// The models, newest first.
-    models: Vec<Model>,
-    /// `cursor` of the next page; absent on the last.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    next_cursor: Option<String>,
-}
-
-impl From<Product> for Model {
+impl From<Product> for ModelBody {
     fn from(product: Product) -> Self {
         let itself = path_of(&product.id);
         let volume = product.volume.clone().unwrap_or_default();
         Self {
             created_at: rfc3339(product.created_at),
-            files: Download::all(&product),
-            software: Software::of(&product),
+            files: DownloadBody::all(&product),
+            software: SoftwareBody::of(&product),
             links: ModelLinks {
                 mesh: format!("{itself}/mesh"),
                 report: format!("{itself}/report"),
@@ -95,133 +94,28 @@ impl From<Product> for Model {
 
 /// Make a model of a volume
 ///
-/// The body is the volume. Stores it, files a job, and answers 202 with the job; with
-/// `Prefer: wait=60` it waits that long for the end and answers 200 with the mesh in the format
-/// that `Accept` asks for. Every parameter of a model is a query parameter.
+/// The body is the volume. The service stores it, files a job, and answers 202 with the job. With
+/// `Prefer: wait=60` it waits up to 60 seconds for the job to end and answers 200 with the mesh in
+/// the format that `Accept` asks for. Every parameter of a model is a query parameter.
 #[utoipa::path(post, path = "/v1/models", tag = "models",
     request_body(content(
         (Vec<u8> = "application/octet-stream"),
         (Vec<u8> = "application/gzip"),
         (Vec<u8> = "application/dicom"),
         (Vec<u8> = "application/nifti"),
-        (super::openapi::UploadForm = "multipart/form-data"),
+        (openapi::UploadForm = "multipart/form-data"),
     )),
-    params(super::openapi::ModelQuery, super::openapi::IdempotencyHeader,
-        ("Prefer" = Option<String>, Header, description = "`wait=SECONDS`: how long to wait for the mesh")),
-    responses(
-        super::openapi::MeshAnswer,
-        (status = 202, description = "Accepted", body = jobs::Job, headers(
-            ("Location" = String, description = "The job's path"),
-            ("Retry-After" = u64, description = "Seconds after which to look again"))),
-        (status = 406, description = "`Accept` names no format of meshes",
-            body = super::problem::ProblemBody, content_type = "application/problem+json"),
-        (status = 409, description = "The job was cancelled while this request waited",
-            body = super::problem::ProblemBody, content_type = "application/problem+json"),
-        FileProblems, UploadProblems,
-    ))]
+    params(openapi::ModelQuery, openapi::IdempotencyHeader, openapi::PreferHeader),
+    responses(openapi::MeshAnswer, WaitAnswers, FileProblems, UploadProblems))]
 pub async fn create_model(
     State(app): State<App>,
     RawQuery(query): RawQuery,
     request: Request,
 ) -> Answer {
-    let offers = Offer::meshes();
-    order::one_line(&app, KIND, query.as_deref(), request, &[], &offers).await
-}
-
-/// List models
-#[utoipa::path(get, path = "/v1/models", tag = "models",
-    params(super::openapi::PageParameters),
-    responses((status = 200, description = "A page, newest first", body = ModelList), ListProblems))]
-pub async fn list_models(
-    State(app): State<App>,
-    RawQuery(query): RawQuery,
-) -> Answer<Json<ModelList>> {
-    let page = products::list(&app, KIND, query.as_deref()).await?;
-    Ok(Json(ModelList {
-        next_cursor: next_cursor(&page),
-        models: page.items.into_iter().map(Model::from).collect(),
-    }))
-}
-
-/// Facts of a model
-#[utoipa::path(get, path = "/v1/models/{id}", tag = "models",
-    params(("id" = String, Path, description = "The model's id")),
-    responses((status = 200, description = "The model", body = Model), LookupProblems))]
-pub async fn get_model(
-    State(app): State<App>,
-    Path(id): Path<String>,
-    RawQuery(query): RawQuery,
-) -> Answer<Json<Model>> {
-    let model = products::get(&app, KIND, &id, query.as_deref()).await?;
-    Ok(Json(model.into()))
-}
-
-/// Erase a model
-#[utoipa::path(delete, path = "/v1/models/{id}", tag = "models",
-    params(("id" = String, Path, description = "The model's id")),
-    responses((status = 204, description = "Erased"), EraseProblems, LookupProblems))]
-pub async fn delete_model(
-    State(app): State<App>,
-    Path(id): Path<String>,
-    RawQuery(query): RawQuery,
-) -> Answer {
-    products::erase(&app, KIND, &id, query.as_deref()).await
-}
-
-/// A model's mesh
-///
-/// In the format that `Accept` asks for; GLB where it does not care.
-#[utoipa::path(get, path = "/v1/models/{id}/mesh", tag = "models",
-    params(("id" = String, Path, description = "The model's id"),
-        super::openapi::ConditionalHeaders),
-    responses(
-        super::openapi::MeshAnswer,
-        super::openapi::DownloadAnswers, LookupProblems))]
-pub async fn get_mesh(
-    State(app): State<App>,
-    Path(id): Path<String>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-) -> Answer {
-    let offers = Offer::meshes();
-    products::get_offered(&app, KIND, &id, query.as_deref(), &headers, &offers).await
-}
-
-/// A model's quality report
-///
-/// JSON, or a page for a person where `Accept` prefers `text/html`.
-#[utoipa::path(get, path = "/v1/models/{id}/report", tag = "models",
-    params(("id" = String, Path, description = "The model's id"),
-        super::openapi::ConditionalHeaders),
-    responses(
-        super::openapi::ReportAnswer,
-        super::openapi::DownloadAnswers, LookupProblems))]
-pub async fn get_report(
-    State(app): State<App>,
-    Path(id): Path<String>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-) -> Answer {
-    let offers = Offer::reports();
-    products::get_offered(&app, KIND, &id, query.as_deref(), &headers, &offers).await
-}
-
-/// A model's file by name
-///
-/// The mesh in each format, `report.json`, `distance.json` (signed distances of the model's parts
-/// to the surface) and `report.html`, which is made when it is asked for.
-#[utoipa::path(get, path = "/v1/models/{id}/{file}", tag = "models",
-    params(("id" = String, Path, description = "The model's id"),
-        ("file" = super::openapi::FileName, Path, description = "The file's name"),
-        super::openapi::ConditionalHeaders),
-    responses(
-        super::openapi::FileAnswer,
-        super::openapi::DownloadAnswers, LookupProblems))]
-pub async fn get_file(
-    State(app): State<App>,
-    Path((id, name)): Path<(String, String)>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-) -> Answer {
-    products::get_file(&app, KIND, (&id, &name), query.as_deref(), &headers).await
+    let job = UploadJob {
+        makes: Resource::Model,
+        apart: &[],
+        offers: Offer::meshes(),
+    };
+    filing::file_upload(&app, job, query.as_deref(), request).await
 }

@@ -1,19 +1,18 @@
-//! `Accept` and `Prefer`.
+//! Content negotiation by `Accept` (RFC 9110, section 12.5.1), and `Prefer: wait` (RFC 7240).
 
 use super::problem::{Answer, Problem};
 use axum::http::{HeaderMap, StatusCode, header};
+use mediatype::{MediaType, MediaTypeError, MediaTypeList, ReadParams, names};
 use std::time::Duration;
 
-/// The index of the offer that the client likes best; the first of equals. Without an
-/// `Accept` header that is the first offer.
+/// The index of the offered media type that `Accept` rates highest, the first among equals. A
+/// request without `Accept` gets the first offer; `None` if no offer is acceptable.
 pub fn best_offer(headers: &HeaderMap, offers: &[&str]) -> Option<usize> {
-    let accept: Vec<&str> = headers
+    let accept: Vec<_> = headers
         .get_all(header::ACCEPT)
         .iter()
         .filter_map(|value| value.to_str().ok())
-        .flat_map(|value| value.split(','))
-        .map(str::trim)
-        .filter(|range| !range.is_empty())
+        .flat_map(MediaTypeList::new)
         .collect();
     if accept.is_empty() {
         return (!offers.is_empty()).then_some(0);
@@ -23,50 +22,61 @@ pub fn best_offer(headers: &HeaderMap, offers: &[&str]) -> Option<usize> {
         .enumerate()
         .map(|(index, offer)| (index, quality(&accept, offer)))
         .filter(|(_, quality)| *quality > 0.0)
-        // max_by takes the last of equals; reversed, that is the first offer.
+        // max_by returns the last of equal elements: in reverse order that is the first offer.
         .rev()
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .map(|(index, _)| index)
 }
 
-/// The quality that the most specific matching range gives an offer.
-fn quality(accept: &[&str], offer: &str) -> f64 {
-    let group = offer.split('/').next().unwrap_or_default();
+/// The quality (0 to 1) that the most specific matching media range gives to an offer, 0 if no
+/// range matches. Ranges that cannot be parsed match nothing; a `q` that is not a number from 0
+/// to 1 counts as 0.
+fn quality(accept: &[Result<MediaType<'_>, MediaTypeError>], offer: &str) -> f32 {
+    let Ok(offer) = MediaType::parse(offer) else {
+        return 0.0;
+    };
+    let specificity = |range: &MediaType<'_>| {
+        if range.essence() == offer {
+            Some(2)
+        } else if range.subty != names::_STAR || range.suffix.is_some() {
+            None
+        } else if range.ty == offer.ty {
+            Some(1)
+        } else {
+            (range.ty == names::_STAR).then_some(0)
+        }
+    };
     accept
         .iter()
-        .filter_map(|range| {
-            let mut parts = range.split(';').map(str::trim);
-            let name = parts.next()?.to_ascii_lowercase();
-            let specificity = match name.as_str() {
-                "*/*" => 0,
-                _ if name == offer => 2,
-                _ if name.strip_suffix("/*") == Some(group) => 1,
-                _ => return None,
-            };
-            let quality = parts
-                .find_map(|p| p.strip_prefix("q="))
-                .map_or(1.0, |q| q.parse().unwrap_or(0.0));
-            Some((specificity, quality))
-        })
+        .flatten()
+        .filter_map(|range| Some((specificity(range)?, range)))
         .max_by_key(|(specificity, _)| *specificity)
-        .map_or(0.0, |(_, quality): (i32, f64)| quality)
+        .map_or(0.0, |(_, range)| match range.get_param(names::Q) {
+            Some(q) => q
+                .unquoted_str()
+                .parse()
+                .ok()
+                .filter(|q| (0.0..=1.0).contains(q))
+                .unwrap_or(0.0),
+            None => 1.0,
+        })
 }
 
-/// Like [`best_offer`], or the refusal that lists the offers.
+/// [`best_offer`], or the 406 that lists the offers.
 pub fn require_offer(headers: &HeaderMap, offers: &[&str]) -> Answer<usize> {
     best_offer(headers, offers).ok_or_else(|| {
         Problem::new(
             StatusCode::NOT_ACCEPTABLE,
             "not-acceptable",
-            "None of the media types in `Accept` can be given.",
+            "The service has none of the media types that `Accept` allows.",
         )
         .at("Accept")
         .fix(format!("Accept one of {}.", offers.join(", ")))
     })
 }
 
-/// The patience of `Prefer: wait=SECONDS` (RFC 7240), where there is one that can be read.
-/// A preference is no condition: what cannot be read is ignored.
+/// The time in `Prefer: wait=SECONDS` (RFC 7240). A preference that cannot be read is ignored, as
+/// the RFC demands.
 pub fn preferred_wait(headers: &HeaderMap) -> Option<Duration> {
     headers
         .get_all("prefer")
@@ -107,6 +117,21 @@ mod tests {
         assert_eq!(chosen("*/*, model/stl;q=0"), Some(1));
         assert_eq!(chosen("image/png"), None);
         assert_eq!(chosen("model/stl;q=nonsense"), None);
+    }
+
+    #[test]
+    fn ranges_are_read_by_the_grammar_of_media_types() {
+        assert_eq!(chosen("Model/STL;q=0.1, APPLICATION/JSON;Q=0.2"), Some(1));
+        assert_eq!(
+            chosen("text/plain;title=\"a, b\", application/json"),
+            Some(1)
+        );
+        assert_eq!(chosen("application/json;q=2, model/stl"), Some(0));
+        assert_eq!(chosen("model/stl;q=nan"), None);
+        assert_eq!(chosen("stl"), None);
+        let offers = ["model/gltf-binary", "model/gltf+json"];
+        let gltf = headers("accept", "model/gltf+json, model/*;q=0.5");
+        assert_eq!(best_offer(&gltf, &offers), Some(1));
     }
 
     #[test]

@@ -1,74 +1,124 @@
-//! One line in the log per request, its id in the answer, its count in the metrics.
+//! What operators see of a request: its id and trace, one line in the log, and the count of
+//! answers. The functions here are called by the layers that [`super::router`] lists.
 //!
-//! What is logged of a path is its pattern, never the path: ids lead to patients.
+//! The log shows the pattern of a path and never the path itself, because ids lead to patients.
 
 use super::app::App;
-use axum::extract::{MatchedPath, Request, State};
-use axum::http::{HeaderMap, HeaderValue};
+use axum::extract::{MatchedPath, Request};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Response};
 use axum::middleware::Next;
-use axum::response::Response;
-use std::sync::atomic::Ordering;
-use std::time::Instant;
-use tracing::Instrument;
+use std::time::Duration;
+use tower_http::request_id::{MakeRequestId, RequestId};
+use tower_http::trace::{MakeSpan, OnResponse};
+use tracing::Span;
 
-const REQUEST_ID: &str = "x-request-id";
-const TRACE_PARENT: &str = "traceparent";
+/// The header with the id of a request, and of its answer.
+pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+
+/// The header of W3C trace contexts.
+const TRACE_PARENT: HeaderName = HeaderName::from_static("traceparent");
+
+/// Longest request id that is taken over from a client.
 const LONGEST_ID: usize = 128;
 
-/// Wraps every request.
-pub async fn observe(State(app): State<App>, request: Request, next: Next) -> Response {
-    let started = Instant::now();
-    let id = request_id(request.headers());
-    let trace = trace_parent(request.headers());
-    let method = request.method().clone();
-    let path = request
-        .extensions()
-        .get::<MatchedPath>()
-        .map_or("-", MatchedPath::as_str)
-        .to_owned();
-    let trace_id = trace.as_deref().map_or("", |parent| &parent[3..35]);
-    let span = tracing::info_span!("request", id, trace = trace_id);
-    let mut response = next.run(request).instrument(span.clone()).await;
-    let status = response.status().as_u16();
-    let ms = started.elapsed().as_millis() as u64;
-    span.in_scope(|| tracing::debug!(%method, path, status, ms, "answered"));
-    if let Some(class) = app.answers.get(usize::from(status / 100).wrapping_sub(1)) {
-        class.fetch_add(1, Ordering::Relaxed);
+/// Removes a client's request id if it is empty, long, or not plain text without spaces.
+pub fn drop_unusable_id<B>(mut request: axum::http::Request<B>) -> axum::http::Request<B> {
+    let usable = |id: &str| (1..=LONGEST_ID).contains(&id.len()) && !id.contains(' ');
+    let id = request.headers().get(REQUEST_ID);
+    if !id.is_some_and(|value| value.to_str().is_ok_and(usable)) {
+        request.headers_mut().remove(REQUEST_ID);
     }
-    for (name, value) in [(REQUEST_ID, Some(id)), (TRACE_PARENT, trace)] {
-        if let Some(value) = value.and_then(|text| HeaderValue::from_str(&text).ok()) {
-            response.headers_mut().insert(name, value);
-        }
+    request
+}
+
+/// Makes request ids that sort by time.
+#[derive(Debug, Clone, Copy)]
+pub struct TimeOrderedId;
+
+impl MakeRequestId for TimeOrderedId {
+    fn make_request_id<B>(&mut self, _: &axum::http::Request<B>) -> Option<RequestId> {
+        let id = uuid::Uuid::now_v7().to_string();
+        HeaderValue::try_from(id).ok().map(RequestId::new)
+    }
+}
+
+/// Continues the client's trace with a span of our own, and names both in the answer.
+pub async fn continue_trace(mut request: Request, next: Next) -> axum::response::Response {
+    let Some(trace) = Trace::of(request.headers()) else {
+        return next.run(request).await;
+    };
+    let parent = HeaderValue::try_from(&trace.parent);
+    request.extensions_mut().insert(trace);
+    let mut response = next.run(request).await;
+    if let Ok(parent) = parent {
+        response.headers_mut().insert(TRACE_PARENT, parent);
     }
     response
 }
 
-/// The client's id where it is harmless, else a new one.
-fn request_id(headers: &HeaderMap) -> String {
-    headers
-        .get(REQUEST_ID)
-        .and_then(|value| value.to_str().ok())
-        .filter(|id| !id.is_empty() && id.len() <= LONGEST_ID && !id.contains(' '))
-        .map_or_else(|| uuid::Uuid::now_v7().to_string(), str::to_owned)
+/// A W3C trace context of version 00.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Trace {
+    /// The trace's id: 32 hexadecimal digits.
+    id: String,
+    /// The header by which our answer continues the trace.
+    parent: String,
 }
 
-/// W3C trace context: the caller's trace, our own span.
-fn trace_parent(headers: &HeaderMap) -> Option<String> {
-    let text = headers.get(TRACE_PARENT)?.to_str().ok()?;
-    let [version, trace, parent, flags] = text.split('-').collect::<Vec<_>>()[..] else {
-        return None;
-    };
-    let hex = |text: &str, length: usize| {
-        text.len() == length
-            && text
-                .bytes()
-                .all(|b| b.is_ascii_digit() || (b'a'..=b'f').contains(&b))
-    };
-    let sound = version == "00"
-        && hex(trace, 32)
-        && hex(parent, 16)
-        && hex(flags, 2)
-        && trace.bytes().any(|b| b != b'0');
-    let span = uuid::Uuid::new_v4().simple().to_string();
-    sound.then(|| format!("00-{trace}-{}-{flags}", &span[..16]))
+impl Trace {
+    /// The client's trace, if the header is valid.
+    fn of(headers: &HeaderMap) -> Option<Self> {
+        let text = headers.get(TRACE_PARENT)?.to_str().ok()?;
+        let [version, id, parent, flags] = text.split('-').collect::<Vec<_>>()[..] else {
+            return None;
+        };
+        let hex = |text: &str, length: usize| {
+            let digit = |b: u8| b.is_ascii_digit() || (b'a'..=b'f').contains(&b);
+            text.len() == length && text.bytes().all(digit)
+        };
+        let valid = version == "00"
+            && hex(id, 32)
+            && hex(parent, 16)
+            && hex(flags, 2)
+            && id.bytes().any(|b| b != b'0');
+        let span = uuid::Uuid::new_v4().simple().to_string();
+        valid.then(|| Self {
+            id: id.to_owned(),
+            parent: format!("00-{id}-{}-{flags}", &span[..16]),
+        })
+    }
+}
+
+/// The span of a request in the log.
+#[derive(Debug, Clone, Copy)]
+pub struct RequestSpan;
+
+impl<B> MakeSpan<B> for RequestSpan {
+    fn make_span(&mut self, request: &axum::http::Request<B>) -> Span {
+        let extensions = request.extensions();
+        let id = extensions.get::<RequestId>();
+        let id = id.and_then(|id| id.header_value().to_str().ok());
+        let trace = extensions.get::<Trace>().map(|trace| trace.id.as_str());
+        let path = extensions.get::<MatchedPath>().map(MatchedPath::as_str);
+        tracing::info_span!(
+            "request",
+            id,
+            trace,
+            method = %request.method(),
+            path = path.unwrap_or("-"),
+        )
+    }
+}
+
+/// Logs and counts every answer.
+#[derive(Clone)]
+pub struct Answered(pub App);
+
+impl<B> OnResponse<B> for Answered {
+    fn on_response(self, response: &Response<B>, latency: Duration, _: &Span) {
+        let status = response.status();
+        let ms = latency.as_millis() as u64;
+        tracing::debug!(status = status.as_u16(), ms, "answered");
+        self.0.metrics.count_answer(status);
+    }
 }

@@ -1,4 +1,4 @@
-//! `GET /`: a page for people, a few commands for curl.
+//! `GET /`: an HTML page for browsers, a few commands for curl.
 
 use super::negotiate;
 use axum::http::{HeaderMap, HeaderValue, header};
@@ -6,12 +6,13 @@ use axum::response::{Html, IntoResponse, Response};
 
 const PAGE: &str = include_str!("page.html");
 
-/// The page's own script and style, and requests to its own service; nothing from elsewhere.
+/// The page may run its own script and style and call its own service; nothing comes from
+/// elsewhere.
 const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; \
     style-src 'unsafe-inline'; img-src 'self'; connect-src 'self'; form-action 'none'; \
     base-uri 'none'; frame-ancestors 'none'";
 
-/// The page where the client prefers HTML, else text.
+/// The page if the client prefers HTML, else text.
 pub async fn welcome(headers: HeaderMap) -> Response {
     let mut response = match negotiate::best_offer(&headers, &["text/plain", "text/html"]) {
         Some(1) => Html(PAGE).into_response(),
@@ -26,7 +27,7 @@ pub async fn welcome(headers: HeaderMap) -> Response {
     response
 }
 
-/// The address by which the client found us.
+/// The address under which the client reached the service.
 fn base_url(headers: &HeaderMap) -> String {
     let host = headers
         .get(header::HOST)

@@ -1,15 +1,15 @@
-//! `limit` and `cursor` of lists, and what a list answers.
+//! `limit` and `cursor` of lists.
 
 use super::problem::{Answer, Problem};
 use super::request::{query_pairs, refuse_unknown};
 use crate::jobs::{ListPage, ListRequest};
 
-/// Entries of a page where nobody asks.
+/// Entries of a page unless `limit` says otherwise.
 const USUAL: u32 = 20;
-/// Most entries of a page.
+/// Greatest `limit`.
 const MOST: u32 = 100;
 
-/// What a list was asked for: the page, and the values of the list's `own` parameters.
+/// The page that a query asks for, and the values of the list's `own` parameters.
 pub fn list_query<const N: usize>(
     query: Option<&str>,
     own: [&'static str; N],
@@ -35,10 +35,12 @@ fn parse_limit(text: &str) -> Answer<u32> {
         Ok(limit @ 1..=MOST) => Ok(limit),
         _ => Err(Problem::bad_request(
             "invalid-parameter",
-            format!("`limit` is no whole number from 1 to {MOST}."),
+            format!("`limit` must be a whole number from 1 to {MOST}."),
         )
         .at("limit")
-        .fix(format!("Give a whole number from 1 to {MOST}."))),
+        .fix(format!(
+            "Give a whole number from 1 to {MOST}, or leave `limit` out for {USUAL}."
+        ))),
     }
 }
 
@@ -49,14 +51,14 @@ fn parse_cursor(text: &str) -> Answer<i64> {
         .ok_or_else(|| {
             Problem::bad_request(
                 "invalid-parameter",
-                "`cursor` was not given out by this service.",
+                "`cursor` is not a cursor of this service.",
             )
             .at("cursor")
-            .fix("Take `next_cursor` of the page before, as it is.")
+            .fix("Use `next_cursor` of the previous page unchanged.")
         })
 }
 
-/// The cursor of the page that follows.
+/// The cursor of the next page; `None` on the last.
 pub fn next_cursor<T>(page: &ListPage<T>) -> Option<String> {
     page.next.map(|sequence| sequence.to_string())
 }

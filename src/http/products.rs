@@ -1,33 +1,133 @@
-//! What models, segmentations and templates have in common over HTTP: they are found, listed,
-//! erased and downloaded in the same way.
+//! What models, segmentations and templates have in common beside being [`Collection`]s: a mesh
+//! in several formats, files that can be downloaded, and perhaps a report.
+//!
+//! [`routes`] serves them under `/v1/{plural}/{id}/mesh`, `.../report` and `.../{file}`.
 
 use super::app::App;
+use super::collection::{Collection, find};
 use super::files;
 use super::negotiate;
-use super::openapi::file_names;
-use super::pagination::list_query;
-use super::problem::{Answer, Problem, shorten};
-use super::request::{query_pairs, refuse_unknown};
-use super::wire::missing;
+use super::openapi::{
+    ConditionalHeaders, Documented, DownloadAnswers, LookupProblems, MeshAnswer, ReportAnswer,
+};
+use super::problem::Answer;
+use super::problem::not_found::{missing, no_such_file};
+use super::request::{PathSegments, query_pairs, refuse_unknown};
 use crate::export::Format;
-use crate::jobs::{Deleted, ListPage, Product, Resource};
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
-use axum::response::{IntoResponse, Response};
+use crate::jobs::{Catalogue, ListPage, ListRequest, Product, Resource, StoreError};
+use axum::extract::{RawQuery, State};
+use axum::http::{HeaderMap, HeaderValue, header};
+use axum::routing::get;
 use serde::Serialize;
-use utoipa::ToSchema;
+use std::borrow::Cow;
+use std::marker::PhantomData;
+use utoipa::openapi::RefOr;
+use utoipa::openapi::path::HttpMethod;
+use utoipa::openapi::schema::{ObjectBuilder, Schema, Type};
+use utoipa::{IntoResponses, PartialSchema, ToSchema};
+use utoipa_axum::router::UtoipaMethodRouter;
 
-/// A program and its version.
+/// One kind of product.
+pub trait ProductCollection: 'static {
+    /// The kind: its ids, its noun, its path.
+    const RESOURCE: Resource;
+
+    /// The product as JSON.
+    type Body: From<Product> + Serialize + ToSchema + Send;
+
+    /// The names of the files it may have beside the mesh in every format.
+    const FILES: &'static [&'static str];
+
+    /// The name of the schema that lists all names of files.
+    const FILE_SCHEMA: &'static str;
+
+    /// What the document says about downloading a file.
+    const FILE_HELP: &'static str;
+
+    /// How the document describes a downloaded file.
+    type FileAnswer: IntoResponses;
+}
+
+impl<P: ProductCollection> Collection for P {
+    const RESOURCE: Resource = P::RESOURCE;
+    type Row = Product;
+    type Body = P::Body;
+
+    async fn row(catalogue: &dyn Catalogue, id: &str) -> Result<Option<Product>, StoreError> {
+        catalogue.product(id).await
+    }
+
+    fn body(product: Product) -> Result<P::Body, StoreError> {
+        Ok(product.into())
+    }
+
+    async fn rows(
+        catalogue: &dyn Catalogue,
+        page: ListRequest,
+    ) -> Result<ListPage<Product>, StoreError> {
+        catalogue.products(P::RESOURCE, page).await
+    }
+}
+
+/// `GET /v1/{plural}/{id}/mesh` and `GET /v1/{plural}/{id}/{file}`; and
+/// `GET /v1/{plural}/{id}/report` if there are reports.
+pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
+    let (noun, plural) = (P::RESOURCE.noun(), P::RESOURCE.plural());
+    let download = |path: &str, id: &str, summary: String| {
+        let path = format!("/v1/{plural}/{{id}}/{path}");
+        Documented::new(HttpMethod::Get, path, plural, id.to_owned(), summary).id(noun)
+    };
+    let mesh = download("mesh", "get_mesh", format!("Download a {noun}'s mesh"))
+        .description("In the format that `Accept` asks for; GLB if it allows any.")
+        .parameters::<ConditionalHeaders>()
+        .answers::<MeshAnswer>();
+    let mut file = download(
+        "{file}",
+        "get_file",
+        format!("Download one of a {noun}'s files"),
+    )
+    .description(P::FILE_HELP);
+    let names = file.refer::<FileNames<P>>();
+    let file = file
+        .segment("file", "The file's name".into(), names)
+        .parameters::<ConditionalHeaders>()
+        .answers::<P::FileAnswer>();
+    let shared = |operation: Documented| {
+        operation
+            .answers::<DownloadAnswers>()
+            .answers::<LookupProblems>()
+    };
+    let mut routes = vec![
+        shared(mesh).served_by(get(get_mesh::<P>)),
+        shared(file).served_by(get(get_file::<P>)),
+    ];
+    if P::FILES.contains(&REPORT) {
+        let report = download("report", "get_report", format!("Read a {noun}'s report"))
+            .description("JSON, or an HTML page if `Accept` prefers `text/html`.")
+            .parameters::<ConditionalHeaders>()
+            .answers::<ReportAnswer>();
+        routes.push(shared(report).served_by(get(get_report::<P>)));
+    }
+    routes
+}
+
+/// The file that holds the report.
+const REPORT: &str = "report.json";
+
+/// The program that made a product.
 #[derive(Serialize, ToSchema)]
-pub struct Software {
+#[schema(as = Software)]
+pub struct SoftwareBody {
     /// The program.
     name: String,
     /// Its version.
     version: String,
 }
 
-/// One download.
+/// A file that can be downloaded.
 #[derive(Serialize, ToSchema)]
-pub struct Download {
+#[schema(as = Download)]
+pub struct DownloadBody {
     /// The file's name.
     #[schema(example = "mesh.glb")]
     name: String,
@@ -35,14 +135,14 @@ pub struct Download {
     href: String,
     /// Its media type.
     media_type: String,
-    /// Its length.
+    /// Its length in bytes.
     bytes: u64,
-    /// SHA-256 of its content; also its `ETag`.
+    /// SHA-256 of its content, hexadecimal; also its `ETag`.
     sha256: String,
 }
 
-impl Software {
-    /// What made a product.
+impl SoftwareBody {
+    /// The program that made `product`.
     pub fn of(product: &Product) -> Self {
         Self {
             name: env!("CARGO_PKG_NAME").into(),
@@ -51,8 +151,8 @@ impl Software {
     }
 }
 
-impl Download {
-    /// All downloads of a product.
+impl DownloadBody {
+    /// All files of `product`.
     pub fn all(product: &Product) -> Vec<Self> {
         product
             .files
@@ -68,7 +168,7 @@ impl Download {
     }
 }
 
-/// A media type that can be had, and the file that has it.
+/// A media type that a client may ask for, and the file that has it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Offer {
     /// The media type.
@@ -78,7 +178,7 @@ pub struct Offer {
 }
 
 impl Offer {
-    /// An offer.
+    /// `file` under `media_type`.
     pub fn new(media_type: &'static str, file: impl Into<String>) -> Self {
         Self {
             media_type,
@@ -86,29 +186,44 @@ impl Offer {
         }
     }
 
-    /// The report for programs and for people.
-    pub fn reports() -> [Self; 2] {
-        [
-            Self::new("application/json", "report.json"),
-            Self::new("text/html", files::PAGE),
-        ]
-    }
-
     /// The mesh in every format, GLB first.
     pub fn meshes() -> Vec<Self> {
         Format::ALL
-            .map(|format| Self::new(format.media_type(), format!("mesh.{}", format.extension())))
+            .map(|format| Self::new(format.media_type(), mesh_name(format)))
             .to_vec()
+    }
+
+    fn reports() -> [Self; 2] {
+        [
+            Self::new("application/json", REPORT),
+            Self::new("text/html", files::PAGE),
+        ]
     }
 }
 
-/// The offer that the client likes best, or the refusal that lists the offers.
+fn mesh_name(format: Format) -> String {
+    format!("mesh.{}", format.extension())
+}
+
+/// The offer that `Accept` rates highest, or the 406 that lists the offers.
 pub fn choose<'a>(headers: &HeaderMap, offers: &'a [Offer]) -> Answer<&'a Offer> {
     let types: Vec<&str> = offers.iter().map(|offer| offer.media_type).collect();
     Ok(&offers[negotiate::require_offer(headers, &types)?])
 }
 
-/// Answers with an offered file, under the media type by which it was offered.
+/// The product of that id, or the 404 or 410 that says why there is none.
+pub async fn find_any(app: &App, id: &str) -> Answer<Product> {
+    let catalogue = &*app.queue.catalogue;
+    match catalogue.product(id).await? {
+        Some(product) => Ok(product),
+        None => {
+            let resource = Resource::of(id).unwrap_or(Resource::Model);
+            Err(missing(catalogue, resource, id).await)
+        }
+    }
+}
+
+/// Answers with the offered file, under the media type by which it was offered.
 pub async fn send(app: &App, product: &Product, offer: &Offer, headers: &HeaderMap) -> Answer {
     let mut response = send_named(app, product, &offer.file, headers).await?;
     if let Some(own) = response.headers_mut().get_mut(header::CONTENT_TYPE)
@@ -119,100 +234,68 @@ pub async fn send(app: &App, product: &Product, offer: &Offer, headers: &HeaderM
     Ok(response)
 }
 
-/// The product of that id, or why there is none.
-pub async fn find(app: &App, id: &str) -> Answer<Product> {
-    let resource = Resource::of(id).unwrap_or(Resource::Model);
-    find_as(app, resource, id).await
+async fn get_mesh<P: ProductCollection>(
+    state: State<App>,
+    id: PathSegments<String>,
+    query: RawQuery,
+    headers: HeaderMap,
+) -> Answer {
+    get_offered::<P>(state, id, query, headers, &Offer::meshes()).await
 }
 
-/// The product of that id and kind, or why there is none.
-pub async fn find_as(app: &App, resource: Resource, id: &str) -> Answer<Product> {
-    let found = match Resource::of(id) == Some(resource) {
-        true => app.queue.catalogue.product(id).await?,
-        false => None,
-    };
-    match found {
-        Some(product) => Ok(product),
-        None => Err(missing(&*app.queue.catalogue, resource, id).await),
-    }
+async fn get_report<P: ProductCollection>(
+    state: State<App>,
+    id: PathSegments<String>,
+    query: RawQuery,
+    headers: HeaderMap,
+) -> Answer {
+    get_offered::<P>(state, id, query, headers, &Offer::reports()).await
 }
 
-/// One product; no query parameter is taken.
-pub async fn get(app: &App, resource: Resource, id: &str, query: Option<&str>) -> Answer<Product> {
-    refuse_unknown(&query_pairs(query), &[])?;
-    find_as(app, resource, id).await
-}
-
-/// A page of products.
-pub async fn list(app: &App, resource: Resource, query: Option<&str>) -> Answer<ListPage<Product>> {
-    let (page, []) = list_query(query, [])?;
-    Ok(app.queue.catalogue.products(resource, page).await?)
-}
-
-/// Erases a volume or a product.
-pub async fn erase(app: &App, resource: Resource, id: &str, query: Option<&str>) -> Answer {
-    refuse_unknown(&query_pairs(query), &[])?;
-    let noun = resource.noun();
-    let deleted = match Resource::of(id) == Some(resource) {
-        true => app.queue.erase(id).await?,
-        false => Deleted::Unknown,
-    };
-    match deleted {
-        Deleted::Done => Ok(StatusCode::NO_CONTENT.into_response()),
-        Deleted::Unknown => Err(missing(&*app.queue.catalogue, resource, id).await),
-        Deleted::InUse => Err(Problem::new(
-            StatusCode::CONFLICT,
-            "in-use",
-            format!("A job that has not ended needs this {noun}."),
-        )
-        .fix("Wait for the job or DELETE it first; GET /v1/jobs?state=queued shows them.")),
-    }
-}
-
-/// The file among `offers` that `Accept` likes best.
-pub async fn get_offered(
-    app: &App,
-    resource: Resource,
-    id: &str,
-    query: Option<&str>,
-    headers: &HeaderMap,
+/// The file among `offers` that `Accept` rates highest.
+async fn get_offered<P: ProductCollection>(
+    State(app): State<App>,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
     offers: &[Offer],
 ) -> Answer {
-    let product = get(app, resource, id, query).await?;
-    let mut response = send(app, &product, choose(headers, offers)?, headers).await?;
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let product = find::<P>(&app, &id).await?;
+    let mut response = send(&app, &product, choose(&headers, offers)?, &headers).await?;
     response
         .headers_mut()
         .insert(header::VARY, HeaderValue::from_static("accept"));
     Ok(response)
 }
 
-/// The file of that name.
-pub async fn get_file(
-    app: &App,
-    resource: Resource,
-    (id, name): (&str, &str),
-    query: Option<&str>,
-    headers: &HeaderMap,
+async fn get_file<P: ProductCollection>(
+    State(app): State<App>,
+    PathSegments((id, name)): PathSegments<(String, String)>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query), &[])?;
-    let names = file_names(resource);
-    if !names.iter().any(|known| known == name) {
-        return Err(no_such_file(resource, name, &names));
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let names = file_names::<P>();
+    if !names.contains(&name) {
+        return Err(no_such_file(P::RESOURCE, &name, &names));
     }
-    let product = find_as(app, resource, id).await?;
-    send_named(app, &product, name, headers).await
+    let product = find::<P>(&app, &id).await?;
+    send_named(&app, &product, &name, &headers).await
 }
 
-async fn send_named(
-    app: &App,
-    product: &Product,
-    name: &str,
-    headers: &HeaderMap,
-) -> Answer<Response> {
-    match product.file(name) {
-        Some(file) => files::send(app, product, file, headers).await,
-        None if name == files::PAGE => {
-            let page = make_page(app, product).await?;
+async fn send_named(app: &App, product: &Product, name: &str, headers: &HeaderMap) -> Answer {
+    if let Some(file) = product.file(name) {
+        return files::send(app, product, file, headers).await;
+    }
+    let work = app.engine.work(product.resource().noun());
+    match work.filter(|_| name == files::PAGE).cloned() {
+        Some(work) => {
+            let stored = app
+                .queue
+                .with_files(product.clone(), work.page_files())
+                .await?;
+            let page = app.decode(move || work.page(&stored)).await??;
             files::send_page(product, page, headers).await
         }
         None => {
@@ -222,26 +305,30 @@ async fn send_named(
     }
 }
 
-/// The page of a product, of its own files.
-async fn make_page(app: &App, product: &Product) -> Answer<String> {
-    let resource = product.resource();
-    let Some(work) = app.engine.work(resource.noun()).cloned() else {
-        return Err(no_such_file(resource, files::PAGE, &file_names(resource)));
-    };
-    let stored = app
-        .queue
-        .with_files(product.clone(), work.page_files())
-        .await?;
-    let _permit = app.inspections.acquire().await.map_err(Problem::internal)?;
-    let page = tokio::task::spawn_blocking(move || work.page(&stored));
-    Ok(page.await.map_err(Problem::internal)??)
+/// All names of files that a product of that kind may have.
+fn file_names<P: ProductCollection>() -> Vec<String> {
+    let others = P::FILES.iter().map(|name| (*name).to_owned());
+    Format::ALL
+        .map(mesh_name)
+        .into_iter()
+        .chain(others)
+        .collect()
 }
 
-fn no_such_file(resource: Resource, name: &str, names: &[String]) -> Problem {
-    Problem::new(
-        StatusCode::NOT_FOUND,
-        "not-found",
-        format!("This {} has no file `{}`.", resource.noun(), shorten(name)),
-    )
-    .fix(format!("There is {}.", names.join(", ")))
+/// The schema of [`file_names`].
+struct FileNames<P>(PhantomData<P>);
+
+impl<P: ProductCollection> ToSchema for FileNames<P> {
+    fn name() -> Cow<'static, str> {
+        P::FILE_SCHEMA.into()
+    }
+}
+
+impl<P: ProductCollection> PartialSchema for FileNames<P> {
+    fn schema() -> RefOr<Schema> {
+        let names = ObjectBuilder::new()
+            .schema_type(Type::String)
+            .enum_values(Some(file_names::<P>()));
+        Schema::from(names).into()
+    }
 }

@@ -1,19 +1,20 @@
-//! Taking requests apart: paths, query strings and JSON bodies, strictly.
+//! Strict reading of paths, query strings and JSON bodies: what is unknown or given twice is
+//! refused.
 
-use super::app::App;
-use super::problem::{Answer, Problem, shorten};
+use super::limits::BodyLimits;
+use super::problem::{Answer, Problem, body, shorten};
 use crate::parameters::nearest;
 use axum::body::Bytes;
 use axum::extract::{FromRequestParts, Request};
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, header};
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
-/// Parts of the path. Like axum's own, but for refusing with a problem object.
-pub struct Path<T>(pub T);
+/// Segments of the path, as [`axum::extract::Path`] reads them, but refused with a problem object.
+pub struct PathSegments<T>(pub T);
 
-impl<S, T> FromRequestParts<S> for Path<T>
+impl<S, T> FromRequestParts<S> for PathSegments<T>
 where
     S: Send + Sync,
     T: DeserializeOwned + Send,
@@ -27,19 +28,19 @@ where
                 "malformed-path",
                 format!("{}.", error.body_text()),
             )
-            .fix("Take paths from `links`, as they are.")),
+            .fix("Use the paths in `links` unchanged.")),
         }
     }
 }
 
-/// The pairs of a query string, decoded, in order.
+/// The names and values of a query string, decoded, in their order.
 pub fn query_pairs(query: Option<&str>) -> Vec<(String, String)> {
     form_urlencoded::parse(query.unwrap_or_default().as_bytes())
         .into_owned()
         .collect()
 }
 
-/// Refuses names outside `known` and names given twice.
+/// Refuses a name that is not among `known`, and a name that is given twice.
 pub fn refuse_unknown(pairs: &[(String, String)], known: &[&str]) -> Answer<()> {
     for (index, (name, _)) in pairs.iter().enumerate() {
         if !known.contains(&name.as_str()) {
@@ -51,18 +52,18 @@ pub fn refuse_unknown(pairs: &[(String, String)], known: &[&str]) -> Answer<()> 
                 format!("`{name}` is given more than once."),
             )
             .at(name)
-            .fix("Give it once."));
+            .fix("Give it only once."));
         }
     }
     Ok(())
 }
 
-/// A refusal of a name that means nothing, with the nearest one that does.
+/// 400 for an unknown name, with the most similar known one.
 pub fn unknown(what: &str, name: &str, known: &[&str]) -> Problem {
     let fix = match nearest(name, known.iter().copied()) {
         Some(near) => format!("Did you mean `{near}`?"),
-        None if known.is_empty() => format!("Leave it out: no {what} is taken here."),
-        None => format!("Known here: {}.", known.join(", ")),
+        None if known.is_empty() => format!("Leave it out: this path takes no {what}."),
+        None => format!("This path takes {}.", known.join(", ")),
     };
     Problem::bad_request(
         "unknown-parameter",
@@ -79,71 +80,40 @@ pub fn media_type(headers: &HeaderMap) -> Option<String> {
     Some(essence.trim().to_ascii_lowercase())
 }
 
-/// The refusal of a body of the type `found`.
-pub fn unsupported_type(found: &str) -> Problem {
-    Problem::new(
-        StatusCode::UNSUPPORTED_MEDIA_TYPE,
-        "unsupported-media-type",
-        format!(
-            "A body of type `{}` is not understood here.",
-            shorten(found)
-        ),
-    )
-    .at("Content-Type")
-}
-
-/// Refuses a compressed transfer: a limit on what arrives would not be one on what it becomes.
+/// Refuses a body that is compressed for the transfer: the limit on its size would not limit what
+/// it decompresses to.
 pub fn refuse_content_encoding(headers: &HeaderMap) -> Answer<()> {
     match headers.get(header::CONTENT_ENCODING) {
-        Some(encoding) if encoding != "identity" => Err(Problem::new(
-            StatusCode::UNSUPPORTED_MEDIA_TYPE,
-            "unsupported-content-encoding",
-            "Content-Encoding is not supported.",
-        )
-        .at("Content-Encoding")
-        .fix("Send the file as it is; a .nii.gz is taken without Content-Encoding.")),
+        Some(encoding) if encoding != "identity" => Err(body::unsupported_encoding()),
         _ => Ok(()),
     }
 }
 
-/// A body that is JSON, at most `limit` bytes of it, not parsed yet.
-pub async fn json_bytes(app: &App, request: Request, limit: usize) -> Answer<Bytes> {
+/// The bytes of a JSON body, not parsed yet.
+///
+/// # Errors
+/// 400 broken off, 408 too slow, 413 too large, 415 of another type or encoding.
+pub async fn json_bytes(request: Request) -> Answer<Bytes> {
     refuse_content_encoding(request.headers())?;
     match media_type(request.headers()).as_deref() {
         None | Some("application/json") => {}
-        Some(other) => return Err(unsupported_type(other).fix("Send application/json.")),
+        Some(other) => return Err(body::unsupported_type(other, "application/json")),
     }
-    let bytes = axum::body::to_bytes(request.into_body(), limit);
-    tokio::time::timeout(app.settings.body_timeout.0, bytes)
+    let limits = BodyLimits::of(&request)?;
+    axum::body::to_bytes(request.into_body(), limits.size.as_usize())
         .await
-        .map_err(|_| {
-            Problem::new(
-                StatusCode::REQUEST_TIMEOUT,
-                "body-too-slow",
-                "The body did not arrive in time.",
-            )
-        })?
-        .map_err(|_| {
-            Problem::new(
-                StatusCode::PAYLOAD_TOO_LARGE,
-                "body-too-large",
-                format!("The body is larger than {limit} bytes, or it broke off."),
-            )
-        })
+        .map_err(|error| body::interrupted(&error, limits.size))
 }
 
 /// The JSON object in a request's body.
-pub async fn json_object(app: &App, request: Request) -> Answer<Map<String, Value>> {
-    let bytes = json_bytes(app, request, app.settings.json_limit.as_usize()).await?;
-    let not_json = |error: serde_json::Error| {
-        Problem::bad_request("malformed-json", format!("The body is not JSON: {error}."))
-            .fix("Send one JSON object.")
-    };
-    match serde_json::from_slice(&bytes).map_err(not_json)? {
-        Value::Object(object) => Ok(object),
-        _ => Err(
-            Problem::bad_request("malformed-json", "The body is not a JSON object.")
-                .fix("Send one JSON object."),
-        ),
+///
+/// # Errors
+/// As [`json_bytes`], and 400 if the body is not one JSON object.
+pub async fn json_object(request: Request) -> Answer<Map<String, Value>> {
+    let bytes = json_bytes(request).await?;
+    match serde_json::from_slice(&bytes) {
+        Ok(Value::Object(object)) => Ok(object),
+        Ok(_) => Err(body::malformed_json("it is another JSON value")),
+        Err(error) => Err(body::malformed_json(&error.to_string())),
     }
 }

@@ -1,98 +1,115 @@
-//! The map of the API.
+//! The map of the API, and the layers around it.
 
 use super::app::App;
-use super::openapi::Document;
-use super::problem::{Problem, from_panic};
-use super::{events, health, jobs, models, observe, pages, segmentations, templates, volumes};
+use super::limits::BodyLimits;
+use super::models::Models;
+use super::observe::{self, REQUEST_ID};
+use super::openapi::{self, Document};
+use super::problem::not_found::no_such_path;
+use super::problem::{from_panic, method_not_allowed};
+use super::segmentations::Segmentations;
+use super::templates::{MESH_SIZE, Templates};
+use super::volumes::Volumes;
+use super::{
+    collection, health, idempotency, jobs, models, pages, products, segmentations, templates,
+    volumes,
+};
+use crate::config::Settings;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
-use axum::http::{HeaderValue, Method, StatusCode, header};
+use axum::http::{HeaderValue, header};
 use axum::middleware;
 use axum::routing::get;
+use tower::ServiceBuilder;
 use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::request_id::{PropagateRequestIdLayer, SetRequestIdLayer};
+use tower_http::sensitive_headers::SetSensitiveRequestHeadersLayer;
 use tower_http::set_header::SetResponseHeaderLayer;
+use tower_http::trace::TraceLayer;
 use utoipa::OpenApi;
-use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouter, UtoipaMethodRouterExt};
 use utoipa_axum::routes;
 use utoipa_swagger_ui::SwaggerUi;
 
 /// Every documented route.
-pub fn routes() -> OpenApiRouter<App> {
-    OpenApiRouter::with_openapi(Document::openapi())
-        .routes(routes!(volumes::create_volume, volumes::list_volumes))
-        .routes(routes!(volumes::get_volume, volumes::delete_volume))
-        .routes(routes!(volumes::preview_volume))
-        .routes(routes!(jobs::create_job, jobs::list_jobs))
-        .routes(routes!(jobs::get_job, jobs::delete_job))
-        .routes(routes!(events::follow_job))
-        .routes(routes!(models::create_model, models::list_models))
-        .routes(routes!(models::get_model, models::delete_model))
-        .routes(routes!(models::get_mesh))
-        .routes(routes!(models::get_report))
-        .routes(routes!(models::get_file))
-        .routes(routes!(
-            segmentations::create_segmentation,
-            segmentations::list_segmentations
-        ))
-        .routes(routes!(
-            segmentations::get_segmentation,
-            segmentations::delete_segmentation
-        ))
-        .routes(routes!(segmentations::get_mesh))
-        .routes(routes!(segmentations::get_report))
-        .routes(routes!(segmentations::get_file))
-        .routes(routes!(
-            templates::create_template,
-            templates::list_templates
-        ))
-        .routes(routes!(templates::get_template, templates::delete_template))
-        .routes(routes!(templates::get_mesh))
-        .routes(routes!(templates::get_file))
-        .routes(routes!(health::alive))
-        .routes(routes!(health::ready))
-        .routes(routes!(health::metrics))
+fn routes(settings: &Settings) -> OpenApiRouter<App> {
+    let upload = || BodyLimits::of_uploads(settings).layers();
+    let json = |size| BodyLimits::of_json(settings, size).layers();
+    let of_every_kind = [
+        // GET /v1/KINDS, GET and DELETE /v1/KINDS/{id}
+        collection::routes::<Volumes>().to_vec(),
+        collection::routes::<Models>().to_vec(),
+        collection::routes::<Segmentations>().to_vec(),
+        collection::routes::<Templates>().to_vec(),
+        // GET /v1/KINDS/{id}/mesh, .../report and .../{file}
+        products::routes::<Models>(),
+        products::routes::<Segmentations>(),
+        products::routes::<Templates>(),
+    ];
+    let of_one_kind: [UtoipaMethodRouter<App>; 12] = [
+        routes!(volumes::create_volume).layer(upload()),
+        routes!(volumes::preview_volume),
+        routes!(models::create_model).layer(upload()),
+        routes!(segmentations::create_segmentation).layer(upload()),
+        routes!(templates::create_template).layer(json(MESH_SIZE)),
+        routes!(jobs::create_job).layer(json(settings.json_limit)),
+        routes!(jobs::list_jobs),
+        routes!(jobs::get_job, jobs::delete_job),
+        routes!(jobs::events::follow_job),
+        routes!(health::alive),
+        routes!(health::ready),
+        routes!(health::metrics),
+    ];
+    of_every_kind.into_iter().flatten().chain(of_one_kind).fold(
+        OpenApiRouter::with_openapi(Document::openapi()),
+        OpenApiRouter::routes,
+    )
+}
+
+/// The document as it is published at `/openapi.json` and committed under `openapi/`.
+pub fn document() -> utoipa::openapi::OpenApi {
+    openapi::publish(routes(&Settings::default()).split_for_parts().1)
 }
 
 /// The whole service.
 pub fn router(app: App) -> Router {
-    let (api, _) = routes().split_for_parts();
-    let document = axum::Json(super::openapi::document());
+    let (api, collected) = routes(&app.settings).split_for_parts();
+    let document = axum::Json(openapi::publish(collected));
+    // A request passes the layers from top to bottom, its answer from bottom to top.
+    let layers = ServiceBuilder::new()
+        .layer(SetSensitiveRequestHeadersLayer::new([
+            header::AUTHORIZATION,
+            header::PROXY_AUTHORIZATION,
+            header::COOKIE,
+            idempotency::HEADER,
+        ]))
+        .map_request(observe::drop_unusable_id)
+        .layer(SetRequestIdLayer::new(REQUEST_ID, observe::TimeOrderedId))
+        .layer(PropagateRequestIdLayer::new(REQUEST_ID))
+        .layer(middleware::from_fn(observe::continue_trace))
+        .layer(
+            TraceLayer::new_for_http()
+                .make_span_with(observe::RequestSpan)
+                .on_request(())
+                .on_response(observe::Answered(app.clone()))
+                .on_eos(())
+                .on_failure(()),
+        )
+        .layer(CatchPanicLayer::custom(from_panic))
+        .layer(SetResponseHeaderLayer::if_not_present(
+            header::X_CONTENT_TYPE_OPTIONS,
+            HeaderValue::from_static("nosniff"),
+        ))
+        // The routes that take a body have limits of their own.
+        .layer(DefaultBodyLimit::disable());
     api.route("/", get(pages::welcome))
         .route(
             "/openapi.json",
             get(move || async move { document.clone() }),
         )
         .merge(SwaggerUi::new("/docs").config(utoipa_swagger_ui::Config::from("/openapi.json")))
-        .fallback(nothing_here)
-        .method_not_allowed_fallback(not_that_way)
-        // `upload` and `request` count for themselves, against the operator's limits.
-        .layer(DefaultBodyLimit::disable())
-        .layer(SetResponseHeaderLayer::if_not_present(
-            header::X_CONTENT_TYPE_OPTIONS,
-            HeaderValue::from_static("nosniff"),
-        ))
-        .layer(CatchPanicLayer::custom(from_panic))
-        .layer(middleware::from_fn_with_state(
-            app.clone(),
-            observe::observe,
-        ))
+        .fallback(no_such_path)
+        .method_not_allowed_fallback(method_not_allowed)
+        .layer(layers)
         .with_state(app)
-}
-
-async fn nothing_here() -> Problem {
-    Problem::new(
-        StatusCode::NOT_FOUND,
-        "no-such-path",
-        "There is nothing under this path.",
-    )
-    .fix("GET /openapi.json lists the paths; /docs shows them.")
-}
-
-async fn not_that_way(method: Method) -> Problem {
-    Problem::new(
-        StatusCode::METHOD_NOT_ALLOWED,
-        "method-not-allowed",
-        format!("{method} is not possible here."),
-    )
-    .fix("Use one of the methods in Allow.")
 }

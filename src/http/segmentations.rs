@@ -1,31 +1,48 @@
-//! `/v1/segmentations`: models fitted to volumes, and the one-line way to fit one.
+//! `/v1/segmentations`: models fitted to volumes, and the request that uploads a volume and fits
+//! a model to it.
 
 use super::app::App;
 use super::files;
-use super::jobs::{self, order};
-use super::openapi::{EraseProblems, FileProblems, ListProblems, LookupProblems, UploadProblems};
-use super::pagination::next_cursor;
+use super::jobs::filing::{self, UploadJob};
+use super::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
 use super::problem::Answer;
-use super::products::{self, Download, Offer, Software};
-use super::request::Path;
+use super::products::{DownloadBody, Offer, ProductCollection, SoftwareBody};
 use super::wire::{path_of, rfc3339};
 use crate::jobs::{Product, Resource};
-use axum::Json;
 use axum::extract::{RawQuery, Request, State};
-use axum::http::HeaderMap;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 
-const KIND: Resource = Resource::Segmentation;
+const MASK: &str = "mask.nii.gz";
 
-/// The part of a form that is an expert's mask.
-const EXPERT: &str = "expert";
+/// The collection of segmentations.
+pub struct Segmentations;
 
-/// A segmentation: a model fitted to a volume, what it says and how far to believe it.
+impl ProductCollection for Segmentations {
+    const RESOURCE: Resource = Resource::Segmentation;
+    type Body = SegmentationBody;
+    const FILES: &'static [&'static str] = &[
+        MASK,
+        "report.json",
+        files::PAGE,
+        "slices.png",
+        "polar.json",
+        "polar.svg",
+        "polar.png",
+    ];
+    const FILE_SCHEMA: &'static str = "SegmentationFileName";
+    const FILE_HELP: &'static str = "`mask.nii.gz`, the mesh in each format, `report.json`, \
+        `report.html` (made on request) and `slices.png` (three slices with the contour of the \
+        fit); for a left ventricle also `polar.json`, `polar.svg` and `polar.png`.";
+    type FileAnswer = openapi::SegmentationFileAnswer;
+}
+
+/// A segmentation: a model fitted to a volume, with its main figures and its reliability.
 #[derive(Serialize, ToSchema)]
-pub struct Segmentation {
-    /// From volume, parameters and fitted mesh: the same everywhere.
+#[schema(as = Segmentation)]
+pub struct SegmentationBody {
+    /// Derived from volume, parameters and fitted mesh, so it is the same on every machine.
     #[schema(example = "seg_2c26b46b68ffc68ff99b453c1d304134")]
     id: String,
     /// When it was made (RFC 3339).
@@ -33,19 +50,18 @@ pub struct Segmentation {
     created_at: String,
     /// The volume that was segmented.
     volume: String,
-    /// The parameters used, every default written out.
+    /// The parameters used, including every default.
     #[schema(value_type = Object)]
     parameters: Map<String, Value>,
-    /// The model taken and every candidate with its merit, why the motion ended, confidence,
-    /// volumes, measures against the expert's mask, and reasons for doubt; the report has all
-    /// of it.
+    /// The chosen model and the merit of every candidate, why the fit stopped, its confidence,
+    /// volumes, agreement with the expert's mask, and warnings; the report has all figures.
     #[schema(value_type = Object)]
     summary: Map<String, Value>,
-    /// What made it.
-    software: Software,
-    /// Its downloads.
-    files: Vec<Download>,
-    /// Where to go from here.
+    /// The program that made it.
+    software: SoftwareBody,
+    /// Its files.
+    files: Vec<DownloadBody>,
+    /// Related paths.
     links: SegmentationLinks,
 }
 
@@ -61,36 +77,26 @@ struct SegmentationLinks {
     mesh: String,
     /// The report.
     report: String,
-    /// The report as a page for people.
+    /// The report as an HTML page.
     page: String,
-    /// The polar map; ventricles only.
+    /// The polar map; left ventricles only.
     #[serde(skip_serializing_if = "Option::is_none")]
     polar: Option<String>,
     /// The volume.
     volume: String,
 }
 
-/// A page of segmentations.
-#[derive(Serialize, ToSchema)]
-pub struct SegmentationList {
-    /// The segmentations, newest first.
-    segmentations: Vec<Segmentation>,
-    /// `cursor` of the next page; absent on the last.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    next_cursor: Option<String>,
-}
-
-impl From<Product> for Segmentation {
+impl From<Product> for SegmentationBody {
     fn from(product: Product) -> Self {
         let itself = path_of(&product.id);
         let volume = product.volume.clone().unwrap_or_default();
         let polar = product.file("polar.svg");
         Self {
             created_at: rfc3339(product.created_at),
-            files: Download::all(&product),
-            software: Software::of(&product),
+            files: DownloadBody::all(&product),
+            software: SoftwareBody::of(&product),
             links: SegmentationLinks {
-                mask: format!("{itself}/mask.nii.gz"),
+                mask: format!("{itself}/{MASK}"),
                 mesh: format!("{itself}/mesh"),
                 report: format!("{itself}/report"),
                 page: format!("{itself}/{}", files::PAGE),
@@ -106,7 +112,7 @@ impl From<Product> for Segmentation {
     }
 }
 
-/// What a finished segmentation can be had as: the mask, the mesh or the report.
+/// What a client that waits for a segmentation may ask for: the mask, the mesh or the report.
 fn offers() -> Vec<Offer> {
     let masks = [
         "application/gzip",
@@ -115,7 +121,7 @@ fn offers() -> Vec<Offer> {
     ];
     let meshes = Offer::meshes().into_iter();
     masks
-        .map(|media_type| Offer::new(media_type, "mask.nii.gz"))
+        .map(|media_type| Offer::new(media_type, MASK))
         .into_iter()
         .chain(meshes.filter(|offer| offer.file != "mesh.json"))
         .chain([Offer::new("application/json", "report.json")])
@@ -124,139 +130,31 @@ fn offers() -> Vec<Offer> {
 
 /// Segment a volume
 ///
-/// The body is the volume, or a form with the part `volume` and perhaps the part `expert`, an
-/// expert's mask to measure against. Stores them, files a job, and answers 202 with the job;
-/// with `Prefer: wait=60` it waits that long for the end and answers 200 with what `Accept` asks
-/// for: the mask on the volume's grid, the fitted mesh, or the report (`application/json`). Every
-/// parameter is a query parameter; `model` names the model to fit, `auto` takes the best of the
-/// library.
+/// The body is the volume, or a form with the file `volume` and optionally the file `expert`, an
+/// expert's mask to measure against. The service stores them, files a job, and answers 202 with
+/// the job. With `Prefer: wait=60` it waits up to 60 seconds for the job to end and answers 200
+/// with what `Accept` asks for: the mask on the volume's grid, the fitted mesh, or the report
+/// (`application/json`). Every parameter is a query parameter; `model` names the model to fit,
+/// and `auto` chooses the best one of the library.
 #[utoipa::path(post, path = "/v1/segmentations", tag = "segmentations",
     request_body(content(
         (Vec<u8> = "application/octet-stream"),
         (Vec<u8> = "application/gzip"),
         (Vec<u8> = "application/dicom"),
         (Vec<u8> = "application/nifti"),
-        (super::openapi::SegmentationForm = "multipart/form-data"),
+        (openapi::SegmentationForm = "multipart/form-data"),
     )),
-    params(super::openapi::SegmentationQuery, super::openapi::IdempotencyHeader,
-        ("Prefer" = Option<String>, Header, description = "`wait=SECONDS`: how long to wait for the end")),
-    responses(
-        super::openapi::SegmentationAnswer,
-        (status = 202, description = "Accepted", body = jobs::Job, headers(
-            ("Location" = String, description = "The job's path"),
-            ("Retry-After" = u64, description = "Seconds after which to look again"))),
-        (status = 406, description = "`Accept` names nothing that a segmentation can be had as",
-            body = super::problem::ProblemBody, content_type = "application/problem+json"),
-        (status = 409, description = "The job was cancelled while this request waited",
-            body = super::problem::ProblemBody, content_type = "application/problem+json"),
-        FileProblems, UploadProblems,
-    ))]
+    params(openapi::SegmentationQuery, openapi::IdempotencyHeader, openapi::PreferHeader),
+    responses(openapi::SegmentationAnswer, WaitAnswers, FileProblems, UploadProblems))]
 pub async fn create_segmentation(
     State(app): State<App>,
     RawQuery(query): RawQuery,
     request: Request,
 ) -> Answer {
-    let offers = offers();
-    order::one_line(&app, KIND, query.as_deref(), request, &[EXPERT], &offers).await
-}
-
-/// List segmentations
-#[utoipa::path(get, path = "/v1/segmentations", tag = "segmentations",
-    params(super::openapi::PageParameters),
-    responses((status = 200, description = "A page, newest first", body = SegmentationList),
-        ListProblems))]
-pub async fn list_segmentations(
-    State(app): State<App>,
-    RawQuery(query): RawQuery,
-) -> Answer<Json<SegmentationList>> {
-    let page = products::list(&app, KIND, query.as_deref()).await?;
-    Ok(Json(SegmentationList {
-        next_cursor: next_cursor(&page),
-        segmentations: page.items.into_iter().map(Segmentation::from).collect(),
-    }))
-}
-
-/// Facts of a segmentation
-#[utoipa::path(get, path = "/v1/segmentations/{id}", tag = "segmentations",
-    params(("id" = String, Path, description = "The segmentation's id")),
-    responses((status = 200, description = "The segmentation", body = Segmentation),
-        LookupProblems))]
-pub async fn get_segmentation(
-    State(app): State<App>,
-    Path(id): Path<String>,
-    RawQuery(query): RawQuery,
-) -> Answer<Json<Segmentation>> {
-    let segmentation = products::get(&app, KIND, &id, query.as_deref()).await?;
-    Ok(Json(segmentation.into()))
-}
-
-/// Erase a segmentation
-#[utoipa::path(delete, path = "/v1/segmentations/{id}", tag = "segmentations",
-    params(("id" = String, Path, description = "The segmentation's id")),
-    responses((status = 204, description = "Erased"), EraseProblems, LookupProblems))]
-pub async fn delete_segmentation(
-    State(app): State<App>,
-    Path(id): Path<String>,
-    RawQuery(query): RawQuery,
-) -> Answer {
-    products::erase(&app, KIND, &id, query.as_deref()).await
-}
-
-/// A segmentation's mesh
-///
-/// In the format that `Accept` asks for; GLB where it does not care.
-#[utoipa::path(get, path = "/v1/segmentations/{id}/mesh", tag = "segmentations",
-    params(("id" = String, Path, description = "The segmentation's id"),
-        super::openapi::ConditionalHeaders),
-    responses(
-        super::openapi::MeshAnswer,
-        super::openapi::DownloadAnswers, LookupProblems))]
-pub async fn get_mesh(
-    State(app): State<App>,
-    Path(id): Path<String>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-) -> Answer {
-    let offers = Offer::meshes();
-    products::get_offered(&app, KIND, &id, query.as_deref(), &headers, &offers).await
-}
-
-/// A segmentation's report
-///
-/// JSON, or a page for a person where `Accept` prefers `text/html`.
-#[utoipa::path(get, path = "/v1/segmentations/{id}/report", tag = "segmentations",
-    params(("id" = String, Path, description = "The segmentation's id"),
-        super::openapi::ConditionalHeaders),
-    responses(
-        super::openapi::ReportAnswer,
-        super::openapi::DownloadAnswers, LookupProblems))]
-pub async fn get_report(
-    State(app): State<App>,
-    Path(id): Path<String>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-) -> Answer {
-    let offers = Offer::reports();
-    products::get_offered(&app, KIND, &id, query.as_deref(), &headers, &offers).await
-}
-
-/// A segmentation's file by name
-///
-/// `mask.nii.gz`, `mesh.glb` and the other formats, `report.json`, `report.html` (made when it is
-/// asked for), `slices.png` (three slices with the contour of the fit); of a ventricle also
-/// `polar.json`, `polar.svg` and `polar.png`.
-#[utoipa::path(get, path = "/v1/segmentations/{id}/{file}", tag = "segmentations",
-    params(("id" = String, Path, description = "The segmentation's id"),
-        ("file" = super::openapi::SegmentationFileName, Path, description = "The file's name"),
-        super::openapi::ConditionalHeaders),
-    responses(
-        super::openapi::SegmentationFileAnswer,
-        super::openapi::DownloadAnswers, LookupProblems))]
-pub async fn get_file(
-    State(app): State<App>,
-    Path((id, name)): Path<(String, String)>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-) -> Answer {
-    products::get_file(&app, KIND, (&id, &name), query.as_deref(), &headers).await
+    let job = UploadJob {
+        makes: Resource::Segmentation,
+        apart: &["expert"],
+        offers: offers(),
+    };
+    filing::file_upload(&app, job, query.as_deref(), request).await
 }

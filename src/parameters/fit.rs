@@ -51,7 +51,7 @@ pub struct Place {
     /// A point in the cavity (or in the organ), LPS mm.
     pub centre: Option<Vec3>,
     /// A voxel there.
-    pub seed: Option<[usize; 3]>,
+    pub seed_point: Option<[usize; 3]>,
     /// Base to apex, LPS, any length.
     pub axis: Option<Vec3>,
     /// First and last voxel of the box that holds the organ's centre.
@@ -63,14 +63,11 @@ impl Parameters for FitParameters {
 
     const SPECS: &'static [ParameterSpec<Self>] = FIT_SPECS;
 
-    const ALIASES: &'static [(&'static str, &'static str)] = &[
-        ("template", "model"),
-        ("centre", "center"),
-        ("seed", "seed_point"),
-    ];
+    const ALIASES: &'static [(&'static str, &'static str)] =
+        &[("template", "model"), ("centre", "center")];
 
     fn finish(parameters: Self) -> Result<Self, ParameterError> {
-        if parameters.place.centre.is_some() && parameters.place.seed.is_some() {
+        if parameters.place.centre.is_some() && parameters.place.seed_point.is_some() {
             return Err(ParameterError {
                 field: "seed_point".into(),
                 message: "`center` and `seed_point` both say where the organ is".into(),
@@ -116,7 +113,7 @@ impl Place {
                 return Err(outside("center", volume));
             }
         }
-        if self.seed.is_some_and(|seed| !inside(&seed)) {
+        if self.seed_point.is_some_and(|voxel| !inside(&voxel)) {
             return Err(outside("seed_point", volume));
         }
         if self.region.is_some_and(|[_, last]| !inside(&last)) {
@@ -127,7 +124,7 @@ impl Place {
             Aabb::of(&[0, 1, 2, 3, 4, 5, 6, 7].map(corner))
         });
         Ok(Hints {
-            centre: self.centre.or(self.seed.map(place)),
+            centre: self.centre.or(self.seed_point.map(place)),
             axis: self.axis,
             region: corners,
         })
@@ -251,14 +248,17 @@ mod tests {
         assert!(refusal(&[("modell", "auto")]).fix.contains("`model`"));
         assert!(refusal(&[("model", "lv.json")]).fix.contains("mdl_"));
         assert!(refusal(&[("expert", "auto")]).fix.contains("vol_"));
-        let both = refusal(&[("center", "1,2,3"), ("seed", "1,2,3")]);
+        let both = refusal(&[("center", "1,2,3"), ("seed_point", "1,2,3")]);
         assert_eq!(both.field, "seed_point");
+        // `seed` is the random seed of a model; a fit has none.
+        let seed = refusal(&[("seed", "1,2,3")]);
+        assert!(seed.fix.contains("`seed_point`"), "{}", seed.fix);
     }
 
     #[test]
     fn hints_are_millimetres_within_the_volume() {
         let hinted = |list: &[(&str, &str)]| pairs(list).unwrap().on(&volume(), 2.5);
-        let seeded = hinted(&[("seed", "0,0,0")]).unwrap();
+        let seeded = hinted(&[("seed_point", "0,0,0")]).unwrap();
         assert_eq!(seeded.hints.centre, Some(Vec3::new(-9.0, -19.0, -29.0)));
         assert_eq!(seeded.margin, 2.5);
         let boxed = hinted(&[("box", "0,1,2,3,4,5"), ("margin", "0")]).unwrap();

@@ -84,14 +84,13 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         name: "seed_point",
         kind: Kind::Integers { count: 3 },
         default: "",
-        summary: "Voxel i,j,k (counted from 0) in the cavity, in place of center. Also understood \
-                  as seed",
+        summary: "Voxel i,j,k (counted from 0) in the cavity; use this or center",
         read: |d, v| {
             let list = v.indices()?;
-            d.place.seed = Some([list[0], list[1], list[2]]);
+            d.place.seed_point = Some([list[0], list[1], list[2]]);
             Ok(())
         },
-        write: |p| json!(p.place.seed),
+        write: |p| json!(p.place.seed_point),
     },
     ParameterSpec {
         name: "axis",

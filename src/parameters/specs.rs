@@ -30,7 +30,7 @@ pub const SPECS: &[ParameterSpec] = &[
             max: u64::MAX,
         },
         default: "1",
-        summary: "Seed of every random choice; same seed, same bytes",
+        summary: "Seed of the random numbers; the same seed gives the same bytes",
         read: |d, v| {
             d.retile.seed = v.u64();
             Ok(())

@@ -3,7 +3,7 @@
 use crate::helpers::{TestApp, text};
 use serde_json::Value;
 use std::path::Path;
-use ventriform::http::openapi::document_json;
+use ventriform::http::document_json;
 use ventriform::parameters::{FIT_SPECS, SPECS};
 
 /// If set, the test writes the document instead of comparing it.

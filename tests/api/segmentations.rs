@@ -217,7 +217,8 @@ async fn invalid_fit_parameters_are_rejected_with_the_field() {
         ("blur=-1", "blur", "0 to 10"),
         ("organ=heart", "organ", "left_ventricle"),
         ("box=5,5,5,1,1,1", "box", "whole numbers"),
-        ("center=1,2,3&seed=1,2,3", "seed_point", "not both"),
+        ("center=1,2,3&seed_point=1,2,3", "seed_point", "not both"),
+        ("seed=1,2,3", "seed", "`seed_point`"),
         ("template=auto&model=auto", "model", ""),
         ("expert=auto", "expert", "vol_"),
     ] {

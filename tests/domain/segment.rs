@@ -154,8 +154,14 @@ fn what_cannot_be_done_is_refused_with_field_and_way_out() {
         ),
         (format!("{segment} --center nan,0,0"), "3 finite numbers"),
         (format!("{segment} --center 900,0,0"), "64 x 64 x 64 voxels"),
-        (format!("{segment} --seed 64,0,0"), "outside the volume"),
-        (format!("{segment} --center 0,0,0 --seed 1,1,1"), "not both"),
+        (
+            format!("{segment} --seed-point 64,0,0"),
+            "outside the volume",
+        ),
+        (
+            format!("{segment} --center 0,0,0 --seed-point 1,1,1"),
+            "not both",
+        ),
         (format!("{segment} --margin inf"), "-5 to 5"),
         (format!("{segment} --blur 11"), "0 to 10"),
         (format!("{segment} --organ liver"), "no model of a liver"),

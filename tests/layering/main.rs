@@ -15,7 +15,8 @@ const USES: &[(&str, &[&str])] = &[];
 /// no database, no runtime, no terminal.
 const SERVICE_CRATES: &[&str] = &[
     "axum",
-    "axum_server",
+    "hyper",
+    "hyper_util",
     "tokio",
     "tokio_util",
     "tower",

@@ -1,33 +1,34 @@
-//! `/v1/jobs`: what was asked for and how far it is.
+//! `/v1/jobs`: jobs are filed, followed, cancelled and erased.
 
-pub mod order;
-mod wire;
+pub mod events;
+pub mod filing;
 
-pub use wire::{Job, describe};
+mod body;
+
+pub use body::{JobBody, describe};
 
 use super::app::App;
 use super::idempotency;
-use super::openapi::{ListProblems, LookupProblems};
+use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
 use super::pagination::{list_query, next_cursor};
+use super::problem::not_found::missing;
 use super::problem::{Answer, Problem, shorten};
-use super::request::{self, Path, query_pairs, refuse_unknown, unknown};
-use super::wire::missing;
-use crate::jobs::{self, Deleted, Interrupted, JobState, NewJob, Resource};
+use super::request::{PathSegments, json_object, query_pairs, refuse_unknown, unknown};
+use crate::jobs::{Deleted, Interrupted, Job, JobState, NewJob, Resource};
 use axum::Json;
 use axum::extract::{RawQuery, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
-use order::wrong;
+use body::JobStateName;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
-use wire::JobStateName;
 
 /// A page of jobs.
 #[derive(Serialize, ToSchema)]
 pub struct JobList {
     /// The jobs, newest first.
-    jobs: Vec<Job>,
+    jobs: Vec<JobBody>,
     /// `cursor` of the next page; absent on the last.
     #[serde(skip_serializing_if = "Option::is_none")]
     next_cursor: Option<String>,
@@ -35,16 +36,16 @@ pub struct JobList {
 
 /// File a job
 ///
-/// The job is on the disk before the answer is on its way. With an `Idempotency-Key`, the same
-/// request again gives the same job.
+/// The job is stored on disk before the service answers. With an `Idempotency-Key`, repeating the
+/// request returns the same job.
 #[utoipa::path(post, path = "/v1/jobs", tag = "jobs",
-    request_body(content = super::openapi::JobRequest, content_type = "application/json"),
-    params(super::openapi::IdempotencyHeader),
+    request_body(content = openapi::JobRequest, content_type = "application/json"),
+    params(openapi::IdempotencyHeader),
     responses(
-        (status = 202, description = "Accepted", body = Job, headers(
+        (status = 202, description = "Accepted", body = JobBody, headers(
             ("Location" = String, description = "The job's path"),
-            ("Retry-After" = u64, description = "Seconds after which to look again"))),
-        super::openapi::FileProblems,
+            ("Retry-After" = u64, description = "Seconds to wait before asking for its state"))),
+        FileProblems,
     ))]
 pub async fn create_job(
     State(app): State<App>,
@@ -53,10 +54,10 @@ pub async fn create_job(
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let key = idempotency::key(request.headers())?;
-    let object = request::json_object(&app, request).await?;
+    let object = json_object(request).await?;
     let job = read_job(&app, &object, key)?;
-    let job = order::file(&app, &job).await?;
-    order::accepted(&app, job).await
+    let job = filing::file(&app, &job).await?;
+    filing::accepted(&app, job).await
 }
 
 const FIELDS: [&str; 3] = ["kind", "volume", "parameters"];
@@ -68,39 +69,46 @@ fn read_job(app: &App, object: &Map<String, Value>, key: Option<String>) -> Answ
     let kind = text(object, "kind")?.unwrap_or("model");
     let Some(work) = app.engine.work(kind) else {
         let kinds: Vec<_> = app.engine.works.iter().map(|w| w.makes().noun()).collect();
-        return Err(wrong(
+        return Err(Problem::invalid_field(
             "kind",
             format!("There is no kind of job `{}`.", shorten(kind)),
         )
         .fix(format!("Known kinds: {}.", kinds.join(", "))));
     };
     let volume = text(object, "volume")?
-        .ok_or_else(|| wrong("volume", "`volume` is missing.").fix("Give the id of a volume."))?;
+        .ok_or_else(|| Problem::invalid_field("volume", "`volume` is missing."))
+        .map_err(|problem| problem.fix("Give the id of a stored volume."))?;
     let empty = Map::new();
     let parameters = match object.get("parameters") {
         None => &empty,
         Some(Value::Object(parameters)) => parameters,
         Some(_) => {
-            return Err(wrong("parameters", "`parameters` is no object.")
-                .fix("Give an object such as {\"points\": 150}."));
+            return Err(Problem::invalid_field(
+                "parameters",
+                "`parameters` must be a JSON object.",
+            )
+            .fix("Give an object such as {\"points\": 150}."));
         }
     };
     let parameters = work.parameters_from_json(parameters)?;
-    Ok(order::new_job(&**work, volume.to_owned(), parameters, key))
+    Ok(filing::new_job(&**work, volume.to_owned(), parameters, key))
 }
 
 fn text<'a>(object: &'a Map<String, Value>, name: &str) -> Answer<Option<&'a str>> {
     match object.get(name) {
         None => Ok(None),
         Some(Value::String(text)) => Ok(Some(text)),
-        Some(_) => Err(wrong(name, format!("`{name}` is no text.")).fix("Give a string.")),
+        Some(_) => Err(
+            Problem::invalid_field(name, format!("`{name}` must be a string."))
+                .fix("Give a JSON string."),
+        ),
     }
 }
 
 /// List jobs
 #[utoipa::path(get, path = "/v1/jobs", tag = "jobs",
-    params(super::openapi::PageParameters,
-        ("state" = Option<JobStateName>, Query, description = "Only jobs of this state")),
+    params(openapi::PageParameters,
+        ("state" = Option<JobStateName>, Query, description = "Only jobs in this state")),
     responses((status = 200, description = "A page, newest first", body = JobList), ListProblems))]
 pub async fn list_jobs(State(app): State<App>, RawQuery(query): RawQuery) -> Answer<Json<JobList>> {
     let (page, [state]) = list_query(query.as_deref(), ["state"])?;
@@ -128,13 +136,13 @@ fn parse_state(name: &str) -> Answer<JobState> {
     })
 }
 
-/// State of a job
+/// Show a job
 #[utoipa::path(get, path = "/v1/jobs/{id}", tag = "jobs",
     params(("id" = String, Path, description = "The job's id")),
-    responses((status = 200, description = "The job", body = Job), LookupProblems))]
+    responses((status = 200, description = "The job", body = JobBody), LookupProblems))]
 pub async fn get_job(
     State(app): State<App>,
-    Path(id): Path<String>,
+    PathSegments(id): PathSegments<String>,
     RawQuery(query): RawQuery,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
@@ -150,20 +158,20 @@ pub async fn get_job(
     Ok((headers, Json(describe(&app, job).await?)).into_response())
 }
 
-/// End or erase a job
+/// Cancel or erase a job
 ///
-/// A job that waits is cancelled at once; one that runs is asked to stop and does so within
-/// 100 ms; one that has ended is erased, what it made stays.
+/// A waiting job is cancelled at once; a running job is asked to stop and does so within 100 ms; a
+/// finished job is erased, but its result stays.
 #[utoipa::path(delete, path = "/v1/jobs/{id}", tag = "jobs",
     params(("id" = String, Path, description = "The job's id")),
     responses(
-        (status = 200, description = "It waited and is cancelled", body = Job),
-        (status = 202, description = "It runs and is asked to stop", body = Job),
-        (status = 204, description = "It had ended and is erased"),
+        (status = 200, description = "It was waiting and is cancelled", body = JobBody),
+        (status = 202, description = "It is running and was asked to stop", body = JobBody),
+        (status = 204, description = "It was finished and is erased"),
         LookupProblems))]
 pub async fn delete_job(
     State(app): State<App>,
-    Path(id): Path<String>,
+    PathSegments(id): PathSegments<String>,
     RawQuery(query): RawQuery,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
@@ -183,8 +191,8 @@ pub async fn delete_job(
     Ok((status, Json(describe(&app, job).await?)).into_response())
 }
 
-/// The job of that id, or why there is none.
-pub async fn find(app: &App, id: &str) -> Answer<jobs::Job> {
+/// The job of that id, or the 404 or 410 that says why there is none.
+pub async fn find(app: &App, id: &str) -> Answer<Job> {
     match app.queue.jobs.job(id).await? {
         Some(job) => Ok(job),
         None => Err(missing(&*app.queue.catalogue, Resource::Job, id).await),

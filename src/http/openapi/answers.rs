@@ -1,12 +1,15 @@
-//! Answers that several handlers share.
+//! Answers and problems that several handlers share.
 
 use crate::export::Format;
 use crate::http::problem::{MEDIA_TYPE, ProblemBody};
 use std::collections::BTreeMap;
 use utoipa::openapi::header::HeaderBuilder;
-use utoipa::openapi::schema::{ObjectBuilder, Schema, Type};
+use utoipa::openapi::schema::{Object, ObjectBuilder, Schema, Type};
 use utoipa::openapi::{Content, ContentBuilder, Ref, RefOr, Response, ResponseBuilder};
 use utoipa::{IntoResponses, ToSchema};
+
+/// The schema of a job, which the handlers register.
+const JOB: &str = "Job";
 
 type Responses = BTreeMap<String, RefOr<Response>>;
 
@@ -19,7 +22,7 @@ fn problem(status: u16, description: &str) -> (String, RefOr<Response>) {
     (status.to_string(), response.into())
 }
 
-/// Makes types that document the problems of a group of handlers.
+/// Declares types that document the problems of a group of handlers.
 macro_rules! problems {
     ($($(#[doc = $doc:literal])+ $name:ident { $($status:literal: $description:literal,)+ })+) => {$(
         $(#[doc = $doc])+
@@ -34,44 +37,44 @@ macro_rules! problems {
 }
 
 problems! {
-    /// Of everything that lists.
+    /// Problems of lists.
     ListProblems {
         400: "A query parameter is unknown, repeated or out of range",
         500: "The service met an error of its own",
     }
-    /// Of everything that looks something up by id.
+    /// Problems of looking something up by its id.
     LookupProblems {
         400: "A query parameter is unknown, or an id or header cannot be read",
-        404: "There is no such thing",
+        404: "There is nothing with this id or name",
         410: "It was erased",
         500: "The service met an error of its own",
     }
-    /// Of everything that erases what jobs may need.
+    /// Problems of erasing what a job may need.
     EraseProblems {
-        409: "A job that has not ended needs it",
+        409: "An unfinished job needs it",
     }
-    /// Of everything that takes a file.
+    /// Problems of uploads.
     UploadProblems {
-        400: "The body is empty, malformed or broke off, or a query parameter is unknown",
+        400: "The body is empty or malformed or broke off, or a query parameter is unknown",
         408: "The body did not arrive in time",
         413: "The body, or the volume in it, is larger than the operator allows",
-        415: "The body is of a type or encoding that is not understood",
-        422: "The body is no volume that can be used, or a parameter is invalid",
+        415: "The body has a type or encoding that this path does not read",
+        422: "The body is not a usable file, or a parameter is invalid",
         500: "The service met an error of its own",
     }
-    /// Of everything that files a job.
+    /// Problems of filing a job.
     FileProblems {
         400: "The request cannot be read",
         408: "The body did not arrive in time",
         413: "The body is larger than the operator allows",
-        415: "The body is of a type or encoding that is not understood",
+        415: "The body has a type or encoding that this path does not read",
         422: "A field or parameter is invalid, or the idempotency key was used for another request",
-        429: "As many jobs wait as may wait; nothing was accepted",
+        429: "The queue is full; the job was not accepted",
         500: "The service met an error of its own",
     }
 }
 
-/// 304, 206, 406 and 416 of downloads.
+/// 206, 304, 406 and 416 of downloads.
 pub struct DownloadAnswers;
 
 impl IntoResponses for DownloadAnswers {
@@ -79,12 +82,43 @@ impl IntoResponses for DownloadAnswers {
         let part = ResponseBuilder::new()
             .description("The part that `Range` asks for")
             .content("*/*", Content::new(Some(binary())));
-        let unchanged = ResponseBuilder::new().description("The validator still holds");
+        let unchanged = ResponseBuilder::new().description("The client's copy is still current");
         [
             ("206".to_owned(), part.build().into()),
             ("304".to_owned(), unchanged.build().into()),
-            problem(406, "`Accept` names none of the formats"),
+            problem(406, "`Accept` allows none of the formats"),
             problem(416, "`Range` lies outside the file"),
+        ]
+        .into()
+    }
+}
+
+/// 202, 406 and 409 of requests that upload a volume and may wait for the result.
+pub struct WaitAnswers;
+
+impl IntoResponses for WaitAnswers {
+    fn responses() -> Responses {
+        let header = |kind: Type, description: &str| {
+            HeaderBuilder::new()
+                .schema(Some(Object::with_type(kind)))
+                .description(Some(description))
+                .build()
+        };
+        let accepted = ResponseBuilder::new()
+            .description("Accepted")
+            .content(
+                "application/json",
+                Content::new(Some(Ref::from_schema_name(JOB))),
+            )
+            .header("Location", header(Type::String, "The job's path"))
+            .header(
+                "Retry-After",
+                header(Type::Integer, "Seconds to wait before asking for its state"),
+            );
+        [
+            ("202".to_owned(), accepted.build().into()),
+            problem(406, "`Accept` allows none of the formats of the result"),
+            problem(409, "The job was cancelled while this request waited"),
         ]
         .into()
     }
@@ -108,7 +142,7 @@ impl IntoResponses for ReportAnswer {
     }
 }
 
-/// 200 with what a segmentation can be had as.
+/// 200 with the mask, mesh or report of a segmentation.
 pub struct SegmentationAnswer;
 
 impl IntoResponses for SegmentationAnswer {
@@ -135,9 +169,9 @@ impl IntoResponses for SegmentationFileAnswer {
 }
 
 /// 200 with any of a model's files.
-pub struct FileAnswer;
+pub struct ModelFileAnswer;
 
-impl IntoResponses for FileAnswer {
+impl IntoResponses for ModelFileAnswer {
     fn responses() -> Responses {
         let mut contents = mesh_contents();
         contents.extend(report_contents());
@@ -145,7 +179,7 @@ impl IntoResponses for FileAnswer {
     }
 }
 
-/// 200 with a job's changes: what each event of the stream is.
+/// 200 with a job's changes; the schema is that of one event.
 pub struct EventsAnswer;
 
 impl IntoResponses for EventsAnswer {
@@ -153,7 +187,7 @@ impl IntoResponses for EventsAnswer {
         let text = || ObjectBuilder::new().schema_type(Type::String);
         let job = text()
             .content_media_type("application/json")
-            .content_schema(Some(Ref::from_schema_name("Job")));
+            .content_schema(Some(Ref::from_schema_name(JOB)));
         let event = ObjectBuilder::new()
             .property("id", text())
             .property("event", text().enum_values(Some(["job"])))
@@ -228,7 +262,7 @@ fn object() -> Schema {
     ObjectBuilder::new().schema_type(Type::Object).into()
 }
 
-/// Bytes: OpenAPI 3.1 says so by saying nothing of their form.
+/// Bytes. OpenAPI 3.1 expresses them by a schema without a type.
 fn binary() -> Schema {
     ObjectBuilder::new()
         .schema_type(utoipa::openapi::schema::SchemaType::AnyValue)

@@ -1,6 +1,6 @@
-//! Bodies that the handlers read piece by piece, so that no type of theirs describes them.
+//! Request bodies that the handlers read piece by piece, so that no Rust type describes them.
 
-use super::inputs::{ModelParameters, SegmentationParameters};
+use super::inputs::{ModelParametersObject, SegmentationParametersObject};
 use serde_json::json;
 use std::borrow::Cow;
 use utoipa::openapi::schema::{
@@ -10,7 +10,7 @@ use utoipa::openapi::schema::{
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 
-/// A job to be filed, as `create_job` reads it field by field.
+/// A job to be filed; `create_job` reads it field by field.
 pub struct JobRequest;
 
 impl ToSchema for JobRequest {
@@ -19,10 +19,13 @@ impl ToSchema for JobRequest {
     }
 
     fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
-        schemas.push((ModelParameters::name().into(), ModelParameters::schema()));
         schemas.push((
-            SegmentationParameters::name().into(),
-            SegmentationParameters::schema(),
+            ModelParametersObject::name().into(),
+            ModelParametersObject::schema(),
+        ));
+        schemas.push((
+            SegmentationParametersObject::name().into(),
+            SegmentationParametersObject::schema(),
         ));
     }
 }
@@ -31,7 +34,7 @@ impl PartialSchema for JobRequest {
     fn schema() -> RefOr<Schema> {
         let text = || ObjectBuilder::new().schema_type(Type::String);
         let kind = text()
-            .description(Some("What kind of work it is"))
+            .description(Some("The kind of work"))
             .enum_values(Some(["model", "segmentation"]))
             .default(Some(json!("model")));
         let volume = text()
@@ -39,8 +42,8 @@ impl PartialSchema for JobRequest {
             .examples(["vol_9f86d081884c7d659a2feaa0c55ad015"]);
         let parameters = AnyOfBuilder::new()
             .description(Some("The parameters of that kind of work"))
-            .item(Ref::from_schema_name(ModelParameters::name()))
-            .item(Ref::from_schema_name(SegmentationParameters::name()));
+            .item(Ref::from_schema_name(ModelParametersObject::name()))
+            .item(Ref::from_schema_name(SegmentationParametersObject::name()));
         let object = ObjectBuilder::new()
             .property("kind", Schema::from(kind))
             .property("volume", Schema::from(volume))
@@ -59,7 +62,7 @@ fn file(description: &str) -> ObjectBuilder {
         .description(Some(description))
 }
 
-/// A form with the volume as file part.
+/// A form whose files are a volume.
 pub struct UploadForm;
 
 impl ToSchema for UploadForm {
@@ -70,7 +73,7 @@ impl ToSchema for UploadForm {
 
 impl PartialSchema for UploadForm {
     fn schema() -> RefOr<Schema> {
-        let file = file("The volume; several parts make up one: a .hdr/.img pair, a DICOM series");
+        let file = file("The volume; several files make up one: a .hdr/.img pair, a DICOM series");
         let form = ObjectBuilder::new()
             .property("file", file)
             .required("file")
@@ -91,7 +94,7 @@ impl ToSchema for SegmentationForm {
 impl PartialSchema for SegmentationForm {
     fn schema() -> RefOr<Schema> {
         let form = ObjectBuilder::new()
-            .property("volume", file("The volume; several parts make up one"))
+            .property("volume", file("The volume; several files make up one"))
             .property(
                 "expert",
                 file("An expert's mask (above 0.5) to measure against"),
@@ -102,7 +105,7 @@ impl PartialSchema for SegmentationForm {
     }
 }
 
-/// A mesh as `mesh.json` has it.
+/// A mesh, as in `mesh.json`.
 pub struct MeshDocument;
 
 impl ToSchema for MeshDocument {
@@ -135,7 +138,7 @@ impl PartialSchema for MeshDocument {
                 "triangles",
                 triples(
                     Type::Integer,
-                    "Places of three vertices each, counter-clockwise seen from outside",
+                    "Indices of three vertices each, counter-clockwise seen from outside",
                 ),
             )
             .required("vertices")

@@ -1,8 +1,8 @@
-//! Parameters and bodies that several handlers share, and those that come from tables.
+//! Parameters that several handlers share, and those that come from the tables of parameters.
 
-use crate::export::Format;
-use crate::jobs::Resource;
-use crate::parameters::{self, FIT_SPECS, Kind, ParameterSpec, Parameters};
+use crate::parameters::{
+    FIT_SPECS, FitParameters, Kind, ModelParameters, ParameterSpec, Parameters,
+};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use utoipa::openapi::path::{Parameter, ParameterBuilder, ParameterIn, ParameterStyle};
@@ -12,22 +12,22 @@ use utoipa::openapi::schema::{
 use utoipa::openapi::{RefOr, Required};
 use utoipa::{IntoParams, PartialSchema, ToSchema};
 
-/// Makes two types that document a table of parameters: as a JSON object, and as query
+/// Declares two types that document a table of parameters: as a JSON object, and as query
 /// parameters.
 macro_rules! parameters {
-    ($object:ident, $query:ident, $table:ty, $what:literal) => {
+    ($object:ident, $name:literal, $query:ident, $table:ty, $what:literal) => {
         #[doc = concat!("Parameters of a ", $what, " as a JSON object.")]
         pub struct $object;
 
         impl ToSchema for $object {
             fn name() -> Cow<'static, str> {
-                stringify!($object).into()
+                $name.into()
             }
         }
 
         impl PartialSchema for $object {
             fn schema() -> RefOr<Schema> {
-                object_of::<$table>(concat!("What decides a ", $what))
+                object_of::<$table>(concat!("The parameters of a ", $what))
             }
         }
 
@@ -43,15 +43,17 @@ macro_rules! parameters {
 }
 
 parameters!(
-    ModelParameters,
+    ModelParametersObject,
+    "ModelParameters",
     ModelQuery,
-    parameters::ModelParameters,
+    ModelParameters,
     "model"
 );
 parameters!(
-    SegmentationParameters,
+    SegmentationParametersObject,
+    "SegmentationParameters",
     SegmentationQuery,
-    parameters::FitParameters,
+    FitParameters,
     "segmentation"
 );
 
@@ -72,7 +74,7 @@ fn query_of<P: Parameters>() -> Vec<Parameter> {
         .map(|spec| {
             let mut parameter = query(spec.name, spec.summary).schema(Some(schema_of(spec)));
             if let Kind::Integers { .. } | Kind::Numbers { .. } = spec.kind {
-                // `1,2,3` in one, not repeated.
+                // One value `1,2,3`, not the parameter repeated.
                 parameter = parameter
                     .style(Some(ParameterStyle::Form))
                     .explode(Some(false));
@@ -164,10 +166,10 @@ impl IntoParams for PageParameters {
             .schema_type(Type::String)
             .pattern(Some("^[1-9][0-9]{0,17}$"));
         vec![
-            query("limit", "Most entries of the page")
+            query("limit", "Greatest number of entries of the page")
                 .schema(Some(Schema::from(limit)))
                 .build(),
-            query("cursor", "`next_cursor` of the page before")
+            query("cursor", "`next_cursor` of the previous page")
                 .schema(Some(Schema::from(cursor)))
                 .build(),
         ]
@@ -199,7 +201,7 @@ impl IntoParams for IdempotencyHeader {
     fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
         let mut key = header(
             "Idempotency-Key",
-            "A random text: the same request under the same key is done once",
+            "A random text. Repeating a request under the same key returns the first job",
         );
         key.schema = Some(
             Schema::from(
@@ -220,12 +222,27 @@ pub struct EventHeader;
 
 impl IntoParams for EventHeader {
     fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        let mut revision = header("Last-Event-ID", "Revision of the job seen last");
+        let mut revision = header(
+            "Last-Event-ID",
+            "The revision of the job that the client received last",
+        );
         let schema = ObjectBuilder::new()
             .schema_type(Type::Integer)
             .minimum(Some(0));
         revision.schema = Some(Schema::from(schema).into());
         vec![revision]
+    }
+}
+
+/// `Prefer`.
+pub struct PreferHeader;
+
+impl IntoParams for PreferHeader {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        vec![header(
+            "Prefer",
+            "`wait=SECONDS`: how long to wait for the result",
+        )]
     }
 }
 
@@ -235,59 +252,18 @@ pub struct ConditionalHeaders;
 impl IntoParams for ConditionalHeaders {
     fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
         vec![
-            header("If-None-Match", "Validators at hand; 304 where one holds"),
+            header(
+                "If-None-Match",
+                "Validators (`ETag`) of the client's copies; 304 if one is current",
+            ),
             header("Range", "`bytes=FIRST-LAST`: a part of the file"),
-            header("If-Range", "The validator under which `Range` makes sense"),
+            header(
+                "If-Range",
+                "Apply `Range` only if this validator is current, else send the whole file",
+            ),
         ]
     }
 }
-
-/// Names of the files that a product of that kind may have.
-pub fn file_names(resource: Resource) -> Vec<String> {
-    let meshes = Format::ALL.map(|format| format!("mesh.{}", format.extension()));
-    let others: &[&str] = match resource {
-        Resource::Model => &["report.json", "report.html", "distance.json"],
-        Resource::Segmentation => &[
-            "mask.nii.gz",
-            "report.json",
-            "report.html",
-            "slices.png",
-            "polar.json",
-            "polar.svg",
-            "polar.png",
-        ],
-        _ => &[],
-    };
-    let others = others.iter().map(|name| (*name).to_owned());
-    meshes.into_iter().chain(others).collect()
-}
-
-/// Makes types that document the file names of a kind of product.
-macro_rules! file_names {
-    ($($name:ident: $resource:ident),+) => {$(
-        #[doc = concat!("The files of a ", stringify!($resource), ".")]
-        pub struct $name;
-
-        impl ToSchema for $name {
-            fn name() -> Cow<'static, str> {
-                stringify!($name).into()
-            }
-        }
-
-        impl PartialSchema for $name {
-            fn schema() -> RefOr<Schema> {
-                Schema::from(
-                    ObjectBuilder::new()
-                        .schema_type(Type::String)
-                        .enum_values(Some(file_names(Resource::$resource))),
-                )
-                .into()
-            }
-        }
-    )+};
-}
-
-file_names!(FileName: Model, SegmentationFileName: Segmentation, TemplateFileName: Template);
 
 /// `name`, `organ` and `model` of a template.
 pub struct TemplateQuery;
@@ -298,8 +274,12 @@ impl IntoParams for TemplateQuery {
         let name = text().min_length(Some(1)).max_length(Some(80));
         let model = text().pattern(Some("^(mdl_|seg_)[0-9a-f]{1,64}$"));
         let own = [
-            ("name", "Name in reports", name),
-            ("model", "Stored model or segmentation to copy", model),
+            ("name", "The name that reports show", name),
+            (
+                "model",
+                "The stored model or segmentation whose mesh is copied",
+                model,
+            ),
         ]
         .map(|(name, summary, schema)| {
             let schema = Schema::from(schema);
@@ -308,7 +288,7 @@ impl IntoParams for TemplateQuery {
         let organ = FIT_SPECS.iter().filter(|spec| spec.name == "organ");
         organ
             .map(|spec| {
-                query(spec.name, "What it shows")
+                query(spec.name, "The organ that the model shows")
                     .schema(Some(schema_of(spec)))
                     .build()
             })

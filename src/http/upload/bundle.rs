@@ -1,23 +1,23 @@
-//! Files that arrived and make up one volume.
+//! The received files of one volume, before they are published.
 
 use crate::http::app::App;
 use crate::http::problem::{Answer, Problem};
-use crate::jobs::{BlobError, Resource, StagedFiles, StoredVolume};
+use crate::jobs::{BlobError, Resource, StagedFiles, StoredVolume, hex};
 use axum::body::Bytes;
 use futures::{Stream, StreamExt};
 use sha2::{Digest, Sha256};
 use tokio::io::AsyncWriteExt;
 
-/// Bytes gathered before one write.
+/// Bytes gathered for one write.
 const WRITE_BYTES: usize = 1 << 20;
 
-/// The files of one volume, which nobody can see yet.
+/// The files of one volume, which are not published yet.
 pub struct Bundle {
     staged: Box<dyn StagedFiles>,
     files: Vec<Received>,
 }
 
-/// One file.
+/// One received file.
 pub struct Received {
     name: String,
     kind: &'static str,
@@ -26,30 +26,25 @@ pub struct Received {
 }
 
 impl Received {
-    /// Takes the sender's name for the file into account.
+    /// Uses the extension of the client's name for the file where the content does not tell.
     pub fn known_as(&mut self, given: &str) {
         self.kind = kind_by_name(given).unwrap_or(self.kind);
     }
 }
 
-/// Writes a stream to a file, hashing it. Forced to the disk when it is published.
-async fn receive<E>(
-    mut pieces: impl Stream<Item = Result<Bytes, E>> + Unpin,
+/// Writes a stream to a file and hashes it on the way. Publishing forces the file to the disk.
+async fn receive(
+    mut pieces: impl Stream<Item = Answer<Bytes>> + Unpin,
     staged: &dyn StagedFiles,
     name: &str,
-    broken: impl FnOnce() -> Problem,
 ) -> Answer<Received> {
     let mut file = staged.create(name).await?;
     let mut hash = Sha256::new();
     let mut waiting = Vec::with_capacity(64 << 10);
     let mut head = Vec::new();
     let mut bytes = 0;
-    loop {
-        let piece = match pieces.next().await {
-            Some(Ok(piece)) => piece,
-            Some(Err(_)) => return Err(broken()),
-            None => break,
-        };
+    while let Some(piece) = pieces.next().await {
+        let piece = piece?;
         hash.update(&piece);
         bytes += piece.len() as u64;
         if head.len() < 132 {
@@ -71,7 +66,7 @@ async fn receive<E>(
     })
 }
 
-/// The extension that the first bytes speak for.
+/// The extension that the first bytes of the content imply.
 fn kind_by_content(head: &[u8]) -> &'static str {
     match head {
         [0x1f, 0x8b, ..] => "nii.gz",
@@ -80,7 +75,7 @@ fn kind_by_content(head: &[u8]) -> &'static str {
     }
 }
 
-/// The two extensions that only a name can tell apart.
+/// `hdr` or `img`, which only the file's name can tell apart.
 fn kind_by_name(name: &str) -> Option<&'static str> {
     ["hdr.gz", "img.gz", "hdr", "img"]
         .into_iter()
@@ -88,7 +83,7 @@ fn kind_by_name(name: &str) -> Option<&'static str> {
 }
 
 impl Bundle {
-    /// A bundle without files.
+    /// An empty bundle.
     pub async fn new(app: &App) -> Answer<Self> {
         Ok(Self {
             staged: app.queue.blobs.stage().await?,
@@ -101,25 +96,27 @@ impl Bundle {
         self.files.iter().all(|file| file.bytes == 0)
     }
 
-    /// Adds a file; `broken` says why where its stream breaks off.
-    pub async fn write<E>(
+    /// Adds a file.
+    ///
+    /// # Errors
+    /// The problem in the stream, or 500 if the file cannot be written.
+    pub async fn write(
         &mut self,
-        pieces: impl Stream<Item = Result<Bytes, E>> + Unpin,
-        broken: impl FnOnce() -> Problem,
+        pieces: impl Stream<Item = Answer<Bytes>> + Unpin,
     ) -> Answer<&mut Received> {
         let name = self.files.len().to_string();
-        let file = receive(pieces, &*self.staged, &name, broken).await?;
+        let file = receive(pieces, &*self.staged, &name).await?;
         self.files.push(file);
         let last = self.files.len() - 1;
         Ok(&mut self.files[last])
     }
 
-    /// Reads the volume and stores it. Tells whether it is new.
+    /// Checks and stores the volume; also returns whether it is new.
     ///
     /// # Errors
-    /// 413 or 422 if the files are no volume that can be used.
+    /// 413 or 422 if the files are not a usable volume.
     pub async fn store(mut self, app: &App) -> Answer<(StoredVolume, bool)> {
-        // The order of parts carries no meaning, so it must not change the id.
+        // The order of the form's parts has no meaning, so it must not change the id.
         self.files
             .sort_by(|a, b| (a.kind, a.digest).cmp(&(b.kind, b.digest)));
         let id = self.volume_id();
@@ -131,13 +128,8 @@ impl Bundle {
         for name in &names {
             files.push(self.staged.local(name).await?);
         }
-        let facts = {
-            let _permit = app.inspections.acquire().await.map_err(Problem::internal)?;
-            let reader = app.engine.reader.clone();
-            tokio::task::spawn_blocking(move || reader.inspect(&files))
-                .await
-                .map_err(Problem::internal)??
-        };
+        let reader = app.engine.reader.clone();
+        let facts = app.decode(move || reader.inspect(&files)).await??;
         let volume = StoredVolume {
             sequence: 0,
             created_at: app.queue.clock.now(),
@@ -149,8 +141,8 @@ impl Bundle {
         Ok(app.queue.add_volume(volume, self.staged).await?)
     }
 
-    /// One file: its SHA-256, as `sha256sum` shows it, cut to 32 digits. Several: the same of
-    /// the list of kinds and hashes.
+    /// Of one file: the first 32 digits of its SHA-256. Of several: the same of the list of their
+    /// kinds and hashes.
     fn volume_id(&self) -> String {
         let prefix = Resource::Volume.prefix();
         if let [file] = &self.files[..] {
@@ -163,8 +155,8 @@ impl Bundle {
         format!("{prefix}{}", hex(&hash.finalize()[..16]))
     }
 
-    /// Gives the files the names they keep: `volume.hdr` and `volume.img` for a pair, else
-    /// numbers with the extension that the content speaks for.
+    /// Gives the files their final names: `volume` with its extension for one file or a pair, else
+    /// numbers with extensions.
     async fn name_files(&self) -> Result<Vec<String>, BlobError> {
         let pair = self.files.len() == 2
             && self.files[0].kind.starts_with("hdr")
@@ -180,8 +172,4 @@ impl Bundle {
         }
         Ok(names)
     }
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

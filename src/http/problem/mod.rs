@@ -1,18 +1,30 @@
-//! Errors as a client sees them: problem objects after RFC 9457.
+//! Errors as a client sees them: problem objects (RFC 9457).
 //!
-//! `type` is `urn:ventriform:problem:` and a word that never changes its meaning; programs
-//! decide by it. `detail` is for a person, `field` names the parameter or header concerned,
-//! `fix` says what to do. Inner causes are logged, not told.
+//! `type` is `urn:ventriform:problem:` followed by a word whose meaning never changes; programs
+//! decide by it. `detail` says what happened, `field` names the parameter, JSON field or header
+//! concerned, and `fix` says what to do. The cause of an internal error goes to the log and never
+//! to the client.
+//!
+//! | file | what it words |
+//! |---|---|
+//! | [`not_found`] | 404 and 410: unknown ids, files and paths; 422 for a field that names one |
+//! | [`body`] | 400, 408, 413 and 415: bodies that are empty, slow, large or of another type |
+//! | [`failure`] | errors of the domain and of the store |
 
-use crate::jobs::{BlobError, Failure, Fault, StoreError};
+pub mod body;
+pub mod not_found;
+
+mod failure;
+
+pub use failure::from_panic;
+
 use axum::Json;
-use axum::http::{HeaderName, HeaderValue, StatusCode, header};
+use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
-use std::any::Any;
 use utoipa::ToSchema;
 
-/// The media type of problems.
+/// The media type of problem objects.
 pub const MEDIA_TYPE: &str = "application/problem+json";
 
 const TYPE_PREFIX: &str = "urn:ventriform:problem:";
@@ -38,23 +50,23 @@ pub struct ProblemBody {
     /// What to do about it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fix: Option<String>,
-    /// The job that failed, where one did.
+    /// The job that failed, if there was one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub job: Option<String>,
 }
 
-/// A problem on its way to the client.
+/// A problem object together with the headers of its answer.
 #[derive(Debug, Clone)]
 pub struct Problem {
     body: Box<ProblemBody>,
     headers: Vec<(HeaderName, HeaderValue)>,
 }
 
-/// What a handler answers.
+/// What a handler returns.
 pub type Answer<T = Response> = Result<T, Problem>;
 
 impl Problem {
-    /// A problem of the kind `code`.
+    /// A problem whose `type` ends in `code`.
     pub fn new(status: StatusCode, code: &str, detail: impl Into<String>) -> Self {
         Self {
             body: Box::new(ProblemBody {
@@ -75,25 +87,20 @@ impl Problem {
         Self::new(StatusCode::BAD_REQUEST, code, detail)
     }
 
-    /// 404.
-    pub fn not_found(what: &str, id: &str) -> Self {
-        Self::new(
-            StatusCode::NOT_FOUND,
-            "not-found",
-            format!("There is no {what} `{}`.", shorten(id)),
-        )
-        .fix(format!("GET /v1/{what}s lists what there is."))
+    /// 422: the value of `field` cannot be used.
+    pub fn invalid_field(field: &str, detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid-field", detail).at(field)
     }
 
-    /// 500, with the cause in the log.
+    /// 500. The cause goes to the log only.
     pub fn internal(cause: impl std::fmt::Display) -> Self {
-        tracing::error!(%cause, "a request met an internal error");
+        tracing::error!(%cause, "internal error while answering a request");
         Self::new(
             StatusCode::INTERNAL_SERVER_ERROR,
             "internal",
-            "The service met an error of its own; it has been logged.",
+            "The service failed to answer because of an internal error, which has been logged.",
         )
-        .fix("Report it with the answer's x-request-id.")
+        .fix("Report it with the x-request-id of this answer.")
     }
 
     /// Names the field concerned.
@@ -117,7 +124,7 @@ impl Problem {
         self.header(header::LOCATION, format!("/v1/jobs/{id}"))
     }
 
-    /// Adds a header.
+    /// Adds a header to the answer.
     #[must_use]
     pub fn header(mut self, name: HeaderName, value: impl AsRef<str>) -> Self {
         if let Ok(value) = HeaderValue::from_str(value.as_ref()) {
@@ -126,10 +133,20 @@ impl Problem {
         self
     }
 
-    /// The body, for embedding into a job.
+    /// The body alone, to be embedded into a job.
     pub fn into_body(self) -> ProblemBody {
         *self.body
     }
+}
+
+/// 405, for paths that exist but do not take the method.
+pub async fn method_not_allowed(method: Method) -> Problem {
+    Problem::new(
+        StatusCode::METHOD_NOT_ALLOWED,
+        "method-not-allowed",
+        format!("This path does not support {method}."),
+    )
+    .fix("Use one of the methods in the Allow header.")
 }
 
 /// `unknown-parameter` -> `Unknown parameter`.
@@ -142,7 +159,7 @@ fn title(code: &str) -> String {
         .unwrap_or_default()
 }
 
-/// Text of a client, cut to a length that fits a message.
+/// A client's text, cut to 80 characters for use in a message.
 pub fn shorten(text: &str) -> String {
     match text.char_indices().nth(80) {
         Some((end, _)) => format!("{}...", &text[..end]),
@@ -161,35 +178,4 @@ impl IntoResponse for Problem {
         headers.extend(self.headers);
         response
     }
-}
-
-impl From<Failure> for Problem {
-    fn from(failure: Failure) -> Self {
-        let status = match failure.fault {
-            Fault::Request | Fault::Content => StatusCode::UNPROCESSABLE_ENTITY,
-            Fault::TooLarge => StatusCode::PAYLOAD_TOO_LARGE,
-            Fault::Service => StatusCode::INTERNAL_SERVER_ERROR,
-        };
-        let mut problem = Self::new(status, &failure.code, failure.detail);
-        problem.body.field = failure.field;
-        problem.body.fix = failure.fix;
-        problem
-    }
-}
-
-impl From<StoreError> for Problem {
-    fn from(error: StoreError) -> Self {
-        Self::internal(error)
-    }
-}
-
-impl From<BlobError> for Problem {
-    fn from(error: BlobError) -> Self {
-        Self::internal(error)
-    }
-}
-
-/// The answer where a handler panicked.
-pub fn from_panic(_: Box<dyn Any + Send + 'static>) -> Response {
-    Problem::internal("a handler panicked").into_response()
 }

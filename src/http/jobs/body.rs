@@ -1,50 +1,51 @@
-//! A job as a client sees it.
+//! A job as JSON.
 
 use crate::http::app::App;
 use crate::http::problem::{Answer, Problem, ProblemBody};
 use crate::http::wire::{path_of, rfc3339};
-use crate::jobs::{self, JobState, Resource};
+use crate::jobs::{Job, JobState, Resource};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 
-/// Work that was accepted.
+/// An accepted job.
 #[derive(Serialize, ToSchema)]
-pub struct Job {
+#[schema(as = Job)]
+pub struct JobBody {
     /// The job's id.
     #[schema(example = "job_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f")]
     id: String,
-    /// What kind of work it is.
+    /// The kind of work.
     #[schema(example = "model")]
     kind: String,
     /// The volume it works on.
     volume: String,
-    /// The parameters, every default written out.
+    /// The parameters, including every default.
     #[schema(value_type = Object)]
     parameters: Map<String, Value>,
-    /// Where it is in its life.
+    /// Its state.
     state: JobStateName,
-    /// The stage of the work, once one was reached.
+    /// The stage of the work, after the first one has begun.
     #[schema(example = "retile")]
     stage: Option<String>,
-    /// How much is done.
+    /// The share of the work that is done.
     #[schema(minimum = 0, maximum = 1)]
     progress: f64,
-    /// Place in the queue, the next being 1; only while it waits.
+    /// Place in the queue; the next job to start has 1. Only while it waits.
     queue_position: Option<u64>,
-    /// When it will probably start (RFC 3339); only while it waits and where past jobs tell.
+    /// When it will probably start (RFC 3339), estimated from past jobs. Only while it waits.
     #[schema(format = DateTime)]
     estimated_start: Option<String>,
-    /// How often a worker took it.
+    /// How often a worker has started it.
     attempts: u32,
-    /// Whether its end was asked for.
+    /// Whether a client has asked to cancel it.
     cancel_requested: bool,
-    /// Grows with every change; the id of its events.
+    /// Grows with every change; also the id of the events.
     revision: i64,
     /// When it was accepted (RFC 3339).
     #[schema(format = DateTime)]
     created_at: String,
-    /// When a worker last took it (RFC 3339).
+    /// When a worker last started it (RFC 3339).
     #[schema(format = DateTime)]
     started_at: Option<String>,
     /// When it ended (RFC 3339).
@@ -52,28 +53,28 @@ pub struct Job {
     finished_at: Option<String>,
     /// Why it failed.
     error: Option<ProblemBody>,
-    /// The model it made, if that was its kind.
+    /// The model it made; only for kind `model`.
     model: Option<String>,
-    /// The segmentation it made, if that was its kind.
+    /// The segmentation it made; only for kind `segmentation`.
     segmentation: Option<String>,
-    /// Where to go from here.
+    /// Related paths.
     links: JobLinks,
 }
 
-/// Where a job is in its life.
+/// The state of a job.
 #[derive(Serialize, ToSchema)]
 #[schema(as = JobState)]
 #[serde(rename_all = "snake_case")]
 pub enum JobStateName {
-    /// Waits for a worker.
+    /// It waits for a worker.
     Queued,
-    /// Is being computed.
+    /// A worker computes it.
     Running,
-    /// Its result is there.
+    /// Its result is stored.
     Succeeded,
-    /// See `error`.
+    /// `error` says why.
     Failed,
-    /// Somebody ended it.
+    /// A client cancelled it.
     Cancelled,
 }
 
@@ -116,8 +117,8 @@ impl From<JobState> for JobStateName {
     }
 }
 
-/// A job as a client sees it.
-pub async fn describe(app: &App, job: jobs::Job) -> Answer<Job> {
+/// The JSON of a job, with its place in the queue if it waits.
+pub async fn describe(app: &App, job: Job) -> Answer<JobBody> {
     let standing = match job.state {
         JobState::Queued => Some(app.queue.position(&job).await?),
         _ => None,
@@ -131,7 +132,7 @@ pub async fn describe(app: &App, job: jobs::Job) -> Answer<Job> {
     let result = job.result.as_deref().map(path_of);
     let below = |name: &str| result.as_ref().map(|path| format!("{path}/{name}"));
     let itself = format!("/v1/jobs/{}", job.id);
-    Ok(Job {
+    Ok(JobBody {
         state: job.state.into(),
         queue_position: standing.map(|s| s.position),
         estimated_start: standing

@@ -1,16 +1,16 @@
-//! `/v1/jobs/{id}/events`: a job's changes as they happen, as server-sent events.
+//! `/v1/jobs/{id}/events`: a job's changes as server-sent events.
 //!
-//! Each event is the whole job and its id is the job's revision, so missing one loses
-//! nothing: whoever comes back with `Last-Event-ID` gets the newest state, if it is newer, and
-//! what follows. The last event shows a final state, then the stream ends. A client that
-//! reconnects after that gets 204, which tells an `EventSource` to stay away.
+//! Each event holds the whole job, and its id is the job's revision, so a client that misses an
+//! event loses nothing. A client that reconnects with `Last-Event-ID` gets the newest state, if it
+//! is newer than that, and what follows. The last event shows a final state; then the stream ends.
+//! A client that reconnects after that gets 204, on which an `EventSource` stops.
 
-use super::app::App;
-use super::jobs::{describe, find};
-use super::openapi::LookupProblems;
-use super::problem::{Answer, Problem};
-use super::request::{Path, query_pairs, refuse_unknown};
-use crate::jobs;
+use super::{describe, find};
+use crate::http::app::App;
+use crate::http::openapi::{self, LookupProblems};
+use crate::http::problem::{Answer, Problem};
+use crate::http::request::{PathSegments, query_pairs, refuse_unknown};
+use crate::jobs::Job;
 use axum::extract::{RawQuery, State};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::sse::{Event, KeepAlive, Sse};
@@ -26,24 +26,24 @@ const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
 /// Follow a job
 ///
-/// Server-sent events named `job`: the whole job at each change, its revision as id, until its
-/// final state. Resumes after `Last-Event-ID`.
+/// Server-sent events named `job`: the whole job after each change, with its revision as the id,
+/// until its final state. Resumes after `Last-Event-ID`.
 #[utoipa::path(get, path = "/v1/jobs/{id}/events", tag = "jobs",
     params(("id" = String, Path, description = "The job's id"),
-        super::openapi::EventHeader),
+        openapi::EventHeader),
     responses(
-        super::openapi::EventsAnswer,
-        (status = 204, description = "The final state was seen already"),
+        openapi::EventsAnswer,
+        (status = 204, description = "The client has already seen the final state"),
         LookupProblems))]
 pub async fn follow_job(
     State(app): State<App>,
-    Path(id): Path<String>,
+    PathSegments(id): PathSegments<String>,
     RawQuery(query): RawQuery,
     headers: HeaderMap,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let seen = last_event_id(&headers)?;
-    // Listening begins before looking, so that no change falls in between.
+    // Subscribing comes before reading, so that no change is missed in between.
     let changes = app.queue.changes();
     let job = find(&app, &id).await?;
     if job.state.is_final() && job.revision <= seen {
@@ -61,13 +61,13 @@ fn last_event_id(headers: &HeaderMap) -> Answer<i64> {
         .ok()
         .and_then(|text| text.trim().parse().ok());
     number.filter(|revision| *revision >= 0).ok_or_else(|| {
-        Problem::bad_request("invalid-header", "`Last-Event-ID` is no whole number.")
+        Problem::bad_request("invalid-header", "`Last-Event-ID` must be a whole number.")
             .at("Last-Event-ID")
-            .fix("Send the id of the event seen last, as it is.")
+            .fix("Send the id of the last event that you received.")
     })
 }
 
-fn stream(app: App, job: jobs::Job, seen: i64, changes: Receiver<Arc<jobs::Job>>) -> Response {
+fn stream(app: App, job: Job, seen: i64, changes: Receiver<Arc<Job>>) -> Response {
     let follower = Follower {
         id: job.id.clone(),
         next: Some(job),
@@ -83,9 +83,9 @@ fn stream(app: App, job: jobs::Job, seen: i64, changes: Receiver<Arc<jobs::Job>>
 struct Follower {
     app: App,
     id: String,
-    next: Option<jobs::Job>,
+    next: Option<Job>,
     seen: i64,
-    changes: Receiver<Arc<jobs::Job>>,
+    changes: Receiver<Arc<Job>>,
 }
 
 impl Follower {
@@ -102,9 +102,9 @@ impl Follower {
         })
     }
 
-    /// The next state newer than the one seen; `None` when the job is gone or the service
-    /// ends.
-    async fn newer(&mut self) -> Option<jobs::Job> {
+    /// The next state that is newer than the last one sent; `None` if the job is gone or the
+    /// service shuts down.
+    async fn newer(&mut self) -> Option<Job> {
         loop {
             if let Some(job) = self.next.take()
                 && job.revision > self.seen
@@ -115,7 +115,7 @@ impl Follower {
                 change = self.changes.recv() => match change {
                     Ok(job) if job.id == self.id => Some((*job).clone()),
                     Ok(_) => None,
-                    // Too slow for the channel: the table knows.
+                    // The client reads more slowly than events arrive: read the table instead.
                     Err(RecvError::Lagged(_)) => Some(self.look().await?),
                     Err(RecvError::Closed) => return None,
                 },
@@ -124,7 +124,7 @@ impl Follower {
         }
     }
 
-    async fn look(&self) -> Option<jobs::Job> {
+    async fn look(&self) -> Option<Job> {
         self.app.queue.jobs.job(&self.id).await.ok().flatten()
     }
 }

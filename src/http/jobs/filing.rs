@@ -1,13 +1,17 @@
-//! Filing jobs: over JSON, or by the one line that carries the volume itself.
+//! Filing a job: the row is on disk before the client reads 202.
+//!
+//! `POST /v1/jobs` names a stored volume; [`file_upload`] takes a request that carries the volume
+//! itself, and may wait for the result (`Prefer: wait`).
 
 use super::describe;
 use crate::http::app::App;
-use crate::http::problem::{Answer, Problem, shorten};
+use crate::http::problem::not_found::field_names_nothing;
+use crate::http::problem::{Answer, Problem};
 use crate::http::products::{self, Offer};
 use crate::http::request::query_pairs;
-use crate::http::wire::{path_of, rfc3339};
+use crate::http::wire::path_of;
 use crate::http::{idempotency, negotiate, upload};
-use crate::jobs::{self, Filed, JobState, NewJob, Resource, Work};
+use crate::jobs::{Filed, Job, JobState, NewJob, Resource, Work};
 use axum::Json;
 use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
@@ -16,39 +20,46 @@ use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Seconds after which to look at a job again, at least and at most.
+/// Least and greatest `Retry-After`, seconds.
 const RETRY_AFTER: (f64, f64) = (1.0, 60.0);
 
-/// Takes a volume in, files a job of the kind that makes `resource`, and answers 202; with
-/// `Prefer: wait`, waits for the end and answers with the offer that `Accept` likes best.
-/// File parts of a form named in `parts` are volumes of their own, whose ids go into the
-/// parameters of the same names.
-pub async fn one_line(
+/// A job on a volume that comes with the request.
+pub struct UploadJob {
+    /// What the job makes.
+    pub makes: Resource,
+    /// Names of a form's files that are volumes of their own. Their ids become the parameters of
+    /// the same names.
+    pub apart: &'static [&'static str],
+    /// What a client that waits may ask for.
+    pub offers: Vec<Offer>,
+}
+
+/// Stores the volume of the request, files a job, and answers 202. With `Prefer: wait`, waits for
+/// the job to end and answers with the offer that `Accept` rates highest.
+pub async fn file_upload(
     app: &App,
-    resource: Resource,
+    job: UploadJob,
     query: Option<&str>,
     request: Request,
-    parts: &[&'static str],
-    offers: &[Offer],
 ) -> Answer {
     let headers = request.headers().clone();
     let patience = negotiate::preferred_wait(&headers);
     if patience.is_some() {
-        products::choose(&headers, offers)?;
+        products::choose(&headers, &job.offers)?;
     }
     let key = idempotency::key(&headers)?;
-    let kind = resource.noun();
+    let kind = job.makes.noun();
     let Some(work) = app.engine.work(kind) else {
         return Err(Problem::internal(format!("no work of kind `{kind}`")));
     };
-    // What can be refused without the body is refused before it is read.
+    // Whatever can be refused without the body is refused before the body is read.
     let mut pairs = query_pairs(query);
     let mut parameters = work.parameters_from_text(&pairs)?;
     require(app, &work.needs(&parameters).items).await?;
     if app.queue.is_full().await? {
         return Err(queue_full(app).await);
     }
-    let upload = upload::receive(app, request, parts).await?;
+    let upload = upload::receive(app, request, job.apart).await?;
     let given = pairs.len();
     pairs.extend(upload.fields);
     for (name, files) in upload.others {
@@ -59,15 +70,14 @@ pub async fn one_line(
         parameters = work.parameters_from_text(&pairs)?;
     }
     let (volume, _) = upload.volume.store(app).await?;
-    let job = new_job(&**work, volume.id, parameters, key);
-    let job = file(app, &job).await?;
+    let filed = file(app, &new_job(&**work, volume.id, parameters, key)).await?;
     match patience {
-        Some(patience) => wait(app, job, patience, &headers, offers).await,
-        None => accepted(app, job).await,
+        Some(patience) => wait(app, filed, patience, &headers, &job.offers).await,
+        None => accepted(app, filed).await,
     }
 }
 
-/// A job to be filed.
+/// A job on a stored volume, for [`file`].
 pub fn new_job(
     work: &dyn Work,
     volume: String,
@@ -86,7 +96,7 @@ pub fn new_job(
 
 async fn wait(
     app: &App,
-    job: jobs::Job,
+    job: Job,
     patience: Duration,
     headers: &HeaderMap,
     offers: &[Offer],
@@ -101,9 +111,9 @@ async fn wait(
         .unwrap_or(HeaderValue::from_static("wait"));
     let mut response = match (job.state, &job.result) {
         (JobState::Succeeded, Some(id)) => {
-            let product = products::find(app, id).await?;
+            let product = products::find_any(app, id).await?;
             let offer = products::choose(headers, offers)?;
-            // The headers of this request are about the upload, not about a part of the file.
+            // The conditional headers of this request concern the upload, not the result.
             let mut response = products::send(app, &product, offer, &HeaderMap::new()).await?;
             if let Ok(location) = HeaderValue::from_str(&path_of(id)) {
                 response.headers_mut().insert(header::LOCATION, location);
@@ -117,7 +127,7 @@ async fn wait(
     Ok(response)
 }
 
-/// Refuses needs that are not there.
+/// Refuses a parameter that names something that does not exist.
 async fn require(app: &App, needs: &BTreeMap<String, String>) -> Answer<()> {
     for (field, id) in needs {
         let there = match Resource::of(id) {
@@ -125,60 +135,36 @@ async fn require(app: &App, needs: &BTreeMap<String, String>) -> Answer<()> {
             _ => app.queue.catalogue.product(id).await?.is_some(),
         };
         if !there {
-            return Err(absent(app, field, id).await?);
+            return Err(field_names_nothing(&*app.queue.catalogue, field, id).await?);
         }
     }
     Ok(())
 }
 
-/// The problem of a field that names what is not there, or not any more.
-pub async fn absent(app: &App, field: &str, id: &str) -> Answer<Problem> {
-    let resource = Resource::of(id).unwrap_or(match field {
-        "model" => Resource::Model,
-        _ => Resource::Volume,
-    });
-    let noun = resource.noun();
-    let detail = match app.queue.catalogue.erased_at(id).await? {
-        Some(at) => format!(
-            "The {noun} `{}` was erased at {}.",
-            shorten(id),
-            rfc3339(at)
-        ),
-        None => format!("There is no {noun} `{}`.", shorten(id)),
-    };
-    let fix = match resource {
-        Resource::Volume => "POST the file to /v1/volumes first.".to_owned(),
-        _ => format!(
-            "GET /v1/{} lists what there is; auto takes what is at hand.",
-            resource.plural()
-        ),
-    };
-    Ok(wrong(field, detail).fix(fix))
-}
-
-/// 422 for a field.
-pub fn wrong(field: &str, detail: impl Into<String>) -> Problem {
-    Problem::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid-field", detail).at(field)
-}
-
-/// Files a job, or says why not.
-pub async fn file(app: &App, job: &NewJob) -> Answer<jobs::Job> {
+/// Files a job. The same request under the same idempotency key returns the first job.
+///
+/// # Errors
+/// 422 if something it needs does not exist or the key was used for another request, 429 if the
+/// queue is full.
+pub async fn file(app: &App, job: &NewJob) -> Answer<Job> {
     match app.queue.file(job).await? {
         Filed::New(job) | Filed::Same(job) => Ok(job),
         Filed::QueueFull => Err(queue_full(app).await),
         Filed::KeyReused => Err(Problem::new(
             StatusCode::UNPROCESSABLE_ENTITY,
             "idempotency-key-reused",
-            "This key came with another request before.",
+            "This key was already used for another request.",
         )
         .at("Idempotency-Key")
-        .fix("Use a new key for a new request.")),
-        Filed::Missing { field, id } => Err(absent(app, &field, &id).await?),
+        .fix("Use a new key for each new request.")),
+        Filed::Missing { field, id } => {
+            Err(field_names_nothing(&*app.queue.catalogue, &field, &id).await?)
+        }
     }
 }
 
-/// The refusal of a full queue.
-pub async fn queue_full(app: &App) -> Problem {
+/// 429 of a full queue.
+async fn queue_full(app: &App) -> Problem {
     let seconds = match app.queue.jobs.load().await {
         Ok(load) => load.mean_duration_ms.unwrap_or_default() / 1000.0,
         Err(_) => RETRY_AFTER.1,
@@ -187,11 +173,11 @@ pub async fn queue_full(app: &App) -> Problem {
         StatusCode::TOO_MANY_REQUESTS,
         "queue-full",
         format!(
-            "{} jobs wait already; nothing was accepted.",
+            "{} jobs are already waiting, so this request was not accepted.",
             app.settings.queue_limit
         ),
     )
-    .fix("Try again after the time in Retry-After.")
+    .fix("Try again after the number of seconds in Retry-After.")
     .header(header::RETRY_AFTER, retry_after(seconds))
 }
 
@@ -200,7 +186,7 @@ fn retry_after(seconds: f64) -> String {
 }
 
 /// 202 with the job.
-pub async fn accepted(app: &App, job: jobs::Job) -> Answer {
+pub async fn accepted(app: &App, job: Job) -> Answer {
     let starts_in_ms = match job.state {
         JobState::Queued => app.queue.position(&job).await?.starts_in_ms,
         _ => None,
@@ -216,8 +202,8 @@ pub async fn accepted(app: &App, job: jobs::Job) -> Answer {
     Ok((StatusCode::ACCEPTED, headers, body).into_response())
 }
 
-/// The problem of a job that did not succeed, as the answer to whoever waited for it.
-pub fn failed(job: &jobs::Job) -> Response {
+/// The problem of a job that did not succeed, for the client that waited for it.
+fn failed(job: &Job) -> Response {
     let problem: Problem = match &job.failure {
         Some(failure) => failure.clone().into(),
         None => Problem::new(
