@@ -1,14 +1,14 @@
-//! How much volumes and segment means vary when a scan is turned, shifted or noisier.
+//! Measures how much volumes and segment means vary when a scan is rotated, shifted or noisier.
 //!
-//! `cargo run --release --example invariance -- MODEL COHORT [superior=frame]` fits MODEL (a
-//! scan to make 150 points of) to every case of COHORT and to copies of it, and prints for each kind of
-//! change the coefficients of variation over the copies: of the wall's and the cavity's
-//! volume (the worst case's), and of the 17 segment means (the worst one's, as mean and
-//! maximum over the cases, and the number of cases in which it is above 5 %).
+//! `cargo run --release --example invariance -- MODEL COHORT [superior=frame]` makes a model of 150
+//! points from the scan MODEL and fits it to every case of COHORT and to changed copies of it. For
+//! each kind of change it prints coefficients of variation over the copies: of the volumes of wall and
+//! cavity (largest over the cases), and of the worst of the 17 segment means (mean and maximum over
+//! the cases, and the number of cases above 5 %).
 //!
-//! Noise is Gaussian, as fine as that of a reconstruction (white noise blurred by 3 mm), with a
-//! standard deviation of 5 % of the wall's reference uptake. The residual of the cohort's healthy
-//! walls about a smooth map is 2 to 5 %, so this about doubles the noise.
+//! The noise is Gaussian with the grain of a reconstruction (white noise blurred by 3 mm) and a
+//! standard deviation of 5 % of the wall's reference uptake. The residual of healthy walls of the
+//! cohort from a smooth map is 2 to 5 %, so this roughly doubles the noise.
 
 use std::path::{Path, PathBuf};
 
@@ -29,8 +29,14 @@ use ventriform::volume::{self, ReadLimits, ReadOptions, Reading, Volume, VolumeF
 
 fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
-    let model = arguments.next().context("a scan to make the model of")?;
-    let cohort = PathBuf::from(arguments.next().context("a folder of cases")?);
+    let model = arguments
+        .next()
+        .context("missing argument MODEL: the scan to make the model from")?;
+    let cohort = PathBuf::from(
+        arguments
+            .next()
+            .context("missing argument COHORT: the folder of cases")?,
+    );
     let mut parameters = DeformParameters::default();
     if arguments.next().as_deref() == Some("superior=frame") {
         parameters.superior = Superior::Frame;
@@ -65,7 +71,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// A kind of change and what it makes of a scan: (scan, a point in the heart, 100 per cent).
+/// Changed copies of a scan, given a point in the heart and the uptake that counts as 100 %.
 type Change = fn(&Volume, &Vec3, f64) -> Vec<Volume>;
 
 const CHANGES: [(&str, Change); 5] = [
@@ -95,7 +101,7 @@ fn turned(scan: &Volume, heart: &Vec3, axis: Vec3) -> Vec<Volume> {
         .into()
 }
 
-/// What `scan` shows after a turn about `centre` and a shift, on the same voxels.
+/// `scan` rotated about `centre` and shifted, on the same voxels.
 fn moved(scan: &Volume, centre: &Vec3, turn: &Rotation3<f64>, shift: &Vec3) -> Volume {
     let field = Field::new(scan, None, 0.0);
     Volume::sampled(scan.shape, scan.frame.clone(), |p| {
@@ -106,7 +112,7 @@ fn moved(scan: &Volume, centre: &Vec3, turn: &Rotation3<f64>, shift: &Vec3) -> V
 /// `scan` with correlated noise of standard deviation `deviation`.
 fn noisy(scan: &Volume, deviation: f64, seed: u64) -> Volume {
     let mut random = stream(seed, Purpose::PhantomNoise);
-    // The sum of twelve uniform numbers is near enough to a Gaussian before it is blurred.
+    // The sum of twelve uniform numbers is close enough to a Gaussian, since it is blurred next.
     let mut white = || (0..12).map(|_| random.random::<f32>()).sum::<f32>() - 6.0;
     let noise = Volume {
         voxels: scan.voxels.iter().map(|_| white()).collect(),
@@ -127,16 +133,16 @@ struct Study {
     parameters: DeformParameters,
 }
 
-/// What one fit measures.
-struct Measures {
-    /// Wall and cavity, ml, then the segment means, per cent.
+/// The figures of one fit.
+struct Figures {
+    /// Volumes of wall and cavity in ml, then the segment means in %.
     values: Vec<f64>,
     heart: Vec3,
     reference: f64,
 }
 
 impl Study {
-    /// Per cent: wall, cavity, worst segment.
+    /// Coefficients of variation in % over a scan and its copies: wall, cavity, worst segment.
     fn variations(&self, scan: &Volume, change: Change) -> Result<[f64; 3]> {
         let first = self.measure(scan)?;
         let mut runs = Vec::new();
@@ -154,17 +160,17 @@ impl Study {
         Ok([variation(0), variation(1), segments])
     }
 
-    fn measure(&self, scan: &Volume) -> Result<Measures> {
+    fn measure(&self, scan: &Volume) -> Result<Figures> {
         let fit = fit(scan, &self.template, &self.parameters, &Monitor::silent())?;
-        let wall = fit.wall.context("the model is a ventricle")?;
+        let wall = fit.wall.context("the model is not a ventricle")?;
         let map = polar::map(scan, &wall, &PolarParameters::default());
         let means = map.segments.iter().map(|s| s.mean_percent.unwrap_or(0.0));
-        Ok(Measures {
+        Ok(Figures {
             values: [fit.wall_ml, wall.cavity_ml]
                 .into_iter()
                 .chain(means)
                 .collect(),
-            heart: fit.cup.context("the model is a ventricle")?.centre,
+            heart: fit.cup.context("the model is not a ventricle")?.centre,
             reference: map.reference,
         })
     }

@@ -1,16 +1,16 @@
-//! Times single steps on a volume that stays in memory, for `scripts/compare_peers.sh`.
+//! Times single steps on a volume in memory, for `scripts/compare_peers.sh`.
 //!
-//! Reads one command a line from standard input and answers each with one line of JSON that
-//! holds `wall_ms` and what came out:
+//! Reads one command per line from standard input and prints one line of JSON for each, with `wall_ms`
+//! and the results:
 //!
 //! ```text
-//! read PATH                  the volume of a file, kept for the commands that follow
+//! read PATH                  read the volume of a file and keep it for the following commands
 //! surface ISO                Marching Cubes over the whole volume at an absolute iso-value
-//! model POINTS SEED [ISO]    the whole way from the volume to the measured model
+//! model POINTS SEED [ISO]    all steps from the volume to the measured model
 //! ```
 //!
-//! Whoever asks can thus take turns with other programs and time both warm, and reads processor
-//! time and memory of this process from `/proc`.
+//! A script can therefore alternate between this process and other programs, time both when warm, and
+//! read processor time and memory of this process from `/proc`.
 
 use anyhow::{Context, Result, bail};
 use serde_json::{Value, json};
@@ -33,7 +33,7 @@ fn main() -> Result<()> {
         let words: Vec<&str> = line.split_whitespace().collect();
         let answer = match words[..] {
             ["read", path] => {
-                // The old volume goes first, or two would be held at once.
+                // Freed first, so that two volumes are never in memory at once.
                 drop(reading.take());
                 let (kept, answer) = read(path, &monitor)?;
                 reading = Some(kept);
@@ -57,7 +57,7 @@ fn main() -> Result<()> {
                     &monitor,
                 )?
             }
-            _ => bail!("`{line}` is no command"),
+            _ => bail!("unknown command `{line}`: expected read, surface or model"),
         };
         println!("{answer}");
         std::io::stdout().flush()?;
@@ -66,7 +66,9 @@ fn main() -> Result<()> {
 }
 
 fn kept(reading: &Option<Reading>) -> Result<&Reading> {
-    reading.as_ref().context("read a volume first")
+    reading
+        .as_ref()
+        .context("no volume is in memory: read one first")
 }
 
 fn read(path: &str, monitor: &Monitor) -> Result<(Reading, Value)> {
@@ -129,7 +131,7 @@ fn since(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1000.0
 }
 
-/// Lends the stages a clock for their timings.
+/// A clock for the durations of the stages.
 struct Clock(Instant);
 
 impl Observer for Clock {

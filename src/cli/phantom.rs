@@ -5,7 +5,7 @@ use super::output::{create_folder, write_file};
 use crate::progress::{CancelToken, Monitor};
 use crate::volume::Volume;
 use crate::volume::nifti::{self, StoredType};
-use crate::volume::phantom::{Defect, PhantomParameters, phantom};
+use crate::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
 use anyhow::Result;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -33,17 +33,17 @@ pub struct PhantomArgs {
     liver: f64,
     /// A perfusion defect: AHA segment 1 to 17 and severity 0 to 1 (repeatable)
     #[arg(long, value_name = "SEGMENT:SEVERITY", value_parser = parse_defect)]
-    defect: Vec<Defect>,
+    defect: Vec<PerfusionDefect>,
     /// Seed of the random numbers for shape and noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
 
-fn parse_defect(text: &str) -> Result<Defect, String> {
+fn parse_defect(text: &str) -> Result<PerfusionDefect, String> {
     let parts = text.split_once(':');
     parts
         .and_then(|(segment, severity)| {
-            Some(Defect {
+            Some(PerfusionDefect {
                 segment: segment.parse().ok()?,
                 severity: severity.parse().ok()?,
             })

@@ -1,17 +1,18 @@
-//! A volume as a smooth function of place.
+//! A volume as a smooth function of position.
 //!
-//! [`Field`] holds a Gaussian-blurred cut-out of a volume and answers with trilinear values
-//! at any point of the patient. Beyond the volume's border the border's value goes on, so an
-//! organ that is cut off there shows no edge where the camera's field of view ends.
+//! [`Field`] holds a Gaussian-blurred part of a volume and interpolates trilinearly at any point of
+//! the patient. Beyond the border of the volume the value at the border continues, so that an organ
+//! cut off by the camera's field of view shows no edge there.
 
 use nalgebra::Matrix3;
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
+use crate::grid::blur::{Kernel, blur};
 use crate::grid::volume::Volume;
 use crate::progress::{Cancelled, Monitor};
 
-/// Blurred voxel values with their place in the patient.
+/// Blurred voxel values with their position in the patient.
 #[derive(Debug, Clone)]
 pub struct Field {
     shape: [usize; 3],
@@ -24,14 +25,14 @@ pub struct Field {
 }
 
 impl Field {
-    /// [`Field::cut_out`] without anybody who could end it.
+    /// [`Field::cut_out`] that cannot be cancelled.
     pub fn new(volume: &Volume, region: Option<&Aabb>, sigma: f64) -> Self {
         Self::cut_out(volume, region, sigma, &Monitor::silent())
             .expect("a silent monitor is never cancelled")
     }
 
-    /// Blurs `volume` by a Gaussian of `sigma` mm inside `region` (whole volume if `None`).
-    /// Values that are not finite count as 0.
+    /// The part of `volume` inside `region`, LPS mm (the whole volume for `None`), blurred by a Gaussian
+    /// of `sigma` mm. Values that are not finite count as 0.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -61,7 +62,7 @@ impl Field {
         Ok(field)
     }
 
-    /// The mean of every block of about `spacing` mm: a small picture of the whole volume.
+    /// The whole volume at low resolution: the mean of every block of about `spacing` mm.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -90,7 +91,7 @@ impl Field {
             .product();
         values.iter_mut().for_each(|v| *v /= count as f32);
         let step = Matrix3::from_diagonal(&Vec3::from_fn(|a, _| block[a] as f64));
-        // The centre of a block of n voxels stands (n - 1) / 2 behind its first voxel.
+        // The centre of a block of n voxels is (n - 1) / 2 voxels behind its first voxel.
         let offset = Vec3::from_fn(|a, _| (block[a] as f64 - 1.0) / 2.0);
         Ok(Self::assemble(shape, values, volume, &offset, &step))
     }
@@ -127,9 +128,16 @@ impl Field {
         }
     }
 
-    /// The same places with other values, in the order of [`Self::values`].
+    /// The same grid with other values, in the order of [`Self::values`].
+    ///
+    /// # Panics
+    /// If the number of values differs.
     pub fn with_values(self, values: Vec<f32>) -> Self {
-        assert_eq!(values.len(), self.values.len(), "one value for every place");
+        assert_eq!(
+            values.len(),
+            self.values.len(),
+            "one value for every sample"
+        );
         Self { values, ..self }
     }
 
@@ -192,18 +200,17 @@ impl Field {
         f64::from(y0 + w * (y1 - y0))
     }
 
-    /// Separable Gaussian of `sigma` mm, borders continued.
+    /// Blurs the samples by a Gaussian of `sigma` mm, cut off at three sigma. Along an axis where sigma
+    /// is below 0.2 voxels they stay as they are.
     ///
     /// # Errors
     /// [`Cancelled`]; the values are then blurred in part.
     pub fn blur(&mut self, sigma: f64, monitor: &Monitor) -> Result<(), Cancelled> {
-        for axis in 0..3 {
-            let kernel = gaussian(sigma / self.spacing()[axis]);
-            if kernel.len() > 1 {
-                self.values = convolve(&self.values, self.shape, axis, &kernel, monitor)?;
-            }
-        }
-        Ok(())
+        let kernels = self.spacing().map(|spacing| match sigma / spacing {
+            voxels if voxels > 0.2 => Kernel::gaussian(voxels, 3.0),
+            _ => Kernel::identity(),
+        });
+        blur(&mut self.values, self.shape, &kernels, monitor)
     }
 }
 
@@ -238,58 +245,6 @@ fn index_window(volume: &Volume, region: &Aabb) -> [(usize, usize); 3] {
         let end = (high[a].ceil().max(0.0) as usize).min(last);
         (first, end.max(first) + 1)
     })
-}
-
-/// Weights of offsets 0, 1, ... of a Gaussian cut at three sigma; `[1]` below 0.2 voxels.
-fn gaussian(sigma: f64) -> Vec<f32> {
-    if !(sigma > 0.2) {
-        return vec![1.0];
-    }
-    let reach = (3.0 * sigma).ceil() as usize;
-    let half: Vec<f64> = (0..=reach)
-        .map(|t| (-0.5 * (t as f64 / sigma).powi(2)).exp())
-        .collect();
-    let sum = half[0] + 2.0 * half[1..].iter().sum::<f64>();
-    half.iter().map(|w| (w / sum) as f32).collect()
-}
-
-fn convolve(
-    values: &[f32],
-    shape: [usize; 3],
-    axis: usize,
-    kernel: &[f32],
-    monitor: &Monitor,
-) -> Result<Vec<f32>, Cancelled> {
-    let stride = [1, shape[0], shape[0] * shape[1]][axis];
-    let n = shape[axis];
-    let mut out = vec![0f32; values.len()];
-    // Whole slabs of `stride` neighbouring samples move together, so that the inner loop
-    // runs along memory for j and k.
-    for (block, target) in values.chunks(stride * n).zip(out.chunks_mut(stride * n)) {
-        for line in 0..n {
-            // Along i the lines are single samples, and a block is a short row of them.
-            if line == 0 || axis > 0 {
-                monitor.check()?;
-            }
-            let target = &mut target[line * stride..(line + 1) * stride];
-            for (t, weight) in kernel.iter().enumerate() {
-                let above = (line + t).min(n - 1) * stride;
-                let below = line.saturating_sub(t) * stride;
-                let (above, below) = (&block[above..above + stride], &block[below..below + stride]);
-                if t == 0 {
-                    target
-                        .iter_mut()
-                        .zip(above)
-                        .for_each(|(o, a)| *o = weight * a);
-                } else {
-                    for ((o, a), b) in target.iter_mut().zip(above).zip(below) {
-                        *o += weight * (a + b);
-                    }
-                }
-            }
-        }
-    }
-    Ok(out)
 }
 
 #[cfg(test)]

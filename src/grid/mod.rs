@@ -2,12 +2,14 @@
 //!
 //! - [`volume`]: voxels and the map from voxel indices to LPS millimetres;
 //! - [`survey`]: range, missing values, and whether a volume is a label map;
-//! - [`field`]: a blurred volume as a smooth function of place;
+//! - [`mod@blur`]: separable Gaussian blur;
+//! - [`field`]: a blurred volume as a smooth function of position;
 //! - [`labels`], [`components`]: sets of voxels, their topology and connected parts;
 //! - [`voxelise`]: from a closed mesh to the mask of the voxels inside it;
 //! - [`agreement`]: how well two masks agree (Jaccard, contour distance, Dice, Hausdorff).
 
 pub mod agreement;
+pub mod blur;
 pub mod components;
 pub mod field;
 pub mod labels;
@@ -15,4 +17,4 @@ pub mod survey;
 pub mod volume;
 pub mod voxelise;
 
-pub use volume::Volume;
+pub use volume::{Affine, ArrayError, Volume};

@@ -1,6 +1,6 @@
-//! What decides the segmentation that comes out of a volume and a model.
+//! The parameters of a fit.
 
-use super::{FIT_SPECS, ParameterError, ParameterSpec, Parameters};
+use super::ParameterError;
 use crate::deform::DeformParameters;
 use crate::deform::template::Organ;
 use crate::geometry::Vec3;
@@ -9,24 +9,24 @@ use crate::locate::localisation::Hints;
 use crate::polar::PolarParameters;
 use crate::volume::Volume;
 
-/// Everything that decides a segmentation, but for the files.
+/// Everything that determines a segmentation, apart from the files.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitParameters {
-    /// Which frame of a 4-D volume, 0-based; `None` for a 3-D one.
+    /// Frame of a 4-D volume, from 0; `None` for a 3-D volume.
     pub frame: Option<usize>,
-    /// Id of the model to fit, or `auto`: the best of those at hand.
+    /// Id of the model to fit, or `auto` for the best of the available models.
     pub model: String,
-    /// Id of the expert's mask, where there is one.
+    /// Id of an expert's mask, if there is one.
     pub expert: Option<String>,
-    /// What the model shows.
+    /// The organ that the model shows.
     pub organ: Organ,
-    /// What is known of the organ's place.
-    pub place: Place,
-    /// [`DeformParameters::margin`]; `None` leaves it to the kind of file.
+    /// Known position of the organ.
+    pub place: KnownPlace,
+    /// [`DeformParameters::margin`]; `None` selects the default for the file format.
     pub margin: Option<f64>,
-    /// How the model is fitted; hints and margin are settled by [`FitParameters::on`].
+    /// Parameters of the deformation. [`FitParameters::on`] sets its hints and margin.
     pub deform: DeformParameters,
-    /// How the polar map is made.
+    /// Parameters of the polar map.
     pub polar: PolarParameters,
 }
 
@@ -37,7 +37,7 @@ impl Default for FitParameters {
             model: FitParameters::AUTO.into(),
             expert: None,
             organ: Organ::LeftVentricle,
-            place: Place::default(),
+            place: KnownPlace::default(),
             margin: None,
             deform: DeformParameters::default(),
             polar: PolarParameters::default(),
@@ -45,12 +45,12 @@ impl Default for FitParameters {
     }
 }
 
-/// What is known of the organ's place, in the words of whoever knows it.
+/// What the user knows about the organ's position.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Place {
+pub struct KnownPlace {
     /// A point in the cavity (or in the organ), LPS mm.
     pub centre: Option<Vec3>,
-    /// A voxel there.
+    /// A voxel in the cavity (or in the organ).
     pub seed_point: Option<[usize; 3]>,
     /// Base to apex, LPS, any length.
     pub axis: Option<Vec3>,
@@ -58,35 +58,30 @@ pub struct Place {
     pub region: Option<[[usize; 3]; 2]>,
 }
 
-impl Parameters for FitParameters {
-    type Draft = Self;
+impl FitParameters {
+    /// The value of [`FitParameters::model`] that selects the best of the available models.
+    pub const AUTO: &str = "auto";
 
-    const SPECS: &'static [ParameterSpec<Self>] = FIT_SPECS;
-
-    const ALIASES: &'static [(&'static str, &'static str)] =
-        &[("template", "model"), ("centre", "center")];
-
-    fn finish(parameters: Self) -> Result<Self, ParameterError> {
+    /// Checks that parameters do not contradict each other.
+    ///
+    /// # Errors
+    /// A [`ParameterError`] if both a point and a voxel state the organ's position.
+    pub(super) fn settle(parameters: Self) -> Result<Self, ParameterError> {
         if parameters.place.centre.is_some() && parameters.place.seed_point.is_some() {
             return Err(ParameterError {
                 field: "seed_point".into(),
-                message: "`center` and `seed_point` both say where the organ is".into(),
+                message: "`center` and `seed_point` both state the organ's position".into(),
                 fix: "Give `center` or `seed_point`, not both.".into(),
             });
         }
         Ok(parameters)
     }
-}
 
-impl FitParameters {
-    /// The word for "the best of the models at hand".
-    pub const AUTO: &str = "auto";
-
-    /// The fit's parameters on one volume: hints in millimetres, the margin settled by
-    /// `usual_margin` where nobody gave one.
+    /// The parameters of the deformation for `volume`: hints in millimetres, and `usual_margin` if
+    /// no margin was given.
     ///
     /// # Errors
-    /// A [`ParameterError`] for a hint that lies outside the volume.
+    /// A [`ParameterError`] for a hint outside the volume.
     pub fn on(
         &self,
         volume: &Volume,
@@ -100,7 +95,7 @@ impl FitParameters {
     }
 }
 
-impl Place {
+impl KnownPlace {
     fn hints(&self, volume: &Volume) -> Result<Hints, ParameterError> {
         let place = |voxel: [usize; 3]| {
             let index = Vec3::from(voxel.map(|x| x as f64));
@@ -140,7 +135,7 @@ fn outside(field: &str, volume: &Volume) -> ParameterError {
     });
     ParameterError {
         field: field.into(),
-        message: "it lies outside the volume".into(),
+        message: "the position lies outside the volume".into(),
         fix: format!(
             "The volume has {nx} x {ny} x {nz} voxels, from ({}) to ({}) mm, LPS.",
             ends[0], ends[1]
@@ -150,6 +145,7 @@ fn outside(field: &str, volume: &Volume) -> ParameterError {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{FIT_SPECS, Kind, Parameters, checks};
     use super::*;
     use crate::geometry::frame::VoxelToPatient;
     use serde_json::json;
@@ -172,9 +168,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_out_reads_back_the_same() {
-        for list in [
-            &[][..],
+    fn written_parameters_read_back_unchanged() {
+        checks::read_back_unchanged::<FitParameters>(&[
+            &[],
             &[
                 ("center", "1.5,-2,3e1"),
                 ("axis", "0,0,-1"),
@@ -191,30 +187,18 @@ mod tests {
                 ("max_iterations", "7"),
                 ("roll", "90"),
             ],
-        ] {
-            let parameters = pairs(list).unwrap();
-            let written = parameters.to_json();
-            assert_eq!(FitParameters::from_json(&written).unwrap(), parameters);
-            for (name, _) in list {
-                assert!(written.contains_key(*name), "{name}");
-            }
-        }
+        ]);
     }
 
     #[test]
-    fn the_table_states_the_defaults_that_the_code_has() {
-        let defaults: Vec<(&str, &str)> = FIT_SPECS
-            .iter()
-            .filter(|s| !s.default.is_empty())
-            .map(|s| (s.name, s.default))
-            .collect();
-        assert_eq!(pairs(&defaults).unwrap(), FitParameters::default());
+    fn the_table_states_the_defaults_of_the_code() {
+        checks::table_states_defaults::<FitParameters>();
     }
 
     #[test]
     fn the_table_allows_what_the_fit_allows() {
         for spec in FIT_SPECS {
-            let super::super::Kind::Number { min, max } = spec.kind else {
+            let Kind::Number { min, max } = spec.kind else {
                 continue;
             };
             for (value, fits) in [(min, true), (max, true), (min - 1e-7, false)] {

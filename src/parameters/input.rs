@@ -1,18 +1,18 @@
-//! One value, text or JSON, held against its [`Kind`].
+//! Checks one value, text or JSON, against its [`Kind`].
 
-use super::Kind;
+use super::kind::Kind;
 use serde_json::Value;
 
-/// A value as a user gave it.
+/// A value as the user gave it.
 #[derive(Debug, Clone, Copy)]
-pub enum Input<'a> {
+pub enum RawValue<'a> {
     /// From a query string or a command line.
     Text(&'a str),
     /// From a JSON document.
     Json(&'a Value),
 }
 
-/// A value of the right type and within its range.
+/// A value of the right type and in its range.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Checked {
     Integer(u64),
@@ -22,8 +22,8 @@ pub enum Checked {
     Text(String),
 }
 
-/// [`Input::check`] has already matched the value with the row's [`Kind`], so each
-/// getter meets its own variant.
+/// The getters for the variants. [`RawValue::check`] returns the variant that belongs to the
+/// [`Kind`] of the parameter, so each row of a table calls the getter of its own kind.
 impl Checked {
     pub(super) fn u64(&self) -> u64 {
         match self {
@@ -70,9 +70,19 @@ impl Checked {
             .map(|&n| usize::try_from(n).map_err(|_| format!("{n} is not a voxel index")))
             .collect()
     }
+
+    /// The first and the last voxel of a box.
+    pub(super) fn corners(&self) -> Result<[[usize; 3]; 2], String> {
+        let list = self.indices()?;
+        let corners = [[list[0], list[1], list[2]], [list[3], list[4], list[5]]];
+        match (0..3).any(|axis| corners[0][axis] > corners[1][axis]) {
+            true => Err("the first corner lies beyond the last one".into()),
+            false => Ok(corners),
+        }
+    }
 }
 
-impl Input<'_> {
+impl RawValue<'_> {
     /// Checks type and range.
     pub(super) fn check(&self, kind: &Kind) -> Result<Checked, String> {
         match *kind {
@@ -94,55 +104,55 @@ impl Input<'_> {
             }
             Kind::Choice(words) => match self.as_text() {
                 Some(word) if words.contains(&word) => Ok(Checked::Text(word.into())),
-                _ => Err(format!("{self} is none of the choices")),
+                _ => Err(format!("{self} is not one of the choices")),
             },
             Kind::Integers { count } => match self.as_integers() {
                 Some(list) if list.len() == count => Ok(Checked::Integers(list)),
-                Some(list) => Err(format!("{} numbers where {count} belong", list.len())),
+                Some(list) => Err(format!("expected {count} numbers, got {}", list.len())),
                 None => Err(format!("{self} is not a list of whole numbers")),
             },
             Kind::Numbers { count } => match self.as_numbers() {
                 Some(list) if list.len() == count => Ok(Checked::Numbers(list)),
-                Some(list) => Err(format!("{} numbers where {count} belong", list.len())),
+                Some(list) => Err(format!("expected {count} numbers, got {}", list.len())),
                 None => Err(format!("{self} is not a list of finite numbers")),
             },
             Kind::Stored { prefixes, word } => match self.as_text() {
                 Some(text) if !word.is_empty() && text == word => Ok(Checked::Text(text.into())),
                 Some(text) if is_id(text, prefixes) => Ok(Checked::Text(text.into())),
-                _ => Err(format!("{self} is no id of such a thing")),
+                _ => Err(format!("{self} is not an id of this kind")),
             },
             Kind::Text { .. } => self
                 .as_text()
                 .map(|t| Checked::Text(t.into()))
-                .ok_or(format!("{self} is not a text")),
+                .ok_or(format!("{self} is not text")),
         }
     }
 
     fn as_u64(&self) -> Option<u64> {
         match self {
-            Input::Text(t) => t.parse().ok(),
-            Input::Json(v) => v.as_u64(),
+            RawValue::Text(t) => t.parse().ok(),
+            RawValue::Json(v) => v.as_u64(),
         }
     }
 
     fn as_f64(&self) -> Option<f64> {
         match self {
-            Input::Text(t) => t.parse().ok().filter(|x: &f64| x.is_finite()),
-            Input::Json(v) => v.as_f64(),
+            RawValue::Text(t) => t.parse().ok().filter(|x: &f64| x.is_finite()),
+            RawValue::Json(v) => v.as_f64(),
         }
     }
 
     fn as_text(&self) -> Option<&str> {
         match self {
-            Input::Text(t) => Some(t),
-            Input::Json(v) => v.as_str(),
+            RawValue::Text(t) => Some(t),
+            RawValue::Json(v) => v.as_str(),
         }
     }
 
     fn as_integers(&self) -> Option<Vec<i64>> {
         match self {
-            Input::Json(Value::Array(list)) => list.iter().map(Value::as_i64).collect(),
-            Input::Json(Value::Number(n)) => n.as_i64().map(|n| vec![n]),
+            RawValue::Json(Value::Array(list)) => list.iter().map(Value::as_i64).collect(),
+            RawValue::Json(Value::Number(n)) => n.as_i64().map(|n| vec![n]),
             _ => self
                 .as_text()?
                 .split(',')
@@ -153,7 +163,7 @@ impl Input<'_> {
 
     fn as_numbers(&self) -> Option<Vec<f64>> {
         match self {
-            Input::Json(Value::Array(list)) => list.iter().map(Value::as_f64).collect(),
+            RawValue::Json(Value::Array(list)) => list.iter().map(Value::as_f64).collect(),
             _ => self
                 .as_text()?
                 .split(',')
@@ -163,18 +173,18 @@ impl Input<'_> {
     }
 }
 
-/// One of the prefixes and hexadecimal digits.
+/// Whether `text` consists of one of `prefixes` and 1 to 64 hexadecimal digits.
 fn is_id(text: &str, prefixes: &[&str]) -> bool {
     let digits = prefixes.iter().find_map(|prefix| text.strip_prefix(prefix));
     digits.is_some_and(|d| (1..=64).contains(&d.len()) && d.bytes().all(|b| b.is_ascii_hexdigit()))
 }
 
-impl std::fmt::Display for Input<'_> {
-    /// The value as given, cut to a length that fits a message.
+impl std::fmt::Display for RawValue<'_> {
+    /// The value as given, cut to 60 characters for an error message.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let text = match self {
-            Input::Text(t) => format!("`{t}`"),
-            Input::Json(v) => format!("`{v}`"),
+            RawValue::Text(t) => format!("`{t}`"),
+            RawValue::Json(v) => format!("`{v}`"),
         };
         match text.char_indices().nth(60) {
             Some((end, _)) => write!(f, "{}...`", &text[..end]),

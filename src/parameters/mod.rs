@@ -1,25 +1,29 @@
-//! The parameters of a model and of a fit by the names that users give them.
+//! The parameters of a model and of a fit, by the names that users give them.
 //!
-//! One table for each, [`SPECS`] and [`FIT_SPECS`], is the single source of names, types,
-//! ranges, defaults and words for the command line, the query string, the JSON of a job and
-//! the OpenAPI document. A value is read and checked here once; past this module
-//! [`ModelParameters`] and [`FitParameters`] are right by construction.
+//! Two tables, [`SPECS`] and [`FIT_SPECS`], define names, types, ranges, defaults and help texts for
+//! the command line, query strings, the JSON of jobs and the OpenAPI document. Text or JSON goes
+//! in; [`ModelParameters`] or [`FitParameters`] come out, with every value of the right type and in
+//! its range, or a [`ParameterError`] with the name of the first invalid parameter.
 
+#[cfg(test)]
+mod checks;
 mod fit;
 mod fit_specs;
 mod input;
+mod kind;
 mod model;
 mod specs;
 mod table;
 
-pub use fit::{FitParameters, Place};
+pub use fit::{FitParameters, KnownPlace};
 pub use fit_specs::FIT_SPECS;
-pub use input::Input;
+pub use input::RawValue;
+pub use kind::Kind;
 pub use model::ModelParameters;
 pub use specs::SPECS;
-pub use table::{Kind, ParameterSpec, Parameters};
+pub use table::{ParameterSpec, Parameters};
 
-/// A parameter that cannot be used, and what to do about it.
+/// An invalid parameter, and what to give instead.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{field}: {message}")]
 pub struct ParameterError {
@@ -27,11 +31,11 @@ pub struct ParameterError {
     pub field: String,
     /// What is wrong with it.
     pub message: String,
-    /// What would be right.
+    /// A sentence with the valid values.
     pub fix: String,
 }
 
-/// The known name most like `name`, if any is like it at all.
+/// The known name most similar to `name`, if any is similar enough.
 pub fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     known
         .map(|k| (strsim::jaro_winkler(&name.to_lowercase(), k), k))

@@ -1,36 +1,37 @@
-//! What decides the model that comes out of a volume.
+//! The parameters of a model.
 
-use super::{ParameterError, ParameterSpec, Parameters, SPECS};
+use super::ParameterError;
+use super::table::Parameters;
 use crate::optimise::OptimiseParameters;
 use crate::retile::{Method, RetileParameters};
 use crate::surface::{Isolate, SurfaceParameters};
 use serde_json::{Map, Value};
 
-/// Everything that decides what model comes out of a volume.
+/// Everything that determines the model of a volume, apart from the volume.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelParameters {
-    /// Which frame of a 4-D volume, 0-based; `None` for a 3-D one.
+    /// Frame of a 4-D volume, from 0; `None` for a 3-D volume.
     pub frame: Option<usize>,
-    /// How many models of the surface are made, each from another seed; the best is kept. 1..=16.
+    /// Number of models made of the surface, each from another seed, 1..=16; the best is kept.
     pub starts: usize,
-    /// Volume to surface.
+    /// From the volume to its surface.
     pub surface: SurfaceParameters,
-    /// Surface to N points and triangles.
+    /// From the surface to N points and their triangles.
     pub retile: RetileParameters,
-    /// Fit and flips.
+    /// Least-squares fit and edge flips.
     pub optimise: OptimiseParameters,
 }
 
 impl Default for ModelParameters {
     fn default() -> Self {
-        Self::finish(Draft::default()).expect("the defaults contradict nothing")
+        Self::settle(ModelDraft::default()).expect("the defaults do not contradict each other")
     }
 }
 
-/// Parameters on their way in: what one decides for another is settled in
-/// [`Parameters::finish`].
+/// The model parameters given so far, before [`ModelParameters::settle`] fills in the defaults that
+/// depend on others.
 #[derive(Debug, Default)]
-pub struct Draft {
+pub struct ModelDraft {
     pub(super) frame: Option<usize>,
     pub(super) surface: SurfaceParameters,
     pub(super) retile: RetileParameters,
@@ -41,23 +42,24 @@ pub struct Draft {
     pub(super) fit_rounds: Option<usize>,
 }
 
-impl Draft {
+impl ModelDraft {
     pub(super) fn set_isolate(&mut self, by: &'static str, isolate: Isolate) {
         self.isolate_words.push(by);
         self.surface.isolate = isolate;
     }
 }
 
-impl Parameters for ModelParameters {
-    type Draft = Draft;
-
-    const SPECS: &'static [ParameterSpec] = SPECS;
-
-    fn finish(mut draft: Draft) -> Result<Self, ParameterError> {
+impl ModelParameters {
+    /// Fills in the defaults of `starts`, `adaptive` and `fit_rounds`, which depend on method and
+    /// number of points.
+    ///
+    /// # Errors
+    /// A [`ParameterError`] if parameters contradict each other.
+    pub(super) fn settle(mut draft: ModelDraft) -> Result<Self, ParameterError> {
         if let [first, .., last] = draft.isolate_words[..] {
             return Err(ParameterError {
                 field: last.into(),
-                message: format!("`{first}` and `{last}` both say which part is the object"),
+                message: format!("`{first}` and `{last}` both select the object"),
                 fix: format!("Give `{first}` or `{last}`, not both."),
             });
         }
@@ -68,8 +70,8 @@ impl Parameters for ModelParameters {
                 fix: "Give at least one of w1, w2, w3, w4 a value above 0.".into(),
             });
         }
-        // The paper spreads its points evenly and leaves them on the surface; density, fit and
-        // further starts belong to the refined route.
+        // The paper's method spreads the points evenly and leaves them on the surface. Varying
+        // density, fit and further starts belong to the refined method.
         let (usual_starts, usual_adaptive, usual_fit) = match draft.retile.method {
             Method::Paper => (1, 0.0, 0),
             Method::Refined => (
@@ -90,15 +92,14 @@ impl Parameters for ModelParameters {
     }
 }
 
-/// Points that the usual number of starts makes in all.
+/// Points of all starts together at the default number of starts.
 const POINTS_IN_ALL: f64 = 200.0;
 
-/// Most starts without being asked for more.
+/// Largest default number of starts.
 const MOST_STARTS: f64 = 4.0;
 
-/// Starts of a model of so many points where nobody says otherwise: 4 of 50 points, 3 of 67, 2
-/// of 110, 1 from 134 points on. Models of few points differ most from start to start, and cost
-/// least.
+/// The default number of starts for a model of `points` points: 4 for 50, 3 for 67, 2 for 110, 1
+/// from 134 on. Models of few points differ most from start to start and take the least time.
 fn usual_starts(points: usize) -> usize {
     (POINTS_IN_ALL / points as f64)
         .round()
@@ -106,20 +107,20 @@ fn usual_starts(points: usize) -> usize {
 }
 
 impl ModelParameters {
-    /// See [`Parameters::from_pairs`].
+    /// Reads parameters given as text; see [`Parameters::from_pairs`].
     ///
     /// # Errors
-    /// As there.
+    /// A [`ParameterError`] for the first parameter that cannot be used.
     pub fn from_pairs<'a>(
         pairs: impl IntoIterator<Item = (&'a str, &'a str)>,
     ) -> Result<Self, ParameterError> {
         <Self as Parameters>::from_pairs(pairs)
     }
 
-    /// See [`Parameters::from_json`].
+    /// Reads parameters given as a JSON object; see [`Parameters::from_json`].
     ///
     /// # Errors
-    /// As there.
+    /// A [`ParameterError`] for the first parameter that cannot be used.
     pub fn from_json(object: &Map<String, Value>) -> Result<Self, ParameterError> {
         <Self as Parameters>::from_json(object)
     }
@@ -127,6 +128,7 @@ impl ModelParameters {
 
 #[cfg(test)]
 mod tests {
+    use super::super::checks;
     use super::*;
     use crate::surface::IsoLevel;
     use serde_json::json;
@@ -140,9 +142,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_out_reads_back_the_same() {
-        for list in [
-            &[][..],
+    fn written_parameters_read_back_unchanged() {
+        checks::read_back_unchanged::<ModelParameters>(&[
+            &[],
             &[
                 ("points", "67"),
                 ("seed", "18446744073709551615"),
@@ -151,24 +153,12 @@ mod tests {
             &[("iso", "absolute:0.47"), ("box", "1,2,3,40,50,60")],
             &[("method", "paper"), ("label", "-3"), ("w2", "0.5")],
             &[("seed_point", "3,4,5"), ("guard", "0"), ("frame", "2")],
-        ] {
-            let parameters = pairs(list).unwrap();
-            let written = parameters.to_json();
-            assert_eq!(ModelParameters::from_json(&written).unwrap(), parameters);
-            for (name, _) in list {
-                assert!(written.contains_key(*name), "{name}");
-            }
-        }
+        ]);
     }
 
     #[test]
-    fn the_table_states_the_defaults_that_the_code_has() {
-        let defaults: Vec<(&str, &str)> = SPECS
-            .iter()
-            .filter(|s| !s.default.is_empty())
-            .map(|s| (s.name, s.default))
-            .collect();
-        assert_eq!(pairs(&defaults).unwrap(), ModelParameters::default());
+    fn the_table_states_the_defaults_of_the_code() {
+        checks::table_states_defaults::<ModelParameters>();
     }
 
     #[test]

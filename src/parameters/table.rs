@@ -1,111 +1,134 @@
-//! Tables of parameters, whatever they are the parameters of.
+//! Tables of parameters: reading, checking and writing values by name.
 
-use super::input::{Checked, Input};
-use super::{ModelParameters, ParameterError, nearest};
+use super::input::{Checked, RawValue};
+use super::kind::Kind;
+use super::{ParameterError, nearest};
 use serde_json::{Map, Value};
 
-/// What kind of value a parameter takes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Kind {
-    /// A whole number in the range.
-    Integer {
-        /// Smallest value.
-        min: u64,
-        /// Largest value.
-        max: u64,
-    },
-    /// A finite number in the range.
-    Number {
-        /// Smallest value.
-        min: f64,
-        /// Largest value.
-        max: f64,
-    },
-    /// One of some words.
-    Choice(&'static [&'static str]),
-    /// `count` whole numbers, separated by commas (in JSON also an array).
-    Integers {
-        /// How many.
-        count: usize,
-    },
-    /// `count` finite numbers, separated by commas (in JSON also an array).
-    Numbers {
-        /// How many.
-        count: usize,
-    },
-    /// Text of a form of its own.
-    Text {
-        /// The form as a regular expression.
-        pattern: &'static str,
-        /// One example.
-        example: &'static str,
-    },
-    /// The id of something that the service keeps. On a command line, files take its place.
-    Stored {
-        /// What ids of such things begin with.
-        prefixes: &'static [&'static str],
-        /// The word that may stand for an id; empty where there is none.
-        word: &'static str,
-    },
-}
-
 /// One row of a table.
-pub struct ParameterSpec<P: Parameters = ModelParameters> {
-    /// The name everywhere: query, JSON, command line (there also with `-` for `_`).
+pub struct ParameterSpec<P: Parameters> {
+    /// The name in queries, in JSON and on the command line (there also with `-` for `_`).
     pub name: &'static str,
     /// Type and range.
     pub kind: Kind,
-    /// The default, as a user would write it; empty where there is none.
+    /// The default as a user would write it; empty if there is no fixed default.
     pub default: &'static str,
-    /// One sentence for help texts.
+    /// One sentence for `--help`, the OpenAPI document and the README.
     pub summary: &'static str,
+    /// Stores the checked value in the draft.
     pub(super) read: fn(&mut P::Draft, &Checked) -> Result<(), String>,
+    /// The value as JSON; null if it is not set.
     pub(super) write: fn(&P) -> Value,
 }
 
-/// A row for one number: its name, where it stands among the parameters (and, on its way in,
-/// their draft), range, default and summary.
-macro_rules! number {
+/// A row for one number: its kind and getter, name, field of the parameters (and of their draft),
+/// range, default and summary.
+macro_rules! plain {
     (
-        $name:literal, $($field:ident).+ $([$index:literal])?,
+        $kind:ident $getter:ident, $name:literal, $($field:ident).+ $([$index:literal])?,
         $min:literal..=$max:literal, $default:literal, $summary:literal
     ) => {
         ParameterSpec {
             name: $name,
-            kind: Kind::Number {
+            kind: Kind::$kind {
                 min: $min,
                 max: $max,
             },
             default: $default,
             summary: $summary,
             read: |draft, value| {
-                draft.$($field).+ $([$index])? = value.f64();
+                draft.$($field).+ $([$index])? = value.$getter();
                 Ok(())
             },
             write: |parameters| json!(parameters.$($field).+ $([$index])?),
         }
     };
 }
+pub(super) use plain;
+
+/// A row for one finite number; see [`plain!`].
+macro_rules! number {
+    ($($row:tt)*) => { $crate::parameters::table::plain!(Number f64, $($row)*) };
+}
 pub(super) use number;
 
-/// Parameters with a table of names.
+/// A row for one whole number; see [`plain!`].
+macro_rules! integer {
+    ($($row:tt)*) => { $crate::parameters::table::plain!(Integer usize, $($row)*) };
+}
+pub(super) use integer;
+
+/// A row for a number without a fixed default: its kind and getter, name, field of the draft,
+/// field of the parameters, range and summary.
+macro_rules! optional {
+    (
+        $kind:ident $getter:ident, $name:literal, $draft:ident => $($field:ident).+,
+        $min:literal..=$max:literal, $summary:literal
+    ) => {
+        ParameterSpec {
+            name: $name,
+            kind: Kind::$kind {
+                min: $min,
+                max: $max,
+            },
+            default: "",
+            summary: $summary,
+            read: |draft, value| {
+                draft.$draft = Some(value.$getter());
+                Ok(())
+            },
+            write: |parameters| json!(parameters.$($field).+),
+        }
+    };
+}
+pub(super) use optional;
+
+/// A row for a choice between words: name, field, default, summary, and the value of each word.
+macro_rules! choice {
+    (
+        $name:literal, $($field:ident).+, $default:literal, $summary:literal,
+        $($word:literal => $value:path),+ $(,)?
+    ) => {
+        ParameterSpec {
+            name: $name,
+            kind: Kind::Choice(&[$($word),+]),
+            default: $default,
+            summary: $summary,
+            read: |draft, value| {
+                draft.$($field).+ = match value.text() {
+                    $($word => $value,)+
+                    other => return Err(format!("`{other}` is not one of the choices")),
+                };
+                Ok(())
+            },
+            write: |parameters| {
+                json!(match parameters.$($field).+ {
+                    $($value => $word),+
+                })
+            },
+        }
+    };
+}
+pub(super) use choice;
+
+/// A set of parameters with a table of names.
 pub trait Parameters: Sized + 'static {
-    /// Parameters on their way in.
+    /// The values given so far.
     type Draft: Default;
 
-    /// The table, in the order in which the values are used.
+    /// The table, in the order in which the stages use the values.
     const SPECS: &'static [ParameterSpec<Self>];
 
-    /// Other names that are understood: (other name, name in the table).
+    /// Alternative names: (alternative, name in the table).
     const ALIASES: &'static [(&'static str, &'static str)] = &[];
 
-    /// Settles what one parameter decides for another.
+    /// Fills in the defaults that depend on other parameters.
     ///
     /// # Errors
-    /// A [`ParameterError`] where parameters contradict each other.
+    /// A [`ParameterError`] if parameters contradict each other.
     fn finish(draft: Self::Draft) -> Result<Self, ParameterError>;
 
-    /// Reads parameters given as text, as in a query string or on a command line.
+    /// Reads parameters given as text, from a query string or a command line.
     ///
     /// # Errors
     /// A [`ParameterError`] that names the first field that is unknown (with the nearest
@@ -116,7 +139,7 @@ pub trait Parameters: Sized + 'static {
         from_inputs(
             pairs
                 .into_iter()
-                .map(|(name, text)| (name, Input::Text(text))),
+                .map(|(name, text)| (name, RawValue::Text(text))),
         )
     }
 
@@ -128,12 +151,12 @@ pub trait Parameters: Sized + 'static {
         from_inputs(
             object
                 .iter()
-                .map(|(name, value)| (name.as_str(), Input::Json(value))),
+                .map(|(name, value)| (name.as_str(), RawValue::Json(value))),
         )
     }
 
-    /// Every parameter by name with the value used, defaults written out.
-    /// [`Parameters::from_json`] reads it back.
+    /// Every parameter that is set, by name, including defaults. [`Parameters::from_json`] reads it
+    /// back.
     fn to_json(&self) -> Map<String, Value> {
         Self::SPECS
             .iter()
@@ -144,7 +167,7 @@ pub trait Parameters: Sized + 'static {
 }
 
 fn from_inputs<'a, P: Parameters>(
-    inputs: impl Iterator<Item = (&'a str, Input<'a>)>,
+    inputs: impl Iterator<Item = (&'a str, RawValue<'a>)>,
 ) -> Result<P, ParameterError> {
     let mut draft = P::Draft::default();
     let mut seen = Vec::new();
@@ -166,7 +189,7 @@ fn from_inputs<'a, P: Parameters>(
 }
 
 impl<P: Parameters> ParameterSpec<P> {
-    /// What to give instead, as a sentence.
+    /// A sentence with the valid values.
     fn fix(&self) -> String {
         let range = match self.kind {
             Kind::Integer { min, max: u64::MAX } => format!("a whole number from {min}"),
@@ -191,6 +214,9 @@ impl<P: Parameters> ParameterSpec<P> {
 }
 
 /// The row for `name`.
+///
+/// # Errors
+/// A [`ParameterError`] with the nearest known name.
 fn find<P: Parameters>(name: &str) -> Result<&'static ParameterSpec<P>, ParameterError> {
     let alias = P::ALIASES.iter().find(|(other, _)| *other == name);
     let own = alias.map_or(name, |(_, own)| own);
@@ -199,7 +225,7 @@ fn find<P: Parameters>(name: &str) -> Result<&'static ParameterSpec<P>, Paramete
         let aliases = P::ALIASES.iter().map(|(other, _)| *other);
         ParameterError {
             field: name.into(),
-            message: "no such parameter".into(),
+            message: "there is no such parameter".into(),
             fix: match nearest(name, names().chain(aliases)) {
                 Some(near) => format!("Did you mean `{near}`?"),
                 None => {

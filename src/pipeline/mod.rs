@@ -1,8 +1,15 @@
-//! The stages in order: from the files of a volume to a model.
+//! From a volume to a model: the stages in order.
 //!
-//! [`generate`] reads, surfaces, re-tiles, optimises and measures: the stage calls in order,
-//! nothing else. The stages guarantee what they hand on; the last look is
-//! [`Report::is_sound`], and a model that is not sound is an error, never a result.
+//! In: the files of a volume ([`generate`]), a volume that was read ([`from_reading`]) or a volume in
+//! memory ([`generate_from`]), and [`ModelParameters`]. Out: a [`Model`]. The steps:
+//!
+//! 1. `volume` reads the files.
+//! 2. `surface` extracts the iso-surface of the ventricle's wall.
+//! 3. `retile` covers it with exactly N points, once for each start ([`starts`]).
+//! 4. `optimise` fits the triangles and flips edges; the best start is kept.
+//! 5. `report` measures the model.
+//!
+//! Guaranteed: a model is returned only if [`Report::is_sound`]; otherwise there is an error.
 
 pub mod starts;
 
@@ -14,21 +21,23 @@ use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, Closeness, Report, ReportInput};
 use crate::retile::RetileError;
 use crate::surface::{self, SurfaceError};
-use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeFile};
+use crate::volume::{
+    self, ReadLimits, ReadOptions, Reading, Volume, VolumeError, VolumeFacts, VolumeFile,
+};
 
-/// A finished model.
+/// A model of one volume.
 #[derive(Debug, Clone)]
 pub struct Model {
-    /// Exactly N vertices, LPS millimetres, closed, facing outward.
+    /// The model: exactly N vertices in LPS millimetres; closed, with outward-facing triangles.
     pub mesh: TriMesh,
-    /// The iso-surface that it stands for.
+    /// The iso-surface that the model approximates, LPS millimetres.
     pub reference: TriMesh,
-    /// What it is worth.
+    /// Figures about the model and how it was made.
     pub report: Report,
 }
 
 impl Model {
-    /// What a mesh file says of the model besides the mesh.
+    /// The metadata that mesh files store with the model.
     pub fn metadata(&self) -> Metadata {
         Metadata {
             quality: self.report.quality_summary(),
@@ -36,7 +45,7 @@ impl Model {
         }
     }
 
-    /// How far it lies from its surface, place by place: what the page is coloured by.
+    /// Distances between the model and its surface at every vertex, by which the page is coloured.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -44,40 +53,40 @@ impl Model {
         Closeness::of(&self.mesh, &self.reference, monitor)
     }
 
-    /// The report as a self-contained page; with `closeness`, also coloured by it.
+    /// The report as a self-contained HTML page, coloured by `closeness` if given.
     pub fn report_html(&self, closeness: Option<&Closeness>) -> String {
         report::html(&self.report, &self.mesh, closeness)
     }
 }
 
-/// Which stage failed, and why.
+/// Why there is no model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PipelineError {
-    /// The files hold no usable volume.
+    /// The files contain no usable volume.
     #[error(transparent)]
     Volume(VolumeError),
-    /// The volume has no usable surface.
+    /// No surface could be extracted from the volume.
     #[error(transparent)]
     Surface(SurfaceError),
-    /// The surface cannot be re-tiled as asked.
+    /// The surface could not be re-tiled with these parameters.
     #[error(transparent)]
     Retile(RetileError),
-    /// The mesh cannot be optimised.
+    /// The mesh could not be optimised.
     #[error(transparent)]
     Optimise(OptimiseError),
-    /// The model broke a promise; it is withheld.
+    /// The finished model failed its checks.
     #[error("the model is not sound: {}", doubts.join(" "))]
     Unsound {
-        /// What is wrong with it, in sentences.
+        /// The failed checks, in sentences.
         doubts: Vec<String>,
     },
-    /// The caller asked for an end.
+    /// The caller cancelled the work.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
 
 impl PipelineError {
-    /// Whether the work ended because it was asked to, in whichever stage.
+    /// Whether the caller cancelled the work, in any stage.
     pub fn is_cancelled(&self) -> bool {
         matches!(
             self,
@@ -89,7 +98,7 @@ impl PipelineError {
         )
     }
 
-    /// The parameter, or the field of the file, that the error is about.
+    /// The parameter or the header field that the error is about.
     pub fn field(&self) -> Option<&'static str> {
         match self {
             PipelineError::Volume(e) => e.field(),
@@ -104,7 +113,7 @@ impl PipelineError {
 /// Makes a model of the volume in `files`.
 ///
 /// # Errors
-/// See [`PipelineError`].
+/// [`PipelineError`].
 pub fn generate(
     files: &[VolumeFile],
     parameters: &ModelParameters,
@@ -120,21 +129,51 @@ pub fn generate(
     from_reading(&reading, parameters, read_ms, monitor)
 }
 
-/// Makes a model of a volume in memory; `read_ms` is what reading took, for the report.
+/// Makes a model of a volume in memory, for example one made by [`Volume::from_array`]. For a volume
+/// from a file prefer [`generate`] or [`from_reading`], whose reports describe the file.
 ///
 /// # Errors
-/// See [`PipelineError`].
+/// [`PipelineError`].
+pub fn generate_from(
+    volume: &Volume,
+    parameters: &ModelParameters,
+    monitor: &Monitor,
+) -> Result<Model, PipelineError> {
+    let facts = volume::describe(volume).map_err(PipelineError::Volume)?;
+    from_volume(volume, &facts, parameters, 0.0, monitor)
+}
+
+/// Makes a model of a volume that was read; `read_ms` is the time that reading took, for the report.
+///
+/// # Errors
+/// [`PipelineError`].
 pub fn from_reading(
     reading: &Reading,
     parameters: &ModelParameters,
     read_ms: f64,
     monitor: &Monitor,
 ) -> Result<Model, PipelineError> {
+    from_volume(
+        &reading.volume,
+        &reading.facts,
+        parameters,
+        read_ms,
+        monitor,
+    )
+}
+
+fn from_volume(
+    volume: &Volume,
+    facts: &VolumeFacts,
+    parameters: &ModelParameters,
+    read_ms: f64,
+    monitor: &Monitor,
+) -> Result<Model, PipelineError> {
     let mut laps = Laps::new(read_ms, monitor);
-    let surface = surface::extract(&reading.volume, &parameters.surface, monitor)
-        .map_err(PipelineError::Surface)?;
+    let surface =
+        surface::extract(volume, &parameters.surface, monitor).map_err(PipelineError::Surface)?;
     laps.end(Stage::Surface);
-    // Neither needs the other.
+    // The two are independent.
     let (tiled, reference) = rayon::join(
         || starts::tile(&surface, parameters, monitor),
         || Reference::new(&surface),
@@ -146,7 +185,7 @@ pub fn from_reading(
     })
     .map_err(PipelineError::Optimise)?;
     let mut report = Report::new(ReportInput {
-        input: report::input(&reading.facts),
+        input: report::input(facts),
         parameters: parameters.to_json().into(),
         surface: &surface,
         tiled: &made.tiled,
@@ -161,9 +200,7 @@ pub fn from_reading(
             doubts: report.warnings,
         });
     }
-    report
-        .warnings
-        .splice(0..0, reading.facts.warnings.iter().cloned());
+    report.warnings.splice(0..0, facts.warnings.iter().cloned());
     Ok(Model {
         mesh: made.optimised.mesh,
         reference: surface.mesh,
@@ -171,7 +208,7 @@ pub fn from_reading(
     })
 }
 
-/// Times of the stages by the observer's clock.
+/// Durations of the stages by the observer's clock.
 struct Laps<'a, 'b> {
     monitor: &'a Monitor<'b>,
     last: f64,

@@ -1,16 +1,16 @@
-//! Several models of one surface, of which the best is kept.
+//! Makes several models of one surface and keeps the best.
 //!
-//! Relaxation, fit and flips end in the arrangement next to where the random points began.
-//! Arrangements of few points differ most in worth, and cost least.
+//! Relaxation, fit and flips converge to an arrangement close to the random starting points.
+//! Arrangements of few points differ most in quality and take the least time to compute.
 //!
-//! 1. [`tile`]: the surface re-tiled from each start, every one with a seed of its own;
-//! 2. [`best`]: each is optimised and measured as one alone would be. Kept is the model with the
-//!    least product of mean distance, largest distance and 1 - mean 2r/R. A product needs no
-//!    weights and no units: what is a tenth worse in one must be a tenth better in another.
+//! 1. [`tile`] re-tiles the surface from each start, every one with its own seed.
+//! 2. [`best`] optimises and measures each result and keeps the model with the smallest product of
+//!    mean distance, largest distance and 1 - mean 2r/R. A product needs neither weights nor units:
+//!    a figure that is a tenth worse must be balanced by another that is a tenth better.
 //!
-//! Guaranteed: the first start is what the seed gives alone, so no model is worse by that product
-//! for having had more starts; the seed that is kept gives the same model alone. Not guaranteed:
-//! that the model is better by each figure, or by fitness.
+//! Guaranteed: the first start uses the given seed itself, so more starts never make the model worse
+//! by that product; the seed of the model that is kept gives the same model with one start.
+//! Not guaranteed: that the model is better by every single figure, or by fitness.
 
 use crate::optimise::{self, OptimiseError, Optimised, Reference};
 use crate::parameters::ModelParameters;
@@ -19,28 +19,28 @@ use crate::report::{self, MeasureParameters, Measures, Start};
 use crate::retile::{self, RetileError, RetileParameters, Tiled};
 use crate::surface::Surface;
 
-/// From one start's seed to the next one's: a prime, far from the steps in which people count, and
-/// so small that the sums stay readable and are exact as the doubles that most JSON readers make.
+/// Difference between the seeds of consecutive starts: a prime, so that starts do not share seeds with
+/// runs that count up, and small enough for the seeds to be exact as JSON numbers.
 const NEXT_SEED: u64 = 1_000_003;
 
-/// The best of the models.
+/// The model that is kept.
 #[derive(Debug, Clone)]
-pub struct Best {
-    /// What it was made of.
+pub struct BestStart {
+    /// The re-tiled mesh before optimisation.
     pub tiled: Tiled,
-    /// The model.
+    /// The optimised model.
     pub optimised: Optimised,
     /// Its measures.
     pub measures: Measures,
-    /// Figures of all models, in order.
+    /// Figures of the models of all starts, in order.
     pub starts: Vec<Start>,
 }
 
-/// Re-tiles the surface from each start. Where one has to warn of the surface, there are no more:
-/// they would find the same, and take long to.
+/// Re-tiles the surface from each start. Stops after the first result with a warning about the
+/// surface: further starts would take long and find the same.
 ///
 /// # Errors
-/// Those of the first start; a later one that fails is left out, and is the last.
+/// The error of the first start. If a later one fails, it is left out and no further ones are made.
 pub fn tile(
     surface: &Surface,
     parameters: &ModelParameters,
@@ -68,18 +68,18 @@ pub fn tile(
     Ok(tiled)
 }
 
-/// Optimises and measures what [`tile`] made, at least one, and keeps the best; `ended` hears of
-/// each stage's end.
+/// Optimises and measures the results of [`tile`], of which there must be at least one, and returns
+/// the best. `ended` is called at the end of each stage.
 ///
 /// # Errors
-/// Those of the optimisation.
+/// [`OptimiseError`] of the first start that cannot be optimised.
 pub fn best(
     mut tiled: Vec<Tiled>,
     reference: &Reference,
     parameters: &ModelParameters,
     monitor: &Monitor,
     mut ended: impl FnMut(Stage),
-) -> Result<Best, OptimiseError> {
+) -> Result<BestStart, OptimiseError> {
     let mut optimised = each(&tiled, monitor, |tiled, monitor| {
         optimise::optimise(tiled, reference, &parameters.optimise, monitor)
     })?;
@@ -93,7 +93,7 @@ pub fn best(
         .map(|(tiled, measures)| Start::new(tiled, measures))
         .collect();
     let kept = least_bad(&measures);
-    Ok(Best {
+    Ok(BestStart {
         tiled: tiled.swap_remove(kept),
         optimised: optimised.swap_remove(kept),
         measures: measures.swap_remove(kept),
@@ -101,7 +101,7 @@ pub fn best(
     })
 }
 
-/// `work` done for each, each of them a piece of the stage.
+/// Applies `work` to every item, each of which counts as an equal part of the stage's progress.
 fn each<T, U, E>(
     starts: &[T],
     monitor: &Monitor,
@@ -113,16 +113,16 @@ fn each<T, U, E>(
         .collect()
 }
 
-/// The first of the best models that do not pierce themselves.
+/// Index of the best model; models without self-intersections come first, and of equals the first.
 fn least_bad(measures: &[Measures]) -> usize {
-    let pierced = |m: &Measures| m.mesh.self_intersections > 0;
+    let intersecting = |m: &Measures| m.mesh.self_intersections > 0;
     let badness = |m: &Measures| {
         m.distance.mean_mm * m.distance.hausdorff_mm * (1.0 - m.shape.radius_ratio.mean)
     };
     (0..measures.len())
         .min_by(|&a, &b| {
             let [a, b] = [a, b].map(|k| &measures[k]);
-            (pierced(a).cmp(&pierced(b))).then(badness(a).total_cmp(&badness(b)))
+            (intersecting(a).cmp(&intersecting(b))).then(badness(a).total_cmp(&badness(b)))
         })
         .unwrap_or(0)
 }
@@ -137,7 +137,7 @@ mod tests {
         ModelParameters::from_pairs(pairs).unwrap()
     }
 
-    fn made(surface: &Surface, parameters: &ModelParameters) -> Best {
+    fn made(surface: &Surface, parameters: &ModelParameters) -> BestStart {
         let monitor = Monitor::silent();
         let tiled = tile(surface, parameters, &monitor).unwrap();
         let reference = Reference::new(surface);

@@ -204,9 +204,9 @@ fn read(
 const DICOM_MARGIN: f64 = 2.5;
 
 /// How far outside the steepest slope the readers of such files draw, mm.
-fn usual_margin(format: volume::Format) -> f64 {
+fn usual_margin(format: volume::FileFormat) -> f64 {
     match format {
-        volume::Format::DicomNm => DICOM_MARGIN,
+        volume::FileFormat::DicomNm => DICOM_MARGIN,
         _ => 0.0,
     }
 }

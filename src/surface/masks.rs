@@ -7,8 +7,13 @@
 //! the smoothed object leaves more than a tenth of the mask, or falls into another number of
 //! parts (crumbs of less than 1 % aside), sigma is halved, down to the raw mask.
 
+use crate::grid::blur::{Kernel, blur};
 use crate::grid::components::Components;
 use crate::grid::labels::Labels;
+use crate::progress::Monitor;
+
+/// Multiple of sigma at which the Gaussian is cut off.
+const CUT: f64 = 4.0;
 
 /// A mask made grey, in a box around it.
 #[derive(Debug, Clone)]
@@ -59,7 +64,7 @@ fn parts(labels: &Labels) -> usize {
 }
 
 fn with_sigma(mask: &Labels, sigma: f64) -> Smoothed {
-    let radius = (4.0 * sigma).ceil() as usize;
+    let radius = (CUT * sigma).ceil() as usize;
     let margin = radius + 1;
     let shape = mask.extent.map(|e| e + 2 * margin);
     let mut values = vec![0f32; shape.iter().product()];
@@ -67,10 +72,10 @@ fn with_sigma(mask: &Labels, sigma: f64) -> Smoothed {
         values[i + margin + shape[0] * (j + margin + shape[1] * (k + margin))] = 1.0;
     }
     if sigma > 0.0 {
-        let weights = kernel(sigma, radius);
-        for axis in 0..3 {
-            convolve(&mut values, shape, axis, &weights);
-        }
+        // The margin is wider than the kernel: all values at the border of the box are 0.
+        let kernels = [(); 3].map(|()| Kernel::gaussian(sigma, CUT));
+        blur(&mut values, shape, &kernels, &Monitor::silent())
+            .expect("a silent monitor is never cancelled");
     }
     let level = keeping(&values, mask.count());
     Smoothed {
@@ -79,32 +84,6 @@ fn with_sigma(mask: &Labels, sigma: f64) -> Smoothed {
         origin: mask.origin.map(|o| o as i64 - margin as i64),
         level,
         sigma,
-    }
-}
-
-fn kernel(sigma: f64, radius: usize) -> Vec<f32> {
-    let weight = |n: usize| (-0.5 * (n as f64 / sigma).powi(2)).exp();
-    let sum = weight(0) + 2.0 * (1..=radius).map(weight).sum::<f64>();
-    (0..=radius).map(|n| (weight(n) / sum) as f32).collect()
-}
-
-/// Convolves along `axis` with the symmetric kernel whose half is `weights`; zero beyond.
-fn convolve(values: &mut [f32], shape: [usize; 3], axis: usize, weights: &[f32]) {
-    let stride = [1, shape[0], shape[0] * shape[1]][axis];
-    let length = shape[axis];
-    let mut line = vec![0f32; length];
-    for start in (0..values.len()).filter(|at| (at / stride).is_multiple_of(length)) {
-        for (n, x) in line.iter_mut().enumerate() {
-            *x = values[start + n * stride];
-        }
-        for n in 0..length {
-            let mut sum = weights[0] * line[n];
-            for (m, w) in weights.iter().enumerate().skip(1) {
-                let before = n.checked_sub(m).map_or(0.0, |at| line[at]);
-                sum += w * (before + line.get(n + m).copied().unwrap_or(0.0));
-            }
-            values[start + n * stride] = sum;
-        }
     }
 }
 

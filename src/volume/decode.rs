@@ -1,22 +1,20 @@
-//! Decoding: stored numbers of any real type to `f32`, in portions, straight into place.
+//! Decoding: stored numbers of any real type to `f32`, in portions, directly into the result.
 
 use super::VolumeError;
 use super::facts::ByteOrder;
 use super::source::Source;
 use super::summary::Tally;
-use crate::progress::Cancelled;
+use crate::progress::{Cancelled, Monitor, Stage};
 
-/// Voxels decoded at a time: a few milliseconds of unpacking, half a mebibyte at most.
+/// Voxels decoded at a time: a few milliseconds of unpacking and at most half a mebibyte.
 const PORTION: usize = 1 << 16;
 
-/// Whole numbers beyond this are not all representable as `f32`; as its bits.
+/// Bits of the `f32` above which not every whole number is representable.
 const EXACT: u32 = 16_777_216_f32.to_bits();
-/// The bits of infinity.
 const INFINITY: u32 = f32::INFINITY.to_bits();
-/// The bit of the sign.
 const SIGN: u32 = 1 << 31;
 
-/// How a voxel is stored.
+/// Data type of a stored voxel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum DataType {
     U8,
@@ -32,7 +30,7 @@ pub(super) enum DataType {
 }
 
 impl DataType {
-    /// Bytes of a voxel.
+    /// Bytes per voxel.
     pub(super) fn size(self) -> usize {
         match self {
             Self::U8 | Self::I8 => 1,
@@ -42,7 +40,7 @@ impl DataType {
         }
     }
 
-    /// The usual name.
+    /// The name that numpy uses.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::U8 => "uint8",
@@ -59,38 +57,36 @@ impl DataType {
     }
 }
 
-/// Everything that one needs to know to decode voxels.
+/// Storage format of voxels.
 #[derive(Debug, Clone)]
 pub(super) struct VoxelFormat {
-    /// The file's name, for messages.
+    /// Name of the file, for error messages.
     pub file: String,
-    /// Voxels along i, j, k, for messages.
+    /// Voxels along i, j, k, for error messages.
     pub shape: [usize; 3],
-    /// How a voxel is stored.
     pub data_type: DataType,
-    /// Order of its bytes.
     pub byte_order: ByteOrder,
-    /// Leading bits of an integer that are not part of its value; fewer than it has.
+    /// Leading bits of an integer that are not part of its value; fewer than the type has.
     pub unused_bits: u32,
     /// Slope and intercept to apply.
     pub scaling: Option<(f64, f64)>,
 }
 
-/// Reads the voxels of a file, front to back.
+/// Reads the voxels of a file from front to back.
 pub(super) struct VoxelReader<'a> {
     decoder: Decoder,
     source: &'a mut Source,
     buffer: Vec<u8>,
 }
 
-/// Decodes portions and keeps what is to be told of them.
+/// Decodes portions and keeps running figures over them.
 struct Decoder {
     format: VoxelFormat,
     odd: Odd,
     tally: Tally,
 }
 
-/// Values that `f32` does not hold as they are.
+/// Values that `f32` cannot represent exactly.
 #[derive(Debug, Default)]
 struct Odd {
     infinite: u64,
@@ -98,7 +94,7 @@ struct Odd {
 }
 
 impl<'a> VoxelReader<'a> {
-    /// A reader for the voxels in `source`, which holds as many as will be asked for.
+    /// A reader for the voxels in `source`. The caller has checked that `source` holds them.
     pub(super) fn new(format: VoxelFormat, source: &'a mut Source) -> Self {
         Self {
             decoder: Decoder {
@@ -111,8 +107,12 @@ impl<'a> VoxelReader<'a> {
         }
     }
 
-    /// Appends `count` voxels, which begin at byte `begin` behind all that were read before,
-    /// to `voxels`. `report` hears the share of `count` that is done.
+    /// Appends the `count` voxels from byte `begin` on to `voxels`. `begin` must not lie before the
+    /// end of the previous call. `report` is called with the share of `count` that is done.
+    ///
+    /// # Errors
+    /// [`VolumeError`] if the file is damaged, a value exceeds the range of `f32`, or memory is
+    /// short.
     pub(super) fn append(
         &mut self,
         begin: u64,
@@ -154,8 +154,8 @@ impl<'a> VoxelReader<'a> {
         Ok(report(1.0)?)
     }
 
-    /// Decodes the `count` voxels that are stored in `words`, from byte `place` on, within these words.
-    /// No voxel goes to a place behind its own: none is overwritten before it was decoded.
+    /// Decodes in place the `count` voxels stored in `words` from byte `place` on. No voxel moves
+    /// back, so none is overwritten before it has been decoded.
     fn in_place(
         &mut self,
         mut words: Vec<f32>,
@@ -177,39 +177,64 @@ impl<'a> VoxelReader<'a> {
         Ok(words)
     }
 
-    /// The figures of all voxels so far.
+    /// Decodes `frames` volumes of `count` voxels each, stored one after the other from byte `begin`
+    /// on, without keeping their voxels.
+    ///
+    /// # Errors
+    /// As [`VoxelReader::append`].
+    pub(super) fn tally_all(
+        &mut self,
+        begin: u64,
+        count: usize,
+        frames: usize,
+        monitor: &Monitor,
+    ) -> Result<(), VolumeError> {
+        let bytes = count as u64 * self.decoder.format.data_type.size() as u64;
+        let mut voxels = Vec::new();
+        for frame in 0..frames {
+            voxels.clear();
+            let begin = begin + frame as u64 * bytes;
+            self.append(begin, count, &mut voxels, &mut |done| {
+                monitor.report(Stage::Read, (frame as f64 + done) / frames as f64)
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Figures over all voxels read so far.
     pub(super) fn tally(&self) -> Tally {
         self.decoder.tally
     }
 
-    /// What happened to the values.
+    /// Warnings about values that `f32` cannot represent.
     pub(super) fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         if self.decoder.odd.infinite > 0 {
             let n = self.decoder.odd.infinite;
             warnings.push(format!(
-                "{n} voxels are infinite and were taken as missing (NaN)."
+                "{n} voxels are infinite and are treated as missing (NaN)."
             ));
         }
         if self.decoder.odd.inexact {
             let name = self.decoder.format.data_type.name();
             warnings.push(format!(
-                "Some {name} values exceed 2^24 and were rounded to 24 binary digits."
+                "Some {name} values exceed 2^24 and were rounded to 24 significant bits."
             ));
         }
         warnings
     }
 
-    /// Looks at what follows the last volume.
+    /// Checks the end of the file after the last volume, which verifies the checksum of a gzip
+    /// member. Returns a warning if more bytes follow.
     pub(super) fn finish(&mut self) -> Result<Option<String>, VolumeError> {
         let left_over = self.source.finish()?;
-        Ok(left_over.then(|| "Bytes that follow the last voxel were left aside.".into()))
+        Ok(left_over.then(|| "Bytes after the last voxel were ignored.".into()))
     }
 }
 
 impl Decoder {
-    /// Appends the voxels stored in `bytes` to `out`; the first of them is number `first` of the
-    /// volume.
+    /// Appends the voxels stored in `bytes` to `out`. The first of them is voxel number `first` of
+    /// the volume.
     fn append(
         &mut self,
         bytes: &[u8],
@@ -220,15 +245,15 @@ impl Decoder {
         decode(bytes, &self.format, out);
         let decoded = &mut out[start..];
         self.odd.settle(bytes, &self.format, decoded, first)?;
-        // While they are still in the cache.
+        // Tallied here because the portion is still in the cache.
         self.tally.add_portion(decoded);
         Ok(())
     }
 }
 
 impl Odd {
-    /// Looks for values that `f32` cannot hold among `voxels`, the first of which is number `first`
-    /// of the volume.
+    /// Counts the values among `voxels` that `f32` cannot represent exactly. The first of `voxels`
+    /// is voxel number `first` of the volume.
     fn settle(
         &mut self,
         bytes: &[u8],
@@ -238,7 +263,7 @@ impl Odd {
     ) -> Result<(), VolumeError> {
         let (mut infinite, mut large) = (false, false);
         for v in &*voxels {
-            // Without their sign bit, floats are ordered as their bits are.
+            // Non-negative floats have the same order as their bits.
             let size = v.to_bits() & !SIGN;
             infinite |= size == INFINITY;
             large |= size > EXACT && size < INFINITY;
@@ -250,7 +275,8 @@ impl Odd {
         }
     }
 
-    /// Makes infinities NaN, and refuses those that the file does not hold: numbers too large.
+    /// Replaces infinities by NaN. An infinity that stands for a finite number in the file is an
+    /// error: the number exceeds the range of `f32`.
     fn settle_infinite(
         &mut self,
         bytes: &[u8],
@@ -284,9 +310,9 @@ fn overflow(format: &VoxelFormat, index: usize, value: f64) -> VolumeError {
 
 /// A stored number.
 trait Stored: Copy {
-    /// Appends `take` of each number in `bytes` to `out`.
+    /// Appends `take` of every number in `bytes` to `out`.
     fn each<O>(bytes: &[u8], order: ByteOrder, out: &mut Vec<O>, take: impl Fn(Self) -> O);
-    /// Without its leading `unused` bits; those of a signed number repeat its sign.
+    /// The value without its leading `unused` bits, sign-extended for signed types.
     fn trim(self, unused: u32) -> Self;
     fn single(self) -> f32;
     fn double(self) -> f64;
@@ -328,55 +354,23 @@ macro_rules! stored {
 }
 stored!(u8, i8, u16, i16, u32, i32, u64, i64, f32, f64);
 
-/// Evaluates `$body` with `$t` standing for the Rust type of `$data_type`.
+/// Evaluates `$body` with `$t` as the Rust type of `$data_type`.
 macro_rules! with_type {
     ($data_type:expr, $t:ident => $body:expr) => {
+        with_type!($data_type, $t => $body;
+            U8 u8, I8 i8, U16 u16, I16 i16, U32 u32, I32 i32, U64 u64, I64 i64, F32 f32, F64 f64)
+    };
+    ($data_type:expr, $t:ident => $body:expr; $($variant:ident $type:ty),*) => {
         match $data_type {
-            DataType::U8 => {
-                type $t = u8;
+            $(DataType::$variant => {
+                type $t = $type;
                 $body
-            }
-            DataType::I8 => {
-                type $t = i8;
-                $body
-            }
-            DataType::U16 => {
-                type $t = u16;
-                $body
-            }
-            DataType::I16 => {
-                type $t = i16;
-                $body
-            }
-            DataType::U32 => {
-                type $t = u32;
-                $body
-            }
-            DataType::I32 => {
-                type $t = i32;
-                $body
-            }
-            DataType::U64 => {
-                type $t = u64;
-                $body
-            }
-            DataType::I64 => {
-                type $t = i64;
-                $body
-            }
-            DataType::F32 => {
-                type $t = f32;
-                $body
-            }
-            DataType::F64 => {
-                type $t = f64;
-                $body
-            }
+            })*
         }
     };
 }
 
-/// Appends the numbers in `bytes` to `voxels`, slope and intercept applied in double precision
+/// Appends the numbers in `bytes` to `voxels`. Slope and intercept are applied in double precision,
 /// as nibabel does.
 fn decode(bytes: &[u8], format: &VoxelFormat, voxels: &mut Vec<f32>) {
     let (order, unused) = (format.byte_order, format.unused_bits);
@@ -393,7 +387,7 @@ fn decode(bytes: &[u8], format: &VoxelFormat, voxels: &mut Vec<f32>) {
     });
 }
 
-/// The first number in `bytes` in double precision, which tells large from infinite.
+/// The first number in `bytes` in double precision, which distinguishes large from infinite values.
 fn exact(bytes: &[u8], format: &VoxelFormat) -> f64 {
     let (slope, inter) = format.scaling.unwrap_or((1.0, 0.0));
     let unused = format.unused_bits;

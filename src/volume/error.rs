@@ -1,4 +1,4 @@
-//! Why a file did not become a volume.
+//! Errors of reading a volume.
 
 use crate::progress::Cancelled;
 
@@ -8,62 +8,64 @@ pub enum VolumeError {
     /// No file was given.
     #[error("no file was given")]
     NoFile,
-    /// There is not a single byte.
+    /// The file has no bytes.
     #[error("{file} is empty")]
     Empty {
         /// The file's name.
         file: String,
     },
-    /// A known format which is not read.
-    #[error("{file} is {format}, which is not read here")]
+    /// A known format that is not supported.
+    #[error("{file} is {format}, which is not supported")]
     Unsupported {
         /// The file's name.
         file: String,
-        /// What it is.
+        /// The format.
         format: String,
         /// How to make a readable file of it.
         fix: &'static str,
     },
-    /// A DICOM image of the right kind that shows no slices.
+    /// A Nuclear Medicine Image that does not contain reconstructed slices.
     #[error("{file} has the Image Type {image_type}: {reason}")]
     NotSlices {
         /// The file's name.
         file: String,
         /// Value 3 of Image Type (0008,0008).
         image_type: String,
-        /// What it shows instead.
+        /// What it contains instead.
         reason: &'static str,
     },
-    /// Nothing known.
-    #[error("{file} is no volume known here: it begins with {start}")]
+    /// The format is unknown.
+    #[error("{file} is not in a known volume format: it begins with {start}")]
     Unrecognised {
         /// The file's name.
         file: String,
-        /// Its first bytes, printable.
+        /// Its first bytes, escaped.
         start: String,
     },
-    /// A header's field has a value that cannot be.
+    /// A header field has an invalid value.
     #[error("{file}: {field} is {value}: {reason}")]
     Field {
         /// The file's name.
         file: String,
-        /// The field as its standard calls it.
+        /// Name of the field in its standard.
         field: &'static str,
-        /// The offending value.
+        /// The invalid value.
         value: String,
-        /// What it must be.
+        /// Why it is invalid.
         reason: String,
-        /// Where the field stands in the (unpacked) file, if it has one place.
+        /// Offset of the field in the unpacked file, if known.
         byte: Option<u64>,
     },
-    /// The file ends before what its header promises.
-    #[error("{file} is cut off or its header lies: {needed} bytes needed, at most {found} there")]
+    /// The file is shorter than its header implies.
+    #[error(
+        "{file} is cut off or its header is wrong: it needs {needed} bytes and has at most {found}"
+    )]
     Truncated {
         /// The file's name.
         file: String,
         /// Bytes (unpacked) up to the last voxel.
         needed: u64,
-        /// Bytes (unpacked) that are there, or that the packed file could hold at best.
+        /// Bytes (unpacked) in the file; for a packed file an upper bound.
         found: u64,
     },
     /// The compressed stream is damaged.
@@ -73,67 +75,67 @@ pub enum VolumeError {
         file: String,
         /// Bytes unpacked so far.
         byte: u64,
-        /// The decoder's words.
+        /// Message of the decoder.
         reason: String,
     },
-    /// More than this service is set to read.
-    #[error("{file} has {asked} {what}, the limit is {limit}")]
+    /// The file exceeds a limit.
+    #[error("{file} has {asked} {what}; the limit is {limit}")]
     TooLarge {
         /// The file's name.
         file: String,
-        /// What there is too much of.
+        /// The limited quantity.
         what: &'static str,
-        /// How much the file asks for.
+        /// How much of it the file has.
         asked: u64,
         /// The limit.
         limit: u64,
     },
-    /// Several volumes in one file and no word which one.
-    #[error("the file holds {frames} frames: say which one")]
+    /// The file holds several volumes, and none was chosen.
+    #[error("the file holds {frames} frames, of which one must be chosen")]
     FrameNeeded {
-        /// How many there are; valid are 0..frames.
+        /// Number of volumes; valid numbers are 0..frames.
         frames: usize,
     },
-    /// A frame that is not there.
-    #[error("frame {frame} is not among the file's {frames} frames (the first one is 0)")]
+    /// The chosen volume does not exist.
+    #[error("the file holds {frames} frames, counted from 0; there is no frame {frame}")]
     FrameOutOfRange {
-        /// What was asked for.
+        /// The number given.
         frame: usize,
-        /// How many there are.
+        /// Number of volumes.
         frames: usize,
     },
     /// A `.hdr` without its `.img`.
-    #[error("{file} is a NIfTI header whose voxels stand in a second file, which is missing")]
+    #[error("{file} is a NIfTI header whose voxels are in a second file, which is missing")]
     ImageMissing {
-        /// The header's name.
+        /// Name of the header file.
         file: String,
     },
-    /// Several files that do not make one volume.
-    #[error("{count} files were given, and they are not a .hdr/.img pair")]
+    /// Several files that do not form one volume.
+    #[error("{count} files were given that are not a .hdr/.img pair")]
     NotOneVolume {
-        /// How many.
+        /// Number of files.
         count: usize,
     },
-    /// A voxel's value cannot be held.
+    /// The value of a voxel exceeds the range of 32-bit floats.
     #[error("{file}: voxel ({}, {}, {}) is {value}, beyond the range of 32-bit floats", .voxel[0], .voxel[1], .voxel[2])]
     Overflow {
         /// The file's name.
         file: String,
-        /// Its index (i, j, k).
+        /// Index (i, j, k) of the voxel.
         voxel: [usize; 3],
         /// The value with slope and intercept applied.
         value: f64,
     },
     /// Every voxel is NaN or infinite.
-    #[error("{file}: none of its voxels is a finite number")]
+    #[error("{file}: no voxel has a finite value")]
     NoFiniteVoxel {
         /// The file's name.
         file: String,
     },
-    /// Memory for the voxels could not be had.
-    #[error("no memory for {bytes} bytes of voxels")]
+    /// Memory for the voxels could not be allocated.
+    #[error("{bytes} bytes of memory for the voxels could not be allocated")]
     Memory {
-        /// How much was asked for.
+        /// Bytes needed.
         bytes: u64,
     },
     /// The operating system could not read the file.
@@ -141,10 +143,10 @@ pub enum VolumeError {
     Io {
         /// The file's name.
         file: String,
-        /// The system's words.
+        /// Message of the operating system.
         reason: String,
     },
-    /// The caller asked for an end.
+    /// The caller cancelled the work.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }

@@ -1,10 +1,10 @@
-//! What was understood of a file, for a person to check.
+//! Facts about a file, for a person to check.
 
 use nalgebra::Matrix4;
 
-/// The file's format.
+/// Format of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
+pub enum FileFormat {
     /// NIfTI-1, voxels in the same file.
     Nifti1,
     /// NIfTI-1, header and voxels in two files.
@@ -15,17 +15,20 @@ pub enum Format {
     Nifti2Pair,
     /// DICOM Nuclear Medicine Image, all slices in one file.
     DicomNm,
+    /// No file: an array in memory.
+    Array,
 }
 
-impl Format {
-    /// The name by which people know it.
+impl FileFormat {
+    /// The common name of the format.
     pub fn as_str(self) -> &'static str {
         match self {
-            Format::Nifti1 => "NIfTI-1",
-            Format::Nifti1Pair => "NIfTI-1 pair",
-            Format::Nifti2 => "NIfTI-2",
-            Format::Nifti2Pair => "NIfTI-2 pair",
-            Format::DicomNm => "DICOM NM",
+            FileFormat::Nifti1 => "NIfTI-1",
+            FileFormat::Nifti1Pair => "NIfTI-1 pair",
+            FileFormat::Nifti2 => "NIfTI-2",
+            FileFormat::Nifti2Pair => "NIfTI-2 pair",
+            FileFormat::DicomNm => "DICOM NM",
+            FileFormat::Array => "array",
         }
     }
 }
@@ -49,23 +52,25 @@ impl ByteOrder {
     }
 }
 
-/// Where the voxels' place in the patient was taken from.
+/// The fields that define the position of the voxels in the patient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AffineSource {
     /// NIfTI's general affine (`srow_x/y/z`).
     Sform,
-    /// NIfTI's rigid one (`quatern_*`, `qoffset_*`, `pixdim`).
+    /// NIfTI's rigid transform (`quatern_*`, `qoffset_*`, `pixdim`).
     Qform,
-    /// The spacing alone: orientation and origin are assumptions.
+    /// NIfTI's spacing alone: orientation and origin are assumptions.
     Pixdim,
     /// DICOM's Image Position and Orientation (Patient), of the detector or of the image.
     ImagePosition,
-    /// DICOM without a position (or an orientation): the origin is an assumption.
+    /// DICOM without a position or an orientation: the origin is an assumption.
     UnknownOrigin,
+    /// The affine that came with an array.
+    Caller,
 }
 
 impl AffineSource {
-    /// The name in answers: `sform`, `qform`, `pixdim`, `image-position`, `unknown-origin`.
+    /// The name in JSON: `sform`, `qform`, `pixdim`, `image-position`, `unknown-origin`, `caller`.
     pub fn as_str(self) -> &'static str {
         match self {
             AffineSource::Sform => "sform",
@@ -73,14 +78,15 @@ impl AffineSource {
             AffineSource::Pixdim => "pixdim",
             AffineSource::ImagePosition => "image-position",
             AffineSource::UnknownOrigin => "unknown-origin",
+            AffineSource::Caller => "caller",
         }
     }
 }
 
-/// The unit of length in which the file speaks; everything of ours is in millimetres.
+/// The unit of length in the file. All lengths in this crate are in millimetres.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LengthUnit {
-    /// Not stated; millimetres are assumed, as every reader does.
+    /// Not stated: read as millimetres, as other readers do.
     Unknown,
     /// Metres.
     Metre,
@@ -91,7 +97,7 @@ pub enum LengthUnit {
 }
 
 impl LengthUnit {
-    /// Millimetres in one unit.
+    /// Millimetres per unit.
     pub fn in_millimetres(self) -> f64 {
         match self {
             LengthUnit::Metre => 1000.0,
@@ -100,7 +106,7 @@ impl LengthUnit {
         }
     }
 
-    /// The unit's name.
+    /// The symbol of the unit.
     pub fn as_str(self) -> &'static str {
         match self {
             LengthUnit::Unknown => "unknown (read as mm)",
@@ -111,24 +117,24 @@ impl LengthUnit {
     }
 }
 
-/// Everything a person needs to see whether the right volume was read the right way.
+/// What a person needs to see to check that the right volume was read correctly.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VolumeFacts {
-    /// The file's format.
-    pub format: Format,
-    /// Order of its bytes.
+    /// Format of the file.
+    pub format: FileFormat,
+    /// Byte order of the file.
     pub byte_order: ByteOrder,
-    /// Whether it came gzipped.
+    /// Whether the file is gzipped.
     pub compressed: bool,
-    /// The stored data type, as in `int16`.
+    /// The stored data type, for example `int16`.
     pub data_type: &'static str,
     /// Slope and intercept that were applied, if any.
     pub scaling: Option<(f64, f64)>,
-    /// All dimensions in the file, trailing ones of size 1 included.
+    /// All dimensions in the file, including trailing ones of size 1.
     pub file_shape: Vec<usize>,
-    /// How many volumes of [`VolumeFacts::shape`] the file holds.
+    /// Number of volumes in the file.
     pub frames: usize,
-    /// Which of them was read, from 0; `None` where all were looked at.
+    /// The volume that was read, from 0; `None` if all were examined.
     pub frame: Option<usize>,
     /// Voxels along i, j, k of one volume.
     pub shape: [usize; 3],
@@ -138,43 +144,43 @@ pub struct VolumeFacts {
     pub affine_lps: Matrix4<f64>,
     /// Voxel index to RAS millimetres (NIfTI's patient frame).
     pub affine_ras: Matrix4<f64>,
-    /// Where the affine came from.
+    /// The fields that define the affine.
     pub affine_source: AffineSource,
-    /// The file's unit of length.
+    /// Unit of length in the file.
     pub unit: LengthUnit,
-    /// The values.
+    /// Figures over the values.
     pub intensity: IntensitySummary,
-    /// What a careful reader should know, in sentences.
+    /// Assumptions, contradictions and oddities, in sentences.
     pub warnings: Vec<String>,
 }
 
-/// The values of a volume (or of all volumes of a file).
+/// Figures over the values of a volume, or of all volumes of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IntensitySummary {
-    /// Smallest number.
+    /// Smallest value.
     pub minimum: f32,
-    /// Largest number.
+    /// Largest value.
     pub maximum: f32,
-    /// Their mean.
+    /// Mean of the values that are not missing.
     pub mean: f64,
-    /// Their sum.
+    /// Sum of the values that are not missing.
     pub sum: f64,
-    /// How many voxels are numbers.
+    /// Number of voxels that have a finite value.
     pub finite: u64,
-    /// How many are not (NaN in the volume, NaN or infinite in the file).
+    /// Number of voxels that do not (NaN in the volume, NaN or infinite in the file).
     pub missing: u64,
-    /// Whether every number is whole.
+    /// Whether all finite values are whole numbers.
     pub integral: bool,
-    /// The labels and their sizes where the volume looks like a label map: few whole values,
-    /// and neighbours mostly alike. Background (0) left out; rising by label.
+    /// The labels and their sizes, in ascending order and without background (0), if the volume looks
+    /// like a label map: few different whole values, and neighbours mostly alike.
     pub labels: Option<Vec<LabelCount>>,
 }
 
 /// One label of a label map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LabelCount {
-    /// The voxels' value.
+    /// Value of the voxels.
     pub label: i64,
-    /// How many voxels carry it.
+    /// Number of voxels with that value.
     pub voxels: u64,
 }

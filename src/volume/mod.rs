@@ -1,25 +1,26 @@
-//! A reconstructed volume: voxels and the map that puts them into the patient.
+//! Reads reconstructed volumes from NIfTI and DICOM files, and makes phantoms.
 //!
-//! In go files as a scanner, a workstation or a colleague wrote them; out come voxel values as
-//! `f32`, an invertible map from voxel indices to LPS millimetres, and the [`VolumeFacts`] that
-//! tell a person what was understood of the file. The way of a file:
+//! In: files as a scanner, a workstation or a user wrote them. Out: voxel values as `f32`, an
+//! invertible map from voxel indices to LPS millimetres, and the [`VolumeFacts`] that let a person
+//! check what was read. The steps:
 //!
-//! 1. `source`: opened, unpacked where gzipped (several members too), every byte counted
-//!    against the limits; `unpack` is the fast way for small files;
-//! 2. `recognise`: told by its content, never by its name;
-//! 3. [`nifti`] or `dicom`: header checked field by field;
-//! 4. `decode`: the voxels, in portions, straight into their final place;
-//! 5. `summary`: what values there are, and whether they look like labels.
+//! 1. `source`: opens the file and unpacks gzip (also several members), counting every byte against
+//!    the limits; `unpack` is a faster way for small files.
+//! 2. `recognise`: determines the format by the content, never by the file name.
+//! 3. [`nifti`] or `dicom`: checks the header field by field.
+//! 4. `decode`: decodes the voxels in portions directly into the result.
+//! 5. `summary`: figures over the values, and whether they look like labels.
 //!
-//! Guaranteed: a file gives the values and positions that its standard assigns to them, or an
-//! error naming field and value. No size that a file states is believed before the file has
-//! shown that it can hold it; memory beyond the voxels themselves stays under a mebibyte, except
-//! for gzipped files of at most 16 MiB (packed and unpacked), which are held whole.
-//! Not guaranteed: that the file's own statement about the patient is true. Contradictions
-//! inside a file are told as warnings.
+//! Guaranteed: a file gives the values and positions that its standard assigns to them, or an error
+//! with the name and value of the invalid field. Before memory is taken for a stated size, the file
+//! must be large enough to hold it. Memory beyond the voxels stays under one mebibyte, except for
+//! gzipped files of at most 16 MiB (packed and unpacked), which are held in memory whole.
 //!
-//! [`mod@phantom`] makes volumes of known truth, [`nifti::write()`] puts volumes into files, and
-//! [`mod@preview`] draws them.
+//! Not guaranteed: that the file's statements about the patient are true. Contradictions inside a
+//! file appear as warnings.
+//!
+//! [`mod@phantom`] makes volumes with known ground truth, [`nifti::write()`] writes volumes to files,
+//! and [`mod@preview`] draws them.
 //!
 //! ```
 //! use ventriform::progress::Monitor;
@@ -42,7 +43,9 @@ mod decode;
 mod dicom;
 pub mod error;
 pub mod facts;
+mod limits;
 pub mod nifti;
+mod open;
 pub mod phantom;
 pub mod preview;
 mod read;
@@ -54,10 +57,12 @@ mod unpack;
 pub use crate::grid::Volume;
 pub use error::VolumeError;
 pub use facts::{
-    AffineSource, ByteOrder, Format, IntensitySummary, LabelCount, LengthUnit, VolumeFacts,
+    AffineSource, ByteOrder, FileFormat, IntensitySummary, LabelCount, LengthUnit, VolumeFacts,
 };
+pub use limits::{ReadLimits, ReadOptions};
+pub use open::{Reading, describe};
 pub use phantom::{Phantom, PhantomParameters, phantom};
 pub use preview::{GrayImage, preview, preview_png};
-pub use read::{ReadLimits, ReadOptions, Reading, inspect, read};
+pub use read::{inspect, read};
 pub use source::VolumeFile;
 pub use summary::summarise;

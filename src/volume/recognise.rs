@@ -1,17 +1,18 @@
-//! What a file is, told by its first bytes.
+//! Recognises the format of a file by its first bytes.
 //!
-//! Names lie and get lost on the way through HTTP; the magic numbers of the formats do not.
+//! File names can be wrong and can get lost during an upload, so only the magic numbers count.
 
+use super::limits::ReadLimits;
 use super::source::{Source, VolumeFile};
-use super::{ReadLimits, VolumeError, dicom, nifti};
+use super::{VolumeError, dicom, nifti};
 
-/// How many unpacked bytes are looked at.
-const LOOKED_AT: usize = 1024;
+/// Unpacked bytes that are examined.
+const EXAMINED: usize = 1024;
 
-/// Files that make up one volume.
+/// Files that together hold one volume or several.
 #[derive(Debug)]
 pub(super) enum Recognised<'a> {
-    /// A NIfTI header, and where the voxels stand.
+    /// A file with a NIfTI header and the file with its voxels, which may be the same.
     Nifti {
         header: &'a VolumeFile,
         voxels: &'a VolumeFile,
@@ -20,16 +21,19 @@ pub(super) enum Recognised<'a> {
     Dicom(&'a VolumeFile),
 }
 
-/// One file's kind.
+/// What a single file is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum FileKind {
     NiftiSingle,
     NiftiHeader,
     Dicom,
     Other,
 }
 
-/// Finds out what `files` are together.
+/// Determines the format of `files`.
+///
+/// # Errors
+/// [`VolumeError`] for unknown or unsupported formats, and for files that do not belong together.
 pub(super) fn recognise<'a>(
     files: &'a [VolumeFile],
     limits: &ReadLimits,
@@ -37,38 +41,38 @@ pub(super) fn recognise<'a>(
     match files {
         [] => Err(VolumeError::NoFile),
         [file] => match look(file, limits)? {
-            (Kind::NiftiSingle, _) => Ok(Recognised::Nifti {
+            (FileKind::NiftiSingle, _) => Ok(Recognised::Nifti {
                 header: file,
                 voxels: file,
             }),
-            (Kind::NiftiHeader, _) => {
+            (FileKind::NiftiHeader, _) => {
                 nifti::check_header(file, limits)?;
                 Err(VolumeError::ImageMissing {
                     file: file.name().into(),
                 })
             }
-            (Kind::Dicom, _) => Ok(Recognised::Dicom(file)),
-            (Kind::Other, start) => Err(refuse(file, &start)),
+            (FileKind::Dicom, _) => Ok(Recognised::Dicom(file)),
+            (FileKind::Other, start) => Err(refuse(file, &start)),
         },
         [a, b] => pair(a, b, limits),
         more => Err(VolumeError::NotOneVolume { count: more.len() }),
     }
 }
 
-/// Two files: one of them must be a header that asks for the other.
+/// Two files: one must be a header whose voxels are in the other.
 fn pair<'a>(
     a: &'a VolumeFile,
     b: &'a VolumeFile,
     limits: &ReadLimits,
 ) -> Result<Recognised<'a>, VolumeError> {
     let (header, voxels) = match (look(a, limits)?, look(b, limits)?) {
-        // Voxels may look like anything.
-        ((Kind::NiftiHeader, _), (Kind::Other | Kind::Dicom, _)) => (a, b),
-        ((Kind::Other | Kind::Dicom, _), (Kind::NiftiHeader, _)) => (b, a),
-        ((Kind::Other, start), (Kind::Other, _)) if is_analyze(&start) => {
+        // A file of voxels may start with any bytes.
+        ((FileKind::NiftiHeader, _), (FileKind::Other | FileKind::Dicom, _)) => (a, b),
+        ((FileKind::Other | FileKind::Dicom, _), (FileKind::NiftiHeader, _)) => (b, a),
+        ((FileKind::Other, start), (FileKind::Other, _)) if is_analyze(&start) => {
             return Err(refuse(a, &start));
         }
-        ((Kind::Other, _), (Kind::Other, start)) if is_analyze(&start) => {
+        ((FileKind::Other, _), (FileKind::Other, start)) if is_analyze(&start) => {
             return Err(refuse(b, &start));
         }
         _ => return Err(VolumeError::NotOneVolume { count: 2 }),
@@ -76,10 +80,10 @@ fn pair<'a>(
     Ok(Recognised::Nifti { header, voxels })
 }
 
-/// The kind of `file` and its first bytes.
-fn look(file: &VolumeFile, limits: &ReadLimits) -> Result<(Kind, Vec<u8>), VolumeError> {
-    let mut start = vec![0; LOOKED_AT];
-    let mut source = Source::open(file, limits.unpacked_bytes.max(LOOKED_AT as u64))?;
+/// The kind of `file`, and its first bytes.
+fn look(file: &VolumeFile, limits: &ReadLimits) -> Result<(FileKind, Vec<u8>), VolumeError> {
+    let mut start = vec![0; EXAMINED];
+    let mut source = Source::open(file, limits.unpacked_bytes.max(EXAMINED as u64))?;
     let there = source.fill(&mut start)?;
     start.truncate(there);
     if start.is_empty() {
@@ -91,39 +95,39 @@ fn look(file: &VolumeFile, limits: &ReadLimits) -> Result<(Kind, Vec<u8>), Volum
         });
     }
     let kind = match (start.get(344..348), start.get(4..8)) {
-        (_, Some(b"n+2\0")) | (Some(b"n+1\0"), _) => Kind::NiftiSingle,
-        (_, Some(b"ni2\0")) | (Some(b"ni1\0"), _) => Kind::NiftiHeader,
-        _ if dicom::is_dicom(&start) => Kind::Dicom,
-        _ => Kind::Other,
+        (_, Some(b"n+2\0")) | (Some(b"n+1\0"), _) => FileKind::NiftiSingle,
+        (_, Some(b"ni2\0")) | (Some(b"ni1\0"), _) => FileKind::NiftiHeader,
+        _ if dicom::is_dicom(&start) => FileKind::Dicom,
+        _ => FileKind::Other,
     };
     Ok((kind, start))
 }
 
-/// Analyze 7.5 has NIfTI-1's length field and no magic.
+/// Whether a file without NIfTI magic is an Analyze 7.5 header, which has the same length field.
 fn is_analyze(start: &[u8]) -> bool {
     let length = [348_i32.to_le_bytes(), 348_i32.to_be_bytes()];
     start.len() >= 348 && length.iter().any(|l| start.starts_with(l))
 }
 
-/// Names what `start` is, as far as it is known.
+/// The error for a file that is not supported, with the name of its format if `start` shows it.
 fn refuse(file: &VolumeFile, start: &[u8]) -> VolumeError {
     const CONVERT: &str = "Convert it to NIfTI (.nii.gz).";
-    const ANALYZE: &str = "Convert it to NIfTI: Analyze does not say where left and right are.";
+    const ANALYZE: &str = "Convert it to NIfTI: Analyze files do not state which side is left.";
     let known: &[(usize, &[u8], &'static str)] = &[
         (0, b"CDF\x01", "a MINC 1 (netCDF) file"),
         (0, b"CDF\x02", "a MINC 1 (netCDF) file"),
-        (0, b"\x89HDF\r\n", "an HDF5 file (MINC 2 is one)"),
+        (0, b"\x89HDF\r\n", "an HDF5 file (for example MINC 2)"),
         (0, b"NRRD", "an NRRD file"),
         (0, b"ObjectType", "a MetaImage header"),
         (0, b"NDims", "a MetaImage header"),
         (0, b"!INTERFILE", "an Interfile header"),
         (0, b"!interfile", "an Interfile header"),
         (0, b"MATRIX", "an ECAT 7 file"),
-        (0, b"\x89PNG", "a PNG picture"),
-        (0, b"\xff\xd8\xff", "a JPEG picture"),
-        (0, b"GIF8", "a GIF picture"),
-        (0, b"II*\0", "a TIFF picture"),
-        (0, b"MM\0*", "a TIFF picture"),
+        (0, b"\x89PNG", "a PNG image"),
+        (0, b"\xff\xd8\xff", "a JPEG image"),
+        (0, b"GIF8", "a GIF image"),
+        (0, b"II*\0", "a TIFF image"),
+        (0, b"MM\0*", "a TIFF image"),
         (0, b"%PDF", "a PDF document"),
         (0, b"PK\x03\x04", "a ZIP archive"),
         (0, b"BZh", "a bzip2 file"),
@@ -142,7 +146,7 @@ fn refuse(file: &VolumeFile, start: &[u8]) -> VolumeError {
     if is_analyze(start) {
         return VolumeError::Unsupported {
             file: name,
-            format: "an Analyze 7.5 header (its magic is not NIfTI's)".into(),
+            format: "an Analyze 7.5 header (it has no NIfTI magic)".into(),
             fix: ANALYZE,
         };
     }

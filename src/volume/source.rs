@@ -1,8 +1,8 @@
-//! Bytes of a file, unpacked on the way and counted.
+//! The unpacked bytes of a file, read from front to back and counted against a limit.
 //!
-//! A gzipped file may consist of several members one after the other (RFC 1952, 2.2); they
-//! read as one stream. Whatever follows the last member is not part of it, as for `gzip -d`.
-//! Small files of one member are unpacked [at once](super::unpack), which is faster.
+//! A gzipped file may consist of several members one after the other (RFC 1952, 2.2), which are
+//! read as one stream. Bytes after the last member are ignored, as by `gzip -d`. Small files of one
+//! member are unpacked [at once](super::unpack), which is faster.
 
 use super::VolumeError;
 use super::unpack::{self, Unpacked};
@@ -15,11 +15,11 @@ use std::sync::Arc;
 /// Packed bytes are read in portions of this size.
 const PORTION: usize = 128 * 1024;
 
-/// No deflate stream unpacks to more than this many times its size (zlib's technical details:
-/// 1032:1 in the limit).
+/// Largest ratio of unpacked to packed size of any deflate stream (1032:1 according to zlib's
+/// technical details).
 const GREATEST_RATIO: u64 = 1032;
 
-/// A file to read, under the name that its sender gave it. The name serves messages alone.
+/// A file to read and its name, which is only used in messages.
 #[derive(Debug, Clone)]
 pub struct VolumeFile {
     name: String,
@@ -33,14 +33,14 @@ enum Content {
 }
 
 impl VolumeFile {
-    /// The file at `path`, known by its own name.
+    /// The file at `path`, named after the last part of the path.
     pub fn at(path: impl AsRef<Path>) -> Self {
         let path = path.as_ref();
         let name = path.file_name().unwrap_or(path.as_os_str());
         Self::named(name.to_string_lossy(), path)
     }
 
-    /// The file at `path`, known as `name` (an upload that is stored under a key).
+    /// The file at `path` under another name, for example an upload that is stored under a key.
     pub fn named(name: impl Into<String>, path: impl AsRef<Path>) -> Self {
         Self {
             name: name.into(),
@@ -48,7 +48,7 @@ impl VolumeFile {
         }
     }
 
-    /// Bytes that never were a file.
+    /// A file whose content is in memory.
     pub fn in_memory(name: impl Into<String>, bytes: impl Into<Arc<[u8]>>) -> Self {
         Self {
             name: name.into(),
@@ -56,8 +56,8 @@ impl VolumeFile {
         }
     }
 
-    /// The file at `path`, together with its other half where it is one of a `.hdr`/`.img`
-    /// pair (either of them perhaps gzipped) and the other lies beside it.
+    /// The file at `path` and, if it is one of a `.hdr`/`.img` pair, the other file of the pair, if
+    /// that is in the same folder. Either may be gzipped.
     pub fn with_other_half(path: impl AsRef<Path>) -> Vec<Self> {
         let path = path.as_ref();
         let mut files = vec![Self::at(path)];
@@ -73,27 +73,31 @@ impl VolumeFile {
         files
     }
 
-    /// The name for messages.
+    /// The name used in messages.
     pub fn name(&self) -> &str {
         &self.name
     }
 }
 
-/// An open file's unpacked bytes, front to back.
+/// The unpacked bytes of an open file.
 pub(super) struct Source {
     file: String,
     body: Body,
+    /// Size of the file as stored, bytes.
     stored: u64,
+    /// Unpacked bytes given out or skipped so far.
     position: u64,
+    /// Most unpacked bytes to give out.
     limit: u64,
     gzip: bool,
+    /// Whether the gzip stream ended before its checksum.
     cut_off: bool,
 }
 
 enum Body {
     Plain(BufReader<Box<dyn ReadSeek>>),
     Gzip(Box<Members>),
-    /// All that the file unpacks to.
+    /// The whole content, in memory.
     Unpacked(Unpacked),
 }
 
@@ -101,7 +105,10 @@ pub(super) trait ReadSeek: Read + Seek {}
 impl<T: Read + Seek> ReadSeek for T {}
 
 impl Source {
-    /// Opens `file`; at most `limit` unpacked bytes will be given out.
+    /// Opens `file` to give out at most `limit` unpacked bytes.
+    ///
+    /// # Errors
+    /// [`VolumeError::Io`].
     pub(super) fn open(file: &VolumeFile, limit: u64) -> Result<Self, VolumeError> {
         let io = |e: io::Error| VolumeError::Io {
             file: file.name.clone(),
@@ -131,22 +138,22 @@ impl Source {
         })
     }
 
-    /// The file's name.
+    /// Name of the file.
     pub(super) fn file(&self) -> &str {
         &self.file
     }
 
-    /// How many bytes were given out or skipped.
+    /// Unpacked bytes given out or skipped so far.
     pub(super) fn position(&self) -> u64 {
         self.position
     }
 
-    /// Whether the bytes are unpacked from gzip.
+    /// Whether the file is gzipped.
     pub(super) fn is_gzip(&self) -> bool {
         self.gzip
     }
 
-    /// How many unpacked bytes there can be at most.
+    /// Upper bound on the number of unpacked bytes in the file.
     pub(super) fn capacity(&self) -> u64 {
         match self.gzip {
             false => self.stored,
@@ -154,8 +161,11 @@ impl Source {
         }
     }
 
-    /// Says that bytes up to `end` will be wanted. Where the file can be unpacked at once, it
-    /// is; what can be read, and what is wrong with it, stays the same.
+    /// Announces that bytes up to `end` will be read. Unpacks the file at once if that is possible;
+    /// bytes and errors are the same either way.
+    ///
+    /// # Errors
+    /// [`VolumeError::Io`].
     pub(super) fn prepare(&mut self, end: u64) -> Result<(), VolumeError> {
         let Body::Gzip(members) = &mut self.body else {
             return Ok(());
@@ -177,7 +187,7 @@ impl Source {
         Ok(())
     }
 
-    /// The next `length` bytes from where they lie, if they are in memory.
+    /// The next `length` bytes, if the file is unpacked in memory.
     pub(super) fn lend(&mut self, length: usize) -> Option<&[u8]> {
         let Body::Unpacked(unpacked) = &self.body else {
             return None;
@@ -188,8 +198,8 @@ impl Source {
         Some(lent)
     }
 
-    /// Gives the memory away in which the next `length` bytes lie, if they are the last of the file
-    /// and most of it; nothing can be read after that. Returns it with the place of the first of them.
+    /// The memory that holds the next `length` bytes and the offset of the first of them, if they are
+    /// the last bytes and most of an unpacked file. Nothing can be read after that.
     pub(super) fn give_up(&mut self, length: usize) -> Option<(Vec<f32>, usize)> {
         let Body::Unpacked(unpacked) = &mut self.body else {
             return None;
@@ -202,7 +212,10 @@ impl Source {
         Some((std::mem::take(unpacked).into_words(), begin))
     }
 
-    /// Fills `buffer` as far as the file reaches and says how far that was.
+    /// Fills `buffer` up to the end of the file and returns the number of bytes read.
+    ///
+    /// # Errors
+    /// [`VolumeError`] if the file is damaged, unreadable or larger than the limit.
     pub(super) fn fill(&mut self, buffer: &mut [u8]) -> Result<usize, VolumeError> {
         let mut filled = 0;
         while filled < buffer.len() {
@@ -219,7 +232,7 @@ impl Source {
                 Ok(0) => break,
                 Ok(n) => filled += n,
                 Err(e) if e.kind() == ErrorKind::Interrupted => {}
-                // Packed data that stop in the midst are a file that was cut off.
+                // The gzip stream ends in the middle: the file was cut off.
                 Err(e) if e.kind() == ErrorKind::UnexpectedEof && self.is_gzip() => {
                     self.cut_off = true;
                     break;
@@ -234,7 +247,8 @@ impl Source {
         }
     }
 
-    /// Fills `buffer` wholly, as a part of the `needed` bytes that the header promises.
+    /// Fills `buffer` completely. `needed` is the size of the file that the header implies, for the
+    /// error if the file ends before.
     pub(super) fn fill_all(&mut self, buffer: &mut [u8], needed: u64) -> Result<(), VolumeError> {
         match self.fill(buffer)? == buffer.len() {
             true => Ok(()),
@@ -242,14 +256,14 @@ impl Source {
         }
     }
 
-    /// Goes forward to byte `target` of the unpacked file.
+    /// Moves forward to byte `target` of the unpacked file.
     pub(super) fn skip_to(&mut self, target: u64) -> Result<(), VolumeError> {
-        debug_assert!(target >= self.position, "a stream goes forward only");
+        debug_assert!(target >= self.position, "a stream cannot move backward");
         if target > self.limit {
             return Err(self.beyond_limit(target));
         }
         if let Body::Plain(reader) = &mut self.body {
-            // Within the buffer nothing is read again.
+            // Keeps the buffer if the target is inside it.
             if let Err(e) = reader.seek_relative((target - self.position) as i64) {
                 return Err(self.failure(&e, 0));
             }
@@ -264,9 +278,9 @@ impl Source {
         Ok(())
     }
 
-    /// Looks past the last byte that is wanted, so that a gzip member's checksum gets checked.
-    /// Returns whether bytes were left over. Reads at most a portion: who appends a bomb shall
-    /// not have it unpacked.
+    /// Reads on after the last byte that is needed, so that the checksum of a gzip member is verified.
+    /// Returns whether the file has more bytes. Reads at most one portion, so that appended data cannot
+    /// exhaust time or memory.
     pub(super) fn finish(&mut self) -> Result<bool, VolumeError> {
         let mut rest = vec![0; PORTION];
         self.limit = u64::MAX;
@@ -275,13 +289,13 @@ impl Source {
             true => Err(VolumeError::Corrupt {
                 file: self.file.clone(),
                 byte: self.position,
-                reason: "the packed data end before their checksum".into(),
+                reason: "the packed data end before the checksum".into(),
             }),
             false => Ok(left_over),
         }
     }
 
-    /// The error for a file that ends too early.
+    /// The error for a file that is too short.
     pub(super) fn truncated(&self, needed: u64, found: u64) -> VolumeError {
         VolumeError::Truncated {
             file: self.file.clone(),
@@ -290,7 +304,7 @@ impl Source {
         }
     }
 
-    /// The error for more bytes than the limit allows.
+    /// The error for a file that exceeds the limit of unpacked bytes.
     pub(super) fn beyond_limit(&self, asked: u64) -> VolumeError {
         VolumeError::TooLarge {
             file: self.file.clone(),
@@ -314,18 +328,18 @@ impl Source {
     }
 }
 
-/// For parsers that want a reader. Failures lose their kind on the way.
+/// For parsers that need a reader. Every error becomes [`ErrorKind::Other`].
 impl Read for Source {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         self.fill(buffer).map_err(io::Error::other)
     }
 }
 
-/// First two bytes of a gzip member.
+/// The first two bytes of a gzip member.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
-/// Gzip members, one after the other. (`MultiGzDecoder` of flate2 takes padding after the last
-/// member for a damaged one.)
+/// Gzip members, one after the other. (`MultiGzDecoder` of flate2 treats padding after the last member
+/// as a damaged member.)
 struct Members {
     current: Option<GzDecoder<BufReader<Box<dyn ReadSeek>>>>,
     first: bool,
@@ -339,17 +353,17 @@ impl Members {
         }
     }
 
-    /// The packed file, if no member has ended yet; nothing can be read after that.
+    /// The packed file, if no member has ended yet. Nothing can be read after that.
     fn take_first(&mut self) -> Option<Box<dyn ReadSeek>> {
         let member = self.current.take_if(|_| self.first)?;
         Some(member.into_inner().into_inner())
     }
 
-    /// Steps to the member after the one that has ended.
+    /// Moves to the member after `ended`.
     fn next(ended: GzDecoder<BufReader<Box<dyn ReadSeek>>>) -> io::Result<Self> {
         let mut packed = ended.into_inner();
-        // The reader may hold a single byte of what follows; one is enough to tell padding,
-        // and a member that starts right and goes on wrong is an error worth telling.
+        // The buffer may hold only one more byte. One is enough to recognise padding; a member that
+        // starts correctly and continues wrongly is reported as an error.
         let follows = packed.fill_buf()?.first() == Some(&GZIP[0]);
         Ok(Self {
             current: follows.then(|| GzDecoder::new(packed)),

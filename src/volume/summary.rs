@@ -1,23 +1,23 @@
-//! What values a volume holds, and whether they look like labels.
+//! Figures over the values of a volume, and whether the values look like labels.
 //!
-//! The reader adds every portion that it has decoded, while it is still in the cache. Sums are taken
-//! within portions whose results are added in order.
+//! The reader adds every portion right after decoding it, while it is still in the cache. Sums are
+//! taken within portions, and their results are added in order.
 
 use super::VolumeError;
 use super::facts::{IntensitySummary, LabelCount};
 use std::collections::BTreeMap;
 
-/// Voxels summed together before the sums are added.
+/// Voxels per partial sum.
 const PORTION: usize = 1 << 16;
 
-/// More different values than this are no label map.
+/// Largest number of different values in a label map.
 const MOST_LABELS: usize = 256;
 
-/// Least share of labelled voxels whose neighbour along i carries the same label. Organs at
-/// coarse voxels have 0.7 and more, counts above noise below 0.2.
+/// Smallest share of labelled voxels in a label map whose neighbour along i has the same label. Organs
+/// with coarse voxels reach 0.7 and more; noisy counts stay below 0.2.
 const LEAST_COHERENCE: f64 = 0.5;
 
-/// Summarises `voxels`, which lie in rows of `row` along i.
+/// Figures over `voxels`, which are stored in rows of `row` voxels along i.
 pub fn summarise(voxels: &[f32], row: usize) -> IntensitySummary {
     let mut tally = Tally::default();
     for portion in voxels.chunks(PORTION) {
@@ -26,7 +26,10 @@ pub fn summarise(voxels: &[f32], row: usize) -> IntensitySummary {
     tally.with_labels(voxels, row)
 }
 
-/// Refuses a volume without any number, and has a sentence for one that is all the same.
+/// A warning if all values are the same.
+///
+/// # Errors
+/// [`VolumeError::NoFiniteVoxel`] if every voxel is missing.
 pub(super) fn judge(
     intensity: &IntensitySummary,
     file: &str,
@@ -36,10 +39,10 @@ pub(super) fn judge(
     }
     let value = intensity.minimum;
     let constant = value == intensity.maximum;
-    Ok(constant.then(|| format!("Every voxel has the value {value}: there is no object.")))
+    Ok(constant.then(|| format!("Every voxel has the value {value}: the volume shows no object.")))
 }
 
-/// Running figures over one or more volumes.
+/// Running figures over one volume or several.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Tally {
     minimum: f32,
@@ -64,19 +67,19 @@ impl Default for Tally {
 }
 
 impl Tally {
-    /// Takes in the voxels that come next.
+    /// Adds the voxels of the next portion.
     pub(super) fn add_portion(&mut self, portion: &[f32]) {
         self.merge(&Tally::of(portion));
     }
 
-    /// The figures of one portion, in lanes that a vector unit can hold.
+    /// Figures over one portion, computed in lanes for the vector unit.
     fn of(portion: &[f32]) -> Self {
         let mut lanes = Lanes::new();
         let (blocks, rest) = portion.as_chunks::<BLOCK>();
         for block in blocks {
             lanes.add_block(block);
         }
-        // What is left over is filled up with voxels that count for nothing.
+        // The last block is padded with missing voxels, which are subtracted below.
         let mut last = [f32::NAN; BLOCK];
         last[..rest.len()].copy_from_slice(rest);
         lanes.add_block(&last);
@@ -101,7 +104,8 @@ impl Tally {
         self.fractional |= other.fractional;
     }
 
-    /// The figures of a volume that was taken in, with its labels if it looks like having any.
+    /// The figures over `voxels`, all of which have been added, with their labels if they look like a
+    /// label map.
     pub(super) fn with_labels(&self, voxels: &[f32], row: usize) -> IntensitySummary {
         let labels = match self.fractional {
             false => labels(voxels, row),
@@ -110,7 +114,7 @@ impl Tally {
         self.summary(labels)
     }
 
-    /// The figures so far. Without any number they are all zero.
+    /// The figures so far; all zero if no voxel is finite.
     pub(super) fn summary(&self, labels: Option<Vec<LabelCount>>) -> IntensitySummary {
         let any = self.finite > 0;
         IntensitySummary {
@@ -126,16 +130,16 @@ impl Tally {
     }
 }
 
-/// Values taken side by side.
+/// Values processed side by side.
 const LANES: usize = 8;
 
-/// Values looked at together for what is rare.
+/// Values per check for the rare cases: missing and fractional values.
 const BLOCK: usize = 16 * LANES;
 
-/// From here on every `f32` is whole.
+/// From this value on, every `f32` is a whole number.
 const WHOLE: f32 = 8_388_608.0;
 
-/// Figures of every eighth voxel, and of all.
+/// Figures over every eighth voxel (arrays) and over all (scalars).
 struct Lanes {
     minimum: [f32; LANES],
     maximum: [f32; LANES],
@@ -155,8 +159,8 @@ impl Lanes {
         }
     }
 
-    /// Without branches on single values. Most blocks miss nothing, and once a fraction was seen
-    /// there is no need to look for more.
+    /// Adds a block without branches on single values: most blocks have no missing values, and once a
+    /// fraction has been found the search for fractions ends.
     fn add_block(&mut self, block: &[f32; BLOCK]) {
         let missing = block.iter().map(|v| u64::from(v.is_nan())).sum::<u64>();
         self.missing += missing;
@@ -172,7 +176,7 @@ impl Lanes {
         }
         if !self.fractional {
             self.fractional = block.iter().fold(false, |any, v| {
-                // Added to 2^23, a number loses its fraction to rounding.
+                // Adding 2^23 rounds a number to a whole one.
                 let size = v.abs();
                 let whole = (size + WHOLE) - WHOLE == size || size >= WHOLE;
                 any | !(whole | v.is_nan())
@@ -181,7 +185,8 @@ impl Lanes {
     }
 }
 
-/// The labels of `voxels`, if they look like ones: whole values, few of them, neighbours alike.
+/// The labels of `voxels`, which are whole, if there are few different ones and neighbours are mostly
+/// alike.
 fn labels(voxels: &[f32], row: usize) -> Option<Vec<LabelCount>> {
     let mut counts: BTreeMap<i64, u64> = BTreeMap::new();
     let (mut labelled, mut alike) = (0_u64, 0_u64);
@@ -199,8 +204,8 @@ fn labels(voxels: &[f32], row: usize) -> Option<Vec<LabelCount>> {
                 return None;
             }
             labelled += length;
-            // A voxel at a label's outer edge has nothing to agree with: only neighbours that
-            // are labelled too can speak against a label map.
+            // A voxel next to background counts as coherent: only a neighbour with another label
+            // is evidence against a label map.
             alike += length - u64::from(previous != 0);
             previous = label;
         }

@@ -16,7 +16,7 @@ use ventriform::grid::field::Field;
 use ventriform::parameters::ModelParameters;
 use ventriform::polar::{self, PolarParameters};
 use ventriform::progress::Monitor;
-use ventriform::volume::phantom::{Defect, Phantom, PhantomParameters, phantom};
+use ventriform::volume::phantom::{PerfusionDefect, Phantom, PhantomParameters, phantom};
 use ventriform::volume::{ReadLimits, ReadOptions, Volume, VolumeFile, read};
 use ventriform::{optimise, retile, surface};
 
@@ -25,7 +25,7 @@ fn parameters(seed: u64, noise: f64) -> PhantomParameters {
     PhantomParameters {
         shape: [64; 3],
         spacing_mm: [4.0; 3],
-        defects: vec![Defect {
+        defects: vec![PerfusionDefect {
             segment: 8,
             severity: 0.5,
         }],

@@ -9,13 +9,13 @@ use ventriform::grid::agreement::compare;
 use ventriform::grid::voxelise::{Mask, voxelise};
 use ventriform::mesh::shapes;
 use ventriform::progress::Monitor;
-use ventriform::volume::phantom::{Defect, PhantomParameters};
+use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters};
 use ventriform::volume::{self, Phantom};
 
-fn defects(segments: &[u8], severity: f64) -> Vec<Defect> {
+fn defects(segments: &[u8], severity: f64) -> Vec<PerfusionDefect> {
     segments
         .iter()
-        .map(|&segment| Defect { segment, severity })
+        .map(|&segment| PerfusionDefect { segment, severity })
         .collect()
 }
 

@@ -1,5 +1,5 @@
-//! Volumes at the edge of what there is, the whole way from a file to a model: a sound model
-//! with exactly as many points as asked for, or an error that names what to change.
+//! Extreme volumes through all stages from a file to a model. Each must give either a sound model with
+//! exactly the requested number of points or an error that names what to change.
 
 #![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
 
@@ -60,13 +60,13 @@ fn generate_stored(
     outcome
 }
 
-/// A model, and nothing else will do.
+/// A model; an error fails the test.
 fn model(volume: &Volume, pairs: &[(&str, &str)]) -> Model {
     generate(volume, pairs)
         .unwrap_or_else(|e| panic!("{:?} {pairs:?}: {e}: {}", volume.shape, advice(&e)))
 }
 
-/// A blunt body that fills most of the box, falling by 1 over its radius.
+/// A blunt body that fills most of the box; its values fall by 1 over its radius.
 fn filling(shape: [usize; 3], spacing: [f64; 3]) -> Volume {
     let half = [0, 1, 2].map(|r| shape[r] as f64 * spacing[r] / 2.0);
     volume(shape, spacing, |p| {
@@ -105,8 +105,8 @@ fn any_shape_from_three_to_a_thousand_voxels_an_axis() {
     }
 }
 
-/// Points on a rod three voxels thin are ten times farther apart than it is thick. Other seeds
-/// would not help it.
+/// On a rod three voxels thick, the points are ten times as far apart as the rod is thick. No seed
+/// changes that.
 #[test]
 fn a_model_that_cannot_follow_its_surface_says_so() {
     for (shape, coarse, starts) in [([3, 3, 1024], true, 1), ([30, 30, 40], false, 3)] {

@@ -10,10 +10,10 @@ use std::time::SystemTime;
 
 use ventriform::progress::Monitor;
 use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{Defect, PhantomParameters, phantom};
+use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
 
 /// A case's folder with scan and truth.
-fn case(cohort: &Path, name: &str, seed: u64, defects: Vec<Defect>) {
+fn case(cohort: &Path, name: &str, seed: u64, defects: Vec<PerfusionDefect>) {
     let made = phantom(
         &PhantomParameters {
             shape: [56; 3],
@@ -48,7 +48,7 @@ fn cohort() -> tempfile::TempDir {
     case(path, "t1", 1, Vec::new());
     std::fs::create_dir_all(path.join("t2")).unwrap();
     std::fs::write(path.join("t2/spect.nii.gz"), b"no NIfTI").unwrap();
-    let defect = Defect {
+    let defect = PerfusionDefect {
         segment: 8,
         severity: 0.6,
     };

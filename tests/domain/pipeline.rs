@@ -1,4 +1,4 @@
-//! The whole way from a file to a model, on simulated scans.
+//! All stages from a file to a model, on simulated scans.
 
 #![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
 
@@ -123,7 +123,7 @@ fn refusals_name_the_field_and_a_way_out() {
     assert_eq!(refused(&[("frame", "4")]).field(), Some("frame"));
 }
 
-/// Raises the token as soon as a stage begins.
+/// Cancels the work as soon as a stage begins.
 struct CancelAt(Stage, CancelToken);
 
 impl Observer for CancelAt {

@@ -110,7 +110,7 @@ fn refusals_tell_the_reason() {
     for (file, part) in [
         (
             "nm/tomo_projections_cardiac_stress_GE.dcm",
-            "projections from round the patient",
+            "projections acquired around the patient",
         ),
         ("odd_pydicom/JPEG2000.dcm", "JPEG 2000 Image Compression"),
         ("odd_pydicom/rtdose_rle.dcm", "RLE Lossless"),
@@ -123,7 +123,7 @@ fn refusals_tell_the_reason() {
         ("odd_pydicom/rtstruct.dcm", "modality: RTSTRUCT"),
         (
             "odd_pydicom/MR_truncated.dcm",
-            "9692 bytes needed, at most 9630 there",
+            "it needs 9692 bytes and has at most 9630",
         ),
         (
             "odd_fodicom/DICOMDIR",

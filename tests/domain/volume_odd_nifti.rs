@@ -114,9 +114,12 @@ const REFUSED: &[(&[&str], &str)] = &[
     (&["nibabel/example4d.nii.gz"], "holds 2 frames"),
     (&["nibabel/functional.nii"], "holds 20 frames"),
     (&["nifti-reader-js/5D_small.nii"], "holds 3 frames"),
-    (&["nifti-reader-js/not-nifti.nii"], "no volume known"),
-    (&["nifti-reader-js/LICENSE"], "no volume known"),
-    (&["nifti-rs/README.md"], "no volume known"),
+    (
+        &["nifti-reader-js/not-nifti.nii"],
+        "not in a known volume format",
+    ),
+    (&["nifti-reader-js/LICENSE"], "not in a known volume format"),
+    (&["nifti-rs/README.md"], "not in a known volume format"),
     (&["nifti-rs/complex/complex32.nii"], "datatype is 32"),
     (&["nifti-rs/complex/complex64.nii"], "datatype is 1792"),
     (&["nifti-rs/rgb/3D.nii"], "datatype is 128"),
@@ -140,7 +143,10 @@ const REFUSED: &[(&[&str], &str)] = &[
         "sizeof_hdr is 11842740",
     ),
     (&["nifti-rs/minimal2.hdr"], "second file, which is missing"),
-    (&["nifti-rs/minimal2.img.gz"], "no volume known"),
+    (
+        &["nifti-rs/minimal2.img.gz"],
+        "not in a known volume format",
+    ),
     (
         &["nifti-rs/minimal.hdr", "nifti-rs/27/int8.nii"],
         "not a .hdr/.img pair",

@@ -1,10 +1,11 @@
-//! Which stored frame is which slice of which gate.
+//! Assigns the stored frames to the slices of each gate.
 //!
-//! PS3.3 C.8.4.8: the Frame Increment Pointer names vectors with one number per stored frame,
-//! counted from 1. The order of the frames in the file means nothing by itself.
+//! After PS3.3 C.8.4.8: the Frame Increment Pointer names vectors that hold one number per stored
+//! frame, counted from 1. These numbers define the order of the slices; the order in which the
+//! file stores its frames does not.
 
 use super::super::VolumeError;
-use super::scan::{
+use super::attributes::{
     Attribute, Attributes, DETECTOR_VECTOR, ENERGY_WINDOW_VECTOR, FRAME_POINTER, IMAGE_TYPE,
     MODALITY, NUMBER_OF_FRAMES, ROTATION_VECTOR, RR_INTERVAL_VECTOR, SLICE_VECTOR, SOP_CLASS,
     TIME_SLOT_VECTOR, clip,
@@ -13,10 +14,14 @@ use super::scan::{
 /// SOP class of the multi-frame Nuclear Medicine Image.
 const NM_IMAGE: &str = "1.2.840.10008.5.1.4.1.1.20";
 
-/// Vectors that may be named too where they hold nothing but 1.
+/// Vectors that the pointer may name in addition if all of their numbers are 1.
 const IDLE_VECTORS: [Attribute; 3] = [ENERGY_WINDOW_VECTOR, DETECTOR_VECTOR, ROTATION_VECTOR];
 
-/// Refuses everything but reconstructed NM slices. Returns whether they are gated.
+/// Checks that the object is a reconstructed NM image, and returns whether it is gated.
+///
+/// # Errors
+/// [`VolumeError::Field`] for another SOP class, [`VolumeError::NotSlices`] for another Image
+/// Type.
 pub(super) fn check_kind(attributes: &Attributes) -> Result<bool, VolumeError> {
     let sop_class = attributes.texts(SOP_CLASS);
     let sop_class = sop_class.first().map_or("missing", String::as_str);
@@ -26,7 +31,7 @@ pub(super) fn check_kind(attributes: &Attributes) -> Result<bool, VolumeError> {
             SOP_CLASS.name,
             sop_class,
             format!(
-                "only the Nuclear Medicine Image ({NM_IMAGE}) is read (modality: {})",
+                "only the Nuclear Medicine Image ({NM_IMAGE}) is supported (modality: {})",
                 match modality.is_empty() {
                     true => "none".into(),
                     false => clip(&modality),
@@ -47,24 +52,29 @@ pub(super) fn check_kind(attributes: &Attributes) -> Result<bool, VolumeError> {
         "RECON TOMO" => Ok(false),
         "RECON GATED TOMO" => Ok(true),
         "TOMO" | "GATED TOMO" => {
-            refuse("its frames are projections from round the patient, not slices")
+            refuse("its frames are projections acquired around the patient, not slices")
         }
         "STATIC" | "DYNAMIC" | "GATED" | "WHOLE BODY" => {
-            refuse("its frames are planar pictures, not slices")
+            refuse("its frames are planar images, not slices")
         }
-        _ => refuse("only RECON TOMO and RECON GATED TOMO are known to be slices"),
+        _ => refuse("only RECON TOMO and RECON GATED TOMO contain reconstructed slices"),
     }
 }
 
-/// For each gate its slices, as numbers of stored frames from 0.
+/// The stored frames of each gate in the order of its slices.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct FrameOrder {
+    /// Slices of one gate.
     slices: usize,
+    /// Numbers of stored frames, from 0: gate after gate, slice after slice.
     stored: Vec<usize>,
 }
 
 impl FrameOrder {
-    /// Reads the vectors of `attributes`.
+    /// Reads the slice vector, and the vectors of R-R intervals and time slots if `gated`.
+    ///
+    /// # Errors
+    /// [`VolumeError::Field`] unless every slice of every gate occurs exactly once.
     pub(super) fn of(
         attributes: &Attributes,
         gated: bool,
@@ -78,7 +88,8 @@ impl FrameOrder {
         check_pointer(attributes, vectors)?;
         if !gated && attributes.shorts(SLICE_VECTOR).is_empty() {
             warnings.push(
-                "There is no Slice Vector: frames are taken as slices in their stored order."
+                "The file has no Slice Vector: the stored order of the frames is used as the \
+                 order of the slices."
                     .into(),
             );
             return Ok(Self {
@@ -86,7 +97,7 @@ impl FrameOrder {
                 stored: (0..frames).collect(),
             });
         }
-        // One index over all vectors, the slice fastest.
+        // One index over all vectors; the slice runs fastest.
         let mut index = vec![0; frames];
         let mut cells = 1_usize;
         let mut slices = 1;
@@ -110,22 +121,22 @@ impl FrameOrder {
             None => Err(attributes.wrong(
                 SLICE_VECTOR.name,
                 &format!("{:?}", attributes.shorts(SLICE_VECTOR)),
-                format!("the {frames} frames must be every slice of every gate, each once"),
+                format!("the {frames} frames must hold every slice of every gate exactly once"),
             )),
         }
     }
 
-    /// How many slices a gate has.
+    /// Slices of one gate.
     pub(super) fn slices(&self) -> usize {
         self.slices
     }
 
-    /// How many gates there are; 1 without gating.
+    /// Number of gates; 1 without gating.
     pub(super) fn gates(&self) -> usize {
         self.stored.len() / self.slices
     }
 
-    /// The stored frames of a gate, from the first slice to the last.
+    /// The stored frames of `gate`, from its first slice to its last.
     pub(super) fn slices_of(&self, gate: usize) -> &[usize] {
         &self.stored[gate * self.slices..(gate + 1) * self.slices]
     }
@@ -135,19 +146,19 @@ fn number_of_frames(attributes: &Attributes) -> Result<usize, VolumeError> {
     let Some([frames]) = attributes.decimals(NUMBER_OF_FRAMES)? else {
         return Err(attributes.missing(NUMBER_OF_FRAMES));
     };
-    // The vectors have a 16-bit number for each frame, in an element of at most a mebibyte.
+    // The vectors hold 16 bits per frame in an element of at most one mebibyte.
     match frames.fract() == 0.0 && (1.0..=524_288.0).contains(&frames) {
         true => Ok(frames as usize),
         false => Err(attributes.wrong(
             NUMBER_OF_FRAMES.name,
             &frames.to_string(),
-            "a whole number from 1 to 524288 expected".into(),
+            "expected a whole number from 1 to 524288".into(),
         )),
     }
 }
 
-/// The pointer, where there is one, must name the vectors of such an image. Vectors that some
-/// writers name besides do no harm as long as they tell nothing apart.
+/// Checks that the Frame Increment Pointer, if present, names exactly `vectors`. Some writers name
+/// further vectors; those are accepted if all of their numbers are 1.
 fn check_pointer(attributes: &Attributes, vectors: &[Attribute]) -> Result<(), VolumeError> {
     let pointer = attributes.shorts(FRAME_POINTER);
     let (stated, _) = pointer.as_chunks::<2>();
@@ -163,11 +174,11 @@ fn check_pointer(attributes: &Attributes, vectors: &[Attribute]) -> Result<(), V
     let write = |[g, e]: [u16; 2]| format!("({g:04X},{e:04X})");
     let stated: Vec<_> = stated.iter().copied().map(write).collect();
     let named: Vec<_> = named.map(write).collect();
-    let reason = format!("{} expected", named.join(" "));
+    let reason = format!("expected {}", named.join(" "));
     Err(attributes.wrong(FRAME_POINTER.name, &stated.join(" "), reason))
 }
 
-/// The numbers of `vector`, one for each frame, from 1.
+/// The numbers of `vector`: one for each frame, each at least 1.
 fn numbers(
     attributes: &Attributes,
     vector: Attribute,
@@ -178,7 +189,7 @@ fn numbers(
         return Err(attributes.missing(vector));
     }
     if numbers.len() != frames || numbers.contains(&0) {
-        let reason = format!("{frames} numbers from 1 expected");
+        let reason = format!("expected {frames} numbers, each at least 1");
         return Err(attributes.wrong(vector.name, &format!("{numbers:?}"), reason));
     }
     Ok(numbers)

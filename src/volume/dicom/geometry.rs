@@ -1,13 +1,14 @@
-//! Where the slices lie in the patient.
+//! Position and orientation of the slices in the patient.
 //!
-//! PS3.3 C.8.4.15: Image Position (Patient) in the first item of the Detector Information
-//! Sequence is that of the *first* slice; slice k lies at position + (row x column) * Spacing
-//! Between Slices * k, and the sign of that spacing counts: GE and Siemens write negative ones.
-//! Pixel Spacing is the distance of rows, then that of columns.
+//! After PS3.3 C.8.4.15: Image Position (Patient) in the first item of the Detector Information
+//! Sequence is the position of the *first* slice. Slice k lies at position + (row x column) *
+//! Spacing Between Slices * k. The sign of that spacing matters: GE and Siemens write negative
+//! values. Pixel Spacing holds the distance of rows first, then the distance of columns.
 
 use super::super::VolumeError;
 use super::super::facts::AffineSource;
-use super::scan::{
+use super::super::open::Placement;
+use super::attributes::{
     Attributes, DETECTOR_ORIENTATION, DETECTOR_POSITION, ORIENTATION, PIXEL_SPACING, POSITION,
     SLICE_THICKNESS, SPACING_BETWEEN_SLICES,
 };
@@ -15,21 +16,13 @@ use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
 use nalgebra::Matrix3;
 
-/// How far direction cosines may be from unit length and from perpendicular.
+/// Largest deviation of direction cosines from unit length and from a right angle.
 const COSINE_SLACK: f64 = 1e-2;
 
-/// Where the voxels are.
-#[derive(Debug, Clone)]
-pub(super) struct Placement {
-    /// Index to LPS millimetres.
-    pub frame: VoxelToPatient,
-    /// Whether the origin is known.
-    pub source: AffineSource,
-    /// Assumptions.
-    pub warnings: Vec<String>,
-}
-
-/// Places columns x rows x slices voxels in the patient.
+/// Position in the patient of a grid of `shape` (columns, rows, slices).
+///
+/// # Errors
+/// [`VolumeError::Field`] for invalid or missing spacings and directions.
 pub(super) fn place(a: &Attributes, shape: [usize; 3]) -> Result<Placement, VolumeError> {
     let mut warnings = Vec::new();
     let Some([between_rows, between_columns]) = a.decimals(PIXEL_SPACING)? else {
@@ -40,7 +33,7 @@ pub(super) fn place(a: &Attributes, shape: [usize; 3]) -> Result<Placement, Volu
         return Err(a.wrong(
             PIXEL_SPACING.name,
             &value,
-            "positive numbers expected".into(),
+            "expected positive numbers".into(),
         ));
     }
     let between_slices = slice_spacing(a, &mut warnings)?;
@@ -56,7 +49,7 @@ pub(super) fn place(a: &Attributes, shape: [usize; 3]) -> Result<Placement, Volu
     let (x, y) = directions(a, orientation.unwrap_or([1.0, 0.0, 0.0, 0.0, 1.0, 0.0]))?;
     if orientation.is_none() {
         warnings.push(
-            "There is no Image Orientation (Patient): axial slices of a patient on the back are \
+            "The file has no Image Orientation (Patient): axial slices of a supine patient are \
              assumed."
                 .into(),
         );
@@ -66,14 +59,14 @@ pub(super) fn place(a: &Attributes, shape: [usize; 3]) -> Result<Placement, Volu
         Matrix3::from_columns(&[between_columns * x, between_rows * y, between_slices * z]);
     let origin = position.map(Vec3::from).unwrap_or_else(|| {
         warnings.push(
-            "There is no Image Position (Patient): the origin is unknown, and the array's \
-             centre was taken for it."
+            "The file has no Image Position (Patient): the origin is placed at the centre of the \
+             array."
                 .into(),
         );
         -(linear * Vec3::from_fn(|axis, _| (shape[axis] as f64 - 1.0) / 2.0))
     });
     let frame = VoxelToPatient::new(linear, origin).map_err(|_| {
-        let reason = "the directions and spacings span no space".into();
+        let reason = "directions and spacings must span three dimensions".into();
         a.wrong(
             DETECTOR_ORIENTATION.name,
             &format!("{orientation:?}"),
@@ -90,20 +83,20 @@ pub(super) fn place(a: &Attributes, shape: [usize; 3]) -> Result<Placement, Volu
     })
 }
 
-/// Signed distance of slices along row x column.
+/// Signed distance of slices along row x column, mm.
 fn slice_spacing(a: &Attributes, warnings: &mut Vec<String>) -> Result<f64, VolumeError> {
     match a.decimals(SPACING_BETWEEN_SLICES)? {
         Some([0.0]) => Err(a.wrong(
             SPACING_BETWEEN_SLICES.name,
             "0",
-            "slices cannot lie in one place".into(),
+            "slices must lie at different positions".into(),
         )),
         Some([spacing]) => Ok(spacing),
         None => match a.decimals(SLICE_THICKNESS)? {
             Some([thickness]) if thickness > 0.0 => {
                 warnings.push(format!(
-                    "There is no Spacing Between Slices: Slice Thickness {thickness} was taken, \
-                     and the slices' direction is an assumption."
+                    "The file has no Spacing Between Slices: Slice Thickness {thickness} is used, \
+                     and the direction of the slices is an assumption."
                 ));
                 Ok(thickness)
             }
@@ -112,7 +105,7 @@ fn slice_spacing(a: &Attributes, warnings: &mut Vec<String>) -> Result<f64, Volu
     }
 }
 
-/// Unit vectors along a row (of rising columns) and along a column (of rising rows).
+/// Unit vectors along a row (toward higher columns) and along a column (toward higher rows).
 fn directions(a: &Attributes, cosines: [f64; 6]) -> Result<(Vec3, Vec3), VolumeError> {
     let [x0, x1, x2, y0, y1, y2] = cosines;
     let (x, y) = (Vec3::new(x0, x1, x2), Vec3::new(y0, y1, y2));
@@ -122,7 +115,7 @@ fn directions(a: &Attributes, cosines: [f64; 6]) -> Result<(Vec3, Vec3), VolumeE
         false => Err(a.wrong(
             DETECTOR_ORIENTATION.name,
             &format!("{cosines:?}"),
-            "two perpendicular unit vectors expected".into(),
+            "expected two perpendicular unit vectors".into(),
         )),
     }
 }

@@ -1,26 +1,33 @@
-//! How the pixels are stored, checked against their element's length.
+//! Storage of the pixels, checked against the length of their element.
 
+use super::super::VolumeError;
 use super::super::decode::{DataType, VoxelFormat};
 use super::super::facts::ByteOrder;
+use super::super::limits::ReadLimits;
 use super::super::source::Source;
-use super::super::{ReadLimits, VolumeError};
-use super::scan::{
-    Attributes, BITS_ALLOCATED, BITS_STORED, COLUMNS, HIGH_BIT, PIXEL_REPRESENTATION, PixelElement,
-    REAL_WORLD_INTERCEPT, REAL_WORLD_SLOPE, RESCALE_INTERCEPT, RESCALE_SLOPE, ROWS, SAMPLES, Scan,
+use super::attributes::{
+    Attributes, BITS_ALLOCATED, BITS_STORED, COLUMNS, HIGH_BIT, PIXEL_REPRESENTATION,
+    REAL_WORLD_INTERCEPT, REAL_WORLD_SLOPE, RESCALE_INTERCEPT, RESCALE_SLOPE, ROWS, SAMPLES,
 };
+use super::scan::{PixelElement, Scan};
 
-/// The pixels of all frames.
+/// Layout of the pixels of all frames.
 #[derive(Debug)]
 pub(super) struct Pixels {
     /// Columns, rows, slices: voxels along i, j, k.
     pub shape: [usize; 3],
-    /// How to decode them.
+    /// How a pixel is stored.
     pub format: VoxelFormat,
+    /// Offset of the first frame in the unpacked file, bytes.
     begin: u64,
 }
 
 impl Pixels {
-    /// Checks everything about the pixels that `scan` found.
+    /// Checks the layout of the pixels found by `scan`: `gates` volumes of `slices` frames.
+    ///
+    /// # Errors
+    /// [`VolumeError`] for unsupported pixel formats, more voxels than `limits` allows, and
+    /// elements too short for the stated frames.
     pub(super) fn of(
         scan: &Scan,
         slices: usize,
@@ -31,11 +38,11 @@ impl Pixels {
         let a = &scan.attributes;
         let samples = a.shorts(SAMPLES).first().copied().unwrap_or(1);
         if samples != 1 {
-            let reason = "only pictures in grey are measurements".into();
+            let reason = "expected 1: colour images are not supported".into();
             return Err(a.wrong(SAMPLES.name, &samples.to_string(), reason));
         }
         let extent = |attribute| match a.short(attribute)? {
-            0 => Err(a.wrong(attribute.name, "0", "at least 1 expected".into())),
+            0 => Err(a.wrong(attribute.name, "0", "expected at least 1".into())),
             n => Ok(usize::from(n)),
         };
         let shape = [extent(COLUMNS)?, extent(ROWS)?, slices];
@@ -52,7 +59,7 @@ impl Pixels {
             },
             begin: scan.begin,
         };
-        // No overflow: two 16-bit numbers and one of 20 bits.
+        // Cannot overflow: two factors of 16 bits and one of 20 bits.
         let voxels = (pixels.frame_voxels() * slices) as u64;
         if voxels > limits.voxels {
             return Err(VolumeError::TooLarge {
@@ -74,14 +81,14 @@ impl Pixels {
         self.shape[0] * self.shape[1]
     }
 
-    /// First byte of stored frame number `frame`.
+    /// Offset of stored frame number `frame`, from 0, bytes.
     pub(super) fn frame_begin(&self, frame: usize) -> u64 {
         let bytes = self.frame_voxels() * self.format.data_type.size();
         self.begin + frame as u64 * bytes as u64
     }
 }
 
-/// The stored type, and how many leading bits are no part of the value.
+/// The data type, and the number of leading bits that are not part of the value.
 fn data_type(scan: &Scan) -> Result<(DataType, u32), VolumeError> {
     let a = &scan.attributes;
     match scan.element {
@@ -94,14 +101,14 @@ fn data_type(scan: &Scan) -> Result<(DataType, u32), VolumeError> {
         0 => false,
         1 => true,
         other => {
-            let reason = "0 (unsigned) or 1 (signed) expected".into();
+            let reason = "expected 0 (unsigned) or 1 (signed)".into();
             return Err(a.wrong(PIXEL_REPRESENTATION.name, &other.to_string(), reason));
         }
     };
     let data_type = match (allocated, signed) {
-        // Big endian words with two bytes each would have to be turned.
+        // In big endian files two 8-bit pixels share a word in swapped order.
         (8, _) if a.byte_order == ByteOrder::Big => {
-            let reason = "8 bits in big endian words are not read".into();
+            let reason = "8-bit pixels in big endian byte order are not supported".into();
             return Err(a.wrong(BITS_ALLOCATED.name, "8", reason));
         }
         (8, false) => DataType::U8,
@@ -111,24 +118,25 @@ fn data_type(scan: &Scan) -> Result<(DataType, u32), VolumeError> {
         (32, false) => DataType::U32,
         (32, true) => DataType::I32,
         (other, _) => {
-            let reason = "8, 16 or 32 expected".into();
+            let reason = "expected 8, 16 or 32".into();
             return Err(a.wrong(BITS_ALLOCATED.name, &other.to_string(), reason));
         }
     };
     let stored = a.shorts(BITS_STORED).first().copied().unwrap_or(allocated);
     if stored == 0 || stored > allocated {
-        let reason = format!("1 to {allocated} (Bits Allocated) expected");
+        let reason = format!("expected 1 to {allocated} (Bits Allocated)");
         return Err(a.wrong(BITS_STORED.name, &stored.to_string(), reason));
     }
     let high_bit = a.shorts(HIGH_BIT).first().copied().unwrap_or(stored - 1);
     if high_bit != stored - 1 {
-        let reason = format!("{} (Bits Stored less 1) expected", stored - 1);
+        let reason = format!("expected {} (Bits Stored - 1)", stored - 1);
         return Err(a.wrong(HIGH_BIT.name, &high_bit.to_string(), reason));
     }
     Ok((data_type, u32::from(allocated - stored)))
 }
 
-/// Rescale Slope and Intercept, or else the first Real World Value Mapping.
+/// Slope and intercept: Rescale Slope and Intercept, otherwise the first item of the Real World
+/// Value Mapping; `None` if there is neither or they change nothing.
 fn scaling(a: &Attributes) -> Result<Option<(f64, f64)>, VolumeError> {
     let (field, slope, inter) = match a.decimals(RESCALE_SLOPE)? {
         Some([slope]) => {
@@ -145,7 +153,7 @@ fn scaling(a: &Attributes) -> Result<Option<(f64, f64)>, VolumeError> {
     };
     if !slope.is_finite() || slope == 0.0 || !inter.is_finite() {
         let value = format!("{slope} (intercept {inter})");
-        let reason = "a finite slope other than 0 and a finite intercept expected".into();
+        let reason = "expected a finite slope other than 0 and a finite intercept".into();
         return Err(a.wrong(field, &value, reason));
     }
     Ok(((slope, inter) != (1.0, 0.0)).then_some((slope, inter)))

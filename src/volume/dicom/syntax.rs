@@ -1,39 +1,40 @@
-//! Where the data set begins, and how it is encoded.
+//! Finds the start of the data set and its encoding.
 //!
-//! PS3.10: 128 bytes of preamble, `DICM`, then group 0002 in Explicit VR Little Endian, which
-//! names the transfer syntax. Old files lack the preamble or all of this; those are taken for
-//! DICOM where they begin with an element of group 0002 or 0008 as a data set does.
+//! After PS3.10, a file begins with 128 bytes of preamble, `DICM`, and group 0002 in Explicit VR
+//! Little Endian, which names the transfer syntax. Old files lack the preamble or all three. They
+//! are recognised as DICOM if they begin with an element of group 0002 or 0008, as a data set does.
 
+use super::super::VolumeError;
+use super::super::limits::ReadLimits;
 use super::super::source::{Source, VolumeFile};
-use super::super::{ReadLimits, VolumeError};
-use super::scan::clip;
+use super::attributes::clip;
 use dicom_encoding::transfer_syntax::{TransferSyntax, TransferSyntaxIndex};
 use dicom_transfer_syntax_registry::TransferSyntaxRegistry;
 
-/// Group 0002 must end within so many bytes.
+/// Group 0002 must end within this many bytes.
 const META_REACH: usize = 64 * 1024;
 
 const IMPLICIT_LITTLE: &str = "1.2.840.10008.1.2";
 const EXPLICIT_LITTLE: &str = "1.2.840.10008.1.2.1";
 const EXPLICIT_BIG: &str = "1.2.840.10008.1.2.2";
 
-/// Deflated Explicit VR Little Endian, the only compression of whole data sets in use.
+/// Deflated Explicit VR Little Endian, the only transfer syntax that compresses whole data sets.
 const DEFLATED: &str = "1.2.840.10008.1.2.1.99";
 
-/// A readable data set's encoding.
+/// Start and encoding of a data set.
 pub(super) struct Syntax {
-    /// First byte of the data set.
+    /// Offset of the data set's first byte in the unpacked file.
     pub data_set: u64,
-    /// How it is encoded.
+    /// The encoding.
     pub transfer_syntax: &'static TransferSyntax,
 }
 
-/// Whether `start`, a file's beginning, is DICOM's.
+/// Whether a file that begins with `start` is a DICOM file.
 pub(in super::super) fn is_dicom(start: &[u8]) -> bool {
     start.get(128..132) == Some(b"DICM") || guess(start).is_some()
 }
 
-/// The encoding of a data set without group 0002 that begins with `start`.
+/// Guesses the encoding of a data set that has no group 0002 and begins with `start`.
 fn guess(start: &[u8]) -> Option<&'static TransferSyntax> {
     let first: &[u8; 8] = start.first_chunk()?;
     let vr = first[4].is_ascii_uppercase() && first[5].is_ascii_uppercase();
@@ -42,7 +43,7 @@ fn guess(start: &[u8]) -> Option<&'static TransferSyntax> {
             TransferSyntaxRegistry.get(EXPLICIT_LITTLE)
         }
         ([0, 8, 0, 0..=0x70], true) => TransferSyntaxRegistry.get(EXPLICIT_BIG),
-        // Implicit VR: an even, short value.
+        // Implicit VR: the length of the value is even and below 65536.
         ([8, 0, 0..=0x70, 0], false) if first[4].is_multiple_of(2) && first[6..] == [0, 0] => {
             TransferSyntaxRegistry.get(IMPLICIT_LITTLE)
         }
@@ -50,7 +51,11 @@ fn guess(start: &[u8]) -> Option<&'static TransferSyntax> {
     }
 }
 
-/// Finds the data set of `file`, and refuses encodings that are not read.
+/// Finds the data set of `file`.
+///
+/// # Errors
+/// [`VolumeError::Unsupported`] for compressed or unknown transfer syntaxes, and
+/// [`VolumeError::Field`] if group 0002 is damaged or the encoding cannot be determined.
 pub(super) fn find(file: &VolumeFile, limits: &ReadLimits) -> Result<Syntax, VolumeError> {
     let reach = META_REACH.min(usize::try_from(limits.unpacked_bytes).unwrap_or(META_REACH));
     let mut start = vec![0; reach];
@@ -64,7 +69,7 @@ pub(super) fn find(file: &VolumeFile, limits: &ReadLimits) -> Result<Syntax, Vol
         file: file.name().into(),
         field: "File Meta Information (0002,xxxx)",
         value: "cut off".into(),
-        reason: format!("its elements must end within {META_REACH} bytes"),
+        reason: format!("the group must end within {META_REACH} bytes"),
         byte: Some(begin as u64),
     })?;
     let transfer_syntax = match &meta.transfer_syntax {
@@ -73,7 +78,7 @@ pub(super) fn find(file: &VolumeFile, limits: &ReadLimits) -> Result<Syntax, Vol
             file: file.name().into(),
             field: "Transfer Syntax UID (0002,0010)",
             value: "missing".into(),
-            reason: "and the data set's first element does not tell its encoding".into(),
+            reason: "the encoding cannot be determined from the first element either".into(),
             byte: Some(meta.end as u64),
         })?,
     };
@@ -83,7 +88,7 @@ pub(super) fn find(file: &VolumeFile, limits: &ReadLimits) -> Result<Syntax, Vol
     })
 }
 
-/// The transfer syntax with `uid`, if its data sets are read.
+/// The transfer syntax with `uid`, if it is uncompressed.
 fn known(uid: &str, file: &VolumeFile) -> Result<&'static TransferSyntax, VolumeError> {
     let refuse = |format: String| VolumeError::Unsupported {
         file: file.name().into(),
@@ -102,14 +107,14 @@ fn known(uid: &str, file: &VolumeFile) -> Result<&'static TransferSyntax, Volume
     }
 }
 
-/// What group 0002 says.
+/// Content of group 0002.
 struct Meta {
     end: usize,
     transfer_syntax: Option<String>,
 }
 
 impl Meta {
-    /// Reads the elements of group 0002 that stand at `begin`; `None` if they do not end.
+    /// Reads the elements of group 0002 at `begin`; `None` if the last one is cut off.
     fn read(start: &[u8], begin: usize) -> Option<Self> {
         let mut meta = Self {
             end: begin,

@@ -1,7 +1,7 @@
-//! Files made by code in every readable encoding, hostile ones, and random damage.
+//! Files made by code in every supported encoding, hostile files, and random damage.
 
 use super::super::{
-    AffineSource, Reading, VolumeFile, inspect as inspect_volume, read as read_volume,
+    AffineSource, ReadOptions, Reading, VolumeFile, inspect as inspect_volume, read as read_volume,
 };
 use super::*;
 use crate::geometry::Vec3;
@@ -205,7 +205,7 @@ fn every_encoding_gives_the_same() {
             assert_eq!(reading.volume.shape, [3, 2, 4]);
             assert_eq!(reading.volume.voxels, ramp);
             assert_eq!(reading.facts.warnings, Vec::<String>::new());
-            assert_eq!(reading.facts.format, Format::DicomNm);
+            assert_eq!(reading.facts.format, FileFormat::DicomNm);
         }
     }
 }
@@ -340,13 +340,13 @@ fn what_is_not_known_of_the_place_is_said() {
     };
     let facts = without(&[(0x20, 0x32)]).unwrap().facts;
     assert_eq!(facts.affine_source, AffineSource::UnknownOrigin);
-    assert!(facts.warnings[0].contains("origin is unknown"));
+    assert!(facts.warnings[0].contains("origin is placed at the centre"));
     let facts = without(&[(0x20, 0x37)]).unwrap().facts;
     assert_eq!(facts.affine_source, AffineSource::UnknownOrigin);
-    assert!(facts.warnings[0].contains("on the back are assumed"));
+    assert!(facts.warnings[0].contains("supine patient are assumed"));
     let facts = without(&[(0x18, 0x88)]).unwrap().facts;
     assert_eq!(facts.spacing_mm[2], 6.0);
-    assert!(facts.warnings[0].contains("Slice Thickness 6 was taken"));
+    assert!(facts.warnings[0].contains("Slice Thickness 6 is used"));
     let neither = without(&[(0x18, 0x88), (0x18, 0x50)]);
     assert_eq!(complaint(neither).0, "Spacing Between Slices (0018,0088)");
     let spacing = without(&[(0x28, 0x30)]);

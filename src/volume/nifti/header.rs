@@ -1,101 +1,44 @@
-//! The header's fields, read from either version's layout and checked one by one.
-//!
-//! The two versions hold the same fields in other places and widths. [`Layout`] says where;
-//! everything after it knows no versions.
+//! The checked header.
 
+use super::super::VolumeError;
 use super::super::decode::{DataType, VoxelFormat};
-use super::super::facts::{ByteOrder, Format, LengthUnit};
+use super::super::facts::{ByteOrder, FileFormat, LengthUnit};
+use super::super::limits::ReadLimits;
 use super::super::source::Source;
-use super::super::{ReadLimits, VolumeError};
+use super::stated::{StatedHeader, StatedOffset};
+use ::nifti::{NiftiHeader, NiftiType};
 
-/// Where the fields of a version stand, in bytes from the start. In NIfTI-1 `dim` is of
-/// `i16`, codes are `i16` and reals `f32`; in NIfTI-2 they are `i64`, `i32` and `f64`.
-struct Layout {
-    size: usize,
-    dim: usize,
-    intent_code: usize,
-    datatype: usize,
-    bitpix: usize,
-    pixdim: usize,
-    vox_offset: usize,
-    scl_slope: usize,
-    scl_inter: usize,
-    xyzt_units: usize,
-    qform_code: usize,
-    sform_code: usize,
-    quatern_b: usize,
-    qoffset_x: usize,
-    srow_x: usize,
-}
-
-const NIFTI_1: Layout = Layout {
-    size: 348,
-    dim: 40,
-    intent_code: 68,
-    datatype: 70,
-    bitpix: 72,
-    pixdim: 76,
-    vox_offset: 108,
-    scl_slope: 112,
-    scl_inter: 116,
-    xyzt_units: 123,
-    qform_code: 252,
-    sform_code: 254,
-    quatern_b: 256,
-    qoffset_x: 268,
-    srow_x: 280,
-};
-
-const NIFTI_2: Layout = Layout {
-    size: 540,
-    dim: 16,
-    intent_code: 504,
-    datatype: 12,
-    bitpix: 14,
-    pixdim: 104,
-    vox_offset: 168,
-    scl_slope: 176,
-    scl_inter: 184,
-    xyzt_units: 500,
-    qform_code: 344,
-    sform_code: 348,
-    quatern_b: 352,
-    qoffset_x: 376,
-    srow_x: 400,
-};
-
-/// Bytes between the header and the first voxel that mark extensions.
+/// Bytes between the header and the first voxel that announce extensions.
 const EXTENDER: u64 = 4;
 
-/// A header's checked content.
+/// The fields of a header after all checks, the same for both versions.
 #[derive(Debug, Clone)]
 pub(super) struct Header {
-    /// The file's name, for messages.
+    /// Name of the file, for error messages.
     pub file: String,
-    /// Whether the voxels stand in another file.
+    /// Whether the voxels are in another file.
     pub pair: bool,
     second_version: bool,
-    /// Order of the bytes of header and voxels.
+    /// Byte order of header and voxels.
     pub byte_order: ByteOrder,
     /// All dimensions, each at least 1.
     pub dim: Vec<usize>,
-    /// The first three, 1 where there are fewer.
+    /// The first three dimensions, 1 for those the file does not have.
     pub shape: [usize; 3],
-    /// Product of the others.
+    /// Number of volumes: the product of the other dimensions.
     pub frames: usize,
-    /// How a voxel is stored.
     pub data_type: DataType,
-    /// First byte of the first voxel.
+    /// Offset of the first voxel, bytes.
     pub vox_offset: u64,
-    /// Slope and intercept, where the file has a scaling.
+    /// Slope and intercept, if the voxels are scaled.
     pub scaling: Option<(f64, f64)>,
     /// The unit of all lengths below.
     pub unit: LengthUnit,
     /// `pixdim`, entry 0 being qfac.
     pub pixdim: [f64; 8],
-    /// 0 where there is no qform.
+    /// 0 if there is no qform.
     pub qform_code: i32,
-    /// 0 where there is no sform.
+    /// 0 if there is no sform.
     pub sform_code: i32,
     /// `quatern_b`, `_c`, `_d`.
     pub quatern: [f64; 3],
@@ -103,104 +46,73 @@ pub(super) struct Header {
     pub qoffset: [f64; 3],
     /// `srow_x`, `_y`, `_z`.
     pub srow: [[f64; 4]; 3],
-    /// Oddities that do no harm.
+    /// Oddities that do not prevent reading.
     pub warnings: Vec<String>,
 }
 
 impl Header {
-    /// Reads the header at the start of `source`.
+    /// Reads and checks the header at the start of `source`.
+    ///
+    /// # Errors
+    /// [`VolumeError`]; for an invalid field [`VolumeError::Field`] with its name, value and
+    /// offset.
     pub(super) fn read(source: &mut Source) -> Result<Self, VolumeError> {
-        let mut bytes = vec![0; NIFTI_1.size];
-        source.fill_all(&mut bytes, NIFTI_1.size as u64)?;
-        let second = matches!(&bytes[4..8], b"n+2\0" | b"ni2\0");
-        if second {
-            bytes.resize(NIFTI_2.size, 0);
-            source.fill_all(&mut bytes[NIFTI_1.size..], NIFTI_2.size as u64)?;
-        }
-        let layout = if second { &NIFTI_2 } else { &NIFTI_1 };
-        let magic = if second { 4 } else { 344 };
-        let size = layout.size as i32;
-        let big_endian = match bytes[..4].try_into().map(i32::from_le_bytes) {
-            Ok(stated) if stated == size => false,
-            Ok(stated) if stated.swap_bytes() == size => true,
-            stated => {
-                return Err(VolumeError::Field {
-                    file: source.file().into(),
-                    field: "sizeof_hdr",
-                    value: stated.unwrap_or_default().to_string(),
-                    reason: format!("{size} expected, in either byte order"),
-                    byte: Some(0),
-                });
-            }
-        };
-        let fields = Fields {
-            file: source.file(),
-            bytes: &bytes,
-            layout,
-            second,
-            big_endian,
-        };
-        let pair = &bytes[magic..magic + 2] == b"ni";
-        Self::check(&fields, pair)
-    }
-
-    fn check(fields: &Fields, pair: bool) -> Result<Self, VolumeError> {
-        let layout = fields.layout;
+        let stated = StatedHeader::read(source)?;
         let mut warnings = Vec::new();
-        let dim = fields.dim()?;
-        fields.refuse_cifti()?;
+        let dim = stated.extents()?;
+        stated.reject_cifti()?;
         let extent = |axis: usize| dim.get(axis).copied().unwrap_or(1);
         let frames = dim
             .iter()
             .skip(3)
             .try_fold(1_usize, |n, &d| n.checked_mul(d));
         let frames = frames.ok_or_else(|| {
-            let reason = "more volumes than can be counted".into();
-            fields.wrong("dim[4..8]", format!("{dim:?}"), reason, layout.dim)
+            let reason = "the number of volumes exceeds the range of integers".into();
+            stated.invalid(
+                "dim[4..8]",
+                format!("{dim:?}"),
+                reason,
+                stated.offsets.dim(0),
+            )
         })?;
         Ok(Self {
-            file: fields.file.into(),
-            pair,
-            second_version: fields.second,
-            byte_order: match fields.big_endian {
-                true => ByteOrder::Big,
-                false => ByteOrder::Little,
-            },
+            pair: stated.pair,
+            second_version: stated.second_version,
+            byte_order: stated.byte_order,
             shape: [extent(0), extent(1), extent(2)],
             frames,
-            data_type: fields.data_type()?,
-            vox_offset: fields.vox_offset(pair)?,
-            scaling: fields.scaling(&mut warnings)?,
-            unit: fields.unit(&mut warnings),
-            pixdim: std::array::from_fn(|i| fields.real_at(layout.pixdim, i)),
-            qform_code: fields.code(layout.qform_code),
-            sform_code: fields.code(layout.sform_code),
-            quatern: std::array::from_fn(|i| fields.real_at(layout.quatern_b, i)),
-            qoffset: std::array::from_fn(|i| fields.real_at(layout.qoffset_x, i)),
-            srow: std::array::from_fn(|row| {
-                std::array::from_fn(|i| fields.real_at(layout.srow_x, 4 * row + i))
-            }),
+            data_type: stated.data_type()?,
+            vox_offset: stated.first_voxel()?,
+            scaling: stated.scaling(&mut warnings)?,
+            unit: stated.unit(&mut warnings),
+            pixdim: stated.pixdim,
+            qform_code: stated.qform_code,
+            sform_code: stated.sform_code,
+            quatern: stated.quatern,
+            qoffset: stated.qoffset,
+            srow: stated.srow,
             dim,
             warnings,
+            file: stated.file,
         })
     }
 
-    /// The format's name.
-    pub(super) fn format(&self) -> Format {
+    /// Version and number of files.
+    pub(super) fn format(&self) -> FileFormat {
         match (self.second_version, self.pair) {
-            (false, false) => Format::Nifti1,
-            (false, true) => Format::Nifti1Pair,
-            (true, false) => Format::Nifti2,
-            (true, true) => Format::Nifti2Pair,
+            (false, false) => FileFormat::Nifti1,
+            (false, true) => FileFormat::Nifti1Pair,
+            (true, false) => FileFormat::Nifti2,
+            (true, true) => FileFormat::Nifti2Pair,
         }
     }
 
-    /// Voxels of one volume. Checked by [`Header::check_size`].
+    /// Voxels of one volume. Cannot overflow after [`Header::check_size`].
     pub(super) fn voxels(&self) -> usize {
         self.shape.iter().product()
     }
 
-    /// How to decode them.
+    /// Storage format of the voxels.
     pub(super) fn voxel_format(&self) -> VoxelFormat {
         VoxelFormat {
             file: self.file.clone(),
@@ -212,13 +124,17 @@ impl Header {
         }
     }
 
-    /// First byte of volume number `frame`.
+    /// Offset of volume number `frame`, from 0, bytes.
     pub(super) fn frame_begin(&self, frame: usize) -> u64 {
         let bytes = self.voxels() as u64 * self.data_type.size() as u64;
         self.vox_offset + frame as u64 * bytes
     }
 
-    /// Checks that the voxels may be read and can be there, before memory is taken for them.
+    /// Checks before any allocation that the volume is within `limits` and that `source` can hold all
+    /// volumes.
+    ///
+    /// # Errors
+    /// [`VolumeError::TooLarge`] or [`VolumeError::Truncated`].
     pub(super) fn check_size(
         &self,
         source: &mut Source,
@@ -249,168 +165,106 @@ impl Header {
     }
 }
 
-/// The type with NIfTI's `code`, or the reason why it is not read.
-fn data_type(code: i16) -> Result<DataType, String> {
-    Ok(match code {
-        2 => DataType::U8,
-        4 => DataType::I16,
-        8 => DataType::I32,
-        16 => DataType::F32,
-        64 => DataType::F64,
-        256 => DataType::I8,
-        512 => DataType::U16,
-        768 => DataType::U32,
-        1024 => DataType::I64,
-        1280 => DataType::U64,
-        other => return Err(refusal(other)),
-    })
-}
-
-/// Why voxels of the type `code` are not read.
-fn refusal(code: i16) -> String {
-    let what = match code {
-        1 => "single bits are not read",
-        32 => "complex64 has two parts per voxel, and no telling which one is the uptake",
-        1792 => "complex128 has two parts per voxel, and no telling which one is the uptake",
-        2048 => "complex256 has two parts per voxel, and no telling which one is the uptake",
-        1536 => "float128 is not read: convert to float32",
-        128 => "RGB24 is a picture in colours, not a measurement",
-        2304 => "RGBA32 is a picture in colours, not a measurement",
-        _ => "no such data type in NIfTI",
+/// The data type with NIfTI's `code`.
+///
+/// # Errors
+/// The reason why voxels of the type are not supported.
+fn data_type(code: i16) -> Result<DataType, &'static str> {
+    const PARTS: &str = "complex numbers are not supported: the uptake cannot be told from two \
+                         parts per voxel";
+    const COLOUR: &str = "colour images are not supported";
+    let header = NiftiHeader {
+        datatype: code,
+        ..NiftiHeader::default()
     };
-    what.into()
+    match header.data_type() {
+        Ok(NiftiType::Uint8) => Ok(DataType::U8),
+        Ok(NiftiType::Int8) => Ok(DataType::I8),
+        Ok(NiftiType::Uint16) => Ok(DataType::U16),
+        Ok(NiftiType::Int16) => Ok(DataType::I16),
+        Ok(NiftiType::Uint32) => Ok(DataType::U32),
+        Ok(NiftiType::Int32) => Ok(DataType::I32),
+        Ok(NiftiType::Uint64) => Ok(DataType::U64),
+        Ok(NiftiType::Int64) => Ok(DataType::I64),
+        Ok(NiftiType::Float32) => Ok(DataType::F32),
+        Ok(NiftiType::Float64) => Ok(DataType::F64),
+        Ok(NiftiType::Float128) => Err("float128 is not supported: convert to float32"),
+        Ok(NiftiType::Complex64 | NiftiType::Complex128 | NiftiType::Complex256) => Err(PARTS),
+        Ok(NiftiType::Rgb24 | NiftiType::Rgba32) => Err(COLOUR),
+        Err(_) if code == 1 => Err("single bits are not supported"),
+        Err(_) => Err("NIfTI defines no such data type"),
+    }
 }
 
-/// The raw bytes with their layout.
-struct Fields<'a> {
-    file: &'a str,
-    bytes: &'a [u8],
-    layout: &'static Layout,
-    second: bool,
-    big_endian: bool,
-}
-
-impl Fields<'_> {
-    fn number<const N: usize>(&self, at: usize) -> [u8; N] {
-        let mut bytes = [0; N];
-        bytes.copy_from_slice(&self.bytes[at..at + N]);
-        if self.big_endian {
-            bytes.reverse();
-        }
-        bytes
-    }
-
-    fn short(&self, at: usize) -> i16 {
-        i16::from_le_bytes(self.number(at))
-    }
-
-    fn code(&self, at: usize) -> i32 {
-        match self.second {
-            true => i32::from_le_bytes(self.number(at)),
-            false => i32::from(self.short(at)),
-        }
-    }
-
-    fn dim_at(&self, index: usize) -> i64 {
-        match self.second {
-            true => i64::from_le_bytes(self.number(self.layout.dim + 8 * index)),
-            false => i64::from(self.short(self.layout.dim + 2 * index)),
-        }
-    }
-
-    fn real_at(&self, at: usize, index: usize) -> f64 {
-        match self.second {
-            true => f64::from_le_bytes(self.number(at + 8 * index)),
-            false => f64::from(f32::from_le_bytes(self.number(at + 4 * index))),
-        }
-    }
-
-    fn wrong(
-        &self,
-        field: &'static str,
-        value: impl ToString,
-        reason: String,
-        at: usize,
-    ) -> VolumeError {
-        VolumeError::Field {
-            file: self.file.into(),
-            field,
-            value: value.to_string(),
-            reason,
-            byte: Some(at as u64),
-        }
-    }
-
-    fn dim(&self) -> Result<Vec<usize>, VolumeError> {
+impl StatedHeader {
+    /// The dimensions, each at least 1.
+    fn extents(&self) -> Result<Vec<usize>, VolumeError> {
         const NAMES: [&str; 8] = [
             "dim[0]", "dim[1]", "dim[2]", "dim[3]", "dim[4]", "dim[5]", "dim[6]", "dim[7]",
         ];
-        let at = |index: usize| self.layout.dim + index * if self.second { 8 } else { 2 };
-        let rank = self.dim_at(0);
-        if !(1..=7).contains(&rank) {
-            let reason = "the number of dimensions must be 1 to 7".into();
-            return Err(self.wrong("dim[0]", rank, reason, at(0)));
-        }
-        let extent = |index: usize| match usize::try_from(self.dim_at(index)) {
+        let rank = (self.dim[0] as usize).min(7);
+        let extent = |index: usize| match usize::try_from(self.dim[index]) {
             Ok(n) if n > 0 => Ok(n),
             _ => {
                 let reason = "a dimension must be at least 1".into();
-                Err(self.wrong(NAMES[index], self.dim_at(index), reason, at(index)))
+                let at = self.offsets.dim(index);
+                Err(self.invalid(NAMES[index], self.dim[index], reason, at))
             }
         };
-        (1..=rank as usize).map(extent).collect()
+        (1..=rank).map(extent).collect()
     }
 
-    fn refuse_cifti(&self) -> Result<(), VolumeError> {
-        let code = self.code(self.layout.intent_code);
-        if self.second && (3000..3100).contains(&code) {
+    fn reject_cifti(&self) -> Result<(), VolumeError> {
+        let code = self.intent_code;
+        if self.second_version && (3000..3100).contains(&code) {
             let reason = "a CIFTI-2 file holds a matrix over brain locations, not a volume".into();
-            return Err(self.wrong("intent_code", code, reason, self.layout.intent_code));
+            return Err(self.invalid("intent_code", code, reason, self.offsets.intent_code));
         }
         Ok(())
     }
 
     fn data_type(&self) -> Result<DataType, VolumeError> {
-        let code = self.short(self.layout.datatype);
-        let refuse = |reason: String| self.wrong("datatype", code, reason, self.layout.datatype);
-        let data_type = data_type(code).map_err(refuse)?;
-        let bits = self.short(self.layout.bitpix);
+        let code = self.datatype;
+        let data_type = data_type(code).map_err(|reason| {
+            self.invalid("datatype", code, reason.into(), self.offsets.datatype)
+        })?;
+        let bits = self.bitpix;
         if i32::from(bits) != 8 * data_type.size() as i32 {
             let reason = format!(
                 "datatype {code} ({}) has {} bits per voxel",
                 data_type.name(),
                 8 * data_type.size()
             );
-            return Err(self.wrong("bitpix", bits, reason, self.layout.bitpix));
+            return Err(self.invalid("bitpix", bits, reason, self.offsets.bitpix));
         }
         Ok(data_type)
     }
 
-    fn vox_offset(&self, pair: bool) -> Result<u64, VolumeError> {
-        let at = self.layout.vox_offset;
-        let least = match pair {
+    /// Offset of the first voxel, bytes.
+    fn first_voxel(&self) -> Result<u64, VolumeError> {
+        let least = match self.pair {
             true => 0,
-            false => self.layout.size as u64 + EXTENDER,
+            false => self.offsets.size as u64 + EXTENDER,
         };
-        let refuse = |value: String, reason: String| self.wrong("vox_offset", value, reason, at);
-        let offset = match self.second {
-            true => {
-                let stated = i64::from_le_bytes(self.number(at));
-                let reason = "the first voxel's byte cannot be negative".into();
-                u64::try_from(stated).map_err(|_| refuse(stated.to_string(), reason))?
+        let invalid = |value: String, reason: String| {
+            self.invalid("vox_offset", value, reason, self.offsets.vox_offset)
+        };
+        let offset = match self.vox_offset {
+            StatedOffset::Whole(stated) => u64::try_from(stated).map_err(|_| {
+                let reason = "the offset of the first voxel cannot be negative".into();
+                invalid(stated.to_string(), reason)
+            })?,
+            // Above 2^53 not every whole number is representable. NaN fails as well.
+            StatedOffset::Real(stated)
+                if !(0.0..=9.0e15).contains(&stated) || stated.fract() != 0.0 =>
+            {
+                let reason = "the offset of the first voxel must be a whole number".into();
+                return Err(invalid(stated.to_string(), reason));
             }
-            false => {
-                let stated = self.real_at(at, 0);
-                // Above 2^53 a float's steps are wider than a byte; and NaN fails as well.
-                if !(0.0..=9.0e15).contains(&stated) || stated.fract() != 0.0 {
-                    let reason = "the first voxel's byte must be a whole number".into();
-                    return Err(refuse(stated.to_string(), reason));
-                }
-                stated as u64
-            }
+            StatedOffset::Real(stated) => stated as u64,
         };
         match offset < least {
-            true => Err(refuse(
+            true => Err(invalid(
                 offset.to_string(),
                 format!("the voxels cannot begin before byte {least}"),
             )),
@@ -418,11 +272,10 @@ impl Fields<'_> {
         }
     }
 
-    /// The standard: a slope of 0 means that there is no scaling. A slope that is no number
-    /// is how several writers say the same.
+    /// Slope and intercept. A slope of 0 means "no scaling" in the standard; several writers use
+    /// NaN for the same.
     fn scaling(&self, warnings: &mut Vec<String>) -> Result<Option<(f64, f64)>, VolumeError> {
-        let slope = self.real_at(self.layout.scl_slope, 0);
-        let inter = self.real_at(self.layout.scl_inter, 0);
+        let (slope, inter) = (self.scl_slope, self.scl_inter);
         if slope == 0.0 || slope.is_nan() {
             if inter.is_finite() && inter != 0.0 {
                 warnings.push(format!(
@@ -433,18 +286,15 @@ impl Fields<'_> {
         }
         let check = |name, value: f64, at| match value.is_finite() {
             true => Ok(()),
-            false => Err(self.wrong(name, value, "must be a finite number".into(), at)),
+            false => Err(self.invalid(name, value, "must be a finite number".into(), at)),
         };
-        check("scl_slope", slope, self.layout.scl_slope)?;
-        check("scl_inter", inter, self.layout.scl_inter)?;
+        check("scl_slope", slope, self.offsets.scl_slope)?;
+        check("scl_inter", inter, self.offsets.scl_inter)?;
         Ok(((slope, inter) != (1.0, 0.0)).then_some((slope, inter)))
     }
 
     fn unit(&self, warnings: &mut Vec<String>) -> LengthUnit {
-        let code = match self.second {
-            true => self.code(self.layout.xyzt_units),
-            false => i32::from(self.bytes[self.layout.xyzt_units]),
-        };
+        let code = self.xyzt_units;
         match code & 7 {
             0 => LengthUnit::Unknown,
             1 => LengthUnit::Metre,
@@ -452,7 +302,7 @@ impl Fields<'_> {
             3 => LengthUnit::Micrometre,
             other => {
                 warnings.push(format!(
-                    "xyzt_units {code} has the unknown unit of length {other}: read as mm."
+                    "xyzt_units {code} states the unknown unit of length {other}: read as mm."
                 ));
                 LengthUnit::Unknown
             }

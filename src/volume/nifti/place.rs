@@ -1,36 +1,29 @@
-//! The affine of a header: sform over qform over pixdim.
+//! The affine of a header: from the sform, otherwise the qform, otherwise `pixdim`.
 //!
-//! `nifti1.h`, "METHOD 1..3". The order is that of the standard's reference library and of
-//! nibabel. Where sform and qform are both given and disagree, the sform is taken and the
-//! distance between the two told. Where neither is given, the standard leaves the orientation
-//! open; nibabel's convention is followed (left-handed storage, i to the patient's left, the
-//! array's centre at the origin), with a warning.
+//! After `nifti1.h`, "METHOD 1" to "METHOD 3", in the order of preference of the standard's
+//! reference library and of nibabel. If sform and qform disagree, the sform is used and a warning
+//! gives their distance. If the file has neither, the standard leaves the orientation open; then
+//! nibabel's convention is used (left-handed storage, i toward the patient's left, the centre of
+//! the array at the origin), with a warning.
 
 use super::super::VolumeError;
 use super::super::facts::AffineSource;
+use super::super::open::Placement;
 use super::header::Header;
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
 use nalgebra::{Matrix4, Vector4};
 
-/// Disagreement of sform and qform beyond this share of a voxel is told.
+/// Distance between sform and qform, as a share of a voxel, above which there is a warning.
 const TOLERANCE: f64 = 0.1;
 
-/// `b^2 + c^2 + d^2` may exceed 1 by rounding, no more.
+/// Largest excess of `b^2 + c^2 + d^2` over 1 that rounding can explain.
 const QUATERNION_SLACK: f64 = 1e-3;
 
-/// Where the voxels are.
-#[derive(Debug, Clone)]
-pub(super) struct Placement {
-    /// Index to LPS millimetres.
-    pub frame: VoxelToPatient,
-    /// Which fields it was made of.
-    pub source: AffineSource,
-    /// Assumptions and contradictions.
-    pub warnings: Vec<String>,
-}
-
-/// Places the header's volume in the patient.
+/// Position of the volumes in the patient.
+///
+/// # Errors
+/// [`VolumeError::Field`] if the field that defines the position is invalid.
 pub(super) fn place(header: &Header) -> Result<Placement, VolumeError> {
     let mut warnings = Vec::new();
     let (ras, source) = if header.sform_code > 0 {
@@ -43,8 +36,8 @@ pub(super) fn place(header: &Header) -> Result<Placement, VolumeError> {
         (qform(header)?, AffineSource::Qform)
     } else {
         warnings.push(
-            "Neither sform nor qform says how the patient lies: i is taken to run to the left, \
-             j to the front, k to the head, and the array's centre as the origin."
+            "Neither sform nor qform states the orientation: i is assumed to run to the left, j to \
+             the front and k to the head, with the origin at the centre of the array."
                 .into(),
         );
         (from_spacing(header)?, AffineSource::Pixdim)
@@ -54,7 +47,7 @@ pub(super) fn place(header: &Header) -> Result<Placement, VolumeError> {
     if scale != 1.0 {
         let unit = header.unit.as_str();
         warnings.push(format!(
-            "Lengths are given in {unit} and were converted to mm."
+            "Lengths are stated in {unit} and were converted to mm."
         ));
     }
     let frame = VoxelToPatient::from_ras(&millimetres).map_err(|_| {
@@ -95,7 +88,7 @@ fn sform(header: &Header) -> Result<Matrix4<f64>, VolumeError> {
     }))
 }
 
-/// Rotation by the unit quaternion, columns scaled by the spacing, k turned by qfac.
+/// The rotation of the unit quaternion with its columns scaled by the spacing; qfac is the sign of k.
 fn qform(header: &Header) -> Result<Matrix4<f64>, VolumeError> {
     let [b, c, d] = header.quatern;
     let length = b * b + c * c + d * d;
@@ -104,7 +97,7 @@ fn qform(header: &Header) -> Result<Matrix4<f64>, VolumeError> {
         let reason = "the squares of quatern_b, _c, _d must add up to at most 1";
         return Err(wrong(header, "quatern_b/c/d", value, reason));
     }
-    // Half turns come out as a slightly negative a^2: then b, c, d are the whole quaternion.
+    // Rounding makes a^2 slightly negative for half turns; their quaternion is b, c, d alone.
     let (a, norm) = match 1.0 - length {
         rest if rest < 1e-7 => (0.0, length.sqrt()),
         rest => (rest.sqrt(), 1.0),
@@ -144,8 +137,8 @@ fn from_spacing(header: &Header) -> Result<Matrix4<f64>, VolumeError> {
     Ok(affine)
 }
 
-/// The absolute spacing, as the reference library takes it. A dimension that the file does not
-/// have needs none.
+/// The absolute values of the spacing, as in the reference library; 1 for dimensions that the file
+/// does not have.
 fn spacing(header: &Header) -> Result<[f64; 3], VolumeError> {
     const NAMES: [&str; 3] = ["pixdim[1]", "pixdim[2]", "pixdim[3]"];
     let mut spacing = [1.0; 3];
@@ -164,11 +157,11 @@ fn spacing(header: &Header) -> Result<[f64; 3], VolumeError> {
     Ok(spacing)
 }
 
-/// A sentence if the qform puts some corner of the volume elsewhere than `sform` does.
+/// A warning if the qform puts a corner of the volume at another position than `sform` does.
 fn disagreement(header: &Header, sform: &Matrix4<f64>) -> Option<String> {
     let qform = match qform(header) {
         Ok(qform) => qform,
-        Err(e) => return Some(format!("The sform was taken; the qform cannot be: {e}.")),
+        Err(e) => return Some(format!("The sform was used; the qform is invalid: {e}.")),
     };
     let corner = |c: usize| {
         let at = |axis: usize| match (c >> axis) & 1 {
@@ -183,11 +176,11 @@ fn disagreement(header: &Header, sform: &Matrix4<f64>) -> Option<String> {
     let voxel = voxel.fold(f64::INFINITY, f64::min);
     (apart > TOLERANCE * voxel).then(|| {
         let apart = apart * header.unit.in_millimetres();
-        format!("sform and qform put voxels up to {apart:.4} mm apart: the sform was taken.")
+        format!("sform and qform put voxels up to {apart:.4} mm apart: the sform was used.")
     })
 }
 
-/// A sentence if the voxels have a size that no scanner makes.
+/// A warning if the voxel size is outside the range of any scanner.
 fn implausible(frame: &VoxelToPatient) -> Option<String> {
     let [x, y, z] = frame.spacing();
     let odd = |s: f64| !(0.05..=50.0).contains(&s);

@@ -1,6 +1,9 @@
-//! Odd files made by code, and random damage.
+//! Unusual files made by code, and random damage.
 
-use super::super::{AffineSource, ByteOrder, Format, Volume, VolumeFile, read as read_volume};
+use super::super::{
+    AffineSource, ByteOrder, FileFormat, ReadOptions, Reading, Volume, VolumeFile,
+    read as read_volume,
+};
 use super::*;
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
@@ -124,7 +127,7 @@ fn both_byte_orders_give_the_same() {
         assert_eq!(reading.volume.shape, [4, 3, 2]);
         let order = [ByteOrder::Little, ByteOrder::Big][usize::from(big_endian)];
         assert_eq!(reading.facts.byte_order, order);
-        assert_eq!(reading.facts.format, Format::Nifti1);
+        assert_eq!(reading.facts.format, FileFormat::Nifti1);
         assert_eq!(reading.facts.affine_source, AffineSource::Sform);
         let origin = reading.volume.frame.to_patient(&Vec3::zeros());
         assert_eq!(origin, Vec3::new(3.0, -5.0, 7.0), "LPS");
@@ -320,7 +323,7 @@ fn pairs_come_in_any_order_and_packing() {
     ] {
         let reading = read_files(&[a, b], None).unwrap();
         assert_eq!(reading.volume.voxels, RAMP);
-        assert_eq!(reading.facts.format, Format::Nifti1Pair);
+        assert_eq!(reading.facts.format, FileFormat::Nifti1Pair);
     }
     assert!(matches!(
         read_bytes(&header),
@@ -359,7 +362,7 @@ fn what_follows_the_voxels_is_not_unpacked() {
     bytes.resize(bytes.len() + (64 << 20), 0);
     let reading = read_bytes(&gzip(&bytes)).unwrap();
     assert_eq!(reading.volume.voxels, RAMP);
-    assert!(reading.facts.warnings[0].contains("left aside"));
+    assert!(reading.facts.warnings[0].contains("were ignored"));
 }
 
 #[test]
@@ -599,7 +602,7 @@ fn version_2_is_read() {
             file.push(n.to_le_bytes());
         }
         let reading = file.read().unwrap();
-        assert_eq!(reading.facts.format, Format::Nifti2);
+        assert_eq!(reading.facts.format, FileFormat::Nifti2);
         assert_eq!(reading.volume.voxels, RAMP.map(|v| v / 4.0));
         assert_eq!(reading.facts.spacing_mm, [3.5; 3]);
         file.put(16 + 8, i64::MAX.to_le_bytes());
@@ -610,12 +613,22 @@ fn version_2_is_read() {
     }
 }
 
-/// The `nifti` crate as an independent reader of the header fields that we write.
+/// The `nifti` crate reads the header and the voxels that are written here.
 #[test]
-fn what_is_written_is_read_by_others() {
+fn written_files_are_read_by_the_nifti_crate() {
+    use ::nifti::{InMemNiftiVolume, NiftiHeader, RandomAccessNiftiVolume};
     let volume = oblique();
     let bytes = write(&volume, StoredType::Float32, false).unwrap();
-    let header = nifti::NiftiHeader::from_reader(&bytes[..348]).unwrap();
+    let header = NiftiHeader::from_reader(&bytes[..348]).unwrap();
+    let voxels = InMemNiftiVolume::from_reader(&bytes[352..], &header).unwrap();
+    for k in 0..3 {
+        for j in 0..4 {
+            for i in 0..5 {
+                let index = [i, j, k].map(|x| x as u16);
+                assert_eq!(voxels.get_f32(&index).unwrap(), volume.at(i, j, k));
+            }
+        }
+    }
     assert_eq!(header.dim, [3, 5, 4, 3, 1, 1, 1, 1]);
     assert_eq!(
         (header.datatype, header.bitpix, header.vox_offset),

@@ -1,60 +1,63 @@
-//! Volumes into NIfTI-1 files.
+//! Writes volumes and masks as NIfTI-1 files.
 //!
-//! The affine goes out exactly as far as `f32` reaches: as sform always, and as qform too where
-//! it is a rotation with spacing (the only thing that a quaternion can say). The bytes depend on
-//! the volume alone: the gzip header carries neither name nor time.
+//! The affine is written as the sform, rounded to `f32`, and also as the qform if it is a rotation
+//! with spacing, which is all that a quaternion can express. The bytes depend on the volume alone:
+//! the gzip header contains neither name nor time.
+//!
+//! The header is a [`NiftiHeader`] of the `nifti` crate. It is serialised here because the crate's
+//! writer writes to paths only, and always with slope 1 and intercept 0.
 
 use super::super::Volume;
 use crate::geometry::frame::VoxelToPatient;
 use crate::progress::{Cancelled, Monitor};
+use ::nifti::header::MAGIC_CODE_NIP1;
+use ::nifti::typedef::{Unit, XForm};
+use ::nifti::{Endianness, NiftiHeader, NiftiType};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use std::io::Write;
 
-/// Bytes before the first voxel: the header and the four that say "no extension".
+/// Bytes before the first voxel: the header and four bytes that announce no extensions.
 const VOX_OFFSET: usize = 352;
 
-/// `scanner anatomical` coordinates.
-const XFORM_CODE: i16 = 1;
-
-/// How far columns of a rotation may be from perpendicular and of unit length.
+/// Largest deviation of the columns of a rotation from unit length and from a right angle.
 const RIGID: f64 = 1e-5;
 
-/// How voxels are stored.
+/// Data type of the stored voxels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StoredType {
-    /// As they are.
+    /// The values unchanged.
     Float32,
-    /// Scaled onto -32000..=32000 by slope and intercept, a quarter of the size when packed;
-    /// whole values of that range go unscaled and exact. NaN becomes the smallest value.
+    /// Scaled to -32000..=32000 by slope and intercept, a quarter of the size after compression.
+    /// Whole values in that range are stored exactly. NaN becomes the smallest value.
     Int16,
     /// Rounded and clamped to 0..=255, for masks and label maps. NaN becomes 0.
     Uint8,
 }
 
 impl StoredType {
-    fn code_and_bits(self) -> (i16, i16) {
+    fn nifti_type(self) -> NiftiType {
         match self {
-            StoredType::Float32 => (16, 32),
-            StoredType::Int16 => (4, 16),
-            StoredType::Uint8 => (2, 8),
+            StoredType::Float32 => NiftiType::Float32,
+            StoredType::Int16 => NiftiType::Int16,
+            StoredType::Uint8 => NiftiType::Uint8,
         }
     }
 }
 
-/// A volume cannot be said in NIfTI-1.
+/// An axis is too long for NIfTI-1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{size} voxels along an axis; NIfTI-1 counts to 32767")]
+#[error("an axis has {size} voxels; NIfTI-1 allows at most 32767")]
 pub struct TooLong {
-    /// Voxels along the offending axis.
+    /// Voxels along that axis.
     pub size: usize,
 }
 
 /// A mask cannot be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum MaskError {
-    /// NIfTI-1 cannot say its size.
+    /// An axis is too long for NIfTI-1.
     #[error(transparent)]
     TooLong(#[from] TooLong),
     /// The caller asked for an end.
@@ -62,8 +65,9 @@ pub enum MaskError {
     Cancelled(#[from] Cancelled),
 }
 
-/// The bytes of a `.nii.gz` with `mask` as 0 and 1 on the grid of `shape` and `frame`. Packed
-/// slice by slice: takes no memory but that of the result, and looks at the token in between.
+/// The bytes of a `.nii.gz` file with `mask` as 0 and 1 on the grid of `shape` and `frame`.
+/// Compresses slice by slice: needs little memory beyond the result, and checks for cancellation
+/// between slices.
 ///
 /// # Errors
 /// [`MaskError`].
@@ -75,7 +79,7 @@ pub fn write_mask(
 ) -> Result<Vec<u8>, MaskError> {
     let header = header(shape, frame, StoredType::Uint8, Scaling::NONE)?;
     let mut encoder = GzEncoder::new(Vec::new(), Compression::new(6));
-    put(&mut encoder, &header);
+    put(&mut encoder, &to_bytes(&header));
     for slice in mask.chunks((shape[0] * shape[1]).max(1)) {
         monitor.check()?;
         let bytes: Vec<u8> = slice.iter().map(|inside| u8::from(*inside)).collect();
@@ -84,16 +88,16 @@ pub fn write_mask(
     Ok(finish(encoder))
 }
 
-/// The bytes of a `.nii` (of a `.nii.gz` where `gzip` is set) with `volume`.
+/// The bytes of a `.nii` file with `volume`, or of a `.nii.gz` file if `gzip` is set.
 ///
 /// # Errors
-/// [`TooLong`] where an axis has more than 32 767 voxels.
+/// [`TooLong`] if an axis has more than 32 767 voxels.
 pub fn write(volume: &Volume, stored: StoredType, gzip: bool) -> Result<Vec<u8>, TooLong> {
     let scaling = match stored {
         StoredType::Int16 => scaling(&volume.voxels),
         StoredType::Float32 | StoredType::Uint8 => Scaling::NONE,
     };
-    let mut bytes = header(volume.shape, &volume.frame, stored, scaling)?;
+    let mut bytes = to_bytes(&header(volume.shape, &volume.frame, stored, scaling)?);
     append_voxels(&mut bytes, &volume.voxels, stored, scaling);
     Ok(if gzip { pack(&bytes) } else { bytes })
 }
@@ -112,7 +116,7 @@ impl Scaling {
     };
 }
 
-/// The scaling that takes the range of `voxels` onto that of the stored numbers.
+/// The scaling that maps the range of `voxels` to the range of the stored numbers.
 fn scaling(voxels: &[f32]) -> Scaling {
     const REACH: f64 = 32_000.0;
     let numbers = || voxels.iter().copied().filter(|v| v.is_finite());
@@ -139,7 +143,7 @@ fn append_voxels(bytes: &mut Vec<u8>, voxels: &[f32], stored: StoredType, scalin
     let (slope, inter) = (f64::from(scaling.slope), f64::from(scaling.inter));
     match stored {
         StoredType::Float32 => bytes.extend(voxels.iter().flat_map(|v| v.to_le_bytes())),
-        // `as` rounds nothing and takes NaN to 0, hence the detour.
+        // `as` truncates and turns NaN into 0.
         StoredType::Int16 => bytes.extend(voxels.iter().flat_map(|&v| {
             let n = ((f64::from(v) - inter) / slope).round();
             (if n.is_nan() { -32_000 } else { n as i16 }).to_le_bytes()
@@ -148,55 +152,100 @@ fn append_voxels(bytes: &mut Vec<u8>, voxels: &[f32], stored: StoredType, scalin
     }
 }
 
+/// The header of a single file with one volume.
 fn header(
     shape: [usize; 3],
     frame: &VoxelToPatient,
     stored: StoredType,
     scaling: Scaling,
-) -> Result<Vec<u8>, TooLong> {
-    let mut bytes = vec![0; VOX_OFFSET];
-    let mut put = |at: usize, field: &[u8]| bytes[at..at + field.len()].copy_from_slice(field);
-    let (datatype, bitpix) = stored.code_and_bits();
-    put(0, &348_i32.to_le_bytes());
-    put(40, &3_i16.to_le_bytes());
-    for axis in 0..7 {
-        let size = shape.get(axis).copied().unwrap_or(1);
-        let extent = i16::try_from(size).map_err(|_| TooLong { size })?;
-        put(42 + 2 * axis, &extent.to_le_bytes());
+) -> Result<NiftiHeader, TooLong> {
+    let mut dim = [3, 1, 1, 1, 1, 1, 1, 1];
+    for (extent, size) in dim[1..].iter_mut().zip(shape) {
+        // The crate counts to 65535, the standard to 32767.
+        let signed = i16::try_from(size).map_err(|_| TooLong { size })?;
+        *extent = signed.cast_unsigned();
     }
-    put(70, &datatype.to_le_bytes());
-    put(72, &bitpix.to_le_bytes());
-    let reals =
-        |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|v| v.to_le_bytes()).collect() };
-    let spacing = frame.spacing().map(|s| s as f32);
-    let pose = quaternion(frame);
+    let data_type = stored.nifti_type();
+    let [dx, dy, dz] = frame.spacing().map(|s| s as f32);
     let qfac = if frame.is_left_handed() { -1.0 } else { 1.0 };
-    put(
-        76,
-        &reals(&[qfac, spacing[0], spacing[1], spacing[2], 1.0, 1.0, 1.0, 1.0]),
-    );
-    put(
-        108,
-        &reals(&[VOX_OFFSET as f32, scaling.slope, scaling.inter]),
-    );
-    put(123, &[2]);
-    put(148, b"ventriform");
     let ras = frame.to_ras();
-    if let Some(bcd) = pose {
-        put(252, &XFORM_CODE.to_le_bytes());
-        put(256, &reals(&bcd));
-        put(268, &reals(&[0, 1, 2].map(|r| ras[(r, 3)] as f32)));
+    let srow = |row: usize| [0, 1, 2, 3].map(|c| ras[(row, c)] as f32);
+    let mut descrip = b"ventriform".to_vec();
+    descrip.resize(80, 0);
+    let mut header = NiftiHeader {
+        dim,
+        datatype: data_type as i16,
+        bitpix: 8 * data_type.size_of() as i16,
+        pixdim: [qfac, dx, dy, dz, 1.0, 1.0, 1.0, 1.0],
+        vox_offset: VOX_OFFSET as f32,
+        scl_slope: scaling.slope,
+        scl_inter: scaling.inter,
+        xyzt_units: Unit::Mm as u8,
+        descrip,
+        qform_code: XForm::Unknown as i16,
+        sform_code: XForm::ScannerAnat as i16,
+        srow_x: srow(0),
+        srow_y: srow(1),
+        srow_z: srow(2),
+        magic: *MAGIC_CODE_NIP1,
+        endianness: Endianness::Little,
+        ..NiftiHeader::default()
+    };
+    if let Some([b, c, d]) = quaternion(frame) {
+        header.qform_code = XForm::ScannerAnat as i16;
+        (header.quatern_b, header.quatern_c, header.quatern_d) = (b, c, d);
+        [header.quatern_x, header.quatern_y, header.quatern_z] =
+            [0, 1, 2].map(|row| ras[(row, 3)] as f32);
     }
-    put(254, &XFORM_CODE.to_le_bytes());
-    for row in 0..3 {
-        let srow = [0, 1, 2, 3].map(|c| ras[(row, c)] as f32);
-        put(280 + 16 * row, &reals(&srow));
-    }
-    put(344, b"n+1\0");
-    Ok(bytes)
+    Ok(header)
 }
 
-/// `quatern_b`, `_c`, `_d` where the frame is a rotation (k perhaps turned) with spacing.
+/// The bytes of `h` in little endian order, and four zeros: no extensions.
+fn to_bytes(h: &NiftiHeader) -> Vec<u8> {
+    let mut out = HeaderBytes(Vec::with_capacity(VOX_OFFSET));
+    out.int(h.sizeof_hdr).raw(&h.data_type).raw(&h.db_name);
+    out.int(h.extents).shorts([h.session_error]);
+    out.raw(&[h.regular, h.dim_info]);
+    out.shorts(h.dim.map(u16::cast_signed));
+    out.reals([h.intent_p1, h.intent_p2, h.intent_p3]);
+    out.shorts([h.intent_code, h.datatype, h.bitpix, h.slice_start]);
+    out.reals(h.pixdim);
+    out.reals([h.vox_offset, h.scl_slope, h.scl_inter]);
+    out.shorts([h.slice_end]).raw(&[h.slice_code, h.xyzt_units]);
+    out.reals([h.cal_max, h.cal_min, h.slice_duration, h.toffset]);
+    out.int(h.glmax).int(h.glmin);
+    out.raw(&h.descrip).raw(&h.aux_file);
+    out.shorts([h.qform_code, h.sform_code]);
+    out.reals([h.quatern_b, h.quatern_c, h.quatern_d]);
+    out.reals([h.quatern_x, h.quatern_y, h.quatern_z]);
+    out.reals(h.srow_x).reals(h.srow_y).reals(h.srow_z);
+    out.raw(&h.intent_name).raw(&h.magic).raw(&[0; 4]);
+    out.0
+}
+
+/// Fields of a header, written one after the other.
+struct HeaderBytes(Vec<u8>);
+
+impl HeaderBytes {
+    fn raw(&mut self, bytes: &[u8]) -> &mut Self {
+        self.0.extend_from_slice(bytes);
+        self
+    }
+
+    fn int(&mut self, number: i32) -> &mut Self {
+        self.raw(&number.to_le_bytes())
+    }
+
+    fn shorts<const N: usize>(&mut self, numbers: [i16; N]) -> &mut Self {
+        self.raw(numbers.map(i16::to_le_bytes).as_flattened())
+    }
+
+    fn reals<const N: usize>(&mut self, numbers: [f32; N]) -> &mut Self {
+        self.raw(numbers.map(f32::to_le_bytes).as_flattened())
+    }
+}
+
+/// `quatern_b`, `_c`, `_d` if the frame is a rotation with spacing, k possibly reversed.
 fn quaternion(frame: &VoxelToPatient) -> Option<[f32; 3]> {
     let ras = frame.to_ras();
     let mut rotation: Matrix3<f64> = ras.fixed_view::<3, 3>(0, 0).into_owned();
@@ -213,7 +262,7 @@ fn quaternion(frame: &VoxelToPatient) -> Option<[f32; 3]> {
         return None;
     }
     let q = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
-    // The standard keeps a >= 0 and stores only the rest; q and -q are the same turn.
+    // The standard stores b, c, d of the quaternion with a >= 0; q and -q are the same rotation.
     let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
     Some([q.i, q.j, q.k].map(|c| (sign * c) as f32))
 }

@@ -1,30 +1,29 @@
-//! Who takes up how much, at a point of the patient.
+//! Uptake of the tissue at every point of the patient.
 //!
-//! The patient frame's origin is the middle of the torso at the height of the heart. The LV's
-//! own coordinates are (toward the anterior wall, toward the septum, from the apex to the
-//! base), with the origin halfway along the outer long axis.
+//! The origin of the patient frame is the middle of the torso at the height of the heart. The
+//! coordinates of the LV are (toward the anterior wall, toward the septum, from apex to base), with
+//! the origin half-way along the outer long axis.
 
-use super::{Defect, PhantomError, PhantomParameters, Pose};
+use super::parameters::{PerfusionDefect, PhantomError, PhantomParameters};
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
-use crate::geometry::random::{Purpose, stream};
+use crate::geometry::random::{Purpose, stream, uniform};
 use crate::progress::{Cancelled, Monitor};
 use nalgebra::{Matrix3, Rotation3, Unit};
-use rand::Rng;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
-/// Where the array's middle lies: between the torso's middle and the heart, so that both small
-/// and large fields of view show the heart.
+/// Position of the centre of the array: between the middle of the torso and the heart, so that small
+/// and large fields of view both contain the heart.
 pub(super) const FIELD_CENTRE: Vec3 = Vec3::new(25.0, -20.0, 0.0);
 
-/// Middle of the LV before the seed shifts it.
+/// Middle of the LV before the random shift.
 const HEART: Vec3 = Vec3::new(45.0, -35.0, 10.0);
 
-/// Sub-voxels along each axis where wall may be: partial volume in steps of 1/27.
+/// Sub-voxels along each axis near the heart: partial volume in steps of 1/27.
 const SUPERSAMPLING: usize = 3;
 
-/// An ellipsoid with axes along the patient's.
+/// An ellipsoid with axes along those of the patient.
 struct Ellipsoid {
     centre: Vec3,
     radii: Vec3,
@@ -59,11 +58,26 @@ const LUNG_SHARE: f64 = 0.4;
 /// Thickness of the right ventricle's wall.
 const RV_WALL: f64 = 4.0;
 
-/// The whole patient.
+/// Position and orientation of the LV, LPS millimetres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeartPose {
+    /// Outermost point of the apex.
+    pub apex: Vec3,
+    /// Where the long axis leaves the base.
+    pub base: Vec3,
+    /// Unit vector from base to apex.
+    pub axis: Vec3,
+    /// Unit vector perpendicular to the axis, toward the middle of the anterior wall.
+    pub anterior: Vec3,
+    /// Unit vector perpendicular to both, toward the middle of the septum.
+    pub septal: Vec3,
+}
+
+/// The LV in its pose and everything around it.
 pub(super) struct Anatomy<'a> {
     parameters: &'a PhantomParameters,
     centre: Vec3,
-    /// Rows: anterior, septal, apex-to-base.
+    /// Rows: anterior, septal, apex to base.
     to_heart: Matrix3<f64>,
     /// Direction of the basal slant, in (anterior, septal).
     slant: [f64; 2],
@@ -73,14 +87,14 @@ pub(super) struct Anatomy<'a> {
     segments: [f64; 17],
 }
 
-/// What there is at a point.
+/// The uptake at a point, by whether the point is in the wall of the LV.
 enum Tissue {
     Wall(f64),
     Other(f64),
 }
 
 impl<'a> Anatomy<'a> {
-    /// The patient of `parameters`, posed by the seed.
+    /// The patient of `parameters`, with the pose that the seed gives.
     pub(super) fn new(parameters: &'a PhantomParameters) -> Self {
         let p = parameters;
         let mut random = stream(p.seed, Purpose::PhantomShape);
@@ -109,12 +123,12 @@ impl<'a> Anatomy<'a> {
         }
     }
 
-    /// The LV's place.
-    pub(super) fn pose(&self) -> Pose {
+    /// Position and orientation of the LV.
+    pub(super) fn pose(&self) -> HeartPose {
         let row = |r: usize| self.to_heart.row(r).transpose();
         let to_base = row(2);
         let half = self.parameters.length_mm / 2.0;
-        Pose {
+        HeartPose {
             apex: self.centre - half * to_base,
             base: self.centre + half * to_base,
             axis: -to_base,
@@ -123,15 +137,18 @@ impl<'a> Anatomy<'a> {
         }
     }
 
-    /// Radius of a ball round the LV.
+    /// Radius of a ball around the LV.
     fn reach(&self) -> f64 {
         let p = self.parameters;
-        // The slanted base rises above the axis' end by the tangent over half a width.
+        // The slanted base rises above the end of the axis by its tangent times half the width.
         let rise = (p.width_mm / 2.0) * p.base_tilt_deg.to_radians().tan();
         (p.length_mm / 2.0 + rise).hypot(p.width_mm / 2.0)
     }
 
-    /// Whether the LV lies inside the volume with some room for its blur.
+    /// Checks that the LV lies inside the volume.
+    ///
+    /// # Errors
+    /// [`PhantomError::TooSmall`].
     pub(super) fn check_fits(&self, p: &PhantomParameters) -> Result<(), PhantomError> {
         let off = self.centre - FIELD_CENTRE;
         let reach = self.extent();
@@ -149,8 +166,8 @@ impl<'a> Anatomy<'a> {
         Ok(())
     }
 
-    /// Half the size of a box round the LV along x, y, z: that of a cylinder of its length
-    /// and width, the slant included.
+    /// Half the size along x, y, z of a box around the LV, taken as a cylinder of its length and width
+    /// including the slant.
     fn extent(&self) -> Vec3 {
         let p = self.parameters;
         let wide = p.width_mm / 2.0;
@@ -159,7 +176,7 @@ impl<'a> Anatomy<'a> {
         axis.map(|c| long * c.abs() + wide * (1.0 - c * c).max(0.0).sqrt())
     }
 
-    /// Uptake, and the mask of the wall, of every voxel.
+    /// The uptake of every voxel, and the mask of the wall.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -184,7 +201,7 @@ impl<'a> Anatomy<'a> {
         Ok((uptake, wall))
     }
 
-    /// Mean uptake of a voxel, and whether wall fills half of it.
+    /// Mean uptake of a voxel, and 1 if the wall fills at least half of it, otherwise 0.
     fn voxel(&self, index: &Vec3, frame: &VoxelToPatient) -> (f32, f32) {
         let middle = frame.to_patient(index);
         let half_voxel = Vec3::from(frame.spacing()).norm() / 2.0;
@@ -211,11 +228,11 @@ impl<'a> Anatomy<'a> {
         )
     }
 
-    /// What there is near the heart.
+    /// The tissue at `p`, which is near the heart.
     fn tissue(&self, p: &Vec3) -> Tissue {
         let parameters = self.parameters;
         let h = self.to_heart * (p - self.centre);
-        // The ellipsoid's equator is at z = 0.
+        // Height above the equator of the ellipsoid.
         let z = h.z + parameters.base_mm - parameters.length_mm / 2.0;
         let tilt = parameters.base_tilt_deg.to_radians().tan();
         let base = parameters.base_mm + tilt * (h.x * self.slant[0] + h.y * self.slant[1]);
@@ -235,8 +252,8 @@ impl<'a> Anatomy<'a> {
         }
     }
 
-    /// The AHA segment (1..=17) at heart coordinates `h`: quarters of the length from the apex,
-    /// then sectors from the anterior wall over the septum.
+    /// The AHA segment (1..=17) at LV coordinates `h`: quarters of the length from the apex, then
+    /// sectors from the anterior wall toward the septum.
     fn segment(&self, h: &Vec3) -> usize {
         let along = h.z / self.parameters.length_mm + 0.5;
         let turns = h.y.atan2(h.x).rem_euclid(TAU) / TAU;
@@ -249,7 +266,7 @@ impl<'a> Anatomy<'a> {
         }
     }
 
-    /// Uptake in the right ventricle: an ellipsoid that leans on the septum.
+    /// Uptake in the right ventricle, an ellipsoid next to the septum; `None` outside it.
     fn right_ventricle(&self, h: &Vec3, z: f64) -> Option<f64> {
         let p = self.parameters;
         if p.right_ventricle == 0.0 {
@@ -265,7 +282,7 @@ impl<'a> Anatomy<'a> {
         }
     }
 
-    /// Uptake away from the heart.
+    /// Uptake outside the heart.
     fn elsewhere(&self, p: &Vec3) -> f64 {
         let parameters = self.parameters;
         if (p.x / TORSO[0]).powi(2) + (p.y / TORSO[1]).powi(2) > 1.0 {
@@ -284,32 +301,27 @@ impl<'a> Anatomy<'a> {
     }
 }
 
-/// Unit vectors across the axis toward the anterior wall (up, as far as the axis allows) and
-/// the septum (toward the patient's right).
+/// Unit vectors perpendicular to the axis toward the anterior wall (superior, as far as the axis
+/// allows) and toward the septum (the patient's right).
 fn across(to_base: &Vec3) -> (Vec3, Vec3) {
     let part = |v: Vec3| v - v.dot(to_base) * to_base;
     let up = part(Vec3::z());
-    // An axis that stands upright has its anterior wall in front.
+    // For a vertical axis, the anterior wall is in front.
     let anterior = match up.norm() > 1e-3 {
         true => up.normalize(),
         false => part(-Vec3::y()).normalize(),
     };
-    // With the apex to the left and front, this points to the right.
+    // Points to the right if the apex is to the left and in front.
     let septal = anterior.cross(to_base);
     (anterior, septal)
 }
 
-/// Uptake by segment: of several defects in one, the worst counts.
-fn wall_uptake(defects: &[Defect]) -> [f64; 17] {
+/// Uptake by segment. Of several defects in a segment, the most severe one counts.
+fn wall_uptake(defects: &[PerfusionDefect]) -> [f64; 17] {
     let mut uptake = [1.0_f64; 17];
     for defect in defects {
         let segment = &mut uptake[usize::from(defect.segment) - 1];
         *segment = segment.min(1.0 - defect.severity);
     }
     uptake
-}
-
-/// A number in [0, 1) of 53 random digits.
-pub(super) fn uniform(random: &mut impl Rng) -> f64 {
-    (random.next_u64() >> 11) as f64 * (-53_f64).exp2()
 }

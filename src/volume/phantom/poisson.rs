@@ -1,16 +1,16 @@
 //! Exact draws from the Poisson distribution.
 //!
-//! Small means by multiplying uniform numbers (Knuth 1969), others by transformed rejection:
+//! Small means by multiplying uniform numbers (Knuth 1969), larger ones by transformed rejection,
 //! algorithm PTRS of W. Hörmann, "The transformed rejection method for generating Poisson
 //! random variables", Insurance: Mathematics and Economics 12 (1993) 39-45.
 
-use super::anatomy::uniform;
+use crate::geometry::random::uniform;
 use rand::Rng;
 
-/// From here on PTRS is valid.
+/// Smallest mean for which PTRS is valid.
 const LARGE: f64 = 10.0;
 
-/// A whole number, Poisson distributed about `mean`; 0 for a mean of 0 or less.
+/// A Poisson-distributed whole number of the given mean; 0 for a mean of 0 or less.
 pub(super) fn draw(mean: f64, random: &mut impl Rng) -> f64 {
     if !(mean > 0.0) {
         0.0
@@ -32,7 +32,7 @@ fn by_multiplication(mean: f64, random: &mut impl Rng) -> f64 {
     n
 }
 
-/// The names and constants are the paper's.
+/// PTRS; names and constants as in the paper.
 fn by_rejection(mean: f64, random: &mut impl Rng) -> f64 {
     let b = 0.931 + 2.53 * mean.sqrt();
     let a = -0.059 + 0.024_83 * b;
@@ -56,7 +56,7 @@ fn by_rejection(mean: f64, random: &mut impl Rng) -> f64 {
     }
 }
 
-/// ln(k!), by Stirling's series from 10 on (error below 1e-12).
+/// ln(k!); for k of 10 and more by Stirling's series, with an error below 1e-12.
 fn ln_factorial(k: f64) -> f64 {
     if k < 10.0 {
         return (2..=k as u64).map(|n| n as f64).product::<f64>().ln();

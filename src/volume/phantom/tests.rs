@@ -1,4 +1,5 @@
 use super::*;
+use crate::geometry::Vec3;
 
 fn small() -> PhantomParameters {
     PhantomParameters {
@@ -77,7 +78,7 @@ fn a_defect_darkens_its_segment_and_no_other() {
         ..small()
     };
     let healthy = make(&quiet);
-    let defect = Defect {
+    let defect = PerfusionDefect {
         segment: 10,
         severity: 1.0,
     };
@@ -181,7 +182,7 @@ fn what_is_out_of_range_is_named() {
         }),
         "shape"
     );
-    let none = Defect {
+    let none = PerfusionDefect {
         segment: 18,
         severity: 0.5,
     };

@@ -1,0 +1,46 @@
+//! The kinds of values that parameters take.
+
+/// What kind of value a parameter takes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// A whole number in a range.
+    Integer {
+        /// Smallest value.
+        min: u64,
+        /// Largest value.
+        max: u64,
+    },
+    /// A finite number in a range.
+    Number {
+        /// Smallest value.
+        min: f64,
+        /// Largest value.
+        max: f64,
+    },
+    /// One of the listed words.
+    Choice(&'static [&'static str]),
+    /// `count` whole numbers, separated by commas (in JSON also an array).
+    Integers {
+        /// How many.
+        count: usize,
+    },
+    /// `count` finite numbers, separated by commas (in JSON also an array).
+    Numbers {
+        /// How many.
+        count: usize,
+    },
+    /// Text in a form of its own.
+    Text {
+        /// The form as a regular expression.
+        pattern: &'static str,
+        /// One example.
+        example: &'static str,
+    },
+    /// The id of an object that the service stores. The command line takes files instead.
+    Stored {
+        /// The prefixes of ids of such objects.
+        prefixes: &'static [&'static str],
+        /// A word that is accepted instead of an id; empty if there is none.
+        word: &'static str,
+    },
+}

@@ -1,0 +1,46 @@
+//! What a caller asks of a reader: which volume of a file, and at what cost.
+
+use super::VolumeError;
+
+/// Which volume of the file to read.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// Number of the volume, from 0, in a file that holds several: for NIfTI the dimensions beyond
+    /// the third, the fourth fastest; for DICOM the gates, those of the first R-R interval first.
+    /// Default `None`, which suits files that hold one volume.
+    pub frame: Option<usize>,
+}
+
+impl ReadOptions {
+    /// The number of the volume to read from a file that holds `frames` volumes.
+    ///
+    /// # Errors
+    /// [`VolumeError::FrameNeeded`] if the file holds several and none was asked for,
+    /// [`VolumeError::FrameOutOfRange`] if the file has no such volume.
+    pub(super) fn choose(self, frames: usize) -> Result<usize, VolumeError> {
+        match self.frame {
+            None if frames == 1 => Ok(0),
+            None => Err(VolumeError::FrameNeeded { frames }),
+            Some(frame) if frame < frames => Ok(frame),
+            Some(frame) => Err(VolumeError::FrameOutOfRange { frame, frames }),
+        }
+    }
+}
+
+/// Upper bounds on what reading a file may cost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ReadLimits {
+    /// Voxels of one volume. Default 2^28: one gibibyte of `f32`, twice a 512^3 volume.
+    pub voxels: u64,
+    /// Bytes of the unpacked file up to the last voxel that is read. Default 4 GiB.
+    pub unpacked_bytes: u64,
+}
+
+impl Default for ReadLimits {
+    fn default() -> Self {
+        Self {
+            voxels: 1 << 28,
+            unpacked_bytes: 4 << 30,
+        }
+    }
+}
