@@ -445,11 +445,6 @@ impl Place {
         Ok(place)
     }
 
-    /// Whether `template` can be fitted there.
-    pub fn suits(&self, template: &Template) -> bool {
-        matches!(self, Place::Ventricle { .. }) == template.cup.is_some()
-    }
-
     fn posture(&self) -> Posture {
         match self {
             Place::Ventricle { posture, .. } => *posture,

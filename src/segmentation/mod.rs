@@ -9,17 +9,19 @@
 mod built_in;
 mod expert;
 mod files;
+mod fitting;
 mod from_files;
 mod report;
 pub mod slices;
 
 pub use expert::{ExpertError, on_grid};
 pub use files::{NamedFile, OutcomeError};
+pub use fitting::OrganSearch;
 pub use from_files::{NamedMesh, Order, SegmentError, Segmented, from_files};
 pub use report::{agreement_json, report_json};
 
 use crate::deform::template::Template;
-use crate::deform::{DeformError, DeformParameters, Fit, Place, fit_at};
+use crate::deform::{DeformError, DeformParameters, Fit, fit_at};
 use crate::grid::agreement::{Agreement, compare};
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::polar::{self, PolarMap, PolarParameters};
@@ -152,11 +154,7 @@ pub fn segment(
         None => None,
     };
     monitor.report(Stage::Report, 0.8)?;
-    let cut = match (&fit.cup, &fit.posture) {
-        (Some(cup), Some(posture)) => Cut::heart(cup, &posture.superior),
-        _ => Cut::body(&fit.mesh),
-    };
-    let slices = slices::png(volume, &fit.mesh, &cut, expert.as_ref(), monitor)?;
+    let slices = slices::png(volume, &fit.mesh, &Cut::of(&fit), expert.as_ref(), monitor)?;
     monitor.report(Stage::Report, 1.0)?;
     Ok(Segmentation {
         fit,
@@ -186,12 +184,9 @@ fn try_all(
 ) -> Result<Trials, SegmentationError> {
     let mut trials = Trials::default();
     let mut first = None;
-    let mut place: Option<Place> = None;
+    let mut search = OrganSearch::default();
     for (index, NamedTemplate { name, template }) in templates.iter().enumerate() {
-        let place = match place.take().filter(|place| place.suits(template)) {
-            Some(found) => place.insert(found),
-            None => place.insert(Place::find(volume, template, parameters, monitor)?),
-        };
+        let place = search.place(volume, template, parameters, monitor)?;
         let monitor = monitor.piece(index, templates.len());
         let name = name.clone();
         match fit_at(place, volume, template, parameters, &monitor) {

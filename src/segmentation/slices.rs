@@ -11,6 +11,7 @@
 
 use nalgebra::Matrix3;
 
+use crate::deform::Fit;
 use crate::deform::wall::anterior;
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
@@ -79,6 +80,14 @@ pub struct Cut {
 }
 
 impl Cut {
+    /// Through the organ that `fit` shows.
+    pub fn of(fit: &Fit) -> Self {
+        match (&fit.cup, &fit.posture) {
+            (Some(cup), Some(posture)) => Self::heart(cup, &posture.superior),
+            _ => Self::body(&fit.mesh),
+        }
+    }
+
     /// Through a ventricle, in a patient whose `superior` direction (unit vector) is given.
     pub fn heart(cup: &Cup, superior: &Vec3) -> Self {
         let up = anterior(&cup.axis, superior);
