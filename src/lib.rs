@@ -35,6 +35,8 @@ pub mod optimise;
 
 pub mod decimate;
 
+pub mod model;
+
 pub mod deform;
 
 pub mod polar;

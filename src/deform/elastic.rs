@@ -30,9 +30,10 @@
 use nalgebra::Matrix3;
 
 use crate::geometry::Vec3;
+use crate::geometry::rotation::nearest_rotation;
 use crate::mesh::TriMesh;
+use crate::model::struts::Strut;
 use crate::numeric::conjugate_gradient::BlockMatrix;
-use crate::progress::{Cancelled, Monitor};
 
 /// Stiffness of each kind of force.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,15 +94,6 @@ impl Stiffness {
             ..self
         }
     }
-}
-
-/// A pair of nodes across the wall.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Strut {
-    /// The nodes.
-    pub nodes: [u32; 2],
-    /// Share of the model's area that the pair stands for.
-    pub share: f64,
 }
 
 /// A spring that is no edge: a strut or a support.
@@ -257,7 +249,7 @@ impl Elastic {
             moments[i] += moment;
             moments[j] += moment;
         }
-        moments.iter().map(rotation_of).collect()
+        moments.iter().map(nearest_rotation).collect()
     }
 
     fn body_frame(&self, positions: &[Vec3]) -> Matrix3<f64> {
@@ -265,7 +257,7 @@ impl Elastic {
         for ([a, b], d) in self.edges.iter().zip(&self.directions) {
             moment += (positions[*b as usize] - positions[*a as usize]) * d.transpose();
         }
-        rotation_of(&moment)
+        nearest_rotation(&moment)
     }
 }
 
@@ -297,19 +289,6 @@ fn springs(mesh: &TriMesh, struts: &[Strut], k: &Stiffness) -> Vec<Spring> {
     springs
 }
 
-/// The rotation nearest to `m` (polar decomposition by SVD; a mirror is turned back).
-pub fn rotation_of(m: &Matrix3<f64>) -> Matrix3<f64> {
-    let svd = m.svd(true, true);
-    let (Some(mut u), Some(v_t)) = (svd.u, svd.v_t) else {
-        return Matrix3::identity();
-    };
-    if (u * v_t).determinant() < 0.0 {
-        let smallest = svd.singular_values.imin();
-        u.column_mut(smallest).neg_mut();
-    }
-    u * v_t
-}
-
 fn direction(positions: &[Vec3], [a, b]: [u32; 2]) -> Vec3 {
     (positions[b as usize] - positions[a as usize])
         .try_normalize(0.0)
@@ -329,71 +308,12 @@ pub fn edges(mesh: &TriMesh) -> Vec<[u32; 2]> {
     edges
 }
 
-/// The share of the mesh's area that belongs to each vertex (a third of its triangles').
-pub fn area_shares(mesh: &TriMesh) -> Vec<f64> {
-    let mut shares = vec![0.0; mesh.vertices.len()];
-    let total = mesh.area() * 6.0;
-    for (t, triangle) in mesh.triangles.iter().enumerate() {
-        let share = mesh.area_normal(t).norm() / total;
-        for v in triangle {
-            shares[*v as usize] += share;
-        }
-    }
-    shares
-}
-
-/// Pairs of nodes across the wall: for every node the one that lies against its inner side,
-/// looks the other way, and is nearest (length over squared cosine). Pairs longer than 2.5
-/// times the middle one bridge something else than the wall and are left out.
-///
-/// # Errors
-/// [`Cancelled`].
-pub fn struts(mesh: &TriMesh, monitor: &Monitor) -> Result<Vec<Strut>, Cancelled> {
-    let normals = mesh.vertex_normals();
-    let shares = area_shares(mesh);
-    let mut found: Vec<(f64, Strut)> = Vec::new();
-    for (i, (p, n)) in mesh.vertices.iter().zip(&normals).enumerate() {
-        monitor.check()?;
-        let opposite = mesh
-            .vertices
-            .iter()
-            .zip(&normals)
-            .enumerate()
-            .filter_map(|(j, (q, m))| {
-                let d = q - p;
-                let length = d.norm();
-                let cos = -n.dot(&d) / length;
-                (n.dot(m) < -0.3 && cos > 0.6).then(|| (length / (cos * cos), length, j))
-            })
-            .min_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((_, length, j)) = opposite {
-            let nodes = [i.min(j) as u32, i.max(j) as u32];
-            let share = shares[i];
-            found.push((length, Strut { nodes, share }));
-        }
-    }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let limit = found.get(found.len() / 2).map_or(0.0, |f| 2.5 * f.0);
-    let mut struts: Vec<Strut> = found
-        .into_iter()
-        .filter(|f| f.0 <= limit)
-        .map(|f| f.1)
-        .collect();
-    struts.sort_by_key(|s| s.nodes);
-    struts.dedup_by(|later, kept| {
-        let same = later.nodes == kept.nodes;
-        if same {
-            kept.share += later.share;
-        }
-        same
-    });
-    Ok(struts)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::mesh::shapes;
+    use crate::model::struts::struts;
+    use crate::progress::Monitor;
     use nalgebra::Rotation3;
 
     fn cup() -> (TriMesh, Elastic) {
@@ -487,18 +407,5 @@ mod tests {
         let growth = |scaling| energy(3, scaling) / energy(2, scaling);
         assert!((3.7..4.3).contains(&growth(SupportScaling::Fixed)));
         assert!((0.93..1.07).contains(&growth(SupportScaling::PerNode)));
-    }
-
-    #[test]
-    fn struts_span_the_wall() {
-        let (mesh, _) = cup();
-        let struts = struts(&mesh, &Monitor::silent()).unwrap();
-        let spanning = struts.iter().map(|s| s.share).sum::<f64>();
-        assert!(spanning > 0.6, "{spanning}");
-        for s in struts {
-            let [a, b] = s.nodes.map(|v| mesh.vertices[v as usize]);
-            let length = (a - b).norm();
-            assert!((10.0..30.0).contains(&length), "{length}");
-        }
     }
 }

@@ -83,7 +83,11 @@ impl CohortFit {
                 length: rounded(c.length),
                 breadth: rounded(c.breadth),
             }),
-            superior: fit.posture.unwrap_or(Posture::FRAME).superior.map(rounded),
+            superior: fit
+                .patient_orientation
+                .unwrap_or(Posture::FRAME)
+                .superior
+                .map(rounded),
             vertices: fit.mesh.vertices.iter().map(|v| v.map(rounded)).collect(),
         }
     }

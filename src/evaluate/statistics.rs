@@ -8,8 +8,8 @@
 
 use nalgebra::DMatrix;
 
-use crate::deform::elastic::rotation_of;
 use crate::geometry::Vec3;
+use crate::geometry::rotation::nearest_rotation;
 use crate::mesh::TriMesh;
 
 /// Mean and modes.
@@ -108,7 +108,7 @@ fn turn_onto(shape: &mut [Vec3], mean: &[Vec3]) {
         .zip(&*shape)
         .map(|(m, p)| m * p.transpose())
         .sum();
-    let turn = rotation_of(&moment);
+    let turn = nearest_rotation(&moment);
     shape.iter_mut().for_each(|p| *p = turn * *p);
 }
 

@@ -3,11 +3,11 @@
 use super::fit::FitParameters;
 use super::table::number;
 use super::{Kind, ParameterSpec};
-use crate::deform::Edge;
+use crate::deform::WallEdge;
 use crate::deform::sensors::SensorKind;
-use crate::deform::template::Organ;
 use crate::geometry::Vec3;
 use crate::locate::patient_orientation::Superior;
+use crate::model::Organ;
 use serde_json::{Value, json};
 
 /// Every parameter of a fit, in the order in which the stages use them.
@@ -233,15 +233,15 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
                   the wall's own, with blur's share of the thickness taken off",
         read: |d, v| {
             d.deform.edge = match v.text() {
-                "anatomical" => Edge::Anatomical,
-                _ => Edge::Apparent,
+                "anatomical" => WallEdge::Anatomical,
+                _ => WallEdge::Apparent,
             };
             Ok(())
         },
         write: |p| {
             json!(match p.deform.edge {
-                Edge::Apparent => "apparent",
-                Edge::Anatomical => "anatomical",
+                WallEdge::Apparent => "apparent",
+                WallEdge::Anatomical => "anatomical",
             })
         },
     },

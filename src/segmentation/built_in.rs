@@ -4,7 +4,7 @@
 //! the model has the apparent edge of a blurred wall, like the models of real scans. It is
 //! kept for the life of the process, and is the same in every process.
 
-use crate::deform::template::{Organ, Template};
+use crate::model::{Organ, Template};
 use crate::parameters::ModelParameters;
 use crate::progress::{Cancelled, Monitor};
 use crate::volume::phantom::{PhantomParameters, phantom};

@@ -1,7 +1,7 @@
 //! Fits of templates to one volume, with one search for the organ.
 
-use crate::deform::template::Template;
-use crate::deform::{DeformError, DeformParameters, Fit, Place, fit_at};
+use crate::deform::{DeformError, DeformParameters, Fit, OrganPlace, fit_at};
+use crate::model::Template;
 use crate::progress::Monitor;
 use crate::volume::Volume;
 
@@ -16,7 +16,7 @@ pub struct OrganSearch {
 #[derive(Debug)]
 struct Done {
     of_ventricle: bool,
-    place: Result<Place, DeformError>,
+    place: Result<OrganPlace, DeformError>,
 }
 
 impl OrganSearch {
@@ -32,13 +32,13 @@ impl OrganSearch {
         template: &Template,
         parameters: &DeformParameters,
         monitor: &Monitor,
-    ) -> Result<&Place, DeformError> {
+    ) -> Result<&OrganPlace, DeformError> {
         let of_ventricle = template.cup.is_some();
         let done = match self.done.take().filter(|d| d.of_ventricle == of_ventricle) {
             Some(done) => done,
             None => Done {
                 of_ventricle,
-                place: Place::find(volume, template, parameters, monitor),
+                place: OrganPlace::find(volume, template, parameters, monitor),
             },
         };
         self.done.insert(done).place.as_ref().map_err(Clone::clone)

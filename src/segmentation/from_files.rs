@@ -9,10 +9,10 @@
 //! (`auto`) those that cannot be used are left out, and the report says why.
 
 use crate::deform::DeformError;
-use crate::deform::template::{Organ, Template, TemplateError};
 use crate::export::read_json::ReadMeshError;
 use crate::locate::localisation::LocaliseError;
 use crate::mesh::TriMesh;
+use crate::model::{Organ, Template, TemplateError};
 use crate::parameters::{FitParameters, ParameterError};
 use crate::progress::{Cancelled, Monitor};
 use crate::segmentation::built_in;

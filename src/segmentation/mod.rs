@@ -20,10 +20,10 @@ pub use fitting::OrganSearch;
 pub use from_files::{NamedMesh, Order, SegmentError, Segmented, from_files};
 pub use report::{agreement_json, report_json};
 
-use crate::deform::template::Template;
 use crate::deform::{DeformError, DeformParameters, Fit, fit_at};
 use crate::grid::agreement::{Agreement, compare};
 use crate::grid::voxelise::{Mask, voxelise};
+use crate::model::Template;
 use crate::polar::{self, PolarMap, PolarParameters};
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::segmentation::slices::Cut;

@@ -57,7 +57,7 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
             "hollowness": round(l.hollowness),
             "confidence": round(l.confidence),
         })),
-        "posture": fit.posture.as_ref().map(|p| json!({
+        "posture": fit.patient_orientation.as_ref().map(|p| json!({
             "superior": point(&p.superior),
             "source": match p.source {
                 Superior::Body => "body",

@@ -12,7 +12,6 @@
 use nalgebra::Matrix3;
 
 use crate::deform::Fit;
-use crate::deform::wall::anterior;
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::geometry::frame::VoxelToPatient;
@@ -20,6 +19,7 @@ use crate::grid::field::Field;
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::locate::cup::Cup;
 use crate::mesh::TriMesh;
+use crate::model::wall::anterior;
 use crate::progress::{Cancelled, Monitor};
 use crate::volume::Volume;
 
@@ -82,8 +82,8 @@ pub struct Cut {
 impl Cut {
     /// Through the organ that `fit` shows.
     pub fn of(fit: &Fit) -> Self {
-        match (&fit.cup, &fit.posture) {
-            (Some(cup), Some(posture)) => Self::heart(cup, &posture.superior),
+        match (&fit.cup, &fit.patient_orientation) {
+            (Some(cup), Some(orientation)) => Self::heart(cup, &orientation.superior),
             _ => Self::body(&fit.mesh),
         }
     }

@@ -5,10 +5,9 @@
 
 use nalgebra::Rotation3;
 use ventriform::deform::dynamics::{self, Motion, StopReason};
-use ventriform::deform::elastic::{Elastic, Stiffness, struts};
-use ventriform::deform::sensors::{Look, SensorKind, Shift};
-use ventriform::deform::template::{Organ, Template, TemplateError};
-use ventriform::deform::{DeformError, DeformParameters, Edge, fit};
+use ventriform::deform::elastic::{Elastic, Stiffness};
+use ventriform::deform::sensors::{EdgeShift, SensorKind, SensorSettings};
+use ventriform::deform::{DeformError, DeformParameters, WallEdge, fit};
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::grid::agreement::compare;
@@ -16,6 +15,8 @@ use ventriform::grid::field::Field;
 use ventriform::grid::voxelise::voxelise;
 use ventriform::locate::localisation::{Hints, LocaliseError};
 use ventriform::mesh::{TriMesh, shapes};
+use ventriform::model::struts::struts;
+use ventriform::model::{Organ, Template, TemplateError};
 use ventriform::progress::{CancelToken, Monitor, Silent};
 use ventriform::volume::Volume;
 
@@ -130,12 +131,12 @@ fn energy_never_rises_without_external_forces() {
         *p += Vec3::new((t * 1.3).sin(), (t * 0.7).cos(), (t * 2.1).sin()) * 4.0;
     }
     let empty = Field::new(&picture(20, 0.0, |_| 1.0), None, 0.0);
-    let look = Look {
+    let look = SensorSettings {
         kind: SensorKind::Gradient,
         reach: 8.0,
         level: 0.5,
         ceiling: 2.0,
-        shift: Shift {
+        shift: EdgeShift {
             inner: 0.0,
             outer: 0.0,
             rim: 0.0,
@@ -247,7 +248,7 @@ fn the_anatomical_edge_takes_off_what_blur_adds() {
     let volume = scan(&truth, 56, |_| 1.0);
     let template = ventricle(cup(Vec3::zeros(), axis(), 1.0));
     // `scan` blurs by 4.5 mm of standard deviation.
-    let agreement = [Edge::Apparent, Edge::Anatomical].map(|edge| {
+    let agreement = [WallEdge::Apparent, WallEdge::Anatomical].map(|edge| {
         let parameters = DeformParameters {
             edge,
             resolution: 4.5 * 2.355,

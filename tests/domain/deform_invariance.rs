@@ -8,11 +8,11 @@ use std::path::Path;
 
 use nalgebra::{Rotation3, Unit};
 use rayon::prelude::*;
-use ventriform::deform::template::{Organ, Template};
 use ventriform::deform::{DeformParameters, fit};
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::grid::field::Field;
+use ventriform::model::{Organ, Template};
 use ventriform::parameters::ModelParameters;
 use ventriform::polar::{self, PolarParameters};
 use ventriform::progress::Monitor;

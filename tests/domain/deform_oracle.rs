@@ -9,12 +9,14 @@
 #![allow(clippy::unwrap_used)]
 
 use ventriform::deform::dynamics::{self, Motion, StopReason};
-use ventriform::deform::elastic::{Elastic, Stiffness, area_shares, struts};
-use ventriform::deform::sensors::{self, Look, PER_TRIANGLE, SensorKind, Shift};
+use ventriform::deform::elastic::{Elastic, Stiffness};
+use ventriform::deform::sensors::{self, EdgeShift, PER_TRIANGLE, SensorKind, SensorSettings};
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::grid::field::Field;
 use ventriform::mesh::{TriMesh, shapes};
+use ventriform::model::area_shares;
+use ventriform::model::struts::struts;
 use ventriform::progress::Monitor;
 use ventriform::volume::Volume;
 
@@ -37,7 +39,7 @@ fn patient() -> Volume {
 }
 
 /// Steps of the reference integrator until it rests.
-fn explicit(start: &TriMesh, body: &Elastic, field: &Field, look: &Look) -> TriMesh {
+fn explicit(start: &TriMesh, body: &Elastic, field: &Field, look: &SensorSettings) -> TriMesh {
     const MASS: f64 = 1.0;
     const DAMPING: f64 = 1.0;
     const STEP: f64 = 0.4;
@@ -83,12 +85,12 @@ fn explicit_and_implicit_steps_end_in_the_same_state() {
         Stiffness::default(),
     );
     for kind in [SensorKind::Gradient, SensorKind::HalfMaximum] {
-        let look = Look {
+        let look = SensorSettings {
             kind,
             reach: 7.0,
             level: 0.5,
             ceiling: 2.0,
-            shift: Shift {
+            shift: EdgeShift {
                 inner: 0.0,
                 outer: 0.0,
                 rim: 0.0,

@@ -3,11 +3,11 @@
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
 
-use ventriform::deform::template::{Organ, Template};
-use ventriform::deform::{DeformParameters, Edge, fit};
+use ventriform::deform::{DeformParameters, WallEdge, fit};
 use ventriform::grid::agreement::compare;
 use ventriform::grid::voxelise::{Mask, voxelise};
 use ventriform::mesh::shapes;
+use ventriform::model::{Organ, Template};
 use ventriform::progress::Monitor;
 use ventriform::volume::phantom::{Defect, PhantomParameters};
 use ventriform::volume::{self, Phantom};
@@ -84,7 +84,7 @@ fn no_varied_patient_is_lost() {
             ..
         } = volume::phantom(&patient, &Monitor::silent()).unwrap();
         let parameters = DeformParameters {
-            edge: Edge::Anatomical,
+            edge: WallEdge::Anatomical,
             resolution: patient.fwhm_mm,
             ..DeformParameters::default()
         };

@@ -8,10 +8,10 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::elastic::rotation_of;
 use crate::geometry::bvh::Bvh;
+use crate::geometry::rotation::nearest_rotation;
 use crate::geometry::{Vec3, triangle};
-use crate::locate::cup::Cup;
+use crate::locate::cup::{Cup, perpendicular};
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Monitor};
 
@@ -22,7 +22,7 @@ pub const COLUMNS: usize = 60;
 
 /// One ray and where it meets the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ray {
+pub struct WallRay {
     /// Start, LPS mm.
     pub start: Vec3,
     /// Unit direction.
@@ -33,9 +33,9 @@ pub struct Ray {
 
 /// The wall as [`ROWS`] × [`COLUMNS`] rays, row by row, apex first.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Wall {
+pub struct VentricleWall {
     /// The rays.
-    pub rays: Vec<Ray>,
+    pub rays: Vec<WallRay>,
     /// Distance of neighbouring rows along the wall, mm.
     pub row_spacing: f64,
     /// Axis position of the mean rim and of the outer apex, mm from the cup's centre.
@@ -53,7 +53,7 @@ pub struct Wall {
 pub fn anterior(axis: &Vec3, superior: &Vec3) -> Vec3 {
     let up = superior - axis * axis.dot(superior);
     up.try_normalize(1e-6)
-        .unwrap_or_else(|| crate::locate::cup::perpendicular(axis).0)
+        .unwrap_or_else(|| perpendicular(axis).0)
 }
 
 /// The place of `cup` after its model has moved from `before` to `after`: the similarity
@@ -67,7 +67,7 @@ pub fn carried(cup: &Cup, before: &TriMesh, after: &TriMesh) -> Cup {
         moment += (q - to) * (p - from).transpose();
         spread += (p - from).norm_squared();
     }
-    let turn = rotation_of(&moment);
+    let turn = nearest_rotation(&moment);
     let scale = (turn.transpose() * moment).trace() / spread;
     Cup {
         centre: to + turn * (cup.centre - from) * scale,
@@ -77,7 +77,7 @@ pub fn carried(cup: &Cup, before: &TriMesh, after: &TriMesh) -> Cup {
     }
 }
 
-impl Wall {
+impl VentricleWall {
     /// Looks at `mesh` from the axis of `cup` in a patient whose `superior` direction (unit
     /// vector) is given.
     ///
@@ -94,7 +94,7 @@ impl Wall {
         let ray = |index: usize| {
             monitor.check()?;
             let (start, direction) = frame.ray(index / COLUMNS, index % COLUMNS);
-            Ok(Ray {
+            Ok(WallRay {
                 start,
                 direction,
                 wall: crossing(mesh, &tree, &start, &direction),
@@ -183,7 +183,7 @@ impl Frame {
 
     /// Volume inside the inner surface, mm³. Where a ray finds no wall (a low rim), the
     /// nearest one towards the apex stands in.
-    fn cavity(&self, rays: &[Ray]) -> f64 {
+    fn cavity(&self, rays: &[WallRay]) -> f64 {
         let mut inner = [0.0; COLUMNS];
         let mut volume = 0.0;
         let step = self.row_spacing();
