@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::Segmentation;
+use super::segment::Segmentation;
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
 use crate::locate::patient_orientation::Superior;

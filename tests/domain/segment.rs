@@ -15,8 +15,7 @@ use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::mesh::shapes;
 use ventriform::parameters::FitParameters;
 use ventriform::progress::{CancelToken, Gauge, Monitor, Observer, Plan, Stage};
-use ventriform::segmentation::OutcomeError;
-use ventriform::segmentation::{Order, from_files};
+use ventriform::segmentation::{SegmentationFilesError, SegmentationOrder, from_files};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
 use ventriform::volume::{ReadLimits, Volume, VolumeFile};
@@ -233,7 +232,7 @@ impl Watcher {
     fn segment(&self, scan: &Path) -> bool {
         let monitor = Monitor::new(self, self.token.clone());
         let parameters = FitParameters::default();
-        let order = Order {
+        let order = SegmentationOrder {
             volume: &[VolumeFile::at(scan)],
             expert: None,
             models: Vec::new(),
@@ -243,7 +242,7 @@ impl Watcher {
         match from_files(&order, &ReadLimits::default(), &monitor) {
             Ok(made) => match made.files(&Format::ALL, None, &monitor) {
                 Ok(_) => false,
-                Err(error) => matches!(error, OutcomeError::Cancelled(_)),
+                Err(error) => matches!(error, SegmentationFilesError::Cancelled(_)),
             },
             Err(error) => error.is_cancelled(),
         }
