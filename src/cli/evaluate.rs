@@ -13,13 +13,13 @@ use anyhow::{Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
-/// Builds the template models, fits them to every patient, writes tables, plots and pictures.
+/// Makes models of the templates, fits them to every patient, writes tables, plots and pictures.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   ventriform evaluate --cohort cohort --points 67,110,150,200,300 --out evaluation
 Writes evaluation.html, evaluation.json, table1.csv, figure3.csv and fits.csv; models/ holds the
-models, fits/ the result and the fitted mesh of every fit. Fits that are there already are not
-made again unless model, files, options or program have changed.")]
+models, fits/ the result and the fitted mesh of every fit. Existing fits are reused unless the
+model, files, options or program have changed.")]
 #[command(mut_arg("points", |arg| arg.default_value("67,110,150,200,300")))]
 pub struct EvaluateArgs {
     #[command(flatten)]
@@ -41,10 +41,10 @@ pub struct EvaluateArgs {
         default_value = "reference,retiled,optimised"
     )]
     models: Vec<ModelName>,
-    /// How our models are made: as by `generate --method`
+    /// How our models are made, as with `generate --method`
     #[arg(long, value_name = "WORD", default_value = "refined")]
     method: String,
-    /// Stiffness of support springs between all nodes within a radius, to see what they do
+    /// Stiffness of support springs between all nodes within a radius, to study their effect
     #[arg(
         long,
         value_name = "K",
@@ -69,17 +69,17 @@ pub struct EvaluateArgs {
         help_heading = "Experiment"
     )]
     support_scaling: ScalingName,
-    /// Leave the alignment of the model as a whole out, as where models are placed by hand
+    /// Skip the alignment of the model as a whole, as for models that are placed by hand
     #[arg(long, help_heading = "Experiment")]
     no_align: bool,
-    /// Where the results go (made where missing)
+    /// The folder for the results, created if missing
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ModelName {
-    /// Marching Cubes thinned out by quadric error: the stand-in for the paper's older model
+    /// Marching Cubes simplified by quadric error: our substitute for the paper's older model
     Reference,
     /// Ours after re-tiling
     Retiled,

@@ -101,7 +101,7 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
 }
 
 /// Reads one volume.
-pub(crate) fn read(paths: &[PathBuf], frame: Option<usize>, monitor: &Monitor) -> Result<Reading> {
+pub(super) fn read(paths: &[PathBuf], frame: Option<usize>, monitor: &Monitor) -> Result<Reading> {
     let files: Vec<VolumeFile> = paths.iter().map(VolumeFile::at).collect();
     volume::read(
         &files,

@@ -7,12 +7,12 @@ use super::fit::Fit;
 use super::parameters::DeformParameters;
 use super::sensors::SensorSettings;
 use super::setup::FitSetup;
+use crate::grid::Volume;
 use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
 use crate::model::wall::{self, VentricleWall};
 use crate::model::{Organ, Template};
 use crate::progress::{Cancelled, Monitor};
-use crate::volume::Volume;
 
 /// Repetitions of a folded fit.
 const RETRIES: usize = 3;

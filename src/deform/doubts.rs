@@ -4,7 +4,7 @@ use super::dynamics::StopReason;
 use super::fit::Fit;
 use super::flags::Flag;
 use crate::geometry::Vec3;
-use crate::volume::Volume;
+use crate::grid::Volume;
 
 /// The reasons to doubt `fit`; volume, thickness, length and strain are judged for a ventricle
 /// only.

@@ -1,26 +1,26 @@
-//! What keeps the model's shape: springs, torsion, wall thickness.
+//! The elastic forces that keep the model's shape: springs, torsion, wall thickness.
 //!
 //! With rest directions d_ij (the posed template's edges), D = Σ |d_ij|² over the edges, and
 //! x_ij = x_j - x_i:
 //!
 //! - springs: k_s / 2 · Σ (|x_ij| - |d_ij|)² / D;
 //! - torsion, local: k_t / 4 · Σ_i Σ_j |x_ij - R_i d_ij|² / D, where R_i is the rotation that
-//!   takes the edges of node i best from rest to now. It keeps the directions of edges at a
-//!   node to each other and so resists folding and kinks;
-//! - torsion, of the body: k_b / 2 · Σ |x_ij - R d_ij|² / D with one R for all nodes. A thin
-//!   sheet may undulate at hardly any local cost, the less the finer the mesh is; this term
-//!   charges undulations by their slope, the same for every mesh;
+//!   maps the edges of node i best from rest to now. It keeps the directions of edges at a
+//!   node relative to each other and so resists folding and kinks;
+//! - torsion, of the body: k_b / 2 · Σ |x_ij - R d_ij|² / D with one R for all nodes. Undulations
+//!   of a thin sheet have little local energy, the less the finer the mesh; the energy of this
+//!   term depends on their slope, equally for every mesh;
 //! - thickness: k_w / 2 · Σ a_p (|x_p| - l_p)² over pairs of nodes across the wall, a_p being
 //!   the share of the model's area that the pair stands for;
 //! - support (off): k_p / 2N · Σ (|x_p| - l_p)² over *all* pairs of nodes nearer to each other
 //!   than a radius at rest. A node's sensors have the weight 1/N, so k_p is the stiffness of
-//!   one spring against what pulls one node. This is how stable mass-spring models were
-//!   stiffened, and it is here to show what it does: the pairs grow with N², the energy with
-//!   N, and the finer the model the less it follows the image. Scaled by 1/N it does not.
+//!   one spring relative to the sensors of one node. Earlier stable mass-spring models were
+//!   stiffened in this way; it is here to show the effect: the number of pairs grows with N²,
+//!   the energy with N, and a finer model follows the image less. Scaled by 1/N it does not.
 //!
 //! Energies are mm²; k_s, k_t, k_b are mm², k_w and k_p are numbers. Because of the division
 //! by D and the shares of area, none of the first four depends on the number of nodes. All
-//! terms are blind to translation and rotation, and their forces balance: no net force, no
+//! terms are invariant to translation and rotation, and their forces balance: no net force, no
 //! net torque.
 //!
 //! Every term is written as a spring towards a target vector (projective dynamics): for
@@ -48,20 +48,18 @@ pub struct Stiffness {
     pub thickness: f64,
     /// k_p. Default 0: no support springs.
     pub support: f64,
-    /// Length up to which two nodes are joined by a support spring, mm. Default 46, the 14
-    /// voxels of the experiment that it is for.
+    /// Greatest length of a support spring, mm. Default 46, the 14 voxels of the experiment.
     pub support_radius: f64,
-    /// How k_p goes with the number of nodes. Default [`SupportScaling::Fixed`].
+    /// How k_p depends on the number of nodes. Default [`SupportScaling::Fixed`].
     pub support_scaling: SupportScaling,
 }
 
-/// How the stiffness of a support spring goes with the number of nodes.
+/// How the stiffness of a support spring depends on the number of nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SupportScaling {
-    /// Every spring has k_p, however many there are.
+    /// Every spring has the stiffness k_p.
     Fixed,
-    /// k_p · 150/N: as stiff as [`SupportScaling::Fixed`] at 150 nodes, and no stiffer with
-    /// more.
+    /// k_p · 150/N: equal to [`SupportScaling::Fixed`] at 150 nodes.
     PerNode,
 }
 
@@ -83,7 +81,7 @@ impl Default for Stiffness {
 }
 
 impl Stiffness {
-    /// Everything `factor` times as stiff.
+    /// The same with every stiffness multiplied by `factor`.
     pub fn times(self, factor: f64) -> Self {
         Self {
             spring: self.spring * factor,
@@ -185,7 +183,7 @@ impl Elastic {
         }
     }
 
-    /// The energy stored, mm².
+    /// The elastic energy, mm².
     pub fn energy(&self, positions: &[Vec3]) -> f64 {
         let k = self.stiffness;
         let frames = self.frames(positions);
@@ -261,7 +259,7 @@ impl Elastic {
     }
 }
 
-/// The struts, and the supports if there are to be any; lengths are not known yet.
+/// The struts and, if they have a stiffness, the support springs; lengths are set later.
 fn springs(mesh: &TriMesh, struts: &[Strut], k: &Stiffness) -> Vec<Spring> {
     let strut = |s: &Strut| Spring {
         nodes: s.nodes,
@@ -338,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn a_moved_and_turned_model_feels_nothing() {
+    fn a_moved_and_turned_model_has_no_energy() {
         let (mesh, body) = cup();
         let turn = Rotation3::from_euler_angles(0.4, -2.0, 1.1);
         let moved: Vec<Vec3> = mesh

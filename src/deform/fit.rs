@@ -26,6 +26,12 @@ pub struct Fit {
     pub localisation: Option<Localisation>,
     /// The long axis of the fitted model; `None` for other organs.
     pub cup: Option<Cup>,
+    /// The patient's orientation in the frame; ventricles only.
+    pub patient_orientation: Option<Posture>,
+    /// The wall seen from the long axis; ventricles only.
+    pub wall: Option<VentricleWall>,
+    /// Volume that the model encloses, the wall's of a ventricle, ml.
+    pub wall_ml: f64,
     /// Isotropic scale of the pose against the template.
     pub scale: f64,
     /// Rotation of the pose against the template.
@@ -52,12 +58,6 @@ pub struct Fit {
     pub self_intersections: usize,
     /// Triangles whose normal turned by more than 90 degrees against the aligned start.
     pub turned_triangles: usize,
-    /// Wall volume, ml (enclosed by the model).
-    pub wall_ml: f64,
-    /// The patient's orientation in the frame; ventricles only.
-    pub patient_orientation: Option<Posture>,
-    /// The wall seen from the long axis; ventricles only.
-    pub wall: Option<VentricleWall>,
     /// Reasons to doubt the fit.
     pub flags: Vec<Flag>,
 }

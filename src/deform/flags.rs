@@ -1,53 +1,53 @@
-//! What gives reason to doubt a fit.
+//! Reasons to doubt a fit, as codes and sentences for the report.
 
 use super::dynamics::StopReason;
 
-/// One reason for doubt.
+/// A reason to doubt a fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Flag {
-    /// The heart was not found with certainty.
+    /// The confidence of the fit is below 0.4.
     #[error("the heart's place is uncertain: confidence {confidence:.2}")]
     UncertainPlace {
-        /// 0..=1.
+        /// The fit's confidence, 0..=1.
         confidence: f64,
     },
-    /// The apical wall does not show.
+    /// The apical wall is too dark to be seen.
     #[error(
-        "the apical wall takes up {:.0} % of the basal one: how far it reaches is the mean \
-         heart's proportion",
+        "the apical wall takes up {:.0} % as much as the basal one: the length of the model is \
+         that of a mean heart of this breadth",
         100.0 * uptake
     )]
     DarkApex {
-        /// Uptake of the apical wall, basal wall = 1.
+        /// Uptake of the apical wall relative to the basal wall.
         uptake: f64,
     },
     /// The motion did not come to rest.
     #[error("the model did not come to rest: {}", reason.as_str())]
     NotAtRest {
-        /// Why it ended.
+        /// Why the motion ended.
         reason: StopReason,
     },
-    /// The surface pierces itself or has turned triangles.
-    #[error("{intersections} pairs of triangles pierce each other, {turned} are turned over")]
+    /// The surface intersects itself or has inverted triangles.
+    #[error("{intersections} pairs of triangles intersect, {turned} triangles are inverted")]
     Folded {
-        /// Piercing pairs.
+        /// Intersecting pairs.
         intersections: usize,
-        /// Turned triangles.
+        /// Inverted triangles.
         turned: usize,
     },
-    /// Few sensors see an edge.
-    #[error("an edge is seen along {:.0} % of the surface only; the rest is the template's", 100.0 * active)]
+    /// Less than half of the surface sees an edge.
+    #[error("an edge is seen along only {:.0} % of the surface; the rest keeps the template's shape", 100.0 * active)]
     PoorContrast {
         /// Share of area with an edge.
         active: f64,
     },
-    /// The volume's border cuts the organ.
+    /// Nodes lie at or beyond the border of the volume.
     #[error("{share:.0} % of the model's nodes lie at or beyond the volume's border")]
     TouchesBorder {
         /// Per cent of nodes.
         share: f64,
     },
-    /// Volume, thickness or strain that no left ventricle has.
+    /// A volume, thickness, length or strain outside the plausible range of left ventricles.
     #[error("implausible shape: {what} is {value:.1}; {least} to {most} is plausible")]
     ImplausibleShape {
         /// The measure.
@@ -59,7 +59,7 @@ pub enum Flag {
         /// Greatest plausible value.
         most: f64,
     },
-    /// The rim is far from a plane, so volumes depend on where one says the base is.
+    /// The rim is far from a plane, so volumes depend on where the base is taken to be.
     #[error("the valve plane is unclear: {:.0} % of the basal half has no wall", 100.0 * gaps)]
     ValvePlane {
         /// Share of basal rays without wall.

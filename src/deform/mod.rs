@@ -48,9 +48,9 @@ pub use flags::Flag;
 pub use parameters::{DeformParameters, WallEdge};
 pub use place::OrganPlace;
 
+use crate::grid::Volume;
 use crate::model::Template;
 use crate::progress::{Monitor, Stage};
-use crate::volume::Volume;
 use attempt::Attempt;
 use elastic::Stiffness;
 use sensors::SensorKind;

@@ -2,12 +2,12 @@
 
 use super::error::DeformError;
 use super::parameters::DeformParameters;
+use crate::grid::Volume;
 use crate::locate::body::{self, Blob};
 use crate::locate::localisation::{self, Localisation};
 use crate::locate::patient_orientation::{Posture, Superior};
 use crate::model::Template;
 use crate::progress::{Monitor, Stage};
-use crate::volume::Volume;
 
 /// Where an organ lies in a volume: the same for all templates of the organ.
 #[derive(Debug, Clone)]

@@ -7,6 +7,7 @@ use super::place::OrganPlace;
 use super::sensors::{EdgeShift, SensorKind, SensorSettings};
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
+use crate::grid::Volume;
 use crate::grid::field::Field;
 use crate::locate::localisation::Localisation;
 use crate::locate::patient_orientation::Posture;
@@ -14,7 +15,6 @@ use crate::mesh::TriMesh;
 use crate::model::Template;
 use crate::model::pose::TemplatePose;
 use crate::progress::Monitor;
-use crate::volume::Volume;
 
 /// Distance of the wall's apparent edge from the edge that the sensors find, mm outward, on the
 /// inner surface, the outer surface and the rim. Measured on simulated scans whose apparent edge

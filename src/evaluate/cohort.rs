@@ -151,7 +151,8 @@ impl Cohort {
         let manifest: Value = match parsed {
             Ok(manifest) => manifest,
             Err(error) => {
-                let what = format!("cannot be read ({error}); templates are told by their names");
+                let what =
+                    format!("cannot be read ({error}); templates are recognised by their names");
                 self.problem("manifest.json", &what);
                 return None;
             }
@@ -159,7 +160,7 @@ impl Cohort {
         let Some(cases) = manifest.get("cases").unwrap_or(&manifest).as_array() else {
             self.problem(
                 "manifest.json",
-                "holds no list of cases; templates are told by their names",
+                "holds no list of cases; templates are recognised by their names",
             );
             return None;
         };

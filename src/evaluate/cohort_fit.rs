@@ -4,7 +4,7 @@
 //! read from a record.
 
 use super::models::CohortModel;
-use super::rows::{Agreed, Outcome};
+use super::rows::{Agreed, FitOutcome};
 use super::table::rounded;
 use crate::deform::Fit;
 use crate::geometry::Vec3;
@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, PartialEq)]
 pub struct CohortFit {
     /// How it went.
-    pub outcome: Outcome,
+    pub outcome: FitOutcome,
     /// Agreement with [`Gold::ALL`](super::rows::Gold::ALL).
     pub agreed: [Option<Agreed>; 2],
     /// Figures of the fit itself, by name.
@@ -34,7 +34,7 @@ pub struct CohortFit {
 
 impl CohortFit {
     /// A result without a fit.
-    pub fn without_fit(outcome: Outcome) -> Self {
+    pub fn without_fit(outcome: FitOutcome) -> Self {
         Self {
             outcome,
             agreed: [None; 2],
@@ -74,7 +74,7 @@ impl CohortFit {
             .map(|(name, value)| (name.to_owned(), rounded(value)))
             .collect();
         Self {
-            outcome: Outcome::Fitted(fit.reason.as_str().to_owned()),
+            outcome: FitOutcome::Fitted(fit.reason.as_str().to_owned()),
             agreed,
             figures,
             cup: fit.cup.map(|c| Cup {

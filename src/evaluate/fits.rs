@@ -11,7 +11,7 @@ use super::files::write_whole;
 use super::models::CohortModel;
 use super::observer::{EvaluationObserver, EvaluationStep};
 use super::record::{self, Key};
-use super::rows::{Gold, Outcome, Row};
+use super::rows::{FitOutcome, FitRow, Gold};
 use crate::deform::DeformParameters;
 use crate::export::{self, Format, Metadata};
 use crate::grid::agreement::compare;
@@ -176,8 +176,8 @@ impl PatientWork<'_> {
 
 impl PatientFits {
     /// The patient's rows of the table.
-    pub fn rows<'a>(&'a self, models: &'a [CohortModel]) -> impl Iterator<Item = Row> + 'a {
-        models.iter().zip(&self.fits).map(|(model, fit)| Row {
+    pub fn rows<'a>(&'a self, models: &'a [CohortModel]) -> impl Iterator<Item = FitRow> + 'a {
+        models.iter().zip(&self.fits).map(|(model, fit)| FitRow {
             template: model.template.clone(),
             kind: model.kind,
             case: self.case.clone(),
@@ -192,14 +192,14 @@ impl PatientFits {
     fn note_problems(&mut self, models: &[CohortModel]) {
         for (model, fit) in models.iter().zip(&self.fits) {
             let problem = match &fit.outcome {
-                Outcome::Fitted(_) => None,
-                Outcome::Lost(reason) => Some(format!("{} lost: {reason}", model.name())),
-                Outcome::Unreadable(reason) => Some(format!("not read: {reason}")),
+                FitOutcome::Fitted(_) => None,
+                FitOutcome::Lost(reason) => Some(format!("{} lost: {reason}", model.name())),
+                FitOutcome::Unreadable(reason) => Some(format!("not read: {reason}")),
             };
             let gold = Gold::ALL.into_iter().filter_map(|gold| {
                 let unusable = self.golds[gold as usize]
                     && fit.agreed[gold as usize].is_none()
-                    && matches!(fit.outcome, Outcome::Fitted(_));
+                    && matches!(fit.outcome, FitOutcome::Fitted(_));
                 unusable.then(|| format!("{} cannot be used", gold.file()))
             });
             for problem in problem.into_iter().chain(gold) {
@@ -242,12 +242,12 @@ impl PatientImages {
     fn fit(&mut self, model: &CohortModel, parameters: &DeformParameters) -> CohortFit {
         let volume = match &self.volume {
             Ok(volume) => volume,
-            Err(reason) => return CohortFit::without_fit(Outcome::Unreadable(reason.clone())),
+            Err(reason) => return CohortFit::without_fit(FitOutcome::Unreadable(reason.clone())),
         };
         let silent = Monitor::silent();
         let fit = match self.search.fit(volume, &model.ready, parameters, &silent) {
             Ok(fit) => fit,
-            Err(error) => return CohortFit::without_fit(Outcome::Lost(error.to_string())),
+            Err(error) => return CohortFit::without_fit(FitOutcome::Lost(error.to_string())),
         };
         let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
         let spacing = volume.frame.spacing();

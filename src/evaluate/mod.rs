@@ -45,7 +45,7 @@ use files::{make_folder, write_whole};
 use findings::findings;
 use fits::{FitRun, PatientFits};
 use models::CohortModel;
-use rows::Row;
+use rows::FitRow;
 use std::path::Path;
 use table::Evaluation;
 
@@ -96,7 +96,7 @@ fn summarise(
     patients: &[PatientFits],
     of_models: Vec<(String, String)>,
 ) -> Result<Evaluation, EvaluateError> {
-    let rows: Vec<Row> = patients.iter().flat_map(|p| p.rows(models)).collect();
+    let rows: Vec<FitRow> = patients.iter().flat_map(|p| p.rows(models)).collect();
     let of_patients = patients
         .iter()
         .flat_map(|p| p.problems.iter().map(|text| (p.case.clone(), text.clone())));

@@ -3,7 +3,7 @@
 
 use super::cohort::{Cohort, read_volume};
 use super::parameters::{EvaluationParameters, ascending};
-use super::rows::{Kind, ModelRow, Variant, average};
+use super::rows::{ModelKind, ModelRow, Variant, average};
 use crate::decimate::decimate;
 use crate::export::{self, Format, Metadata};
 use crate::geometry::triangle::radius_ratio;
@@ -23,7 +23,7 @@ pub struct CohortModel {
     /// The case that it was made from.
     pub template: String,
     /// Its kind.
-    pub kind: Kind,
+    pub kind: ModelKind,
     /// Its figures for Figure 3.
     pub row: ModelRow,
     /// The model prepared for fitting.
@@ -174,7 +174,7 @@ impl TemplateSurface<'_> {
                 radius_ratio(&a, &b, &c)
             })
             .collect();
-        let kind = Kind { variant, points };
+        let kind = ModelKind { variant, points };
         let row = ModelRow {
             template: self.case.to_owned(),
             kind,

@@ -1,4 +1,4 @@
-//! How far an evaluation is, told to whoever runs it.
+//! The progress of an evaluation, for its caller.
 
 /// The steps of an evaluation, in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -9,7 +9,7 @@ use super::cohort_fit::CohortFit;
 use super::error::EvaluateError;
 use super::fits::PatientFits;
 use super::models::CohortModel;
-use super::rows::{self, Gold, Kind, Row};
+use super::rows::{self, FitRow, Gold, ModelKind};
 use super::table::Picture;
 use crate::progress::Monitor;
 use crate::segmentation::{on_grid, slices};
@@ -23,7 +23,7 @@ pub fn draw(
     cohort: &Cohort,
     models: &[CohortModel],
     patients: &[PatientFits],
-    rows: &[Row],
+    rows: &[FitRow],
 ) -> Result<Vec<Picture>, EvaluateError> {
     let Some(kind) = shown(rows) else {
         return Ok(Vec::new());
@@ -50,8 +50,8 @@ pub fn draw(
 }
 
 /// The kind of model whose fits are shown.
-fn shown(rows: &[Row]) -> Option<Kind> {
-    let score = |kind: &Kind| {
+fn shown(rows: &[FitRow]) -> Option<ModelKind> {
+    let score = |kind: &ModelKind| {
         let own = || rows::of_kind(rows, None, *kind);
         let found = rows::mean(own(), Gold::Expert).or_else(|| rows::mean(own(), Gold::Truth));
         (kind.variant, found.map_or(0.0, |c| c.jaccard))

@@ -6,7 +6,7 @@
 use super::cohort_fit::CohortFit;
 use super::error::EvaluateError;
 use super::files::write_whole;
-use super::rows::{Agreed, Outcome};
+use super::rows::{Agreed, FitOutcome};
 use crate::geometry::Vec3;
 use crate::locate::cup::Cup;
 use serde::{Deserialize, Serialize};
@@ -17,7 +17,7 @@ use std::path::Path;
 #[derive(Serialize, Deserialize)]
 struct Record {
     key: String,
-    outcome: Outcome,
+    outcome: FitOutcome,
     agreed: [Option<Agreed>; 2],
     figures: BTreeMap<String, f64>,
     /// Centre, axis, length and breadth.
@@ -96,7 +96,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.json");
         let fitted = CohortFit {
-            outcome: Outcome::Fitted("converged".into()),
+            outcome: FitOutcome::Fitted("converged".into()),
             agreed: [
                 Some(Agreed {
                     jaccard: 0.812_345,

@@ -34,16 +34,16 @@ pub struct Mode {
     pub scores: Vec<f64>,
 }
 
-/// The fits cannot be compared.
+/// Why fits cannot be compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum StatisticsError {
-    /// Fewer than two.
+    /// Fewer than two fits.
     #[error("{count} fits were given; at least two are needed")]
     TooFew {
         /// How many there were.
         count: usize,
     },
-    /// Other nodes or triangles than the first one.
+    /// A fit has other nodes or triangles than the first one.
     #[error("fit {index} has other triangles than the first: all must be fits of one model")]
     OtherModel {
         /// Place in the list, from 0.
@@ -51,7 +51,7 @@ pub enum StatisticsError {
     },
 }
 
-/// Rounds of the Procrustes alignment; it has come to rest after three or four.
+/// Rounds of the Procrustes alignment, which converges in three or four.
 const ROUNDS: usize = 10;
 
 /// Aligns `fits` and finds their mean and modes.
@@ -133,7 +133,7 @@ fn principal_modes(shapes: &[Vec<Vec3>], mean: &[Vec3]) -> Vec<Mode> {
     order
         .into_iter()
         .take(count - 1)
-        // What is left below this share is rounding.
+        // Smaller eigenvalues are rounding errors.
         .filter(|e| eigen.eigenvalues[*e] > 1e-10 * total)
         .map(|e| {
             let value = eigen.eigenvalues[e];

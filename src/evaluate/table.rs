@@ -1,28 +1,27 @@
 //! The results as CSV and JSON.
 //!
-//! Figures are rounded to six places before anything else is done with them: that is below
-//! what a fit can resolve, and the same whether a row was just made or read from an earlier
-//! run.
+//! Figures are rounded to six places before they are used, which is finer than a fit resolves, so
+//! that they are the same whether a fit was just computed or read from an earlier run.
 
 use serde_json::{Value, json};
 
 use super::findings::Finding;
-use super::rows::{self, Agreed, Cell, Gold, Kind, ModelRow, Outcome, Row};
+use super::rows::{self, Agreed, Cell, FitOutcome, FitRow, Gold, ModelKind, ModelRow};
 
 /// A cohort's evaluation, ready to be written out.
 #[derive(Debug, Clone, Default)]
 pub struct Evaluation {
-    /// What the run was asked for, by name.
+    /// The settings of the run, by name.
     pub settings: Vec<(String, String)>,
     /// The templates and what each model was made from.
     pub templates: Vec<(String, String)>,
-    /// What was missing or could not be read: the case, and what is the matter.
+    /// Problems with cases, models and fits: the case, and what is wrong.
     pub problems: Vec<(String, String)>,
     /// The models.
     pub models: Vec<ModelRow>,
     /// The fits.
-    pub rows: Vec<Row>,
-    /// What they say about the paper's findings.
+    pub rows: Vec<FitRow>,
+    /// Whether they confirm the paper's findings.
     pub findings: Vec<Finding>,
     /// Slices of one fit of each patient.
     pub pictures: Vec<Picture>,
@@ -31,7 +30,7 @@ pub struct Evaluation {
 impl Evaluation {
     /// Whether at least one fit succeeded.
     pub fn has_fit(&self) -> bool {
-        let fitted = |row: &Row| matches!(row.outcome, Outcome::Fitted(_));
+        let fitted = |row: &FitRow| matches!(row.outcome, FitOutcome::Fitted(_));
         self.rows.iter().any(fitted)
     }
 }
@@ -47,7 +46,7 @@ pub struct Picture {
     pub png: Vec<u8>,
 }
 
-/// Six places, as every figure is kept.
+/// The value rounded to six places.
 pub fn rounded(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
@@ -93,7 +92,7 @@ fn words(text: &str) -> Vec<String> {
 ///
 /// # Errors
 /// [`csv::Error`].
-pub fn fits_csv(rows: &[Row]) -> Result<Vec<u8>, csv::Error> {
+pub fn fits_csv(rows: &[FitRow]) -> Result<Vec<u8>, csv::Error> {
     let mut names: Vec<&str> = rows
         .iter()
         .flat_map(|r| r.figures.keys().map(String::as_str))
@@ -105,7 +104,7 @@ pub fn fits_csv(rows: &[Row]) -> Result<Vec<u8>, csv::Error> {
         head.extend(AGREED.map(|name| format!("{name}_{}", gold.as_str())));
     }
     head.extend(names.iter().map(|name| (*name).to_owned()));
-    let line = |row: &Row| {
+    let line = |row: &FitRow| {
         let mut line = vec![
             row.case.clone(),
             row.template.clone(),
@@ -144,7 +143,7 @@ pub fn figure3_csv(models: &[ModelRow]) -> Result<Vec<u8>, csv::Error> {
     csv_bytes([head].into_iter().chain(models.iter().map(line)))
 }
 
-/// Who a mean of Table 1 is over.
+/// What a line of Table 1 is a mean over.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Line {
     /// The template, or `all`.
@@ -154,10 +153,10 @@ pub struct Line {
 }
 
 /// What a line of Table 1 holds: a cell for each kind of model, where there is one.
-pub type Cells = Vec<(Kind, Option<Cell>)>;
+pub type TableCells = Vec<(ModelKind, Option<Cell>)>;
 
 /// Table 1: for every template and for all of them, each patient and the mean over all.
-pub fn table1(rows: &[Row], gold: Gold) -> Vec<(Line, Cells)> {
+pub fn table1(rows: &[FitRow], gold: Gold) -> Vec<(Line, TableCells)> {
     let kinds = rows::kinds(rows);
     let cases = rows::distinct(rows, |r| r.case.clone());
     let mut templates = vec![None];
@@ -188,7 +187,7 @@ pub fn table1(rows: &[Row], gold: Gold) -> Vec<(Line, Cells)> {
 ///
 /// # Errors
 /// [`csv::Error`].
-pub fn table1_csv(rows: &[Row]) -> Result<Vec<u8>, csv::Error> {
+pub fn table1_csv(rows: &[FitRow]) -> Result<Vec<u8>, csv::Error> {
     let head = "gold,template,case,model,points,jaccard,contour_distance_voxels,least_jaccard,fits";
     let mut lines = vec![words(head)];
     for gold in Gold::ALL {
@@ -251,7 +250,7 @@ fn model_json(m: &ModelRow) -> Value {
 }
 
 /// The lines of Table 1 that are means over patients.
-fn means_json(rows: &[Row]) -> Vec<Value> {
+fn means_json(rows: &[FitRow]) -> Vec<Value> {
     let mut means = Vec::new();
     for gold in Gold::ALL {
         for (line, cells) in table1(rows, gold) {
@@ -276,7 +275,7 @@ fn means_json(rows: &[Row]) -> Vec<Value> {
     means
 }
 
-fn row_json(row: &Row) -> Value {
+fn row_json(row: &FitRow) -> Value {
     let agreed = |gold: Gold| -> Value {
         let figures = agreed_figures(row.agreed[gold as usize].as_ref());
         let named = AGREED.iter().zip(figures);
@@ -309,7 +308,7 @@ mod tests {
             row("p1", Variant::Reference, 67, Some(0.71)),
             row("p1", Variant::Optimised, 150, Some(0.82)),
         ];
-        let text = |rows: &[Row]| String::from_utf8(fits_csv(rows).unwrap()).unwrap();
+        let text = |rows: &[FitRow]| String::from_utf8(fits_csv(rows).unwrap()).unwrap();
         let fields: Vec<usize> = text(&rows).lines().map(|l| l.split(',').count()).collect();
         assert_eq!(fields, [17; 3]);
         // A comma in a reason is quoted.

@@ -13,9 +13,9 @@ pub struct Strut {
     pub share: f64,
 }
 
-/// Pairs of nodes across the wall: for every node the one that lies against its inner side,
-/// looks the other way, and is nearest (length over squared cosine). Pairs longer than 2.5
-/// times the middle one bridge something else than the wall and are left out.
+/// Finds the pairs of nodes across the wall, sorted by node. The partner of a node lies on the
+/// inward side, has an opposite normal, and is nearest by length over squared cosine. Pairs longer
+/// than 2.5 times the median span something else than the wall and are left out.
 ///
 /// # Errors
 /// [`Cancelled`].

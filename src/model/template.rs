@@ -9,6 +9,7 @@ use super::struts::{Strut, struts};
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::geometry::frame::VoxelToPatient;
+use crate::grid::Volume;
 use crate::grid::field::Field;
 use crate::grid::voxelise::voxelise;
 use crate::locate::cup::Cup;
@@ -17,7 +18,6 @@ use crate::locate::localisation::Hints;
 use crate::mesh::TriMesh;
 use crate::mesh::topology::{self, Defect};
 use crate::progress::{Cancelled, Monitor};
-use crate::volume::Volume;
 
 /// Why a mesh cannot be a model to fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -31,13 +31,15 @@ pub enum TemplateError {
         /// Index of the vertex.
         vertex: usize,
     },
-    /// The triangles face inward, or the mesh encloses nothing.
-    #[error("the model encloses {volume_ml:.3} ml; a closed, outward surface is needed")]
+    /// The triangles face inward, or the enclosed volume is out of range.
+    #[error(
+        "the model encloses {volume_ml:.3} ml; 0.1 to 10000 ml are needed, its triangles facing outward"
+    )]
     NoVolume {
         /// Enclosed volume, ml.
         volume_ml: f64,
     },
-    /// More nodes than the fit is made for.
+    /// More nodes than [`MAX_NODES`].
     #[error("the model has {vertices} vertices; at most {limit} can be fitted")]
     TooLarge {
         /// Number of vertices.
@@ -45,10 +47,10 @@ pub enum TemplateError {
         /// The limit.
         limit: usize,
     },
-    /// A ventricle was asked for, and the mesh is no cup.
+    /// The organ is a left ventricle, and the mesh is no cup.
     #[error(
-        "the model is no ventricle: it agrees with a cup by {correlation:.2} only; say \
-         organ = generic for other shapes"
+        "the model is no left ventricle: its correlation with a cup is {correlation:.2}, more than \
+         0.6 is needed"
     )]
     NoCup {
         /// Correlation with a cup.

@@ -28,9 +28,9 @@ pub use draw::{json, png, svg};
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
+use crate::grid::Volume;
 use crate::grid::field::Field;
 use crate::model::wall::{COLUMNS, ROWS, VentricleWall, WallRay};
-use crate::volume::Volume;
 
 /// Parameters of [`map`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,7 +83,7 @@ pub struct Segment {
     pub mean_percent: Option<f64>,
     /// Share of its area below the threshold, per cent.
     pub extent_percent: f64,
-    /// VentricleWall area, mm², as far as it is counted.
+    /// Wall area, mm², as far as it is counted.
     pub area: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The segmentation's report.
+//! The report of a segmentation, as JSON.
 
 use serde_json::{Value, json};
 
@@ -16,7 +16,7 @@ fn point(p: &Vec3) -> [f64; 3] {
     [p.x, p.y, p.z].map(round)
 }
 
-/// Everything that is known of a segmentation, as JSON. Lengths are mm (LPS), volumes ml.
+/// The figures of a segmentation as JSON. Lengths are mm (LPS), volumes ml.
 pub fn report_json(segmentation: &Segmentation) -> Value {
     let fit = &segmentation.fit;
     let displacements: Vec<f64> = fit.displacements.iter().map(|d| round(d.norm())).collect();
@@ -97,7 +97,7 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
     })
 }
 
-/// Why this template, in a sentence.
+/// Why this template was chosen, in a sentence.
 fn choice(segmentation: &Segmentation) -> String {
     let chosen = &segmentation.candidates[segmentation.chosen];
     let others = segmentation.candidates.iter().enumerate();
@@ -126,7 +126,7 @@ fn rows(fit: &crate::deform::Fit) -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// The polar map without its pixels, which have a file of their own.
+/// The polar map without its pixels, which are in polar.json.
 fn summary(map: &polar::PolarMap) -> Value {
     let mut value = polar::json(map);
     if let Some(object) = value.as_object_mut() {
