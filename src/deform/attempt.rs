@@ -5,7 +5,7 @@ use super::dynamics::{self, Moved};
 use super::elastic::Elastic;
 use super::fit::Fit;
 use super::parameters::DeformParameters;
-use super::sensors::SensorSettings;
+use super::sensors::{SensorReading, SensorSettings};
 use super::setup::FitSetup;
 use crate::grid::Volume;
 use crate::mesh::TriMesh;
@@ -98,17 +98,7 @@ impl Attempt {
         monitor: &Monitor,
     ) -> Result<Fit, Cancelled> {
         let mesh = self.moved.mesh;
-        let readings = &self.moved.readings;
-        let seen: f64 = readings.iter().map(|r| r.share * r.weight).sum();
-        let misfit: f64 = readings
-            .iter()
-            .map(|r| r.share * r.weight * r.offset * r.offset)
-            .sum();
-        let active = readings
-            .iter()
-            .filter(|r| r.weight > 0.25)
-            .map(|r| r.share)
-            .sum::<f64>();
+        let (active, residual) = edges_seen(&self.moved.readings);
         let cup = template
             .cup
             .map(|cup| wall::carried(&cup, &template.mesh, &mesh));
@@ -135,11 +125,7 @@ impl Attempt {
             iterations: self.moved.iterations,
             runs: self.runs,
             energy: self.moved.energy,
-            residual: if seen > 0.0 {
-                (misfit / seen).sqrt()
-            } else {
-                f64::INFINITY
-            },
+            residual,
             active,
             strain: self.strain,
             self_intersections: self.intersections,
@@ -153,6 +139,27 @@ impl Attempt {
         fit.flags = doubts::flags(&fit, volume, template.organ == Organ::LeftVentricle);
         Ok(fit)
     }
+}
+
+/// The share of area whose sensors see an edge, and the weighted rms distance to the edges, mm;
+/// infinite without any edge.
+fn edges_seen(readings: &[SensorReading]) -> (f64, f64) {
+    let seen: f64 = readings.iter().map(|r| r.share * r.weight).sum();
+    let misfit: f64 = readings
+        .iter()
+        .map(|r| r.share * r.weight * r.offset * r.offset)
+        .sum();
+    let active = readings
+        .iter()
+        .filter(|r| r.weight > 0.25)
+        .map(|r| r.share)
+        .sum::<f64>();
+    let residual = if seen > 0.0 {
+        (misfit / seen).sqrt()
+    } else {
+        f64::INFINITY
+    };
+    (active, residual)
 }
 
 /// The number of triangles whose normal turned by 90 degrees or more from `before` to `now`.

@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::segment::Segmentation;
+use crate::deform::Fit;
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
 use crate::locate::patient_orientation::Superior;
@@ -19,7 +20,6 @@ fn point(p: &Vec3) -> [f64; 3] {
 /// The figures of a segmentation as JSON. Lengths are mm (LPS), volumes ml.
 pub fn report_json(segmentation: &Segmentation) -> Value {
     let fit = &segmentation.fit;
-    let displacements: Vec<f64> = fit.displacements.iter().map(|d| round(d.norm())).collect();
     let flags: Vec<Value> = fit
         .flags
         .iter()
@@ -66,25 +66,7 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
             "tilt_degrees": round(p.tilt()),
             "confidence": round(p.confidence),
         })),
-        "fit": {
-            "reason": fit.reason.as_str(),
-            "confidence": round(fit.confidence),
-            "iterations": fit.iterations,
-            "runs": fit.runs,
-            "residual_mm": round(fit.residual),
-            "active_sensors": round(fit.active),
-            "strain": round(fit.strain.sqrt()),
-            "energy": fit.energy.iter().map(|e| round(*e)).collect::<Vec<_>>(),
-            "self_intersections": fit.self_intersections,
-            "turned_triangles": fit.turned_triangles,
-            "long_axis": fit.cup.map(|c| json!({
-                "base": point(&c.base()),
-                "apex": point(&c.apex()),
-            })),
-            "scale": round(fit.scale),
-            "rotation": rows(fit),
-            "displacement_mm": displacements,
-        },
+        "fit": fit_json(fit),
         "volumes_ml": {
             "wall": round(fit.wall_ml),
             "cavity": fit.wall.as_ref().map(|w| round(w.cavity_ml)),
@@ -94,6 +76,30 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
         "polar": segmentation.polar.as_ref().map(summary),
         "flags": flags,
         "mask_rule": "a voxel belongs to the mask if its centre lies inside the surface",
+    })
+}
+
+/// How the motion went, and the fitted model's pose.
+fn fit_json(fit: &Fit) -> Value {
+    let displacements: Vec<f64> = fit.displacements.iter().map(|d| round(d.norm())).collect();
+    json!({
+        "reason": fit.reason.as_str(),
+        "confidence": round(fit.confidence),
+        "iterations": fit.iterations,
+        "runs": fit.runs,
+        "residual_mm": round(fit.residual),
+        "active_sensors": round(fit.active),
+        "strain": round(fit.strain.sqrt()),
+        "energy": fit.energy.iter().map(|e| round(*e)).collect::<Vec<_>>(),
+        "self_intersections": fit.self_intersections,
+        "turned_triangles": fit.turned_triangles,
+        "long_axis": fit.cup.map(|c| json!({
+            "base": point(&c.base()),
+            "apex": point(&c.apex()),
+        })),
+        "scale": round(fit.scale),
+        "rotation": rows(fit),
+        "displacement_mm": displacements,
     })
 }
 
@@ -119,7 +125,7 @@ fn choice(segmentation: &Segmentation) -> String {
     }
 }
 
-fn rows(fit: &crate::deform::Fit) -> Vec<[f64; 3]> {
+fn rows(fit: &Fit) -> Vec<[f64; 3]> {
     let m = fit.rotation.matrix();
     (0..3)
         .map(|r| [0, 1, 2].map(|c| round(m[(r, c)])))
