@@ -49,7 +49,7 @@ pub enum TemplateError {
     },
     /// The organ is a left ventricle, and the mesh is no cup.
     #[error(
-        "the model is no left ventricle: its correlation with a cup is {correlation:.2}, more than \
+        "the model is no ventricle: its correlation with a cup is {correlation:.2}, more than \
          0.6 is needed"
     )]
     NoCup {

@@ -49,7 +49,7 @@ fn placed(mut mesh: TriMesh, centre: Vec3, axis: Vec3, scale: f64) -> TriMesh {
     mesh
 }
 
-/// What a camera would show of `wall`: 1 in the wall, `uptake` scaling it by place.
+/// A blurred image of `wall`: 1 in the wall, multiplied by `uptake` at each point.
 fn scan(wall: &TriMesh, n: usize, uptake: impl Fn(&Vec3) -> f64) -> Volume {
     let frame = VoxelToPatient::centred([n; 3], [SPACING; 3], Vec3::zeros()).unwrap();
     let mask = voxelise(wall, [n; 3], &frame);
@@ -183,7 +183,7 @@ fn a_ventricle_is_found_and_fitted_beside_a_hotter_organ() {
 }
 
 #[test]
-fn a_defect_without_any_uptake_does_not_suck_the_surface_in() {
+fn a_defect_without_any_uptake_does_not_draw_the_surface_inward() {
     let centre = Vec3::new(10.0, -5.0, 8.0);
     let truth = cup(centre, axis(), 1.0);
     let healthy = scan(&truth, 56, |_| 1.0);
@@ -242,7 +242,7 @@ fn a_turned_and_moved_patient_gives_the_same_volume() {
 }
 
 #[test]
-fn the_anatomical_edge_takes_off_what_blur_adds() {
+fn the_anatomical_edge_subtracts_what_blur_adds() {
     let thin = shapes::cup(70.0, 31.0, 8.0, 14);
     let truth = placed(thin, Vec3::new(5.0, -8.0, 3.0), axis(), 1.05);
     let volume = scan(&truth, 56, |_| 1.0);
@@ -261,7 +261,7 @@ fn the_anatomical_edge_takes_off_what_blur_adds() {
     assert!(agreement[1] > agreement[0] + 0.02, "{agreement:?}");
 }
 
-/// Noise that is alike over some voxels: a linear congruential generator, blurred.
+/// Correlated noise: the output of a linear congruential generator, blurred.
 fn noise(seed: u64, sigma: f64) -> Volume {
     let mut state = seed;
     let mut volume = picture(40, 0.0, |_| 0.0);
@@ -276,7 +276,7 @@ fn noise(seed: u64, sigma: f64) -> Volume {
 }
 
 #[test]
-fn no_heart_is_said_and_not_made_up() {
+fn a_volume_without_a_heart_is_an_error() {
     let template = ventricle(cup(Vec3::zeros(), axis(), 1.0));
     let parameters = DeformParameters::default();
     let fit_to = |volume: &Volume| fit(volume, &template, &parameters, &Monitor::silent());
@@ -288,7 +288,7 @@ fn no_heart_is_said_and_not_made_up() {
     let shell = |p: &Vec3, radius: f64, wall: f64| {
         ball(p, &Vec3::zeros(), radius) - ball(p, &Vec3::zeros(), radius - wall)
     };
-    // Solid; closed all round as a stomach is; larger, as a skull or a cortex is; a ring.
+    // A solid ball; a closed shell like a stomach; a larger one like a skull or a cortex; a ring.
     let others = [
         ("ball", picture(40, 4.5, |p| ball(p, &Vec3::zeros(), 40.0))),
         ("stomach", picture(40, 4.5, |p| shell(p, 38.0, 10.0))),

@@ -1,9 +1,9 @@
-//! The implicit integrator against an explicit one that shares nothing with its solver.
+//! The implicit integrator against an explicit one that shares no code with its solver.
 //!
 //! Semi-implicit Euler on m x'' = -g m x' + elastic forces + sensor forces, with the forces
-//! taken from the energies' own gradients and small steps, ends where the implicit steps end.
-//! Not to the last digit: the implicit run takes its sensors' mean answer for certain after
-//! some steps, while the reference looks anew before each one.
+//! computed as gradients of the energies and with small steps, ends in the state in which the
+//! implicit steps end. The states are not equal to the last digit: the implicit run fixes the mean
+//! of its sensors' readings after some steps, the reference reads them before every step.
 
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
@@ -116,9 +116,9 @@ fn explicit_and_implicit_steps_end_in_the_same_state() {
             / start.vertices.len() as f64;
         let apart = pairs().map(|(p, q)| (p - q).norm()).sum::<f64>() / start.vertices.len() as f64;
         let farthest = pairs().map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
-        // A real journey (4.7 and 4.1 mm), and the same end: 0.147 and 0.134 voxels apart in the
-        // mean, 0.31 at most. Nearer they cannot come, because they do not ask the same: one
-        // rests on the mean of twelve answers, the other on the last one.
+        // Both move far (4.7 and 4.1 mm) and end close together: 0.147 and 0.134 voxels apart in
+        // the mean, 0.31 at most. They cannot be equal, because one rests on the mean of twelve
+        // readings and the other on the last one.
         assert!(moved > 4.0, "{moved}");
         assert!(apart < 0.15 * SPACING, "{kind:?}: {apart} mm in the mean");
         assert!(farthest < 0.35 * SPACING, "{kind:?}: {farthest} mm at most");

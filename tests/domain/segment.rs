@@ -1,4 +1,4 @@
-//! `ventriform segment` and `measure`: the files, keys and refusals that others rely on.
+//! `ventriform segment` and `measure`: the files, keys and errors that other programs rely on.
 
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
@@ -20,7 +20,7 @@ use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
 use ventriform::volume::{ReadLimits, Volume, VolumeFile};
 
-/// A folder with `scan.nii.gz`, its `truth.nii.gz`, and masks that do not suit it.
+/// A folder with `scan.nii.gz`, its `truth.nii.gz`, and masks that do not match it.
 fn folder() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let parameters = PhantomParameters {
@@ -74,7 +74,7 @@ fn number(value: &Value) -> f64 {
 }
 
 #[test]
-fn a_model_of_one_scan_segments_it_with_names_that_others_rely_on() {
+fn a_model_of_a_scan_segments_it_with_stable_names() {
     let folder = folder();
     let here = folder.path();
     succeeds(here, "generate scan.nii.gz -o lv.json --points 150");
@@ -110,7 +110,7 @@ fn a_model_of_one_scan_segments_it_with_names_that_others_rely_on() {
 }
 
 #[test]
-fn formats_hints_and_the_built_in_model_are_taken() {
+fn formats_hints_and_the_built_in_model_are_accepted() {
     let folder = folder();
     let here = folder.path();
     let all = Format::ALL.map(|format| format!(" --format {}", format.extension()));
@@ -141,7 +141,7 @@ fn formats_hints_and_the_built_in_model_are_taken() {
 }
 
 #[test]
-fn what_cannot_be_done_is_refused_with_field_and_way_out() {
+fn errors_name_the_field_and_what_to_do() {
     let folder = folder();
     let here = folder.path();
     let segment = "segment scan.nii.gz -o out --model auto";
@@ -206,7 +206,7 @@ fn templates_are_imported_into_a_data_folder() {
     assert!(ball.contains("no ventricle"), "{ball}");
 }
 
-/// Notes the stages and how the whole grows, and raises the token at one of them.
+/// Records the stages and the progress of the whole, and cancels at one of them.
 struct Watcher {
     gauge: Gauge,
     stages: Mutex<Vec<Stage>>,
@@ -228,7 +228,7 @@ impl Watcher {
         }
     }
 
-    /// Segments the scan to the last file; whether it ended because it was told to.
+    /// Segments the scan and encodes every file; returns whether it was cancelled.
     fn segment(&self, scan: &Path) -> bool {
         let monitor = Monitor::new(self, self.token.clone());
         let parameters = FitParameters::default();
@@ -267,7 +267,7 @@ impl Observer for Watcher {
 }
 
 #[test]
-fn every_stage_tells_where_it_is_and_ends_when_it_is_told_to() {
+fn every_stage_reports_progress_and_can_be_cancelled() {
     let folder = folder();
     let scan = folder.path().join("scan.nii.gz");
     let watcher = Watcher::new(None);
@@ -283,7 +283,7 @@ fn every_stage_tells_where_it_is_and_ends_when_it_is_told_to() {
         let watcher = Watcher::new(Some(stage));
         assert!(watcher.segment(&scan), "{stage:?}");
         let raised = watcher.raised.lock().unwrap().unwrap();
-        // Generous: the machine may be busy. Alone, no stage takes a tenth of it.
+        // Generous, because the machine may be busy: without load no stage takes a tenth of it.
         assert!(raised.elapsed() < Duration::from_secs(1), "{stage:?}");
     }
 }
