@@ -6,10 +6,10 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use ventriform::deform::template::{Organ, Template};
 use ventriform::deform::{DeformParameters, fit};
 use ventriform::grid::voxelise::voxelise;
 use ventriform::locate::localisation as localise;
+use ventriform::model::{Organ, Template};
 use ventriform::parameters::ModelParameters;
 use ventriform::progress::Monitor;
 use ventriform::volume::Volume;

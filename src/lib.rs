@@ -116,6 +116,8 @@ pub mod optimise;
 
 pub mod decimate;
 
+pub mod model;
+
 pub mod deform;
 
 pub mod polar;
@@ -149,7 +151,7 @@ pub mod http;
 #[cfg(feature = "service")]
 pub mod cli;
 
-pub use deform::template::{Organ, Template};
+pub use model::{Organ, Template};
 pub use export::{Format, Metadata, encode};
 pub use grid::agreement::{Agreement, compare};
 pub use grid::voxelise::{Mask, voxelise};

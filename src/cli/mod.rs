@@ -1,15 +1,16 @@
 //! The `ventriform` command: arguments in, exit status out.
 
 mod bar;
+mod cohort_args;
 mod demo;
-pub(crate) mod evaluate;
+mod evaluate;
 mod generate;
 mod library;
 mod measure;
 mod output;
 mod parameter_args;
 mod phantom;
-pub(crate) mod segment;
+mod segment;
 mod serve;
 mod statistics;
 mod templates;

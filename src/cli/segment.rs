@@ -6,7 +6,7 @@ use crate::export::{self, Format};
 use crate::parameters::FitParameters;
 use crate::progress::{CancelToken, Monitor, Plan};
 use crate::segmentation::Segmentation;
-use crate::segmentation::{NamedFile, NamedMesh, Order, from_files};
+use crate::segmentation::{NamedFile, NamedMesh, SegmentationOrder, from_files};
 use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeFile};
 use crate::work::problems::Explain;
 use anyhow::{Context, Result, anyhow, bail};
@@ -77,7 +77,7 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
     }
     let volume: Vec<VolumeFile> = args.input.iter().map(VolumeFile::at).collect();
     let expert = args.expert.as_ref().map(|path| [VolumeFile::at(path)]);
-    let order = Order {
+    let order = SegmentationOrder {
         volume: &volume,
         expert: expert.as_ref().map(|files| &files[..]),
         models: named.into_iter().map(|m| mesh(m)).collect::<Result<_>>()?,
@@ -101,7 +101,7 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
 }
 
 /// Reads one volume.
-pub(crate) fn read(paths: &[PathBuf], frame: Option<usize>, monitor: &Monitor) -> Result<Reading> {
+pub(super) fn read(paths: &[PathBuf], frame: Option<usize>, monitor: &Monitor) -> Result<Reading> {
     let files: Vec<VolumeFile> = paths.iter().map(VolumeFile::at).collect();
     volume::read(
         &files,

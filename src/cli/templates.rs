@@ -1,7 +1,9 @@
 //! `ventriform templates`: the library of models that `segment` and the service choose from.
 
+use super::cohort_args::CohortArgs;
 use super::output::{create_folder, write_file};
-use crate::evaluate::cohort::{CohortArgs, read_volume};
+use crate::evaluate::cohort::read_volume;
+use crate::evaluate::parameters::ascending;
 use crate::export::{self, Format};
 use crate::parameters::ModelParameters;
 use crate::pipeline;
@@ -54,8 +56,8 @@ fn build(args: &BuildArgs) -> Result<()> {
         let (path, what) = cohort.source(case).with_context(|| {
             format!("the files of case {case} are missing from the cohort's folder")
         })?;
-        let reading = read_volume(&path)?;
-        for n in args.cohort.points() {
+        let reading = read_volume(&path).with_context(|| path.display().to_string())?;
+        for n in ascending(&args.cohort.points) {
             let context = || format!("the model of {case} with {n} points");
             let pairs = [("points", n.to_string())];
             let parameters =

@@ -1,34 +1,37 @@
-//! A first fit by few parameters: the model as a whole is moved, turned, stretched along and
-//! across its axis, made thicker or thinner, and its rim raised and tilted until its sensors
-//! agree best.
+//! A first fit with twelve parameters: the model as a whole is moved, turned, stretched along and
+//! across its axis, thickened, and its rim raised and tilted, until its sensors agree best.
 //!
 //! Gauss-Newton on Σ share · weight · (n · (u(x) - offset n))², where u is a combination of
-//! twelve fields: three shifts, three turns, two stretches, a shift along the normals, and a
-//! rise and two tilts of the basal half. A weak pull to zero keeps directions that the image says nothing about where they were.
+//! twelve displacement fields: three shifts, three turns, two stretches, a shift along the
+//! normals, and a rise and two tilts of the basal half. A weak penalty keeps parameters near zero
+//! on which the image has no information.
 
 use nalgebra::{SMatrix, SVector};
 
-use super::elastic::area_shares;
-use super::sensors::{self, Look, Reading};
+use super::sensors::{self, SensorReading, SensorSettings};
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::locate::cup::perpendicular;
 use crate::mesh::TriMesh;
+use crate::model::area_shares;
 use crate::progress::{Cancelled, Monitor};
 
 const FIELDS: usize = 12;
-type Row = SVector<f64, FIELDS>;
+type Coefficients = SVector<f64, FIELDS>;
 
 /// Rounds of Gauss-Newton.
 const ROUNDS: usize = 12;
 
-/// Aligns `mesh` with the edges in `field`; `axis` is the long axis (any for other organs).
-/// The sensors' reach falls from `look.reach` to `last_reach` on the way.
+/// Aligns `mesh` with the edges in `field`; `axis` is the long axis, any direction for organs
+/// other than ventricles. The sensors' reach falls from `settings.reach` to `last_reach`, mm.
+///
+/// # Errors
+/// [`Cancelled`].
 pub fn align(
     mesh: &TriMesh,
     axis: &Vec3,
     field: &Field,
-    look: &Look,
+    settings: &SensorSettings,
     last_reach: f64,
     monitor: &Monitor,
 ) -> Result<TriMesh, Cancelled> {
@@ -36,8 +39,13 @@ pub fn align(
     let shares = area_shares(&mesh);
     for round in 0..ROUNDS {
         let progress = round as f64 / (ROUNDS - 1) as f64;
-        let reach = look.reach * (last_reach / look.reach).powf(progress);
-        let readings = sensors::read(&mesh, field, &Look { reach, ..*look }, monitor)?;
+        let reach = settings.reach * (last_reach / settings.reach).powf(progress);
+        let readings = sensors::read(
+            &mesh,
+            field,
+            &SensorSettings { reach, ..*settings },
+            monitor,
+        )?;
         let centre: Vec3 = mesh.vertices.iter().zip(&shares).map(|(p, s)| p * *s).sum();
         let basis = Basis {
             axis: *axis,
@@ -57,14 +65,14 @@ pub fn align(
     Ok(mesh)
 }
 
-/// Pull of the rim's rise and tilts to zero. From 0.02 to 0.1 the mean Jaccard over 60 fits
-/// (four models, 15 simulated patients) changes by 0.002; without any pull it is 0.003 lower.
-const RIM_PULL: f64 = 0.03;
+/// Penalty on the rise and the tilts of the rim. Between 0.02 and 0.1 the mean Jaccard index over
+/// 60 fits (four models, 15 simulated patients) changes by 0.002; without it, it is 0.003 lower.
+const RIM_PENALTY: f64 = 0.03;
 
-/// Pulls of the two stretches to zero: where the apex takes up nothing, the edge of what can
-/// be seen would shorten the model. Simulated scans with an edge all round do not notice.
-const LENGTH_PULL: f64 = 0.03;
-const BREADTH_PULL: f64 = 0.01;
+/// Penalties on the two stretches: without them the visible part of the wall would shorten a model
+/// whose apex takes up no tracer. Simulated scans with an edge all round are not affected.
+const LENGTH_PENALTY: f64 = 0.03;
+const BREADTH_PENALTY: f64 = 0.01;
 
 struct Basis {
     axis: Vec3,
@@ -104,7 +112,7 @@ impl Basis {
         ]
     }
 
-    fn displacement(&self, p: &Vec3, n: &Vec3, step: &Row) -> Vec3 {
+    fn displacement(&self, p: &Vec3, n: &Vec3, step: &Coefficients) -> Vec3 {
         self.fields(p, n)
             .iter()
             .zip(step.iter())
@@ -112,24 +120,26 @@ impl Basis {
             .sum()
     }
 
-    fn solve(&self, readings: &[Reading]) -> Row {
+    fn solve(&self, readings: &[SensorReading]) -> Coefficients {
         let mut matrix = SMatrix::<f64, FIELDS, FIELDS>::identity() * 0.005;
         // Thickness and stretch across are nearly the same thing on the epicardium alone;
         // the thickness of the blurred wall varies less between patients than their size.
         matrix[(8, 8)] += 0.02;
-        matrix[(6, 6)] += LENGTH_PULL;
-        matrix[(7, 7)] += BREADTH_PULL;
+        matrix[(6, 6)] += LENGTH_PENALTY;
+        matrix[(7, 7)] += BREADTH_PENALTY;
         for field in 9..FIELDS {
-            matrix[(field, field)] += RIM_PULL;
+            matrix[(field, field)] += RIM_PENALTY;
         }
-        let mut rhs = Row::zeros();
+        let mut rhs = Coefficients::zeros();
         for r in readings {
             let fields = self.fields(&r.place, &r.normal);
-            let row = Row::from_fn(|i, _| fields[i].dot(&r.normal));
+            let row = Coefficients::from_fn(|i, _| fields[i].dot(&r.normal));
             let weight = r.share * r.weight;
             matrix += row * row.transpose() * weight;
             rhs += row * (weight * r.offset);
         }
-        matrix.cholesky().map_or_else(Row::zeros, |c| c.solve(&rhs))
+        matrix
+            .cholesky()
+            .map_or_else(Coefficients::zeros, |c| c.solve(&rhs))
     }
 }

@@ -1,14 +1,14 @@
-//! How much thicker blur makes a wall look.
+//! How much thicker a wall looks because of blur.
 //!
 //! A slab of thickness w and uptake 1, seen with a Gaussian of full width F at half maximum
 //! (s = F / 2.355), shows the profile f(x) = [Φ(x + w/2) - Φ(x - w/2)] with
-//! Φ(x) = erf(x / √2 s) / 2. Its full width W at half maximum is what [`crate::deform::Edge::Apparent`]
-//! measures; W grows with w from F (an infinitely thin wall) and comes near to w for walls
-//! much thicker than F, so w follows from W and F by bisection.
+//! Φ(x) = erf(x / √2 s) / 2. Its full width W at half maximum is what
+//! [`WallEdge::Apparent`](crate::deform::WallEdge::Apparent) measures. W grows with w from F (an
+//! infinitely thin wall) and approaches w for walls much thicker than F, so w follows from W and F
+//! by bisection.
 //!
-//! Left out: the wall's curvature, blood in the cavity, uptake that differs across the wall.
-//! A wall no thicker than F / 2 in truth can hardly be told from a thinner one; the answer
-//! there is half of F.
+//! Neglected: the wall's curvature, activity in the blood, uptake that varies across the wall.
+//! Walls thinner than F / 2 can hardly be distinguished; the result is at least F / 2.
 
 use std::f64::consts::SQRT_2;
 
@@ -20,8 +20,8 @@ use crate::mesh::TriMesh;
 const FWHM: f64 = 2.354_820_045;
 
 /// Mean thickness of the wall `mesh` about the axis of `cup`, mm: twice its volume over the
-/// area of its inner and outer surface, the rim left out. The flanks of a rounded rim still
-/// count, which makes a short cup up to a tenth too thin.
+/// area of its inner and outer surface without the rim. The flanks of a rounded rim are included,
+/// which makes the result up to a tenth too small for a short cup.
 pub fn thickness(mesh: &TriMesh, cup: &Cup) -> f64 {
     let area: f64 = (0..mesh.triangles.len())
         .filter_map(|t| {
@@ -39,8 +39,8 @@ pub fn thickness(mesh: &TriMesh, cup: &Cup) -> f64 {
     }
 }
 
-/// What blur of `resolution` mm (full width at half maximum) adds to a wall that looks
-/// `apparent` mm thick.
+/// What blur of `resolution` mm (full width at half maximum) adds to the thickness of a wall that
+/// looks `apparent` mm thick, mm.
 pub fn excess(apparent: f64, resolution: f64) -> f64 {
     if !(resolution > 0.0 && apparent > 0.0) {
         return 0.0;
@@ -100,7 +100,7 @@ mod tests {
         assert!((width(60.0, 12.0) - 60.0).abs() < 1e-3);
         assert!(excess(60.0, 12.0).abs() < 1e-3);
         assert_eq!(excess(14.0, 0.0), 0.0);
-        // Thinner than the blur itself allows: the least wall that can be told.
+        // Thinner than any blurred wall: the least result, half the resolution.
         assert!((excess(9.0, 12.0) - 3.0).abs() < 1e-6);
     }
 
@@ -116,8 +116,7 @@ mod tests {
             breadth: 1.0,
         };
         let found = thickness(&mesh, &cup);
-        // 10.9 of 12: no share of area tells the flanks of the rounded rim from the wall, and
-        // this cup is short.
+        // 10.9 of 12: the flanks of the rounded rim count as wall, and this cup is short.
         assert!((10.8..11.0).contains(&found), "{found}");
     }
 
@@ -125,7 +124,7 @@ mod tests {
     fn the_excess_is_what_a_blurred_slab_shows() {
         for resolution in [8.0, 11.5, 16.0] {
             for thickness in [8.5, 11.0, 15.0] {
-                // Sampled and convolved by hand.
+                // The slab convolved numerically.
                 let s = resolution / FWHM;
                 let step = 0.01;
                 let value = |x: f64| -> f64 {

@@ -1,37 +1,40 @@
 //! The motion of the model: implicit Euler steps until nothing moves.
 //!
-//! Node i has mass m_i = mass · area share, velocity v, and feels damping g, the elastic
-//! forces and its sensors: Σ share · weight · (n n^T)(target - x), spread by barycentric
-//! coordinates. A step of length dt solves
+//! In go the model, its elastic body, the image and the settings of the sensors; out comes the
+//! model at rest ([`run`]).
+//!
+//! Node i has mass m_i = mass · area share and velocity v. Damping g, the elastic forces and the
+//! forces of the sensors act on it: Σ share · weight · (n n^T)(target - x), distributed by
+//! barycentric coordinates. A step of length dt solves
 //!
 //! ```text
 //! (M/dt² + g M/dt + K + J^T W J) x' = (M/dt² + g M/dt) x + M v/dt + targets
 //! ```
 //!
-//! Sensors look anew before every step; their reach falls step by step from far to near, and
-//! then their answers are averaged until they are certain.
-//! The implicit step is stable for any dt, so the motion ends because it has converged, or
-//! because the limit of steps is reached, and the result says which.
+//! Sensors are read before every step. Their reach falls step by step; when it has reached its
+//! least value, readings are averaged, and after 12 of them the mean is fixed. The implicit step
+//! is stable for any dt, so the motion ends at rest, where it stalls, or at the limit of steps
+//! ([`StopReason`]).
 
-use super::elastic::{Elastic, area_shares};
-use super::sensors::{self, Look, PER_TRIANGLE, Reading};
+use super::elastic::Elastic;
+use super::sensors::{self, PER_TRIANGLE, SensorReading, SensorSettings};
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::mesh::TriMesh;
+use crate::model::area_shares;
 use crate::numeric::conjugate_gradient::BlockMatrix;
 use crate::progress::{Cancelled, Monitor};
 
 /// Why the motion ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StopReason {
-    /// No node moves farther than the tolerance any more.
+    /// No node moved farther than the tolerance in the last step.
     Converged,
-    /// The energy has not fallen for 20 steps: sensors change their minds to and fro.
+    /// The energy has not fallen for 20 steps: sensors alternate between two edges.
     Stalled,
     /// The limit of steps was reached first.
     MaxIterations,
-    /// A position was no longer finite or left the neighbourhood; the last sound state is
-    /// returned.
+    /// A node moved by more than 200 mm or was no longer finite; the last valid state is returned.
     Diverged,
 }
 
@@ -50,7 +53,7 @@ impl StopReason {
 /// How the model moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
-    /// Mass of the whole model against a sensor force of 1 per mm, in units of dt². Default
+    /// Mass of the whole model relative to a sensor force of 1 per mm, in units of dt². Default
     /// 0.1.
     pub mass: f64,
     /// Damping, 1/dt. Default 1.
@@ -61,8 +64,8 @@ pub struct Motion {
     pub last_reach: f64,
     /// Factor of the reach from step to step. Default 0.85.
     pub narrowing: f64,
-    /// Largest move of a node that counts as rest, mm. Default 0.04, a hundredth of a
-    /// usual voxel.
+    /// Greatest displacement of a node in a step that counts as rest, mm. Default 0.04, a
+    /// hundredth of a usual voxel.
     pub tolerance: f64,
     /// Limit of steps. Default 100.
     pub max_iterations: usize,
@@ -91,15 +94,15 @@ pub struct Moved {
     pub reason: StopReason,
     /// Steps made.
     pub iterations: usize,
-    /// Largest move in the last step, mm.
+    /// Greatest displacement of a node in the last step, mm.
     pub last_move: f64,
     /// Energy (elastic, sensors, motion) before each step, mm².
     pub energy: Vec<f64>,
-    /// What the sensors see at the end.
-    pub readings: Vec<Reading>,
+    /// The sensors' readings at the end.
+    pub readings: Vec<SensorReading>,
 }
 
-/// Lets `body` move in `field` from `start`.
+/// Moves `body` in `field` from `start` until it rests.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -107,13 +110,13 @@ pub fn run(
     start: &TriMesh,
     body: &Elastic,
     field: &Field,
-    look: &Look,
+    settings: &SensorSettings,
     motion: &Motion,
     monitor: &Monitor,
 ) -> Result<Moved, Cancelled> {
-    let mut state = State::new(start, body, motion);
-    let mut memory = Memory::default();
-    let mut reach = look.reach;
+    let mut state = MotionState::new(start, body, motion);
+    let mut mean = SensorMean::default();
+    let mut reach = settings.reach;
     let mut energies: Vec<f64> = Vec::new();
     let mut lowest = (f64::INFINITY, 0);
     let mut reason = StopReason::MaxIterations;
@@ -121,13 +124,18 @@ pub fn run(
     for _ in 0..motion.max_iterations {
         monitor.check()?;
         let settled = reach <= motion.last_reach;
-        if !memory.is_certain() {
-            memory.hear(
-                sensors::read(&state.mesh, field, &Look { reach, ..*look }, monitor)?,
+        if !mean.is_fixed() {
+            mean.add(
+                sensors::read(
+                    &state.mesh,
+                    field,
+                    &SensorSettings { reach, ..*settings },
+                    monitor,
+                )?,
                 settled,
             );
         }
-        let readings = memory.readings(&state.mesh);
+        let readings = mean.readings(&state.mesh);
         let energy =
             body.energy(&state.mesh.vertices) + sensor_energy(&readings) + state.kinetic_energy();
         energies.push(energy);
@@ -149,7 +157,12 @@ pub fn run(
             break;
         }
     }
-    let readings = sensors::read(&state.mesh, field, &Look { reach, ..*look }, monitor)?;
+    let readings = sensors::read(
+        &state.mesh,
+        field,
+        &SensorSettings { reach, ..*settings },
+        monitor,
+    )?;
     Ok(Moved {
         mesh: state.mesh,
         reason,
@@ -160,71 +173,71 @@ pub fn run(
     })
 }
 
-/// What the sensors have said so far. Noise lets some of them waver between two edges for
-/// ever; once the reach has come to its end, each new answer therefore counts less than the
-/// one before it (1, 1/2, 1/3, ...: the mean of all answers), and after [`ANSWERS`] of them
-/// the edges are known and the model comes to rest on them.
+/// The mean of the sensors' readings. Noise lets some sensors alternate between two edges for
+/// ever. When the reach is at its least, each new reading therefore counts less than the one
+/// before it (1, 1/2, 1/3, ...: the mean of all); after [`SETTLED_READINGS`] of them the edges are
+/// fixed, and the model comes to rest on them.
 #[derive(Default)]
-struct Memory {
-    answers: Vec<Reading>,
-    /// Mean edge point of each answer.
+struct SensorMean {
+    last: Vec<SensorReading>,
+    /// Mean edge point of each sensor.
     edges: Vec<Vec3>,
     count: usize,
 }
 
-/// Answers after which the mean is taken for certain.
-const ANSWERS: usize = 12;
+/// Readings after which their mean is fixed.
+const SETTLED_READINGS: usize = 12;
 
-impl Memory {
-    fn is_certain(&self) -> bool {
-        self.count >= ANSWERS
+impl SensorMean {
+    fn is_fixed(&self) -> bool {
+        self.count >= SETTLED_READINGS
     }
 
-    fn hear(&mut self, mut readings: Vec<Reading>, settled: bool) {
+    fn add(&mut self, mut readings: Vec<SensorReading>, settled: bool) {
         self.count = if settled { self.count + 1 } else { 1 };
         let share = 1.0 / self.count as f64;
-        if self.answers.is_empty() {
-            self.answers.clone_from(&readings);
+        if self.last.is_empty() {
+            self.last.clone_from(&readings);
             self.edges = vec![Vec3::zeros(); readings.len()];
         }
         for (i, r) in readings.iter_mut().enumerate() {
             let edge = &mut self.edges[i];
             *edge += (r.place + r.normal * r.offset - *edge) * share;
-            let before = self.answers[i].weight;
+            let before = self.last[i].weight;
             r.weight = before + (r.weight - before) * share;
         }
-        self.answers = readings;
+        self.last = readings;
     }
 
-    /// The answers as seen from where the model is now.
-    fn readings(&self, mesh: &TriMesh) -> Vec<Reading> {
+    /// The mean readings, relative to where the model is now.
+    fn readings(&self, mesh: &TriMesh) -> Vec<SensorReading> {
         let weights = sensors::barycentric();
         let place = |i: usize| {
             let corners = mesh.corners(i / PER_TRIANGLE);
             let w = weights[i % PER_TRIANGLE];
             corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2]
         };
-        let seen = |(i, r): (usize, &Reading)| {
+        let seen = |(i, r): (usize, &SensorReading)| {
             let place = place(i);
-            Reading {
+            SensorReading {
                 place,
                 offset: r.normal.dot(&(self.edges[i] - place)),
                 ..*r
             }
         };
-        self.answers.iter().enumerate().map(seen).collect()
+        self.last.iter().enumerate().map(seen).collect()
     }
 }
 
-fn sensor_energy(readings: &[Reading]) -> f64 {
+fn sensor_energy(readings: &[SensorReading]) -> f64 {
     readings
         .iter()
         .map(|r| 0.5 * r.share * r.weight * r.offset * r.offset)
         .sum()
 }
 
-/// Positions, velocities and what a step needs again and again.
-struct State {
+/// Positions and velocities, and the parts of the equations that all steps share.
+struct MotionState {
     mesh: TriMesh,
     velocity: Vec<Vec3>,
     masses: Vec<f64>,
@@ -235,7 +248,7 @@ struct State {
     origin: Vec<Vec3>,
 }
 
-impl State {
+impl MotionState {
     fn new(start: &TriMesh, body: &Elastic, motion: &Motion) -> Self {
         let nodes = start.vertices.len();
         let masses: Vec<f64> = area_shares(start).iter().map(|s| s * motion.mass).collect();
@@ -266,8 +279,9 @@ impl State {
         pairs.map(|(v, m)| 0.5 * m * v.norm_squared()).sum()
     }
 
-    /// One step; the largest move, or `None` (and no step) where it leads nowhere sound.
-    fn step(&mut self, body: &Elastic, motion: &Motion, readings: &[Reading]) -> Option<f64> {
+    /// Makes one step and returns the greatest displacement of a node, mm; `None` where the motion
+    /// diverged, in which case the positions stay as they were.
+    fn step(&mut self, body: &Elastic, motion: &Motion, readings: &[SensorReading]) -> Option<f64> {
         let dt = motion.time_step;
         let inertia = 1.0 / (dt * dt) + motion.damping / dt;
         let old = &self.mesh.vertices;
@@ -293,8 +307,8 @@ impl State {
         }
         let mut new = old.clone();
         self.matrix.solve(&rhs, &mut new, 1e-7, 60);
-        let wild = |(p, o): (&Vec3, &Vec3)| !((p - o).norm() < 200.0);
-        if new.iter().zip(&self.origin).any(wild) {
+        let diverged = |(p, o): (&Vec3, &Vec3)| !((p - o).norm() < 200.0);
+        if new.iter().zip(&self.origin).any(diverged) {
             return None;
         }
         let mut farthest = 0f64;

@@ -1,55 +1,53 @@
-//! What gives reason to doubt a fit.
+//! Reasons to doubt a fit, as codes and sentences for the report.
 
-use super::{Fit, StopReason};
-use crate::geometry::Vec3;
-use crate::volume::Volume;
+use super::dynamics::StopReason;
 
-/// One reason for doubt.
+/// A reason to doubt a fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Flag {
-    /// The heart was not found with certainty.
+    /// The confidence of the fit is below 0.4.
     #[error("the heart's place is uncertain: confidence {confidence:.2}")]
     UncertainPlace {
-        /// 0..=1.
+        /// The fit's confidence, 0..=1.
         confidence: f64,
     },
-    /// The apical wall does not show.
+    /// The apical wall is too dark to be seen.
     #[error(
-        "the apical wall takes up {:.0} % of the basal one: how far it reaches is the mean \
-         heart's proportion",
+        "the apical wall takes up {:.0} % as much as the basal one: the length of the model is \
+         that of a mean heart of this breadth",
         100.0 * uptake
     )]
     DarkApex {
-        /// Uptake of the apical wall, basal wall = 1.
+        /// Uptake of the apical wall relative to the basal wall.
         uptake: f64,
     },
     /// The motion did not come to rest.
     #[error("the model did not come to rest: {}", reason.as_str())]
     NotAtRest {
-        /// Why it ended.
+        /// Why the motion ended.
         reason: StopReason,
     },
-    /// The surface pierces itself or has turned triangles.
-    #[error("{intersections} pairs of triangles pierce each other, {turned} are turned over")]
+    /// The surface intersects itself or has inverted triangles.
+    #[error("{intersections} pairs of triangles intersect, {turned} triangles are inverted")]
     Folded {
-        /// Piercing pairs.
+        /// Intersecting pairs.
         intersections: usize,
-        /// Turned triangles.
+        /// Inverted triangles.
         turned: usize,
     },
-    /// Few sensors see an edge.
-    #[error("an edge is seen along {:.0} % of the surface only; the rest is the template's", 100.0 * active)]
+    /// Less than half of the surface sees an edge.
+    #[error("an edge is seen along only {:.0} % of the surface; the rest keeps the template's shape", 100.0 * active)]
     PoorContrast {
         /// Share of area with an edge.
         active: f64,
     },
-    /// The volume's border cuts the organ.
+    /// Nodes lie at or beyond the border of the volume.
     #[error("{share:.0} % of the model's nodes lie at or beyond the volume's border")]
     TouchesBorder {
         /// Per cent of nodes.
         share: f64,
     },
-    /// Volume, thickness or strain that no left ventricle has.
+    /// A volume, thickness, length or strain outside the plausible range of left ventricles.
     #[error("implausible shape: {what} is {value:.1}; {least} to {most} is plausible")]
     ImplausibleShape {
         /// The measure.
@@ -61,7 +59,7 @@ pub enum Flag {
         /// Greatest plausible value.
         most: f64,
     },
-    /// The rim is far from a plane, so volumes depend on where one says the base is.
+    /// The rim is far from a plane, so volumes depend on where the base is taken to be.
     #[error("the valve plane is unclear: {:.0} % of the basal half has no wall", 100.0 * gaps)]
     ValvePlane {
         /// Share of basal rays without wall.
@@ -83,79 +81,4 @@ impl Flag {
             Flag::ValvePlane { .. } => "valve_plane",
         }
     }
-}
-
-/// Looks for reasons to doubt `fit`.
-pub(super) fn raise(fit: &Fit, volume: &Volume, ventricle: bool) -> Vec<Flag> {
-    let mut flags = Vec::new();
-    if fit.confidence < 0.4 {
-        let confidence = fit.confidence;
-        flags.push(Flag::UncertainPlace { confidence });
-    }
-    if let Some(uptake) = fit.localisation.as_ref().and_then(|l| l.dark_apex) {
-        flags.push(Flag::DarkApex { uptake });
-    }
-    if matches!(fit.reason, StopReason::MaxIterations | StopReason::Diverged) {
-        flags.push(Flag::NotAtRest { reason: fit.reason });
-    }
-    if fit.self_intersections + fit.turned_triangles > 0 {
-        flags.push(Flag::Folded {
-            intersections: fit.self_intersections,
-            turned: fit.turned_triangles,
-        });
-    }
-    if fit.active < 0.5 {
-        flags.push(Flag::PoorContrast { active: fit.active });
-    }
-    let outside = fit
-        .mesh
-        .vertices
-        .iter()
-        .filter(|p| beyond(volume, p))
-        .count();
-    if outside > 0 {
-        let share = 100.0 * outside as f64 / fit.mesh.vertices.len() as f64;
-        flags.push(Flag::TouchesBorder { share });
-    }
-    if ventricle {
-        flags.extend(implausible(fit));
-    }
-    flags
-}
-
-fn beyond(volume: &Volume, p: &Vec3) -> bool {
-    let index = volume.frame.to_voxel(p);
-    (0..3).any(|a| index[a] <= 0.0 || index[a] >= volume.shape[a] as f64 - 1.0)
-}
-
-fn implausible(fit: &Fit) -> Vec<Flag> {
-    let Some(wall) = &fit.wall else {
-        return Vec::new();
-    };
-    let length = wall.extent[1] - wall.extent[0];
-    let mut flags: Vec<Flag> = [
-        ("the wall's volume in ml", fit.wall_ml, 50.0, 400.0),
-        ("the cavity's volume in ml", wall.cavity_ml, 5.0, 450.0),
-        ("the wall's mean thickness in mm", wall.thickness, 7.0, 28.0),
-        ("the length in mm", length, 45.0, 140.0),
-        (
-            "the strain in per cent",
-            100.0 * fit.strain.sqrt(),
-            0.0,
-            45.0,
-        ),
-    ]
-    .into_iter()
-    .filter(|(_, value, least, most)| !(least..=most).contains(&value))
-    .map(|(what, value, least, most)| Flag::ImplausibleShape {
-        what,
-        value,
-        least,
-        most,
-    })
-    .collect();
-    if wall.gaps > 0.25 {
-        flags.push(Flag::ValvePlane { gaps: wall.gaps });
-    }
-    flags
 }

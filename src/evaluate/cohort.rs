@@ -1,58 +1,53 @@
 //! A cohort's folder: who is in it, and in which files.
 //!
-//! One folder for each case with `spect.nii.gz` (or `.nii`, `.dcm`) and, where they are known,
-//! the gold standards of [`Gold`]. `manifest.json`, a list of `{"case", "role"}` (or an object
-//! with such a list under `cases`), says which cases are templates: those of the role
-//! `template`. Without it, cases whose names begin with `t` are. Whatever is missing becomes a
-//! sentence in [`Cohort::problems`] and not the end of the run.
+//! Each case has a folder of its own with `spect.nii.gz` (or `.nii`, `.dcm`) and, where they are
+//! known, the gold standards of [`Gold`]. `manifest.json`, a list of `{"case", "role"}` (or an
+//! object with such a list under `cases`), says which cases are templates: those with the role
+//! `template`. Without a manifest, cases whose names begin with `t` are templates. A missing
+//! file does not end the run: it is noted in [`Cohort::problems`].
 
-use crate::cli::segment::read;
-use crate::evaluate::rows::Gold;
+use super::rows::Gold;
 use crate::progress::Monitor;
-use crate::volume::Reading;
-use anyhow::{Context, Result, bail};
-use clap::Args;
+use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeFile};
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::io;
 use std::path::{Path, PathBuf};
 
-/// Which cohort, and how its templates' models are made. A command that takes these sets the
-/// default of `points`.
-#[derive(Debug, Args)]
-pub struct CohortArgs {
-    /// The cohort's folder: one folder for each case with spect.nii.gz, lv_expert_img.nii.gz
-    /// and lv_truth.nii.gz; manifest.json says which are templates (else: names with t)
-    #[arg(long, value_name = "DIR")]
-    cohort: PathBuf,
-    /// Numbers of points of our models
-    #[arg(long, value_name = "N,...", value_delimiter = ',')]
-    points: Vec<usize>,
-    /// The template whose model comes from its expert's mask [default: the third, if it has one]
-    #[arg(long, value_name = "CASE")]
-    manual: Option<String>,
+/// Why a folder is no cohort.
+#[derive(Debug, thiserror::Error)]
+pub enum CohortError {
+    /// The folder cannot be read.
+    #[error("{}: {error}", folder.display())]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// Why.
+        error: io::Error,
+    },
+    /// There is no template, or no patient.
+    #[error(
+        "{}: {templates} template and {patients} other cases with a spect.nii.gz; both are needed",
+        folder.display()
+    )]
+    TooFewCases {
+        /// The folder.
+        folder: PathBuf,
+        /// Templates with a scan.
+        templates: usize,
+        /// Other cases with a scan.
+        patients: usize,
+    },
+    /// The template that was named for the manual mask does not exist or has no such mask.
+    #[error("there is no template {name} with a {}", Gold::Expert.file())]
+    NoManualMask {
+        /// The name.
+        name: String,
+    },
 }
 
-impl CohortArgs {
-    /// Looks at the folder.
-    pub fn open(&self) -> Result<Cohort> {
-        Cohort::open(&self.cohort, self.manual.as_deref())
-    }
-
-    /// The numbers of points, each once, rising.
-    pub fn points(&self) -> Vec<usize> {
-        sorted(&self.points)
-    }
-}
-
-/// The numbers, each once, rising.
-pub fn sorted(numbers: &[usize]) -> Vec<usize> {
-    let mut numbers = numbers.to_vec();
-    numbers.sort_unstable();
-    numbers.dedup();
-    numbers
-}
-
-/// A cohort's folder and who is who in it.
+/// A cohort's folder and its cases.
+#[derive(Debug)]
 pub struct Cohort {
     folder: PathBuf,
     /// Cases that models are made of, by name.
@@ -61,7 +56,7 @@ pub struct Cohort {
     pub patients: Vec<String>,
     /// The template whose model comes from its expert's mask, if any.
     pub manual: Option<String>,
-    /// Cases, and what is the matter with them.
+    /// Cases, and what is wrong with each.
     pub problems: Vec<(String, String)>,
 }
 
@@ -69,10 +64,13 @@ pub struct Cohort {
 const SCAN: &str = "spect";
 
 impl Cohort {
-    /// Looks at `folder`. `manual` names the template whose model is to come from the expert's
-    /// mask; otherwise, as in the paper (two scans by threshold, one manual mask, one
-    /// phantom), it is the third template, where it has such a mask.
-    fn open(folder: &Path, manual: Option<&str>) -> Result<Self> {
+    /// Reads the manifest and the names of the files of `folder`. `manual` names the template
+    /// whose model is to come from the expert's mask. Default, as in the paper (two scans by
+    /// threshold, one manual mask, one phantom): the third template, if it has such a mask.
+    ///
+    /// # Errors
+    /// [`CohortError`].
+    pub fn open(folder: &Path, manual: Option<&str>) -> Result<Self, CohortError> {
         let mut cohort = Self {
             folder: folder.to_path_buf(),
             templates: Vec::new(),
@@ -105,12 +103,11 @@ impl Cohort {
             }
         }
         if cohort.templates.is_empty() || cohort.patients.is_empty() {
-            bail!(
-                "{}: {} template and {} other cases with a spect.nii.gz; both are needed",
-                folder.display(),
-                cohort.templates.len(),
-                cohort.patients.len()
-            );
+            return Err(CohortError::TooFewCases {
+                folder: cohort.folder,
+                templates: cohort.templates.len(),
+                patients: cohort.patients.len(),
+            });
         }
         Ok(cohort)
     }
@@ -119,13 +116,19 @@ impl Cohort {
         self.problems.push((case.to_owned(), what.to_owned()));
     }
 
-    /// Every case that the manifest or a folder speaks of, by name.
-    fn names(&self, roles: &Option<BTreeMap<String, String>>) -> Result<Vec<String>> {
+    /// The cases of the manifest and of the folder, sorted by name.
+    fn names(&self, roles: &Option<BTreeMap<String, String>>) -> Result<Vec<String>, CohortError> {
+        let unreadable = |error| CohortError::Folder {
+            folder: self.folder.clone(),
+            error,
+        };
         let mut names: Vec<String> = roles.iter().flat_map(|r| r.keys().cloned()).collect();
-        let entries = std::fs::read_dir(&self.folder)
-            .with_context(|| format!("{}", self.folder.display()))?;
-        for entry in entries {
-            let name = entry?.file_name().to_string_lossy().into_owned();
+        for entry in std::fs::read_dir(&self.folder).map_err(unreadable)? {
+            let name = entry
+                .map_err(unreadable)?
+                .file_name()
+                .to_string_lossy()
+                .into_owned();
             let stems = [SCAN, "lv_truth", "lv_expert_img"];
             if stems.iter().any(|stem| self.file(&name, stem).is_some()) {
                 names.push(name);
@@ -136,7 +139,7 @@ impl Cohort {
         Ok(names)
     }
 
-    /// The role of every case of the manifest, where there is a readable one.
+    /// The role of every case of the manifest; `None` without a readable manifest.
     fn roles(&mut self) -> Option<BTreeMap<String, String>> {
         let path = self.folder.join("manifest.json");
         if !path.is_file() {
@@ -148,7 +151,8 @@ impl Cohort {
         let manifest: Value = match parsed {
             Ok(manifest) => manifest,
             Err(error) => {
-                let what = format!("cannot be read ({error}); templates are told by their names");
+                let what =
+                    format!("cannot be read ({error}); templates are recognised by their names");
                 self.problem("manifest.json", &what);
                 return None;
             }
@@ -156,13 +160,13 @@ impl Cohort {
         let Some(cases) = manifest.get("cases").unwrap_or(&manifest).as_array() else {
             self.problem(
                 "manifest.json",
-                "holds no list of cases; templates are told by their names",
+                "holds no list of cases; templates are recognised by their names",
             );
             return None;
         };
         let role = |c: &Value| {
             let name = c["case"].as_str()?;
-            // A name is the name of a folder in the cohort's, never a way out of it.
+            // A name must not lead out of the cohort's folder.
             let plain = !name.is_empty() && !name.contains(['/', '\\']) && name != "..";
             plain.then(|| {
                 (
@@ -174,26 +178,20 @@ impl Cohort {
         Some(cases.iter().filter_map(role).collect())
     }
 
-    fn choose_manual(&mut self, asked: Option<&str>) -> Result<()> {
+    fn choose_manual(&mut self, asked: Option<&str>) -> Result<(), CohortError> {
         let has_mask = |name: &String| self.gold(name, Gold::Expert).is_some();
         self.manual = match asked {
             Some(name) => {
                 let found = self.templates.iter().find(|t| *t == name).cloned();
-                let found = found.filter(has_mask);
-                if found.is_none() {
-                    bail!(
-                        "--manual {name}: there is no template of that name with a {}",
-                        Gold::Expert.file()
-                    );
-                }
-                found
+                let missing = || CohortError::NoManualMask { name: name.into() };
+                Some(found.filter(has_mask).ok_or_else(missing)?)
             }
             None => self.templates.get(2).cloned().filter(has_mask),
         };
         Ok(())
     }
 
-    /// The file `stem` of a case, in whichever format it is there.
+    /// The file `stem` of a case, in the first format that exists.
     fn file(&self, case: &str, stem: &str) -> Option<PathBuf> {
         ["nii.gz", "nii", "dcm"]
             .iter()
@@ -222,9 +220,18 @@ impl Cohort {
     }
 }
 
-/// Reads a volume of a cohort.
-pub fn read_volume(path: &Path) -> Result<Reading> {
-    read(&[path.to_path_buf()], None, &Monitor::silent())
+/// Reads a volume of a cohort: a file of one frame.
+///
+/// # Errors
+/// [`VolumeError`].
+pub fn read_volume(path: &Path) -> Result<Reading, VolumeError> {
+    let (options, limits) = (ReadOptions::default(), ReadLimits::default());
+    volume::read(
+        &[VolumeFile::at(path)],
+        &options,
+        &limits,
+        &Monitor::silent(),
+    )
 }
 
 #[cfg(test)]
@@ -254,7 +261,7 @@ mod tests {
     ];
 
     #[test]
-    fn without_a_manifest_names_tell() {
+    fn without_a_manifest_names_decide() {
         let folder = folder_of(&FILES, None);
         let cohort = Cohort::open(folder.path(), None).unwrap();
         assert_eq!(
@@ -270,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn a_manifest_is_believed_and_its_absentees_are_named() {
+    fn a_manifest_decides_and_its_missing_cases_are_named() {
         let text = r#"[{"case":"b","role":"template"},{"case":"t1","role":"test"},
                        {"case":"gone","role":"test"},{"case":"../x","role":"test"}]"#;
         let folder = folder_of(&FILES, Some(text));

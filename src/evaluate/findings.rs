@@ -1,50 +1,50 @@
-//! What the results say about the paper's findings, each as a claim, a verdict and figures.
+//! Whether the results confirm the paper's findings, each as a claim, a verdict and figures.
 
-use super::rows::{self, Gold, Kind, ModelRow, Row, Variant};
+use super::rows::{self, FitRow, Gold, ModelKind, ModelRow, Variant};
 
-/// What became of a claim.
+/// Whether the results agree with a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
+pub enum FindingVerdict {
     /// The figures agree.
     Confirmed,
     /// The figures contradict.
     Refuted,
-    /// The run did not include what it takes to say.
+    /// The run does not include the models or numbers of points that decide it.
     Open,
 }
 
-impl Verdict {
+impl FindingVerdict {
     /// The word in reports.
     pub fn as_str(self) -> &'static str {
         match self {
-            Verdict::Confirmed => "confirmed",
-            Verdict::Refuted => "refuted",
-            Verdict::Open => "not decided",
+            FindingVerdict::Confirmed => "confirmed",
+            FindingVerdict::Refuted => "refuted",
+            FindingVerdict::Open => "not decided",
         }
     }
 
     fn of(holds: Option<bool>) -> Self {
         match holds {
-            Some(true) => Verdict::Confirmed,
-            Some(false) => Verdict::Refuted,
-            None => Verdict::Open,
+            Some(true) => FindingVerdict::Confirmed,
+            Some(false) => FindingVerdict::Refuted,
+            None => FindingVerdict::Open,
         }
     }
 }
 
-/// One of the paper's findings in the light of these results.
+/// One of the paper's findings and what these results say about it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
-    /// What the paper says.
+    /// The finding.
     pub claim: &'static str,
     /// Whether it holds here.
-    pub verdict: Verdict,
-    /// By which figures.
+    pub verdict: FindingVerdict,
+    /// The figures that decide it.
     pub figures: String,
 }
 
-/// All findings that the paper states of its evaluation.
-pub fn findings(rows: &[Row], models: &[ModelRow]) -> Vec<Finding> {
+/// All findings of the paper's evaluation.
+pub fn findings(rows: &[FitRow], models: &[ModelRow]) -> Vec<Finding> {
     vec![
         flips_raise_fitness(models),
         best_number(rows),
@@ -60,7 +60,7 @@ fn flips_raise_fitness(models: &[ModelRow]) -> Finding {
         .iter()
         .filter(|m| m.kind.variant == Variant::Optimised)
     {
-        let before = Kind {
+        let before = ModelKind {
             variant: Variant::Retiled,
             ..after.kind
         };
@@ -73,7 +73,7 @@ fn flips_raise_fitness(models: &[ModelRow]) -> Finding {
     let most = gains.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     Finding {
         claim: "Flips (here with the fit before them) raise the mean fitness of every model.",
-        verdict: Verdict::of((!gains.is_empty()).then_some(least > 0.0)),
+        verdict: FindingVerdict::of((!gains.is_empty()).then_some(least > 0.0)),
         figures: format!(
             "gain in the raw form {least:.1} to {most:.1} % over {} models",
             gains.len()
@@ -82,7 +82,7 @@ fn flips_raise_fitness(models: &[ModelRow]) -> Finding {
 }
 
 /// Mean E_J against the expert by number of points, for one variant.
-fn curve(rows: &[Row], variant: Variant) -> Vec<(usize, f64)> {
+fn curve(rows: &[FitRow], variant: Variant) -> Vec<(usize, f64)> {
     rows::kinds(rows)
         .into_iter()
         .filter(|k| k.variant == variant)
@@ -100,8 +100,8 @@ fn best(curve: &[(usize, f64)]) -> Option<(usize, f64)> {
     })
 }
 
-/// The least number of points that is as good as any.
-fn best_number(rows: &[Row]) -> Finding {
+/// The least number of points whose mean E_J is within [`NOTICEABLE`] of the greatest.
+fn best_number(rows: &[FitRow]) -> Finding {
     let curve = curve(rows, Variant::Optimised);
     let top = best(&curve);
     let enough = top.and_then(|top| {
@@ -110,7 +110,7 @@ fn best_number(rows: &[Row]) -> Finding {
     });
     Finding {
         claim: "The best number of points lies between 110 and 200.",
-        verdict: Verdict::of(enough.map(|b| (110..=200).contains(&b.0))),
+        verdict: FindingVerdict::of(enough.map(|b| (110..=200).contains(&b.0))),
         figures: enough.zip(top).map_or_else(String::new, |(enough, top)| {
             format!(
                 "{} points are the least that are as good as any (E_J {:.3}, within \
@@ -121,10 +121,10 @@ fn best_number(rows: &[Row]) -> Finding {
     }
 }
 
-/// A change of the mean E_J below this is no change: half of what two readers' noise makes.
+/// Smaller changes of the mean E_J do not count: half the difference between two readers.
 const NOTICEABLE: f64 = 0.005;
 
-fn more_points_hurt(rows: &[Row]) -> Finding {
+fn more_points_hurt(rows: &[FitRow]) -> Finding {
     let curve = curve(rows, Variant::Optimised);
     let most = curve.last().copied().filter(|c| c.0 > 200);
     let best = best(&curve);
@@ -133,7 +133,7 @@ fn more_points_hurt(rows: &[Row]) -> Finding {
         .map(|(most, best)| best.1 - most.1 > NOTICEABLE);
     Finding {
         claim: "More than 200 points hurt.",
-        verdict: Verdict::of(holds),
+        verdict: FindingVerdict::of(holds),
         figures: most.zip(best).map_or_else(String::new, |(most, best)| {
             format!(
                 "mean E_J {:.3} at {} points, {:.3} at the best number, {}",
@@ -144,7 +144,7 @@ fn more_points_hurt(rows: &[Row]) -> Finding {
 }
 
 /// Differences of E_J (new minus old) over the pairs of fits that differ in the kind alone.
-fn differences(rows: &[Row], new: Kind, old: Kind) -> Vec<f64> {
+fn differences(rows: &[FitRow], new: ModelKind, old: ModelKind) -> Vec<f64> {
     rows::of_kind(rows, None, new)
         .filter_map(|row| {
             let other =
@@ -155,7 +155,7 @@ fn differences(rows: &[Row], new: Kind, old: Kind) -> Vec<f64> {
 }
 
 fn compare(
-    rows: &[Row],
+    rows: &[FitRow],
     claim: &'static str,
     old: Variant,
     accept: impl Fn(f64) -> bool,
@@ -166,7 +166,7 @@ fn compare(
         if new.variant != Variant::Optimised {
             continue;
         }
-        let old = Kind {
+        let old = ModelKind {
             variant: old,
             ..new
         };
@@ -184,17 +184,17 @@ fn compare(
     }
     Finding {
         claim,
-        verdict: Verdict::of(holds),
+        verdict: FindingVerdict::of(holds),
         figures: figures.join("; "),
     }
 }
 
-fn new_models_beat_the_reference(rows: &[Row]) -> Finding {
+fn new_models_beat_the_reference(rows: &[FitRow]) -> Finding {
     let claim = "New models segment better than the reference model of as many points (E_J).";
     compare(rows, claim, Variant::Reference, |mean| mean > 0.0)
 }
 
-fn flips_help_the_fit(rows: &[Row]) -> Finding {
+fn flips_help_the_fit(rows: &[FitRow]) -> Finding {
     let claim = "Models after the flips segment no worse than after re-tiling alone (E_J).";
     compare(rows, claim, Variant::Retiled, |mean| mean > -NOTICEABLE)
 }
@@ -204,7 +204,7 @@ mod tests {
     use super::super::rows::tests::row;
     use super::*;
 
-    fn verdict(rows: &[Row], claim: &str) -> Verdict {
+    fn verdict(rows: &[FitRow], claim: &str) -> FindingVerdict {
         let found = findings(rows, &[]);
         let of = |f: &&Finding| f.claim.contains(claim);
         found.iter().find(of).unwrap().verdict
@@ -219,22 +219,25 @@ mod tests {
             (200, 0.748),
             (300, 0.649),
         ];
-        let mut rows: Vec<Row> = curve
+        let mut rows: Vec<FitRow> = curve
             .map(|(n, j)| row("p1", Variant::Optimised, n, Some(j)))
             .into();
-        assert_eq!(verdict(&rows, "reference model"), Verdict::Open);
+        assert_eq!(verdict(&rows, "reference model"), FindingVerdict::Open);
         rows.push(row("p1", Variant::Reference, 67, Some(0.6)));
         for claim in ["between 110 and 200", "hurt", "reference model"] {
-            assert_eq!(verdict(&rows, claim), Verdict::Confirmed, "{claim}");
+            assert_eq!(verdict(&rows, claim), FindingVerdict::Confirmed, "{claim}");
         }
-        assert_eq!(verdict(&rows, "after re-tiling"), Verdict::Open);
-        assert_eq!(verdict(&rows, "raise the mean fitness"), Verdict::Open);
+        assert_eq!(verdict(&rows, "after re-tiling"), FindingVerdict::Open);
+        assert_eq!(
+            verdict(&rows, "raise the mean fitness"),
+            FindingVerdict::Open
+        );
     }
 
     #[test]
     fn a_flat_curve_refutes_that_more_points_hurt() {
         let rows = [150, 300].map(|n| row("p1", Variant::Optimised, n, Some(0.8)));
-        assert_eq!(verdict(&rows, "hurt"), Verdict::Refuted);
-        assert_eq!(verdict(&rows, "between 110"), Verdict::Confirmed);
+        assert_eq!(verdict(&rows, "hurt"), FindingVerdict::Refuted);
+        assert_eq!(verdict(&rows, "between 110"), FindingVerdict::Confirmed);
     }
 }

@@ -1,118 +1,92 @@
 //! Every model fitted to every patient, in parallel over the patients.
+//!
+//! The organ is searched once in each patient, and each fit goes through the same functions as
+//! [`crate::segmentation`]. The result of every fit is written to a [`record`]; a result whose
+//! record has the right key is read and not computed again.
 
-use crate::cli::Bar;
-use crate::deform::{DeformError, DeformParameters, Place, fit_at};
-use crate::evaluate::cohort::{Cohort, read_volume};
-use crate::evaluate::models::Model;
-use crate::evaluate::record;
-use crate::evaluate::record::Key;
-use crate::evaluate::rows::{Agreed, Gold, Outcome, Row};
-use crate::evaluate::table::rounded;
+use super::cohort::{Cohort, read_volume};
+use super::cohort_fit::CohortFit;
+use super::error::EvaluateError;
+use super::files::write_whole;
+use super::models::CohortModel;
+use super::observer::{EvaluationObserver, EvaluationStep};
+use super::record::{self, Key};
+use super::rows::{FitOutcome, FitRow, Gold};
+use crate::deform::DeformParameters;
 use crate::export::{self, Format, Metadata};
-use crate::geometry::Vec3;
 use crate::grid::agreement::compare;
 use crate::grid::voxelise::{Mask, voxelise};
-use crate::locate::cup::Cup;
-use crate::mesh::TriMesh;
 use crate::progress::Monitor;
-use crate::segmentation::on_grid;
-use crate::segmentation::slices;
-use crate::segmentation::slices::Cut;
+use crate::segmentation::{OrganSearch, on_grid};
 use crate::volume::Volume;
-use anyhow::{Context, Result};
 use rayon::prelude::*;
-use std::cell::OnceCell;
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// What became of one fit. All numbers are [`rounded`], so that a result is the same whether
-/// it was just made or read again.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Fitted {
-    /// How it went.
-    pub outcome: Outcome,
-    /// Agreement with [`Gold::ALL`].
-    pub agreed: [Option<Agreed>; 2],
-    /// What the fit says of itself.
-    pub figures: BTreeMap<String, f64>,
-    /// The long axis.
-    pub cup: Option<Cup>,
-    /// The fitted nodes, LPS mm.
-    pub vertices: Vec<Vec3>,
-}
-
 /// All fits of one patient.
-pub struct Patient {
-    /// Its name.
+pub struct PatientFits {
+    /// The patient's name.
     pub case: String,
-    /// Which gold standards it has.
+    /// Whether the patient has a file for each of [`Gold::ALL`].
     pub golds: [bool; 2],
-    /// One for each model, in the models' order.
-    pub fits: Vec<Fitted>,
-    /// What is the matter with its files.
+    /// One for each model, in the order of the models.
+    pub fits: Vec<CohortFit>,
+    /// What is wrong with the patient's files or fits.
     pub problems: Vec<String>,
 }
 
-impl Patient {
-    /// Its rows of the table.
-    pub fn rows<'a>(&'a self, models: &'a [Model]) -> impl Iterator<Item = Row> + 'a {
-        models.iter().zip(&self.fits).map(|(model, fitted)| Row {
-            template: model.template.clone(),
-            kind: model.kind,
-            case: self.case.clone(),
-            outcome: fitted.outcome.clone(),
-            agreed: fitted.agreed,
-            golds: self.golds,
-            figures: fitted.figures.clone(),
-        })
-    }
+/// What all fits of a run have in common.
+pub struct FitRun<'a> {
+    /// How the models are fitted.
+    pub parameters: &'a DeformParameters,
+    /// Bytes that identify the program: results of another program are computed again.
+    pub program: &'a [u8],
+    /// Where records and fitted meshes go.
+    pub folder: &'a Path,
 }
 
-/// Fits all `models` to all patients of `cohort`; `folder` keeps what is done.
-pub fn run(
+/// Fits all `models` to all patients of `cohort`.
+///
+/// # Errors
+/// Where a record or a mesh cannot be written. A fit that fails is a result.
+pub fn fit_all(
     cohort: &Cohort,
-    models: &[Model],
-    parameters: &DeformParameters,
-    folder: &Path,
-    bar: &Bar,
-) -> Result<Vec<Patient>> {
-    let program = Key::of_this_program();
+    models: &[CohortModel],
+    run: &FitRun<'_>,
+    observer: &dyn EvaluationObserver,
+) -> Result<Vec<PatientFits>, EvaluateError> {
+    let key = Key::new().and(run.program);
     let done = AtomicUsize::new(0);
     let all = (cohort.patients.len() * models.len()).max(1);
     let advance = || {
         let count = 1 + done.fetch_add(1, Ordering::Relaxed);
-        bar.show("fit", count as f64 / all as f64);
+        observer.progress(EvaluationStep::Fits, count as f64 / all as f64);
     };
     cohort
         .patients
         .par_iter()
-        // One patient is one piece of work: they take long, and not equally long.
+        // Patients take long, and not equally long: each is a piece of work of its own.
         .with_max_len(1)
         .map(|case| {
-            let files = Files::read(cohort, case)?;
-            let key = files.add_to(program.clone());
-            let key = key.and(format!("{parameters:?}").as_bytes());
-            let desk = Desk {
-                case,
-                folder,
-                parameters,
-                key,
-            };
-            desk.fit_all(&files, models, &advance)
+            let files = PatientFiles::read(cohort, case);
+            let key = files
+                .add_to(key.clone())
+                .and(format!("{:?}", run.parameters).as_bytes());
+            let work = PatientWork { case, run, key };
+            work.fit_all(&files, models, &advance)
         })
         .collect()
 }
 
-/// A patient's files as they lie on disk.
-struct Files {
-    scan: std::result::Result<Vec<u8>, String>,
+/// A patient's files as bytes.
+struct PatientFiles {
+    scan: Result<Vec<u8>, String>,
     golds: [Option<Vec<u8>>; 2],
-    paths: [Option<std::path::PathBuf>; 3],
+    paths: [Option<PathBuf>; 3],
 }
 
-impl Files {
-    fn read(cohort: &Cohort, case: &str) -> Result<Self> {
+impl PatientFiles {
+    fn read(cohort: &Cohort, case: &str) -> Self {
         let scan = cohort.scan(case);
         let bytes = match &scan {
             Some(path) => std::fs::read(path).map_err(|e| e.to_string()),
@@ -121,11 +95,11 @@ impl Files {
         let paths = Gold::ALL.map(|gold| cohort.gold(case, gold));
         let golds = paths.clone().map(|p| p.and_then(|p| std::fs::read(p).ok()));
         let [expert, truth] = paths;
-        Ok(Self {
+        Self {
             scan: bytes,
             golds,
             paths: [scan, expert, truth],
-        })
+        }
     }
 
     fn add_to(&self, key: Key) -> Key {
@@ -140,19 +114,23 @@ impl Files {
     }
 }
 
-/// One patient's work.
-struct Desk<'a> {
+/// One patient's part of the run.
+struct PatientWork<'a> {
     case: &'a str,
-    folder: &'a Path,
-    parameters: &'a DeformParameters,
+    run: &'a FitRun<'a>,
     key: Key,
 }
 
-impl Desk<'_> {
-    fn fit_all(&self, files: &Files, models: &[Model], advance: &impl Fn()) -> Result<Patient> {
-        // Read when the first fit is needed that is not there yet.
-        let mut scene: Option<Scene> = None;
-        let mut patient = Patient {
+impl PatientWork<'_> {
+    fn fit_all(
+        &self,
+        files: &PatientFiles,
+        models: &[CohortModel],
+        advance: &impl Fn(),
+    ) -> Result<PatientFits, EvaluateError> {
+        // Read when the first fit is needed that has no record.
+        let mut images: Option<PatientImages> = None;
+        let mut patient = PatientFits {
             case: self.case.to_owned(),
             golds: files.golds.each_ref().map(Option::is_some),
             fits: Vec::new(),
@@ -160,50 +138,68 @@ impl Desk<'_> {
         };
         for model in models {
             let name = format!("{}_{}", self.case, model.name());
-            let path = self.folder.join(format!("{name}.json"));
+            let path = self.run.folder.join(format!("{name}.json"));
             let key = self.key.clone().and(&model.json).text();
-            let fitted = match record::read(&path, &key) {
+            let fit = match record::read(&path, &key) {
                 Some(kept) => kept,
                 None => {
-                    let scene = scene.get_or_insert_with(|| Scene::read(files));
-                    let fitted = scene.fit(model, self.parameters);
-                    self.write_mesh(&name, model, &fitted)?;
-                    record::write(&path, &key, &fitted)?;
-                    fitted
+                    let images = images.get_or_insert_with(|| PatientImages::read(files));
+                    let fit = images.fit(model, self.run.parameters);
+                    self.write_mesh(&name, model, &fit)?;
+                    record::write(&path, &key, &fit)?;
+                    fit
                 }
             };
-            patient.fits.push(fitted);
+            patient.fits.push(fit);
             advance();
         }
         patient.note_problems(models);
         Ok(patient)
     }
 
-    /// The fitted mesh, for `ventriform statistics` and whoever wants to look at it.
-    fn write_mesh(&self, name: &str, model: &Model, fitted: &Fitted) -> Result<()> {
-        if fitted.vertices.is_empty() {
+    /// Writes the fitted mesh, for `ventriform statistics` and for viewers.
+    fn write_mesh(
+        &self,
+        name: &str,
+        model: &CohortModel,
+        fit: &CohortFit,
+    ) -> Result<(), EvaluateError> {
+        if fit.vertices.is_empty() {
             return Ok(());
         }
-        let mesh = fitted.mesh(model);
+        let mesh = fit.mesh(model);
         let title = format!("{} fitted to {}", model.name(), self.case);
         let bytes = export::encode(Format::Json, &mesh, &Metadata::new(title))?;
-        record::write_file(&self.folder.join(format!("{name}.mesh.json")), &bytes)
+        write_whole(&self.run.folder.join(format!("{name}.mesh.json")), &bytes)
     }
 }
 
-impl Patient {
-    /// Says which fits were lost, and once what every fit of the patient complains of.
-    fn note_problems(&mut self, models: &[Model]) {
-        for (model, fitted) in models.iter().zip(&self.fits) {
-            let problem = match &fitted.outcome {
-                Outcome::Fitted(_) => None,
-                Outcome::Lost(reason) => Some(format!("{} lost: {reason}", model.name())),
-                Outcome::Unreadable(reason) => Some(format!("not read: {reason}")),
+impl PatientFits {
+    /// The patient's rows of the table.
+    pub fn rows<'a>(&'a self, models: &'a [CohortModel]) -> impl Iterator<Item = FitRow> + 'a {
+        models.iter().zip(&self.fits).map(|(model, fit)| FitRow {
+            template: model.template.clone(),
+            kind: model.kind,
+            case: self.case.clone(),
+            outcome: fit.outcome.clone(),
+            agreed: fit.agreed,
+            golds: self.golds,
+            figures: fit.figures.clone(),
+        })
+    }
+
+    /// Notes every fit that was lost, and once each problem that all fits of the patient have.
+    fn note_problems(&mut self, models: &[CohortModel]) {
+        for (model, fit) in models.iter().zip(&self.fits) {
+            let problem = match &fit.outcome {
+                FitOutcome::Fitted(_) => None,
+                FitOutcome::Lost(reason) => Some(format!("{} lost: {reason}", model.name())),
+                FitOutcome::Unreadable(reason) => Some(format!("not read: {reason}")),
             };
             let gold = Gold::ALL.into_iter().filter_map(|gold| {
                 let unusable = self.golds[gold as usize]
-                    && fitted.agreed[gold as usize].is_none()
-                    && matches!(fitted.outcome, Outcome::Fitted(_));
+                    && fit.agreed[gold as usize].is_none()
+                    && matches!(fit.outcome, FitOutcome::Fitted(_));
                 unusable.then(|| format!("{} cannot be used", gold.file()))
             });
             for problem in problem.into_iter().chain(gold) {
@@ -215,42 +211,20 @@ impl Patient {
     }
 }
 
-impl Fitted {
-    /// The fitted mesh.
-    pub fn mesh(&self, model: &Model) -> TriMesh {
-        TriMesh {
-            vertices: self.vertices.clone(),
-            triangles: model.ready.mesh.triangles.clone(),
-        }
-    }
-
-    fn without_fit(outcome: Outcome) -> Self {
-        Self {
-            outcome,
-            agreed: [None; 2],
-            figures: BTreeMap::new(),
-            cup: None,
-            vertices: Vec::new(),
-        }
-    }
-}
-
-/// A patient's volume with its gold standards on the same grid.
-pub struct Scene {
-    volume: std::result::Result<Volume, String>,
+/// A patient's volume, and the gold standards on its grid.
+struct PatientImages {
+    volume: Result<Volume, String>,
     golds: [Option<Mask>; 2],
-    /// Where the ventricle is, once it was looked for.
-    place: OnceCell<std::result::Result<Place, DeformError>>,
+    search: OrganSearch,
 }
 
-impl Scene {
-    fn read(files: &Files) -> Self {
+impl PatientImages {
+    fn read(files: &PatientFiles) -> Self {
         let [scan, golds @ ..] = &files.paths;
         let volume = match (scan, &files.scan) {
-            (Some(path), Ok(_)) => read_volume(path).map(|r| r.volume).map_err(|e| {
-                // The path is the case's; the reason is what matters.
-                format!("{}", e.root_cause())
-            }),
+            (Some(path), Ok(_)) => read_volume(path)
+                .map(|reading| reading.volume)
+                .map_err(|error| error.to_string()),
             (_, Err(reason)) => Err(reason.clone()),
             (None, Ok(_)) => Err("its scan is gone".to_owned()),
         };
@@ -261,93 +235,24 @@ impl Scene {
         Self {
             volume,
             golds,
-            place: OnceCell::new(),
+            search: OrganSearch::default(),
         }
     }
 
-    fn fit(&self, model: &Model, parameters: &DeformParameters) -> Fitted {
+    fn fit(&mut self, model: &CohortModel, parameters: &DeformParameters) -> CohortFit {
         let volume = match &self.volume {
             Ok(volume) => volume,
-            Err(reason) => return Fitted::without_fit(Outcome::Unreadable(reason.clone())),
+            Err(reason) => return CohortFit::without_fit(FitOutcome::Unreadable(reason.clone())),
         };
         let silent = Monitor::silent();
-        let place = self
-            .place
-            .get_or_init(|| Place::find(volume, &model.ready, parameters, &silent));
-        let found = match place
-            .as_ref()
-            .map_err(Clone::clone)
-            .and_then(|place| fit_at(place, volume, &model.ready, parameters, &silent))
-        {
-            Ok(found) => found,
-            Err(error) => return Fitted::without_fit(Outcome::Lost(error.to_string())),
+        let fit = match self.search.fit(volume, &model.ready, parameters, &silent) {
+            Ok(fit) => fit,
+            Err(error) => return CohortFit::without_fit(FitOutcome::Lost(error.to_string())),
         };
-        let mask = voxelise(&found.mesh, volume.shape, &volume.frame);
+        let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
         let spacing = volume.frame.spacing();
-        let agreed = self.golds.each_ref().map(|gold| {
-            let a = compare(&mask, gold.as_ref()?, spacing, &silent).ok()?;
-            Some(Agreed {
-                jaccard: rounded(a.jaccard),
-                contour_voxels: a.contours.map(|c| rounded(c.mean_voxels)),
-                contour_mm: a.contours.map(|c| rounded(c.mean_mm)),
-                dice: rounded(a.dice),
-                hausdorff95_mm: a.contours.map(|c| rounded(c.hausdorff95_mm)),
-            })
-        });
-        let mut figures = BTreeMap::from([
-            ("confidence", found.confidence),
-            ("merit", found.merit()),
-            ("iterations", found.iterations as f64),
-            ("self_intersections", found.self_intersections as f64),
-            ("wall_ml", found.wall_ml),
-            ("flags", found.flags.len() as f64),
-        ]);
-        if let Some(wall) = &found.wall {
-            figures.insert("cavity_ml", wall.cavity_ml);
-        }
-        let figures = figures
-            .into_iter()
-            .filter(|(_, value)| value.is_finite())
-            .map(|(name, value)| (name.to_owned(), rounded(value)))
-            .collect();
-        Fitted {
-            outcome: Outcome::Fitted(found.reason.as_str().to_owned()),
-            agreed,
-            figures,
-            cup: found.cup.map(|c| Cup {
-                centre: c.centre.map(rounded),
-                axis: c.axis.map(rounded),
-                length: rounded(c.length),
-                breadth: rounded(c.breadth),
-            }),
-            vertices: found.mesh.vertices.iter().map(|v| v.map(rounded)).collect(),
-        }
+        let agreements = (self.golds.each_ref())
+            .map(|gold| compare(&mask, gold.as_ref()?, spacing, &silent).ok());
+        CohortFit::of(&fit, agreements)
     }
-}
-
-/// The picture of a patient with one of its fits; `None` where there is none to show.
-pub fn picture(
-    cohort: &Cohort,
-    case: &str,
-    model: &Model,
-    fitted: &Fitted,
-) -> Result<Option<Vec<u8>>> {
-    let (Some(cup), Some(scan)) = (&fitted.cup, cohort.scan(case)) else {
-        return Ok(None);
-    };
-    let volume = read_volume(&scan)
-        .context("the scan was readable a moment ago")?
-        .volume;
-    let expert = cohort.gold(case, Gold::Expert).and_then(|path| {
-        on_grid(
-            &read_volume(&path).ok()?.volume,
-            &volume,
-            &Monitor::silent(),
-        )
-        .ok()
-    });
-    let mesh = fitted.mesh(model);
-    let (cut, silent) = (Cut::heart(cup, &Vec3::z()), Monitor::silent());
-    let png = slices::png(&volume, &mesh, &cut, expert.as_ref(), &silent)?;
-    Ok(Some(png))
 }

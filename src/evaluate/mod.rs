@@ -1,20 +1,132 @@
-//! How well a cohort is segmented, and what a set of fits has in common.
+//! The paper's evaluation on a cohort: how well models segment, against which gold standard,
+//! and what the paper's findings become.
 //!
-//! - [`cohort`], [`models`], [`fits`], [`record`]: who is in the folder, the models of the
-//!   templates, their fits to the patients, and how these are kept.
+//! In goes a folder of scans with gold standards; out come tables, a page, the models and every
+//! fit ([`evaluate`]).
 //!
-//! - [`rows`]: many fits; means, and what they say about the paper's findings ([`findings`]).
-//! - [`table`], [`page`]: the same as CSV and JSON, and as one page with [`plot`]s and
-//!   [`slices`](crate::segmentation::slices).
-//! - [`statistics`]: mean shape and principal modes.
+//! 1. [`cohort`]: which cases are templates, which are patients, and their files.
+//! 2. [`models`]: the models of the templates, ours at every number of points and the reference
+//!    model.
+//! 3. [`fits`]: every model fitted to every patient by the functions of
+//!    [`crate::segmentation`]; results are kept in [`record`]s, so that a run that was stopped
+//!    continues where it ended.
+//! 4. [`rows`]: the table of all fits, and means over it; [`findings`]: what they say about
+//!    each of the paper's findings.
+//! 5. [`pictures`], [`table`], [`page`]: slices, CSV and JSON, and one page with [`plot`]s.
+//!
+//! [`statistics`] stands beside this: mean shape and principal modes of fits of one model.
+//!
+//! Guaranteed: the same cohort, parameters and program give the same bytes, on any number of
+//! threads and however often the run was stopped.
 
 pub mod cohort;
+pub mod cohort_fit;
+pub mod error;
+pub mod files;
 pub mod findings;
 pub mod fits;
 pub mod models;
+pub mod observer;
 pub mod page;
+pub mod parameters;
+pub mod pictures;
 pub mod plot;
 pub mod record;
 pub mod rows;
 pub mod statistics;
 pub mod table;
+
+pub use cohort::{Cohort, CohortError};
+pub use error::EvaluateError;
+pub use observer::{EvaluationObserver, EvaluationStep};
+pub use parameters::EvaluationParameters;
+
+use files::{make_folder, write_whole};
+use findings::findings;
+use fits::{FitRun, PatientFits};
+use models::CohortModel;
+use rows::FitRow;
+use std::path::Path;
+use table::Evaluation;
+
+/// Evaluates `cohort` and writes everything to the folder `out`: `evaluation.html`,
+/// `evaluation.json`, `table1.csv`, `figure3.csv`, `fits.csv`, `models/` and `fits/`. `program`
+/// is any bytes that identify the program: fits of another program are made again.
+///
+/// # Errors
+/// Where a parameter is out of range, no model can be made, or the results cannot be written. A
+/// single template, patient or fit that fails is named in the results and is no error.
+pub fn evaluate(
+    cohort: &Cohort,
+    parameters: &EvaluationParameters,
+    program: &[u8],
+    out: &Path,
+    observer: &dyn EvaluationObserver,
+) -> Result<Evaluation, EvaluateError> {
+    parameters.validate()?;
+    let (models_folder, fits_folder) = (out.join("models"), out.join("fits"));
+    make_folder(&models_folder)?;
+    make_folder(&fits_folder)?;
+    observer.progress(EvaluationStep::Models, 0.0);
+    let (models, problems) = models::build(cohort, parameters);
+    if models.is_empty() {
+        let reasons = problems.into_iter().map(|(_, reason)| reason).collect();
+        return Err(EvaluateError::NoModel { reasons });
+    }
+    for model in &models {
+        let path = models_folder.join(format!("{}.json", model.name()));
+        write_whole(&path, &model.json)?;
+    }
+    let run = FitRun {
+        parameters: &parameters.deform,
+        program,
+        folder: &fits_folder,
+    };
+    let patients = fits::fit_all(cohort, &models, &run, observer)?;
+    observer.progress(EvaluationStep::Pictures, 1.0);
+    let mut evaluation = summarise(cohort, &models, &patients, problems)?;
+    evaluation.settings = parameters.settings(cohort);
+    write_results(out, &evaluation)?;
+    Ok(evaluation)
+}
+
+fn summarise(
+    cohort: &Cohort,
+    models: &[CohortModel],
+    patients: &[PatientFits],
+    of_models: Vec<(String, String)>,
+) -> Result<Evaluation, EvaluateError> {
+    let rows: Vec<FitRow> = patients.iter().flat_map(|p| p.rows(models)).collect();
+    let of_patients = patients
+        .iter()
+        .flat_map(|p| p.problems.iter().map(|text| (p.case.clone(), text.clone())));
+    let problems = cohort.problems.iter().cloned();
+    let figure3: Vec<_> = models.iter().map(|m| m.row.clone()).collect();
+    Ok(Evaluation {
+        settings: Vec::new(),
+        templates: cohort
+            .templates
+            .iter()
+            .filter_map(|t| Some((t.clone(), cohort.source(t)?.1.to_owned())))
+            .collect(),
+        problems: problems.chain(of_models).chain(of_patients).collect(),
+        findings: findings(&rows, &figure3),
+        pictures: pictures::draw(cohort, models, patients, &rows)?,
+        models: figure3,
+        rows,
+    })
+}
+
+fn write_results(out: &Path, evaluation: &Evaluation) -> Result<(), EvaluateError> {
+    let json = serde_json::to_vec_pretty(&table::to_json(evaluation))?;
+    for (name, bytes) in [
+        ("fits.csv", table::fits_csv(&evaluation.rows)?),
+        ("table1.csv", table::table1_csv(&evaluation.rows)?),
+        ("figure3.csv", table::figure3_csv(&evaluation.models)?),
+        ("evaluation.json", json),
+        ("evaluation.html", page::html(evaluation).into_bytes()),
+    ] {
+        write_whole(&out.join(name), &bytes)?;
+    }
+    Ok(())
+}

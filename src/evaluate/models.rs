@@ -1,37 +1,38 @@
 //! The models of a cohort's templates: ours at every number of points, before and after fit
 //! and flips, and the reference model.
 
-use crate::cli::evaluate::EvaluateArgs;
+use super::cohort::{Cohort, read_volume};
+use super::parameters::{EvaluationParameters, ascending};
+use super::rows::{ModelKind, ModelRow, Variant, average};
 use crate::decimate::decimate;
-use crate::deform::template::{Organ, Template};
-use crate::evaluate::cohort::{Cohort, read_volume};
-use crate::evaluate::rows::{Kind, ModelRow, Variant, average};
 use crate::export::{self, Format, Metadata};
 use crate::geometry::triangle::radius_ratio;
 use crate::mesh::TriMesh;
+use crate::model::{Organ, Template};
 use crate::optimise::{self, Reference};
-use crate::parameters::ModelParameters;
+use crate::parameters::{ModelParameters, ParameterError};
 use crate::pipeline::starts;
 use crate::progress::Monitor;
-use crate::surface::{self, Surface};
-use anyhow::{Context, Result};
+use crate::surface::{self, Surface, SurfaceError};
+use crate::volume::VolumeError;
 use rayon::prelude::*;
+use std::path::PathBuf;
 
-/// A model, ready to be fitted.
-pub struct Model {
+/// A model of a template, ready to be fitted.
+pub struct CohortModel {
     /// The case that it was made from.
     pub template: String,
     /// Its kind.
-    pub kind: Kind,
-    /// Its place in Figure 3.
+    pub kind: ModelKind,
+    /// Its figures for Figure 3.
     pub row: ModelRow,
-    /// Prepared for fitting.
+    /// The model prepared for fitting.
     pub ready: Template,
-    /// Its file.
+    /// The model as a JSON file.
     pub json: Vec<u8>,
 }
 
-impl Model {
+impl CohortModel {
     /// The name of its file and of its fits' files.
     pub fn name(&self) -> String {
         format!(
@@ -43,51 +44,85 @@ impl Model {
     }
 }
 
-/// Makes every model that `args` asks for; what cannot be made becomes a problem.
-pub fn build(cohort: &Cohort, args: &EvaluateArgs) -> (Vec<Model>, Vec<(String, String)>) {
-    let made: Vec<Vec<Result<Model>>> = cohort
+/// Why a model could not be made.
+#[derive(Debug, thiserror::Error)]
+enum ModelError {
+    #[error("its files are gone")]
+    Gone,
+    #[error("{}: {error}", path.display())]
+    Read { path: PathBuf, error: VolumeError },
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
+    #[error("{0}. {fix}", fix = .0.fix)]
+    Parameter(#[from] ParameterError),
+    #[error("{what}: {error}")]
+    Step {
+        what: String,
+        error: Box<dyn std::error::Error + Send + Sync>,
+    },
+}
+
+/// Puts the step before the error of a stage.
+fn during<E: std::error::Error + Send + Sync + 'static>(
+    what: impl FnOnce() -> String,
+) -> impl FnOnce(E) -> ModelError {
+    move |error| ModelError::Step {
+        what: what(),
+        error: error.into(),
+    }
+}
+
+/// Makes every model that `parameters` ask for. Returns the models and, for each that could not
+/// be made, the template and the reason.
+pub fn build(
+    cohort: &Cohort,
+    parameters: &EvaluationParameters,
+) -> (Vec<CohortModel>, Vec<(String, String)>) {
+    let made: Vec<Vec<Result<CohortModel, ModelError>>> = cohort
         .templates
         .par_iter()
-        .map(|case| of_template(cohort, case, args).unwrap_or_else(|error| vec![Err(error)]))
+        .map(|case| of_template(cohort, case, parameters).unwrap_or_else(|error| vec![Err(error)]))
         .collect();
     let (mut models, mut problems) = (Vec::new(), Vec::new());
     for (case, made) in cohort.templates.iter().zip(made) {
         for model in made {
             match model {
                 Ok(model) => models.push(model),
-                Err(error) => problems.push((case.clone(), format!("no model: {error:#}"))),
+                Err(error) => problems.push((case.clone(), format!("no model: {error}"))),
             }
         }
     }
     (models, problems)
 }
 
-fn of_template(cohort: &Cohort, case: &str, args: &EvaluateArgs) -> Result<Vec<Result<Model>>> {
-    let (path, _) = cohort.source(case).context("its files are gone")?;
-    let reading = read_volume(&path)?;
-    let parameters = args.model_parameters(None)?;
-    let surface = surface::extract(&reading.volume, &parameters.surface, &Monitor::silent())?;
-    let workshop = Workshop {
+fn of_template(
+    cohort: &Cohort,
+    case: &str,
+    parameters: &EvaluationParameters,
+) -> Result<Vec<Result<CohortModel, ModelError>>, ModelError> {
+    let (path, _) = cohort.source(case).ok_or(ModelError::Gone)?;
+    let reading = read_volume(&path).map_err(|error| ModelError::Read { path, error })?;
+    let defaults = parameters.model_parameters(None)?;
+    let surface = surface::extract(&reading.volume, &defaults.surface, &Monitor::silent())?;
+    let source = TemplateSurface {
         case,
         reference: Reference::new(&surface),
         surface,
     };
+    let makes = |variant: Variant| parameters.variants.contains(&variant);
     let mut models = Vec::new();
-    if args.makes(Variant::Reference) {
-        for points in args.reference_points() {
-            models.push(workshop.thin_out(points));
+    if makes(Variant::Reference) {
+        for points in ascending(&parameters.reference_points) {
+            models.push(source.thin_out(points));
         }
     }
-    for points in args.cohort.points() {
-        let made = args
+    for points in ascending(&parameters.points) {
+        let made = parameters
             .model_parameters(Some(points))
-            .and_then(|p| workshop.retile(points, &p));
+            .map_err(ModelError::from)
+            .and_then(|own| source.retile(points, &own));
         match made {
-            Ok(made) => models.extend(
-                made.into_iter()
-                    .filter(|m| args.makes(m.kind.variant))
-                    .map(Ok),
-            ),
+            Ok(made) => models.extend(made.into_iter().filter(|m| makes(m.kind.variant)).map(Ok)),
             Err(error) => models.push(Err(error)),
         }
     }
@@ -95,41 +130,51 @@ fn of_template(cohort: &Cohort, case: &str, args: &EvaluateArgs) -> Result<Vec<R
 }
 
 /// One template's surface, which all its models are made of.
-struct Workshop<'a> {
+struct TemplateSurface<'a> {
     case: &'a str,
     surface: Surface,
     reference: Reference,
 }
 
-impl Workshop<'_> {
-    fn thin_out(&self, points: usize) -> Result<Model> {
+impl TemplateSurface<'_> {
+    fn thin_out(&self, points: usize) -> Result<CohortModel, ModelError> {
         let mesh = decimate(&self.surface.mesh, points, &Monitor::silent())
-            .with_context(|| format!("the reference model of {points} points"))?;
+            .map_err(during(|| format!("the reference model of {points} points")))?;
         self.finish(mesh, Variant::Reference, points)
     }
 
-    fn retile(&self, points: usize, parameters: &ModelParameters) -> Result<[Model; 2]> {
+    fn retile(
+        &self,
+        points: usize,
+        parameters: &ModelParameters,
+    ) -> Result<[CohortModel; 2], ModelError> {
         let monitor = Monitor::silent();
-        let context = || format!("{points} points");
-        let tiled = starts::tile(&self.surface, parameters, &monitor).with_context(context)?;
+        let what = || format!("{points} points");
+        let tiled = starts::tile(&self.surface, parameters, &monitor).map_err(during(what))?;
         let best = starts::best(tiled, &self.reference, parameters, &monitor, |_| {})
-            .with_context(context)?;
+            .map_err(during(what))?;
         Ok([
             self.finish(best.tiled.mesh, Variant::Retiled, points)?,
             self.finish(best.optimised.mesh, Variant::Optimised, points)?,
         ])
     }
 
-    fn finish(&self, mesh: TriMesh, variant: Variant, points: usize) -> Result<Model> {
-        let context = || format!("{} model of {points} points", variant.as_str());
-        let fitness = optimise::assess(&mesh, &self.reference, [1.0; 4]).with_context(context)?;
+    /// Measures `mesh` and prepares it for fitting.
+    fn finish(
+        &self,
+        mesh: TriMesh,
+        variant: Variant,
+        points: usize,
+    ) -> Result<CohortModel, ModelError> {
+        let what = || format!("{} model of {points} points", variant.as_str());
+        let fitness = optimise::assess(&mesh, &self.reference, [1.0; 4]).map_err(during(what))?;
         let shapes: Vec<f64> = (0..mesh.triangles.len())
             .map(|t| {
                 let [a, b, c] = mesh.corners(t);
                 radius_ratio(&a, &b, &c)
             })
             .collect();
-        let kind = Kind { variant, points };
+        let kind = ModelKind { variant, points };
         let row = ModelRow {
             template: self.case.to_owned(),
             kind,
@@ -140,10 +185,11 @@ impl Workshop<'_> {
             worst_shape: shapes.iter().copied().fold(1.0, f64::min),
         };
         let title = format!("{}, {} of {points} points", self.case, variant.title());
-        let json = export::encode(Format::Json, &mesh, &Metadata::new(title))?;
+        let json =
+            export::encode(Format::Json, &mesh, &Metadata::new(title)).map_err(during(what))?;
         let ready =
-            Template::new(mesh, Organ::LeftVentricle, &Monitor::silent()).with_context(context)?;
-        Ok(Model {
+            Template::new(mesh, Organ::LeftVentricle, &Monitor::silent()).map_err(during(what))?;
+        Ok(CohortModel {
             template: self.case.to_owned(),
             kind,
             row,

@@ -6,7 +6,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 
 use super::plot::{Series, escape, plot};
-use super::rows::{self, Cell, Gold, Kind, ModelRow, Row, Variant};
+use super::rows::{self, Cell, FitRow, Gold, ModelKind, ModelRow, Variant};
 use super::table::{Evaluation, table1};
 use crate::segmentation::slices;
 
@@ -131,7 +131,7 @@ fn figure3(out: &mut String, models: &[ModelRow]) {
     out.push_str("</div>\n");
 }
 
-fn agreement(out: &mut String, rows: &[Row], gold: Gold) {
+fn agreement(out: &mut String, rows: &[FitRow], gold: Gold) {
     let (title, about) = match gold {
         Gold::Expert => (
             "Agreement with the expert",
@@ -197,7 +197,7 @@ fn agreement(out: &mut String, rows: &[Row], gold: Gold) {
     }
 }
 
-fn table_line(out: &mut String, rows: &[Row], case: &str, cells: &[(Kind, Option<Cell>)]) {
+fn table_line(out: &mut String, rows: &[FitRow], case: &str, cells: &[(ModelKind, Option<Cell>)]) {
     let class = if case == "mean" {
         " class=\"mean\""
     } else {
@@ -231,8 +231,8 @@ fn table_line(out: &mut String, rows: &[Row], case: &str, cells: &[(Kind, Option
 }
 
 /// What a cell without figures says.
-fn why_empty(rows: &[Row], case: &str) -> &'static str {
-    let unreadable = |r: &Row| matches!(r.outcome, rows::Outcome::Unreadable(_));
+fn why_empty(rows: &[FitRow], case: &str) -> &'static str {
+    let unreadable = |r: &FitRow| matches!(r.outcome, rows::FitOutcome::Unreadable(_));
     if rows.iter().any(|r| r.case == case && unreadable(r)) {
         "unreadable"
     } else {
@@ -241,7 +241,7 @@ fn why_empty(rows: &[Row], case: &str) -> &'static str {
 }
 
 /// One line for each variant, thin ones for the templates of the finished models.
-fn curves(rows: &[Row], gold: Gold, pick: fn(&Cell) -> Option<f64>) -> Vec<Series> {
+fn curves(rows: &[FitRow], gold: Gold, pick: fn(&Cell) -> Option<f64>) -> Vec<Series> {
     let kinds = rows::kinds(rows);
     let line = |variant: Variant, template: Option<&str>| -> Vec<(f64, f64)> {
         kinds
@@ -318,7 +318,7 @@ mod tests {
             row("p3", Variant::Optimised, 67, None),
             row("p4", Variant::Optimised, 67, None),
         ];
-        rows[4].outcome = rows::Outcome::Unreadable("truncated".into());
+        rows[4].outcome = rows::FitOutcome::Unreadable("truncated".into());
         let evaluation = Evaluation {
             findings: findings(&rows, &[]),
             rows,

@@ -1,15 +1,14 @@
-//! A fit's result as it is kept, so that a run that was stopped goes on where it was.
+//! The file of one fit's result, so that a run that was stopped continues where it ended.
 //!
-//! A record is believed only if its key is the one that the run would give it now: the
-//! SHA-256 of everything that the fit depends on (this program, the model, the patient's
-//! files, the parameters). It is written to a file beside its own and renamed, so that a run
-//! killed in the midst of writing leaves no half record.
+//! A record is used only if its key is the one that this run would give it: the SHA-256 of
+//! everything that the fit depends on (program, model, the patient's files, parameters).
 
-use crate::evaluate::fits::Fitted;
-use crate::evaluate::rows::{Agreed, Outcome};
+use super::cohort_fit::CohortFit;
+use super::error::EvaluateError;
+use super::files::write_whole;
+use super::rows::{Agreed, FitOutcome};
 use crate::geometry::Vec3;
 use crate::locate::cup::Cup;
-use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -18,18 +17,19 @@ use std::path::Path;
 #[derive(Serialize, Deserialize)]
 struct Record {
     key: String,
-    outcome: Outcome,
+    outcome: FitOutcome,
     agreed: [Option<Agreed>; 2],
     figures: BTreeMap<String, f64>,
     /// Centre, axis, length and breadth.
     cup: Option<([f64; 3], [f64; 3], f64, f64)>,
+    superior: [f64; 3],
     vertices: Vec<[f64; 3]>,
 }
 
-/// The result kept at `path` under `key`.
-pub fn read(path: &Path, key: &str) -> Option<Fitted> {
+/// The result in the file `path`; `None` if there is no whole record with this key.
+pub fn read(path: &Path, key: &str) -> Option<CohortFit> {
     let record: Record = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
-    (record.key == key).then(|| Fitted {
+    (record.key == key).then(|| CohortFit {
         outcome: record.outcome,
         agreed: record.agreed,
         figures: record.figures,
@@ -39,46 +39,41 @@ pub fn read(path: &Path, key: &str) -> Option<Fitted> {
             length,
             breadth,
         }),
+        superior: record.superior.into(),
         vertices: record.vertices.into_iter().map(Vec3::from).collect(),
     })
 }
 
-/// Keeps `fitted` at `path` under `key`.
-pub fn write(path: &Path, key: &str, fitted: &Fitted) -> Result<()> {
+/// Writes the result with its key to the file `path`.
+///
+/// # Errors
+/// [`EvaluateError::Write`].
+pub fn write(path: &Path, key: &str, fit: &CohortFit) -> Result<(), EvaluateError> {
     let record = Record {
         key: key.to_owned(),
-        outcome: fitted.outcome.clone(),
-        agreed: fitted.agreed,
-        figures: fitted.figures.clone(),
-        cup: fitted
+        outcome: fit.outcome.clone(),
+        agreed: fit.agreed,
+        figures: fit.figures.clone(),
+        cup: fit
             .cup
             .map(|c| (c.centre.into(), c.axis.into(), c.length, c.breadth)),
-        vertices: fitted.vertices.iter().map(|v| (*v).into()).collect(),
+        superior: fit.superior.into(),
+        vertices: fit.vertices.iter().map(|v| (*v).into()).collect(),
     };
-    write_file(path, &serde_json::to_vec(&record)?)
-}
-
-/// Writes a file all at once or not at all.
-pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let beside = path.with_file_name(format!(".{name}.part"));
-    std::fs::write(&beside, bytes)
-        .and_then(|()| std::fs::rename(&beside, path))
-        .with_context(|| format!("cannot write {}", path.display()))
+    write_whole(path, &serde_json::to_vec(&record)?)
 }
 
 /// A SHA-256 over parts, each with its length, so that no two lists of parts read the same.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct Key(Sha256);
 
 impl Key {
-    /// Begins with this program: another build may fit otherwise.
-    pub fn of_this_program() -> Self {
-        let program = std::env::current_exe().and_then(std::fs::read);
-        Self(Sha256::new()).and(&program.unwrap_or_default())
+    /// The key of no parts.
+    pub fn new() -> Self {
+        Self(Sha256::new())
     }
 
-    /// The key with one part more.
+    /// The key with one more part.
     pub fn and(mut self, part: &[u8]) -> Self {
         self.0.update((part.len() as u64).to_le_bytes());
         self.0.update(part);
@@ -94,14 +89,14 @@ impl Key {
 
 #[cfg(test)]
 mod tests {
-    use crate::evaluate::record::*;
+    use super::*;
 
     #[test]
     fn a_record_is_read_again_under_its_key_alone() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.json");
-        let fitted = Fitted {
-            outcome: Outcome::Fitted("converged".into()),
+        let fitted = CohortFit {
+            outcome: FitOutcome::Fitted("converged".into()),
             agreed: [
                 Some(Agreed {
                     jaccard: 0.812_345,
@@ -119,6 +114,7 @@ mod tests {
                 length: 80.000_001,
                 breadth: 1.1,
             }),
+            superior: Vec3::z(),
             vertices: vec![Vec3::new(0.1, 0.2, 0.3)],
         };
         write(&path, "k1", &fitted).unwrap();
@@ -133,10 +129,7 @@ mod tests {
 
     #[test]
     fn keys_tell_lists_of_parts_apart() {
-        let key = |parts: &[&[u8]]| {
-            let start = Key(Sha256::new());
-            parts.iter().fold(start, |k, p| k.and(p)).text()
-        };
+        let key = |parts: &[&[u8]]| parts.iter().fold(Key::new(), |k, p| k.and(p)).text();
         assert_eq!(key(&[b"ab", b"c"]), key(&[b"ab", b"c"]));
         assert_ne!(key(&[b"ab", b"c"]), key(&[b"a", b"bc"]));
         assert_ne!(key(&[b"abc"]), key(&[b"abc", b""]));

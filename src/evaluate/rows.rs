@@ -1,9 +1,8 @@
-//! The results of a cohort: one [`Row`] for each model fitted to each patient, one
+//! The results of a cohort: one [`FitRow`] for each model fitted to each patient, one
 //! [`ModelRow`] for each model, and means over them.
 //!
-//! A fit that failed counts as no agreement at all (E_J = 0), lest losing a hard case raise a
-//! mean. What there is nothing to measure against is left out of means: a patient without a
-//! gold standard, or one whose scan could not be read.
+//! A fit that failed counts as E_J = 0, so that losing a hard case does not raise a mean. Patients
+//! without a gold standard, or whose scan could not be read, are left out of means.
 
 use std::collections::BTreeMap;
 
@@ -33,7 +32,7 @@ impl Variant {
         }
     }
 
-    /// What it is, for people.
+    /// A description for readers.
     pub fn title(self) -> &'static str {
         match self {
             Variant::Reference => "reference model",
@@ -73,40 +72,40 @@ impl Gold {
     }
 }
 
-/// One kind of model: what a mean is taken over.
+/// Variant and number of points of a model: means are taken over models of one kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Kind {
+pub struct ModelKind {
     /// Which kind.
     pub variant: Variant,
     /// Number of points.
     pub points: usize,
 }
 
-/// How the attempt to fit went.
+/// How a fit went.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Outcome {
-    /// There is a fit; why its motion ended.
+pub enum FitOutcome {
+    /// There is a fit; the reason why its motion ended.
     Fitted(String),
-    /// There is none, and why.
+    /// There is no fit; the reason.
     Lost(String),
-    /// The scan could not be read; nothing was tried.
+    /// The scan could not be read; the reason.
     Unreadable(String),
 }
 
-impl Outcome {
+impl FitOutcome {
     /// The reason alone.
     pub fn reason(&self) -> &str {
         match self {
-            Outcome::Fitted(r) | Outcome::Lost(r) | Outcome::Unreadable(r) => r,
+            FitOutcome::Fitted(r) | FitOutcome::Lost(r) | FitOutcome::Unreadable(r) => r,
         }
     }
 
     /// The state alone.
     pub fn as_str(&self) -> &'static str {
         match self {
-            Outcome::Fitted(_) => "fitted",
-            Outcome::Lost(_) => "lost",
-            Outcome::Unreadable(_) => "unreadable",
+            FitOutcome::Fitted(_) => "fitted",
+            FitOutcome::Lost(_) => "lost",
+            FitOutcome::Unreadable(_) => "unreadable",
         }
     }
 }
@@ -128,28 +127,28 @@ pub struct Agreed {
 
 /// One model fitted to one patient.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub struct FitRow {
     /// The case that the model was made from.
     pub template: String,
     /// The kind of model.
-    pub kind: Kind,
+    pub kind: ModelKind,
     /// The patient.
     pub case: String,
     /// How it went.
-    pub outcome: Outcome,
+    pub outcome: FitOutcome,
     /// Agreement with [`Gold::ALL`]; `None` where there is no such gold standard or no fit.
     pub agreed: [Option<Agreed>; 2],
     /// Which gold standards the patient has.
     pub golds: [bool; 2],
-    /// What the fit says of itself, by name.
+    /// Figures of the fit itself, by name.
     pub figures: BTreeMap<String, f64>,
 }
 
-impl Row {
+impl FitRow {
     /// E_J; 0 for a lost case, `None` where there is nothing to compare.
     pub fn jaccard(&self, gold: Gold) -> Option<f64> {
         match self.outcome {
-            Outcome::Lost(_) if self.golds[gold as usize] => Some(0.0),
+            FitOutcome::Lost(_) if self.golds[gold as usize] => Some(0.0),
             _ => self.agreed[gold as usize].map(|a| a.jaccard),
         }
     }
@@ -166,12 +165,12 @@ pub struct ModelRow {
     /// Its template.
     pub template: String,
     /// The kind of model.
-    pub kind: Kind,
-    /// In the paper's raw form.
+    pub kind: ModelKind,
+    /// Fitness in the paper's raw form.
     pub raw: f64,
-    /// In ours.
+    /// Normalised fitness, 0..=1.
     pub normalised: f64,
-    /// For comparison between tools.
+    /// Fitness in the robust form, for comparison between tools.
     pub robust: f64,
     /// Mean radius ratio 2r/R of its triangles.
     pub shape: f64,
@@ -193,7 +192,7 @@ pub struct Cell {
 }
 
 /// The mean over the rows that `choose` takes; `None` if none of them can be measured.
-pub fn mean<'a>(rows: impl IntoIterator<Item = &'a Row>, gold: Gold) -> Option<Cell> {
+pub fn mean<'a>(rows: impl IntoIterator<Item = &'a FitRow>, gold: Gold) -> Option<Cell> {
     let (mut jaccards, mut contours) = (Vec::new(), Vec::new());
     for row in rows {
         jaccards.extend(row.jaccard(gold));
@@ -215,10 +214,10 @@ pub fn average(values: &[f64]) -> Option<f64> {
 
 /// The rows of a kind, of one template or of all.
 pub fn of_kind<'a>(
-    rows: &'a [Row],
+    rows: &'a [FitRow],
     template: Option<&'a str>,
-    kind: Kind,
-) -> impl Iterator<Item = &'a Row> {
+    kind: ModelKind,
+) -> impl Iterator<Item = &'a FitRow> {
     rows.iter()
         .filter(move |r| r.kind == kind && template.is_none_or(|t| r.template == t))
 }
@@ -235,7 +234,7 @@ pub fn distinct<T, K: PartialEq>(items: &[T], key: impl Fn(&T) -> K) -> Vec<K> {
 }
 
 /// The kinds that occur, by variant and number of points.
-pub fn kinds(rows: &[Row]) -> Vec<Kind> {
+pub fn kinds(rows: &[FitRow]) -> Vec<ModelKind> {
     let mut found = distinct(rows, |r| r.kind);
     found.sort_unstable();
     found
@@ -246,7 +245,7 @@ pub(super) mod tests {
     use super::*;
 
     /// A row with E_CD = 1 - E_J against both gold standards; lost without an E_J.
-    pub fn row(case: &str, variant: Variant, points: usize, jaccard: Option<f64>) -> Row {
+    pub fn row(case: &str, variant: Variant, points: usize, jaccard: Option<f64>) -> FitRow {
         let agreed = jaccard.map(|jaccard| Agreed {
             jaccard,
             contour_voxels: Some(1.0 - jaccard),
@@ -254,13 +253,13 @@ pub(super) mod tests {
             dice: 2.0 * jaccard / (1.0 + jaccard),
             hausdorff95_mm: Some(5.0),
         });
-        Row {
+        FitRow {
             template: "t1".into(),
-            kind: Kind { variant, points },
+            kind: ModelKind { variant, points },
             case: case.into(),
             outcome: match jaccard {
-                Some(_) => Outcome::Fitted("converged".into()),
-                None => Outcome::Lost("no heart, none at all".into()),
+                Some(_) => FitOutcome::Fitted("converged".into()),
+                None => FitOutcome::Lost("no heart, none at all".into()),
             },
             agreed: [agreed; 2],
             golds: [true; 2],
@@ -287,7 +286,7 @@ pub(super) mod tests {
             row("p3", Variant::Optimised, 150, None),
         ];
         rows[1].golds = [false; 2];
-        rows[2].outcome = Outcome::Unreadable("truncated".into());
+        rows[2].outcome = FitOutcome::Unreadable("truncated".into());
         assert_eq!(mean(&rows, Gold::Truth).unwrap().count, 1);
         assert_eq!(mean(&rows[1..], Gold::Truth), None);
     }

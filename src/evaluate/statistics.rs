@@ -8,8 +8,8 @@
 
 use nalgebra::DMatrix;
 
-use crate::deform::elastic::rotation_of;
 use crate::geometry::Vec3;
+use crate::geometry::rotation::nearest_rotation;
 use crate::mesh::TriMesh;
 
 /// Mean and modes.
@@ -34,16 +34,16 @@ pub struct Mode {
     pub scores: Vec<f64>,
 }
 
-/// The fits cannot be compared.
+/// Why fits cannot be compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum StatisticsError {
-    /// Fewer than two.
+    /// Fewer than two fits.
     #[error("{count} fits were given; at least two are needed")]
     TooFew {
         /// How many there were.
         count: usize,
     },
-    /// Other nodes or triangles than the first one.
+    /// A fit has other nodes or triangles than the first one.
     #[error("fit {index} has other triangles than the first: all must be fits of one model")]
     OtherModel {
         /// Place in the list, from 0.
@@ -51,7 +51,7 @@ pub enum StatisticsError {
     },
 }
 
-/// Rounds of the Procrustes alignment; it has come to rest after three or four.
+/// Rounds of the Procrustes alignment, which converges in three or four.
 const ROUNDS: usize = 10;
 
 /// Aligns `fits` and finds their mean and modes.
@@ -108,7 +108,7 @@ fn turn_onto(shape: &mut [Vec3], mean: &[Vec3]) {
         .zip(&*shape)
         .map(|(m, p)| m * p.transpose())
         .sum();
-    let turn = rotation_of(&moment);
+    let turn = nearest_rotation(&moment);
     shape.iter_mut().for_each(|p| *p = turn * *p);
 }
 
@@ -133,7 +133,7 @@ fn principal_modes(shapes: &[Vec<Vec3>], mean: &[Vec3]) -> Vec<Mode> {
     order
         .into_iter()
         .take(count - 1)
-        // What is left below this share is rounding.
+        // Smaller eigenvalues are rounding errors.
         .filter(|e| eigen.eigenvalues[*e] > 1e-10 * total)
         .map(|e| {
             let value = eigen.eigenvalues[e];

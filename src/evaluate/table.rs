@@ -1,33 +1,38 @@
 //! The results as CSV and JSON.
 //!
-//! Figures are rounded to six places before anything else is done with them: that is below
-//! what a fit can resolve, and the same whether a row was just made or read from an earlier
-//! run.
-
-use std::fmt::Write;
+//! Figures are rounded to six places before they are used, which is finer than a fit resolves, so
+//! that they are the same whether a fit was just computed or read from an earlier run.
 
 use serde_json::{Value, json};
 
 use super::findings::Finding;
-use super::rows::{self, Agreed, Cell, Gold, Kind, ModelRow, Row};
+use super::rows::{self, Agreed, Cell, FitOutcome, FitRow, Gold, ModelKind, ModelRow};
 
 /// A cohort's evaluation, ready to be written out.
 #[derive(Debug, Clone, Default)]
 pub struct Evaluation {
-    /// What the run was asked for, by name.
+    /// The settings of the run, by name.
     pub settings: Vec<(String, String)>,
     /// The templates and what each model was made from.
     pub templates: Vec<(String, String)>,
-    /// What was missing or could not be read: the case, and what is the matter.
+    /// Problems with cases, models and fits: the case, and what is wrong.
     pub problems: Vec<(String, String)>,
     /// The models.
     pub models: Vec<ModelRow>,
     /// The fits.
-    pub rows: Vec<Row>,
-    /// What they say about the paper's findings.
+    pub rows: Vec<FitRow>,
+    /// Whether they confirm the paper's findings.
     pub findings: Vec<Finding>,
     /// Slices of one fit of each patient.
     pub pictures: Vec<Picture>,
+}
+
+impl Evaluation {
+    /// Whether at least one fit succeeded.
+    pub fn has_fit(&self) -> bool {
+        let fitted = |row: &FitRow| matches!(row.outcome, FitOutcome::Fitted(_));
+        self.rows.iter().any(fitted)
+    }
 }
 
 /// A picture for the page.
@@ -41,7 +46,7 @@ pub struct Picture {
     pub png: Vec<u8>,
 }
 
-/// Six places, as every figure is kept.
+/// The value rounded to six places.
 pub fn rounded(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
@@ -65,82 +70,80 @@ fn agreed_figures(agreed: Option<&Agreed>) -> [Option<f64>; 5] {
     ]
 }
 
-/// Text as one field of CSV (RFC 4180).
-fn field(text: &str) -> String {
-    if text.contains(['"', ',', '\n', '\r']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
-}
-
+/// A figure of a table, four places; empty where there is none.
 fn number(value: Option<f64>) -> String {
     value.map_or_else(String::new, |v| format!("{v:.4}"))
 }
 
-/// Every fit as a line.
-pub fn fits_csv(rows: &[Row]) -> String {
+/// The lines as CSV (RFC 4180, but for lines that end in a line feed alone).
+fn csv_bytes(lines: impl IntoIterator<Item = Vec<String>>) -> Result<Vec<u8>, csv::Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for line in lines {
+        writer.write_record(&line)?;
+    }
+    Ok(writer.into_inner().map_err(|e| e.into_error())?)
+}
+
+fn words(text: &str) -> Vec<String> {
+    text.split(',').map(str::to_owned).collect()
+}
+
+/// Every fit as a line of CSV.
+///
+/// # Errors
+/// [`csv::Error`].
+pub fn fits_csv(rows: &[FitRow]) -> Result<Vec<u8>, csv::Error> {
     let mut names: Vec<&str> = rows
         .iter()
         .flat_map(|r| r.figures.keys().map(String::as_str))
         .collect();
     names.sort_unstable();
     names.dedup();
-    let mut out = String::from("case,template,model,points,state,reason");
+    let mut head = words("case,template,model,points,state,reason");
     for gold in Gold::ALL {
-        for name in AGREED {
-            let _ = write!(out, ",{name}_{}", gold.as_str());
-        }
+        head.extend(AGREED.map(|name| format!("{name}_{}", gold.as_str())));
     }
-    names.iter().for_each(|n| {
-        let _ = write!(out, ",{n}");
-    });
-    out.push('\n');
-    for row in rows {
-        let _ = write!(
-            out,
-            "{},{},{},{},{},{}",
-            field(&row.case),
-            field(&row.template),
-            row.kind.variant.as_str(),
-            row.kind.points,
-            row.outcome.as_str(),
-            field(row.outcome.reason())
-        );
+    head.extend(names.iter().map(|name| (*name).to_owned()));
+    let line = |row: &FitRow| {
+        let mut line = vec![
+            row.case.clone(),
+            row.template.clone(),
+            row.kind.variant.as_str().to_owned(),
+            row.kind.points.to_string(),
+            row.outcome.as_str().to_owned(),
+            row.outcome.reason().to_owned(),
+        ];
         let agreed = row.agreed.iter().flat_map(|a| agreed_figures(a.as_ref()));
         let own = names.iter().map(|n| row.figures.get(*n).copied());
-        for value in agreed.chain(own) {
-            let _ = write!(out, ",{}", number(value));
-        }
-        out.push('\n');
-    }
-    out
+        line.extend(agreed.chain(own).map(number));
+        line
+    };
+    csv_bytes([head].into_iter().chain(rows.iter().map(line)))
 }
 
-/// Figure 3: the mean fitness of every model.
-pub fn figure3_csv(models: &[ModelRow]) -> String {
-    let mut out = String::from(
+/// Figure 3 as CSV: the mean fitness of every model.
+///
+/// # Errors
+/// [`csv::Error`].
+pub fn figure3_csv(models: &[ModelRow]) -> Result<Vec<u8>, csv::Error> {
+    let head = words(
         "template,model,points,fitness_raw,fitness_normalised,fitness_robust,\
-         radius_ratio_mean,radius_ratio_least\n",
+         radius_ratio_mean,radius_ratio_least",
     );
-    for m in models {
-        let _ = writeln!(
-            out,
-            "{},{},{},{:.4},{:.4},{:.4},{:.4},{:.4}",
-            field(&m.template),
-            m.kind.variant.as_str(),
-            m.kind.points,
-            m.raw,
-            m.normalised,
-            m.robust,
-            m.shape,
-            m.worst_shape
-        );
-    }
-    out
+    let line = |m: &ModelRow| {
+        let mut line = vec![
+            m.template.clone(),
+            m.kind.variant.as_str().to_owned(),
+            m.kind.points.to_string(),
+        ];
+        let figures = [m.raw, m.normalised, m.robust, m.shape, m.worst_shape];
+        line.extend(figures.map(|figure| number(Some(figure))));
+        line
+    };
+    csv_bytes([head].into_iter().chain(models.iter().map(line)))
 }
 
-/// Who a mean of Table 1 is over.
+/// What a line of Table 1 is a mean over.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Line {
     /// The template, or `all`.
@@ -150,10 +153,10 @@ pub struct Line {
 }
 
 /// What a line of Table 1 holds: a cell for each kind of model, where there is one.
-pub type Cells = Vec<(Kind, Option<Cell>)>;
+pub type TableCells = Vec<(ModelKind, Option<Cell>)>;
 
 /// Table 1: for every template and for all of them, each patient and the mean over all.
-pub fn table1(rows: &[Row], gold: Gold) -> Vec<(Line, Cells)> {
+pub fn table1(rows: &[FitRow], gold: Gold) -> Vec<(Line, TableCells)> {
     let kinds = rows::kinds(rows);
     let cases = rows::distinct(rows, |r| r.case.clone());
     let mut templates = vec![None];
@@ -181,30 +184,30 @@ pub fn table1(rows: &[Row], gold: Gold) -> Vec<(Line, Cells)> {
 }
 
 /// Table 1 against both gold standards as CSV.
-pub fn table1_csv(rows: &[Row]) -> String {
-    let mut out = String::from(
-        "gold,template,case,model,points,jaccard,contour_distance_voxels,least_jaccard,fits\n",
-    );
+///
+/// # Errors
+/// [`csv::Error`].
+pub fn table1_csv(rows: &[FitRow]) -> Result<Vec<u8>, csv::Error> {
+    let head = "gold,template,case,model,points,jaccard,contour_distance_voxels,least_jaccard,fits";
+    let mut lines = vec![words(head)];
     for gold in Gold::ALL {
         for (line, cells) in table1(rows, gold) {
-            for (kind, cell) in cells {
-                let _ = writeln!(
-                    out,
-                    "{},{},{},{},{},{},{},{},{}",
-                    gold.as_str(),
-                    field(&line.template),
-                    field(&line.case),
-                    kind.variant.as_str(),
-                    kind.points,
+            lines.extend(cells.into_iter().map(|(kind, cell)| {
+                vec![
+                    gold.as_str().to_owned(),
+                    line.template.clone(),
+                    line.case.clone(),
+                    kind.variant.as_str().to_owned(),
+                    kind.points.to_string(),
                     number(cell.map(|c| c.jaccard)),
                     number(cell.and_then(|c| c.contour)),
                     number(cell.map(|c| c.least)),
-                    cell.map_or(0, |c| c.count)
-                );
-            }
+                    cell.map_or(0, |c| c.count).to_string(),
+                ]
+            }));
         }
     }
-    out
+    csv_bytes(lines)
 }
 
 /// Everything as JSON.
@@ -247,7 +250,7 @@ fn model_json(m: &ModelRow) -> Value {
 }
 
 /// The lines of Table 1 that are means over patients.
-fn means_json(rows: &[Row]) -> Vec<Value> {
+fn means_json(rows: &[FitRow]) -> Vec<Value> {
     let mut means = Vec::new();
     for gold in Gold::ALL {
         for (line, cells) in table1(rows, gold) {
@@ -272,7 +275,7 @@ fn means_json(rows: &[Row]) -> Vec<Value> {
     means
 }
 
-fn row_json(row: &Row) -> Value {
+fn row_json(row: &FitRow) -> Value {
     let agreed = |gold: Gold| -> Value {
         let figures = agreed_figures(row.agreed[gold as usize].as_ref());
         let named = AGREED.iter().zip(figures);
@@ -305,11 +308,11 @@ mod tests {
             row("p1", Variant::Reference, 67, Some(0.71)),
             row("p1", Variant::Optimised, 150, Some(0.82)),
         ];
-        let text = fits_csv(&rows);
-        let fields: Vec<usize> = text.lines().map(|l| l.split(',').count()).collect();
+        let text = |rows: &[FitRow]| String::from_utf8(fits_csv(rows).unwrap()).unwrap();
+        let fields: Vec<usize> = text(&rows).lines().map(|l| l.split(',').count()).collect();
         assert_eq!(fields, [17; 3]);
         // A comma in a reason is quoted.
-        let lost = fits_csv(&[row("p2", Variant::Optimised, 150, None)]);
+        let lost = text(&[row("p2", Variant::Optimised, 150, None)]);
         assert!(lost.contains(",lost,\"no heart, none at all\","));
     }
 
@@ -334,7 +337,7 @@ mod tests {
         assert_eq!(names, expected.collect::<Vec<_>>());
         let all = table[2].1[0].1.unwrap();
         assert!((all.jaccard - 0.77).abs() < 1e-12 && all.count == 4);
-        let csv = table1_csv(&rows);
+        let csv = String::from_utf8(table1_csv(&rows).unwrap()).unwrap();
         assert_eq!(csv.lines().count(), 1 + 2 * 9);
     }
 }

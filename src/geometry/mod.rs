@@ -5,6 +5,7 @@
 pub mod bvh;
 pub mod frame;
 pub mod random;
+pub mod rotation;
 pub mod triangle;
 
 /// A position or a direction in patient space: LPS, millimetres.

@@ -7,14 +7,11 @@
 //! A map of several labels is no picture of one body: the label at the hinted centre, else the
 //! most frequent one, is taken as a mask, and the others count as nothing.
 
-use crate::deform::template::Pose;
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::grid::survey::label_map;
 use crate::grid::volume::Volume;
-use crate::locate::cup::Cup;
 use crate::locate::localisation::{Hints, LocaliseError};
-use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Monitor};
 use std::collections::BTreeMap;
 
@@ -143,25 +140,6 @@ fn flood(field: &Field, level: f32, seed: usize, label: &mut [u32]) -> Blob {
         centre: sum / count as f64,
         volume: count as f64 * field.spacing().iter().product::<f64>(),
         uptake: value / count as f64,
-    }
-}
-
-impl Blob {
-    /// The pose that gives `mesh` this centre and volume.
-    pub fn pose(&self, mesh: &TriMesh) -> Pose {
-        let centroid: Vec3 = mesh.vertices.iter().sum::<Vec3>() / mesh.vertices.len() as f64;
-        let place = |centre: Vec3, volume: f64| Cup {
-            centre,
-            axis: Vec3::z(),
-            length: volume.cbrt(),
-            breadth: 1.0,
-        };
-        Pose::between(
-            &place(centroid, mesh.volume()),
-            &place(self.centre, self.volume),
-            &nalgebra::Rotation3::identity(),
-            0.0,
-        )
     }
 }
 

@@ -2,10 +2,10 @@
 
 use super::ParameterError;
 use crate::deform::DeformParameters;
-use crate::deform::template::Organ;
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::locate::localisation::Hints;
+use crate::model::Organ;
 use crate::polar::PolarParameters;
 use crate::volume::Volume;
 

@@ -2,11 +2,11 @@
 
 use super::table::{choice, integer, number, optional};
 use super::{FitParameters, Kind, ParameterError, ParameterSpec, Parameters};
-use crate::deform::Edge;
+use crate::deform::WallEdge;
 use crate::deform::sensors::SensorKind;
-use crate::deform::template::Organ;
 use crate::geometry::Vec3;
 use crate::locate::patient_orientation::Superior;
+use crate::model::Organ;
 use serde_json::{Value, json};
 
 impl Parameters for FitParameters {
@@ -200,8 +200,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "apparent",
         "Which edge of a ventricle's wall to detect: apparent (the edge in the blurred image) or \
          anatomical (the edge of the wall itself, with the thickness added by blur removed)",
-        "apparent" => Edge::Apparent,
-        "anatomical" => Edge::Anatomical,
+        "apparent" => WallEdge::Apparent,
+        "anatomical" => WallEdge::Anatomical,
     ),
     number!(
         "resolution",

@@ -1,6 +1,6 @@
 //! The polar map: the wall's uptake laid flat, and its means over the AHA's 17 segments.
 //!
-//! Every ray of the fitted model's [`Wall`] gives one value: the largest and the mean value
+//! Every ray of the fitted model's [`VentricleWall`] gives one value: the largest and the mean value
 //! of the image between the inner and the outer surface, lengthened by
 //! [`PolarParameters::extension`] to both sides. Apex in the centre, base at the rim,
 //! anterior on top, septum on the left, as seen from the apex (Cerqueira et al., Circulation
@@ -26,11 +26,11 @@ mod glyphs;
 
 pub use draw::{json, png, svg};
 
-use crate::deform::wall::{COLUMNS, ROWS, Ray, Wall};
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
+use crate::grid::Volume;
 use crate::grid::field::Field;
-use crate::volume::Volume;
+use crate::model::wall::{COLUMNS, ROWS, VentricleWall, WallRay};
 
 /// Parameters of [`map`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -157,7 +157,7 @@ pub fn segment_of(row: usize, column: usize) -> usize {
 }
 
 /// Samples `volume` along the rays of `wall`.
-pub fn map(volume: &Volume, wall: &Wall, parameters: &PolarParameters) -> PolarMap {
+pub fn map(volume: &Volume, wall: &VentricleWall, parameters: &PolarParameters) -> PolarMap {
     let ends = wall.rays.iter().filter_map(|r| {
         let reach = r.wall?[1] + parameters.extension;
         Some(r.start + r.direction * reach)
@@ -202,7 +202,7 @@ pub fn map(volume: &Volume, wall: &Wall, parameters: &PolarParameters) -> PolarM
 }
 
 /// For every column the row behind its last one that meets the wall.
-fn rims(wall: &Wall) -> [usize; COLUMNS] {
+fn rims(wall: &VentricleWall) -> [usize; COLUMNS] {
     std::array::from_fn(|column| {
         let met = |row: &usize| wall.rays[row * COLUMNS + column].wall.is_some();
         (0..ROWS).rev().find(met).map_or(0, |row| row + 1)
@@ -227,7 +227,7 @@ fn reference(pixels: &[Option<Pixel>]) -> f64 {
     if area > 0.0 { sum / area } else { 0.0 }
 }
 
-fn pixel(field: &Field, ray: &Ray, row_spacing: f64, extension: f64) -> Option<Pixel> {
+fn pixel(field: &Field, ray: &WallRay, row_spacing: f64, extension: f64) -> Option<Pixel> {
     let [enters, leaves] = ray.wall?;
     let from = (enters - extension).max(0.0);
     let to = leaves + extension;
@@ -281,7 +281,7 @@ mod tests {
 
     /// A cup of revolution about an axis that points forward, with its wall hot but for the
     /// patient's left side, which has half the uptake.
-    fn scene() -> (Volume, Wall) {
+    fn scene() -> (Volume, VentricleWall) {
         let mut mesh = shapes::cup(60.0, 32.0, 12.0, 24);
         // Apex from -z to -y (anterior).
         for p in &mut mesh.vertices {
@@ -308,7 +308,7 @@ mod tests {
             length: 65.0,
             breadth: 1.0,
         };
-        let wall = Wall::new(&mesh, &cup, &Vec3::z(), &crate::progress::Monitor::silent());
+        let wall = VentricleWall::new(&mesh, &cup, &Vec3::z(), &crate::progress::Monitor::silent());
         (volume, wall.unwrap())
     }
 

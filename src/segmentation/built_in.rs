@@ -1,17 +1,17 @@
-//! The model for those who have none: a healthy left ventricle, made when it is first needed.
+//! The built-in model: a healthy left ventricle, generated when it is first needed.
 //!
-//! A phantom without noise and neighbours goes through the same stages as every scan, so
-//! the model has the apparent edge of a blurred wall, like the models of real scans. It is
+//! It is generated like any other model, from a phantom without noise and without neighbouring
+//! organs, and has the apparent edge of a blurred wall like the models of real scans. It is
 //! kept for the life of the process, and is the same in every process.
 
-use crate::deform::template::{Organ, Template};
+use crate::model::{Organ, Template};
 use crate::parameters::ModelParameters;
 use crate::progress::{Cancelled, Monitor};
 use crate::volume::phantom::{PhantomParameters, phantom};
 use crate::volume::{ReadLimits, VolumeFile, nifti};
 use std::sync::OnceLock;
 
-/// The name under which reports speak of it.
+/// Its name in reports.
 pub const NAME: &str = "built-in";
 
 static TEMPLATE: OnceLock<Template> = OnceLock::new();
@@ -52,8 +52,8 @@ fn make(monitor: &Monitor<'_>) -> Result<Template, Cancelled> {
     sound(Template::new(mesh, Organ::LeftVentricle, monitor), monitor)
 }
 
-/// Nothing here depends on the caller but for the token, so any other failure would be a
-/// defect, which the test below meets.
+/// Only the cancel token depends on the caller, so any other failure is a defect, which the test
+/// below would find.
 fn sound<T, E: std::fmt::Debug>(
     result: Result<T, E>,
     monitor: &Monitor<'_>,
@@ -73,7 +73,7 @@ mod tests {
     use crate::segmentation::built_in::*;
 
     #[test]
-    fn making_it_ends_when_it_is_told_to() {
+    fn making_it_can_be_cancelled() {
         let cancel = CancelToken::new();
         cancel.cancel();
         let monitor = Monitor::new(&Silent, cancel);

@@ -1,17 +1,17 @@
-//! What comes of a segmentation, as files.
+//! The files of a segmentation.
 
+use super::from_files::SegmentedVolume;
+use super::report::report_json;
 use crate::export::{self, ExportError, Format, Metadata};
 use crate::parameters::Parameters;
 use crate::polar;
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report;
 use crate::report::html::{Pictured, segmentation};
-use crate::segmentation::from_files::Segmented;
-use crate::segmentation::report_json;
 use crate::volume::nifti::{self, MaskError};
 use serde_json::{Map, Value, json};
 
-/// One file of an outcome.
+/// One file of a segmentation.
 #[derive(Debug, Clone)]
 pub struct NamedFile {
     /// `mask.nii.gz`, `mesh.glb`, `report.json`, `polar.svg` ...
@@ -22,9 +22,9 @@ pub struct NamedFile {
     pub bytes: Vec<u8>,
 }
 
-/// Why an outcome cannot be written as files.
+/// Why a segmentation cannot be written as files.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum OutcomeError {
+pub enum SegmentationFilesError {
     /// A mesh format cannot hold the mesh.
     #[error(transparent)]
     Mesh(#[from] ExportError),
@@ -41,18 +41,18 @@ pub enum OutcomeError {
     Cancelled(#[from] Cancelled),
 }
 
-impl Segmented {
+impl SegmentedVolume {
     /// The mask on the input's grid, the mesh in `formats`, the report, slices and, of a
     /// ventricle, the polar map. `volume_id` names the volume in the mesh files.
     ///
     /// # Errors
-    /// See [`OutcomeError`].
+    /// See [`SegmentationFilesError`].
     pub fn files(
         &self,
         formats: &[Format],
         volume_id: Option<String>,
         monitor: &Monitor<'_>,
-    ) -> Result<Vec<NamedFile>, OutcomeError> {
+    ) -> Result<Vec<NamedFile>, SegmentationFilesError> {
         monitor.report(Stage::Export, 0.0)?;
         let mut files = vec![self.mask(monitor)?];
         monitor.report(Stage::Export, 0.5)?;
@@ -81,7 +81,7 @@ impl Segmented {
         Ok(files)
     }
 
-    /// The report: everything known, with the parameters used.
+    /// The report, with the parameters used, the facts of the input and warnings.
     pub fn report(&self) -> Value {
         let mut report = report_json(&self.segmentation);
         if let Some(object) = report.as_object_mut() {
@@ -94,7 +94,7 @@ impl Segmented {
         report
     }
 
-    /// The report as a self-contained page; `files` are those of [`Segmented::files`].
+    /// The report as a self-contained page; `files` are those of [`SegmentedVolume::files`].
     pub fn page(&self, files: &[NamedFile]) -> NamedFile {
         let bytes = |name: &str| {
             let found = files.iter().find(|file| file.name == name);
@@ -113,7 +113,7 @@ impl Segmented {
         }
     }
 
-    /// The figures one looks at first.
+    /// The main figures, for lists and mesh files.
     pub fn summary(&self) -> Map<String, Value> {
         let report = report_json(&self.segmentation);
         let fit = &report["fit"];
@@ -133,7 +133,7 @@ impl Segmented {
         .collect()
     }
 
-    fn mask(&self, monitor: &Monitor<'_>) -> Result<NamedFile, OutcomeError> {
+    fn mask(&self, monitor: &Monitor<'_>) -> Result<NamedFile, SegmentationFilesError> {
         let mask = &self.segmentation.mask;
         let frame = &self.reading.volume.frame;
         let bytes = nifti::write_mask(&mask.voxels, mask.shape, frame, monitor);
@@ -147,7 +147,7 @@ impl Segmented {
         })
     }
 
-    fn polar(&self, monitor: &Monitor<'_>) -> Result<Vec<NamedFile>, OutcomeError> {
+    fn polar(&self, monitor: &Monitor<'_>) -> Result<Vec<NamedFile>, SegmentationFilesError> {
         let Some(map) = &self.segmentation.polar else {
             return Ok(Vec::new());
         };
@@ -174,8 +174,8 @@ fn json_file(name: &str, value: &Value) -> NamedFile {
     }
 }
 
-fn other(what: &'static str, error: &dyn std::error::Error) -> OutcomeError {
-    OutcomeError::Other {
+fn other(what: &'static str, error: &dyn std::error::Error) -> SegmentationFilesError {
+    SegmentationFilesError::Other {
         what,
         reason: error.to_string(),
     }

@@ -1,220 +1,48 @@
-//! A patient's segmentation from beginning to end: fit, mask, volumes, polar map, measures,
-//! pictures.
+//! A patient's segmentation from beginning to end.
 //!
-//! Several templates may be given: each is fitted, and the fit with the greatest
-//! [`Fit::merit`](crate::deform::Fit::merit) is taken (the first of equals); the others'
-//! figures are kept to say why. A template that cannot be fitted is left out with its reason,
-//! unless none can. The organ is searched once for all of them.
+//! In go a volume, models and parameters; out come the fitted model, its mask, volumes, polar map,
+//! measures against an expert's mask, slices and a report.
+//!
+//! 1. [`SegmentationOrder`]: the files, models and parameters.
+//! 2. [`from_files`] reads the volume and the expert's mask and completes the parameters with what
+//!    depends on the volume ([`FitParameters::on`](crate::parameters::FitParameters::on)).
+//! 3. The models are checked and prepared; without a model, the built-in one is taken. A model
+//!    that was named must be usable; of several that are merely available, unusable ones are left
+//!    out, and the report says why.
+//! 4. The expert's mask is brought to the volume's grid ([`on_grid`]).
+//! 5. Every template is fitted, with one search for the organ ([`OrganSearch`]), and the fit with
+//!    the greatest [`Fit::merit`](crate::deform::Fit::merit) is chosen, the first of equals. A
+//!    template whose fit fails is left out, unless all fail.
+//! 6. [`segment`] makes mask, measures, polar map and [`slices`] of the fit.
+//! 7. [`report_json`] is the report; [`SegmentedVolume::files`] are the files written, the same on
+//!    the command line and over HTTP.
+
+mod order;
+
+mod from_files;
 
 mod built_in;
-mod expert;
-mod files;
-mod from_files;
-mod report;
+mod templates;
+
+mod expert_mask;
+
+mod fitting;
+
+mod segment;
 pub mod slices;
 
-pub use expert::{ExpertError, on_grid};
-pub use files::{NamedFile, OutcomeError};
-pub use from_files::{NamedMesh, Order, SegmentError, Segmented, from_files};
+mod report;
+
+mod files;
+
+mod error;
+
+pub use error::SegmentationError;
+pub use expert_mask::{ExpertMaskError, on_grid};
+pub use files::{NamedFile, SegmentationFilesError};
+pub use fitting::{OrganSearch, RankedTemplate};
+pub use from_files::{SegmentedVolume, from_files};
+pub use order::{NamedMesh, SegmentationOrder};
 pub use report::{agreement_json, report_json};
-
-use crate::deform::template::Template;
-use crate::deform::{DeformError, DeformParameters, Fit, Place, fit_at};
-use crate::grid::agreement::{Agreement, compare};
-use crate::grid::voxelise::{Mask, voxelise};
-use crate::polar::{self, PolarMap, PolarParameters};
-use crate::progress::{Cancelled, Monitor, Stage};
-use crate::segmentation::slices::Cut;
-use crate::volume::Volume;
-
-/// Parameters of [`segment`].
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct SegmentationParameters {
-    /// The fit's.
-    pub deform: DeformParameters,
-    /// The polar map's.
-    pub polar: PolarParameters,
-}
-
-/// A template with the name under which the report speaks of it.
-#[derive(Debug, Clone)]
-pub struct NamedTemplate {
-    /// The name.
-    pub name: String,
-    /// The template.
-    pub template: Template,
-}
-
-/// One template's fit in figures.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Candidate {
-    /// The template's name.
-    pub name: String,
-    /// What it is ranked by.
-    pub merit: f64,
-    /// Share of area with an edge.
-    pub active: f64,
-    /// Root of the mean squared strain.
-    pub strain: f64,
-    /// Weighted rms distance to the edges, mm.
-    pub residual: f64,
-}
-
-/// A template that could not be fitted.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Refused {
-    /// The template's name.
-    pub name: String,
-    /// Why.
-    pub reason: String,
-}
-
-/// A segmented patient.
-#[derive(Debug, Clone)]
-pub struct Segmentation {
-    /// The fitted model.
-    pub fit: Fit,
-    /// Its voxels on the input's grid.
-    pub mask: Mask,
-    /// The wall's uptake; ventricles only.
-    pub polar: Option<PolarMap>,
-    /// Against the expert's mask, where one was given.
-    pub agreement: Option<Agreement>,
-    /// Slices of the volume with the contours of fit and expert: a PNG.
-    pub slices: Vec<u8>,
-    /// Place of the taken template in `candidates`.
-    pub chosen: usize,
-    /// Every template fitted, in the order given.
-    pub candidates: Vec<Candidate>,
-    /// Templates that could not be fitted.
-    pub refused: Vec<Refused>,
-}
-
-/// Why there is no segmentation.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SegmentationError {
-    /// No template was given.
-    #[error("no model was given to fit")]
-    NoTemplate,
-    /// No template could be fitted; the first one's reason.
-    #[error(transparent)]
-    Deform(#[from] DeformError),
-    /// The expert's mask cannot be used.
-    #[error(transparent)]
-    Expert(ExpertError),
-    /// The caller asked for an end.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
-}
-
-impl From<ExpertError> for SegmentationError {
-    fn from(error: ExpertError) -> Self {
-        match error {
-            ExpertError::Cancelled(cancelled) => cancelled.into(),
-            other => SegmentationError::Expert(other),
-        }
-    }
-}
-
-/// Segments `volume` by the best of `templates`; measures against `expert` if given.
-///
-/// # Errors
-/// [`SegmentationError`].
-pub fn segment(
-    volume: &Volume,
-    templates: &[NamedTemplate],
-    parameters: &SegmentationParameters,
-    expert: Option<&Volume>,
-    monitor: &Monitor,
-) -> Result<Segmentation, SegmentationError> {
-    let expert = expert.map(|e| on_grid(e, volume, monitor)).transpose()?;
-    let Trials {
-        mut fits,
-        candidates,
-        refused,
-    } = try_all(volume, templates, &parameters.deform, monitor)?;
-    let chosen = (0..fits.len())
-        .rev()
-        .max_by(|a, b| candidates[*a].merit.total_cmp(&candidates[*b].merit))
-        .ok_or(SegmentationError::NoTemplate)?;
-    let fit = fits.swap_remove(chosen);
-    monitor.report(Stage::Polar, 0.0)?;
-    let polar = fit
-        .wall
-        .as_ref()
-        .map(|wall| polar::map(volume, wall, &parameters.polar));
-    monitor.report(Stage::Report, 0.0)?;
-    let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
-    monitor.report(Stage::Report, 0.5)?;
-    let agreement = match &expert {
-        // One grid by construction: `on_grid` made the mask on the volume's.
-        Some(expert) => compare(&mask, expert, volume.frame.spacing(), monitor).ok(),
-        None => None,
-    };
-    monitor.report(Stage::Report, 0.8)?;
-    let cut = match (&fit.cup, &fit.posture) {
-        (Some(cup), Some(posture)) => Cut::heart(cup, &posture.superior),
-        _ => Cut::body(&fit.mesh),
-    };
-    let slices = slices::png(volume, &fit.mesh, &cut, expert.as_ref(), monitor)?;
-    monitor.report(Stage::Report, 1.0)?;
-    Ok(Segmentation {
-        fit,
-        mask,
-        polar,
-        agreement,
-        slices,
-        chosen,
-        candidates,
-        refused,
-    })
-}
-
-/// Every template's fit, or why there is none.
-#[derive(Default)]
-struct Trials {
-    fits: Vec<Fit>,
-    candidates: Vec<Candidate>,
-    refused: Vec<Refused>,
-}
-
-fn try_all(
-    volume: &Volume,
-    templates: &[NamedTemplate],
-    parameters: &DeformParameters,
-    monitor: &Monitor,
-) -> Result<Trials, SegmentationError> {
-    let mut trials = Trials::default();
-    let mut first = None;
-    let mut place: Option<Place> = None;
-    for (index, NamedTemplate { name, template }) in templates.iter().enumerate() {
-        let place = match place.take().filter(|place| place.suits(template)) {
-            Some(found) => place.insert(found),
-            None => place.insert(Place::find(volume, template, parameters, monitor)?),
-        };
-        let monitor = monitor.piece(index, templates.len());
-        let name = name.clone();
-        match fit_at(place, volume, template, parameters, &monitor) {
-            Ok(fit) => {
-                trials.candidates.push(Candidate {
-                    name,
-                    merit: fit.merit(),
-                    active: fit.active,
-                    strain: fit.strain.sqrt(),
-                    residual: fit.residual,
-                });
-                trials.fits.push(fit);
-            }
-            Err(error) => {
-                monitor.check()?;
-                let reason = error.to_string();
-                trials.refused.push(Refused { name, reason });
-                first.get_or_insert(error);
-            }
-        }
-    }
-    match first {
-        Some(error) if trials.fits.is_empty() => Err(error.into()),
-        _ => Ok(trials),
-    }
-}
+pub use segment::{Segmentation, SegmentationParameters, segment};
+pub use templates::{NamedTemplate, RefusedTemplate};

@@ -1,8 +1,9 @@
-//! The segmentation's report.
+//! The report of a segmentation, as JSON.
 
 use serde_json::{Value, json};
 
-use super::Segmentation;
+use super::segment::Segmentation;
+use crate::deform::Fit;
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
 use crate::locate::patient_orientation::Superior;
@@ -16,10 +17,9 @@ fn point(p: &Vec3) -> [f64; 3] {
     [p.x, p.y, p.z].map(round)
 }
 
-/// Everything that is known of a segmentation, as JSON. Lengths are mm (LPS), volumes ml.
+/// The figures of a segmentation as JSON. Lengths are mm (LPS), volumes ml.
 pub fn report_json(segmentation: &Segmentation) -> Value {
     let fit = &segmentation.fit;
-    let displacements: Vec<f64> = fit.displacements.iter().map(|d| round(d.norm())).collect();
     let flags: Vec<Value> = fit
         .flags
         .iter()
@@ -57,7 +57,7 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
             "hollowness": round(l.hollowness),
             "confidence": round(l.confidence),
         })),
-        "posture": fit.posture.as_ref().map(|p| json!({
+        "posture": fit.patient_orientation.as_ref().map(|p| json!({
             "superior": point(&p.superior),
             "source": match p.source {
                 Superior::Body => "body",
@@ -66,25 +66,7 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
             "tilt_degrees": round(p.tilt()),
             "confidence": round(p.confidence),
         })),
-        "fit": {
-            "reason": fit.reason.as_str(),
-            "confidence": round(fit.confidence),
-            "iterations": fit.iterations,
-            "runs": fit.runs,
-            "residual_mm": round(fit.residual),
-            "active_sensors": round(fit.active),
-            "strain": round(fit.strain.sqrt()),
-            "energy": fit.energy.iter().map(|e| round(*e)).collect::<Vec<_>>(),
-            "self_intersections": fit.self_intersections,
-            "turned_triangles": fit.turned_triangles,
-            "long_axis": fit.cup.map(|c| json!({
-                "base": point(&c.base()),
-                "apex": point(&c.apex()),
-            })),
-            "scale": round(fit.scale),
-            "rotation": rows(fit),
-            "displacement_mm": displacements,
-        },
+        "fit": fit_json(fit),
         "volumes_ml": {
             "wall": round(fit.wall_ml),
             "cavity": fit.wall.as_ref().map(|w| round(w.cavity_ml)),
@@ -97,7 +79,31 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
     })
 }
 
-/// Why this template, in a sentence.
+/// How the motion went, and the fitted model's pose.
+fn fit_json(fit: &Fit) -> Value {
+    let displacements: Vec<f64> = fit.displacements.iter().map(|d| round(d.norm())).collect();
+    json!({
+        "reason": fit.reason.as_str(),
+        "confidence": round(fit.confidence),
+        "iterations": fit.iterations,
+        "runs": fit.runs,
+        "residual_mm": round(fit.residual),
+        "active_sensors": round(fit.active),
+        "strain": round(fit.strain.sqrt()),
+        "energy": fit.energy.iter().map(|e| round(*e)).collect::<Vec<_>>(),
+        "self_intersections": fit.self_intersections,
+        "turned_triangles": fit.turned_triangles,
+        "long_axis": fit.cup.map(|c| json!({
+            "base": point(&c.base()),
+            "apex": point(&c.apex()),
+        })),
+        "scale": round(fit.scale),
+        "rotation": rows(fit),
+        "displacement_mm": displacements,
+    })
+}
+
+/// Why this template was chosen, in a sentence.
 fn choice(segmentation: &Segmentation) -> String {
     let chosen = &segmentation.candidates[segmentation.chosen];
     let others = segmentation.candidates.iter().enumerate();
@@ -119,14 +125,14 @@ fn choice(segmentation: &Segmentation) -> String {
     }
 }
 
-fn rows(fit: &crate::deform::Fit) -> Vec<[f64; 3]> {
+fn rows(fit: &Fit) -> Vec<[f64; 3]> {
     let m = fit.rotation.matrix();
     (0..3)
         .map(|r| [0, 1, 2].map(|c| round(m[(r, c)])))
         .collect()
 }
 
-/// The polar map without its pixels, which have a file of their own.
+/// The polar map without its pixels, which are in polar.json.
 fn summary(map: &polar::PolarMap) -> Value {
     let mut value = polar::json(map);
     if let Some(object) = value.as_object_mut() {

@@ -11,7 +11,7 @@
 
 use nalgebra::Matrix3;
 
-use crate::deform::wall::anterior;
+use crate::deform::Fit;
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::geometry::frame::VoxelToPatient;
@@ -19,6 +19,7 @@ use crate::grid::field::Field;
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::locate::cup::Cup;
 use crate::mesh::TriMesh;
+use crate::model::wall::anterior;
 use crate::progress::{Cancelled, Monitor};
 use crate::volume::Volume;
 
@@ -79,6 +80,14 @@ pub struct Cut {
 }
 
 impl Cut {
+    /// Through the organ that `fit` shows.
+    pub fn of(fit: &Fit) -> Self {
+        match (&fit.cup, &fit.patient_orientation) {
+            (Some(cup), Some(orientation)) => Self::heart(cup, &orientation.superior),
+            _ => Self::body(&fit.mesh),
+        }
+    }
+
     /// Through a ventricle, in a patient whose `superior` direction (unit vector) is given.
     pub fn heart(cup: &Cup, superior: &Vec3) -> Self {
         let up = anterior(&cup.axis, superior);

@@ -7,14 +7,14 @@
 
 use super::page::PageError;
 use crate::deform::DeformError;
-use crate::deform::template::{Organ, TemplateError};
 use crate::export::read_json::ReadMeshError;
 use crate::jobs::{Failure, Fault, WorkError};
 use crate::locate::localisation::LocaliseError;
+use crate::model::{Organ, TemplateError};
 use crate::parameters::ParameterError;
 use crate::pipeline::PipelineError;
 use crate::retile::RetileError;
-use crate::segmentation::{ExpertError, SegmentError, SegmentationError};
+use crate::segmentation::{ExpertMaskError, SegmentationError};
 use crate::surface::SurfaceError;
 use crate::volume::VolumeError;
 use std::error::Error;
@@ -147,41 +147,109 @@ impl Explain for PipelineError {
     }
 }
 
-impl Explain for SegmentError {
+impl Explain for SegmentationError {
     fn explain(&self) -> Failure {
-        use SegmentationError::{Cancelled, Deform, Expert, NoTemplate};
-        let kind = match self {
-            SegmentError::Volume(volume) => return volume.explain(),
-            SegmentError::ExpertVolume(volume) => return volume.explain().at("expert"),
-            SegmentError::Parameter(parameter) => return parameter.explain(),
-            SegmentError::Unreadable { .. }
-            | SegmentError::Model { .. }
-            | SegmentError::OtherOrgan { .. } => (Fault::Request, "unsuitable-model"),
-            SegmentError::NoModel { .. } | SegmentError::Segmentation(NoTemplate) => {
-                (Fault::Request, "no-model")
+        let (code, field, advice) = match self {
+            SegmentationError::Volume(volume) => return volume.explain(),
+            SegmentationError::ExpertVolume(volume) => return volume.explain().at("expert"),
+            SegmentationError::Parameter(parameter) => return parameter.explain(),
+            SegmentationError::NotFound(error) => return error.explain(),
+            SegmentationError::Fit(error) => return error.explain(),
+            SegmentationError::NoModel { .. } | SegmentationError::NoTemplate => (
+                (Fault::Request, "no-model"),
+                "model",
+                "Name a model in `model`, or add one to the library.".into(),
+            ),
+            SegmentationError::UnreadableModel { .. } => {
+                (UNSUITABLE_CHOICE, "model", GIVE_MESH_JSON.into())
             }
-            SegmentError::Segmentation(Expert(ExpertError::Empty)) => {
-                (Fault::Content, "empty-mask")
+            SegmentationError::UnsuitableModel { error, .. } => {
+                (UNSUITABLE_CHOICE, "model", template_advice(error))
             }
-            SegmentError::Segmentation(Expert(ExpertError::Elsewhere { .. })) => {
-                (Fault::Content, "mask-elsewhere")
+            SegmentationError::OtherOrgan { shows, .. } => (
+                UNSUITABLE_CHOICE,
+                "model",
+                format!("Give a model of that organ, or set `organ` to {shows}."),
+            ),
+            SegmentationError::ExpertMask(ExpertMaskError::Empty) => (
+                (Fault::Content, "empty-mask"),
+                "expert",
+                "Give a mask whose voxels are above 0.5 inside the organ.".into(),
+            ),
+            SegmentationError::ExpertMask(ExpertMaskError::Elsewhere { .. }) => (
+                (Fault::Content, "mask-elsewhere"),
+                "expert",
+                "Give a mask of the same scan whose header places it correctly in the patient."
+                    .into(),
+            ),
+            SegmentationError::ExpertMask(ExpertMaskError::Cancelled(_))
+            | SegmentationError::Cancelled(_) => {
+                return failure(CANCELLED, self, None, START_AGAIN.into());
             }
-            SegmentError::Segmentation(Deform(DeformError::Localise(localise))) => match localise {
-                LocaliseError::HintOutside => (Fault::Request, "hint-outside"),
-                LocaliseError::Blank => (Fault::Content, "blank-volume"),
-                _ => (Fault::Content, "no-heart"),
-            },
-            SegmentError::Segmentation(Deform(_)) => (Fault::Request, "invalid-parameter"),
-            SegmentError::Segmentation(Cancelled(_) | Expert(ExpertError::Cancelled(_)))
-            | SegmentError::Cancelled(_) => CANCELLED,
         };
-        failure(kind, self, self.field(), segmentation_advice(self))
+        failure(code, self, Some(field), advice)
     }
 
     fn is_cancelled(&self) -> bool {
-        SegmentError::is_cancelled(self)
+        SegmentationError::is_cancelled(self)
     }
 }
+
+impl Explain for LocaliseError {
+    fn explain(&self) -> Failure {
+        let (kind, field, advice) = match self {
+            LocaliseError::NoHeart { .. } => (
+                (Fault::Content, "no-heart"),
+                Some("center"),
+                "Check that the file is a reconstructed heart scan; if it is, give the heart's \
+                 centre as `center` (x,y,z in LPS millimetres).",
+            ),
+            LocaliseError::HintOutside => (
+                (Fault::Request, "hint-outside"),
+                None,
+                "Give `center` or `box` inside the volume, or leave them out.",
+            ),
+            LocaliseError::Blank => (
+                (Fault::Content, "blank-volume"),
+                None,
+                "Check that this is the right file and, for a 4-D one, the right `frame`.",
+            ),
+            LocaliseError::Cancelled(_) => (CANCELLED, None, START_AGAIN),
+        };
+        failure(kind, self, field, advice.into())
+    }
+
+    fn is_cancelled(&self) -> bool {
+        matches!(self, LocaliseError::Cancelled(_))
+    }
+}
+
+impl Explain for DeformError {
+    fn explain(&self) -> Failure {
+        let (field, advice) = match self {
+            DeformError::Localise(error) => return error.explain(),
+            DeformError::Cancelled(_) => {
+                return failure(CANCELLED, self, None, START_AGAIN.into());
+            }
+            DeformError::TooManyNodes { limit, .. } => (
+                Some("model"),
+                format!("Give a model of at most {limit} points, or use no support springs."),
+            ),
+            DeformError::Parameter { field, .. } => (Some(*field), FINITE_NUMBERS.into()),
+            DeformError::HintNotFinite | DeformError::OtherOrgan => (None, FINITE_NUMBERS.into()),
+        };
+        failure((Fault::Request, "invalid-parameter"), self, field, advice)
+    }
+
+    fn is_cancelled(&self) -> bool {
+        match self {
+            DeformError::Localise(error) => error.is_cancelled(),
+            error => matches!(error, DeformError::Cancelled(_)),
+        }
+    }
+}
+
+const FINITE_NUMBERS: &str = "Give finite numbers within their ranges.";
 
 impl Explain for ReadMeshError {
     fn explain(&self) -> Failure {
@@ -210,7 +278,11 @@ impl Explain for PageError {
     }
 }
 
+/// A mesh that was uploaded as a template and cannot be fitted.
 const UNSUITABLE_MODEL: (Fault, &str) = (Fault::Content, "unsuitable-model");
+
+/// A model that was chosen for a segmentation and cannot be fitted.
+const UNSUITABLE_CHOICE: (Fault, &str) = (Fault::Request, "unsuitable-model");
 
 const GIVE_MESH_JSON: &str = "Give a JSON mesh as `generate` writes it (mesh.json).";
 
@@ -356,51 +428,6 @@ fn template_advice(error: &TemplateError) -> String {
         }
         TemplateError::TooLarge { limit, .. } => format!("Give a model of at most {limit} points."),
         _ => "Give a closed surface that faces outward, in LPS millimetres.".into(),
-    }
-}
-
-fn segmentation_advice(error: &SegmentError) -> String {
-    use SegmentationError::{Cancelled, Deform, Expert, NoTemplate};
-    match error {
-        SegmentError::Volume(error) | SegmentError::ExpertVolume(error) => volume_advice(error),
-        SegmentError::Parameter(error) => error.fix.clone(),
-        SegmentError::Unreadable { .. } => GIVE_MESH_JSON.into(),
-        SegmentError::Model { error, .. } => template_advice(error),
-        SegmentError::OtherOrgan { shows, .. } => {
-            format!("Give a model of that organ, or set `organ` to {shows}.")
-        }
-        SegmentError::NoModel { .. } | SegmentError::Segmentation(NoTemplate) => {
-            "Name a model in `model`, or add one to the library.".into()
-        }
-        SegmentError::Segmentation(Expert(error)) => match error {
-            ExpertError::Empty => "Give a mask whose voxels are above 0.5 inside the organ.".into(),
-            ExpertError::Elsewhere { .. } => "Give a mask of the same scan whose header places it \
-                 correctly in the patient."
-                .into(),
-            ExpertError::Cancelled(_) => START_AGAIN.into(),
-        },
-        SegmentError::Segmentation(Deform(error)) => deform_advice(error),
-        SegmentError::Segmentation(Cancelled(_)) | SegmentError::Cancelled(_) => START_AGAIN.into(),
-    }
-}
-
-fn deform_advice(error: &DeformError) -> String {
-    match error {
-        DeformError::Localise(LocaliseError::NoHeart { .. }) => {
-            "Check that the file is a reconstructed heart scan; if it is, give the heart's centre \
-             as `center` (x,y,z in LPS millimetres)."
-                .into()
-        }
-        DeformError::Localise(LocaliseError::HintOutside) => {
-            "Give `center` or `box` inside the volume, or leave them out.".into()
-        }
-        DeformError::Localise(LocaliseError::Blank) => {
-            "Check that this is the right file and, for a 4-D one, the right `frame`.".into()
-        }
-        DeformError::TooManyNodes { limit, .. } => {
-            format!("Give a model of at most {limit} points, or use no support springs.")
-        }
-        _ => "Give finite numbers within their ranges.".into(),
     }
 }
 

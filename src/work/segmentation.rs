@@ -11,7 +11,9 @@ use crate::jobs::{
 };
 use crate::parameters::{FitParameters, Parameters};
 use crate::progress::{Monitor, Plan};
-use crate::segmentation::{NamedFile, NamedMesh, Order, OutcomeError, SegmentError, from_files};
+use crate::segmentation::{
+    NamedFile, NamedMesh, SegmentationError, SegmentationFilesError, SegmentationOrder, from_files,
+};
 use crate::volume::ReadLimits;
 use serde_json::{Map, Value};
 
@@ -59,7 +61,7 @@ impl Work for SegmentationWork {
         let expert = input.items.get("expert");
         let expert = expert.map(|expert| volume_files(&expert.files));
         let (models, named) = models(input, &parameters)?;
-        let order = Order {
+        let order = SegmentationOrder {
             volume: &volume_files(&input.files),
             expert: expert.as_deref(),
             models,
@@ -69,7 +71,7 @@ impl Work for SegmentationWork {
         let made = from_files(&order, &self.limits, monitor).map_err(|error| work_error(&error))?;
         let files = made.files(&Format::ALL, Some(input.volume.clone()), monitor);
         let files = files.map_err(|error| match error {
-            OutcomeError::Cancelled(cancelled) => cancelled.into(),
+            SegmentationFilesError::Cancelled(cancelled) => cancelled.into(),
             error => WorkError::Failed(not_exportable(&error)),
         })?;
         Ok(WorkOutput {
@@ -110,7 +112,7 @@ fn models(
     };
     if let Some(item) = input.items.get("model") {
         if let Some(other) = organ_of(item).filter(|shown| shown != organ) {
-            return Err(work_error(&SegmentError::OtherOrgan {
+            return Err(work_error(&SegmentationError::OtherOrgan {
                 name: item.id.clone(),
                 shows: other,
                 wanted: organ,
@@ -141,6 +143,9 @@ fn mesh(item: &StoredItem) -> Result<Option<NamedMesh>, WorkError> {
     };
     match read_json::decode(&bytes) {
         Ok(mesh) => Ok(Some(NamedMesh { name, mesh })),
-        Err(error) => Err(work_error(&SegmentError::Unreadable { name, error })),
+        Err(error) => Err(work_error(&SegmentationError::UnreadableModel {
+            name,
+            error,
+        })),
     }
 }

@@ -2,9 +2,9 @@
 
 use super::files::mesh_file;
 use super::problems::{Explain, unknown_organ, unsuitable_mesh};
-use crate::deform::template::{Organ, Template};
 use crate::export::{Format, Metadata, read_json};
 use crate::jobs::{Failure, OutputFile, WorkOutput};
+use crate::model::{Organ, Template};
 use crate::progress::Monitor;
 use serde_json::json;
 

@@ -8,7 +8,7 @@
 use std::path::{Path, PathBuf};
 
 use ventriform::deform::DeformParameters;
-use ventriform::deform::template::{Organ, Template};
+use ventriform::model::{Organ, Template};
 use ventriform::parameters::ModelParameters;
 use ventriform::pipeline;
 use ventriform::progress::Monitor;

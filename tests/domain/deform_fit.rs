@@ -5,10 +5,9 @@
 
 use nalgebra::Rotation3;
 use ventriform::deform::dynamics::{self, Motion, StopReason};
-use ventriform::deform::elastic::{Elastic, Stiffness, struts};
-use ventriform::deform::sensors::{Look, SensorKind, Shift};
-use ventriform::deform::template::{Organ, Template, TemplateError};
-use ventriform::deform::{DeformError, DeformParameters, Edge, fit};
+use ventriform::deform::elastic::{Elastic, Stiffness};
+use ventriform::deform::sensors::{EdgeShift, SensorKind, SensorSettings};
+use ventriform::deform::{DeformError, DeformParameters, WallEdge, fit};
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::grid::agreement::compare;
@@ -16,6 +15,8 @@ use ventriform::grid::field::Field;
 use ventriform::grid::voxelise::voxelise;
 use ventriform::locate::localisation::{Hints, LocaliseError};
 use ventriform::mesh::{TriMesh, shapes};
+use ventriform::model::struts::struts;
+use ventriform::model::{Organ, Template, TemplateError};
 use ventriform::progress::{CancelToken, Monitor, Silent};
 use ventriform::volume::Volume;
 
@@ -48,7 +49,7 @@ fn placed(mut mesh: TriMesh, centre: Vec3, axis: Vec3, scale: f64) -> TriMesh {
     mesh
 }
 
-/// What a camera would show of `wall`: 1 in the wall, `uptake` scaling it by place.
+/// A blurred image of `wall`: 1 in the wall, multiplied by `uptake` at each point.
 fn scan(wall: &TriMesh, n: usize, uptake: impl Fn(&Vec3) -> f64) -> Volume {
     let frame = VoxelToPatient::centred([n; 3], [SPACING; 3], Vec3::zeros()).unwrap();
     let mask = voxelise(wall, [n; 3], &frame);
@@ -130,12 +131,12 @@ fn energy_never_rises_without_external_forces() {
         *p += Vec3::new((t * 1.3).sin(), (t * 0.7).cos(), (t * 2.1).sin()) * 4.0;
     }
     let empty = Field::new(&picture(20, 0.0, |_| 1.0), None, 0.0);
-    let look = Look {
+    let look = SensorSettings {
         kind: SensorKind::Gradient,
         reach: 8.0,
         level: 0.5,
         ceiling: 2.0,
-        shift: Shift {
+        shift: EdgeShift {
             inner: 0.0,
             outer: 0.0,
             rim: 0.0,
@@ -182,7 +183,7 @@ fn a_ventricle_is_found_and_fitted_beside_a_hotter_organ() {
 }
 
 #[test]
-fn a_defect_without_any_uptake_does_not_suck_the_surface_in() {
+fn a_defect_without_any_uptake_does_not_draw_the_surface_inward() {
     let centre = Vec3::new(10.0, -5.0, 8.0);
     let truth = cup(centre, axis(), 1.0);
     let healthy = scan(&truth, 56, |_| 1.0);
@@ -241,13 +242,13 @@ fn a_turned_and_moved_patient_gives_the_same_volume() {
 }
 
 #[test]
-fn the_anatomical_edge_takes_off_what_blur_adds() {
+fn the_anatomical_edge_subtracts_what_blur_adds() {
     let thin = shapes::cup(70.0, 31.0, 8.0, 14);
     let truth = placed(thin, Vec3::new(5.0, -8.0, 3.0), axis(), 1.05);
     let volume = scan(&truth, 56, |_| 1.0);
     let template = ventricle(cup(Vec3::zeros(), axis(), 1.0));
     // `scan` blurs by 4.5 mm of standard deviation.
-    let agreement = [Edge::Apparent, Edge::Anatomical].map(|edge| {
+    let agreement = [WallEdge::Apparent, WallEdge::Anatomical].map(|edge| {
         let parameters = DeformParameters {
             edge,
             resolution: 4.5 * 2.355,
@@ -260,7 +261,7 @@ fn the_anatomical_edge_takes_off_what_blur_adds() {
     assert!(agreement[1] > agreement[0] + 0.02, "{agreement:?}");
 }
 
-/// Noise that is alike over some voxels: a linear congruential generator, blurred.
+/// Correlated noise: the output of a linear congruential generator, blurred.
 fn noise(seed: u64, sigma: f64) -> Volume {
     let mut state = seed;
     let mut volume = picture(40, 0.0, |_| 0.0);
@@ -275,7 +276,7 @@ fn noise(seed: u64, sigma: f64) -> Volume {
 }
 
 #[test]
-fn no_heart_is_said_and_not_made_up() {
+fn a_volume_without_a_heart_is_an_error() {
     let template = ventricle(cup(Vec3::zeros(), axis(), 1.0));
     let parameters = DeformParameters::default();
     let fit_to = |volume: &Volume| fit(volume, &template, &parameters, &Monitor::silent());
@@ -287,7 +288,7 @@ fn no_heart_is_said_and_not_made_up() {
     let shell = |p: &Vec3, radius: f64, wall: f64| {
         ball(p, &Vec3::zeros(), radius) - ball(p, &Vec3::zeros(), radius - wall)
     };
-    // Solid; closed all round as a stomach is; larger, as a skull or a cortex is; a ring.
+    // A solid ball; a closed shell like a stomach; a larger one like a skull or a cortex; a ring.
     let others = [
         ("ball", picture(40, 4.5, |p| ball(p, &Vec3::zeros(), 40.0))),
         ("stomach", picture(40, 4.5, |p| shell(p, 38.0, 10.0))),

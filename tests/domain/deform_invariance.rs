@@ -1,5 +1,5 @@
-//! What is measured must not depend on how the patient lies, on where the voxels happen to
-//! fall, or on the noise.
+//! Measures must not depend on the patient's orientation, on the position of the voxel grid, or on
+//! the noise.
 
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
@@ -8,11 +8,11 @@ use std::path::Path;
 
 use nalgebra::{Rotation3, Unit};
 use rayon::prelude::*;
-use ventriform::deform::template::{Organ, Template};
 use ventriform::deform::{DeformParameters, fit};
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::grid::field::Field;
+use ventriform::model::{Organ, Template};
 use ventriform::parameters::ModelParameters;
 use ventriform::polar::{self, PolarParameters};
 use ventriform::progress::Monitor;
@@ -91,7 +91,7 @@ fn measure(volume: &Volume, template: &Template) -> Vec<f64> {
         .collect()
 }
 
-/// The largest coefficient of variation over the measures, and which it is of.
+/// The largest coefficient of variation over the measures, and the index of that measure.
 fn worst_variation(runs: &[Vec<f64>]) -> (f64, usize) {
     let n = runs.len() as f64;
     (0..runs[0].len())
@@ -149,7 +149,7 @@ fn shifts_turns_of_the_patient_and_turns_of_the_grid_change_nothing() {
 fn a_patient_who_is_tilted_keeps_volumes_and_segments() {
     let template = template();
     let parameters = PhantomParameters {
-        // The torso must be in view: its outline says how it lies.
+        // The torso must be in view, because its outline shows the patient's orientation.
         shape: [96; 3],
         ..parameters(2, 0.05)
     };

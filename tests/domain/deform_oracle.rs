@@ -1,20 +1,22 @@
-//! The implicit integrator against an explicit one that shares nothing with its solver.
+//! The implicit integrator against an explicit one that shares no code with its solver.
 //!
 //! Semi-implicit Euler on m x'' = -g m x' + elastic forces + sensor forces, with the forces
-//! taken from the energies' own gradients and small steps, ends where the implicit steps end.
-//! Not to the last digit: the implicit run takes its sensors' mean answer for certain after
-//! some steps, while the reference looks anew before each one.
+//! computed as gradients of the energies and with small steps, ends in the state in which the
+//! implicit steps end. The states are not equal to the last digit: the implicit run fixes the mean
+//! of its sensors' readings after some steps, the reference reads them before every step.
 
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
 
 use ventriform::deform::dynamics::{self, Motion, StopReason};
-use ventriform::deform::elastic::{Elastic, Stiffness, area_shares, struts};
-use ventriform::deform::sensors::{self, Look, PER_TRIANGLE, SensorKind, Shift};
+use ventriform::deform::elastic::{Elastic, Stiffness};
+use ventriform::deform::sensors::{self, EdgeShift, PER_TRIANGLE, SensorKind, SensorSettings};
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::grid::field::Field;
 use ventriform::mesh::{TriMesh, shapes};
+use ventriform::model::area_shares;
+use ventriform::model::struts::struts;
 use ventriform::progress::Monitor;
 use ventriform::volume::Volume;
 
@@ -37,7 +39,7 @@ fn patient() -> Volume {
 }
 
 /// Steps of the reference integrator until it rests.
-fn explicit(start: &TriMesh, body: &Elastic, field: &Field, look: &Look) -> TriMesh {
+fn explicit(start: &TriMesh, body: &Elastic, field: &Field, look: &SensorSettings) -> TriMesh {
     const MASS: f64 = 1.0;
     const DAMPING: f64 = 1.0;
     const STEP: f64 = 0.4;
@@ -83,12 +85,12 @@ fn explicit_and_implicit_steps_end_in_the_same_state() {
         Stiffness::default(),
     );
     for kind in [SensorKind::Gradient, SensorKind::HalfMaximum] {
-        let look = Look {
+        let look = SensorSettings {
             kind,
             reach: 7.0,
             level: 0.5,
             ceiling: 2.0,
-            shift: Shift {
+            shift: EdgeShift {
                 inner: 0.0,
                 outer: 0.0,
                 rim: 0.0,
@@ -114,9 +116,9 @@ fn explicit_and_implicit_steps_end_in_the_same_state() {
             / start.vertices.len() as f64;
         let apart = pairs().map(|(p, q)| (p - q).norm()).sum::<f64>() / start.vertices.len() as f64;
         let farthest = pairs().map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
-        // A real journey (4.7 and 4.1 mm), and the same end: 0.147 and 0.134 voxels apart in the
-        // mean, 0.31 at most. Nearer they cannot come, because they do not ask the same: one
-        // rests on the mean of twelve answers, the other on the last one.
+        // Both move far (4.7 and 4.1 mm) and end close together: 0.147 and 0.134 voxels apart in
+        // the mean, 0.31 at most. They cannot be equal, because one rests on the mean of twelve
+        // readings and the other on the last one.
         assert!(moved > 4.0, "{moved}");
         assert!(apart < 0.15 * SPACING, "{kind:?}: {apart} mm in the mean");
         assert!(farthest < 0.35 * SPACING, "{kind:?}: {farthest} mm at most");

@@ -1,13 +1,13 @@
-//! Simulated patients that differ in what clinics differ in: none is lost.
+//! Simulated patients that differ as patients and scanners of clinics do: none is lost.
 
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
 
-use ventriform::deform::template::{Organ, Template};
-use ventriform::deform::{DeformParameters, Edge, fit};
+use ventriform::deform::{DeformParameters, WallEdge, fit};
 use ventriform::grid::agreement::compare;
 use ventriform::grid::voxelise::{Mask, voxelise};
 use ventriform::mesh::shapes;
+use ventriform::model::{Organ, Template};
 use ventriform::progress::Monitor;
 use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters};
 use ventriform::volume::{self, Phantom};
@@ -84,7 +84,7 @@ fn no_varied_patient_is_lost() {
             ..
         } = volume::phantom(&patient, &Monitor::silent()).unwrap();
         let parameters = DeformParameters {
-            edge: Edge::Anatomical,
+            edge: WallEdge::Anatomical,
             resolution: patient.fwhm_mm,
             ..DeformParameters::default()
         };
@@ -92,9 +92,9 @@ fn no_varied_patient_is_lost() {
         let found = fit.localisation.as_ref().unwrap().cup;
         let off = (found.centre - (pose.apex + pose.base) / 2.0).norm();
         let angle = found.axis.angle(&pose.axis).to_degrees();
-        // 3.4 mm at most where the apex shows. Where it takes up nothing, how far it lies from
-        // the base is only known by the proportions of hearts, which differ by 8 % of the length,
-        // and the axis by what is left of the wall: 14.8 mm and 10.5 degrees.
+        // 3.4 mm at most where the apex is visible. Where it takes up no tracer, its distance from
+        // the base follows from the proportions of hearts, which vary by 8 % of the length, and the
+        // axis from the visible part of the wall: 14.8 mm and 10.5 degrees.
         let dark = fit.localisation.as_ref().unwrap().dark_apex.is_some();
         let (far, askew) = if dark { (15.0, 11.0) } else { (4.0, 6.0) };
         assert!(

@@ -40,8 +40,8 @@ fn case(cohort: &Path, name: &str, seed: u64, defects: Vec<PerfusionDefect>) {
     }
 }
 
-/// One template that works and one that does not; a whole patient, one without a gold
-/// standard, one whose scan is torn off, one without a scan.
+/// One usable and one unusable template; a complete patient, one without the expert's mask, one
+/// with a truncated scan, one without a scan.
 fn cohort() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
@@ -133,12 +133,12 @@ fn a_cohort_with_gaps_is_evaluated_resumed_and_reproduced() {
         };
         means.iter().find(wanted).unwrap().clone()
     };
-    // Only what there is something to measure against counts.
+    // Only fits with a gold standard count.
     assert_eq!(mean("expert")["fits"], 1);
     assert_eq!(mean("truth")["fits"], 2);
     assert!(mean("truth")["jaccard"].as_f64().unwrap() > 0.6);
 
-    // Killed in the midst: one record torn, one gone, one file half written.
+    // As after a crash: one record truncated, one missing, one file half written.
     let fit = |case: &str, model: &str| first.join(format!("fits/{case}_t1_{model}_67.json"));
     let torn = std::fs::read(fit("p1", "optimised")).unwrap();
     std::fs::write(fit("p1", "optimised"), &torn[..torn.len() / 2]).unwrap();
@@ -157,10 +157,10 @@ fn a_cohort_with_gaps_is_evaluated_resumed_and_reproduced() {
     assert_eq!(
         modified(&fit("p1", "reference")),
         kept,
-        "a whole record is not made again"
+        "a complete record is not made again"
     );
 
-    // Another gold standard: the patient's fits are measured anew.
+    // Another gold standard: the patient's fits are measured again.
     let other = std::fs::read(cohort.path().join("p2/lv_truth.nii.gz")).unwrap();
     std::fs::write(cohort.path().join("p1/lv_expert_img.nii.gz"), other).unwrap();
     evaluate(cohort.path(), &first, 2);
@@ -169,7 +169,7 @@ fn a_cohort_with_gaps_is_evaluated_resumed_and_reproduced() {
 }
 
 #[test]
-fn a_cohort_of_nothing_useful_is_refused_with_the_reason() {
+fn an_unusable_cohort_is_an_error_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let run = |cohort: &Path| {

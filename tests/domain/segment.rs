@@ -1,4 +1,4 @@
-//! `ventriform segment` and `measure`: the files, keys and refusals that others rely on.
+//! `ventriform segment` and `measure`: the files, keys and errors that other programs rely on.
 
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
@@ -15,13 +15,12 @@ use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::mesh::shapes;
 use ventriform::parameters::FitParameters;
 use ventriform::progress::{CancelToken, Gauge, Monitor, Observer, Plan, Stage};
-use ventriform::segmentation::OutcomeError;
-use ventriform::segmentation::{Order, from_files};
+use ventriform::segmentation::{SegmentationFilesError, SegmentationOrder, from_files};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
 use ventriform::volume::{ReadLimits, Volume, VolumeFile};
 
-/// A folder with `scan.nii.gz`, its `truth.nii.gz`, and masks that do not suit it.
+/// A folder with `scan.nii.gz`, its `truth.nii.gz`, and masks that do not match it.
 fn folder() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let parameters = PhantomParameters {
@@ -75,7 +74,7 @@ fn number(value: &Value) -> f64 {
 }
 
 #[test]
-fn a_model_of_one_scan_segments_it_with_names_that_others_rely_on() {
+fn a_model_of_a_scan_segments_it_with_stable_names() {
     let folder = folder();
     let here = folder.path();
     succeeds(here, "generate scan.nii.gz -o lv.json --points 150");
@@ -111,7 +110,7 @@ fn a_model_of_one_scan_segments_it_with_names_that_others_rely_on() {
 }
 
 #[test]
-fn formats_hints_and_the_built_in_model_are_taken() {
+fn formats_hints_and_the_built_in_model_are_accepted() {
     let folder = folder();
     let here = folder.path();
     let all = Format::ALL.map(|format| format!(" --format {}", format.extension()));
@@ -142,7 +141,7 @@ fn formats_hints_and_the_built_in_model_are_taken() {
 }
 
 #[test]
-fn what_cannot_be_done_is_refused_with_field_and_way_out() {
+fn errors_name_the_field_and_what_to_do() {
     let folder = folder();
     let here = folder.path();
     let segment = "segment scan.nii.gz -o out --model auto";
@@ -207,7 +206,7 @@ fn templates_are_imported_into_a_data_folder() {
     assert!(ball.contains("no ventricle"), "{ball}");
 }
 
-/// Notes the stages and how the whole grows, and raises the token at one of them.
+/// Records the stages and the progress of the whole, and cancels at one of them.
 struct Watcher {
     gauge: Gauge,
     stages: Mutex<Vec<Stage>>,
@@ -229,11 +228,11 @@ impl Watcher {
         }
     }
 
-    /// Segments the scan to the last file; whether it ended because it was told to.
+    /// Segments the scan and encodes every file; returns whether it was cancelled.
     fn segment(&self, scan: &Path) -> bool {
         let monitor = Monitor::new(self, self.token.clone());
         let parameters = FitParameters::default();
-        let order = Order {
+        let order = SegmentationOrder {
             volume: &[VolumeFile::at(scan)],
             expert: None,
             models: Vec::new(),
@@ -243,7 +242,7 @@ impl Watcher {
         match from_files(&order, &ReadLimits::default(), &monitor) {
             Ok(made) => match made.files(&Format::ALL, None, &monitor) {
                 Ok(_) => false,
-                Err(error) => matches!(error, OutcomeError::Cancelled(_)),
+                Err(error) => matches!(error, SegmentationFilesError::Cancelled(_)),
             },
             Err(error) => error.is_cancelled(),
         }
@@ -268,7 +267,7 @@ impl Observer for Watcher {
 }
 
 #[test]
-fn every_stage_tells_where_it_is_and_ends_when_it_is_told_to() {
+fn every_stage_reports_progress_and_can_be_cancelled() {
     let folder = folder();
     let scan = folder.path().join("scan.nii.gz");
     let watcher = Watcher::new(None);
@@ -284,7 +283,7 @@ fn every_stage_tells_where_it_is_and_ends_when_it_is_told_to() {
         let watcher = Watcher::new(Some(stage));
         assert!(watcher.segment(&scan), "{stage:?}");
         let raised = watcher.raised.lock().unwrap().unwrap();
-        // Generous: the machine may be busy. Alone, no stage takes a tenth of it.
+        // Generous, because the machine may be busy: without load no stage takes a tenth of it.
         assert!(raised.elapsed() < Duration::from_secs(1), "{stage:?}");
     }
 }

@@ -1,56 +1,23 @@
-//! A model made ready to be fitted: its place as a cup, its struts.
+//! A model made ready to be fitted.
+//!
+//! In goes a mesh and the organ it shows. The mesh must be a closed, outward surface of at most
+//! [`MAX_NODES`] nodes; a ventricle must agree with a cup. Out comes the mesh with its cup (centre,
+//! long axis, length) and the pairs of nodes across its wall.
 
-use super::elastic::{self, Strut};
+use super::organ::Organ;
+use super::struts::{Strut, struts};
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::geometry::frame::VoxelToPatient;
+use crate::grid::Volume;
 use crate::grid::field::Field;
 use crate::grid::voxelise::voxelise;
-use crate::locate::cup::{Cup, perpendicular};
+use crate::locate::cup::Cup;
 use crate::locate::localisation as localise;
 use crate::locate::localisation::Hints;
 use crate::mesh::TriMesh;
 use crate::mesh::topology::{self, Defect};
 use crate::progress::{Cancelled, Monitor};
-use crate::volume::Volume;
-
-/// What a model is a model of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Organ {
-    /// The left ventricle's wall: a cup, found by itself.
-    LeftVentricle,
-    /// A liver: one blob.
-    Liver,
-    /// A kidney: one blob.
-    Kidney,
-    /// Anything closed.
-    Generic,
-}
-
-impl Organ {
-    /// Every organ.
-    pub const ALL: [Organ; 4] = [
-        Organ::LeftVentricle,
-        Organ::Liver,
-        Organ::Kidney,
-        Organ::Generic,
-    ];
-
-    /// The organ of that name.
-    pub fn parse(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|organ| organ.as_str() == name)
-    }
-
-    /// The name in parameters and reports.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Organ::LeftVentricle => "left_ventricle",
-            Organ::Liver => "liver",
-            Organ::Kidney => "kidney",
-            Organ::Generic => "generic",
-        }
-    }
-}
 
 /// Why a mesh cannot be a model to fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -64,13 +31,15 @@ pub enum TemplateError {
         /// Index of the vertex.
         vertex: usize,
     },
-    /// The triangles face inward, or the mesh encloses nothing.
-    #[error("the model encloses {volume_ml:.3} ml; a closed, outward surface is needed")]
+    /// The triangles face inward, or the enclosed volume is out of range.
+    #[error(
+        "the model encloses {volume_ml:.3} ml; 0.1 to 10000 ml are needed, its triangles facing outward"
+    )]
     NoVolume {
         /// Enclosed volume, ml.
         volume_ml: f64,
     },
-    /// More nodes than the fit is made for.
+    /// More nodes than [`MAX_NODES`].
     #[error("the model has {vertices} vertices; at most {limit} can be fitted")]
     TooLarge {
         /// Number of vertices.
@@ -78,10 +47,10 @@ pub enum TemplateError {
         /// The limit.
         limit: usize,
     },
-    /// A ventricle was asked for, and the mesh is no cup.
+    /// The organ is a left ventricle, and the mesh is no cup.
     #[error(
-        "the model is no ventricle: it agrees with a cup by {correlation:.2} only; say \
-         organ = generic for other shapes"
+        "the model is no ventricle: its correlation with a cup is {correlation:.2}, more than \
+         0.6 is needed"
     )]
     NoCup {
         /// Correlation with a cup.
@@ -102,14 +71,14 @@ pub struct Template {
     pub mesh: TriMesh,
     /// What it shows.
     pub organ: Organ,
-    /// Its place as a cup; ventricles only.
+    /// Centre, long axis and size of the wall; ventricles only.
     pub cup: Option<Cup>,
-    /// Node pairs across the wall; none where there is no wall.
+    /// Node pairs across the wall; ventricles only, empty otherwise.
     pub struts: Vec<Strut>,
 }
 
 impl Template {
-    /// Checks `mesh` and finds what the fit has to know of it.
+    /// Checks `mesh`, finds its cup and its struts.
     ///
     /// # Errors
     /// [`TemplateError`].
@@ -126,15 +95,12 @@ impl Template {
         }
         topology::check(&mesh)?;
         let volume_ml = mesh.volume() / 1000.0;
-        // The picture of the mesh below takes memory by its size: refuse planets.
+        // The voxel picture below takes memory by the size of the mesh.
         if !(volume_ml > 0.1 && volume_ml < 10_000.0) {
             return Err(TemplateError::NoVolume { volume_ml });
         }
         let (cup, struts) = match organ {
-            Organ::LeftVentricle => (
-                Some(cup_of(&mesh, monitor)?),
-                elastic::struts(&mesh, monitor)?,
-            ),
+            Organ::LeftVentricle => (Some(cup_of(&mesh, monitor)?), struts(&mesh, monitor)?),
             Organ::Liver | Organ::Kidney | Organ::Generic => (None, Vec::new()),
         };
         Ok(Self {
@@ -146,8 +112,8 @@ impl Template {
     }
 }
 
-/// Finds the cup in the model by the search that finds it in patients, so that both mean the
-/// same by centre, axis and length.
+/// Finds the cup in the model by the same search as in patients, so that centre, axis and length
+/// are defined alike in both.
 fn cup_of(mesh: &TriMesh, monitor: &Monitor) -> Result<Cup, TemplateError> {
     const SPACING: f64 = 3.25;
     let bounds = Aabb::of(&mesh.vertices);
@@ -187,59 +153,5 @@ fn cup_of(mesh: &TriMesh, monitor: &Monitor) -> Result<Cup, TemplateError> {
         }
         Err(localise::LocaliseError::Cancelled(c)) => Err(c.into()),
         Err(_) => Err(none),
-    }
-}
-
-/// The map from one cup to another: the patient's own tilt, then the least turn from axis to
-/// axis, then `roll` radians about the axis, lengths along the axis by the lengths, across by
-/// the breadths. So a heart that is tilted with its patient meets the same side of the model.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Pose {
-    from: Cup,
-    to: Cup,
-    turn: nalgebra::Rotation3<f64>,
-}
-
-impl Pose {
-    /// The pose that takes `from` to `to` in a patient who is turned by `tilt` in the frame.
-    pub fn between(from: &Cup, to: &Cup, tilt: &nalgebra::Rotation3<f64>, roll: f64) -> Self {
-        let tilted = tilt * from.axis;
-        let least = nalgebra::Rotation3::rotation_between(&tilted, &to.axis)
-            // Opposite axes: half a turn about anything across.
-            .unwrap_or_else(|| {
-                let (across, _) = perpendicular(&tilted);
-                nalgebra::Rotation3::from_axis_angle(
-                    &nalgebra::Unit::new_normalize(across),
-                    std::f64::consts::PI,
-                )
-            });
-        let about =
-            nalgebra::Rotation3::from_axis_angle(&nalgebra::Unit::new_normalize(to.axis), roll);
-        Self {
-            from: *from,
-            to: *to,
-            turn: about * least * tilt,
-        }
-    }
-
-    /// Isotropic scale: the cube root of the change of volume.
-    pub fn scale(&self) -> f64 {
-        let along = self.to.length / self.from.length;
-        let across = along * self.to.breadth / self.from.breadth;
-        (along * across * across).cbrt()
-    }
-
-    /// The rotation.
-    pub fn rotation(&self) -> &nalgebra::Rotation3<f64> {
-        &self.turn
-    }
-
-    /// Where a point of the template goes.
-    pub fn apply(&self, p: &Vec3) -> Vec3 {
-        let along = self.to.length / self.from.length;
-        let across = along * self.to.breadth / self.from.breadth;
-        let turned = self.turn * (p - self.from.centre);
-        let share = turned.dot(&self.to.axis);
-        self.to.centre + self.to.axis * (share * (along - across)) + turned * across
     }
 }

@@ -5,16 +5,16 @@ use crate::grid::voxelise::Mask;
 use crate::progress::{Cancelled, Monitor};
 use crate::volume::Volume;
 
-/// The mask cannot be measured against.
+/// Why a mask cannot be compared with a volume.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ExpertError {
-    /// Nothing in it is above 0.5.
+pub enum ExpertMaskError {
+    /// No voxel is above 0.5.
     #[error("the expert's mask is empty")]
     Empty,
-    /// It lies somewhere else than the volume.
+    /// More than a hundredth of it lies outside the volume.
     #[error(
-        "only {inside} of the mask's {all} voxels lie inside the volume: its place in the \
-         patient is another one"
+        "only {inside} of the mask's {all} voxels lie inside the volume: the headers place mask \
+         and volume differently in the patient"
     )]
     Elsewhere {
         /// Mask voxels inside the volume.
@@ -27,18 +27,22 @@ pub enum ExpertError {
     Cancelled(#[from] Cancelled),
 }
 
-/// Voxels between two looks at the cancel token.
+/// Voxels between two checks of the cancel token.
 const PORTION: usize = 1 << 14;
 
-/// `expert` (anything above 0.5) on the grid of `volume`: as it is where the grids agree
-/// within a hundredth of a voxel, else by the nearest voxel in the patient.
+/// The mask `expert` (voxels above 0.5) on the grid of `volume`: unchanged where the grids agree
+/// within a hundredth of a voxel, otherwise by the nearest voxel in the patient.
 ///
 /// # Errors
-/// [`ExpertError`].
-pub fn on_grid(expert: &Volume, volume: &Volume, monitor: &Monitor) -> Result<Mask, ExpertError> {
+/// [`ExpertMaskError`].
+pub fn on_grid(
+    expert: &Volume,
+    volume: &Volume,
+    monitor: &Monitor,
+) -> Result<Mask, ExpertMaskError> {
     let all = expert.voxels.iter().filter(|v| **v > 0.5).count();
     if all == 0 {
-        return Err(ExpertError::Empty);
+        return Err(ExpertMaskError::Empty);
     }
     if same_grid(expert, volume) {
         return Ok(Mask {
@@ -54,7 +58,7 @@ pub fn on_grid(expert: &Volume, volume: &Volume, monitor: &Monitor) -> Result<Ma
         inside += usize::from(*value > 0.5 && contains(volume, &place(expert, v)));
     }
     if inside * 100 < all * 99 {
-        return Err(ExpertError::Elsewhere { inside, all });
+        return Err(ExpertMaskError::Elsewhere { inside, all });
     }
     let mut mask = Mask::empty(volume.shape);
     for (v, voxel) in mask.voxels.iter_mut().enumerate() {
@@ -116,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mask_on_another_grid_is_taken_over_by_place() {
+    fn a_mask_on_another_grid_is_resampled_by_its_place() {
         let image = volume([30; 3], 2.0, Vec3::zeros(), 10.0);
         let fine = volume([50; 3], 1.0, Vec3::new(1.0, 0.5, 0.0), 10.0);
         let taken = on_grid(&fine, &image, &Monitor::silent()).unwrap();
@@ -132,13 +136,13 @@ mod tests {
         let none = volume([30; 3], 2.0, Vec3::zeros(), 0.0);
         assert_eq!(
             on_grid(&none, &image, &Monitor::silent()),
-            Err(ExpertError::Empty)
+            Err(ExpertMaskError::Empty)
         );
         let mut far = image.clone();
         far.frame = VoxelToPatient::centred([30; 3], [2.0; 3], Vec3::new(400.0, 0.0, 0.0)).unwrap();
         assert!(matches!(
             on_grid(&far, &image, &Monitor::silent()),
-            Err(ExpertError::Elsewhere { inside: 0, .. })
+            Err(ExpertMaskError::Elsewhere { inside: 0, .. })
         ));
     }
 }

@@ -1,72 +1,74 @@
-//! One sensor's profile: the image along a normal, and the edge on it.
+//! The image along one sensor's normal, and the edge on it.
 
-use super::sensors::{Look, SensorKind};
+use super::settings::{SensorKind, SensorSettings};
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 
-/// Distance of the readings along a profile, mm.
+/// Distance of the samples along a profile, mm.
 const STEP: f64 = 1.0;
-/// Half the distance between the readings of a difference quotient, in steps.
+/// Half the distance between the samples of a difference quotient, in steps.
 const HALF: usize = 2;
-/// The ridge and the trough beside an edge are looked for this far from it, in steps.
+/// Farthest distance of the ridge and the trough from an edge, in steps.
 const FLANK: isize = 14;
-/// The half-way point lies at most this far from the steepest slope, in steps; what seems to
-/// lie farther away belongs to other structures.
+/// Farthest distance of the half-way point from the steepest slope, in steps: a farther one belongs
+/// to another structure.
 const NEAR: f64 = 2.0;
 
 /// The edge on a profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Edge {
+pub struct ProfileEdge {
     /// Where it lies, mm along the normal.
     pub offset: f64,
     /// Slope (image units per mm) times nearness; 0 where there is none.
     pub score: f64,
-    /// From the ridge to the half-way point, mm, where the kind of sensor looks for them.
+    /// From the ridge to the half-way point, mm; for [`SensorKind::HalfMaximum`] only.
     pub half_width: Option<f64>,
 }
 
-/// A profile and room for its readings.
+/// A profile, with buffers for its samples.
 pub struct Profile {
-    look: Look,
+    settings: SensorSettings,
     half: usize,
-    /// exp(-t²/2(reach/2)²) of every slope's place.
+    /// [`SensorSettings::nearness`] at each slope.
     nearness: Vec<f64>,
     values: Vec<f64>,
     slopes: Vec<f64>,
 }
 
 impl Profile {
-    /// A profile for sensors that look like this.
-    pub fn new(look: &Look) -> Self {
-        let half = (look.reach / STEP).ceil().max(1.0) as usize;
+    /// A profile for sensors with these settings.
+    pub fn new(settings: &SensorSettings) -> Self {
+        let half = (settings.reach / STEP).ceil().max(1.0) as usize;
         Self {
-            look: *look,
+            settings: *settings,
             half,
             nearness: (0..=2 * half)
-                .map(|s| look.nearness((s as f64 - half as f64) * STEP))
+                .map(|s| settings.nearness((s as f64 - half as f64) * STEP))
                 .collect(),
             values: Vec::new(),
             slopes: Vec::new(),
         }
     }
 
-    /// Looks for the edge near `place`, along `normal`.
-    pub fn look(&mut self, field: &Field, place: &Vec3, normal: &Vec3) -> Edge {
+    /// The edge near `place`, along `normal`.
+    pub fn edge(&mut self, field: &Field, place: &Vec3, normal: &Vec3) -> ProfileEdge {
         let reach = self.half + HALF;
         let start = field.to_index(place);
         let step = field.step(normal) * STEP;
         self.values.clear();
         self.values.extend((0..=2 * reach).map(|s| {
             let t = s as f64 - reach as f64;
-            field.at_index(&(start + step * t)).min(self.look.ceiling)
+            field
+                .at_index(&(start + step * t))
+                .min(self.settings.ceiling)
         }));
-        if self.look.kind == SensorKind::Level {
+        if self.settings.kind == SensorKind::Level {
             return self.crossing(reach);
         }
         self.slopes.clear();
         self.slopes.extend((0..=2 * self.half).map(|s| {
             let slope = (self.values[s] - self.values[s + 2 * HALF]) / (2.0 * HALF as f64 * STEP);
-            match self.look.kind {
+            match self.settings.kind {
                 SensorKind::Unsigned => slope.abs(),
                 _ => slope.max(0.0),
             }
@@ -79,18 +81,18 @@ impl Profile {
             }
         }
         let seen = score(best);
-        // The Gaussian has chosen the hill, but it also pulls the summit towards the sensor:
-        // climb on the slope itself.
+        // The Gaussian selects the peak but also shifts it towards the sensor: climb on the
+        // unweighted slope.
         let top = climb(&self.slopes, best);
         let steepest = top as f64 - self.half as f64;
-        let half_way = (self.look.kind == SensorKind::HalfMaximum && seen > 0.0).then(|| {
-            // Most of what is asked for was read above.
+        let half_way = (self.settings.kind == SensorKind::HalfMaximum && seen > 0.0).then(|| {
+            // Most of these samples were taken above.
             let middle = (top + HALF) as isize;
             let value = |s: isize| match usize::try_from(middle + s) {
                 Ok(known) if known < self.values.len() => self.values[known],
                 _ => {
                     let index = start + step * (steepest + s as f64);
-                    field.at_index(&index).min(self.look.ceiling)
+                    field.at_index(&index).min(self.settings.ceiling)
                 }
             };
             half_way(value)
@@ -99,16 +101,16 @@ impl Profile {
             Some((beyond, width)) => (beyond, Some(width * STEP)),
             None => (parabola(&self.slopes, top), None),
         };
-        Edge {
+        ProfileEdge {
             offset: (steepest + beyond) * STEP,
             score: seen,
             half_width,
         }
     }
 
-    /// The nearest outward fall through the level.
-    fn crossing(&self, reach: usize) -> Edge {
-        let level = self.look.level;
+    /// The nearest point where the image falls through the level outward.
+    fn crossing(&self, reach: usize) -> ProfileEdge {
+        let level = self.settings.level;
         let mut best: Option<(f64, f64)> = None;
         for (s, pair) in self.values.windows(2).enumerate() {
             if pair[0] >= level && pair[1] < level {
@@ -119,9 +121,9 @@ impl Profile {
             }
         }
         let (t, slope) = best.unwrap_or((0.0, 0.0));
-        Edge {
+        ProfileEdge {
             offset: t * STEP,
-            score: slope / STEP * self.look.nearness(t * STEP),
+            score: slope / STEP * self.settings.nearness(t * STEP),
             half_width: None,
         }
     }
@@ -150,8 +152,8 @@ fn half_way(value: impl Fn(isize) -> f64) -> (f64, f64) {
     (crossing.clamp(-NEAR, NEAR), crossing + ridge.0)
 }
 
-/// Where a falling profile stops to rise backward (`towards` = -1) or to fall forward (1):
-/// steps from 0 and value.
+/// The end of the fall on a profile, backward (`towards` = -1) to the ridge or forward (1) to the
+/// trough: steps from 0 and value.
 fn turning(value: impl Fn(isize) -> f64, towards: isize) -> (f64, f64) {
     let (mut s, mut last) = (0, value(0));
     while s < FLANK {
@@ -183,15 +185,16 @@ fn climb(values: &[f64], start: usize) -> usize {
     }
 }
 
-/// Where between its neighbours the maximum of a parabola lies, -0.5..=0.5.
+/// The maximum of the parabola through a sample and its neighbours, in steps from the sample,
+/// -0.5..=0.5.
 fn parabola(scores: &[f64], best: usize) -> f64 {
     if best == 0 || best + 1 == scores.len() {
         return 0.0;
     }
     let (a, b, c) = (scores[best - 1], scores[best], scores[best + 1]);
-    let bend = a - 2.0 * b + c;
-    if bend < 0.0 {
-        (0.5 * (a - c) / bend).clamp(-0.5, 0.5)
+    let second = a - 2.0 * b + c;
+    if second < 0.0 {
+        (0.5 * (a - c) / second).clamp(-0.5, 0.5)
     } else {
         0.0
     }

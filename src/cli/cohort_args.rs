@@ -1,0 +1,31 @@
+//! The arguments of the commands that work on a cohort's folder.
+
+use crate::evaluate::{Cohort, CohortError};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Which cohort, and how its templates' models are made. A command that takes these sets the
+/// default of `points`.
+#[derive(Debug, Args)]
+pub struct CohortArgs {
+    /// The cohort's folder: one folder for each case with spect.nii.gz, lv_expert_img.nii.gz
+    /// and lv_truth.nii.gz; manifest.json says which are templates (else: names with t)
+    #[arg(long, value_name = "DIR")]
+    cohort: PathBuf,
+    /// Numbers of points of our models
+    #[arg(long, value_name = "N,...", value_delimiter = ',')]
+    pub points: Vec<usize>,
+    /// The template whose model comes from its expert's mask [default: the third, if it has one]
+    #[arg(long, value_name = "CASE")]
+    manual: Option<String>,
+}
+
+impl CohortArgs {
+    /// Reads who is in the folder.
+    ///
+    /// # Errors
+    /// [`CohortError`].
+    pub fn open(&self) -> Result<Cohort, CohortError> {
+        Cohort::open(&self.cohort, self.manual.as_deref())
+    }
+}

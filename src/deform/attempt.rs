@@ -1,0 +1,170 @@
+//! Runs of the motion, repeated with a stiffer model while the result is folded.
+
+use super::doubts;
+use super::dynamics::{self, Moved};
+use super::elastic::Elastic;
+use super::fit::Fit;
+use super::parameters::DeformParameters;
+use super::sensors::{SensorReading, SensorSettings};
+use super::setup::FitSetup;
+use crate::grid::Volume;
+use crate::mesh::TriMesh;
+use crate::mesh::intersections::self_intersections;
+use crate::model::wall::{self, VentricleWall};
+use crate::model::{Organ, Template};
+use crate::progress::{Cancelled, Monitor};
+
+/// Repetitions of a folded fit.
+const RETRIES: usize = 3;
+/// Factor of the stiffness from one repetition to the next.
+const STIFFER: f64 = 4.0;
+
+/// One run of the motion and its folds.
+pub struct Attempt {
+    moved: Moved,
+    strain: f64,
+    intersections: usize,
+    turned: usize,
+    runs: usize,
+}
+
+impl Attempt {
+    /// Repeats the motion with a stiffer model until nothing is folded; the least folded run
+    /// otherwise. `thicken` moves the inner and the outer edge outward, mm.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn best(
+        aligned: &TriMesh,
+        template: &Template,
+        setup: &FitSetup,
+        parameters: &DeformParameters,
+        thicken: f64,
+        monitor: &Monitor,
+    ) -> Result<Self, Cancelled> {
+        let wide = setup.sensors(parameters, parameters.sensor, thicken);
+        let near = SensorSettings {
+            reach: (0.8 * wide.reach).max(parameters.motion.last_reach),
+            ..wide
+        };
+        let mut best: Option<Self> = None;
+        for run in 1..=1 + RETRIES {
+            let stiffness = parameters.stiffness.times(STIFFER.powi(run as i32 - 1));
+            let body = Elastic::new(aligned, &template.struts, stiffness);
+            let moved = dynamics::run(
+                aligned,
+                &body,
+                &setup.field,
+                &near,
+                &parameters.motion,
+                monitor,
+            )?;
+            let attempt = Self {
+                strain: body.strain(&moved.mesh.vertices),
+                intersections: self_intersections(&moved.mesh).len(),
+                turned: turned(aligned, &moved.mesh),
+                moved,
+                runs: run,
+            };
+            let faults = attempt.faults();
+            let better = best.as_ref().is_none_or(|b| faults < b.faults());
+            if better {
+                best = Some(attempt);
+            }
+            if let Some(best) = &mut best {
+                best.runs = run;
+            }
+            if faults == 0 {
+                break;
+            }
+        }
+        Ok(best.expect("the loop runs at least once and takes its first attempt"))
+    }
+
+    fn faults(&self) -> usize {
+        self.intersections + self.turned
+    }
+
+    /// The figures of the run.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn into_fit(
+        self,
+        volume: &Volume,
+        template: &Template,
+        setup: &FitSetup,
+        aligned: &TriMesh,
+        monitor: &Monitor,
+    ) -> Result<Fit, Cancelled> {
+        let mesh = self.moved.mesh;
+        let (active, residual) = edges_seen(&self.moved.readings);
+        let cup = template
+            .cup
+            .map(|cup| wall::carried(&cup, &template.mesh, &mesh));
+        let wall = cup
+            .map(|cup| {
+                VentricleWall::new(&mesh, &cup, &setup.patient_orientation.superior, monitor)
+            })
+            .transpose()?;
+        let posed = &setup.posed.vertices;
+        let mut fit = Fit {
+            displacements: mesh
+                .vertices
+                .iter()
+                .zip(posed)
+                .map(|(p, q)| p - q)
+                .collect(),
+            cup,
+            scale: setup.pose.scale(),
+            rotation: *setup.pose.rotation(),
+            confidence: setup.localisation.as_ref().map_or(0.5, |l| l.confidence)
+                * (active / 0.5).min(1.0),
+            localisation: setup.localisation.clone(),
+            reason: self.moved.reason,
+            iterations: self.moved.iterations,
+            runs: self.runs,
+            energy: self.moved.energy,
+            residual,
+            active,
+            strain: self.strain,
+            self_intersections: self.intersections,
+            turned_triangles: turned(aligned, &mesh),
+            wall_ml: mesh.volume() / 1000.0,
+            patient_orientation: cup.map(|_| setup.patient_orientation),
+            wall,
+            mesh,
+            flags: Vec::new(),
+        };
+        fit.flags = doubts::flags(&fit, volume, template.organ == Organ::LeftVentricle);
+        Ok(fit)
+    }
+}
+
+/// The share of area whose sensors see an edge, and the weighted rms distance to the edges, mm;
+/// infinite without any edge.
+fn edges_seen(readings: &[SensorReading]) -> (f64, f64) {
+    let seen: f64 = readings.iter().map(|r| r.share * r.weight).sum();
+    let misfit: f64 = readings
+        .iter()
+        .map(|r| r.share * r.weight * r.offset * r.offset)
+        .sum();
+    let active = readings
+        .iter()
+        .filter(|r| r.weight > 0.25)
+        .map(|r| r.share)
+        .sum::<f64>();
+    let residual = if seen > 0.0 {
+        (misfit / seen).sqrt()
+    } else {
+        f64::INFINITY
+    };
+    (active, residual)
+}
+
+/// The number of triangles whose normal turned by 90 degrees or more from `before` to `now`.
+fn turned(before: &TriMesh, now: &TriMesh) -> usize {
+    (0..now.triangles.len())
+        .filter(|t| before.area_normal(*t).dot(&now.area_normal(*t)) <= 0.0)
+        .count()
+}

@@ -1,0 +1,120 @@
+//! The parameters of a fit.
+
+use super::dynamics::Motion;
+use super::elastic::Stiffness;
+use super::error::DeformError;
+use super::sensors::SensorKind;
+use crate::locate::localisation::Hints;
+use crate::locate::patient_orientation::Superior;
+
+/// Parameters of [`fit`](super::fit).
+#[derive(Debug, Clone, PartialEq)]
+pub struct DeformParameters {
+    /// What is known of the organ's place. Default: nothing.
+    pub hints: Hints,
+    /// Rotation of the template about the long axis, added to the least rotation that aligns the
+    /// axes, degrees. Default 0.
+    pub roll: f64,
+    /// What decides the patient's superior direction. The model is posed by it, and the columns
+    /// and segments of the wall are counted from it. Ventricles only. Default
+    /// [`Superior::Body`].
+    pub superior: Superior,
+    /// Whether the model is aligned as a whole before it is deformed. Default true. If false, as
+    /// for models that are placed by hand, the rest state is the posed template.
+    pub align: bool,
+    /// Stiffness of the model.
+    pub stiffness: Stiffness,
+    /// Which point of an edge the sensors report. Default [`SensorKind::HalfMaximum`].
+    pub sensor: SensorKind,
+    /// Initial reach of the sensors, mm, 2..=30. Default 10.
+    pub reach: f64,
+    /// Gaussian blur of the image, sigma in mm, 0..=10. Default 3.
+    pub blur: f64,
+    /// Distance of the reader's edge from the edge found, mm outward, -5..=5. Default 0.
+    pub margin: f64,
+    /// Which edge of a ventricle's wall is fitted. Default [`WallEdge::Apparent`].
+    pub edge: WallEdge,
+    /// The image's resolution (full width of a point at half its maximum), mm, 0..=30, for
+    /// [`WallEdge::Anatomical`]. Default 11.5, the mean over the simulated scans, motion and
+    /// filter included.
+    pub resolution: f64,
+    /// How the model moves.
+    pub motion: Motion,
+}
+
+impl Default for DeformParameters {
+    fn default() -> Self {
+        Self {
+            hints: Hints::default(),
+            roll: 0.0,
+            superior: Superior::Body,
+            align: true,
+            stiffness: Stiffness::default(),
+            sensor: SensorKind::HalfMaximum,
+            reach: 10.0,
+            blur: 3.0,
+            margin: 0.0,
+            edge: WallEdge::Apparent,
+            resolution: 11.5,
+            motion: Motion::default(),
+        }
+    }
+}
+
+/// An edge of a ventricle's wall.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WallEdge {
+    /// The edge seen in the blurred image.
+    Apparent,
+    /// The edge of the wall itself: the thickness that blur adds is subtracted.
+    Anatomical,
+}
+
+impl DeformParameters {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// [`DeformError::Parameter`] names the first one that cannot be used.
+    pub fn validate(&self) -> Result<(), DeformError> {
+        let (k, m) = (&self.stiffness, &self.motion);
+        let checks = [
+            ("roll", self.roll, -360.0, 360.0),
+            ("stiffness.spring", k.spring, 0.0, 1e6),
+            ("stiffness.torsion", k.torsion, 0.0, 1e6),
+            ("stiffness.body", k.body, 0.0, 1e6),
+            ("stiffness.thickness", k.thickness, 0.0, 1e6),
+            ("stiffness.support", k.support, 0.0, 1e6),
+            ("stiffness.support_radius", k.support_radius, 0.0, 1e3),
+            ("reach", self.reach, 2.0, 30.0),
+            ("blur", self.blur, 0.0, 10.0),
+            ("margin", self.margin, -5.0, 5.0),
+            ("resolution", self.resolution, 0.0, 30.0),
+            ("motion.mass", m.mass, 1e-6, 1e6),
+            ("motion.damping", m.damping, 0.0, 1e6),
+            ("motion.time_step", m.time_step, 1e-3, 1e3),
+            ("motion.last_reach", m.last_reach, 1.0, 30.0),
+            ("motion.narrowing", m.narrowing, 0.1, 0.99),
+            ("motion.tolerance", m.tolerance, 1e-6, 1.0),
+            ("motion.max_iterations", m.max_iterations as f64, 1.0, 1e4),
+        ];
+        for (field, value, least, most) in checks {
+            if !(least..=most).contains(&value) {
+                return Err(DeformError::Parameter {
+                    field,
+                    value,
+                    least,
+                    most,
+                });
+            }
+        }
+        let hints = self.hints.centre.iter().chain(&self.hints.axis);
+        let region = self.hints.region.iter().flat_map(|r| [&r.min, &r.max]);
+        if !hints.chain(region).all(|p| p.iter().all(|x| x.is_finite())) {
+            return Err(DeformError::HintNotFinite);
+        }
+        if self.hints.axis.is_some_and(|a| !(a.norm() > 1e-6)) {
+            return Err(DeformError::HintNotFinite);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,79 @@
+//! Where an organ lies in a volume.
+
+use super::error::DeformError;
+use super::parameters::DeformParameters;
+use crate::grid::Volume;
+use crate::locate::body::{self, Blob};
+use crate::locate::localisation::{self, Localisation};
+use crate::locate::patient_orientation::{Posture, Superior};
+use crate::model::Template;
+use crate::progress::{Monitor, Stage};
+
+/// Where an organ lies in a volume: the same for all templates of the organ.
+#[derive(Debug, Clone)]
+pub enum OrganPlace {
+    /// A left ventricle.
+    Ventricle {
+        /// Where it was found.
+        found: Localisation,
+        /// The patient's orientation in the frame.
+        orientation: Posture,
+    },
+    /// Any other organ.
+    Body {
+        /// The bright body.
+        blob: Blob,
+        /// In a map of several labels, the mask of the label that is fitted.
+        mask: Option<Volume>,
+    },
+}
+
+impl OrganPlace {
+    /// Searches `volume` for the organ of `template`.
+    ///
+    /// # Errors
+    /// [`DeformError`].
+    pub fn find(
+        volume: &Volume,
+        template: &Template,
+        parameters: &DeformParameters,
+        monitor: &Monitor,
+    ) -> Result<Self, DeformError> {
+        parameters.validate()?;
+        monitor.report(Stage::Localise, 0.0)?;
+        let place = match template.cup {
+            Some(_) => {
+                let found = localisation::localise(volume, &parameters.hints, monitor)?;
+                let orientation = match parameters.superior {
+                    Superior::Body => Posture::of_body(volume, &found.cup.centre, monitor)?,
+                    Superior::Frame => Posture::FRAME,
+                };
+                OrganPlace::Ventricle { found, orientation }
+            }
+            None => {
+                let mask = body::one_label(volume, &parameters.hints, monitor)?;
+                let picture = mask.as_ref().unwrap_or(volume);
+                let blob = body::find(picture, &parameters.hints, monitor)?;
+                OrganPlace::Body { blob, mask }
+            }
+        };
+        monitor.report(Stage::Localise, 1.0)?;
+        Ok(place)
+    }
+
+    /// The patient's orientation in the frame; the frame's own for organs other than ventricles.
+    pub(super) fn patient_orientation(&self) -> Posture {
+        match self {
+            OrganPlace::Ventricle { orientation, .. } => *orientation,
+            OrganPlace::Body { .. } => Posture::FRAME,
+        }
+    }
+
+    /// The image to fit to, where it is not the volume itself.
+    pub(super) fn mask(&self) -> Option<&Volume> {
+        match self {
+            OrganPlace::Ventricle { .. } => None,
+            OrganPlace::Body { mask, .. } => mask.as_ref(),
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! Where the wall's edge is: sensors that sample the image along the model's normals.
+//!
+//! In go the model, the blurred image and [`SensorSettings`]; out comes a [`SensorReading`] for
+//! every sensor ([`read`]).
+//!
+//! 1. Every triangle carries [`PER_TRIANGLE`] sensors at the centroids of its congruent parts.
+//!    All sensors of a triangle stand for the same area, so sums over sensors do not depend on
+//!    the number of nodes.
+//! 2. A sensor samples the image along the normal, `reach` millimetres to both sides, and
+//!    maximises a direction-weighted gradient: score(t) = max(0, -df/dn) · exp(-t²/2(reach/2)²).
+//! 3. The maximum decides *which* edge is meant, and its value relative to the other sensors'
+//!    is the weight. *Which point* of the edge is the target depends on [`SensorKind`].
+//! 4. Sensors whose half width (ridge to edge) differs from the median get less weight.
+//!
+//! A perfusion defect has no edge: its sensors have hardly any weight, and the model's stiffness
+//! continues the wall. An organ that touches the heart has edges of its own farther out, which
+//! the Gaussian attenuates. Where it blurs into the wall (the right ventricle's insertion, the
+//! liver) the wall looks thicker than elsewhere, which step 4 recognises.
+
+mod profile;
+mod settings;
+
+pub use settings::{EdgeShift, SensorKind, SensorSettings};
+
+use crate::geometry::Vec3;
+use crate::grid::field::Field;
+use crate::mesh::TriMesh;
+use crate::progress::{Cancelled, Monitor};
+use profile::Profile;
+use settings::WallSide;
+
+/// Sensors on each triangle: the centroids of its nine congruent parts.
+pub const PER_TRIANGLE: usize = 9;
+
+/// Factor of the reach of sensors on the rim: the basal extent of the wall differs more between
+/// patients than its radius does.
+const RIM_REACH: f64 = 1.75;
+
+/// What one sensor found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SensorReading {
+    /// Place of the sensor, mm.
+    pub place: Vec3,
+    /// Outward unit normal there.
+    pub normal: Vec3,
+    /// Distance to the edge along the normal, mm; outward positive.
+    pub offset: f64,
+    /// 0..=1; 0 where there is no edge.
+    pub weight: f64,
+    /// Share of the model's area; the shares sum to 1.
+    pub share: f64,
+}
+
+/// Barycentric coordinates of the sensors.
+pub fn barycentric() -> [[f64; 3]; PER_TRIANGLE] {
+    let mut out = [[0.0; 3]; PER_TRIANGLE];
+    let mut next = 0;
+    // The small triangles of a threefold subdivision: six upright ones, three inverted ones.
+    for a in 0..3 {
+        for b in 0..(3 - a) {
+            out[next] = centroid(a, b, 1);
+            next += 1;
+        }
+    }
+    for a in 0..2 {
+        for b in 0..(2 - a) {
+            out[next] = centroid(a, b, 2);
+            next += 1;
+        }
+    }
+    out
+}
+
+fn centroid(a: usize, b: usize, shift: usize) -> [f64; 3] {
+    let u = (a as f64 + shift as f64 / 3.0) / 3.0;
+    let v = (b as f64 + shift as f64 / 3.0) / 3.0;
+    [1.0 - u - v, u, v]
+}
+
+/// Exponent from a sensor's score, relative to that of strong sensors, to its weight: the scatter
+/// of edges grows faster than their slope falls. 1.5 instead of 1 raises the Jaccard index of
+/// hearts without apical uptake by 0.04 and does not change the simulated cohort's mean.
+const WEIGHT_EXPONENT: f64 = 1.5;
+
+/// Triangles that are read between two checks of the cancel token.
+const PORTION: usize = 64;
+
+/// Reads all sensors of `mesh` in `field`: [`PER_TRIANGLE`] for each triangle, in the order of the
+/// triangles.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn read(
+    mesh: &TriMesh,
+    field: &Field,
+    settings: &SensorSettings,
+    monitor: &Monitor,
+) -> Result<Vec<SensorReading>, Cancelled> {
+    let normals = mesh.vertex_normals();
+    let weights = barycentric();
+    let total = mesh.area() * 2.0 * PER_TRIANGLE as f64;
+    let mut profile = Profile::new(settings);
+    let mut rim = Profile::new(&SensorSettings {
+        reach: settings.reach * RIM_REACH,
+        ..*settings
+    });
+    let mut readings = Vec::with_capacity(mesh.triangles.len() * PER_TRIANGLE);
+    let mut widths = Vec::with_capacity(readings.capacity());
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        if t % PORTION == 0 {
+            monitor.check()?;
+        }
+        let share = mesh.area_normal(t).norm() / total;
+        let corners = mesh.corners(t);
+        let sides = triangle.map(|v| normals[v as usize]);
+        for w in &weights {
+            let place = corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2];
+            let normal = (sides[0] * w[0] + sides[1] * w[1] + sides[2] * w[2])
+                .try_normalize(0.0)
+                .unwrap_or_else(Vec3::zeros);
+            let (side, shift) = settings.shift.at(&place, &normal);
+            let line = match side {
+                WallSide::Rim => &mut rim,
+                WallSide::Inner | WallSide::Outer => &mut profile,
+            };
+            let edge = line.edge(field, &place, &normal);
+            widths.push((side, edge.half_width));
+            readings.push(SensorReading {
+                place,
+                normal,
+                offset: edge.offset + shift,
+                weight: edge.score,
+                share,
+            });
+        }
+    }
+    weigh(&mut readings);
+    for side in [WallSide::Inner, WallSide::Outer, WallSide::Rim] {
+        weigh_by_width(&mut readings, &widths, side);
+    }
+    Ok(readings)
+}
+
+/// Replaces scores by weights.
+fn weigh(readings: &mut [SensorReading]) {
+    let mut scores: Vec<f64> = readings.iter().map(|r| r.weight).collect();
+    scores.sort_by(f64::total_cmp);
+    let strong = scores[scores.len() * 9 / 10];
+    for r in readings {
+        r.weight = if strong > 0.0 {
+            (r.weight / strong).min(1.0).powf(WEIGHT_EXPONENT)
+        } else {
+            0.0
+        };
+    }
+}
+
+/// Sensors whose half width differs from the median by this much, mm, have about half the weight.
+/// The standard deviation over clear edges of simulated scans is 1.0 mm.
+const ODD_WIDTH: f64 = 1.5;
+/// Shift of the rim's edge for each millimetre of half width: the ridge before the rim lies where
+/// the wall ends less the blur, so a wide fall ends farther out than its half-way point.
+const RIM_WIDTH: f64 = 0.3;
+
+/// Compares the half widths of the edges on one side of the wall with their median.
+fn weigh_by_width(
+    readings: &mut [SensorReading],
+    widths: &[(WallSide, Option<f64>)],
+    side: WallSide,
+) {
+    let own = |w: &(WallSide, Option<f64>)| w.1.filter(|_| w.0 == side);
+    let mut clear: Vec<f64> = widths
+        .iter()
+        .zip(&*readings)
+        .filter(|(_, r)| r.weight > 0.25)
+        .filter_map(|(w, _)| own(w))
+        .collect();
+    clear.sort_by(f64::total_cmp);
+    let Some(usual) = clear.get(clear.len() / 2) else {
+        return;
+    };
+    for (w, r) in widths.iter().zip(readings) {
+        let Some(more) = own(w).map(|width| width - usual) else {
+            continue;
+        };
+        match side {
+            WallSide::Rim => r.offset += RIM_WIDTH * more.clamp(-4.0, 4.0),
+            WallSide::Inner | WallSide::Outer => {
+                let odd = (more / ODD_WIDTH).powi(2);
+                r.weight /= 1.0 + odd + odd * odd / 16.0;
+            }
+        }
+    }
+}

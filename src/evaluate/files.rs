@@ -1,0 +1,31 @@
+//! Files that are written whole or not at all.
+
+use super::error::EvaluateError;
+use std::path::Path;
+
+/// Writes `bytes` to a file beside `path` and renames it, so that a run that is killed leaves no
+/// half file under this name.
+///
+/// # Errors
+/// [`EvaluateError::Write`].
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), EvaluateError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let beside = path.with_file_name(format!(".{name}.part"));
+    std::fs::write(&beside, bytes)
+        .and_then(|()| std::fs::rename(&beside, path))
+        .map_err(|error| EvaluateError::Write {
+            path: path.to_path_buf(),
+            error,
+        })
+}
+
+/// Makes a folder and those above it, where they are missing.
+///
+/// # Errors
+/// [`EvaluateError::Write`].
+pub fn make_folder(path: &Path) -> Result<(), EvaluateError> {
+    std::fs::create_dir_all(path).map_err(|error| EvaluateError::Write {
+        path: path.to_path_buf(),
+        error,
+    })
+}

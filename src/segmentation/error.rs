@@ -1,0 +1,99 @@
+//! Why there is no segmentation.
+
+use super::expert_mask::ExpertMaskError;
+use crate::deform::DeformError;
+use crate::export::read_json::ReadMeshError;
+use crate::locate::localisation::LocaliseError;
+use crate::model::TemplateError;
+use crate::parameters::ParameterError;
+use crate::progress::Cancelled;
+use crate::volume::VolumeError;
+
+/// Why there is no segmentation: one variant for each step that can fail, with that step's error.
+/// Cancellation is [`SegmentationError::Cancelled`], whichever step met it.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SegmentationError {
+    /// The files hold no usable volume.
+    #[error(transparent)]
+    Volume(VolumeError),
+    /// The files of the expert's mask hold no usable volume.
+    #[error("the expert's mask: {0}")]
+    ExpertVolume(VolumeError),
+    /// A parameter does not suit the volume.
+    #[error("`{}`: {}", .0.field, .0.message)]
+    Parameter(#[from] ParameterError),
+    /// There is no model of the organ, and none is built in.
+    #[error("there is no model of a {organ}")]
+    NoModel {
+        /// The organ.
+        organ: &'static str,
+    },
+    /// No template was given to fit.
+    #[error("no model was given to fit")]
+    NoTemplate,
+    /// A model's file cannot be parsed.
+    #[error("model {name}: {error}")]
+    UnreadableModel {
+        /// The model.
+        name: String,
+        /// Why.
+        error: ReadMeshError,
+    },
+    /// The model shows another organ.
+    #[error("model {name} shows a {shows}; a model of a {wanted} is needed")]
+    OtherOrgan {
+        /// The model.
+        name: String,
+        /// Its organ.
+        shows: String,
+        /// The organ to segment.
+        wanted: &'static str,
+    },
+    /// A model's mesh cannot be fitted.
+    #[error("model {name}: {error}")]
+    UnsuitableModel {
+        /// The model.
+        name: String,
+        /// Why.
+        error: TemplateError,
+    },
+    /// The expert's mask cannot be compared with the volume's.
+    #[error(transparent)]
+    ExpertMask(ExpertMaskError),
+    /// The organ is not found in the volume.
+    #[error(transparent)]
+    NotFound(LocaliseError),
+    /// No model could be fitted: the first one's error, if it is not that the organ is not found.
+    #[error(transparent)]
+    Fit(DeformError),
+    /// The caller asked for an end.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl SegmentationError {
+    /// Whether the work ended because the caller asked for it.
+    pub fn is_cancelled(&self) -> bool {
+        matches!(self, SegmentationError::Cancelled(_))
+    }
+}
+
+impl From<ExpertMaskError> for SegmentationError {
+    fn from(error: ExpertMaskError) -> Self {
+        match error {
+            ExpertMaskError::Cancelled(cancelled) => cancelled.into(),
+            error => SegmentationError::ExpertMask(error),
+        }
+    }
+}
+
+impl From<DeformError> for SegmentationError {
+    fn from(error: DeformError) -> Self {
+        match error {
+            DeformError::Cancelled(cancelled)
+            | DeformError::Localise(LocaliseError::Cancelled(cancelled)) => cancelled.into(),
+            DeformError::Localise(error) => SegmentationError::NotFound(error),
+            error => SegmentationError::Fit(error),
+        }
+    }
+}

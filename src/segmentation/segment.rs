@@ -1,0 +1,93 @@
+//! From a volume and templates to the fit, its mask, measures, polar map and slices.
+
+use super::error::SegmentationError;
+use super::expert_mask::on_grid;
+use super::fitting::{RankedTemplate, Trials, try_all};
+use super::slices::{self, Cut};
+use super::templates::{NamedTemplate, RefusedTemplate};
+use crate::deform::{DeformParameters, Fit};
+use crate::grid::agreement::{Agreement, compare};
+use crate::grid::voxelise::{Mask, voxelise};
+use crate::polar::{self, PolarMap, PolarParameters};
+use crate::progress::{Monitor, Stage};
+use crate::volume::Volume;
+
+/// Parameters of [`segment`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SegmentationParameters {
+    /// The fit's.
+    pub deform: DeformParameters,
+    /// The polar map's.
+    pub polar: PolarParameters,
+}
+
+/// The segmentation of one volume.
+#[derive(Debug, Clone)]
+pub struct Segmentation {
+    /// The fitted model.
+    pub fit: Fit,
+    /// The voxels inside it, on the volume's grid.
+    pub mask: Mask,
+    /// The polar map of the wall's uptake; ventricles only.
+    pub polar: Option<PolarMap>,
+    /// Agreement with the expert's mask, if one was given.
+    pub agreement: Option<Agreement>,
+    /// Slices of the volume with the contours of fit and expert, as a PNG file.
+    pub slices: Vec<u8>,
+    /// Index of the chosen template in `candidates`.
+    pub chosen: usize,
+    /// The templates that were fitted, in the order given.
+    pub candidates: Vec<RankedTemplate>,
+    /// Models that were not fitted, or whose fit failed.
+    pub refused: Vec<RefusedTemplate>,
+}
+
+/// Segments `volume` by the best of `templates` and compares the mask with `expert` if given.
+///
+/// # Errors
+/// [`SegmentationError`].
+pub fn segment(
+    volume: &Volume,
+    templates: &[NamedTemplate],
+    parameters: &SegmentationParameters,
+    expert: Option<&Volume>,
+    monitor: &Monitor,
+) -> Result<Segmentation, SegmentationError> {
+    let expert = expert.map(|e| on_grid(e, volume, monitor)).transpose()?;
+    let Trials {
+        mut fits,
+        candidates,
+        refused,
+    } = try_all(volume, templates, &parameters.deform, monitor)?;
+    let chosen = (0..fits.len())
+        .rev()
+        .max_by(|a, b| candidates[*a].merit.total_cmp(&candidates[*b].merit))
+        .ok_or(SegmentationError::NoTemplate)?;
+    let fit = fits.swap_remove(chosen);
+    monitor.report(Stage::Polar, 0.0)?;
+    let polar = fit
+        .wall
+        .as_ref()
+        .map(|wall| polar::map(volume, wall, &parameters.polar));
+    monitor.report(Stage::Report, 0.0)?;
+    let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
+    monitor.report(Stage::Report, 0.5)?;
+    let agreement = match &expert {
+        // Both masks are on the volume's grid, so this fails only when cancelled.
+        Some(expert) => compare(&mask, expert, volume.frame.spacing(), monitor).ok(),
+        None => None,
+    };
+    monitor.report(Stage::Report, 0.8)?;
+    let slices = slices::png(volume, &fit.mesh, &Cut::of(&fit), expert.as_ref(), monitor)?;
+    monitor.report(Stage::Report, 1.0)?;
+    Ok(Segmentation {
+        fit,
+        mask,
+        polar,
+        agreement,
+        slices,
+        chosen,
+        candidates,
+        refused,
+    })
+}
