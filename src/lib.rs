@@ -151,12 +151,12 @@ pub mod http;
 #[cfg(feature = "service")]
 pub mod cli;
 
-pub use model::{Organ, Template};
 pub use export::{Format, Metadata, encode};
 pub use grid::agreement::{Agreement, compare};
 pub use grid::voxelise::{Mask, voxelise};
 pub use grid::{Affine, ArrayError, Volume};
 pub use mesh::TriMesh;
+pub use model::{Organ, Template};
 pub use parameters::{FitParameters, ModelParameters};
 pub use pipeline::{Model, generate, generate_from};
 pub use progress::Monitor;

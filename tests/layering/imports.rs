@@ -12,16 +12,9 @@ use std::path::{Path, PathBuf};
 /// A module's path from the crate's root: `["mesh", "topology"]`.
 pub type ModulePath = Vec<String>;
 
-/// One source file.
-pub struct Source {
-    /// Path below `src`.
-    pub path: PathBuf,
-    /// The words and signs of its code, without comments, strings and test modules.
-    tokens: Vec<String>,
-}
-
-/// The source files of the crate by module.
-pub struct Sources(BTreeMap<ModulePath, Source>);
+/// The code of the crate's files by module: words and signs, without comments, strings and test
+/// modules.
+pub struct Sources(BTreeMap<ModulePath, Vec<String>>);
 
 /// A path that a file names, resolved against the module it stands in.
 struct Named {
@@ -36,20 +29,11 @@ impl Sources {
         let mut sources = BTreeMap::new();
         for path in rust_files(src) {
             let text = fs::read_to_string(&path).expect("a source file");
-            let path = path
-                .strip_prefix(src)
-                .expect("a path inside src")
-                .to_owned();
-            let tokens = without_tests(tokens(&text));
-            sources.insert(module_of(&path), Source { path, tokens });
+            let inside = path.strip_prefix(src).expect("a path inside src");
+            sources.insert(module_of(inside), without_tests(tokens(&text)));
         }
         assert!(!sources.is_empty(), "no sources in {}", src.display());
         Self(sources)
-    }
-
-    /// The files by module.
-    pub fn iter(&self) -> impl Iterator<Item = (&ModulePath, &Source)> {
-        self.0.iter()
     }
 
     /// For each module the modules of other files whose items it uses.
@@ -57,7 +41,7 @@ impl Sources {
         let named: BTreeMap<&ModulePath, Vec<Named>> = self
             .0
             .iter()
-            .map(|(module, source)| (module, self.named(module, &source.tokens)))
+            .map(|(module, tokens)| (module, self.named(module, tokens)))
             .collect();
         let reexports: BTreeMap<(&ModulePath, &str), &ModulePath> = named
             .iter()
