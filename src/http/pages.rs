@@ -44,20 +44,20 @@ fn commands(url: &str) -> String {
     format!(
         "ventriform {version}: surface models of the left ventricle from cardiac SPECT
 
-a model of 150 points, as GLB:
+A model of 150 points, as GLB:
   curl -fsS --data-binary @spect.nii.gz -H 'Prefer: wait=60' -H 'Accept: model/gltf-binary' '{url}/v1/models?points=150' -o lv.glb
-the same in the background; the answer names the job:
+The same in the background; the answer names the job:
   curl -fsS --data-binary @spect.nii.gz '{url}/v1/models?points=150'
-the wall of the ventricle in a scan, by the best model of the library, as mask.nii.gz:
+The wall of the ventricle as mask.nii.gz, found with the best model of the library:
   curl -fsS --data-binary @spect.nii.gz -H 'Prefer: wait=60' '{url}/v1/segmentations?model=auto' -o mask.nii.gz
-how far the jobs are:
+The jobs and their progress:
   curl -fsS '{url}/v1/jobs'
-what was made:
+Stored models and segmentations:
   curl -fsS '{url}/v1/models'; curl -fsS '{url}/v1/segmentations'
-what is known of a model (or of a segmentation), for a person:
+The report on a model (or a segmentation) as an HTML page:
   curl -fsS '{url}/v1/models/ID/report.html' -o report.html
 
-all of it: {url}/docs, {url}/openapi.json
+All paths: {url}/docs, {url}/openapi.json
 ",
         version = env!("CARGO_PKG_VERSION"),
     )

@@ -4,7 +4,7 @@ use super::app::App;
 use super::limits::BodyLimits;
 use super::models::Models;
 use super::observe::{self, REQUEST_ID};
-use super::openapi::{self, Document};
+use super::openapi::{self, DocumentFrame};
 use super::problem::not_found::no_such_path;
 use super::problem::{from_panic, method_not_allowed};
 use super::segmentations::Segmentations;
@@ -61,7 +61,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(health::metrics),
     ];
     of_every_kind.into_iter().flatten().chain(of_one_kind).fold(
-        OpenApiRouter::with_openapi(Document::openapi()),
+        OpenApiRouter::with_openapi(DocumentFrame::openapi()),
         OpenApiRouter::routes,
     )
 }

@@ -4,9 +4,9 @@ use crate::export::Format;
 use crate::http::problem::{MEDIA_TYPE, ProblemBody};
 use std::collections::BTreeMap;
 use utoipa::openapi::header::HeaderBuilder;
-use utoipa::openapi::schema::{Object, ObjectBuilder, Schema, Type};
+use utoipa::openapi::schema::{ObjectBuilder, Schema, Type};
 use utoipa::openapi::{Content, ContentBuilder, Ref, RefOr, Response, ResponseBuilder};
-use utoipa::{IntoResponses, ToSchema};
+use utoipa::{IntoResponses, PartialSchema, ToSchema};
 
 /// The schema of a job, which the handlers register.
 const JOB: &str = "Job";
@@ -98,9 +98,9 @@ pub struct WaitAnswers;
 
 impl IntoResponses for WaitAnswers {
     fn responses() -> Responses {
-        let header = |kind: Type, description: &str| {
+        let header = |schema: RefOr<Schema>, description: &str| {
             HeaderBuilder::new()
-                .schema(Some(Object::with_type(kind)))
+                .schema(Some(schema))
                 .description(Some(description))
                 .build()
         };
@@ -110,10 +110,10 @@ impl IntoResponses for WaitAnswers {
                 "application/json",
                 Content::new(Some(Ref::from_schema_name(JOB))),
             )
-            .header("Location", header(Type::String, "The job's path"))
+            .header("Location", header(String::schema(), "The job's path"))
             .header(
                 "Retry-After",
-                header(Type::Integer, "Seconds to wait before asking for its state"),
+                header(u64::schema(), "Seconds to wait before asking for its state"),
             );
         [
             ("202".to_owned(), accepted.build().into()),

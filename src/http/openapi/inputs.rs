@@ -239,10 +239,9 @@ pub struct PreferHeader;
 
 impl IntoParams for PreferHeader {
     fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        vec![header(
-            "Prefer",
-            "`wait=SECONDS`: how long to wait for the result",
-        )]
+        let mut wait = header("Prefer", "`wait=SECONDS`: how long to wait for the result");
+        wait.schema = Some(Option::<String>::schema());
+        vec![wait]
     }
 }
 

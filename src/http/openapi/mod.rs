@@ -53,7 +53,7 @@ use utoipa::openapi::{RefOr, Required};
     ),
     components(schemas(super::problem::ProblemBody))
 )]
-pub struct Document;
+pub struct DocumentFrame;
 
 /// The document as it is published, from what the routes have collected.
 pub fn publish(mut collected: utoipa::openapi::OpenApi) -> utoipa::openapi::OpenApi {

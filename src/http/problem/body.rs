@@ -61,7 +61,7 @@ pub fn too_large(limit: Size) -> Problem {
         "body-too-large",
         format!("The body is larger than {limit}, the limit of this service."),
     )
-    .fix("Send a smaller or a compressed file, or ask the operator to raise the limit.")
+    .fix("Send less (a volume may be gzipped: .nii.gz), or ask the operator to raise the limit.")
 }
 
 /// 413: a form has more than `limit` files.

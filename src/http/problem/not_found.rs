@@ -28,6 +28,14 @@ fn unknown_id(resource: Resource, id: &str) -> Problem {
 }
 
 fn erased(resource: Resource, id: &str, at: Timestamp) -> Problem {
+    let fix = match resource {
+        Resource::Volume => "Upload the same file again; it gets the same id.",
+        Resource::Model | Resource::Segmentation => {
+            "Send the same volume with the same parameters again; the result gets the same id."
+        }
+        Resource::Template => "Add the same mesh again; it gets the same id.",
+        Resource::Job => "File a new job.",
+    };
     Problem::new(
         StatusCode::GONE,
         "gone",
@@ -37,7 +45,7 @@ fn erased(resource: Resource, id: &str, at: Timestamp) -> Problem {
             rfc3339(at)
         ),
     )
-    .fix("Send the same volume with the same parameters to create it again.")
+    .fix(fix)
 }
 
 /// 404: a thing that exists has no file of that name; `names` are those it has.
