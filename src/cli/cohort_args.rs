@@ -8,14 +8,14 @@ use std::path::PathBuf;
 /// default of `points`.
 #[derive(Debug, Args)]
 pub struct CohortArgs {
-    /// The cohort's folder: one folder for each case with spect.nii.gz, lv_expert_img.nii.gz
-    /// and lv_truth.nii.gz; manifest.json says which are templates (else: names with t)
+    /// Folder of the cohort: one folder for each case with spect.nii.gz, lv_expert_img.nii.gz
+    /// and lv_truth.nii.gz; manifest.json says which are templates (without it: names with t)
     #[arg(long, value_name = "DIR")]
     cohort: PathBuf,
     /// Numbers of points of our models
     #[arg(long, value_name = "N,...", value_delimiter = ',')]
     pub points: Vec<usize>,
-    /// The template whose model comes from its expert's mask [default: the third, if it has one]
+    /// Template whose model is made from its expert's mask [default: the third, if it has one]
     #[arg(long, value_name = "CASE")]
     manual: Option<String>,
 }

@@ -9,11 +9,12 @@ use crate::evaluate::table::Evaluation;
 use crate::evaluate::{
     EvaluateError, EvaluationObserver, EvaluationParameters, EvaluationStep, evaluate,
 };
+use crate::work::problems::Explain;
 use anyhow::{Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
-/// Makes models of the templates, fits them to every patient, writes tables, plots and pictures.
+/// Make models of the templates, fit them to every patient, write tables, plots and pictures
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   ventriform evaluate --cohort cohort --points 67,110,150,200,300 --out evaluation
@@ -72,7 +73,7 @@ pub struct EvaluateArgs {
     /// Skip the alignment of the model as a whole, as for models that are placed by hand
     #[arg(long, help_heading = "Experiment")]
     no_align: bool,
-    /// The folder for the results, created if missing
+    /// Folder for the results (created if missing)
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
@@ -138,7 +139,7 @@ impl EvaluationObserver for Bar {
 /// Runs `ventriform evaluate`.
 ///
 /// # Errors
-/// Those of [`evaluate`], and where not one fit succeeded.
+/// The errors of [`evaluate`], and if no fit succeeded.
 pub fn run(args: &EvaluateArgs) -> Result<()> {
     let parameters = args.parameters();
     parameters.validate().map_err(with_advice)?;
@@ -157,14 +158,14 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
     let evaluation = made.map_err(with_advice)?;
     print_summary(&evaluation);
     if !evaluation.has_fit() {
-        bail!("not one fit succeeded; evaluation.html says why");
+        bail!("no fit succeeded; see the reasons in evaluation.html");
     }
     Ok(())
 }
 
 fn with_advice(error: EvaluateError) -> anyhow::Error {
     match error {
-        EvaluateError::ModelParameter(error) => anyhow!("{error}. {}", error.fix),
+        EvaluateError::ModelParameter(error) => anyhow!(error.with_advice()),
         error => error.into(),
     }
 }
