@@ -33,8 +33,8 @@ pub enum EvaluateError {
     Scan {
         /// The patient.
         case: String,
-        /// Why.
-        error: VolumeError,
+        /// Why; boxed, because it is several times larger than any other error.
+        error: Box<VolumeError>,
     },
     /// A fitted mesh cannot be written as JSON.
     #[error(transparent)]

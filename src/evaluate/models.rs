@@ -50,7 +50,10 @@ enum ModelError {
     #[error("its files are gone")]
     Gone,
     #[error("{}: {error}", path.display())]
-    Read { path: PathBuf, error: VolumeError },
+    Read {
+        path: PathBuf,
+        error: Box<VolumeError>,
+    },
     #[error(transparent)]
     Surface(#[from] SurfaceError),
     #[error("{0}. {fix}", fix = .0.fix)]
@@ -101,7 +104,10 @@ fn of_template(
     parameters: &EvaluationParameters,
 ) -> Result<Vec<Result<CohortModel, ModelError>>, ModelError> {
     let (path, _) = cohort.source(case).ok_or(ModelError::Gone)?;
-    let reading = read_volume(&path).map_err(|error| ModelError::Read { path, error })?;
+    let reading = read_volume(&path).map_err(|error| ModelError::Read {
+        path,
+        error: Box::new(error),
+    })?;
     let defaults = parameters.model_parameters(None)?;
     let surface = surface::extract(&reading.volume, &defaults.surface, &Monitor::silent())?;
     let source = TemplateSurface {

@@ -75,7 +75,7 @@ fn png(
     let monitor = Monitor::silent();
     let reading = read_volume(&scan).map_err(|error| EvaluateError::Scan {
         case: case.to_owned(),
-        error,
+        error: Box::new(error),
     })?;
     let volume = reading.volume;
     let expert = cohort.gold(case, Gold::Expert).and_then(|path| {

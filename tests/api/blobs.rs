@@ -20,11 +20,14 @@ use ventriform::jobs::{
 };
 use ventriform::store::Store;
 
-type Files = Arc<Mutex<BTreeMap<String, Vec<u8>>>>;
+/// Files of one item by name.
+type ItemFiles = BTreeMap<String, Vec<u8>>;
+
+type Files = Arc<Mutex<ItemFiles>>;
 
 #[derive(Clone, Default)]
 struct MemoryBlobs {
-    items: Arc<Mutex<BTreeMap<String, BTreeMap<String, Vec<u8>>>>>,
+    items: Arc<Mutex<BTreeMap<String, ItemFiles>>>,
 }
 
 /// A copy in a temporary folder that is deleted with the last clone of the result.
