@@ -1,11 +1,12 @@
 //! A picture of a volume for a person: its three middle slices, side by side.
 //!
-//! From left to right an axial, a coronal and a sagittal slice through the array's middle, each
-//! in true proportions. Oblique volumes are shown along the array axes that come nearest to the
-//! patient's. The sides are radiology's: the patient's right is on the left of the axial and the
-//! coronal picture; front is up in the axial one and to the left in the sagittal one; the head
-//! is up in both upright ones. Grey runs from 0 (or the smallest value, where that is negative)
-//! to the 99.5th percentile of the shown slices, so that one hot voxel does not darken the rest.
+//! From left to right: an axial, a coronal and a sagittal slice through the middle of the array, each
+//! in true proportions. Oblique volumes are shown along the array axes that are closest to the axes
+//! of the patient. The orientation follows radiological convention: the patient's right is on the
+//! left of the axial and the coronal slice; anterior is at the top of the axial slice and on the left
+//! of the sagittal one; superior is at the top of the coronal and the sagittal slice. The grey scale
+//! runs from 0 (or the smallest value, if that is negative) to the 99.5th percentile of the shown
+//! slices, so that a single bright voxel does not darken the rest.
 
 use super::Volume;
 use crate::geometry::frame::VoxelToPatient;
@@ -77,7 +78,7 @@ impl Axis {
         }
     }
 
-    /// The (fractional) index at `fraction` of the way.
+    /// The fractional index at `fraction` of the extent.
     fn index(self, fraction: f64) -> f64 {
         let along = if self.backwards {
             1.0 - fraction
@@ -107,7 +108,7 @@ impl PatientAxes {
         ];
         let cosine = |patient, array| direction_cosine(&volume.frame, patient, array);
         let fit = |order: &[usize; 3]| -> f64 { (0..3).map(|p| cosine(p, order[p]).abs()).sum() };
-        // The first of equals wins, so that the choice is always the same.
+        // Of equally good orders the first is used, so that the choice is deterministic.
         let best = ORDERS.iter().fold(&ORDERS[0], |best, order| {
             if fit(order) > fit(best) { order } else { best }
         });
@@ -165,8 +166,8 @@ fn slice(volume: &Volume, right: Axis, down: Axis, longest_mm: f64) -> Slice {
     }
 }
 
-/// The value between four voxels of the plane of axes `a` and `b` through `index`; a missing
-/// one counts as 0.
+/// The value interpolated between four voxels of the plane of axes `a` and `b` through `index`;
+/// missing voxels count as 0.
 fn bilinear(volume: &Volume, index: &mut [usize; 3], a: (usize, f64), b: (usize, f64)) -> f32 {
     let mut value = 0.0;
     for (da, db) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
@@ -184,7 +185,7 @@ fn bilinear(volume: &Volume, index: &mut [usize; 3], a: (usize, f64), b: (usize,
     value as f32
 }
 
-/// The values that become black and white.
+/// The values shown as black and as white.
 fn window(slices: &[Slice]) -> (f32, f32) {
     let mut values: Vec<f32> = slices
         .iter()
@@ -194,7 +195,7 @@ fn window(slices: &[Slice]) -> (f32, f32) {
     let (below, &mut high, above) = values.select_nth_unstable_by(rank, f32::total_cmp);
     let low = below.iter().copied().fold(0.0, f32::min);
     let highest = above.iter().copied().fold(high, f32::max);
-    // A small bright thing on nothing: the percentile is background.
+    // For a small bright object on an empty background, the percentile is background.
     let white = if high > low { high } else { highest };
     (low, white)
 }
