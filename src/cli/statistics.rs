@@ -1,12 +1,11 @@
 //! `ventriform statistics`: mean shape and principal modes of a set of fits.
 
 use super::output::{create_folder, write_file};
-use crate::evaluate::statistics::{Statistics, statistics};
+use crate::evaluate::statistics::statistics;
 use crate::export::{self, Format, Metadata};
 use crate::mesh::TriMesh;
 use anyhow::{Context, Result};
 use clap::Args;
-use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Compute mean shape and principal modes of fits of one model
@@ -50,34 +49,11 @@ pub fn run(args: &StatisticsArgs) -> Result<()> {
             write_mesh(&args.output, &name, &found.along(mode, sign))?;
         }
     }
-    write_summary(&args.output, &found)
+    let summary = serde_json::to_vec_pretty(&found.to_json())?;
+    write_file(&args.output.join("statistics.json"), &summary)
 }
 
 fn write_mesh(folder: &Path, name: &str, mesh: &TriMesh) -> Result<()> {
     let bytes = export::encode(Format::Json, mesh, &Metadata::new(name))?;
     write_file(&folder.join(format!("{name}.json")), &bytes)
-}
-
-fn write_summary(folder: &Path, found: &Statistics) -> Result<()> {
-    let mut so_far = 0.0;
-    let modes: Vec<_> = found
-        .modes
-        .iter()
-        .map(|mode| {
-            so_far += mode.variance;
-            json!({
-                "variance_mm2": mode.variance,
-                "share": mode.variance / found.total_variance,
-                "compactness": so_far / found.total_variance,
-                "scores": mode.scores,
-            })
-        })
-        .collect();
-    let summary = json!({
-        "nodes": found.mean.vertices.len(),
-        "total_variance_mm2": found.total_variance,
-        "modes": modes,
-    });
-    let bytes = serde_json::to_vec_pretty(&summary)?;
-    write_file(&folder.join("statistics.json"), &bytes)
 }

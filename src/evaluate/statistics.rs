@@ -7,6 +7,7 @@
 //! (S shapes have at most S - 1 modes).
 
 use nalgebra::DMatrix;
+use serde_json::{Value, json};
 
 use crate::geometry::Vec3;
 use crate::geometry::rotation::nearest_rotation;
@@ -94,6 +95,30 @@ impl Statistics {
             *p += d * deviations;
         }
         mesh
+    }
+
+    /// The variances of the modes with their shares of the total, the share of all modes up to
+    /// each one (compactness), and the scores, as JSON.
+    pub fn to_json(&self) -> Value {
+        let mut so_far = 0.0;
+        let modes: Vec<Value> = self
+            .modes
+            .iter()
+            .map(|mode| {
+                so_far += mode.variance;
+                json!({
+                    "variance_mm2": mode.variance,
+                    "share": mode.variance / self.total_variance,
+                    "compactness": so_far / self.total_variance,
+                    "scores": mode.scores,
+                })
+            })
+            .collect();
+        json!({
+            "nodes": self.mean.vertices.len(),
+            "total_variance_mm2": self.total_variance,
+            "modes": modes,
+        })
     }
 }
 
