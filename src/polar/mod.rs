@@ -1,7 +1,7 @@
 //! The polar map: the wall's uptake laid flat, and its means over the AHA's 17 segments.
 //!
 //! In: a volume and the [`VentricleWall`] of a fitted model, as rays from the long axis. Out: a
-//! [`PolarMap`], drawn by [`svg`] and [`png`], written by [`json()`].
+//! [`PolarMap`], drawn by [`svg()`] and [`png()`], written by [`json()`].
 //!
 //! 1. The image is blurred ([`PolarParameters::blur`]), because the largest of many noisy values
 //!    is too large.

@@ -3,8 +3,8 @@
 //! [`measure`](measure::measure) takes any mesh and its reference surface S and gives counts and
 //! topology (self-intersections found exactly), shape (radius ratios, angles, edge lengths,
 //! valences), smoothness (dihedral angles) and closeness (two-sided distances, volume, area).
-//! [`ModelReport::new`] joins these figures to the facts of the stages. [`model_page`] makes a
-//! self-contained page of that report, coloured by [`Closeness`]; [`segmentation_page`] one of a
+//! [`ModelReport::new`] joins these figures to the facts of the stages. [`model_page()`] makes a
+//! self-contained page of that report, coloured by [`Closeness`]; [`segmentation_page()`] one of a
 //! segmentation's.
 //!
 //! A report is JSON with stable names: lengths in millimetres, angles in degrees, volumes in
