@@ -102,6 +102,8 @@ pub mod mesh;
 pub mod numeric;
 pub mod progress;
 
+pub mod draw;
+
 pub mod grid;
 
 pub mod volume;

@@ -5,7 +5,7 @@ use super::{Bar, ModelArgs};
 use crate::export::{self, Format};
 use crate::pipeline::{self, Model};
 use crate::progress::{CancelToken, Monitor};
-use crate::report::Report;
+use crate::report::ModelReport;
 use crate::volume::{ReadLimits, VolumeFile};
 use crate::work::problems::Explain;
 use anyhow::{Context, Result, bail};
@@ -109,7 +109,7 @@ fn extension(path: &Path) -> String {
 }
 
 /// Prints the main figures and all warnings on standard error.
-pub fn print_summary(report: &Report) {
+pub fn print_summary(report: &ModelReport) {
     for line in report.headlines() {
         eprintln!("{line}");
     }

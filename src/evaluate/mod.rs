@@ -12,7 +12,7 @@
 //!    continues where it ended.
 //! 4. [`rows`]: the table of all fits, and means over it; [`findings`]: what they say about
 //!    each of the paper's findings.
-//! 5. [`pictures`], [`table`], [`page`]: slices, CSV and JSON, and one page with [`plot`]s.
+//! 5. [`pictures`], [`table`], [`cohort_page`]: slices, CSV and JSON, and one page with charts.
 //!
 //! [`statistics`] stands beside this: mean shape and principal modes of fits of one model.
 //!
@@ -21,16 +21,15 @@
 
 pub mod cohort;
 pub mod cohort_fit;
+pub mod cohort_page;
 pub mod error;
 pub mod files;
 pub mod findings;
 pub mod fits;
 pub mod models;
 pub mod observer;
-pub mod page;
 pub mod parameters;
 pub mod pictures;
-pub mod plot;
 pub mod record;
 pub mod rows;
 pub mod statistics;
@@ -124,7 +123,10 @@ fn write_results(out: &Path, evaluation: &Evaluation) -> Result<(), EvaluateErro
         ("table1.csv", table::table1_csv(&evaluation.rows)?),
         ("figure3.csv", table::figure3_csv(&evaluation.models)?),
         ("evaluation.json", json),
-        ("evaluation.html", page::html(evaluation).into_bytes()),
+        (
+            "evaluation.html",
+            cohort_page::cohort_page(evaluation).into_bytes(),
+        ),
     ] {
         write_whole(&out.join(name), &bytes)?;
     }

@@ -11,7 +11,7 @@ use super::segmentations::Segmentations;
 use super::templates::{MESH_SIZE, Templates};
 use super::volumes::Volumes;
 use super::{
-    collection, health, idempotency, jobs, models, pages, products, segmentations, templates,
+    collection, front_page, health, idempotency, jobs, models, products, segmentations, templates,
     volumes,
 };
 use crate::config::Settings;
@@ -102,7 +102,7 @@ pub fn router(app: App) -> Router {
         ))
         // The routes that take a body have limits of their own.
         .layer(DefaultBodyLimit::disable());
-    api.route("/", get(pages::welcome))
+    api.route("/", get(front_page::welcome))
         .route(
             "/openapi.json",
             get(move || async move { document.clone() }),

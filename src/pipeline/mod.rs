@@ -9,7 +9,7 @@
 //! 4. `optimise` fits the triangles and flips edges; the best start is kept.
 //! 5. `report` measures the model.
 //!
-//! Guaranteed: a model is returned only if [`Report::is_sound`]; otherwise there is an error.
+//! Guaranteed: a model is returned only if [`ModelReport::is_sound`]; otherwise there is an error.
 
 pub mod starts;
 
@@ -18,7 +18,7 @@ use crate::mesh::TriMesh;
 use crate::optimise::{OptimiseError, Reference};
 use crate::parameters::{ModelParameters, Parameters};
 use crate::progress::{Cancelled, Monitor, Stage};
-use crate::report::{self, Closeness, Report, ReportInput};
+use crate::report::{self, Closeness, ModelReport, ReportInput};
 use crate::retile::RetileError;
 use crate::surface::{self, SurfaceError};
 use crate::volume::{
@@ -33,7 +33,7 @@ pub struct Model {
     /// The iso-surface that the model approximates, LPS millimetres.
     pub reference: TriMesh,
     /// Figures about the model and how it was made.
-    pub report: Report,
+    pub report: ModelReport,
 }
 
 impl Model {
@@ -55,7 +55,7 @@ impl Model {
 
     /// The report as a self-contained HTML page, coloured by `closeness` if given.
     pub fn report_html(&self, closeness: Option<&Closeness>) -> String {
-        report::html(&self.report, &self.mesh, closeness)
+        report::model_page(&self.report, &self.mesh, closeness)
     }
 }
 
@@ -184,7 +184,7 @@ fn from_volume(
         laps.end(stage)
     })
     .map_err(PipelineError::Optimise)?;
-    let mut report = Report::new(ReportInput {
+    let mut report = ModelReport::new(ReportInput {
         input: report::input(facts),
         parameters: parameters.to_json().into(),
         surface: &surface,

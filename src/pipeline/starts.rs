@@ -15,7 +15,7 @@
 use crate::optimise::{self, OptimiseError, Optimised, Reference};
 use crate::parameters::ModelParameters;
 use crate::progress::{Monitor, Stage};
-use crate::report::{self, MeasureParameters, Measures, Start};
+use crate::report::{self, MeasureParameters, Measures, StartSummary};
 use crate::retile::{self, RetileError, RetileParameters, Tiled};
 use crate::surface::Surface;
 
@@ -33,7 +33,7 @@ pub struct BestStart {
     /// Its measures.
     pub measures: Measures,
     /// Figures of the models of all starts, in order.
-    pub starts: Vec<Start>,
+    pub starts: Vec<StartSummary>,
 }
 
 /// Re-tiles the surface from each start. Stops after the first result with a warning about the
@@ -90,7 +90,7 @@ pub fn best(
     })?;
     ended(Stage::Report);
     let starts = (tiled.iter().zip(&measures))
-        .map(|(tiled, measures)| Start::new(tiled, measures))
+        .map(|(tiled, measures)| StartSummary::new(tiled, measures))
         .collect();
     let kept = least_bad(&measures);
     Ok(BestStart {
@@ -144,7 +144,7 @@ mod tests {
         best(tiled, &reference, parameters, &monitor, |_| {}).unwrap()
     }
 
-    fn badness(start: &Start) -> f64 {
+    fn badness(start: &StartSummary) -> f64 {
         start.distance_mean_mm * start.hausdorff_mm * (1.0 - start.radius_ratio_mean)
     }
 

@@ -1,30 +1,36 @@
 //! The polar map: the wall's uptake laid flat, and its means over the AHA's 17 segments.
 //!
-//! Every ray of the fitted model's [`VentricleWall`] gives one value: the largest and the mean value
-//! of the image between the inner and the outer surface, lengthened by
-//! [`PolarParameters::extension`] to both sides. Apex in the centre, base at the rim,
-//! anterior on top, septum on the left, as seen from the apex (Cerqueira et al., Circulation
-//! 2002). Rings by share of the way from apex to base: 17 within 0.25; 13 to 16 within 0.5;
-//! 7 to 12 within 0.75; 1 to 6 beyond.
+//! In: a volume and the [`VentricleWall`] of a fitted model, as rays from the long axis. Out: a
+//! [`PolarMap`], drawn by [`svg()`] and [`png()`], written by [`json()`].
 //!
-//! Before it is sampled the image is blurred a little ([`PolarParameters::blur`]): the largest of
-//! many noisy values is always too large. Towards the rim blur mixes the wall with what lies
-//! beyond, and where exactly a model ends there is the least certain thing about it: the last
-//! [`PolarParameters::rim_margin`] millimetres are shown and not counted, and over
-//! [`PolarParameters::rim_fade`] more the weight rises to 1, so that no ray comes in or falls
-//! out as a whole.
+//! 1. The image is blurred ([`PolarParameters::blur`]), because the largest of many noisy values
+//!    is too large.
+//! 2. Along each ray, the largest and the mean value are taken between the inner and the outer
+//!    surface, extended by [`PolarParameters::extension`] on both sides.
+//! 3. The reference, 100 per cent, is the mean of the largest values over the hottest quarter of
+//!    this patient's wall. A high percentile would follow the noise of a few pixels.
+//! 4. Means over the 17 segments of the American Heart Association (Cerqueira et al., Circulation
+//!    2002), and the share of wall below [`PolarParameters::threshold`] of the reference. Each ray
+//!    counts by the area of wall it stands for.
 //!
-//! Means and extents weigh each ray with the piece of wall it stands for, not with pixels.
-//! The extent is the share of wall below a threshold of this patient's own reference: the mean
-//! over the hottest quarter of the wall (a high percentile follows the noise of a few pixels).
-//! There is no normal database behind it: it is no TPD, no summed score and no diagnosis.
-//! Means show what the image shows: without attenuation correction the base, which lies
-//! deeper, is 20 to 30 % below the apex in a heart of even uptake.
+//! On the map the apex is in the centre, the base at the rim, anterior on top, septum on the left,
+//! as seen from the apex. Segments by share of the way from apex to base: 17 within 0.25; 13 to 16
+//! within 0.5; 7 to 12 within 0.75; 1 to 6 beyond.
+//!
+//! Towards the rim, blur mixes the wall with what lies beyond it, and the model's end is the least
+//! certain part of a fit. The last [`PolarParameters::rim_margin`] millimetres are therefore shown
+//! but not counted, and over the next [`PolarParameters::rim_fade`] millimetres the weight rises
+//! to 1, so that a small change of the fit does not add or remove a whole ray.
+//!
+//! Not guaranteed: there is no normal database; the extent is not a TPD, a summed score or a
+//! diagnosis. Without attenuation correction the base, which lies deeper in the body, is 20 to
+//! 30 % below the apex in a heart of even uptake.
 
-mod draw;
-mod glyphs;
+mod json;
+mod picture;
 
-pub use draw::{json, png, svg};
+pub use json::json;
+pub use picture::{png, svg};
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
@@ -38,13 +44,13 @@ pub struct PolarParameters {
     /// Share of the reference below which wall counts as a defect, 0..=1. Default 0.65, which
     /// is 0.6 of the 98th percentile (mean of 19 simulated scans).
     pub threshold: f64,
-    /// How far the samples go beyond the wall on both sides, mm, 0..=10. Default 3.
+    /// Length beyond the wall that is sampled on both sides, mm, 0..=10. Default 3.
     pub extension: f64,
     /// Gaussian blur of the image before it is sampled, sigma in mm, 0..=10. Default 4.5.
     pub blur: f64,
-    /// Length of wall at the rim that segments leave out, mm, 0..=20. Default 3.
+    /// Length of wall at the rim that is not counted, mm, 0..=20. Default 3.
     pub rim_margin: f64,
-    /// Length of wall beyond it over which the weight rises to 1, mm, 0..=30. Default 12.
+    /// Length of wall next to it over which the weight rises to 1, mm, 0..=30. Default 12.
     pub rim_fade: f64,
 }
 
@@ -60,16 +66,16 @@ impl Default for PolarParameters {
     }
 }
 
-/// A value along one ray.
+/// The values along one ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pixel {
     /// Largest value on the way through the wall.
     pub max: f64,
     /// Mean value on the way through the wall.
     pub mean: f64,
-    /// Piece of wall that the ray stands for, mm².
+    /// Area of wall that the ray stands for, mm².
     pub area: f64,
-    /// How much of that piece is counted: 0 at the rim, 1 far from it.
+    /// Share of that area that counts: 0 at the rim, 1 far from it.
     pub weight: f64,
 }
 
@@ -124,7 +130,7 @@ pub const NAMES: [&str; 17] = [
     "apex",
 ];
 
-/// The coronary artery that usually feeds a segment.
+/// The coronary artery that usually supplies a segment.
 pub fn territory(segment: usize) -> &'static str {
     match segment {
         1 | 2 | 7 | 8 | 13 | 14 | 17 => "LAD",
@@ -177,7 +183,7 @@ pub fn map(volume: &Volume, wall: &VentricleWall, parameters: &PolarParameters) 
             let pixel = pixel(&field, ray, wall.row_spacing, parameters.extension)?;
             let rows = rims[index % COLUMNS] as f64 - 0.5 - (index / COLUMNS) as f64;
             let counted = rows * wall.row_spacing - parameters.rim_margin;
-            // No fade at all is a step: NaN (0 / 0) counts as behind it.
+            // Without a fade the weight is a step, and NaN (0 / 0) at the step counts as 0.
             let weight = (counted / parameters.rim_fade).clamp(0.0, 1.0);
             let weight = if weight.is_nan() { 0.0 } else { weight };
             Some(Pixel { weight, ..pixel })
@@ -201,7 +207,7 @@ pub fn map(volume: &Volume, wall: &VentricleWall, parameters: &PolarParameters) 
     }
 }
 
-/// For every column the row behind its last one that meets the wall.
+/// For every column, one more than the last row that meets the wall.
 fn rims(wall: &VentricleWall) -> [usize; COLUMNS] {
     std::array::from_fn(|column| {
         let met = |row: &usize| wall.rays[row * COLUMNS + column].wall.is_some();
@@ -274,6 +280,7 @@ fn summarise(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::draw::image::tests::decoded;
     use crate::geometry::frame::VoxelToPatient;
     use crate::grid::voxelise::voxelise;
     use crate::locate::cup::Cup;
@@ -369,10 +376,8 @@ mod tests {
     fn pictures_can_be_read_again() {
         let (volume, wall) = scene();
         let map = map(&volume, &wall, &PolarParameters::default());
-        let bytes = png(&map).unwrap();
-        let decoder = ::png::Decoder::new(std::io::Cursor::new(bytes));
-        let info = decoder.read_info().unwrap();
-        assert_eq!((info.info().width, info.info().height), (640, 640));
+        let (width, height, _) = decoded(&png(&map));
+        assert_eq!((width, height), (640, 640));
         let text = svg(&map);
         assert!(text.starts_with("<svg") && text.ends_with("</svg>\n"));
         let value = json(&map);

@@ -1,8 +1,8 @@
-//! How far the model lies from the surface, place by place.
+//! Signed distances from a model to the surface that it was made from.
 //!
-//! Every triangle is cut into `parts`² alike ones, as many as keep the whole below
-//! [`MOST_QUERIES`]; for the middle of each the signed distance to the surface is kept. A page
-//! is coloured by it when the surface itself is not at hand any more.
+//! Every triangle is cut into `parts`² congruent ones, as many as keep their number below
+//! [`MOST_QUERIES`]. For the centroid of each, the distance to the closest point of the surface is
+//! stored, so that a page can be coloured after the surface itself is gone.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -12,9 +12,9 @@ use crate::geometry::bvh::Bvh;
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Monitor};
 
-/// Most distance queries for a model.
+/// Upper limit of the distance queries for a model, unless it has more triangles.
 const MOST_QUERIES: usize = 20_000;
-/// Most parts that a triangle's side is cut into.
+/// Upper limit of the parts that a triangle's side is cut into.
 const MOST_PARTS: usize = 12;
 
 /// Signed distances from the model to its surface.
@@ -22,7 +22,7 @@ const MOST_PARTS: usize = 12;
 pub struct Closeness {
     /// Parts that each side of a triangle is cut into.
     pub parts: usize,
-    /// Distance of the middle of each part, mm, to a thousandth; positive outside of the
+    /// Distance of the centroid of each part, mm, rounded to 0.001; positive outside of the
     /// surface. Triangle by triangle, `parts`² each, in the order of [`cut`].
     pub distances_mm: Vec<f32>,
 }
@@ -37,8 +37,8 @@ impl Closeness {
         let parts = subdivisions(mesh.triangles.len());
         let distances = (0..mesh.triangles.len()).into_par_iter().map(|t| {
             monitor.check()?;
-            let middles = cut(&mesh.corners(t), parts).map(|[a, b, c]| (a + b + c) / 3.0);
-            let distances = middles.map(|p| signed_distance(&p, reference, &tree));
+            let centroids = cut(&mesh.corners(t), parts).map(|[a, b, c]| (a + b + c) / 3.0);
+            let distances = centroids.map(|p| signed_distance(&p, reference, &tree));
             Ok(distances.map(rounded).collect::<Vec<f32>>())
         });
         Ok(Self {
@@ -47,7 +47,7 @@ impl Closeness {
         })
     }
 
-    /// Whether these are distances of a mesh of so many triangles.
+    /// Whether there are as many distances as a mesh of `triangles` triangles needs.
     pub fn suits(&self, triangles: usize) -> bool {
         (1..=MOST_PARTS).contains(&self.parts)
             && self.distances_mm.len() == triangles * self.parts * self.parts
@@ -58,14 +58,14 @@ fn rounded(distance: f64) -> f32 {
     ((1e3 * distance).round() / 1e3) as f32
 }
 
-/// How many parts to cut each side of a triangle into, so that colours follow the surface
-/// without more than [`MOST_QUERIES`] queries.
+/// The number of parts of each side of a triangle that [`MOST_QUERIES`] and [`MOST_PARTS`]
+/// allow.
 fn subdivisions(triangles: usize) -> usize {
     let fitting = (MOST_QUERIES as f64 / triangles.max(1) as f64).sqrt();
     (fitting as usize).clamp(1, MOST_PARTS)
 }
 
-/// The triangle cut into `parts`² alike ones.
+/// The triangle cut into `parts`² congruent ones.
 pub fn cut(whole: &[Vec3; 3], parts: usize) -> impl Iterator<Item = [Vec3; 3]> + use<> {
     let [a, b, c] = *whole;
     let at = move |i: usize, j: usize| {
@@ -79,7 +79,8 @@ pub fn cut(whole: &[Vec3; 3], parts: usize) -> impl Iterator<Item = [Vec3; 3]> +
     })
 }
 
-/// Positive outside of the surface; the side is told by the closest triangle's normal.
+/// Distance to the surface, mm: positive on the side to which the closest triangle's normal
+/// points.
 fn signed_distance(p: &Vec3, reference: &TriMesh, tree: &Bvh) -> f64 {
     tree.closest(p).map_or(0.0, |closest| {
         let normal = reference.area_normal(closest.triangle as usize);

@@ -1,14 +1,16 @@
 //! Two-sided distances between a model and the surface it was made from.
 //!
-//! Each side is sampled evenly by area, and every sample looks for the closest point of the
-//! other side, as Metro does (Cignoni, Rocchini, Scopigno 1998): means and percentiles.
+//! Means and percentiles: each side is sampled evenly by area, and for every sample the closest
+//! point of the other side is found, as in Metro (Cignoni, Rocchini, Scopigno, Computer Graphics
+//! Forum 1998).
 //!
-//! Samples miss the largest distance. `farthest` bounds it from both sides instead: no
-//! point of a triangle is farther from the other side than the triangle's farthest corner is
-//! from any one triangle of the other side; nor than its centroid is, plus the way to the
-//! centroid. Triangles whose bound exceeds the best distance found are cut in four and looked
-//! at again, until none can exceed it by more than 1 %. Where a mesh is too large for that,
-//! samples and some vertices have to do, and the bound is absent.
+//! Samples miss the largest distance. `farthest` therefore computes a lower and an upper bound of
+//! it: a point of a triangle is not farther from the other side than the triangle's farthest
+//! corner is from any one triangle of the other side, and not farther than the distance of the
+//! triangle's centroid plus the point's distance to that centroid. Triangles whose upper bound
+//! exceeds the largest distance found are cut in four, until none can exceed it by more than 1 %.
+//! Where a mesh is too large for that, samples and some of its vertices give the lower bound, and
+//! there is no upper one.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -21,17 +23,18 @@ use crate::mesh::TriMesh;
 use crate::optimise::Reference;
 use crate::progress::{Cancelled, Monitor};
 
-/// Queries between two looks at the cancel token, some 10 ms of work.
+/// Queries between two checks of the cancel token, about 10 ms of work.
 const CHUNK: usize = 8192;
-/// How far the largest distance may lie above the one reported, as a share of it.
+/// Largest excess of the true largest distance over the one reported, as a share of the latter.
 const TOLERANCE: f64 = 0.01;
-/// Most queries for a largest distance, in units of the even samples.
+/// Upper limit of the queries for a largest distance, in units of the even samples.
 const MOST_REFINED: usize = 40;
 
-/// Triangles that are tried before the tree: the sheets of a wall that a row of voxels meets.
+/// Number of recently closest triangles that are tried before the tree is searched: consecutive
+/// vertices of a Marching Cubes surface alternate between the sheets of a wall.
 const RECENT: usize = 6;
 
-/// How far model and surface lie apart.
+/// Distances between a model and its surface, and what they enclose.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Distance {
     /// Mean of the two directions' means, mm.
@@ -40,9 +43,9 @@ pub struct Distance {
     pub rms_mm: f64,
     /// The larger of the two directions' 95th percentiles, mm.
     pub hd95_mm: f64,
-    /// The largest distance of either direction (Hausdorff), mm: one that was found.
+    /// The largest distance of either direction (Hausdorff) that was found, mm: a lower bound.
     pub hausdorff_mm: f64,
-    /// What the largest distance surely does not exceed, mm; absent for very large meshes.
+    /// Upper bound of the largest distance, mm; absent for very large meshes.
     pub hausdorff_at_most_mm: Option<f64>,
     /// The mean in units of the smallest voxel spacing.
     pub mean_voxels: f64,
@@ -67,7 +70,7 @@ pub struct Distance {
 /// Distances of one side's points to the other side.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Direction {
-    /// Even samples taken.
+    /// Number of even samples.
     pub samples: usize,
     /// Mean over the even samples, mm.
     pub mean_mm: f64,
@@ -75,16 +78,16 @@ pub struct Direction {
     pub rms_mm: f64,
     /// 95th percentile over the even samples, mm.
     pub p95_mm: f64,
-    /// Largest found anywhere, mm.
+    /// Largest distance found at any point, mm.
     pub max_mm: f64,
-    /// What the largest surely does not exceed, mm; absent for very large meshes.
+    /// Upper bound of the largest distance, mm; absent for very large meshes.
     pub max_at_most_mm: Option<f64>,
 }
 
 /// Measures `model` against `reference` with `samples` even samples on each side.
 ///
 /// # Errors
-/// [`Cancelled`] where the monitor says so.
+/// [`Cancelled`].
 pub fn distance(
     model: &TriMesh,
     reference: &Reference,
@@ -149,8 +152,9 @@ impl Direction {
     }
 }
 
-/// The largest distance of any point of `from` to `to`: one that was found, at least
-/// `found`, and a bound that holds, if `budget` queries reach one within [`TOLERANCE`].
+/// Lower and upper bound of the largest distance of any point of `from` to `to`. The lower bound
+/// is a distance that was found, at least `found`. There is no upper bound where more than
+/// `budget` queries would be needed to bring the two within [`TOLERANCE`].
 fn farthest(
     from: &TriMesh,
     (to, tree): (&TriMesh, &Bvh),
@@ -191,8 +195,8 @@ fn farthest(
     Ok((best, Some(best * (1.0 + TOLERANCE))))
 }
 
-/// A bound for the distance of triangle `t`'s points, from what is closest to its corners.
-/// The distance to one fixed triangle is convex, so that it is largest at a corner.
+/// Upper bound of the distance of triangle `t`'s points, from the triangles closest to its
+/// corners. The distance to one fixed triangle is convex, so it is largest at a corner.
 fn bound_by_corners(from: &TriMesh, t: usize, closest: &[Closest], to: &TriMesh) -> f64 {
     let known = from.triangles[t].map(|v| closest[v as usize]);
     if known.iter().all(|c| c.triangle == known[0].triangle) {
@@ -231,7 +235,7 @@ fn distances(points: &[Vec3], to: &Bvh, monitor: &Monitor) -> Result<Vec<f64>, C
 /// The closest point of `to` for each point, in the points' order; none where `to` is empty.
 fn closest_points(points: &[Vec3], to: &Bvh, monitor: &Monitor) -> Result<Vec<Closest>, Cancelled> {
     in_order(points, monitor, |points| {
-        // Points follow each other over the surface: the last answer is near the next.
+        // Consecutive points are close together: the last answer is a good start for the next.
         let mut last = None;
         let find = |p: &Vec3| {
             let found = to.closest_from(p, last, |_| true)?;
@@ -242,7 +246,7 @@ fn closest_points(points: &[Vec3], to: &Bvh, monitor: &Monitor) -> Result<Vec<Cl
     })
 }
 
-/// What `look` finds for the points, some hundred in one task, in the points' order.
+/// The results of `look` for the points, some hundreds in one task, in the points' order.
 fn in_order(
     points: &[Vec3],
     monitor: &Monitor,
@@ -257,9 +261,9 @@ fn in_order(
     Ok(closest)
 }
 
-/// For each point, in order, the closest point of `to`; or, where one of the triangles that
-/// were closest to points just before is no farther than `near`, the closest point of that one,
-/// which is found much faster.
+/// For each point, in order, the closest point of `to`. Where one of the triangles that were
+/// closest to the points before is no farther than `near`, the closest point of that triangle
+/// instead, which is found much faster.
 fn close_points(
     points: &[Vec3],
     (to, tree): (&TriMesh, &Bvh),
@@ -298,8 +302,8 @@ fn closest_on(mesh: &TriMesh, t: u32, p: &Vec3) -> Closest {
 }
 
 /// `count` points spread evenly over the area: one in each of `count` equal shares of it, in
-/// the triangles' order, at the places of a two-dimensional Kronecker sequence (Roberts'
-/// R2). Even without random numbers, and the same every time.
+/// the triangles' order, at the places of a two-dimensional Kronecker sequence (Roberts' R2),
+/// which is even and needs no random numbers.
 fn even_samples(mesh: &TriMesh, count: usize) -> Vec<Vec3> {
     // 1/g and 1/g² for the real root g of x³ = x + 1.
     const STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];

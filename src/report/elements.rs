@@ -9,16 +9,16 @@ use crate::geometry::{Vec3, triangle};
 use crate::mesh::TriMesh;
 use crate::mesh::topology;
 
-/// An undirected edge and the triangles at it.
+/// An undirected edge with the triangles at it: one, two, or more where the mesh is no manifold.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Edge {
+struct EdgeTriangles {
     vertices: [u32; 2],
     /// For each triangle at the edge: its index, and whether it runs from the lower to the
     /// higher vertex.
     triangles: Vec<(u32, bool)>,
 }
 
-fn edges(triangles: &[[u32; 3]]) -> Vec<Edge> {
+fn edges(triangles: &[[u32; 3]]) -> Vec<EdgeTriangles> {
     let mut sides: Vec<([u32; 2], u32, bool)> = Vec::with_capacity(3 * triangles.len());
     for (t, corners) in triangles.iter().enumerate() {
         for k in 0..3 {
@@ -29,14 +29,14 @@ fn edges(triangles: &[[u32; 3]]) -> Vec<Edge> {
     sides.sort_unstable();
     sides
         .chunk_by(|x, y| x.0 == y.0)
-        .map(|group| Edge {
+        .map(|group| EdgeTriangles {
             vertices: group[0].0,
             triangles: group.iter().map(|s| (s.1, s.2)).collect(),
         })
         .collect()
 }
 
-/// The figures, one entry for each triangle, edge or vertex.
+/// One entry for each triangle, edge or vertex.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Elements {
     /// Radius ratio 2r/R of every triangle, 1 = equilateral.
@@ -62,17 +62,17 @@ impl Elements {
         Self::from_edges(mesh, &edges(&mesh.triangles))
     }
 
-    fn from_edges(mesh: &TriMesh, edges: &[Edge]) -> Self {
+    fn from_edges(mesh: &TriMesh, edges: &[EdgeTriangles]) -> Self {
         let corners: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
         let normals: Vec<Vec3> = (0..mesh.triangles.len())
             .map(|t| mesh.area_normal(t))
             .collect();
         let angles: Vec<[f64; 3]> = corners.iter().map(angles_deg).collect();
-        let length = |e: &Edge| {
+        let length = |e: &EdgeTriangles| {
             let [a, b] = e.vertices.map(|v| mesh.vertices[v as usize]);
             (b - a).norm()
         };
-        let dihedral = |e: &Edge| match e.triangles[..] {
+        let dihedral = |e: &EdgeTriangles| match e.triangles[..] {
             [(s, _), (t, _)] => {
                 let angle = triangle::angle_between(&normals[s as usize], &normals[t as usize]);
                 Some(angle.to_degrees())
@@ -104,7 +104,7 @@ fn angles_deg([a, b, c]: &[Vec3; 3]) -> [f64; 3] {
         .map(|(p, q, r)| triangle::angle_between(&(q - p), &(r - p)).to_degrees())
 }
 
-/// What a mesh is, whatever it looks like: counts and topology.
+/// Counts, topology and size of a mesh.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MeshFacts {
     /// Number of vertices.
@@ -115,24 +115,14 @@ pub struct MeshFacts {
     pub triangles: usize,
     /// Connected components.
     pub components: usize,
-    /// V - E + F.
+    /// Euler characteristic V - E + F: 2 for each component without handles. Only vertices in
+    /// use count.
     pub euler_characteristic: i64,
     /// Handles over all components, of a closed manifold.
     pub genus: Option<i64>,
-    /// No edge has a single triangle.
-    pub closed: bool,
-    /// No edge has more than two triangles.
-    pub edge_manifold: bool,
-    /// The triangles round every vertex form one cycle, and every edge has two of them.
-    pub vertex_manifold: bool,
-    /// Neighbouring triangles run against each other along their edge.
-    pub oriented: bool,
-    /// The triangles face outward (the enclosed volume is positive).
-    pub outward: bool,
-    /// Components that face outward; the others bound cavities.
-    pub outward_components: usize,
-    /// The first defect found, in words.
-    pub defect: Option<String>,
+    /// Whether it is a closed, oriented manifold, property by property.
+    #[serde(flatten)]
+    pub manifold: ManifoldFacts,
     /// Pairs of triangles that meet in more than shared vertices and edges, found exactly.
     pub self_intersections: usize,
     /// Area, mm².
@@ -145,6 +135,27 @@ pub struct MeshFacts {
     pub max_mm: [f64; 3],
 }
 
+/// What makes a mesh a closed, oriented manifold that faces outward.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ManifoldFacts {
+    /// No edge has a single triangle.
+    pub closed: bool,
+    /// No edge has more than two triangles.
+    pub edge_manifold: bool,
+    /// The triangles about every vertex form one cycle, and every edge has two of them.
+    pub vertex_manifold: bool,
+    /// Neighbouring triangles traverse their common edge in opposite directions, so that their
+    /// normals point to the same side.
+    pub oriented: bool,
+    /// The triangles face outward (the enclosed volume is positive).
+    pub outward: bool,
+    /// Components with a positive enclosed volume. The others bound cavities of the wall, or face
+    /// the wrong way.
+    pub outward_components: usize,
+    /// The first defect found, in words.
+    pub defect: Option<String>,
+}
+
 /// How well-shaped the triangles are.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Shape {
@@ -154,7 +165,7 @@ pub struct Shape {
     pub min_angle_deg: Summary,
     /// Largest angle of each triangle, degrees.
     pub max_angle_deg: Summary,
-    /// Edge lengths, mm.
+    /// EdgeTriangles lengths, mm.
     pub edge_length_mm: Summary,
     /// Areas of triangles, mm².
     pub area_mm2: Summary,
@@ -181,7 +192,7 @@ pub struct Smoothness {
 }
 
 impl Shape {
-    /// Sums `elements` up.
+    /// The summaries of `elements`.
     pub fn of(elements: &Elements) -> Self {
         Self {
             radius_ratio: Summary::of(&elements.radius_ratio),
@@ -213,7 +224,7 @@ impl Valence {
 }
 
 impl Smoothness {
-    /// Sums `elements` up.
+    /// The summaries of `elements`.
     pub fn of(elements: &Elements) -> Self {
         Self {
             dihedral_deg: Summary::of(&elements.dihedral_deg),
@@ -228,7 +239,7 @@ pub struct Histograms {
     pub radius_ratio: Histogram,
     /// Smallest angle of each triangle, degrees.
     pub min_angle_deg: Histogram,
-    /// Edge lengths, mm.
+    /// EdgeTriangles lengths, mm.
     pub edge_length_mm: Histogram,
     /// Angles between neighbouring triangles' normals, degrees.
     pub dihedral_deg: Histogram,
@@ -237,7 +248,7 @@ pub struct Histograms {
 }
 
 impl Histograms {
-    /// Counts both meshes' elements over the same bins.
+    /// Counts the elements of both meshes over the same bins.
     pub fn of(retiled: &Elements, optimised: &Elements) -> Self {
         let continuous = |pick: fn(&Elements) -> &Vec<f64>| {
             Histogram::continuous(pick(retiled), pick(optimised))
@@ -252,8 +263,8 @@ impl Histograms {
     }
 }
 
-/// Measures elements and topology of `mesh` in one go; `self_intersections` comes from
-/// [`crate::mesh::intersections`].
+/// Elements and topology of `mesh`, from one list of its edges; `self_intersections` is the number
+/// of pairs that [`crate::mesh::intersections`] found.
 pub(super) fn facts(mesh: &TriMesh, self_intersections: usize) -> (Elements, MeshFacts) {
     let edges = edges(&mesh.triangles);
     let elements = Elements::from_edges(mesh, &edges);
@@ -263,13 +274,8 @@ pub(super) fn facts(mesh: &TriMesh, self_intersections: usize) -> (Elements, Mes
     let components = topology::components(mesh.vertices.len(), &mesh.triangles);
     let volume = mesh.volume();
     let aabb = crate::geometry::bvh::Aabb::of(&mesh.vertices);
-    let facts = MeshFacts {
-        vertices: mesh.vertices.len(),
-        edges: edges.len(),
-        triangles: mesh.triangles.len(),
-        components: components.iter().max().map_or(0, |m| *m as usize + 1),
-        euler_characteristic: euler,
-        genus: census.as_ref().ok().map(topology::Census::genus),
+    let genus = census.as_ref().ok().map(topology::Census::genus);
+    let manifold = ManifoldFacts {
         closed: edges.iter().all(|e| e.triangles.len() >= 2),
         edge_manifold: edges.iter().all(|e| e.triangles.len() <= 2),
         vertex_manifold: edges.iter().all(|e| e.triangles.len() == 2) && fans(mesh, &edges) == used,
@@ -281,6 +287,15 @@ pub(super) fn facts(mesh: &TriMesh, self_intersections: usize) -> (Elements, Mes
         outward: volume > 0.0,
         outward_components: outward_components(mesh, &components),
         defect: census.err().map(|d| d.to_string()),
+    };
+    let facts = MeshFacts {
+        vertices: mesh.vertices.len(),
+        edges: edges.len(),
+        triangles: mesh.triangles.len(),
+        components: components.iter().max().map_or(0, |m| *m as usize + 1),
+        euler_characteristic: euler,
+        genus,
+        manifold,
         self_intersections,
         area_mm2: elements.area_mm2.iter().sum(),
         volume_ml: volume / 1000.0,
@@ -290,15 +305,15 @@ pub(super) fn facts(mesh: &TriMesh, self_intersections: usize) -> (Elements, Mes
     (elements, facts)
 }
 
-/// How many of the components face outward; `component` gives that of every vertex.
+/// Number of components that face outward; `component` holds the component of every vertex.
 pub(super) fn outward_components(mesh: &TriMesh, component: &[u32]) -> usize {
     let volumes = topology::component_volumes(&mesh.vertices, &mesh.triangles, component);
     volumes.iter().filter(|v| **v > 0.0).count()
 }
 
-/// Number of fans over all vertices: sets of corners at one vertex that are joined through
-/// edges with two triangles. One for each vertex in use of a manifold.
-fn fans(mesh: &TriMesh, edges: &[Edge]) -> usize {
+/// Number of fans over all vertices. A fan is a set of triangle corners at one vertex that are
+/// joined through edges with two triangles; a manifold has one for each vertex in use.
+fn fans(mesh: &TriMesh, edges: &[EdgeTriangles]) -> usize {
     let corner = |t: u32, v: u32| {
         let place = mesh.triangles[t as usize].iter().position(|&c| c == v);
         3 * t + place.map_or(0, |k| k as u32)
@@ -340,8 +355,12 @@ mod tests {
         near(&elements.dihedral_deg, 6, (-1f64 / 3.0).acos().to_degrees());
         near(&elements.valence, 4, 3.0);
         assert_eq!((facts.euler_characteristic, facts.genus), (2, Some(0)));
-        assert!(facts.closed && facts.edge_manifold && facts.vertex_manifold);
-        assert!(facts.oriented && facts.outward && facts.defect.is_none());
+        assert!(
+            facts.manifold.closed && facts.manifold.edge_manifold && facts.manifold.vertex_manifold
+        );
+        assert!(
+            facts.manifold.oriented && facts.manifold.outward && facts.manifold.defect.is_none()
+        );
     }
 
     #[test]
@@ -356,7 +375,12 @@ mod tests {
             assert_eq!(facts.edges, census.edges);
             assert_eq!(facts.components, census.components);
             assert_eq!(facts.euler_characteristic, census.euler_characteristic);
-            assert!(facts.closed && facts.vertex_manifold && facts.oriented && facts.outward);
+            assert!(
+                facts.manifold.closed
+                    && facts.manifold.vertex_manifold
+                    && facts.manifold.oriented
+                    && facts.manifold.outward
+            );
         }
     }
 
@@ -371,14 +395,21 @@ mod tests {
         let open = with(&|m| {
             m.triangles.pop();
         });
-        assert!(!open.closed && open.edge_manifold && open.oriented && open.defect.is_some());
+        assert!(
+            !open.manifold.closed
+                && open.manifold.edge_manifold
+                && open.manifold.oriented
+                && open.manifold.defect.is_some()
+        );
         let doubled = with(&|m| m.triangles.push(m.triangles[0]));
-        assert!(doubled.closed && !doubled.edge_manifold);
+        assert!(doubled.manifold.closed && !doubled.manifold.edge_manifold);
         let turned = with(&|m| m.triangles[0].swap(0, 1));
-        assert!(turned.closed && turned.edge_manifold && !turned.oriented);
+        assert!(
+            turned.manifold.closed && turned.manifold.edge_manifold && !turned.manifold.oriented
+        );
         let inward = with(&|m| m.triangles.iter_mut().for_each(|t| t.swap(0, 1)));
-        assert!(inward.closed && inward.oriented && !inward.outward);
-        assert_eq!(inward.outward_components, 0);
+        assert!(inward.manifold.closed && inward.manifold.oriented && !inward.manifold.outward);
+        assert_eq!(inward.manifold.outward_components, 0);
         // A small sphere far away faces inward: the whole still encloses a positive volume.
         let stray = with(&|m| {
             let n = m.vertices.len() as u32;
@@ -395,8 +426,13 @@ mod tests {
             m.triangles.extend(turned);
             m.vertices.extend(far);
         });
-        assert!(stray.oriented && stray.outward && stray.defect.is_none());
-        assert_eq!((stray.components, stray.outward_components), (2, 1));
+        assert!(
+            stray.manifold.oriented && stray.manifold.outward && stray.manifold.defect.is_none()
+        );
+        assert_eq!(
+            (stray.components, stray.manifold.outward_components),
+            (2, 1)
+        );
         // Two spheres that share a vertex.
         let pinched = with(&|m| {
             let n = m.vertices.len() as u32;
@@ -406,7 +442,11 @@ mod tests {
             let copies: Vec<Vec3> = m.vertices[1..].iter().map(|v| v * 2.0).collect();
             m.vertices.extend(copies);
         });
-        assert!(pinched.closed && pinched.edge_manifold && !pinched.vertex_manifold);
+        assert!(
+            pinched.manifold.closed
+                && pinched.manifold.edge_manifold
+                && !pinched.manifold.vertex_manifold
+        );
         assert_eq!((pinched.components, pinched.euler_characteristic), (1, 3));
     }
 }

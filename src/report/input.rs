@@ -1,10 +1,10 @@
-//! The volume's facts by the names of the report (and of the service's volumes).
+//! The facts about a volume's file as JSON, by the names that reports use.
 
 use crate::volume::{IntensitySummary, VolumeFacts};
 use nalgebra::Matrix4;
 use serde_json::{Value, json};
 
-/// What was understood of the volume's file.
+/// Format, grid, frame, intensities and warnings of the volume's file. Lengths in mm.
 pub fn input(facts: &VolumeFacts) -> Value {
     json!({
         "format": facts.format.as_str(),

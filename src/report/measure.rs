@@ -1,4 +1,4 @@
-//! Everything that is measured on a model.
+//! All measures of a mesh beside its reference surface.
 
 use super::distance::{Distance, distance};
 use super::elements::{Elements, MeshFacts, Shape, Smoothness, facts};
@@ -22,7 +22,7 @@ impl Default for MeasureParameters {
     }
 }
 
-/// All measures of one mesh against its reference surface.
+/// All measures of a mesh against its reference surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measures {
     /// Figures of every triangle, edge and vertex.
@@ -37,10 +37,11 @@ pub struct Measures {
     pub distance: Distance,
 }
 
-/// Measures `mesh`, a manifold or not, against `reference`. Indices must be in range.
+/// Measures `mesh` against `reference`. The mesh need not be a manifold, but its indices must be in
+/// range.
 ///
 /// # Errors
-/// [`Cancelled`] where the monitor says so.
+/// [`Cancelled`].
 pub fn measure(
     mesh: &TriMesh,
     reference: &Reference,

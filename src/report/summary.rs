@@ -1,8 +1,10 @@
-//! Many numbers in a few: summaries and histograms.
+//! Lists of numbers as summaries and histograms.
 
 use serde::{Deserialize, Serialize};
 
-/// What a list of numbers is like. All zero for an empty list.
+use crate::numeric::round_step::round_step;
+
+/// Mean, spread and percentiles of a list of numbers. All zero for an empty list.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     /// Arithmetic mean.
@@ -24,7 +26,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Sums `values` up, in their order.
+    /// The summary of `values`. Sums run in their order.
     pub fn of(values: &[f64]) -> Self {
         if values.is_empty() {
             return Self::default();
@@ -75,10 +77,10 @@ pub struct Histogram {
 }
 
 impl Histogram {
-    /// Some 20 to 40 bins of a round width over the range of both lists.
+    /// 20 to 42 bins of a round width over the range of both lists.
     pub fn continuous(retiled: &[f64], optimised: &[f64]) -> Self {
         let (min, max) = range(retiled, optimised);
-        let width = round_width((max - min) / 40.0);
+        let width = round_step((max - min) / 40.0);
         Self::with_bins(
             (min / width).floor() * width,
             max,
@@ -119,19 +121,6 @@ fn range(a: &[f64], b: &[f64]) -> (f64, f64) {
     let min = finite().fold(f64::INFINITY, f64::min);
     let max = finite().fold(f64::NEG_INFINITY, f64::max);
     if min <= max { (min, max) } else { (0.0, 0.0) }
-}
-
-/// The smallest of 1, 2, 5 times a power of ten that is not below `width`; 1 for 0.
-fn round_width(width: f64) -> f64 {
-    if !(width > 0.0) {
-        return 1.0;
-    }
-    let power = 10f64.powf(width.log10().floor());
-    let factor = [1.0, 2.0, 5.0]
-        .into_iter()
-        .find(|f| f * power >= width)
-        .unwrap_or(10.0);
-    factor * power
 }
 
 #[cfg(test)]

@@ -6,8 +6,7 @@ use crate::export::{self, ExportError, Format, Metadata};
 use crate::parameters::Parameters;
 use crate::polar;
 use crate::progress::{Cancelled, Monitor, Stage};
-use crate::report;
-use crate::report::html::{Pictured, segmentation};
+use crate::report::{self, SegmentationPage, SegmentationReport};
 use crate::volume::nifti::{self, MaskError};
 use serde_json::{Map, Value, json};
 
@@ -100,8 +99,10 @@ impl SegmentedVolume {
             let found = files.iter().find(|file| file.name == name);
             found.map(|file| file.bytes.as_slice())
         };
-        let page = segmentation(&Pictured {
-            report: &self.report(),
+        let report: SegmentationReport = serde_json::from_value(self.report())
+            .expect("the page reads the fields of the report by the types it was written with");
+        let page = report::segmentation_page(&SegmentationPage {
+            report: &report,
             mesh: &self.segmentation.fit.mesh,
             slices: bytes("slices.png"),
             polar: bytes("polar.svg"),
@@ -160,7 +161,7 @@ impl SegmentedVolume {
         let png = NamedFile {
             name: "polar.png".into(),
             media_type: "image/png",
-            bytes: polar::png(map).map_err(|error| other("polar.png", &error))?,
+            bytes: polar::png(map),
         };
         Ok(vec![json_file("polar.json", &polar::json(map)), svg, png])
     }

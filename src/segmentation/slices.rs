@@ -1,17 +1,19 @@
-//! Three slices through a fitted organ with the contours of fit and expert.
+//! Three slices through a fitted organ with the contours of the fit and the expert's mask.
 //!
-//! Of a ventricle ([`Cut::heart`]), from left to right as cardiologists look at it: a
-//! short-axis slice through the middle of the cavity (anterior on top, septum left), a
-//! horizontal long-axis slice (apex on top, septum left), a vertical long-axis slice (base
-//! left, anterior on top). Of any other organ ([`Cut::body`]), as radiologists do: axial
-//! (anterior on top), coronal, sagittal (anterior left), the patient's right on the left. A
-//! slice is a plane of the patient, sampled in equal steps: the scan by trilinear
-//! interpolation, the fitted mesh by the same rule that makes masks of it, the expert's mask
-//! by its nearest voxel. Grey runs from 0 to the greatest value within the fit.
+//! A ventricle ([`Cut::heart`]) is shown as in cardiology, from left to right: a short-axis slice
+//! through the middle of the cavity (anterior on top, septum left), a horizontal long-axis slice
+//! (apex on top, septum left), a vertical long-axis slice (base left, anterior on top). Any other
+//! organ ([`Cut::body`]) is shown as in radiology: axial (anterior on top), coronal, sagittal
+//! (anterior left), with the patient's right on the left.
+//!
+//! A slice is a plane of the patient, sampled in equal steps: the scan by trilinear interpolation,
+//! the fitted mesh by the rule that masks are made by, the expert's mask at the nearest voxel.
+//! Grey runs from 0 to the greatest value within the fit.
 
 use nalgebra::Matrix3;
 
 use crate::deform::Fit;
+use crate::draw::Image;
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::geometry::frame::VoxelToPatient;
@@ -37,7 +39,8 @@ pub const FIT: [u8; 3] = [255, 150, 0];
 /// The expert's contour.
 pub const EXPERT: [u8; 3] = [0, 210, 255];
 
-/// The three slices of one patient as a PNG file.
+/// The three slices of one patient as a PNG file, `cut` as it says, with the contour of `fit` and,
+/// where it is given, of `expert` (a mask on the volume's grid).
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -52,25 +55,7 @@ pub fn png(
     for plane in &cut.planes {
         slices.push(slice(plane, volume, fit, expert, monitor)?);
     }
-    let width = 3 * SIDE + 2 * GAP;
-    let mut pixels = Vec::with_capacity(3 * width * SIDE);
-    for row in 0..SIDE {
-        for (place, slice) in slices.iter().enumerate() {
-            if place > 0 {
-                pixels.extend([0; 3 * GAP]);
-            }
-            pixels.extend(slice[row * SIDE..(row + 1) * SIDE].iter().flatten());
-        }
-    }
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, width as u32, SIDE as u32);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder
-        .write_header()
-        .and_then(|mut writer| writer.write_image_data(&pixels))
-        .expect("the picture has as many pixels as it says, and memory does not fail");
-    Ok(bytes)
+    Ok(Image::side_by_side(&slices, GAP).png())
 }
 
 /// Where to cut: for each slice the places of its pixels, index (column, row, 0) to patient.
@@ -125,7 +110,7 @@ fn slice(
     fit: &TriMesh,
     expert: Option<&Mask>,
     monitor: &Monitor,
-) -> Result<Vec<[u8; 3]>, Cancelled> {
+) -> Result<Image<3>, Cancelled> {
     let place = |pixel: usize| {
         let (column, row) = (pixel % SIDE, pixel / SIDE);
         frame.to_patient(&Vec3::new(column as f64, row as f64, 0.0))
@@ -140,18 +125,20 @@ fn slice(
         .filter(|p| inside[*p])
         .map(|p| values[p])
         .fold(0.0, f64::max);
-    let mut pixels: Vec<[u8; 3]> = values
-        .iter()
-        .map(|v| [(255.0 * v / white.max(f64::MIN_POSITIVE)).clamp(0.0, 255.0) as u8; 3])
-        .collect();
+    let grey = |v: &f64| [(255.0 * v / white.max(f64::MIN_POSITIVE)).clamp(0.0, 255.0) as u8; 3];
+    let mut picture = Image {
+        width: SIDE,
+        height: SIDE,
+        pixels: values.iter().map(grey).collect(),
+    };
     if let Some(expert) = expert {
         let drawn: Vec<bool> = (0..SIDE * SIDE)
             .map(|p| at_nearest(expert, &volume.frame.to_voxel(&place(p))))
             .collect();
-        outline(&mut pixels, &drawn, EXPERT);
+        outline(&mut picture.pixels, &drawn, EXPERT);
     }
-    outline(&mut pixels, &inside, FIT);
-    Ok(pixels)
+    outline(&mut picture.pixels, &inside, FIT);
+    Ok(picture)
 }
 
 fn at_nearest(mask: &Mask, index: &Vec3) -> bool {
@@ -187,6 +174,7 @@ fn outline(pixels: &mut [[u8; 3]], inside: &[bool], colour: [u8; 3]) {
 
 #[cfg(test)]
 mod tests {
+    use crate::draw::image::tests::decoded;
     use crate::mesh::shapes;
     use crate::segmentation::slices::*;
 
@@ -214,17 +202,10 @@ mod tests {
         };
         let cut = Cut::heart(&cup, &Vec3::z());
         let bytes = png(&volume, &mesh, &cut, Some(&wall), &Monitor::silent()).unwrap();
-        let mut reader = ::png::Decoder::new(std::io::Cursor::new(&bytes))
-            .read_info()
-            .unwrap();
-        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
-        let info = reader.next_frame(&mut pixels).unwrap();
-        assert_eq!(
-            (info.width as usize, info.height as usize),
-            (3 * SIDE + 2 * GAP, SIDE)
-        );
+        let (width, height, pixels) = decoded(&bytes);
+        assert_eq!((width, height), (3 * SIDE + 2 * GAP, SIDE));
         // Grey values on the axis, apical and basal of the centre: wall and nothing.
-        let at = |column: usize, row: usize| pixels[3 * (row * info.width as usize + column)];
+        let at = |column: usize, row: usize| pixels[3 * (row * width + column)];
         let middle = SIDE + GAP + SIDE / 2;
         let millimetres = |mm: f64| (SIDE as f64 / 2.0 + mm / STEP) as usize;
         assert!(at(middle, millimetres(-25.0)) > 150, "the apex is on top");

@@ -62,7 +62,7 @@ pub use facts::{
 pub use limits::{ReadLimits, ReadOptions};
 pub use open::{Reading, describe};
 pub use phantom::{Phantom, PhantomParameters, phantom};
-pub use preview::{GrayImage, preview, preview_png};
+pub use preview::{preview, preview_png};
 pub use read::{inspect, read};
 pub use source::VolumeFile;
 pub use summary::summarise;

@@ -1,4 +1,4 @@
-//! A picture of a volume for a person: its three middle slices, side by side.
+//! A picture of a volume: its three middle slices, side by side.
 //!
 //! From left to right: an axial, a coronal and a sagittal slice through the middle of the array, each
 //! in true proportions. Oblique volumes are shown along the array axes that are closest to the axes
@@ -9,6 +9,7 @@
 //! slices, so that a single bright voxel does not darken the rest.
 
 use super::Volume;
+use crate::draw::Image;
 use crate::geometry::frame::VoxelToPatient;
 
 /// Length of the longest side of a slice in pixels.
@@ -20,19 +21,8 @@ const GAP: usize = 4;
 /// Share of the shown pixels that are not saturated.
 const PERCENTILE: f64 = 0.995;
 
-/// A picture in shades of grey, row by row from the top left.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct GrayImage {
-    /// Pixels in a row.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// 0 black ... 255 white, `width * height` of them.
-    pub pixels: Vec<u8>,
-}
-
 /// Draws the three middle slices of `volume`; at most 776 x 256 pixels.
-pub fn preview(volume: &Volume) -> GrayImage {
+pub fn preview(volume: &Volume) -> Image<1> {
     let axes = PatientAxes::of(volume);
     // Columns run to the patient's left or back, rows to the back or feet.
     let views = [
@@ -43,34 +33,25 @@ pub fn preview(volume: &Volume) -> GrayImage {
     let longest = [axes.x, axes.y, axes.z].map(|a| a.extent_mm);
     let longest = longest.into_iter().fold(0.0, f64::max);
     let slices = views.map(|(right, down)| slice(volume, right, down, longest));
-    let white = window(&slices);
-    assemble(&slices, white)
+    let window = window(&slices);
+    Image::side_by_side(&slices.map(|slice| slice.grey(window)), GAP)
 }
 
 /// [`preview`] as a PNG file.
 pub fn preview_png(volume: &Volume) -> Vec<u8> {
-    let image = preview(volume);
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, image.width as u32, image.height as u32);
-    encoder.set_color(png::ColorType::Grayscale);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder
-        .write_header()
-        .and_then(|mut writer| writer.write_image_data(&image.pixels))
-        .expect("the picture has as many pixels as it says, and memory does not fail");
-    bytes
+    preview(volume).png()
 }
 
 /// An array axis, walked in a direction of the patient.
 #[derive(Debug, Clone, Copy)]
-struct Axis {
+struct ArrayAxis {
     array: usize,
     size: usize,
     backwards: bool,
     extent_mm: f64,
 }
 
-impl Axis {
+impl ArrayAxis {
     fn reversed(self) -> Self {
         Self {
             backwards: !self.backwards,
@@ -91,9 +72,9 @@ impl Axis {
 
 /// The array axes nearest to the patient's x (left), y (back), z (head).
 struct PatientAxes {
-    x: Axis,
-    y: Axis,
-    z: Axis,
+    x: ArrayAxis,
+    y: ArrayAxis,
+    z: ArrayAxis,
 }
 
 impl PatientAxes {
@@ -113,7 +94,7 @@ impl PatientAxes {
             if fit(order) > fit(best) { order } else { best }
         });
         let spacing = volume.frame.spacing();
-        let axis = |patient: usize| Axis {
+        let axis = |patient: usize| ArrayAxis {
             array: best[patient],
             size: volume.shape[best[patient]],
             backwards: cosine(patient, best[patient]) < 0.0,
@@ -138,9 +119,21 @@ struct Slice {
     values: Vec<f32>,
 }
 
+impl Slice {
+    /// Grey values, black at `low` and white from `high` on.
+    fn grey(self, (low, high): (f32, f32)) -> Image<1> {
+        let grey = |value: &f32| [(255.0 * (value - low) / (high - low)).round() as u8];
+        Image {
+            width: self.width,
+            height: self.height,
+            pixels: self.values.iter().map(grey).collect(),
+        }
+    }
+}
+
 /// The middle slice whose columns run along `right` and rows along `down`.
-fn slice(volume: &Volume, right: Axis, down: Axis, longest_mm: f64) -> Slice {
-    let pixels = |a: Axis| {
+fn slice(volume: &Volume, right: ArrayAxis, down: ArrayAxis, longest_mm: f64) -> Slice {
+    let pixels = |a: ArrayAxis| {
         let length = (a.extent_mm / longest_mm * LONGEST_SIDE as f64).round();
         (length as usize).clamp(1, LONGEST_SIDE)
     };
@@ -200,29 +193,6 @@ fn window(slices: &[Slice]) -> (f32, f32) {
     (low, white)
 }
 
-fn assemble(slices: &[Slice], (low, high): (f32, f32)) -> GrayImage {
-    let width = slices.iter().map(|s| s.width).sum::<usize>() + GAP * (slices.len() - 1);
-    let height = slices.iter().map(|s| s.height).max().unwrap_or(1);
-    let mut pixels = vec![0; width * height];
-    let mut left = 0;
-    for s in slices {
-        let top = (height - s.height) / 2;
-        for (row, values) in s.values.chunks(s.width).enumerate() {
-            let start = (top + row) * width + left;
-            for (pixel, value) in pixels[start..start + s.width].iter_mut().zip(values) {
-                let share = (value - low) / (high - low);
-                *pixel = (255.0 * share).round() as u8;
-            }
-        }
-        left += s.width + GAP;
-    }
-    GrayImage {
-        width,
-        height,
-        pixels,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -242,7 +212,7 @@ mod tests {
     }
 
     /// Whether the brightest pixel of panel `n` lies right of its middle, and below it.
-    fn side(image: &GrayImage, n: usize) -> (bool, bool) {
+    fn side(image: &Image<1>, n: usize) -> (bool, bool) {
         let panel = LONGEST_SIDE + GAP;
         let inside = |i: usize| (n * panel..n * panel + LONGEST_SIDE).contains(&(i % image.width));
         let pixels = image.pixels.iter().enumerate().filter(|(i, _)| inside(*i));
@@ -292,7 +262,7 @@ mod tests {
             (image.width, image.height),
             (256 + 256 + 128 + 2 * GAP, 256)
         );
-        assert!(image.pixels.iter().all(|&p| p == 0));
+        assert!(image.pixels.iter().all(|p| *p == [0]));
         assert!(preview_png(&volume).starts_with(b"\x89PNG"));
     }
 }

@@ -6,8 +6,7 @@
 //! deleted by then.
 
 use crate::export::read_json::{self, ReadMeshError};
-use crate::report::html::{Pictured, segmentation};
-use crate::report::{self, Closeness, Report};
+use crate::report::{self, Closeness, ModelReport, SegmentationPage, SegmentationReport};
 use std::io;
 
 /// Why there is no page.
@@ -43,12 +42,12 @@ pub(super) const SEGMENTATION_FILES: &[&str] =
 /// [`PageError`].
 pub(super) fn model_page(read: &ReadFile<'_>) -> Result<String, PageError> {
     let text = required(read, "report.json")?;
-    let report: Report = from_json("report.json", &text)?;
+    let report: ModelReport = from_json("report.json", &text)?;
     let mesh = read_json::decode(&required(read, "mesh.json")?)?;
     let closeness: Option<Closeness> = optional(read, "distance.json")?
         .map(|text| from_json("distance.json", &text))
         .transpose()?;
-    Ok(report::html(&report, &mesh, closeness.as_ref()))
+    Ok(report::model_page(&report, &mesh, closeness.as_ref()))
 }
 
 /// The page of a segmentation, made of `report.json`, `mesh.json` and, if they exist,
@@ -57,11 +56,11 @@ pub(super) fn model_page(read: &ReadFile<'_>) -> Result<String, PageError> {
 /// # Errors
 /// [`PageError`].
 pub(super) fn segmentation_page(read: &ReadFile<'_>) -> Result<String, PageError> {
-    let report = from_json("report.json", &required(read, "report.json")?)?;
+    let report: SegmentationReport = from_json("report.json", &required(read, "report.json")?)?;
     let mesh = read_json::decode(&required(read, "mesh.json")?)?;
     let slices = optional(read, "slices.png")?;
     let polar = optional(read, "polar.svg")?;
-    Ok(segmentation(&Pictured {
+    Ok(report::segmentation_page(&SegmentationPage {
         report: &report,
         mesh: &mesh,
         slices: slices.as_deref(),

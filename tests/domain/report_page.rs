@@ -2,7 +2,7 @@
 
 // A test's helpers state their expectations by panicking, as the test does.
 #![allow(clippy::unwrap_used)]
-// Stages may say more of themselves without a change here.
+// Stages may add facts without a change here.
 #![allow(clippy::needless_update)]
 
 use base64::Engine;
@@ -14,7 +14,9 @@ use ventriform::optimise::{
     FitnessForm, FitnessSummary, OptimiseFacts, OptimiseParameters, Optimised, Reference,
 };
 use ventriform::progress::Monitor;
-use ventriform::report::{Closeness, MeasureParameters, Report, ReportInput, Start, html, measure};
+use ventriform::report::{
+    Closeness, MeasureParameters, ModelReport, ReportInput, StartSummary, measure, model_page,
+};
 use ventriform::retile::{RetileFacts, Tiled};
 use ventriform::surface::Surface;
 
@@ -35,7 +37,7 @@ fn fitness(normalised: f64) -> FitnessSummary {
 }
 
 /// The report on `model`, as if it had come out of the pipeline.
-fn report(model: &TriMesh) -> Report {
+fn report(model: &TriMesh) -> ModelReport {
     let surface = surface();
     let reference = Reference::new(&surface);
     let measures = measure(
@@ -58,7 +60,7 @@ fn report(model: &TriMesh) -> Report {
         lengths: reference.lengths(model.triangles.len()),
         facts: OptimiseFacts::default(),
     };
-    Report::new(ReportInput {
+    ModelReport::new(ReportInput {
         input: json!({ "name": HOSTILE }),
         parameters: json!({ "points": model.vertices.len(), "seed": 1 }),
         surface: &surface,
@@ -68,7 +70,7 @@ fn report(model: &TriMesh) -> Report {
             fitness: FitnessForm::Normalised,
             ..OptimiseParameters::default()
         },
-        starts: vec![Start::new(&tiled, &measures)],
+        starts: vec![StartSummary::new(&tiled, &measures)],
         measures,
         timings_ms: vec![("surface".to_owned(), 12.0), ("retile".to_owned(), 30.5)],
     })
@@ -124,7 +126,7 @@ fn the_names_that_others_rely_on_are_there() {
 }
 
 #[test]
-fn a_model_that_breaks_its_promises_is_told_so() {
+fn broken_promises_are_reported() {
     let sound = report(&model());
     assert!(sound.is_sound());
     let mut open = model();
@@ -145,14 +147,14 @@ fn a_model_that_breaks_its_promises_is_told_so() {
     crossed.vertices[far].x = 0.0;
     let crossed = report(&crossed);
     assert!(crossed.mesh.self_intersections > 0 && !crossed.is_sound());
-    let page = html(&crossed, &model(), None);
+    let page = model_page(&crossed, &model(), None);
     assert!(page.contains("promises are broken"));
 }
 
 #[test]
 fn the_page_fetches_nothing_and_lets_no_text_become_markup() {
     let model = model();
-    let page = html(&report(&model), &model, Some(&closeness(&model)));
+    let page = model_page(&report(&model), &model, Some(&closeness(&model)));
     for outside in ["http:", "https:", "src=\"/", "url(h", "@import", "<link"] {
         assert!(!page.contains(outside), "{outside}");
     }
@@ -170,8 +172,8 @@ fn the_page_fetches_nothing_and_lets_no_text_become_markup() {
 #[test]
 fn the_policy_allows_the_pages_own_style_and_script_alone() {
     let model = model();
-    let page = html(&report(&model), &model, None);
-    let policy = ventriform::report::html::content_security_policy();
+    let page = model_page(&report(&model), &model, None);
+    let policy = ventriform::draw::document::content_security_policy(true);
     assert!(page.contains(&policy) && policy.starts_with("default-src 'none'"));
     let between = |open: &str, close: &str| {
         let from = page.rfind(open).unwrap() + open.len();
@@ -192,7 +194,7 @@ fn the_policy_allows_the_pages_own_style_and_script_alone() {
 #[test]
 fn the_turning_view_holds_the_model() {
     let model = model();
-    let page = html(&report(&model), &model, None);
+    let page = model_page(&report(&model), &model, None);
     let open = "<script type=\"application/json\" id=\"mesh\">";
     let from = page.find(open).unwrap() + open.len();
     let data = &page[from..from + page[from..].find("</script>").unwrap()];
@@ -215,7 +217,7 @@ fn measures_do_not_depend_on_the_number_of_threads() {
             .unwrap();
         pool.install(|| {
             let report = report(&model);
-            let page = html(&report, &model, Some(&closeness(&model)));
+            let page = model_page(&report, &model, Some(&closeness(&model)));
             (serde_json::to_string(&report).unwrap(), page)
         })
     };

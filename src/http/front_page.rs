@@ -4,7 +4,7 @@ use super::negotiate;
 use axum::http::{HeaderMap, HeaderValue, header};
 use axum::response::{Html, IntoResponse, Response};
 
-const PAGE: &str = include_str!("page.html");
+const PAGE: &str = include_str!("front_page.html");
 
 /// The page may run its own script and style and call its own service; nothing comes from
 /// elsewhere.

@@ -1,12 +1,11 @@
-//! The stages' facts by the names of the report.
+//! The stages' facts under the names they have in the report.
 //!
-//! The one place that knows both: a field that a stage adds to its facts appears in the
-//! report by one line here.
+//! A stage's fact appears in the report by one line here.
 
 use serde_json::{Map, Value, json};
 
 use super::elements::outward_components;
-use super::{Forms, Start, SurfaceSection};
+use super::sections::{FitnessForms, StartSummary, SurfaceSection};
 use crate::mesh::topology;
 use crate::optimise::fitness::{Lengths, Scales};
 use crate::optimise::{Ended, FitnessForm, FitnessSummary, OptimiseFacts, Optimised};
@@ -20,9 +19,9 @@ fn object(value: Value) -> Map<String, Value> {
     }
 }
 
-pub fn surface(surface: &Surface) -> SurfaceSection {
+pub(super) fn surface(surface: &Surface) -> SurfaceSection {
     let mesh = &surface.mesh;
-    // S is a closed manifold by its type's promise: 3F = 2E.
+    // `Surface` is always a closed manifold: 3F = 2E.
     let edges = 3 * mesh.triangles.len() / 2;
     let components = topology::components(mesh.vertices.len(), &mesh.triangles);
     SurfaceSection {
@@ -68,7 +67,7 @@ fn surface_facts(facts: &SurfaceFacts) -> Map<String, Value> {
     }))
 }
 
-pub fn retile(facts: &RetileFacts, starts: &[Start]) -> Map<String, Value> {
+pub(super) fn retile(facts: &RetileFacts, starts: &[StartSummary]) -> Map<String, Value> {
     object(json!({
         "seed": facts.seed,
         "repulsion_rounds": facts.repulsion_rounds,
@@ -78,7 +77,7 @@ pub fn retile(facts: &RetileFacts, starts: &[Start]) -> Map<String, Value> {
     }))
 }
 
-pub fn optimise(facts: &OptimiseFacts) -> Map<String, Value> {
+pub(super) fn optimise(facts: &OptimiseFacts) -> Map<String, Value> {
     object(json!({
         "flips": facts.flips,
         "sweeps": facts.sweeps,
@@ -94,7 +93,7 @@ pub fn optimise(facts: &OptimiseFacts) -> Map<String, Value> {
     }))
 }
 
-pub fn warnings(surface: &Surface, tiled: &Tiled, optimised: &Optimised) -> Vec<String> {
+pub(super) fn warnings(surface: &Surface, tiled: &Tiled, optimised: &Optimised) -> Vec<String> {
     [
         &surface.facts.warnings,
         &tiled.facts.warnings,
@@ -106,7 +105,7 @@ pub fn warnings(surface: &Surface, tiled: &Tiled, optimised: &Optimised) -> Vec<
     .collect()
 }
 
-pub fn form_name(form: FitnessForm) -> &'static str {
+pub(super) fn form_name(form: FitnessForm) -> &'static str {
     match form {
         FitnessForm::Raw => "raw",
         FitnessForm::Normalised => "normalised",
@@ -114,7 +113,7 @@ pub fn form_name(form: FitnessForm) -> &'static str {
     }
 }
 
-pub fn driving_form(summary: &FitnessSummary, form: FitnessForm) -> f64 {
+pub(super) fn driving_form(summary: &FitnessSummary, form: FitnessForm) -> f64 {
     match form {
         FitnessForm::Raw => summary.raw,
         FitnessForm::Normalised => summary.normalised,
@@ -122,8 +121,8 @@ pub fn driving_form(summary: &FitnessSummary, form: FitnessForm) -> f64 {
     }
 }
 
-pub fn forms(summary: &&FitnessSummary) -> Forms {
-    Forms {
+pub(super) fn forms(summary: &&FitnessSummary) -> FitnessForms {
+    FitnessForms {
         raw: summary.raw,
         normalised: summary.normalised,
         robust: summary.robust,
@@ -131,7 +130,7 @@ pub fn forms(summary: &&FitnessSummary) -> Forms {
 }
 
 /// Numerators and floors of A, B (radians), C and D (mm) in every form.
-pub fn scales(lengths: Lengths) -> Map<String, Value> {
+pub(super) fn scales(lengths: Lengths) -> Map<String, Value> {
     [
         FitnessForm::Raw,
         FitnessForm::Normalised,

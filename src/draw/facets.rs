@@ -1,9 +1,12 @@
-//! A small rasteriser: triangles seen along an axis, through a depth buffer, into a PNG.
+//! Shaded triangles, seen along an axis.
 //!
-//! Orthographic, flat-shaded, with the triangles' edges drawn in. Rendered at
-//! [`SUPERSAMPLING`] times the size and averaged, so that outlines are smooth; the
-//! background is transparent, so that the picture suits light and dark pages.
+//! In: triangles in patient coordinates, a direction to look from, a [`Style`]. Out: square RGBA
+//! pixels. Orthographic projection, a depth buffer, flat shading, triangle edges drawn in; facets
+//! that face away are left out. Rendered at [`SUPERSAMPLING`] times the size and averaged, so that
+//! outlines are smooth. The background is transparent, so that the picture suits light and dark
+//! pages.
 
+use super::image::Image;
 use crate::geometry::Vec3;
 
 /// Rows and columns of rendered pixels for each of the picture's.
@@ -17,7 +20,7 @@ pub type Colour = [f64; 3];
 /// A direction to look from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
-    /// What a physician calls it.
+    /// Name of the view in radiology.
     pub name: &'static str,
     /// Patient direction (LPS) that points right in the picture.
     pub right: Vec3,
@@ -50,52 +53,52 @@ impl View {
         },
     ];
 
-    /// From the object to the eye.
+    /// Unit vector from the object to the eye.
     pub fn toward(&self) -> Vec3 {
         self.right.cross(&self.up)
     }
 }
 
-/// A triangle to draw.
+/// A triangle to draw, alone or as a part of a larger one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Facet {
     /// Corners, LPS mm, counter-clockwise seen from outside.
     pub corners: [Vec3; 3],
     /// Colour before shading.
     pub colour: Colour,
-    /// Corners of the triangle whose sides are drawn where this one meets them: itself, or
-    /// the whole one that it is a part of.
+    /// Corners of the triangle whose sides are drawn: the same, or those of the triangle that
+    /// this one is a part of.
     pub outline: [Vec3; 3],
 }
 
-/// A square picture under work.
-struct Canvas {
+/// Square supersampled pixels with their depths toward the eye.
+struct DepthBuffer {
     side: usize,
     depth: Vec<f64>,
     pixels: Vec<Option<Colour>>,
 }
 
-/// How to draw.
+/// Placement, size, lines and light of a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Style {
-    /// What comes to the picture's middle, LPS mm.
+    /// Point in the middle of the picture, LPS mm.
     pub centre: Vec3,
-    /// How far the object reaches from there to any side, mm.
+    /// Largest distance of the object from there along any axis, mm.
     pub reach: f64,
     /// Rows and columns of the picture, pixels.
     pub side: usize,
     /// Width of lines, pixels.
     pub line: f64,
-    /// Light from everywhere, 0..=1; the rest comes from lamps. Colours that mean something
-    /// want more of it than those of a material.
+    /// Share of ambient light, 0..=1; the rest comes from two lamps. Colours that stand for
+    /// values need more of it than those of a material.
     pub ambient: f64,
 }
 
-/// Draws `facets` from `view`.
-pub fn png(facets: &[Facet], view: &View, style: &Style) -> Vec<u8> {
+/// Draws `facets` as seen from `view`: `style.side` rows and columns.
+pub fn picture(facets: &[Facet], view: &View, style: &Style) -> Image<4> {
     let side = style.side;
     let fine = side * SUPERSAMPLING;
-    let mut canvas = Canvas {
+    let mut buffer = DepthBuffer {
         side: fine,
         depth: vec![f64::NEG_INFINITY; fine * fine],
         pixels: vec![None; fine * fine],
@@ -128,9 +131,9 @@ pub fn png(facets: &[Facet], view: &View, style: &Style) -> Vec<u8> {
             normal.dot(&toward),
         );
         let colour = shade(facet.colour, &local, style.ambient);
-        canvas.fill(&seen, colour, &sides, style.line * SUPERSAMPLING as f64);
+        buffer.fill(&seen, colour, &sides, style.line * SUPERSAMPLING as f64);
     }
-    canvas.encode(side)
+    buffer.averaged(side)
 }
 
 /// Lambert's law under a key light from the upper left and a weak one from the lower right,
@@ -142,7 +145,7 @@ fn shade(colour: Colour, normal: &Vec3, ambient: f64) -> Colour {
     colour.map(|c| (c * light).clamp(0.0, 1.0))
 }
 
-impl Canvas {
+impl DepthBuffer {
     fn fill(&mut self, [a, b, c]: &[Vec3; 3], colour: Colour, sides: &Sides, width: f64) {
         let doubled_area = cross(a, b, c);
         if doubled_area == 0.0 {
@@ -176,9 +179,9 @@ impl Canvas {
         min.clamp(0.0, limit) as usize..max.clamp(0.0, limit) as usize
     }
 
-    /// Averages the fine pixels and writes an RGBA PNG of `side` pixels.
-    fn encode(&self, side: usize) -> Vec<u8> {
-        let mut rgba = Vec::with_capacity(4 * side * side);
+    /// The mean of the fine pixels at each of `side` × `side` pixels; alpha is the share covered.
+    fn averaged(&self, side: usize) -> Image<4> {
+        let mut pixels = Vec::with_capacity(side * side);
         for row in 0..side {
             for column in 0..side {
                 let mut sum = [0.0; 3];
@@ -192,19 +195,16 @@ impl Canvas {
                     }
                 }
                 let byte = |x: f64| (255.0 * x).round() as u8;
-                rgba.extend(sum.map(|s| byte(s / f64::max(covered, 1.0))));
-                rgba.push(byte(covered / (SUPERSAMPLING * SUPERSAMPLING) as f64));
+                let [r, g, b] = sum.map(|s| byte(s / f64::max(covered, 1.0)));
+                let alpha = byte(covered / (SUPERSAMPLING * SUPERSAMPLING) as f64);
+                pixels.push([r, g, b, alpha]);
             }
         }
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, side as u32, side as u32);
-        encoder.set_color(png::ColorType::Rgba);
-        encoder.set_depth(png::BitDepth::Eight);
-        let written = encoder
-            .write_header()
-            .and_then(|mut writer| writer.write_image_data(&rgba));
-        debug_assert!(written.is_ok(), "a Vec takes all that is written");
-        bytes
+        Image {
+            width: side,
+            height: side,
+            pixels,
+        }
     }
 }
 
@@ -249,16 +249,6 @@ mod tests {
             .collect()
     }
 
-    fn alpha(png_bytes: &[u8]) -> (usize, Vec<u8>) {
-        let mut reader = png::Decoder::new(std::io::Cursor::new(png_bytes))
-            .read_info()
-            .unwrap();
-        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
-        let info = reader.next_frame(&mut pixels).unwrap();
-        let alpha = pixels.iter().skip(3).step_by(4).copied().collect();
-        (info.width as usize, alpha)
-    }
-
     #[test]
     fn a_sphere_covers_its_disc_without_gaps() {
         let mesh = shapes::icosphere(10.0, 4);
@@ -269,9 +259,9 @@ mod tests {
             line: 1.0,
             ambient: 0.3,
         };
-        let picture = png(&facets(&mesh), &View::ALL[0], &style);
-        let (side, alpha) = alpha(&picture);
-        let share = alpha.iter().map(|&a| f64::from(a)).sum::<f64>() / 255.0 / (side * side) as f64;
+        let picture = picture(&facets(&mesh), &View::ALL[0], &style);
+        let alpha = picture.pixels.iter().map(|pixel| f64::from(pixel[3]));
+        let share = alpha.sum::<f64>() / 255.0 / (style.side * style.side) as f64;
         let disc = std::f64::consts::PI * (FILL / 2.0).powi(2);
         assert!((share / disc - 1.0).abs() < 0.01, "{share} {disc}");
     }

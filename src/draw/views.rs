@@ -1,0 +1,115 @@
+//! A triangle mesh for a page: shaded pictures from three sides, and a view to turn.
+//!
+//! The pictures are embedded PNGs and need no script. The view to turn is a canvas that the page's
+//! script fills; without scripts it stays hidden.
+
+use maud::{Markup, PreEscaped, html};
+use rayon::prelude::*;
+use serde_json::json;
+
+use super::facets::{Colour, Facet, Style, View, picture};
+use super::text::data_uri;
+use crate::geometry::Vec3;
+use crate::geometry::bvh::Aabb;
+use crate::mesh::TriMesh;
+
+/// Side of a picture in pixels; shown at half of that or less.
+const SIDE: usize = 500;
+/// Colour of the heart's wall.
+const MYOCARDIUM: Colour = [0.90, 0.42, 0.36];
+/// Most triangles that a browser turns smoothly.
+const MOST_TURNED: usize = 20_000;
+
+/// Three pictures as `data:` URIs, in the order of [`View::ALL`].
+pub type Pictures = Vec<String>;
+
+/// A section with the mesh from three sides and, up to [`MOST_TURNED`] triangles, one to turn
+/// ([`HtmlDocument::turning`](super::document::HtmlDocument::turning)).
+pub fn section(title: &str, mesh: &TriMesh) -> Markup {
+    let facets: Vec<Facet> = (0..mesh.triangles.len())
+        .map(|t| Facet {
+            corners: mesh.corners(t),
+            colour: MYOCARDIUM,
+            outline: mesh.corners(t),
+        })
+        .collect();
+    html! {
+        section {
+            h2 { (title) }
+            p.hint {
+                "Every triangle of the mesh. Letters mark the patient's sides: L left, R right, "
+                "A anterior, P posterior, S superior, I inferior."
+            }
+            div.row.four {
+                (figures(&pictures(&facets, mesh, 0.34), "The model"))
+                @if mesh.triangles.len() <= MOST_TURNED { (turnable(mesh)) }
+            }
+        }
+    }
+}
+
+/// `facets`, triangles of `mesh` or parts of them, from three sides; `ambient` as in [`Style`].
+pub fn pictures(facets: &[Facet], mesh: &TriMesh, ambient: f64) -> Pictures {
+    let aabb = Aabb::of(&mesh.vertices);
+    let reach = (aabb.max - aabb.min).amax() / 2.0;
+    // Full-width lines about many small triangles would make the picture black.
+    let edge = (4.0 * mesh.area() / 3f64.sqrt() / mesh.triangles.len() as f64).sqrt();
+    let pixels = edge / reach * SIDE as f64 / 2.0;
+    let style = Style {
+        centre: (aabb.min + aabb.max) / 2.0,
+        reach,
+        side: SIDE,
+        line: (pixels / 16.0).clamp(0.0, 1.6),
+        ambient,
+    };
+    View::ALL
+        .par_iter()
+        .map(|view| data_uri("image/png", &picture(facets, view, &style).png()))
+        .collect()
+}
+
+/// `pictures` with the letters of the patient's sides; `what` they show, for readers who cannot
+/// see them.
+pub fn figures(pictures: &Pictures, what: &str) -> Markup {
+    html! {
+        @for (view, uri) in View::ALL.iter().zip(pictures) {
+            @let [east, north, west, south] = view.letters;
+            figure {
+                div.view {
+                    img src=(uri) alt=(format!("{what}, {} view", view.name.to_lowercase()))
+                        width="500" height="500";
+                    i.east aria-hidden="true" { (east) }
+                    i.north aria-hidden="true" { (north) }
+                    i.west aria-hidden="true" { (west) }
+                    i.south aria-hidden="true" { (south) }
+                }
+                figcaption { (view.name) }
+            }
+        }
+    }
+}
+
+/// A canvas for the script, and the mesh about its centre, rounded to 0.01 mm.
+fn turnable(mesh: &TriMesh) -> Markup {
+    let aabb = Aabb::of(&mesh.vertices);
+    let centre = (aabb.min + aabb.max) / 2.0;
+    let about = |v: &Vec3| ((v - centre) * 100.0).map(f64::round) / 100.0;
+    let vertices: Vec<f64> = mesh
+        .vertices
+        .iter()
+        .flat_map(|v| <[f64; 3]>::from(about(v)))
+        .collect();
+    let triangles: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
+    // Numbers only: nothing in it can end the script element.
+    let data = json!({ "vertices": vertices, "triangles": triangles }).to_string();
+    html! {
+        figure id="turnable" hidden {
+            div.view {
+                canvas id="turn" tabindex="0" role="img"
+                    aria-label="The model to turn by dragging or by the arrow keys" {}
+            }
+            figcaption { "Drag to turn" }
+        }
+        script type="application/json" id="mesh" { (PreEscaped(data)) }
+    }
+}

@@ -1,0 +1,49 @@
+//! The polar map as JSON.
+
+use serde_json::{Value, json};
+
+use super::{COLUMNS, NAMES, PolarMap, ROWS, territory};
+
+/// Segments, extents, and the pixels in per cent of the reference (`null` where there is no
+/// wall).
+pub fn json(map: &PolarMap) -> Value {
+    let round = |x: f64| (100.0 * x).round() / 100.0;
+    let percent = |x: f64| {
+        if map.reference > 0.0 {
+            round(100.0 * x / map.reference)
+        } else {
+            0.0
+        }
+    };
+    let segments: Vec<Value> = map
+        .segments
+        .iter()
+        .map(|s| {
+            json!({
+                "number": s.number,
+                "name": NAMES[s.number - 1],
+                "territory": territory(s.number),
+                "mean_percent": s.mean_percent.map(round),
+                "extent_percent": round(s.extent_percent),
+                "area_mm2": round(s.area),
+            })
+        })
+        .collect();
+    let rows: Vec<Value> = map
+        .pixels
+        .chunks(COLUMNS)
+        .map(|row| row.iter().map(|p| p.map(|p| percent(p.max))).collect())
+        .collect();
+    json!({
+        "reference": map.reference,
+        "threshold_percent": 100.0 * map.threshold,
+        "extent_percent": round(map.extent_percent),
+        "note": "per cent of the hottest quarter of this scan's own wall; no normal database, not TPD",
+        "segments": segments,
+        "rows": ROWS,
+        "columns": COLUMNS,
+        "first_column": "lateral",
+        "direction": "lateral, anterior, septal, inferior",
+        "values_percent": rows,
+    })
+}

@@ -1,0 +1,258 @@
+//! The report of a model: the stages' facts and the model's measures as one JSON document.
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use super::distance::Distance;
+use super::elements::{Elements, Histograms, MeshFacts, Shape, Smoothness};
+use super::measure::Measures;
+use super::sections::{
+    FitnessSection, FitnessTerms, Program, RetileSection, Stages, StartSummary, SurfaceSection,
+};
+use super::stage_facts;
+use crate::optimise::{FitnessSummary, OptimiseParameters, Optimised};
+use crate::retile::Tiled;
+use crate::surface::Surface;
+
+/// The report of a model. `serde_json::to_value(&report)` is what the service answers.
+///
+/// The page is made from a stored report, perhaps by a later version: a new field needs
+/// `#[serde(default)]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ModelReport {
+    /// Who made the model.
+    pub software: Program,
+    /// The volume it was made from.
+    pub input: Value,
+    /// Every parameter, defaults written out.
+    pub parameters: Value,
+    /// The iso-surface.
+    pub surface: SurfaceSection,
+    /// The re-tiled mesh, before optimisation.
+    pub retile: RetileSection,
+    /// What optimisation did.
+    pub optimise: Map<String, Value>,
+    /// The model: counts and topology.
+    pub mesh: MeshFacts,
+    /// The model: shape of its triangles.
+    pub shape: Shape,
+    /// The model: angles between neighbouring triangles.
+    pub smoothness: Smoothness,
+    /// The model beside the iso-surface.
+    pub distance: Distance,
+    /// The paper's fitness after each stage.
+    pub fitness: FitnessSection,
+    /// Distributions before and after optimisation.
+    pub histograms: Histograms,
+    /// Milliseconds of each stage and their `total`.
+    pub timings_ms: Map<String, Value>,
+    /// Sentences about the input and the model that a user should know.
+    pub warnings: Vec<String>,
+}
+
+/// The parts of a [`ModelReport`].
+#[derive(Debug)]
+pub struct ReportInput<'a> {
+    /// Facts about the volume, as the caller words them.
+    pub input: Value,
+    /// Every parameter by its name, defaults written out.
+    pub parameters: Value,
+    /// Result of the surface stage.
+    pub surface: &'a Surface,
+    /// Result of re-tiling.
+    pub tiled: &'a Tiled,
+    /// Result of optimisation.
+    pub optimised: &'a Optimised,
+    /// The parameters that drove it.
+    pub optimise_parameters: &'a OptimiseParameters,
+    /// Measures of `optimised.mesh`.
+    pub measures: Measures,
+    /// The models of which it is the best, itself among them.
+    pub starts: Vec<StartSummary>,
+    /// Milliseconds by stage, in order.
+    pub timings_ms: Vec<(String, f64)>,
+}
+
+impl ModelReport {
+    /// Joins the stages' facts and the model's measures.
+    pub fn new(input: ReportInput) -> Self {
+        let retiled = Elements::of(&input.tiled.mesh);
+        let measures = input.measures;
+        let surface = stage_facts::surface(input.surface);
+        let mut warnings = stage_facts::warnings(input.surface, input.tiled, input.optimised);
+        warnings.extend(doubts(&measures.mesh, &surface, input.tiled));
+        warnings.extend(coarseness(&measures));
+        Self {
+            software: Program::this(),
+            input: input.input,
+            parameters: input.parameters,
+            surface,
+            retile: RetileSection {
+                facts: stage_facts::retile(&input.tiled.facts, &input.starts),
+                shape: Shape::of(&retiled),
+                smoothness: Smoothness::of(&retiled),
+            },
+            optimise: stage_facts::optimise(&input.optimised.facts),
+            histograms: Histograms::of(&retiled, &measures.elements),
+            mesh: measures.mesh,
+            shape: measures.shape,
+            smoothness: measures.smoothness,
+            distance: measures.distance,
+            fitness: fitness(input.optimised, input.optimise_parameters),
+            timings_ms: timings(input.timings_ms),
+            warnings,
+        }
+    }
+
+    /// Whether the model keeps its promises: a closed, oriented manifold that faces outward
+    /// (walls of cavities inward, as on the surface), with the surface's topology and no
+    /// self-intersection.
+    pub fn is_sound(&self) -> bool {
+        let mesh = &self.mesh;
+        mesh.manifold.defect.is_none()
+            && mesh.manifold.outward
+            && mesh.self_intersections == 0
+            && mesh.euler_characteristic == self.surface.euler_characteristic
+            && mesh.components == self.surface.components
+            && mesh.manifold.outward_components == self.surface.outward_components
+    }
+
+    /// The report as indented JSON text.
+    pub fn to_json_text(&self) -> String {
+        serde_json::to_string_pretty(self).expect("every key of the report is a string")
+    }
+
+    /// The main figures, one sentence a line.
+    pub fn headlines(&self) -> Vec<String> {
+        let (mesh, shape, distance) = (&self.mesh, &self.shape, &self.distance);
+        vec![
+            format!(
+                "{} points, {} triangles, Euler characteristic {}, {} self-intersections",
+                mesh.vertices, mesh.triangles, mesh.euler_characteristic, mesh.self_intersections
+            ),
+            format!(
+                "fitness {:.3} after re-tiling, {:.3} optimised ({:+.1} %)",
+                self.fitness.retiled, self.fitness.optimised, self.fitness.gain_percent
+            ),
+            format!(
+                "radius ratio 2r/R {:.3} mean, {:.3} least; {:.1}° mean angle between neighbours",
+                shape.radius_ratio.mean, shape.radius_ratio.min, self.smoothness.dihedral_deg.mean
+            ),
+            format!(
+                "{:.2} mm mean and {:.2} mm largest distance to the surface, volume {:+.2} %",
+                distance.mean_mm, distance.hausdorff_mm, distance.volume_error_percent
+            ),
+        ]
+    }
+
+    /// The figures that mesh files carry.
+    pub fn quality_summary(&self) -> Map<String, Value> {
+        let figures = [
+            ("radius_ratio_mean", self.shape.radius_ratio.mean),
+            ("radius_ratio_min", self.shape.radius_ratio.min),
+            ("dihedral_mean_deg", self.smoothness.dihedral_deg.mean),
+            ("distance_mean_mm", self.distance.mean_mm),
+            ("hausdorff_mm", self.distance.hausdorff_mm),
+            ("volume_error_percent", self.distance.volume_error_percent),
+            ("fitness", self.fitness.optimised),
+        ];
+        let mut summary = Map::new();
+        summary.insert("vertices".into(), self.mesh.vertices.into());
+        let euler = self.mesh.euler_characteristic;
+        summary.insert("euler_characteristic".into(), euler.into());
+        let crossings = self.mesh.self_intersections;
+        summary.insert("self_intersections".into(), crossings.into());
+        summary.extend(figures.map(|(name, x)| (name.to_owned(), x.into())));
+        summary
+    }
+}
+
+/// Sentences about the promises that a model breaks.
+fn doubts(mesh: &MeshFacts, surface: &SurfaceSection, tiled: &Tiled) -> Vec<String> {
+    let mut doubts = Vec::new();
+    if let Some(defect) = &mesh.manifold.defect {
+        doubts.push(format!("The model is no closed manifold: {defect}."));
+    }
+    if mesh.self_intersections > 0 {
+        let n = mesh.self_intersections;
+        doubts.push(format!(
+            "The model intersects itself: {n} pairs of triangles."
+        ));
+    }
+    if mesh.euler_characteristic != surface.euler_characteristic {
+        doubts.push(format!(
+            "The model's Euler characteristic is {}, the surface's {}.",
+            mesh.euler_characteristic, surface.euler_characteristic
+        ));
+    }
+    if mesh.manifold.outward_components != surface.outward_components {
+        doubts.push(format!(
+            "Components of the model that face outward: {}, of the surface: {}.",
+            mesh.manifold.outward_components, surface.outward_components
+        ));
+    }
+    if mesh.vertices != tiled.mesh.vertices.len() {
+        doubts.push(format!(
+            "The model has {} vertices, the re-tiled surface {}.",
+            mesh.vertices,
+            tiled.mesh.vertices.len()
+        ));
+    }
+    doubts
+}
+
+/// Percent of the surface's volume beyond which a difference of the model's is a warning. Models
+/// of left ventricles differ by less than 0.1 %.
+const VOLUME_DOUBT_PERCENT: f64 = 10.0;
+
+/// A warning where a sound model has too few points for its surface: parts of the surface that are
+/// thinner than the points' spacing are lost.
+fn coarseness(measures: &Measures) -> Option<String> {
+    let percent = measures.distance.volume_error_percent;
+    let points = measures.mesh.vertices;
+    (percent.abs() > VOLUME_DOUBT_PERCENT).then(|| {
+        format!(
+            "The model's volume differs from the surface's by {percent:+.0} %: {points} points \
+             are too few to follow this surface."
+        )
+    })
+}
+
+fn timings(stages: Vec<(String, f64)>) -> Map<String, Value> {
+    let total: f64 = stages.iter().map(|(_, ms)| ms).sum();
+    let mut timings: Map<String, Value> = stages
+        .into_iter()
+        .map(|(stage, ms)| (stage, ms.into()))
+        .collect();
+    timings.insert("total".into(), total.into());
+    timings
+}
+
+fn fitness(optimised: &Optimised, parameters: &OptimiseParameters) -> FitnessSection {
+    let stages = Stages {
+        retiled: &optimised.retiled,
+        fitted: &optimised.fitted,
+        optimised: &optimised.optimised,
+    };
+    let driving = stages.map(|s| stage_facts::driving_form(s, parameters.fitness));
+    FitnessSection {
+        form: stage_facts::form_name(parameters.fitness).to_owned(),
+        retiled: driving.retiled,
+        fitted: driving.fitted,
+        optimised: driving.optimised,
+        gain_percent: 100.0 * (driving.optimised / driving.retiled - 1.0),
+        weights: parameters.weights,
+        scales: stage_facts::scales(optimised.lengths),
+        forms: stages.map(stage_facts::forms),
+        terms: stages.map(terms),
+    }
+}
+
+fn terms(summary: &&FitnessSummary) -> FitnessTerms {
+    FitnessTerms {
+        a_deg: summary.a_mean.to_degrees(),
+        b_deg: summary.b_mean.to_degrees(),
+        c: summary.c_mean,
+        d_mm: summary.d_mean,
+    }
+}

@@ -1,0 +1,455 @@
+//! The page of a segmentation: doubts, figures, slices, polar map, agreement, the fitted model.
+
+use maud::{Markup, html};
+use serde_json::{Map, Value};
+
+use super::sections::Program;
+use super::segmentation_report::SegmentationReport;
+use crate::draw::document::{self, HeadlineFigure, HtmlDocument, Sign};
+use crate::draw::text::{data_uri, number, signed};
+use crate::draw::views;
+use crate::mesh::TriMesh;
+
+/// A segmentation's report with its pictures.
+#[derive(Debug, Clone, Copy)]
+pub struct SegmentationPage<'a> {
+    /// The report.
+    pub report: &'a SegmentationReport,
+    /// The fitted model.
+    pub mesh: &'a TriMesh,
+    /// Slices of the volume with the contour of the fit: a PNG of three squares side by side.
+    pub slices: Option<&'a [u8]>,
+    /// The polar map as SVG.
+    pub polar: Option<&'a [u8]>,
+}
+
+/// The page as HTML. What the report does not contain is left out.
+pub fn segmentation_page(page: &SegmentationPage) -> String {
+    let report = page.report;
+    let reasons = report.flags.iter().map(|flag| flag.reason.as_str());
+    HtmlDocument {
+        title: &format!("{}: segmentation", organ(report)),
+        subtitle: &origin(report),
+        body: html! {
+            (verdict(report))
+            (figures(report))
+            (document::notes("Reasons to look closer", reasons))
+            (document::notes("Please note", report.warnings.iter().map(String::as_str)))
+            @if let Some(png) = page.slices { (slices(report, png)) }
+            @if let Some(svg) = page.polar { (polar(report, svg)) }
+            (agreement(report))
+            (views::section("The fitted model", page.mesh))
+            (candidates(report))
+            (particulars(report))
+        },
+        turning: true,
+        footer: &Program::this().footer(),
+    }
+    .html()
+}
+
+/// The organ's name as a heading begins.
+fn organ(report: &SegmentationReport) -> String {
+    let word = match report.organ() {
+        "generic" => "organ",
+        word => word,
+    };
+    let mut letters = word.chars();
+    let first = letters.next().map(|letter| letter.to_ascii_uppercase());
+    first
+        .into_iter()
+        .chain(letters)
+        .collect::<String>()
+        .replace('_', " ")
+}
+
+/// One line on where the segmentation comes from.
+fn origin(report: &SegmentationReport) -> String {
+    let list = |name: &str, decimals: usize| {
+        let numbers = report.input.get(name)?.as_array()?;
+        let texts: Vec<String> = numbers
+            .iter()
+            .filter_map(Value::as_f64)
+            .map(|x| number(x, decimals))
+            .collect();
+        (!texts.is_empty()).then(|| texts.join(" × "))
+    };
+    let format = report.input.get("format").and_then(Value::as_str);
+    [
+        report.template.as_ref().map(|name| format!("Model {name}")),
+        format.map(|format| format!("volume: {format}")),
+        list("shape", 0).map(|shape| format!("{shape} voxels")),
+        list("spacing_mm", 2).map(|spacing| format!("{spacing} mm")),
+    ]
+    .into_iter()
+    .flatten()
+    .collect::<Vec<_>>()
+    .join(" · ")
+}
+
+/// What could be flagged, each with whether it is in order.
+fn checks(report: &SegmentationReport) -> Vec<(bool, String)> {
+    let percent = |name: &str| number(100.0 * report.fit_number(name), 0);
+    let reason = report.fit.get("reason").and_then(Value::as_str);
+    let mut checks = vec![
+        (
+            "poor_contrast",
+            format!(
+                "An edge is seen along {} % of the surface",
+                percent("active_sensors")
+            ),
+        ),
+        (
+            "not_at_rest",
+            format!(
+                "The model came to rest: {} after {} steps",
+                reason.unwrap_or("–").replace('_', " "),
+                number(report.fit_number("iterations"), 0)
+            ),
+        ),
+        (
+            "folded",
+            "No triangle cuts another one or is turned over".to_owned(),
+        ),
+        (
+            "touches_border",
+            "The organ lies inside of the volume".to_owned(),
+        ),
+    ];
+    if report.is_ventricle() {
+        checks.extend([
+            (
+                "uncertain_place",
+                format!(
+                    "Confidence in the heart's place: {} %",
+                    percent("confidence")
+                ),
+            ),
+            ("dark_apex", "The apical wall is seen".to_owned()),
+            (
+                "implausible_shape",
+                "Volumes, thickness and length are those of a heart".to_owned(),
+            ),
+            (
+                "valve_plane",
+                "The wall reaches up to the base all around".to_owned(),
+            ),
+        ]);
+    }
+    let raised = |code: &str| report.flags.iter().any(|flag| flag.code == code);
+    checks
+        .into_iter()
+        .map(|(code, text)| (!raised(code), text))
+        .collect()
+}
+
+fn verdict(report: &SegmentationReport) -> Markup {
+    let (sign, headline) = match report.flags.len() {
+        0 => (
+            Sign::Good,
+            "Nothing gives reason to doubt this segmentation.".to_owned(),
+        ),
+        1 => (
+            Sign::Doubt,
+            "There is one reason to look closer.".to_owned(),
+        ),
+        n => (
+            Sign::Doubt,
+            format!("There are {n} reasons to look closer."),
+        ),
+    };
+    document::verdict(sign, &headline, &checks(report))
+}
+
+fn figures(report: &SegmentationReport) -> Markup {
+    let measures = report.measures.unwrap_or_default();
+    let wall = match report.is_ventricle() {
+        true => "volume of the wall",
+        false => "volume of the organ",
+    };
+    let extent = report.polar.as_ref().and_then(|polar| polar.extent_percent);
+    let rows = [
+        (report.volumes_ml.wall, 1, "ml", wall),
+        (report.volumes_ml.cavity, 1, "ml", "volume of the cavity"),
+        (
+            report.wall_thickness_mm,
+            1,
+            "mm",
+            "mean thickness of the wall",
+        ),
+        (extent, 1, "%", "of the wall below the threshold of uptake"),
+        (
+            measures.jaccard,
+            3,
+            "of 1",
+            "Jaccard index against the expert (E_J)",
+        ),
+        (measures.dice, 3, "of 1", "Dice index against the expert"),
+        (
+            measures.contour_distance_voxels,
+            3,
+            "voxels",
+            "mean distance of the contours (E_CD)",
+        ),
+        (
+            measures.hausdorff95_mm,
+            1,
+            "mm",
+            "95th percentile of the distance between the contours",
+        ),
+    ];
+    let figures: Vec<HeadlineFigure> = rows
+        .into_iter()
+        .filter_map(|(value, decimals, unit, label)| {
+            Some(HeadlineFigure {
+                value: number(value?, decimals),
+                unit,
+                label: label.to_owned(),
+            })
+        })
+        .collect();
+    document::figures(&figures)
+}
+
+fn slices(report: &SegmentationReport, png: &[u8]) -> Markup {
+    let (about, names) = match report.is_ventricle() {
+        true => (
+            "Planes of the heart through the middle of its cavity: anterior on top and septum on \
+             the left of the first, apex on top of the second and on the right of the third.",
+            ["Short axis", "Horizontal long axis", "Vertical long axis"],
+        ),
+        false => (
+            "Planes of the patient through the middle of the organ: the patient's right on the \
+             left of the first two, anterior on top of the first and on the left of the third.",
+            ["Axial", "Coronal", "Sagittal"],
+        ),
+    };
+    html! {
+        section {
+            h2 { "Slices" }
+            p.hint { (about) }
+            p.legend {
+                span.key-fit { "the fitted surface" }
+                @if report.measures.is_some() { span.key-expert { "the expert's mask" } }
+            }
+            figure.slices {
+                img src=(data_uri("image/png", png))
+                    alt="Three slices of the volume with the contour of the fit";
+                figcaption { @for name in names { span { (name) } } }
+            }
+        }
+    }
+}
+
+/// The polar map beside its segments.
+fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
+    let figures = report.polar.clone().unwrap_or_default();
+    let percent = |value: Option<f64>, decimals| number(value.unwrap_or(f64::NAN), decimals);
+    html! {
+        section {
+            h2 { "Uptake of the wall" }
+            p.hint {
+                "Polar map of the 17 segments of the American Heart Association: apex in the "
+                "centre, anterior on top, septum on the left. In per cent of the hottest quarter "
+                "of this scan's own wall; there is no normal database behind it."
+            }
+            div.row.beside {
+                figure.paper {
+                    img src=(data_uri("image/svg+xml", svg)) alt="Polar map of the wall's uptake";
+                }
+                div.scroll {
+                    table {
+                        thead {
+                            tr {
+                                th.n scope="col" {}
+                                th scope="col" { "Segment" }
+                                th scope="col" { "Artery" }
+                                th.n scope="col" { "mean, %" }
+                                th.n scope="col" {
+                                    "below " (percent(figures.threshold_percent, 0)) " %, % of area"
+                                }
+                            }
+                        }
+                        tbody {
+                            @for segment in &figures.segments {
+                                tr {
+                                    td.n { (segment.number.unwrap_or(0)) }
+                                    th scope="row" { (segment.name) }
+                                    td { (segment.territory) }
+                                    td.n { (percent(segment.mean_percent, 1)) }
+                                    td.n { (percent(segment.extent_percent, 1)) }
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Measures against the expert's mask, where there was one.
+fn agreement(report: &SegmentationReport) -> Markup {
+    let Some(measures) = report.measures else {
+        return Markup::default();
+    };
+    let difference = measures.volume_difference_percent;
+    let rows = [
+        ("Jaccard (E_J)", measures.jaccard, 3, ""),
+        ("Dice", measures.dice, 3, ""),
+        (
+            "Mean contour distance (E_CD)",
+            measures.contour_distance_voxels,
+            3,
+            "voxels",
+        ),
+        (
+            "Mean contour distance",
+            measures.contour_distance_mm,
+            2,
+            "mm",
+        ),
+        ("Hausdorff distance", measures.hausdorff_mm, 2, "mm"),
+        ("Hausdorff distance, 95 %", measures.hausdorff95_mm, 2, "mm"),
+        ("Volume of the mask", measures.volume_ml, 1, "ml"),
+        (
+            "Volume of the expert's mask",
+            measures.expert_volume_ml,
+            1,
+            "ml",
+        ),
+    ]
+    .into_iter()
+    .filter_map(|(name, value, decimals, unit)| Some((name, number(value?, decimals), unit)))
+    .chain(difference.map(|share| ("Difference of the volumes", signed(share, 1), "%")));
+    html! {
+        section {
+            h2 { "Against the expert's mask" }
+            table.narrow {
+                tbody {
+                    @for (name, value, unit) in rows {
+                        tr { th scope="row" { (name) } td.n { (value) } td { (unit) } }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The models that were tried, where there were several.
+fn candidates(report: &SegmentationReport) -> Markup {
+    let (tried, refused) = (&report.candidates, &report.refused);
+    if tried.len() + refused.len() < 2 {
+        return Markup::default();
+    }
+    let or_dash = |text: &Option<String>| text.clone().unwrap_or_else(|| "–".to_owned());
+    let columns = ["merit", "share with an edge", "strain", "residual, mm"];
+    html! {
+        section {
+            h2 { "Models tried" }
+            p.hint { (report.choice.clone().unwrap_or_default()) "." }
+            div.scroll {
+                table {
+                    thead {
+                        tr {
+                            th scope="col" { "Model" }
+                            @for column in columns { th.n scope="col" { (column) } }
+                        }
+                    }
+                    tbody {
+                        @for model in tried {
+                            @let figures = [
+                                (model.merit, 3), (model.active, 3),
+                                (model.strain, 3), (model.residual_mm, 2),
+                            ];
+                            tr {
+                                th scope="row" { (or_dash(&model.template)) }
+                                @for (value, decimals) in figures {
+                                    td.n { (number(value.unwrap_or(f64::NAN), decimals)) }
+                                }
+                            }
+                        }
+                        @for model in refused {
+                            tr {
+                                th scope="row" { (or_dash(&model.template)) }
+                                td colspan="4" { "left out: " (or_dash(&model.reason)) }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Everything else, by its name in the report, without lists of an entry for each node or step.
+fn particulars(report: &SegmentationReport) -> Markup {
+    let short = |object: &Map<String, Value>| {
+        let kept = object.iter().filter(|(name, value)| {
+            let long = value.as_array().is_some_and(|list| list.len() > 4);
+            !long && !name.starts_with("affine")
+        });
+        let kept = kept.map(|(name, value)| (name.clone(), value.clone()));
+        Value::Object(kept.collect())
+    };
+    let place = report.localisation.clone().unwrap_or_default();
+    document::particulars(&[
+        ("Parameters", short(&report.parameters)),
+        ("Fit", short(&report.fit)),
+        ("Place", short(&place)),
+        ("Input", short(&report.input)),
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+    use serde_json::json;
+
+    fn page(report: Value) -> String {
+        segmentation_page(&SegmentationPage {
+            report: &serde_json::from_value(report).unwrap(),
+            mesh: &shapes::tetrahedron(2.0),
+            slices: None,
+            polar: None,
+        })
+    }
+
+    #[test]
+    fn missing_fields_and_nulls_are_left_out() {
+        let page = page(json!({
+            "volumes_ml": { "wall": 12.25, "cavity": null },
+            "wall_thickness_mm": null,
+            "measures": null,
+            "polar": null,
+            "localisation": null,
+            "a_later_version": 1,
+        }));
+        assert!(page.contains("<h1>Organ: segmentation</h1>"));
+        assert!(page.contains("12.2 ") && page.contains("volume of the organ"));
+        for absent in [
+            "cavity",
+            "thickness",
+            "Jaccard",
+            "Uptake",
+            "Place",
+            "Models tried",
+        ] {
+            assert!(!page.contains(absent), "{absent}");
+        }
+    }
+
+    #[test]
+    fn flags_lower_the_verdict_and_are_listed_with_their_reasons() {
+        let page = page(json!({
+            "parameters": { "organ": "left_ventricle" },
+            "flags": [{ "code": "dark_apex", "reason": "No wall at the <apex>." }],
+        }));
+        assert!(page.contains("<h1>Left ventricle: segmentation</h1>"));
+        assert!(page.contains("There is one reason to look closer."));
+        assert!(page.contains("<li>No wall at the &lt;apex&gt;.</li>"));
+        assert!(page.contains("no: The apical wall is seen"));
+        assert!(page.contains("yes: No triangle cuts another one"));
+    }
+}
