@@ -1,5 +1,7 @@
 //! Numerical methods that several stages share.
 //!
-//! - [`conjugate_gradient`]: sparse symmetric positive definite systems.
+//! - [`conjugate_gradient`]: the solver of sparse symmetric positive definite systems;
+//! - [`block_matrix`]: such systems of 3×3 blocks.
 
+pub mod block_matrix;
 pub mod conjugate_gradient;
