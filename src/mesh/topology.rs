@@ -12,6 +12,7 @@ use super::TriMesh;
 use super::half_edges::{around, lowest_outgoing, pair_half_edges};
 use super::ids::{FaceId, VertexId};
 use crate::geometry::Vec3;
+use crate::numeric::disjoint_sets;
 
 pub use super::defect::MeshDefect;
 
@@ -88,33 +89,12 @@ pub fn check_triangles(vertices: usize, triangles: &[[u32; 3]]) -> Result<Census
 
 /// The connected component of every vertex, numbered in the order of their lowest vertices.
 pub fn components(vertices: usize, triangles: &[[u32; 3]]) -> Vec<u32> {
-    let mut parent: Vec<u32> = (0..vertices as u32).collect();
-    fn root(parent: &mut [u32], mut v: u32) -> u32 {
-        while parent[v as usize] != v {
-            parent[v as usize] = parent[parent[v as usize] as usize];
-            v = parent[v as usize];
-        }
-        v
+    let mut parent = disjoint_sets::singletons(vertices);
+    for [a, b, c] in triangles {
+        disjoint_sets::unite(&mut parent, *a, *b);
+        disjoint_sets::unite(&mut parent, *a, *c);
     }
-    for t in triangles {
-        for k in 1..3 {
-            let (a, b) = (root(&mut parent, t[0]), root(&mut parent, t[k]));
-            // The lower index becomes the root, so that numbering follows the vertices.
-            parent[a.max(b) as usize] = a.min(b);
-        }
-    }
-    let mut number = vec![u32::MAX; vertices];
-    let mut count = 0;
-    (0..vertices as u32)
-        .map(|v| {
-            let r = root(&mut parent, v) as usize;
-            if number[r] == u32::MAX {
-                number[r] = count;
-                count += 1;
-            }
-            number[r]
-        })
-        .collect()
+    disjoint_sets::set_numbers(&mut parent)
 }
 
 /// The number of components, given that of every vertex by [`components`].

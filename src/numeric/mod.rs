@@ -1,7 +1,11 @@
 //! Numerical methods that several stages share.
 //!
 //! - [`conjugate_gradient`]: the solver of sparse symmetric positive definite systems;
-//! - [`block_matrix`]: such systems of 3×3 blocks.
+//! - [`block_matrix`]: such systems of 3×3 blocks;
+//! - [`disjoint_sets`]: union-find;
+//! - [`order`]: quantiles.
 
 pub mod block_matrix;
 pub mod conjugate_gradient;
+pub mod disjoint_sets;
+pub mod order;

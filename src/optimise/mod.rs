@@ -61,18 +61,6 @@ pub struct Optimised {
     pub facts: OptimiseFacts,
 }
 
-/// Why the sweeps of flips ended.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Ended {
-    /// No legal flip gains.
-    #[default]
-    NoFlipGains,
-    /// An earlier triangulation came back ([`Gain::Local`] only); the best one is returned.
-    Cycle,
-    /// The maximum number of sweeps was run; the best triangulation is returned.
-    SweepLimit,
-}
-
 /// What [`optimise`] did; part of the report.
 #[derive(Debug, Clone, Default)]
 pub struct OptimiseFacts {
@@ -95,6 +83,18 @@ pub struct OptimiseFacts {
     pub self_intersections: usize,
     /// Warnings for the user, as sentences.
     pub warnings: Vec<String>,
+}
+
+/// Why the sweeps of flips ended.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Ended {
+    /// No legal flip gains.
+    #[default]
+    NoFlipGains,
+    /// An earlier triangulation came back ([`Gain::Local`] only); the best one is returned.
+    Cycle,
+    /// The maximum number of sweeps was run; the best triangulation is returned.
+    SweepLimit,
 }
 
 /// Why a mesh could not be optimised.
