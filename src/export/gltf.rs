@@ -55,17 +55,7 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
     let normals = single::normals(&mesh.vertex_normals());
     // The index 65535 is reserved for restarting a primitive.
     let narrow = positions.len() <= 65535;
-
-    let mut buffer = Vec::with_capacity(24 * positions.len() + 12 * mesh.triangles.len());
-    buffer.extend(positions.iter().flatten().flat_map(|x| x.to_le_bytes()));
-    buffer.extend(normals.iter().flatten().flat_map(|x| x.to_le_bytes()));
-    for &v in mesh.triangles.iter().flatten() {
-        if narrow {
-            buffer.extend((v as u16).to_le_bytes());
-        } else {
-            buffer.extend(v.to_le_bytes());
-        }
-    }
+    let mut buffer = bytes_of(&positions, &normals, &mesh.triangles, narrow);
     let indices_end = buffer.len();
     buffer.resize(indices_end.next_multiple_of(4), 0);
 
@@ -138,6 +128,26 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
         "buffers": [{ "byteLength": buffer.len() }],
     });
     Ok((document, buffer))
+}
+
+/// Positions, normals and indices; these are u16 if `narrow`, otherwise u32.
+fn bytes_of(
+    positions: &[[f32; 3]],
+    normals: &[[f32; 3]],
+    triangles: &[[u32; 3]],
+    narrow: bool,
+) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(24 * positions.len() + 12 * triangles.len());
+    bytes.extend(positions.iter().flatten().flat_map(|x| x.to_le_bytes()));
+    bytes.extend(normals.iter().flatten().flat_map(|x| x.to_le_bytes()));
+    for &v in triangles.iter().flatten() {
+        if narrow {
+            bytes.extend((v as u16).to_le_bytes());
+        } else {
+            bytes.extend(v.to_le_bytes());
+        }
+    }
+    bytes
 }
 
 /// The smallest and largest coordinates, as `f64`, whose decimals represent an `f32` exactly.

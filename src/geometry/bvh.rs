@@ -225,30 +225,41 @@ impl Bvh {
                 }
                 continue;
             }
-            let first = node.first_or_right as usize;
-            for slot in first..first + node.count as usize {
-                let triangle = self.order[slot];
-                // The triangle's own box is faster to test than its closest point, and rules out
-                // most triangles.
-                if Aabb::of(&self.corners[slot]).squared_distance(p) > bound || !admits(triangle) {
-                    continue;
-                }
-                let found = self.closest_in(slot, p);
-                let nearer = match &best {
-                    None => true,
-                    Some(b) => {
-                        found.squared_distance < b.squared_distance
-                            || (found.squared_distance == b.squared_distance
-                                && triangle < b.triangle)
-                    }
-                };
-                if nearer {
-                    bound = found.squared_distance;
-                    best = Some(found);
-                }
-            }
+            self.improve_in_leaf(node, p, &admits, &mut best);
+            bound = best.map_or(bound, |found| found.squared_distance);
         }
         best
+    }
+
+    /// Replaces `best` by the closest point on an admitted triangle of a leaf, if that is nearer or,
+    /// at the same distance, on a lower triangle.
+    #[inline]
+    fn improve_in_leaf(
+        &self,
+        leaf: &Node,
+        p: &Vec3,
+        admits: &impl Fn(u32) -> bool,
+        best: &mut Option<Closest>,
+    ) {
+        let first = leaf.first_or_right as usize;
+        for slot in first..first + leaf.count as usize {
+            let triangle = self.order[slot];
+            let bound = best.map_or(f64::INFINITY, |found| found.squared_distance);
+            // The triangle's own box is faster to test than its closest point, and rules out most
+            // triangles.
+            if Aabb::of(&self.corners[slot]).squared_distance(p) > bound || !admits(triangle) {
+                continue;
+            }
+            let found = self.closest_in(slot, p);
+            let is_nearer = best.is_none_or(|known| {
+                found.squared_distance < known.squared_distance
+                    || (found.squared_distance == known.squared_distance
+                        && triangle < known.triangle)
+            });
+            if is_nearer {
+                *best = Some(found);
+            }
+        }
     }
 
     /// The closest point on the triangle in a slot.

@@ -28,8 +28,39 @@ pub fn tetrahedron(edge: f64) -> TriMesh {
 /// A sphere about the origin: an icosahedron whose triangles are split in four `subdivisions`
 /// times, with all vertices on the sphere. It has 10·4^s + 2 vertices.
 pub fn icosphere(radius: f64, subdivisions: u32) -> TriMesh {
+    let TriMesh {
+        mut vertices,
+        mut triangles,
+    } = icosahedron();
+    for _ in 0..subdivisions {
+        let mut middles: BTreeMap<(u32, u32), u32> = BTreeMap::new();
+        let mut finer = Vec::with_capacity(4 * triangles.len());
+        for t in &triangles {
+            let [a, b, c]: [u32; 3] = *t;
+            let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(p, q)| {
+                *middles.entry((p.min(q), p.max(q))).or_insert_with(|| {
+                    let middle = vertices[p as usize] + vertices[q as usize];
+                    vertices.push(middle.normalize());
+                    vertices.len() as u32 - 1
+                })
+            });
+            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+        }
+        triangles = finer;
+    }
+    for v in &mut vertices {
+        *v *= radius;
+    }
+    TriMesh {
+        vertices,
+        triangles,
+    }
+}
+
+/// The icosahedron with its vertices on the unit sphere.
+fn icosahedron() -> TriMesh {
     let g = f64::midpoint(1.0, 5f64.sqrt());
-    let mut vertices: Vec<Vec3> = [
+    let vertices = [
         [-1.0, g, 0.0],
         [1.0, g, 0.0],
         [-1.0, -g, 0.0],
@@ -45,7 +76,7 @@ pub fn icosphere(radius: f64, subdivisions: u32) -> TriMesh {
     ]
     .map(|p| Vec3::from(p).normalize())
     .to_vec();
-    let mut triangles = vec![
+    let triangles = vec![
         [0, 11, 5],
         [0, 5, 1],
         [0, 1, 7],
@@ -67,25 +98,6 @@ pub fn icosphere(radius: f64, subdivisions: u32) -> TriMesh {
         [8, 6, 7],
         [9, 8, 1],
     ];
-    for _ in 0..subdivisions {
-        let mut middles: BTreeMap<(u32, u32), u32> = BTreeMap::new();
-        let mut finer = Vec::with_capacity(4 * triangles.len());
-        for t in &triangles {
-            let [a, b, c]: [u32; 3] = *t;
-            let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(p, q)| {
-                *middles.entry((p.min(q), p.max(q))).or_insert_with(|| {
-                    let middle = vertices[p as usize] + vertices[q as usize];
-                    vertices.push(middle.normalize());
-                    vertices.len() as u32 - 1
-                })
-            });
-            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-        }
-        triangles = finer;
-    }
-    for v in &mut vertices {
-        *v *= radius;
-    }
     TriMesh {
         vertices,
         triangles,

@@ -2,8 +2,8 @@
 //!
 //! - [`conjugate_gradient`]: the solver of sparse symmetric positive definite systems;
 //! - [`block_matrix`]: such systems of 3×3 blocks;
-//! - [`disjoint_sets`]: union-find;
-//! - [`order`]: quantiles.
+//! - [`disjoint_sets`]: union-find on a list of parents;
+//! - [`order`]: order statistics.
 
 pub mod block_matrix;
 pub mod conjugate_gradient;
