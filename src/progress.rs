@@ -105,7 +105,7 @@ pub struct TotalProgress {
 }
 
 impl TotalProgress {
-    /// A gauge at zero.
+    /// The progress of work that has not begun.
     pub fn new(plan: Plan) -> Self {
         Self {
             done: Mutex::new(vec![0.0; plan.0.len()]),
@@ -216,7 +216,7 @@ impl<'a> Monitor<'a> {
         }
     }
 
-    /// The monitor for piece `index` of `count` equal pieces: reports of its stages are scaled to
+    /// The monitor for part `index` of `count` equal parts: reports of its stages are scaled to
     /// that part of each stage of the whole.
     #[must_use]
     pub fn part(&self, index: usize, count: usize) -> Self {

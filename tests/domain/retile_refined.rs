@@ -32,7 +32,10 @@ fn check(surface: &Surface, points: usize, tiled: &Tiled) {
     assert_eq!(before.euler_characteristic, after.euler_characteristic);
     assert_eq!(before.components, after.components);
     assert!(tiled.mesh.volume() > 0.0);
-    assert_eq!(self_intersections(&tiled.mesh), Vec::<[u32; 2]>::new());
+    assert_eq!(
+        self_intersections(&tiled.mesh),
+        Vec::<[ventriform::mesh::FaceId; 2]>::new()
+    );
 }
 
 fn radius_ratios(mesh: &TriMesh) -> (f64, f64) {

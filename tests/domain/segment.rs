@@ -14,7 +14,7 @@ use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::mesh::shapes;
 use ventriform::parameters::FitParameters;
-use ventriform::progress::{CancelToken, TotalProgress, Monitor, Observer, Plan, Stage};
+use ventriform::progress::{CancelToken, Monitor, Observer, Plan, Stage, TotalProgress};
 use ventriform::segmentation::{SegmentationFilesError, SegmentationOrder, from_files};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
