@@ -2,7 +2,7 @@
 
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use ventriform::mesh::shapes;
-use ventriform::optimise::{FitParameters, OptimiseParameters, Reference, optimise};
+use ventriform::optimise::{LeastSquaresParameters, OptimiseParameters, Reference, optimise};
 use ventriform::progress::Monitor;
 use ventriform::retile::{RetileParameters, retile};
 use ventriform::surface::from_mesh;
@@ -14,9 +14,9 @@ fn bench(criterion: &mut Criterion) {
     let reference = Reference::new(&surface);
     let fitted = OptimiseParameters::default();
     let flipped = OptimiseParameters {
-        fit: FitParameters {
+        fit: LeastSquaresParameters {
             rounds: 0,
-            ..FitParameters::default()
+            ..LeastSquaresParameters::default()
         },
         ..OptimiseParameters::default()
     };

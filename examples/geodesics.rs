@@ -10,7 +10,7 @@ use std::io::{read_to_string, stdin};
 use anyhow::Context;
 use serde::Deserialize;
 use ventriform::geometry::Vec3;
-use ventriform::mesh::TriMesh;
+use ventriform::mesh::{FaceId, TriMesh};
 use ventriform::retile::geodesics::distances;
 use ventriform::retile::{Geodesics, SurfacePoint};
 
@@ -31,7 +31,7 @@ fn main() -> anyhow::Result<()> {
     };
     let points: Vec<SurfacePoint> = (query.points.into_iter())
         .map(|(triangle, u, v, w)| SurfacePoint {
-            triangle,
+            triangle: FaceId(triangle),
             barycentric: [u, v, w],
         })
         .collect();

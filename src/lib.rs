@@ -98,8 +98,9 @@
 //! ```
 
 pub mod geometry;
-pub mod mesh;
 pub mod numeric;
+
+pub mod mesh;
 pub mod progress;
 
 pub mod draw;

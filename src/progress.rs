@@ -6,7 +6,7 @@
 //! row of the jobs table, a test).
 //!
 //! Guaranteed: a stage checks the token at least every 50 ms. Progress of a whole job never
-//! decreases ([`Gauge`]).
+//! decreases ([`TotalProgress`]).
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -99,13 +99,13 @@ impl Plan {
 /// The completed fraction of a [`Plan`]. It never decreases, although stages may be repeated: when
 /// several models are fitted one after the other, each goes through the same stages.
 #[derive(Debug)]
-pub struct Gauge {
+pub struct TotalProgress {
     plan: Plan,
     done: Mutex<Vec<f64>>,
 }
 
-impl Gauge {
-    /// A gauge at zero.
+impl TotalProgress {
+    /// The progress of work that has not begun.
     pub fn new(plan: Plan) -> Self {
         Self {
             done: Mutex::new(vec![0.0; plan.0.len()]),
@@ -209,17 +209,17 @@ impl<'a> Monitor<'a> {
     /// A monitor without an observer, with the same cancel token: for work that is not a stage of
     /// the whole.
     #[must_use]
-    pub fn untold(&self) -> Monitor<'static> {
+    pub fn without_observer(&self) -> Monitor<'static> {
         Monitor {
             cancel: self.cancel.clone(),
             ..Monitor::silent()
         }
     }
 
-    /// The monitor for piece `index` of `count` equal pieces: reports of its stages are scaled to
+    /// The monitor for part `index` of `count` equal parts: reports of its stages are scaled to
     /// that part of each stage of the whole.
     #[must_use]
-    pub fn piece(&self, index: usize, count: usize) -> Self {
+    pub fn part(&self, index: usize, count: usize) -> Self {
         let own = self.span.1 / count.max(1) as f64;
         Self {
             observer: self.observer,
@@ -266,11 +266,11 @@ mod tests {
     #[test]
     fn the_completed_fraction_grows_from_zero_to_one() {
         for plan in [Plan::GENERATION, Plan::SEGMENTATION] {
-            let gauge = Gauge::new(plan);
+            let total = TotalProgress::new(plan);
             let mut last = 0.0;
             for (stage, _) in plan.0 {
                 for fraction in [0.0, 0.5, 1.0] {
-                    let now = gauge.advance(*stage, fraction);
+                    let now = total.advance(*stage, fraction);
                     assert!(now >= last - 1e-12);
                     last = now;
                 }
@@ -281,17 +281,17 @@ mod tests {
 
     #[test]
     fn repeated_stages_never_decrease_the_completed_fraction() {
-        struct Kept(Gauge, Mutex<Vec<f64>>);
+        struct Kept(TotalProgress, Mutex<Vec<f64>>);
         impl Observer for Kept {
             fn progress(&self, stage: Stage, fraction: f64) {
                 let whole = self.0.advance(stage, fraction);
                 self.1.lock().unwrap().push(whole);
             }
         }
-        let kept = Kept(Gauge::new(Plan::SEGMENTATION), Mutex::default());
+        let kept = Kept(TotalProgress::new(Plan::SEGMENTATION), Mutex::default());
         let monitor = Monitor::new(&kept, CancelToken::new());
-        for piece in 0..3 {
-            let monitor = monitor.piece(piece, 3);
+        for part in 0..3 {
+            let monitor = monitor.part(part, 3);
             for stage in [Stage::Localise, Stage::Align, Stage::Deform] {
                 monitor.report(stage, 1.0).unwrap();
             }

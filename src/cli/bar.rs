@@ -1,6 +1,6 @@
 //! A progress bar, shown only on a terminal.
 
-use crate::progress::{Gauge, Observer, Plan, Stage};
+use crate::progress::{Observer, Plan, Stage, TotalProgress};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::Instant;
@@ -10,7 +10,7 @@ const STEPS: u64 = 1000;
 /// Shows the stage and the progress on standard error, and measures the time.
 pub struct Bar {
     bar: ProgressBar,
-    gauge: Gauge,
+    gauge: TotalProgress,
     start: Instant,
 }
 
@@ -34,7 +34,7 @@ impl Bar {
         }
         Self {
             bar,
-            gauge: Gauge::new(plan),
+            gauge: TotalProgress::new(plan),
             start: Instant::now(),
         }
     }

@@ -1,45 +1,53 @@
-//! Edge collapses in the order of their error.
+//! Edge collapses in the order of their quadric error.
+//!
+//! In: a closed surface. Each call of [`Collapses::collapse_cheapest`] removes one vertex. Edges
+//! wait in a priority queue with the error and the place of their collapse. Entries are not
+//! updated: every vertex has a version, and an entry whose ends have changed since is skipped.
+//! Collapses that are not allowed are kept aside and tried again after something has changed.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use super::MOST_TURN;
+use super::MAX_TURN;
 use super::quadric::Quadric;
 use crate::geometry::{Vec3, triangle};
-use crate::mesh::TriMesh;
 use crate::mesh::intersections::{IntersectionIndex, triangles_intersect};
+use crate::mesh::{FaceId, TriMesh, VertexId, ids};
 
-/// A triangle of this radius ratio 2r/R is a needle; collapses that make one are avoided as
-/// those are that turn one over, since a needle's normal is noise.
+/// Radius ratio 2r/R below which a triangle is a needle. Collapses that make one are not allowed,
+/// since the normal of a needle is noise.
 const NEEDLE: f64 = 0.01;
 
-/// An edge and what its collapse costs.
+/// The collapse of an edge into one vertex.
 #[derive(Debug, Clone, Copy)]
-struct Candidate {
+struct CollapseCandidate {
+    /// Quadric error at `place`, mm⁴.
     error: f64,
-    /// The lower vertex first.
-    edge: [u32; 2],
-    /// Sum of both vertices' versions when the error was computed.
+    /// The ends of the edge, the lower first.
+    edge: [VertexId; 2],
+    /// Sum of both ends' versions when the error was computed.
     version: u32,
+    /// Position of the remaining vertex, mm.
     place: Vec3,
 }
 
-impl PartialEq for Candidate {
+impl PartialEq for CollapseCandidate {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
 
-impl Eq for Candidate {}
+impl Eq for CollapseCandidate {}
 
-impl PartialOrd for Candidate {
+impl PartialOrd for CollapseCandidate {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl Ord for Candidate {
-    /// The heap's greatest is the cheapest; ties go by the edge.
+impl Ord for CollapseCandidate {
+    /// The heap returns the greatest first, so the candidate with the smallest error is the
+    /// greatest; ties are decided by the edge.
     fn cmp(&self, other: &Self) -> Ordering {
         let error = other.error.total_cmp(&self.error);
         let edge = || other.edge.cmp(&self.edge);
@@ -48,77 +56,80 @@ impl Ord for Candidate {
     }
 }
 
-/// A surface on its way to fewer vertices.
+/// A surface between two collapses.
 pub struct Collapses {
     positions: Vec<Vec3>,
-    triangles: Vec<Option<[u32; 3]>>,
-    /// Triangles at each vertex.
-    fans: Vec<Vec<u32>>,
+    /// `None` for removed triangles.
+    triangles: Vec<Option<[VertexId; 3]>>,
+    /// Triangles at each vertex; none at a removed one.
+    fans: Vec<Vec<FaceId>>,
     quadrics: Vec<Quadric>,
-    /// Raised whenever something at the vertex changes.
+    /// Incremented whenever something at the vertex changes.
     versions: Vec<u32>,
-    left: usize,
-    queue: BinaryHeap<Candidate>,
-    /// Candidates that would have broken a promise when their turn came.
-    forbidden: Vec<Candidate>,
+    /// Number of vertices that have not been removed.
+    vertices_left: usize,
+    queue: BinaryHeap<CollapseCandidate>,
+    /// Candidates that were not allowed when their turn came.
+    forbidden: Vec<CollapseCandidate>,
     /// Whether anything was collapsed since the forbidden ones were last tried.
     collapsed_since: bool,
     index: IntersectionIndex,
 }
 
 impl Collapses {
-    /// `mesh` is closed and manifold.
+    /// Prepares `mesh`, which must be a closed manifold.
     pub fn new(mesh: &TriMesh) -> Self {
         let vertices = mesh.vertices.len();
         let mut fans = vec![Vec::new(); vertices];
         let mut quadrics = vec![Quadric::zero(); vertices];
-        for (t, triangle) in (0..).zip(&mesh.triangles) {
-            let plane = Quadric::of_plane(
-                &mesh.area_normal(t as usize),
-                &mesh.vertices[triangle[0] as usize],
-            );
-            for v in triangle.map(|v| v as usize) {
+        for t in FaceId::first(mesh.triangles.len()) {
+            let corners = mesh.corner_ids(t).map(VertexId::index);
+            let normal = mesh.area_normal(t.index());
+            let plane = Quadric::of_plane(&normal, &mesh.vertices[corners[0]]);
+            for v in corners {
                 fans[v].push(t);
                 quadrics[v] = quadrics[v].plus(&plane);
             }
         }
-        // Near the end triangles are some ten times longer than those that come in.
+        // The last triangles are about ten times longer than the first ones.
         let edge = (mesh.area() / mesh.triangles.len().max(1) as f64).sqrt();
         let mut this = Self {
             positions: mesh.vertices.clone(),
-            triangles: mesh.triangles.iter().copied().map(Some).collect(),
+            triangles: mesh
+                .triangles
+                .iter()
+                .map(|t| Some(ids::typed(*t)))
+                .collect(),
             fans,
             quadrics,
             versions: vec![0; vertices],
-            left: vertices,
+            vertices_left: vertices,
             queue: BinaryHeap::new(),
             forbidden: Vec::new(),
             collapsed_since: false,
             index: IntersectionIndex::new(&mesh.vertices, &mesh.triangles, 2.0 * edge),
         };
-        for triangle in &mesh.triangles {
-            for k in 0..3 {
-                let edge = [triangle[k], triangle[(k + 1) % 3]];
-                // Each edge is met from both sides.
-                if edge[0] < edge[1] {
-                    this.consider(edge);
-                }
+        for t in FaceId::first(mesh.triangles.len()) {
+            let [a, b, c] = mesh.corner_ids(t);
+            // Every edge occurs twice, once in each direction.
+            for edge in [[a, b], [b, c], [c, a]].into_iter().filter(|[p, q]| p < q) {
+                this.consider(edge);
             }
         }
         this
     }
 
-    /// Vertices left.
-    pub fn vertices(&self) -> usize {
-        self.left
+    /// The number of vertices left.
+    pub fn vertices_left(&self) -> usize {
+        self.vertices_left
     }
 
-    /// Collapses the cheapest edge that may be; `false` where none may.
-    pub fn cheapest(&mut self) -> bool {
+    /// Performs the allowed collapse with the smallest error. Returns `false` if none is allowed.
+    pub fn collapse_cheapest(&mut self) -> bool {
         loop {
             while let Some(candidate) = self.queue.pop() {
                 if self.is_current(&candidate) {
-                    if self.may(&candidate) {
+                    if self.is_allowed(&candidate) {
                         self.collapse(&candidate);
                         self.collapsed_since = true;
                         return true;
@@ -126,7 +137,7 @@ impl Collapses {
                     self.forbidden.push(candidate);
                 }
             }
-            // What was forbidden may be allowed after what has changed since.
+            // Forbidden collapses may be allowed after others.
             if !std::mem::take(&mut self.collapsed_since) {
                 return false;
             }
@@ -134,17 +145,18 @@ impl Collapses {
         }
     }
 
-    fn is_current(&self, candidate: &Candidate) -> bool {
-        let [a, b] = candidate.edge.map(|v| v as usize);
+    /// Whether both ends are as they were when the candidate was computed.
+    fn is_current(&self, candidate: &CollapseCandidate) -> bool {
+        let [a, b] = candidate.edge.map(VertexId::index);
         candidate.version == self.versions[a] + self.versions[b]
             && !self.fans[a].is_empty()
             && !self.fans[b].is_empty()
     }
 
-    /// The surface as it is, vertices in their old order.
+    /// The present surface; vertices keep their order.
     pub fn into_mesh(self) -> TriMesh {
         let mut number = vec![u32::MAX; self.positions.len()];
-        let mut vertices = Vec::with_capacity(self.left);
+        let mut vertices = Vec::with_capacity(self.vertices_left);
         for (v, fan) in self.fans.iter().enumerate() {
             if !fan.is_empty() {
                 number[v] = vertices.len() as u32;
@@ -154,18 +166,20 @@ impl Collapses {
         let triangles = self.triangles.into_iter().flatten();
         TriMesh {
             vertices,
-            triangles: triangles.map(|t| t.map(|v| number[v as usize])).collect(),
+            triangles: triangles.map(|t| t.map(|v| number[v.index()])).collect(),
         }
     }
 
-    fn consider(&mut self, [a, b]: [u32; 2]) {
+    /// Adds the collapse of an edge to the queue.
+    fn consider(&mut self, [a, b]: [VertexId; 2]) {
         let edge = [a.min(b), a.max(b)];
-        let [i, j] = edge.map(|v| v as usize);
+        let [i, j] = edge.map(VertexId::index);
         let quadric = self.quadrics[i].plus(&self.quadrics[j]);
         let (p, q) = (self.positions[i], self.positions[j]);
         let middle = (p + q) / 2.0;
         let best = quadric.best_near(&middle);
-        // A nearly flat fan may put its least error far away: then the edge itself must do.
+        // For a nearly flat fan the smallest error may be far away. Then only the ends and the
+        // midpoint of the edge are considered.
         let near = (best - middle).norm() <= (q - p).norm();
         let (error, place) = [best, middle, p, q]
             .into_iter()
@@ -173,7 +187,7 @@ impl Collapses {
             .map(|x| (quadric.at(&x), x))
             .min_by(|x, y| x.0.total_cmp(&y.0))
             .expect("there are at least three places to choose from");
-        self.queue.push(Candidate {
+        self.queue.push(CollapseCandidate {
             error,
             edge,
             version: self.versions[i] + self.versions[j],
@@ -181,11 +195,11 @@ impl Collapses {
         });
     }
 
-    /// The vertices round `v`, sorted.
-    fn neighbours(&self, v: u32) -> Vec<u32> {
-        let mut found: Vec<u32> = self.fans[v as usize]
+    /// The neighbours of `v`, ascending.
+    fn neighbours(&self, v: VertexId) -> Vec<VertexId> {
+        let mut found: Vec<VertexId> = self.fans[v.index()]
             .iter()
-            .filter_map(|t| self.triangles[*t as usize])
+            .filter_map(|t| self.triangles[t.index()])
             .flatten()
             .filter(|w| *w != v)
             .collect();
@@ -194,49 +208,49 @@ impl Collapses {
         found
     }
 
-    /// Whether the collapse keeps every promise.
-    fn may(&self, candidate: &Candidate) -> bool {
+    /// Whether the collapse keeps topology and shape.
+    fn is_allowed(&self, candidate: &CollapseCandidate) -> bool {
         let [a, b] = candidate.edge;
         self.keeps_topology(a, b) && self.keeps_shape(candidate)
     }
 
-    /// The link condition: the ends have just the two neighbours in common that the edge's
-    /// triangles give them, and four vertices at least stay.
-    fn keeps_topology(&self, a: u32, b: u32) -> bool {
+    /// The link condition: the ends have exactly two common neighbours, the third corners of the
+    /// edge's triangles; and at least four vertices remain.
+    fn keeps_topology(&self, a: VertexId, b: VertexId) -> bool {
         let (of_a, of_b) = (self.neighbours(a), self.neighbours(b));
-        let common: Vec<u32> = of_a
+        let common: Vec<VertexId> = of_a
             .iter()
             .filter(|v| of_b.binary_search(v).is_ok())
             .copied()
             .collect();
-        // A corner of three triangles beside the edge would be left with two.
-        let stays_closed = |v: &u32| self.fans[*v as usize].len() > 3;
-        common.len() == 2 && common.iter().all(stays_closed) && self.left > 4
+        // A common neighbour with three triangles would be left with two.
+        let stays_closed = |v: &VertexId| self.fans[v.index()].len() > 3;
+        common.len() == 2 && common.iter().all(stays_closed) && self.vertices_left > 4
     }
 
-    /// No triangle turns over, becomes a needle or pierces another.
-    fn keeps_shape(&self, candidate: &Candidate) -> bool {
+    /// Whether no triangle turns over, becomes a needle or comes to intersect another.
+    fn keeps_shape(&self, candidate: &CollapseCandidate) -> bool {
         let [a, b] = candidate.edge;
-        let least = MOST_TURN.to_radians().cos();
-        let gone_or_moved: Vec<u32> = [a, b]
+        let least = MAX_TURN.to_radians().cos();
+        let changed: Vec<FaceId> = [a, b]
             .iter()
-            .flat_map(|v| self.fans[*v as usize].iter().copied())
+            .flat_map(|v| self.fans[v.index()].iter().copied())
             .collect();
-        let mut moved: Vec<([u32; 3], [Vec3; 3])> = Vec::new();
-        for t in &gone_or_moved {
-            let Some(ids) = self.triangles[*t as usize] else {
+        let mut moved: Vec<([VertexId; 3], [Vec3; 3])> = Vec::new();
+        for t in &changed {
+            let Some(ids) = self.triangles[t.index()] else {
                 continue;
             };
             if ids.contains(&a) && ids.contains(&b) {
                 continue;
             }
-            let old = ids.map(|v| self.positions[v as usize]);
+            let old = ids.map(|v| self.positions[v.index()]);
             let new_ids = ids.map(|v| if v == b { a } else { v });
             let new = new_ids.map(|v| {
                 if v == a {
                     candidate.place
                 } else {
-                    self.positions[v as usize]
+                    self.positions[v.index()]
                 }
             });
             let before = triangle::area_normal(&old[0], &old[1], &old[2]);
@@ -244,7 +258,7 @@ impl Collapses {
             let turned = before.dot(&after) < least * before.norm() * after.norm();
             let needle = triangle::radius_ratio(&new[0], &new[1], &new[2])
                 < NEEDLE.min(triangle::radius_ratio(&old[0], &old[1], &old[2]));
-            if turned || needle || self.index.pierces(new_ids, &new, &gone_or_moved) {
+            if turned || needle || self.index.intersects(new_ids, &new, &changed) {
                 return false;
             }
             moved.push((new_ids, new));
@@ -256,39 +270,39 @@ impl Collapses {
         })
     }
 
-    fn collapse(&mut self, candidate: &Candidate) {
+    fn collapse(&mut self, candidate: &CollapseCandidate) {
         let [a, b] = candidate.edge;
-        let (i, j) = (a as usize, b as usize);
+        let (i, j) = (a.index(), b.index());
         self.positions[i] = candidate.place;
         self.quadrics[i] = self.quadrics[i].plus(&self.quadrics[j]);
         for t in std::mem::take(&mut self.fans[j]) {
-            let Some(ids) = self.triangles[t as usize] else {
+            let Some(ids) = self.triangles[t.index()] else {
                 continue;
             };
             if ids.contains(&a) {
-                self.triangles[t as usize] = None;
+                self.triangles[t.index()] = None;
                 self.index.remove(t);
-                for v in ids.map(|v| v as usize) {
+                for v in ids.map(VertexId::index) {
                     self.fans[v].retain(|other| *other != t);
                 }
             } else {
-                self.triangles[t as usize] = Some(ids.map(|v| if v == b { a } else { v }));
+                self.triangles[t.index()] = Some(ids.map(|v| if v == b { a } else { v }));
                 self.fans[i].push(t);
             }
         }
         for t in self.fans[i].clone() {
-            if let Some(ids) = self.triangles[t as usize] {
-                let corners = ids.map(|v| self.positions[v as usize]);
+            if let Some(ids) = self.triangles[t.index()] {
+                let corners = ids.map(|v| self.positions[v.index()]);
                 self.index.set(t, ids, corners);
             }
         }
-        self.left -= 1;
+        self.vertices_left -= 1;
         self.refresh(a);
     }
 
-    /// Looks anew at every edge of `v`.
-    fn refresh(&mut self, v: u32) {
-        self.versions[v as usize] += 1;
+    /// Adds new candidates for all edges at `v`, which has changed.
+    fn refresh(&mut self, v: VertexId) {
+        self.versions[v.index()] += 1;
         for w in self.neighbours(v) {
             self.consider([v, w]);
         }

@@ -1,65 +1,71 @@
-//! A surface thinned out by quadric error: the evaluation's reference model.
+//! Decimation by quadric error: makes the reference models of the evaluation.
+//!
+//! In: a closed surface and a number of points. Out: a closed surface with exactly that many
+//! vertices. After Garland and Heckbert, *Surface simplification using quadric error metrics*,
+//! SIGGRAPH 1997.
 //!
 //! The paper compares its models with an older one of 67 points that is neither smooth nor
-//! regular and that nobody outside its group has. Marching Cubes thinned out by quadric error
-//! (Garland and Heckbert, *Surface simplification using quadric error metrics*, SIGGRAPH 1997)
-//! stands in for it: the usual way to a coarse mesh before there was re-tiling, close to the
-//! surface, with triangles of any size and shape.
+//! regular and that is not available outside its group. A decimated Marching Cubes surface takes
+//! its place: before re-tiling it was the usual way to a coarse mesh, close to the surface, with
+//! triangles of any size and shape.
 //!
-//! A closed surface and a number of points go in; a closed surface of exactly that many
-//! vertices comes out.
-//!
-//! 1. Every vertex gets a [`quadric::Quadric`]: the area-weighted squared distances to the
+//! 1. Every vertex gets a [`quadric::Quadric`], the area-weighted sum of squared distances to the
 //!    planes of its triangles.
-//! 2. The edge whose ends can be drawn together at the least error is collapsed, again and
-//!    again, to the point of least error. Errors that have changed since are skipped.
-//! 3. A collapse that would break a promise is put off until no other is left.
+//! 2. The edge whose collapse causes the smallest error is collapsed, repeatedly, to the point of
+//!    smallest error.
+//! 3. A collapse that is not allowed is postponed until no other is left.
 //!
-//! Guaranteed: exactly the number of points asked for, a closed manifold of the surface's
-//! Euler characteristic (link condition), no self-intersection that was not there before
-//! (exact tests), no triangle turned by more than [`MOST_TURN`] in one collapse, the same
-//! result for any number of threads. Not guaranteed: even points or good triangles; that is
-//! the reference's point. Where no collapse is left before the number is reached, that is an
+//! Guaranteed:
+//! - exactly the requested number of points;
+//! - a closed manifold with the surface's Euler characteristic (link condition);
+//! - no new self-intersection (exact tests);
+//! - no normal turns by more than [`MAX_TURN`] in one collapse;
+//! - the same result for any number of threads.
+//!
+//! Not guaranteed: evenly distributed points or good triangles, in which the reference should
+//! differ from re-tiling. If no collapse is allowed before the number is reached, that is an
 //! error.
 
 mod collapse;
 mod quadric;
 
 use crate::mesh::TriMesh;
-use crate::mesh::topology::{self, Defect};
+use crate::mesh::topology::{self, MeshDefect};
 use crate::progress::{Cancelled, Monitor};
 use collapse::Collapses;
 
-/// A triangle's normal may turn by at most this much in one collapse, degrees: as much as a
-/// folding triangle turns before it shows its back, less a margin.
-pub const MOST_TURN: f64 = 78.0;
+/// Largest angle, degrees, by which a triangle's normal may turn in one collapse: that at which a
+/// triangle turns over, less a margin.
+pub const MAX_TURN: f64 = 78.0;
 
-/// Why there is no thinned surface.
+/// Why a surface could not be decimated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DecimateError {
-    /// The surface is no closed manifold.
-    #[error("the surface to thin out is not a closed manifold: {0}")]
-    NotClosed(#[from] Defect),
-    /// Fewer points than a closed surface needs, or more than there are.
-    #[error("{points} points were asked for; 4 to the surface's own {vertices} are possible")]
+    /// The surface is not a closed manifold.
+    #[error("the surface to decimate is not a closed manifold: {0}")]
+    NotClosed(#[from] MeshDefect),
+    /// Fewer points than a closed surface needs, or more than the surface has.
+    #[error(
+        "{points} points were requested; 4 to {vertices}, the number of the surface, are possible"
+    )]
     Points {
-        /// What was asked for.
+        /// The requested number of points.
         points: usize,
-        /// Vertices of the surface.
+        /// Number of vertices of the surface.
         vertices: usize,
     },
-    /// Every edge left would break a promise if it were collapsed.
-    #[error("no edge can be collapsed any more at {reached} points")]
+    /// No remaining edge can be collapsed.
+    #[error("at {reached} points no edge can be collapsed any more")]
     Stuck {
-        /// Vertices left.
+        /// Number of vertices left.
         reached: usize,
     },
-    /// The caller asked for an end.
+    /// Cancelled by the caller.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
 
-/// Thins `surface` out to exactly `points` vertices.
+/// Decimates `surface` (LPS mm) to exactly `points` vertices.
 ///
 /// # Errors
 /// [`DecimateError`].
@@ -74,11 +80,11 @@ pub fn decimate(
         return Err(DecimateError::Points { points, vertices });
     }
     let mut collapses = Collapses::new(surface);
-    while collapses.vertices() > points {
+    while collapses.vertices_left() > points {
         monitor.check()?;
-        if !collapses.cheapest() {
+        if !collapses.collapse_cheapest() {
             return Err(DecimateError::Stuck {
-                reached: collapses.vertices(),
+                reached: collapses.vertices_left(),
             });
         }
     }
@@ -92,12 +98,12 @@ mod tests {
     use crate::mesh::intersections::self_intersections;
     use crate::mesh::shapes;
 
-    fn thinned(surface: &TriMesh, points: usize) -> TriMesh {
+    fn decimated(surface: &TriMesh, points: usize) -> TriMesh {
         decimate(surface, points, &Monitor::silent()).unwrap()
     }
 
     #[test]
-    fn the_number_is_exact_and_the_topology_kept() {
+    fn the_number_of_points_is_exact_and_the_topology_kept() {
         let surfaces = [
             shapes::icosphere(30.0, 4),
             shapes::torus(30.0, 10.0, 60, 30),
@@ -107,11 +113,11 @@ mod tests {
         for surface in surfaces {
             let before = topology::check(&surface).unwrap();
             for points in [67, 300] {
-                let mesh = thinned(&surface, points);
+                let mesh = decimated(&surface, points);
                 let census = topology::check(&mesh).unwrap();
                 assert_eq!(census.vertices, points);
                 assert_eq!(census.euler_characteristic, before.euler_characteristic);
-                assert_eq!(self_intersections(&mesh), Vec::<[u32; 2]>::new());
+                assert!(self_intersections(&mesh).is_empty());
                 assert!((mesh.volume() / surface.volume() - 1.0).abs() < 0.1);
             }
         }
@@ -119,9 +125,9 @@ mod tests {
 
     #[test]
     fn flat_faces_cost_nothing() {
-        // A cube of 6 x 2 x 8² triangles needs its 8 corners only.
+        // A cube of 6 x 2 x 8² triangles needs only its 8 corners.
         let cube = grid_cube(8);
-        let mesh = thinned(&cube, 8);
+        let mesh = decimated(&cube, 8);
         let tree = Bvh::new(&mesh.vertices, &mesh.triangles);
         for p in &cube.vertices {
             let distance = tree.closest(p).unwrap().squared_distance.sqrt();
@@ -132,15 +138,15 @@ mod tests {
     #[test]
     fn a_sphere_stays_round() {
         let sphere = shapes::icosphere(30.0, 4);
-        let mesh = thinned(&sphere, 150);
+        let mesh = decimated(&sphere, 150);
         let tree = Bvh::new(&mesh.vertices, &mesh.triangles);
         let worst = sphere
             .vertices
             .iter()
             .map(|p| tree.closest(p).unwrap().squared_distance.sqrt())
             .fold(0.0, f64::max);
-        // Points that lie in the mean of their tangent planes: half a sagitta, twice for
-        // uneven triangles. With 296 triangles an edge is 9.4 mm, its sagitta 0.37 mm.
+        // With 296 triangles an edge is 9.4 mm long and its sagitta 0.37 mm. Vertices at the mean
+        // of their tangent planes are half a sagitta away, twice that for uneven triangles.
         assert!(worst < 0.8, "{worst}");
         assert!((mesh.volume() / sphere.volume() - 1.0).abs() < 0.03);
     }
@@ -155,7 +161,7 @@ mod tests {
                 DecimateError::Points { points, vertices }
             );
         }
-        assert_eq!(thinned(&sphere, 4).triangles.len(), 4);
+        assert_eq!(decimated(&sphere, 4).triangles.len(), 4);
         let torus = shapes::torus(3.0, 1.0, 12, 8);
         assert!(matches!(
             decimate(&torus, 5, &Monitor::silent()).unwrap_err(),

@@ -1,14 +1,15 @@
-//! Sums of squared distances to planes (Garland and Heckbert 1997, section 4).
+//! Quadrics: weighted sums of squared distances to planes (Garland and Heckbert 1997, section 4).
 
 use nalgebra::Matrix3;
 
 use crate::geometry::Vec3;
 
-/// Singular values below this share of the greatest one say nothing about a point: along a
-/// ridge or on a flat part any place is as good, and the one nearest to the edge is taken.
+/// Fraction of the largest singular value below which singular values count as zero. In their
+/// directions, along a ridge or on a flat part, all points have about the same error, and the
+/// one nearest to the edge is taken.
 const RANK_TOLERANCE: f64 = 1e-3;
 
-/// Q(x) = xᵀ A x + 2 bᵀ x + c = Σ area · (distance of x to a plane)², mm⁴.
+/// Q(x) = xᵀ A x + 2 bᵀ x + c = Σ area · (distance of x from a plane)², mm⁴.
 #[derive(Debug, Clone, Copy)]
 pub struct Quadric {
     a: Matrix3<f64>,
@@ -17,7 +18,7 @@ pub struct Quadric {
 }
 
 impl Quadric {
-    /// Nothing.
+    /// The quadric of no planes.
     pub fn zero() -> Self {
         Self {
             a: Matrix3::zeros(),
@@ -26,7 +27,8 @@ impl Quadric {
         }
     }
 
-    /// The plane of a triangle with this area normal (twice its area long) through `p`.
+    /// The quadric of a triangle's plane through `p`; `area_normal` is the triangle's normal, twice
+    /// its area long.
     pub fn of_plane(area_normal: &Vec3, p: &Vec3) -> Self {
         let length = area_normal.norm();
         if length == 0.0 {
@@ -41,7 +43,7 @@ impl Quadric {
         }
     }
 
-    /// Both together.
+    /// The sum of two quadrics.
     pub fn plus(&self, other: &Self) -> Self {
         Self {
             a: self.a + other.a,
@@ -50,12 +52,12 @@ impl Quadric {
         }
     }
 
-    /// Q(x); rounding may leave it a little below zero, which counts as zero.
+    /// Q(x), at least zero: rounding errors below zero are removed.
     pub fn at(&self, x: &Vec3) -> f64 {
         (x.dot(&(self.a * x)) + 2.0 * self.b.dot(x) + self.c).max(0.0)
     }
 
-    /// The point of least error, of all such points the one nearest to `near`.
+    /// The point of smallest error; of several the one nearest to `near`.
     pub fn best_near(&self, near: &Vec3) -> Vec3 {
         let svd = self.a.svd(true, true);
         let tolerance = RANK_TOLERANCE * svd.singular_values.max();
@@ -82,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn a_single_plane_leaves_the_point_where_it_was_across() {
+    fn with_a_single_plane_the_point_is_projected_onto_it() {
         let q = Quadric::of_plane(&(Vec3::z() * 4.0), &Vec3::new(0.0, 0.0, 5.0));
         let best = q.best_near(&Vec3::new(7.0, 8.0, 9.0));
         assert!((best - Vec3::new(7.0, 8.0, 5.0)).norm() < 1e-12);

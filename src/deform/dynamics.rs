@@ -22,7 +22,7 @@ use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::mesh::TriMesh;
 use crate::model::area_shares;
-use crate::numeric::conjugate_gradient::BlockMatrix;
+use crate::numeric::block_matrix::BlockMatrix;
 use crate::progress::{Cancelled, Monitor};
 
 /// Why the motion ended.

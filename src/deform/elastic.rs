@@ -33,7 +33,7 @@ use crate::geometry::Vec3;
 use crate::geometry::rotation::nearest_rotation;
 use crate::mesh::TriMesh;
 use crate::model::struts::Strut;
-use crate::numeric::conjugate_gradient::BlockMatrix;
+use crate::numeric::block_matrix::BlockMatrix;
 
 /// Stiffness of each kind of force.
 #[derive(Debug, Clone, Copy, PartialEq)]

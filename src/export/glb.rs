@@ -1,9 +1,9 @@
-//! GLB: a glTF document and its buffer in one binary file (glTF 2.0, section 4).
+//! GLB, the binary form of glTF: document and buffer in one file (glTF 2.0, section 4).
 
 use super::{ExportError, Format, Metadata, gltf};
 use crate::mesh::TriMesh;
 
-/// A GLB file: header, JSON chunk, binary chunk, each a multiple of 4 bytes long.
+/// A GLB file: a header, a JSON chunk and a binary chunk, each a multiple of 4 bytes long.
 ///
 /// # Errors
 /// See [`gltf::document`]; [`ExportError::TooLarge`] beyond 4 GiB.

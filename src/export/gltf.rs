@@ -1,14 +1,14 @@
-//! glTF 2.0: one node, one mesh, one buffer.
+//! glTF 2.0 with one node, one mesh and one buffer.
 //!
-//! The vertices stay patient millimetres, so that a program that reads the accessor has
-//! medical coordinates. The node's matrix alone leads to glTF's world, metres with Y up, in
-//! which the patient stands upright and looks along +Z:
+//! The vertices are in patient coordinates, so a program that reads the accessor directly has
+//! medical coordinates. The node's matrix converts them to the world frame of glTF, metres with
+//! Y up, in which the patient stands upright and faces +Z:
 //!
 //! ```text
 //! X = L / 1000,   Y = S / 1000,   Z = -P / 1000
 //! ```
 //!
-//! Buffer: positions (f32), normals (f32), indices (u16 where they fit, else u32).
+//! The buffer contains positions (f32), normals (f32) and indices (u16 if they fit, otherwise u32).
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 use super::{ExportError, FRAME, Metadata, UNIT, single};
 use crate::mesh::TriMesh;
 
-/// Columns of LPS millimetres to glTF metres.
+/// The matrix from LPS millimetres to glTF metres, by columns.
 const PATIENT_TO_WORLD: [f64; 16] = [
     0.001, 0.0, 0.0, 0.0, //
     0.0, 0.0, -0.001, 0.0, //
@@ -25,7 +25,7 @@ const PATIENT_TO_WORLD: [f64; 16] = [
     0.0, 0.0, 0.0, 1.0,
 ];
 
-// The specification's numbers for component types and buffer targets.
+// Numbers of component types and buffer targets in the specification.
 const UNSIGNED_SHORT: u32 = 5123;
 const UNSIGNED_INT: u32 = 5125;
 const FLOAT: u32 = 5126;
@@ -46,26 +46,16 @@ pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Result<Vec<u8>, ExportErro
     Ok(document.to_string().into_bytes())
 }
 
-/// The JSON document, its buffer without a URI, and the buffer, a multiple of 4 bytes long.
+/// The JSON document, in which the buffer has no URI, and the buffer, a multiple of 4 bytes long.
 ///
 /// # Errors
 /// [`ExportError::NotFinite`], [`ExportError::Inseparable`]: see [`single`].
 pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>), ExportError> {
     let positions = single::positions(&mesh.vertices)?;
     let normals = single::normals(&mesh.vertex_normals());
-    // 65535 restarts a primitive, so it is no index.
+    // The index 65535 is reserved for restarting a primitive.
     let narrow = positions.len() <= 65535;
-
-    let mut buffer = Vec::with_capacity(24 * positions.len() + 12 * mesh.triangles.len());
-    buffer.extend(positions.iter().flatten().flat_map(|x| x.to_le_bytes()));
-    buffer.extend(normals.iter().flatten().flat_map(|x| x.to_le_bytes()));
-    for &v in mesh.triangles.iter().flatten() {
-        if narrow {
-            buffer.extend((v as u16).to_le_bytes());
-        } else {
-            buffer.extend(v.to_le_bytes());
-        }
-    }
+    let mut buffer = bytes_of(&positions, &normals, &mesh.triangles, narrow);
     let indices_end = buffer.len();
     buffer.resize(indices_end.next_multiple_of(4), 0);
 
@@ -140,7 +130,27 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
     Ok((document, buffer))
 }
 
-/// Smallest and largest coordinates. Widened to `f64`, whose decimals name an `f32` exactly.
+/// Positions, normals and indices; these are u16 if `narrow`, otherwise u32.
+fn bytes_of(
+    positions: &[[f32; 3]],
+    normals: &[[f32; 3]],
+    triangles: &[[u32; 3]],
+    narrow: bool,
+) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(24 * positions.len() + 12 * triangles.len());
+    bytes.extend(positions.iter().flatten().flat_map(|x| x.to_le_bytes()));
+    bytes.extend(normals.iter().flatten().flat_map(|x| x.to_le_bytes()));
+    for &v in triangles.iter().flatten() {
+        if narrow {
+            bytes.extend((v as u16).to_le_bytes());
+        } else {
+            bytes.extend(v.to_le_bytes());
+        }
+    }
+    bytes
+}
+
+/// The smallest and largest coordinates, as `f64`, whose decimals represent an `f32` exactly.
 fn extent(positions: &[[f32; 3]]) -> ([f64; 3], [f64; 3]) {
     let mut min = [f32::INFINITY; 3];
     let mut max = [f32::NEG_INFINITY; 3];

@@ -1,4 +1,4 @@
-//! Plain JSON: every coordinate as the shortest decimal that reads back the same.
+//! Plain JSON, with every coordinate as the shortest decimal that gives the same number when read.
 
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -8,7 +8,7 @@ use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
 
 #[derive(Serialize)]
-struct Document<'a> {
+struct WrittenMesh<'a> {
     #[serde(flatten)]
     metadata: Map<String, Value>,
     vertices: Vec<[f64; 3]>,
@@ -16,15 +16,14 @@ struct Document<'a> {
     normals: Vec<[f64; 3]>,
 }
 
-/// A JSON file with `frame`, `unit`, what is known of the origin, `vertices`, `triangles`
-/// and `normals`.
+/// A JSON file with `frame`, `unit`, the other metadata, `vertices`, `triangles` and `normals`.
 pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Vec<u8> {
     let rows = |vectors: &[Vec3]| vectors.iter().map(|&v| v.into()).collect();
-    let document = Document {
+    let document = WrittenMesh {
         metadata: metadata.to_object(),
         vertices: rows(&mesh.vertices),
         triangles: &mesh.triangles,
         normals: rows(&mesh.vertex_normals()),
     };
-    serde_json::to_vec(&document).expect("numbers and text keys always serialise")
+    serde_json::to_vec(&document).expect("numbers and text keys can always be serialised")
 }

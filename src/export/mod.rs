@@ -1,23 +1,23 @@
-//! Meshes as files: one module per format.
+//! Writes meshes to files, one module per format.
 //!
-//! Every format carries the same vertices in the same order: millimetres in the patient frame
-//! LPS (x to the patient's left, y to posterior, z to superior), exactly as many as the mesh
-//! has, and triangles that run counter-clockwise seen from outside.
+//! In: a mesh (LPS mm) and its metadata. Out: the bytes of a file. All formats contain the same
+//! vertices in the same order, in millimetres in the patient frame LPS (x to the patient's left,
+//! y to posterior, z to superior), and the same triangles, counter-clockwise seen from outside.
 //!
-//! | format | precision | says frame and unit in |
+//! | format | precision | frame and unit are stored in |
 //! |---|---|---|
-//! | [`Format::Glb`], [`Format::Gltf`] | single | `extras`; the node's matrix leads to glTF's metres, Y up |
+//! | [`Format::Glb`], [`Format::Gltf`] | single | `extras`; the node's matrix converts to glTF's metres, Y up |
 //! | [`Format::Stl`] | single | the 80-byte header |
 //! | [`Format::Ply`] | double | comments |
 //! | [`Format::Obj`] | double, shortest decimal | comments |
 //! | [`Format::Vtp`] | double | field data `SPACE`, `UNIT` |
 //! | [`Format::Json`] | double, shortest decimal | `frame`, `unit` |
 //!
-//! `SPACE=LPS` is the phrase by which 3D Slicer knows the frame of STL, PLY and OBJ files.
+//! 3D Slicer recognises the frame of STL, PLY and OBJ files by the text `SPACE=LPS`.
 //!
-//! Guaranteed: same mesh and metadata, same bytes; vertices stay distinct in single precision
-//! (see `single.rs`). Not looked at: whether the mesh is a manifold; that is
-//! [`crate::mesh::topology`]'s business.
+//! Guaranteed: the same mesh and metadata give the same bytes; vertices stay distinct in single
+//! precision (see `single.rs`). Not checked: whether the mesh is a manifold; see
+//! [`crate::mesh::topology`].
 
 mod glb;
 mod gltf;
@@ -33,9 +33,10 @@ use serde_json::{Map, Value};
 
 use crate::mesh::TriMesh;
 
-/// The frame that every format speaks.
+/// The coordinate frame of all formats.
 pub const FRAME: &str = "LPS";
-/// The unit that every format speaks.
+
+/// The unit of length of all formats.
 pub const UNIT: &str = "mm";
 
 /// A file format for meshes.
@@ -58,7 +59,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Every format.
+    /// All formats.
     pub const ALL: [Format; 7] = [
         Format::Glb,
         Format::Gltf,
@@ -82,8 +83,8 @@ impl Format {
         }
     }
 
-    /// The media type. Registered with IANA, but for PLY and VTP, which nobody registered:
-    /// `application/x-ply` is customary, `application/x-vtp` is ours after its pattern.
+    /// The media type. All are registered with IANA except those of PLY and VTP:
+    /// `application/x-ply` is customary, and `application/x-vtp` follows its pattern.
     pub fn media_type(self) -> &'static str {
         match self {
             Format::Glb => "model/gltf-binary",
@@ -96,7 +97,7 @@ impl Format {
         }
     }
 
-    /// The format of a file extension, with or without the dot, in any case.
+    /// The format with this file extension, with or without the dot, in upper or lower case.
     pub fn from_extension(extension: &str) -> Option<Self> {
         let extension = extension.strip_prefix('.').unwrap_or(extension);
         Self::ALL
@@ -104,8 +105,8 @@ impl Format {
             .find(|f| f.extension().eq_ignore_ascii_case(extension))
     }
 
-    /// The format of a media type, in any case, parameters (`; q=0.9`) not looked at. Old
-    /// names that clients still send are understood too.
+    /// The format with this media type, in upper or lower case; parameters (`; q=0.9`) are ignored.
+    /// Older names that clients still send are recognised as well.
     pub fn from_media_type(media_type: &str) -> Option<Self> {
         let essence = media_type.split(';').next()?.trim().to_ascii_lowercase();
         let old = match essence.as_str() {
@@ -121,23 +122,23 @@ impl Format {
     }
 }
 
-/// What a file says about its mesh besides the mesh.
+/// What a file contains besides the mesh.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Metadata {
-    /// Name for people; the object's name where the format has one.
+    /// Title for people; also the name of the object if the format has one.
     pub title: String,
-    /// Identity of the volume that the mesh was made from.
+    /// Id of the volume that the mesh was made from.
     pub volume_id: Option<String>,
     /// DICOM Frame of Reference UID of that volume.
     pub frame_of_reference_uid: Option<String>,
     /// Name and version of the software, such as `ventriform 0.1.0`.
     pub software: String,
-    /// A few figures of quality, in the order in which they shall appear.
+    /// Measures of quality, in the order in which they are written.
     pub quality: Map<String, Value>,
 }
 
 impl Metadata {
-    /// Metadata that name this software and nothing else.
+    /// Metadata with a title and the name and version of this software.
     pub fn new(title: impl Into<String>) -> Self {
         Self {
             title: title.into(),
@@ -146,7 +147,7 @@ impl Metadata {
         }
     }
 
-    /// Everything as one JSON object, frame and unit first.
+    /// All metadata as one JSON object, with frame and unit first.
     fn to_object(&self) -> Map<String, Value> {
         let mut object = Map::new();
         object.insert("frame".into(), FRAME.into());
@@ -158,7 +159,7 @@ impl Metadata {
         object
     }
 
-    /// What is known of title, origin and software, as key and value.
+    /// Title, origin and software as pairs of key and value; unknown ones are left out.
     fn identity(&self) -> Vec<(&'static str, &str)> {
         let volume = self.volume_id.as_deref();
         let frame_uid = self.frame_of_reference_uid.as_deref();
@@ -174,7 +175,7 @@ impl Metadata {
         .collect()
     }
 
-    /// Comment lines for formats that have such, in ASCII without control characters.
+    /// The metadata as comment lines, in ASCII without control characters.
     fn comments(&self) -> Vec<String> {
         let mut lines = vec![format!("SPACE={FRAME} UNIT={UNIT}")];
         let identity = self.identity();
@@ -187,8 +188,8 @@ impl Metadata {
     }
 }
 
-/// `text` with everything but printable ASCII replaced by `?`, so that no title can end a
-/// comment or a header.
+/// `text` with all characters other than printable ASCII replaced by `?`, so that no title can end
+/// a comment or a header.
 fn printable(text: &str) -> String {
     text.chars()
         .map(|c| {
@@ -201,33 +202,33 @@ fn printable(text: &str) -> String {
         .collect()
 }
 
-/// Why a mesh cannot be written.
+/// Why a mesh could not be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ExportError {
-    /// No triangles.
+    /// The mesh has no triangles.
     #[error("the mesh has no triangles")]
     Empty,
-    /// A coordinate is NaN or infinite (for GLB, glTF and STL: in single precision).
-    #[error("vertex {vertex} is not finite")]
+    /// A coordinate is NaN or infinite; for GLB, glTF and STL, in single precision.
+    #[error("a coordinate of vertex {vertex} is not finite")]
     NotFinite {
         /// Index of the vertex.
         vertex: usize,
     },
-    /// A triangle names a vertex that is not there.
-    #[error("triangle {triangle} names a vertex beyond the last one")]
+    /// A triangle refers to a vertex that does not exist.
+    #[error("triangle {triangle} refers to a vertex that does not exist")]
     IndexOutOfRange {
         /// Index of the triangle.
         triangle: usize,
     },
-    /// Single precision cannot tell the vertex from others, even when moved a little.
+    /// The vertex coincides with others in single precision, even if moved slightly.
     #[error(
-        "vertex {vertex} coincides with others in single precision; write PLY, OBJ, VTP or JSON instead"
+        "vertex {vertex} coincides with others in single precision; PLY, OBJ, VTP and JSON have double precision"
     )]
     Inseparable {
         /// Index of the vertex.
         vertex: usize,
     },
-    /// More bytes or items than the format can count.
+    /// The mesh has more bytes or elements than the format can count.
     #[error("the mesh is too large for {format}")]
     TooLarge {
         /// Extension of the format.
@@ -235,7 +236,7 @@ pub enum ExportError {
     },
 }
 
-/// `mesh` as the bytes of a file.
+/// Writes `mesh` as the bytes of a file.
 ///
 /// # Errors
 /// See [`ExportError`].

@@ -1,4 +1,5 @@
-//! Wavefront OBJ, in text: every coordinate as the shortest decimal that reads back the same.
+//! Wavefront OBJ, with every coordinate as the shortest decimal that gives the same number when
+//! read.
 
 use std::fmt::Write;
 
@@ -9,7 +10,7 @@ use crate::mesh::TriMesh;
 pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Vec<u8> {
     let mut text = String::new();
     let written = write(&mut text, mesh, metadata);
-    debug_assert!(written.is_ok(), "a String takes all that is written");
+    debug_assert!(written.is_ok(), "writing to a String cannot fail");
     text.into_bytes()
 }
 
@@ -17,7 +18,7 @@ fn write(text: &mut String, mesh: &TriMesh, metadata: &Metadata) -> std::fmt::Re
     for comment in metadata.comments() {
         writeln!(text, "# {comment}")?;
     }
-    // Blanks would end the name.
+    // The name must not contain spaces.
     let name = printable(&metadata.title).replace(' ', "_");
     writeln!(text, "o {}", if name.is_empty() { "model" } else { &name })?;
     for p in &mesh.vertices {

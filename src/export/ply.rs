@@ -6,7 +6,7 @@ use crate::mesh::TriMesh;
 /// A PLY file.
 ///
 /// # Errors
-/// [`ExportError::TooLarge`] beyond 2³¹ vertices: readers expect signed indices.
+/// [`ExportError::TooLarge`] beyond 2³¹ vertices, since readers expect signed indices.
 pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Result<Vec<u8>, ExportError> {
     if i32::try_from(mesh.vertices.len()).is_err() {
         return Err(ExportError::TooLarge {

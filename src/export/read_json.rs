@@ -1,15 +1,18 @@
-//! Reads the meshes that [`super::json`] writes.
+//! Reads the JSON meshes that [`super::json`] writes.
+//!
+//! In: the bytes of a file. Out: a mesh in LPS millimetres whose triangles refer to existing
+//! vertices. Whether it is closed is not checked.
 
 use serde::Deserialize;
 
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
 
-/// Largest file that is looked at, bytes: some 100 000 vertices with normals.
+/// Size of the largest file that is read, bytes: about 100 000 vertices with normals.
 const MAX_BYTES: usize = 32 << 20;
 
 #[derive(Deserialize)]
-struct Document {
+struct ReadMesh {
     #[serde(default)]
     frame: Option<String>,
     #[serde(default)]
@@ -18,45 +21,45 @@ struct Document {
     triangles: Vec<[u32; 3]>,
 }
 
-/// Why a file is no mesh of ours.
+/// Why a file could not be read as a mesh.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ReadMeshError {
-    /// More bytes than are looked at.
+    /// The file is too large.
     #[error("the model file has {bytes} bytes; at most {MAX_BYTES} are read")]
     TooLong {
-        /// Its length.
+        /// Size of the file.
         bytes: usize,
     },
-    /// No JSON, or without `vertices` and `triangles`.
+    /// The file is not JSON, or has no `vertices` or `triangles`.
     #[error("the model file is not a JSON mesh: {0}")]
     Json(String),
-    /// Another frame or unit than LPS millimetres.
-    #[error("the model's {field} is {value:?}; {expected} is needed")]
+    /// The frame is not LPS or the unit not mm.
+    #[error("the model's {field} is {value:?}; it must be {expected}")]
     Frame {
         /// `frame` or `unit`.
         field: &'static str,
-        /// What the file says.
+        /// Its value in the file.
         value: String,
-        /// What is understood.
+        /// The only supported value.
         expected: &'static str,
     },
-    /// A triangle names a vertex that is not there.
-    #[error("triangle {triangle} names a vertex beyond the last one")]
+    /// A triangle refers to a vertex that does not exist.
+    #[error("triangle {triangle} refers to a vertex that does not exist")]
     IndexOutOfRange {
         /// Index of the triangle.
         triangle: usize,
     },
 }
 
-/// The mesh in `bytes`, LPS mm.
+/// Reads the mesh in `bytes`, LPS mm.
 ///
 /// # Errors
-/// [`ReadMeshError`]. Whether the mesh is closed is not looked at.
+/// See [`ReadMeshError`].
 pub fn decode(bytes: &[u8]) -> Result<TriMesh, ReadMeshError> {
     if bytes.len() > MAX_BYTES {
         return Err(ReadMeshError::TooLong { bytes: bytes.len() });
     }
-    let document: Document =
+    let document: ReadMesh =
         serde_json::from_slice(bytes).map_err(|e| ReadMeshError::Json(e.to_string()))?;
     demand("frame", document.frame, super::FRAME)?;
     demand("unit", document.unit, super::UNIT)?;
@@ -93,7 +96,7 @@ mod tests {
     use crate::mesh::shapes;
 
     #[test]
-    fn what_was_written_comes_back_to_the_last_bit() {
+    fn a_written_mesh_is_read_back_exactly() {
         let mesh = shapes::icosphere(12.3, 2);
         let bytes = json::encode(&mesh, &Metadata::new("sphere"));
         let back = decode(&bytes).unwrap();
@@ -102,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn other_files_are_refused_with_the_reason() {
+    fn errors_name_what_is_wrong_with_a_file() {
         assert!(matches!(decode(b"solid x"), Err(ReadMeshError::Json(_))));
         let stray = br#"{"vertices":[[0,0,0]],"triangles":[[0,1,2]]}"#;
         assert_eq!(

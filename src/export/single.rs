@@ -1,24 +1,24 @@
-//! Positions and normals in single precision, without losing a vertex.
+//! Positions and normals in single precision, with all vertices kept distinct.
 //!
-//! A reader of STL joins the corners of triangles by equal coordinates, and many a reader of
-//! GLB does so too. Rounding to `f32` may bring two vertices together: at 200 mm its steps
-//! are 0.000 015 mm. Where that happens the later vertex moves along x by as few steps as
-//! make it distinct, at most [`MOST_STEPS`].
+//! Readers of STL, and many readers of GLB, join the corners of triangles by equal coordinates.
+//! Rounding to `f32` may give two vertices the same position: at 200 mm its steps are 0.000 015
+//! mm. In that case the later vertex is moved along x by as few steps as make it distinct, at
+//! most [`MAX_STEPS`].
 
 use std::collections::BTreeSet;
 
 use super::ExportError;
 use crate::geometry::Vec3;
 
-/// Steps of `f32` that a vertex may move. More would be needed only where dozens of vertices
-/// fall on one point, and such a mesh has no business in single precision.
-const MOST_STEPS: usize = 64;
+/// Largest number of `f32` steps by which a vertex is moved. More would be needed only if dozens
+/// of vertices had the same position, and single precision is not suitable for such a mesh.
+const MAX_STEPS: usize = 64;
 
-/// The positions rounded to `f32`, pairwise distinct.
+/// The positions rounded to `f32`, all distinct.
 ///
 /// # Errors
-/// [`ExportError::NotFinite`] beyond the range of `f32`, [`ExportError::Inseparable`] where
-/// too many vertices fall on one point.
+/// [`ExportError::NotFinite`] beyond the range of `f32`, [`ExportError::Inseparable`] if too many
+/// vertices have the same position.
 pub fn positions(vertices: &[Vec3]) -> Result<Vec<[f32; 3]>, ExportError> {
     let mut rounded: Vec<[f32; 3]> = vertices.iter().map(round).collect();
     if let Some(vertex) = rounded
@@ -32,17 +32,17 @@ pub fn positions(vertices: &[Vec3]) -> Result<Vec<[f32; 3]>, ExportError> {
         let mut steps = 0;
         while !taken.insert(p.map(f32::to_bits)) {
             steps += 1;
-            if steps > MOST_STEPS {
+            if steps > MAX_STEPS {
                 return Err(ExportError::Inseparable { vertex });
             }
-            // Adding zero turns -0 into +0: the two are equal to a reader.
+            // Adding zero turns -0 into +0, since readers consider both equal.
             p[0] = p[0].next_up() + 0.0;
         }
     }
     Ok(rounded)
 }
 
-/// Unit normals rounded to `f32`; +z stands in where a vertex has no area around it.
+/// Unit normals rounded to `f32`; +z for a vertex without area around it.
 pub fn normals(normals: &[Vec3]) -> Vec<[f32; 3]> {
     normals
         .iter()
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn zeros_of_both_signs_count_as_one_place() {
+    fn zeros_of_both_signs_count_as_the_same_position() {
         let pair = [Vec3::new(0.0, 1.0, 2.0), Vec3::new(-0.0, 1.0, 2.0)];
         let [a, b] = positions(&pair).unwrap()[..] else {
             panic!("two vertices")
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn what_single_precision_cannot_hold_is_refused() {
+    fn positions_beyond_single_precision_are_refused() {
         let far = [Vec3::new(1e39, 0.0, 0.0)];
         assert_eq!(
             positions(&far).unwrap_err(),

@@ -1,4 +1,4 @@
-//! Binary STL: an 80-byte header, the number of triangles, 50 bytes for each.
+//! Binary STL: an 80-byte header, the number of triangles, and 50 bytes per triangle.
 
 use super::{ExportError, Format, Metadata, single};
 use crate::geometry::{Vec3, triangle};
@@ -21,10 +21,8 @@ pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Result<Vec<u8>, ExportErro
     bytes.extend(count.to_le_bytes());
     for t in &mesh.triangles {
         let corners = t.map(|v| positions[v as usize]);
-        let [a, b, c] = corners.map(|p| Vec3::from(p.map(f64::from)));
-        let normal = triangle::area_normal(&a, &b, &c)
-            .try_normalize(0.0)
-            .unwrap_or_else(Vec3::zeros);
+        let corners_f64 = corners.map(|p| Vec3::from(p.map(f64::from)));
+        let normal = triangle::unit_normal(&corners_f64);
         let numbers = [normal.x as f32, normal.y as f32, normal.z as f32];
         let numbers = numbers.iter().chain(corners.iter().flatten());
         bytes.extend(numbers.flat_map(|x| x.to_le_bytes()));
@@ -33,8 +31,8 @@ pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Result<Vec<u8>, ExportErro
     Ok(bytes)
 }
 
-/// Frame and unit first, then what else fits. Never begins with `solid`, by which readers
-/// know the text form.
+/// Frame and unit, followed by as much of the other metadata as fits. The header never begins
+/// with `solid`, by which readers recognise the text form.
 fn header(metadata: &Metadata) -> Vec<u8> {
     let mut header = metadata.comments().join("; ").into_bytes();
     header.resize(HEADER_BYTES, b' ');

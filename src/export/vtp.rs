@@ -1,7 +1,7 @@
-//! VTK XML PolyData with inline base64: positions and normals in double precision.
+//! VTK XML PolyData with positions and normals in double precision, as inline base64.
 //!
-//! Each array is the number of its bytes (`UInt64`) and the bytes, encoded as one piece.
-//! Texts are field data; VTK wants them as ASCII codes with a closing 0.
+//! Every array consists of the number of its bytes (`UInt64`) and the bytes, encoded together.
+//! Texts are field data, which VTK expects as ASCII codes that end with 0.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

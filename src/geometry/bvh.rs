@@ -1,20 +1,23 @@
-//! A bounding-volume hierarchy over triangles: closest point, box overlap and rays.
+//! A bounding-volume hierarchy over triangles, for closest points, box overlaps and rays.
 //!
-//! Built top down by splitting the longest axis of the centroids' box at the median; queries
-//! are exact, and ties are broken by the lower triangle index, so answers do not depend on
-//! the tree's shape. Building costs O(n log n), a closest-point query on a smooth surface
-//! O(log n).
+//! In: vertices and triangles. The tree is built from the root down; every node splits its
+//! triangles at the median of their centroids along the longest axis of the centroids' box.
+//!
+//! Guaranteed: queries are exact, and of several equal results the one with the lowest triangle
+//! index is returned, so results do not depend on the shape of the tree or the number of threads.
+//! Building takes O(n log n), a closest-point query on a smooth surface O(log n).
 
 use super::{Vec3, triangle};
 
-/// Triangles in one leaf. Small leaves cost nodes, large ones cost triangle tests; 4 was the
-/// fastest of 2, 4 and 8.
+/// Largest number of triangles in a leaf. Smaller leaves mean more nodes, larger ones more
+/// triangle tests; 4 was the fastest of 2, 4 and 8.
 const LEAF_SIZE: usize = 4;
 
-/// Triangles from which on the two halves of a subtree are built side by side.
+/// Smallest number of triangles in a half of a subtree for which both halves are built in
+/// parallel.
 const PARALLEL_SIZE: usize = 2048;
 
-/// An axis-aligned box in millimetres.
+/// An axis-aligned bounding box, mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aabb {
     /// Smallest coordinates.
@@ -24,7 +27,7 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// The box that holds nothing.
+    /// The box that contains nothing.
     pub fn empty() -> Self {
         Self {
             min: Vec3::repeat(f64::INFINITY),
@@ -32,7 +35,7 @@ impl Aabb {
         }
     }
 
-    /// The smallest box around some points.
+    /// The smallest box that contains some points.
     pub fn of<'a>(points: impl IntoIterator<Item = &'a Vec3>) -> Self {
         let mut aabb = Self::empty();
         for p in points {
@@ -42,7 +45,7 @@ impl Aabb {
         aabb
     }
 
-    /// The smallest box around two.
+    /// The smallest box that contains both.
     pub fn union(&self, other: &Self) -> Self {
         Self {
             min: self.min.zip_map(&other.min, lesser),
@@ -50,12 +53,12 @@ impl Aabb {
         }
     }
 
-    /// Whether the two boxes share a point (touching counts).
+    /// Whether the boxes have a point in common; touching counts.
     pub fn overlaps(&self, other: &Self) -> bool {
         (0..3).all(|r| self.min[r] <= other.max[r] && other.min[r] <= self.max[r])
     }
 
-    /// Squared distance from `p` to the box, 0 inside.
+    /// The squared distance from `p` to the box, mm²; 0 inside.
     pub fn squared_distance(&self, p: &Vec3) -> f64 {
         let outside = |r: usize| greater(greater(self.min[r] - p[r], p[r] - self.max[r]), 0.0);
         let [x, y, z] = [outside(0), outside(1), outside(2)];
@@ -63,19 +66,19 @@ impl Aabb {
     }
 }
 
-/// How much boxes are widened where rays are cast at them, mm: rounding of coordinates up to
-/// metres loses no triangle.
+/// Margin by which boxes are extended in ray queries, mm. It exceeds the rounding errors of
+/// coordinates up to metres, so that no triangle is missed.
 const SLACK: f64 = 1e-9;
 
-/// A ray that boxes are asked for.
-struct Ray {
+/// A ray prepared for tests against boxes.
+struct BoxRay {
     start: Vec3,
-    /// One over the direction's components.
+    /// The reciprocals of the direction's components.
     inverse: Vec3,
 }
 
-impl Ray {
-    /// Whether it meets the box, whose slabs it crosses one after the other.
+impl BoxRay {
+    /// Whether the ray meets the box: its intervals within the three slabs overlap.
     fn meets(&self, aabb: &Aabb) -> bool {
         let (mut enters, mut leaves) = (0.0, f64::INFINITY);
         for a in 0..3 {
@@ -88,54 +91,57 @@ impl Ray {
     }
 }
 
-/// The lesser of two, the second where they cannot be compared: one instruction, where
-/// nalgebra's `inf` and `sup` branch.
+/// The smaller of two numbers, the second if they cannot be compared. This is a single
+/// instruction, whereas nalgebra's `inf` and `sup` branch.
 #[inline]
 fn lesser(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
-/// The greater of two, the second where they cannot be compared.
+/// The greater of two numbers, the second if they cannot be compared.
 #[inline]
 fn greater(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// The answer of a closest-point query.
+/// The result of a closest-point query.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Closest {
-    /// Index of the triangle that holds the point.
+    /// Index of the triangle that contains the point.
     pub triangle: u32,
-    /// The point's barycentric coordinates in it.
+    /// The point's barycentric coordinates in the triangle.
     pub barycentric: [f64; 3],
-    /// The point itself, millimetres.
+    /// The point itself, mm.
     pub point: Vec3,
-    /// Squared distance from the query, mm².
+    /// Squared distance from the queried position, mm².
     pub squared_distance: f64,
 }
 
 #[derive(Debug, Clone)]
 struct Node {
     aabb: Aabb,
-    /// Leaf: first entry of `order`; inner node: index of the right child (the left one
-    /// follows its parent).
+    /// For a leaf, its first entry in `order`; for an inner node, the index of the right child.
+    /// The left child follows its parent.
     first_or_right: u32,
-    /// Triangles in the leaf, 0 for an inner node.
+    /// Number of triangles in a leaf; 0 for an inner node.
     count: u32,
 }
 
-/// The tree. Owns a copy of the corner positions, in leaf order, for locality.
+/// The tree. It has its own copy of the corners, in the order of the leaves, which are therefore
+/// close together in memory.
 #[derive(Debug, Clone)]
 pub struct Bvh {
     nodes: Vec<Node>,
+    /// The triangles in the order of the leaves.
     order: Vec<u32>,
-    /// Where in `order` each triangle stands.
+    /// The place of each triangle in `order`.
     slots: Vec<u32>,
+    /// The corners of the triangles, in the order of the leaves.
     corners: Vec<[Vec3; 3]>,
 }
 
 impl Bvh {
-    /// Builds the tree over `triangles`, whose indices point into `vertices`.
+    /// Builds the tree over `triangles`, which are indices into `vertices`.
     ///
     /// # Panics
     /// If an index is out of range.
@@ -163,20 +169,20 @@ impl Bvh {
         }
     }
 
-    /// The point of the triangles closest to `p`; `None` only for an empty tree.
+    /// The point of all triangles that is closest to `p`; `None` only for an empty tree.
     pub fn closest(&self, p: &Vec3) -> Option<Closest> {
         self.closest_where(p, |_| true)
     }
 
-    /// The closest point among the triangles that `admits` lets through: give it to keep,
-    /// for example, the opposite side of a thin wall out. `None` where none is admitted.
+    /// The closest point on the triangles for which `admits` is true, for example those that face
+    /// the right way, to exclude the opposite side of a thin wall. `None` if there are none.
     pub fn closest_where(&self, p: &Vec3, admits: impl Fn(u32) -> bool) -> Option<Closest> {
         self.closest_from(p, None, admits)
     }
 
-    /// [`closest_where`](Self::closest_where) with a guess: a triangle that is likely near `p`,
-    /// such as the answer for a point beside it. The answer does not depend on the guess, the
-    /// time does. A guess that is no triangle of the tree is none.
+    /// [`closest_where`](Self::closest_where) with a guess: a triangle that is probably near `p`,
+    /// such as the result for a neighbouring point. The guess affects the time but not the
+    /// result; one that is not a triangle of the tree is ignored.
     pub fn closest_from(
         &self,
         p: &Vec3,
@@ -186,7 +192,7 @@ impl Bvh {
         let guessed = guess.filter(|t| (*t as usize) < self.slots.len() && admits(*t));
         let mut best = guessed.map(|t| self.closest_in(self.slots[t as usize] as usize, p));
         let mut bound = best.map_or(f64::INFINITY, |found| found.squared_distance);
-        // Depth is at most log2 of 2^32 triangles, and each level leaves one node waiting.
+        // The depth is at most log2 of 2^32 triangles, and each level adds one waiting node.
         let mut stack = [(0u32, 0.0f64); 64];
         let mut height = 0;
         if let Some(root) = self.nodes.first() {
@@ -219,32 +225,44 @@ impl Bvh {
                 }
                 continue;
             }
-            let first = node.first_or_right as usize;
-            for slot in first..first + node.count as usize {
-                let triangle = self.order[slot];
-                // A box of its own costs less than the closest point and rules most out.
-                if Aabb::of(&self.corners[slot]).squared_distance(p) > bound || !admits(triangle) {
-                    continue;
-                }
-                let found = self.closest_in(slot, p);
-                let nearer = match &best {
-                    None => true,
-                    Some(b) => {
-                        found.squared_distance < b.squared_distance
-                            || (found.squared_distance == b.squared_distance
-                                && triangle < b.triangle)
-                    }
-                };
-                if nearer {
-                    bound = found.squared_distance;
-                    best = Some(found);
-                }
-            }
+            self.improve_in_leaf(node, p, &admits, &mut best);
+            bound = best.map_or(bound, |found| found.squared_distance);
         }
         best
     }
 
-    /// The closest point of the triangle in a slot.
+    /// Replaces `best` by the closest point on an admitted triangle of a leaf, if that is nearer or,
+    /// at the same distance, on a lower triangle.
+    #[inline]
+    fn improve_in_leaf(
+        &self,
+        leaf: &Node,
+        p: &Vec3,
+        admits: &impl Fn(u32) -> bool,
+        best: &mut Option<Closest>,
+    ) {
+        let first = leaf.first_or_right as usize;
+        for slot in first..first + leaf.count as usize {
+            let triangle = self.order[slot];
+            let bound = best.map_or(f64::INFINITY, |found| found.squared_distance);
+            // The triangle's own box is faster to test than its closest point, and rules out most
+            // triangles.
+            if Aabb::of(&self.corners[slot]).squared_distance(p) > bound || !admits(triangle) {
+                continue;
+            }
+            let found = self.closest_in(slot, p);
+            let is_nearer = best.is_none_or(|known| {
+                found.squared_distance < known.squared_distance
+                    || (found.squared_distance == known.squared_distance
+                        && triangle < known.triangle)
+            });
+            if is_nearer {
+                *best = Some(found);
+            }
+        }
+    }
+
+    /// The closest point on the triangle in a slot.
     fn closest_in(&self, slot: usize, p: &Vec3) -> Closest {
         let [a, b, c] = &self.corners[slot];
         let [u, v, w] = triangle::closest_barycentric(p, a, b, c);
@@ -257,22 +275,24 @@ impl Bvh {
         }
     }
 
-    /// Calls `visit` with every triangle whose box overlaps `aabb`, in tree order.
+    /// Calls `visit` with every triangle whose bounding box overlaps `aabb`, in the order of the
+    /// tree.
     pub fn for_each_overlapping(&self, aabb: &Aabb, mut visit: impl FnMut(u32)) {
         self.for_each_where(|other| other.overlaps(aabb), &mut visit);
     }
 
-    /// Calls `visit` with every triangle that the ray from `start` on in `direction` may meet,
-    /// in tree order: those whose box it meets.
+    /// Calls `visit` with every triangle whose bounding box the ray from `start` in `direction`
+    /// meets, in the order of the tree: all those that the ray itself may meet.
     pub fn for_each_along(&self, start: &Vec3, direction: &Vec3, mut visit: impl FnMut(u32)) {
-        let ray = Ray {
+        let ray = BoxRay {
             start: *start,
             inverse: direction.map(|x| 1.0 / x),
         };
         self.for_each_where(|aabb| ray.meets(aabb), &mut visit);
     }
 
-    /// Calls `visit` with every triangle whose box `admits` lets through, in tree order.
+    /// Calls `visit` with every triangle for whose bounding box `admits` is true, in the order of
+    /// the tree.
     fn for_each_where(&self, admits: impl Fn(&Aabb) -> bool, visit: &mut impl FnMut(u32)) {
         let mut stack = [0u32; 64];
         let mut height = usize::from(!self.nodes.is_empty());
@@ -299,7 +319,7 @@ impl Bvh {
     }
 }
 
-/// Appends the subtree over `order` (whose first entry stands at `offset` of the whole).
+/// Appends the subtree over `order`, whose first entry has the place `offset` in the whole.
 fn build(
     nodes: &mut Vec<Node>,
     order: &mut [u32],
@@ -334,12 +354,15 @@ fn build(
         right_index = nodes.len();
         build(nodes, right, offset + middle, corners, centroids);
     } else {
-        let alone = |order, offset| {
+        let build_apart = |order, offset| {
             let mut nodes = Vec::new();
             build(&mut nodes, order, offset, corners, centroids);
             nodes
         };
-        let (left, right) = rayon::join(|| alone(left, offset), || alone(right, offset + middle));
+        let (left, right) = rayon::join(
+            || build_apart(left, offset),
+            || build_apart(right, offset + middle),
+        );
         append(nodes, left);
         right_index = nodes.len();
         append(nodes, right);
@@ -348,7 +371,7 @@ fn build(
     nodes[index].count = 0;
 }
 
-/// Appends a subtree that was built by itself.
+/// Appends a subtree that was built separately.
 fn append(nodes: &mut Vec<Node>, subtree: Vec<Node>) {
     let shift = nodes.len() as u32;
     nodes.extend(subtree.into_iter().map(|mut node| {
@@ -389,7 +412,7 @@ mod tests {
     }
 
     #[test]
-    fn halves_built_side_by_side_make_the_same_tree() {
+    fn halves_built_in_parallel_make_the_same_tree() {
         let mesh = shapes::icosphere(5.0, 5);
         let tree = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
@@ -400,7 +423,7 @@ mod tests {
         assert!(one.order.len() > 4 * PARALLEL_SIZE);
         let many = tree(3);
         assert_eq!(format!("{:?}", one.nodes), format!("{:?}", many.nodes));
-        // Every triangle is its own closest: the parts were put together rightly.
+        // Every triangle is the closest to its own centroid, so the parts fit together.
         for t in (0..mesh.triangles.len()).step_by(97) {
             let [a, b, c] = mesh.corners(t);
             let found = many.closest(&((a + b + c) / 3.0)).unwrap();
@@ -409,14 +432,14 @@ mod tests {
     }
 
     #[test]
-    fn no_triangle_that_a_ray_meets_is_left_out() {
+    fn ray_queries_miss_no_triangle() {
         let mesh = shapes::torus(9.0, 3.0, 40, 17);
         let bvh = Bvh::new(&mesh.vertices, &mesh.triangles);
         let (mut met, mut asked) = (0, 0);
         for i in 0..300 {
             let t = f64::from(i);
             let start = Vec3::new((t * 1.7).sin(), (t * 0.9).cos(), (t * 2.3).sin()) * 12.0;
-            // Along the axes too, where a component of the direction is 0.
+            // Some directions are axes, with components that are 0.
             let direction = match i % 4 {
                 3 => Vec3::new((t * 0.3).cos(), (t * 1.1).sin(), (t * 0.7).cos()).normalize(),
                 axis => Vec3::ith(axis as usize, 1.0),

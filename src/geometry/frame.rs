@@ -1,15 +1,15 @@
-//! From voxel indices to the patient.
+//! Coordinate frames: from voxel indices to patient coordinates.
 //!
-//! A volume is an array with indices (i, j, k), i fastest; index (0, 0, 0) is the *centre* of
-//! the first voxel. [`VoxelToPatient`] takes (fractional) indices to millimetres in DICOM's
-//! patient frame, LPS: x grows to the patient's left, y to posterior, z to superior. NIfTI
-//! speaks RAS, which differs by the signs of x and y; [`VoxelToPatient::from_ras`] is the one
-//! place where that is turned.
+//! A volume is an array with indices (i, j, k), of which i varies fastest; index (0, 0, 0) is the
+//! *centre* of the first voxel. [`VoxelToPatient`] maps indices, fractional ones too, to
+//! millimetres in the patient frame of DICOM, LPS: x increases to the patient's left, y to
+//! posterior, z to superior. NIfTI uses RAS, in which x and y have the opposite sign;
+//! [`VoxelToPatient::from_ras`] and [`VoxelToPatient::to_ras`] are the only conversions.
 
 use super::Vec3;
 use nalgebra::{Matrix3, Matrix4};
 
-/// The affine map from voxel indices to LPS millimetres. Always invertible and finite.
+/// The affine map from voxel indices to LPS millimetres; always finite and invertible.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VoxelToPatient {
     linear: Matrix3<f64>,
@@ -17,18 +17,18 @@ pub struct VoxelToPatient {
     inverse: Matrix3<f64>,
 }
 
-/// A map that is not finite or cannot be inverted.
+/// An affine map is not finite or not invertible.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the affine is singular or not finite")]
 pub struct SingularAffine;
 
 impl VoxelToPatient {
-    /// `linear`'s columns are the steps of i, j, k in millimetres (LPS); `origin` is the
-    /// centre of voxel (0, 0, 0).
+    /// The map with the given linear part, whose columns are the steps of i, j, k in millimetres
+    /// (LPS), and with the centre of voxel (0, 0, 0) at `origin`.
     ///
     /// # Errors
-    /// [`SingularAffine`] unless every entry is finite and the volume of a voxel is not
-    /// vanishing against the product of its spacings.
+    /// [`SingularAffine`] if an entry is not finite, or if the volume of a voxel is less than a
+    /// millionth of the product of its spacings.
     pub fn new(linear: Matrix3<f64>, origin: Vec3) -> Result<Self, SingularAffine> {
         let spacing_product: f64 = linear.column_iter().map(|c| c.norm()).product();
         let finite = linear.iter().chain(origin.iter()).all(|x| x.is_finite());
@@ -46,7 +46,7 @@ impl VoxelToPatient {
         })
     }
 
-    /// Takes NIfTI's affine (index to RAS+ millimetres) over into LPS.
+    /// The map given by an affine of NIfTI, from indices to RAS+ millimetres.
     ///
     /// # Errors
     /// See [`VoxelToPatient::new`].
@@ -57,7 +57,7 @@ impl VoxelToPatient {
         Self::new(linear, origin)
     }
 
-    /// Axis-aligned voxels of `spacing` mm with the array's centre at `centre`.
+    /// The map for an axis-aligned array of voxels of `spacing` mm that is centred at `centre`.
     ///
     /// # Errors
     /// See [`VoxelToPatient::new`].
@@ -70,7 +70,7 @@ impl VoxelToPatient {
         Self::new(Matrix3::from_diagonal(&Vec3::from(spacing)), centre - half)
     }
 
-    /// The affine for NIfTI: index to RAS+ millimetres.
+    /// The affine for NIfTI, from indices to RAS+ millimetres.
     pub fn to_ras(&self) -> Matrix4<f64> {
         let mut m = self.matrix();
         m.row_mut(0).neg_mut();
@@ -78,7 +78,7 @@ impl VoxelToPatient {
         m
     }
 
-    /// The 4×4 matrix, index to LPS millimetres.
+    /// The 4×4 matrix from indices to LPS millimetres.
     pub fn matrix(&self) -> Matrix4<f64> {
         let mut m = Matrix4::identity();
         m.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.linear);
@@ -86,33 +86,33 @@ impl VoxelToPatient {
         m
     }
 
-    /// Voxel index (fractional) to LPS millimetres.
+    /// Maps a voxel index, possibly fractional, to LPS millimetres.
     pub fn to_patient(&self, index: &Vec3) -> Vec3 {
         self.linear * index + self.origin
     }
 
-    /// LPS millimetres to voxel index (fractional).
+    /// Maps LPS millimetres to a fractional voxel index.
     pub fn to_voxel(&self, patient: &Vec3) -> Vec3 {
         self.inverse * (patient - self.origin)
     }
 
-    /// The 3×3 part: columns are the steps along i, j, k.
+    /// The 3×3 linear part, whose columns are the steps along i, j, k in mm.
     pub fn linear(&self) -> &Matrix3<f64> {
         &self.linear
     }
 
-    /// Distance of neighbouring voxel centres along i, j, k in millimetres.
+    /// The distances of neighbouring voxel centres along i, j, k, mm.
     pub fn spacing(&self) -> [f64; 3] {
         [0, 1, 2].map(|axis| self.linear.column(axis).norm())
     }
 
-    /// Volume of one voxel in cubic millimetres.
+    /// The volume of one voxel, mm³.
     pub fn voxel_volume(&self) -> f64 {
         self.linear.determinant().abs()
     }
 
-    /// Whether the map mirrors: triangles that turn outward in index space must then be
-    /// turned over.
+    /// Whether the map reverses orientation. Triangles that face outward in index space must then
+    /// be reversed.
     pub fn is_left_handed(&self) -> bool {
         self.linear.determinant() < 0.0
     }

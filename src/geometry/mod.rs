@@ -1,6 +1,6 @@
-//! Words that every stage shares: points, frames, closest points, exact predicates, seeds.
+//! Geometry that all stages share: vectors, coordinate frames, closest points, random numbers.
 //!
-//! Lengths are millimetres and angles radians wherever a name does not say otherwise.
+//! Lengths are in millimetres and angles in radians unless a name says otherwise.
 
 pub mod bvh;
 pub mod frame;
@@ -11,5 +11,5 @@ pub mod triangle;
 /// A position or a direction in patient space: LPS, millimetres.
 pub type Vec3 = nalgebra::Vector3<f64>;
 
-/// A direction or a position in a plane.
+/// A position or a direction in a plane.
 pub type Vec2 = nalgebra::Vector2<f64>;

@@ -1,31 +1,31 @@
-//! Random numbers that depend on the seed and the purpose alone.
+//! Random numbers that are determined by a seed and a purpose.
 //!
-//! PCG-XSL-RR-128/64 (O'Neill 2014), one independent stream for each purpose, so that drawing
-//! one number more in one stage changes no other stage.
+//! The generator is PCG-XSL-RR-128/64 (O'Neill 2014). Every purpose has an independent stream, so
+//! drawing more numbers in one stage does not affect any other stage.
 
 use rand::Rng;
 use rand_pcg::Pcg64;
 
-/// What a stream of random numbers is for. The discriminant is part of every result's
-/// reproducibility: never renumber.
+/// What a stream of random numbers is used for. The numbers of the variants are part of every
+/// result and must never change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Purpose {
-    /// First positions of the model's points.
+    /// Initial positions of the model's points.
     Placement = 1,
-    /// Quality of re-tiling where sites must jump.
+    /// New positions of sites that are moved.
     Relocation = 2,
-    /// Samples for measuring.
+    /// Samples for measurements.
     Measure = 3,
-    /// Counting noise of a phantom.
+    /// Counting noise of phantoms.
     PhantomNoise = 4,
-    /// Shape of a phantom.
+    /// Shapes of phantoms.
     PhantomShape = 5,
     /// Starting poses of the deformable model.
     Pose = 6,
 }
 
-/// The generator for `purpose` under `seed`.
+/// The generator of the stream for `purpose` with this seed.
 pub fn stream(seed: u64, purpose: Purpose) -> Pcg64 {
     Pcg64::new(u128::from(seed), purpose as u128)
 }

@@ -1,14 +1,23 @@
-//! One triangle: area, shape, closest point.
+//! Geometry of a single triangle: normal, shape, closest point, ray intersection.
+//!
+//! Corners are in millimetres and counter-clockwise seen from outside.
 
 use super::Vec3;
 
-/// Twice the area times the unit normal (counter-clockwise a, b, c seen from outside).
+/// The outward normal of the triangle, twice its area long, mm².
 pub fn area_normal(a: &Vec3, b: &Vec3, c: &Vec3) -> Vec3 {
     (b - a).cross(&(c - a))
 }
 
-/// The radius ratio 2r/R of inscribed to circumscribed circle: 1 for the equilateral
-/// triangle, 0 for a degenerate one.
+/// The unit outward normal; zero for a degenerate triangle.
+pub fn unit_normal([a, b, c]: &[Vec3; 3]) -> Vec3 {
+    area_normal(a, b, c)
+        .try_normalize(0.0)
+        .unwrap_or_else(Vec3::zeros)
+}
+
+/// The radius ratio 2r/R of inscribed and circumscribed circle: 1 for an equilateral triangle,
+/// 0 for a degenerate one.
 pub fn radius_ratio(a: &Vec3, b: &Vec3, c: &Vec3) -> f64 {
     let (la, lb, lc) = ((b - c).norm(), (c - a).norm(), (a - b).norm());
     let doubled_area = area_normal(a, b, c).norm();
@@ -21,13 +30,13 @@ pub fn radius_ratio(a: &Vec3, b: &Vec3, c: &Vec3) -> f64 {
     }
 }
 
-/// The angle between two normals of any length, 0..=π, accurate also near 0 and π.
+/// The angle between two vectors of any length, 0..=π; accurate near 0 and π as well.
 pub fn angle_between(n0: &Vec3, n1: &Vec3) -> f64 {
     n0.cross(n1).norm().atan2(n0.dot(n1))
 }
 
-/// The barycentric coordinates of the point of triangle `a b c` closest to `p` (Ericson,
-/// Real-Time Collision Detection, 5.1.5).
+/// The barycentric coordinates of the point of triangle `a b c` that is closest to `p`
+/// (Ericson, *Real-Time Collision Detection*, 2005, section 5.1.5).
 pub fn closest_barycentric(p: &Vec3, a: &Vec3, b: &Vec3, c: &Vec3) -> [f64; 3] {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
@@ -64,8 +73,8 @@ pub fn closest_barycentric(p: &Vec3, a: &Vec3, b: &Vec3, c: &Vec3) -> [f64; 3] {
     [1.0 - v - w, v, w]
 }
 
-/// Distance from `start` along a ray to the triangle `a`, `b`, `c`, in lengths of `direction`;
-/// `None` where the ray passes it by (Möller and Trumbore 1997).
+/// The distance from `start` along a ray to the triangle `a b c`, in lengths of `direction`;
+/// `None` if the ray misses the triangle (Möller and Trumbore 1997).
 pub fn ray_distance(start: &Vec3, direction: &Vec3, a: &Vec3, b: &Vec3, c: &Vec3) -> Option<f64> {
     let (ab, ac) = (b - a, c - a);
     let p = direction.cross(&ac);

@@ -14,6 +14,7 @@
 //! 2012) over the box that holds both masks.
 
 use crate::grid::voxelise::Mask;
+use crate::numeric::order::quantile;
 use crate::progress::{Cancelled, Monitor};
 
 /// How two masks agree. A is the first, B the reference.
@@ -133,17 +134,13 @@ fn contour_distances(
         mean_voxels: mean(&distances([1.0; 3])?),
         mean_mm: mean(&mm),
         hausdorff_mm: mm.iter().flatten().fold(0.0, |a, b| a.max(*b)),
-        hausdorff95_mm: mm.iter_mut().map(|d| quantile(d, 0.95)).fold(0.0, f64::max),
+        hausdorff95_mm: (mm.iter_mut())
+            .map(|distances| {
+                distances.sort_by(f64::total_cmp);
+                quantile(distances, 0.95)
+            })
+            .fold(0.0, f64::max),
     })
-}
-
-/// The q-quantile by linear interpolation between order statistics.
-fn quantile(values: &mut [f64], q: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let at = q * (values.len() - 1) as f64;
-    let low = at.floor() as usize;
-    let high = (low + 1).min(values.len() - 1);
-    values[low] + (at - low as f64) * (values[high] - values[low])
 }
 
 /// The box of both masks inside the grid.

@@ -5,6 +5,7 @@
 //! 6-connected and its background 26-connected, the pair that Marching Cubes' table obeys.
 
 use crate::grid::labels::Labels;
+use crate::numeric::disjoint_sets::{set_numbers, singletons, unite};
 
 /// A stretch of voxels of one row, border included in the coordinates.
 #[derive(Debug, Clone, Copy)]
@@ -47,7 +48,7 @@ impl Components {
             }
         }
         first.push(runs.len());
-        let mut parent: Vec<usize> = (0..runs.len()).collect();
+        let mut parent = singletons(runs.len());
         let reach = usize::from(!inside);
         for k in 0..planes {
             for j in 0..rows {
@@ -65,17 +66,12 @@ impl Components {
                 }
             }
         }
-        let mut number = vec![usize::MAX; runs.len()];
-        let mut sizes = Vec::new();
-        let mut component = Vec::with_capacity(runs.len());
-        for r in 0..runs.len() {
-            let root = root(&mut parent, r);
-            if number[root] == usize::MAX {
-                number[root] = sizes.len();
-                sizes.push(0);
-            }
-            sizes[number[root]] += runs[r].end - runs[r].start;
-            component.push(number[root]);
+        let component: Vec<usize> = (set_numbers(&mut parent).into_iter())
+            .map(|label| label as usize)
+            .collect();
+        let mut sizes = vec![0; component.iter().max().map_or(0, |c| c + 1)];
+        for (run, &c) in runs.iter().zip(&component) {
+            sizes[c] += run.end - run.start;
         }
         Self {
             runs,
@@ -150,13 +146,12 @@ fn unite_overlapping(
     runs: &[Run],
     [here, there]: [std::ops::Range<usize>; 2],
     reach: usize,
-    parent: &mut [usize],
+    parent: &mut [u32],
 ) {
     let (mut a, mut b) = (here.start, there.start);
     while a < here.end && b < there.end {
         if runs[a].start < runs[b].end + reach && runs[b].start < runs[a].end + reach {
-            let (x, y) = (root(parent, a), root(parent, b));
-            parent[x.max(y)] = x.min(y);
+            unite(parent, a as u32, b as u32);
         }
         if runs[a].end < runs[b].end {
             a += 1;
@@ -164,14 +159,6 @@ fn unite_overlapping(
             b += 1;
         }
     }
-}
-
-fn root(parent: &mut [usize], mut r: usize) -> usize {
-    while parent[r] != r {
-        parent[r] = parent[parent[r]];
-        r = parent[r];
-    }
-    r
 }
 
 #[cfg(test)]

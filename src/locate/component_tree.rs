@@ -187,15 +187,8 @@ fn lowest_step(
     0
 }
 
-fn root(parent: &mut [u32], mut r: u32) -> u32 {
-    while parent[r as usize] != r {
-        parent[r as usize] = parent[parent[r as usize] as usize];
-        r = parent[r as usize];
-    }
-    r
-}
-
 fn unite(parent: &mut [u32], sums: &mut [Sums], a: u32, b: u32) {
+    use crate::numeric::disjoint_sets::root;
     let (a, b) = (root(parent, a), root(parent, b));
     if a == b {
         return;

@@ -1,17 +1,27 @@
-//! The one triangle mesh, what is true of it, and small meshes to try things on.
+//! The triangle mesh that all stages share: storage, connectivity, topology, intersections.
 //!
-//! [`TriMesh`] is plain data: positions in millimetres (LPS) and index triples that run
-//! counter-clockwise seen from outside. [`topology`] says whether it is a closed manifold;
-//! [`adjacency`] walks it.
+//! [`TriMesh`] is plain data: positions in millimetres (LPS) and index triples,
+//! counter-clockwise seen from outside. The other modules answer questions about it:
+//!
+//! - [`ids`]: index types for vertices, faces and half-edges;
+//! - [`half_edges`]: neighbours, and edge flips;
+//! - [`topology`]: whether it is a closed manifold, with how many components and handles;
+//! - [`intersections`]: which of its triangles intersect, decided exactly;
+//! - [`shapes`]: meshes with known properties, for tests and examples.
 
-pub mod adjacency;
+mod defect;
+pub mod half_edges;
+pub mod ids;
 pub mod intersections;
 pub mod shapes;
 pub mod topology;
 
+pub use ids::{FaceId, HalfEdgeId, VertexId};
+
 use crate::geometry::{Vec3, triangle};
 
-/// A triangle mesh: positions (LPS, mm) and counter-clockwise index triples.
+/// A triangle mesh: vertex positions and index triples. Nothing about its topology is promised;
+/// [`topology::check`] tells.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TriMesh {
     /// Vertex positions in millimetres, patient frame LPS.
@@ -21,12 +31,17 @@ pub struct TriMesh {
 }
 
 impl TriMesh {
-    /// The three corner positions of triangle `t`.
+    /// The corner indices of a face.
+    pub fn corner_ids(&self, face: FaceId) -> [VertexId; 3] {
+        ids::typed(self.triangles[face.index()])
+    }
+
+    /// The positions of the corners of triangle `t`, mm.
     pub fn corners(&self, t: usize) -> [Vec3; 3] {
         self.triangles[t].map(|v| self.vertices[v as usize])
     }
 
-    /// Twice the area times the outward unit normal of triangle `t`.
+    /// The outward normal of triangle `t`, twice its area long, mm².
     pub fn area_normal(&self, t: usize) -> Vec3 {
         let [a, b, c] = self.corners(t);
         triangle::area_normal(&a, &b, &c)
@@ -39,8 +54,8 @@ impl TriMesh {
             .sum()
     }
 
-    /// Enclosed volume, mm³: positive where the triangles face outward (divergence theorem,
-    /// taken about the first vertex to keep digits far from the origin).
+    /// Enclosed volume, mm³, by the divergence theorem: positive if the triangles face outward.
+    /// Computed relative to the first vertex, since far from the origin digits would cancel.
     pub fn volume(&self) -> f64 {
         let Some(origin) = self.vertices.first() else {
             return 0.0;
@@ -53,18 +68,25 @@ impl TriMesh {
             .sum()
     }
 
-    /// Area-weighted unit normal of every vertex; zero where a vertex has no area around it.
+    /// See [`vertex_normals`].
     pub fn vertex_normals(&self) -> Vec<Vec3> {
-        let mut normals = vec![Vec3::zeros(); self.vertices.len()];
-        for t in 0..self.triangles.len() {
-            let n = self.area_normal(t);
-            for v in self.triangles[t] {
-                normals[v as usize] += n;
-            }
-        }
-        for n in &mut normals {
-            *n = n.try_normalize(0.0).unwrap_or_else(Vec3::zeros);
-        }
-        normals
+        vertex_normals(&self.vertices, &self.triangles)
     }
+}
+
+/// The unit normal of every vertex: the mean normal of the triangles around it, weighted by
+/// area. Zero where they have no area.
+pub fn vertex_normals(vertices: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::zeros(); vertices.len()];
+    for t in triangles {
+        let [a, b, c] = t.map(|v| vertices[v as usize]);
+        let normal = triangle::area_normal(&a, &b, &c);
+        for &v in t {
+            normals[v as usize] += normal;
+        }
+    }
+    for n in &mut normals {
+        *n = n.try_normalize(0.0).unwrap_or_else(Vec3::zeros);
+    }
+    normals
 }

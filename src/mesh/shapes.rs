@@ -1,4 +1,7 @@
-//! Closed meshes with known answers: spheres, tori and ventricle-like cups.
+//! Closed meshes with known areas, volumes and topology: spheres, tori and ventricle-like cups.
+//!
+//! All are centred at or rotationally symmetric about the origin's z axis, in millimetres, with
+//! triangles that face outward.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -22,48 +25,13 @@ pub fn tetrahedron(edge: f64) -> TriMesh {
     }
 }
 
-/// A sphere about the origin: an icosahedron whose triangles are cut in four
-/// `subdivisions` times. 10·4^s + 2 vertices.
+/// A sphere about the origin: an icosahedron whose triangles are split in four `subdivisions`
+/// times, with all vertices on the sphere. It has 10·4^s + 2 vertices.
 pub fn icosphere(radius: f64, subdivisions: u32) -> TriMesh {
-    let g = f64::midpoint(1.0, 5f64.sqrt());
-    let mut vertices: Vec<Vec3> = [
-        [-1.0, g, 0.0],
-        [1.0, g, 0.0],
-        [-1.0, -g, 0.0],
-        [1.0, -g, 0.0],
-        [0.0, -1.0, g],
-        [0.0, 1.0, g],
-        [0.0, -1.0, -g],
-        [0.0, 1.0, -g],
-        [g, 0.0, -1.0],
-        [g, 0.0, 1.0],
-        [-g, 0.0, -1.0],
-        [-g, 0.0, 1.0],
-    ]
-    .map(|p| Vec3::from(p).normalize())
-    .to_vec();
-    let mut triangles = vec![
-        [0, 11, 5],
-        [0, 5, 1],
-        [0, 1, 7],
-        [0, 7, 10],
-        [0, 10, 11],
-        [1, 5, 9],
-        [5, 11, 4],
-        [11, 10, 2],
-        [10, 7, 6],
-        [7, 1, 8],
-        [3, 9, 4],
-        [3, 4, 2],
-        [3, 2, 6],
-        [3, 6, 8],
-        [3, 8, 9],
-        [4, 9, 5],
-        [2, 4, 11],
-        [6, 2, 10],
-        [8, 6, 7],
-        [9, 8, 1],
-    ];
+    let TriMesh {
+        mut vertices,
+        mut triangles,
+    } = icosahedron();
     for _ in 0..subdivisions {
         let mut middles: BTreeMap<(u32, u32), u32> = BTreeMap::new();
         let mut finer = Vec::with_capacity(4 * triangles.len());
@@ -89,8 +57,55 @@ pub fn icosphere(radius: f64, subdivisions: u32) -> TriMesh {
     }
 }
 
-/// A torus about the z axis: `major` from the axis to the tube's centre, `minor` the tube's
-/// radius, in `around` × `across` quadrilaterals.
+/// The icosahedron with its vertices on the unit sphere.
+fn icosahedron() -> TriMesh {
+    let g = f64::midpoint(1.0, 5f64.sqrt());
+    let vertices = [
+        [-1.0, g, 0.0],
+        [1.0, g, 0.0],
+        [-1.0, -g, 0.0],
+        [1.0, -g, 0.0],
+        [0.0, -1.0, g],
+        [0.0, 1.0, g],
+        [0.0, -1.0, -g],
+        [0.0, 1.0, -g],
+        [g, 0.0, -1.0],
+        [g, 0.0, 1.0],
+        [-g, 0.0, -1.0],
+        [-g, 0.0, 1.0],
+    ]
+    .map(|p| Vec3::from(p).normalize())
+    .to_vec();
+    let triangles = vec![
+        [0, 11, 5],
+        [0, 5, 1],
+        [0, 1, 7],
+        [0, 7, 10],
+        [0, 10, 11],
+        [1, 5, 9],
+        [5, 11, 4],
+        [11, 10, 2],
+        [10, 7, 6],
+        [7, 1, 8],
+        [3, 9, 4],
+        [3, 4, 2],
+        [3, 2, 6],
+        [3, 6, 8],
+        [3, 8, 9],
+        [4, 9, 5],
+        [2, 4, 11],
+        [6, 2, 10],
+        [8, 6, 7],
+        [9, 8, 1],
+    ];
+    TriMesh {
+        vertices,
+        triangles,
+    }
+}
+
+/// A torus about the z axis, made of `around` × `across` quadrilaterals: `major` is the distance
+/// from the axis to the tube's centre, `minor` the tube's radius, both in mm.
 pub fn torus(major: f64, minor: f64, around: u32, across: u32) -> TriMesh {
     let mut mesh = TriMesh::default();
     for i in 0..around {
@@ -108,9 +123,9 @@ pub fn torus(major: f64, minor: f64, around: u32, across: u32) -> TriMesh {
     mesh
 }
 
-/// A cup like the ventricle's wall, genus 0: half an ellipsoid of `length` (apex at -z) and
-/// equatorial `radius`, `wall` mm thick, closed by a rounded rim. `around` meridians; rows
-/// are spaced to match.
+/// A cup shaped like the ventricle's wall, of genus 0: half an ellipsoid of semi-axis `length`
+/// (apex at -z) and equatorial `radius`, with a wall of `wall` mm that ends in a rounded rim at
+/// z = 0. It has `around` meridians; the distance between its rows matches.
 pub fn cup(length: f64, radius: f64, wall: f64, around: u32) -> TriMesh {
     use std::f64::consts::{FRAC_PI_2, PI};
     let step = TAU * radius / f64::from(around);
@@ -150,7 +165,7 @@ pub fn cup(length: f64, radius: f64, wall: f64, around: u32) -> TriMesh {
         for row in 0..height - 1 {
             let [p, q] = [id(row, i), id(row, i + 1)];
             let [s, t] = [id(row + 1, i), id(row + 1, i + 1)];
-            // Odd rows are turned by half a step: the shorter diagonal changes sides.
+            // Odd rows are rotated by half a step, so the shorter diagonal alternates.
             if row % 2 == 0 {
                 mesh.triangles.extend([[p, q, s], [q, t, s]]);
             } else {
@@ -178,7 +193,7 @@ mod tests {
         let (length, radius, wall) = (60.0, 30.0, 10.0);
         let shell = cup(length, radius, wall, 96).volume();
         let half = |l: f64, r: f64| 2.0 / 3.0 * PI * l * r * r;
-        // Rim: half a torus tube (Pappus).
+        // The rim is half a torus (Pappus).
         let rim = PI * (wall / 2.0).powi(2) / 2.0 * 2.0 * PI * (radius - wall / 2.0);
         let exact = half(length, radius) - half(length - wall, radius - wall) + rim;
         assert!((shell / exact - 1.0).abs() < 0.01, "{shell} {exact}");

@@ -1,121 +1,80 @@
-//! Is it a closed manifold, and of which kind?
+//! Checks that a mesh is a closed manifold, and counts its topology.
 //!
-//! [`check`] demands and counts. A mesh passes when every edge belongs to exactly two
-//! triangles that run through it in opposite directions, every vertex is used and has one
-//! single cycle of triangles around it, and no triangle occurs twice. Positions are not
-//! looked at: self-intersection is [`super::intersections`]' business.
+//! In: index triples. Out: a [`Census`] (vertices, edges, triangles, components, Euler
+//! characteristic), or the first [`MeshDefect`].
+//!
+//! A mesh passes if every edge belongs to exactly two triangles that traverse it in opposite
+//! directions, every vertex is used and surrounded by a single cycle of triangles, and no
+//! triangle occurs twice. Positions are not considered; self-intersection is the subject of
+//! [`super::intersections`].
 
 use super::TriMesh;
-use super::adjacency::Adjacency;
+use super::half_edges::{around, lowest_outgoing, pair_half_edges};
+use super::ids::{FaceId, VertexId};
 use crate::geometry::Vec3;
+use crate::numeric::disjoint_sets;
 
-/// What keeps a triangle list from being a closed, oriented 2-manifold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Defect {
-    /// A triangle names one vertex twice.
-    #[error("triangle {triangle} uses a vertex twice")]
-    DegenerateTriangle {
-        /// Index of the triangle.
-        triangle: u32,
-    },
-    /// Only one triangle lies at the edge: the surface has a hole.
-    #[error("edge {edge:?} belongs to one triangle only")]
-    OpenEdge {
-        /// The edge's vertices, the lower index first.
-        edge: [u32; 2],
-    },
-    /// Three or more triangles share the edge.
-    #[error("edge {edge:?} belongs to more than two triangles")]
-    NonManifoldEdge {
-        /// The edge's vertices, the lower index first.
-        edge: [u32; 2],
-    },
-    /// The two triangles of the edge run the same way through it.
-    #[error("the triangles at edge {edge:?} are oriented against each other")]
-    TurnedTriangles {
-        /// The edge's vertices, the lower index first.
-        edge: [u32; 2],
-    },
-    /// The triangles round the vertex form more than one cycle.
-    #[error("vertex {vertex} joins more than one fan of triangles")]
-    NonManifoldVertex {
-        /// Index of the vertex.
-        vertex: u32,
-    },
-    /// No triangle uses the vertex.
-    #[error("vertex {vertex} belongs to no triangle")]
-    UnusedVertex {
-        /// Index of the vertex.
-        vertex: u32,
-    },
-    /// Two triangles have the same three vertices.
-    #[error("triangle {triangle} has the same three vertices as another one")]
-    DoubledTriangle {
-        /// Index of the later triangle.
-        triangle: u32,
-    },
-}
+pub use super::defect::MeshDefect;
 
-/// The numbers of a closed manifold.
+/// The counts of a closed manifold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Census {
-    /// Number of vertices.
+    /// Number of vertices, V.
     pub vertices: usize,
-    /// Number of edges.
+    /// Number of edges, E.
     pub edges: usize,
-    /// Number of triangles.
+    /// Number of triangles, F.
     pub triangles: usize,
-    /// Connected components.
+    /// Number of connected components.
     pub components: usize,
-    /// V - E + F: 2 for each sphere, less 2 for each handle.
+    /// V - E + F: 2 for each component, less 2 for each handle.
     pub euler_characteristic: i64,
 }
 
 impl Census {
-    /// Handles over all components.
+    /// Number of handles over all components.
     pub fn genus(&self) -> i64 {
         self.components as i64 - self.euler_characteristic / 2
     }
 }
 
-/// Demands that `mesh` is a closed, oriented 2-manifold, and counts it.
+/// Checks that `mesh` is a closed, oriented 2-manifold and counts its topology.
 ///
 /// # Errors
-/// The first [`Defect`] met.
-pub fn check(mesh: &TriMesh) -> Result<Census, Defect> {
+/// The first [`MeshDefect`] found.
+pub fn check(mesh: &TriMesh) -> Result<Census, MeshDefect> {
     check_triangles(mesh.vertices.len(), &mesh.triangles)
 }
 
 /// [`check`] for a triangle list over `vertices` vertices.
 ///
 /// # Errors
-/// The first [`Defect`] met.
-pub fn check_triangles(vertices: usize, triangles: &[[u32; 3]]) -> Result<Census, Defect> {
-    let adjacency = Adjacency::new(triangles)?;
-    // Where every edge belongs to two triangles, a double lies across each of the three.
-    let sorted = |t: u32| {
-        let mut key = triangles[t as usize];
+/// The first [`MeshDefect`] found.
+pub fn check_triangles(vertices: usize, triangles: &[[u32; 3]]) -> Result<Census, MeshDefect> {
+    let twins = pair_half_edges(triangles)?;
+    // Every edge has two triangles, so a duplicate lies across each of its three edges.
+    let sorted = |t: FaceId| {
+        let mut key = triangles[t.index()];
         key.sort_unstable();
         key
     };
-    for t in 0..triangles.len() as u32 {
-        let across = adjacency.neighbours(t)[0];
+    for t in FaceId::first(triangles.len()) {
+        let across = twins[t.half_edge(0).index()].face();
         if t < across && sorted(t) == sorted(across) {
-            return Err(Defect::DoubledTriangle { triangle: across });
+            return Err(MeshDefect::DuplicateTriangle { triangle: across });
         }
     }
     let mut corners = vec![0u32; vertices];
     for &v in triangles.iter().flatten() {
         corners[v as usize] += 1;
     }
-    let outgoing = Adjacency::outgoing(triangles, vertices);
-    for (vertex, h) in outgoing.iter().enumerate() {
-        let vertex_id = vertex as u32;
-        let Some(h) = h else {
-            return Err(Defect::UnusedVertex { vertex: vertex_id });
+    let outgoing = lowest_outgoing(triangles, vertices);
+    for (vertex, outgoing) in VertexId::first(vertices).zip(outgoing) {
+        let Some(first) = outgoing else {
+            return Err(MeshDefect::UnusedVertex { vertex });
         };
-        if adjacency.around(*h).count() != corners[vertex] as usize {
-            return Err(Defect::NonManifoldVertex { vertex: vertex_id });
+        if around(&twins, first).count() != corners[vertex.index()] as usize {
+            return Err(MeshDefect::NonManifoldVertex { vertex });
         }
     }
     let edges = 3 * triangles.len() / 2;
@@ -123,50 +82,46 @@ pub fn check_triangles(vertices: usize, triangles: &[[u32; 3]]) -> Result<Census
         vertices,
         edges,
         triangles: triangles.len(),
-        components: components(vertices, triangles)
-            .iter()
-            .max()
-            .map_or(0, |m| *m as usize + 1),
+        components: component_count(&components(vertices, triangles)),
         euler_characteristic: vertices as i64 - edges as i64 + triangles.len() as i64,
     })
 }
 
-/// The connected component of every vertex, numbered by lowest vertex.
+/// The connected component of every vertex, numbered in the order of their lowest vertices.
 pub fn components(vertices: usize, triangles: &[[u32; 3]]) -> Vec<u32> {
-    let mut parent: Vec<u32> = (0..vertices as u32).collect();
-    fn root(parent: &mut [u32], mut v: u32) -> u32 {
-        while parent[v as usize] != v {
-            parent[v as usize] = parent[parent[v as usize] as usize];
-            v = parent[v as usize];
-        }
-        v
+    let mut parent = disjoint_sets::singletons(vertices);
+    for [a, b, c] in triangles {
+        disjoint_sets::unite(&mut parent, *a, *b);
+        disjoint_sets::unite(&mut parent, *a, *c);
     }
-    for t in triangles {
-        for k in 1..3 {
-            let (a, b) = (root(&mut parent, t[0]), root(&mut parent, t[k]));
-            // The lower index becomes the root, so that numbering follows the vertices.
-            parent[a.max(b) as usize] = a.min(b);
-        }
-    }
-    let mut number = vec![u32::MAX; vertices];
-    let mut count = 0;
-    (0..vertices as u32)
-        .map(|v| {
-            let r = root(&mut parent, v) as usize;
-            if number[r] == u32::MAX {
-                number[r] = count;
-                count += 1;
-            }
-            number[r]
-        })
-        .collect()
+    disjoint_sets::set_numbers(&mut parent)
 }
 
-/// Signed volume of each component, mm³: positive where it faces outward, negative where it
-/// bounds a cavity. `component` gives that of every vertex, as [`components`] does.
+/// The number of components, given that of every vertex by [`components`].
+pub fn component_count(component: &[u32]) -> usize {
+    component.iter().max().map_or(0, |c| *c as usize + 1)
+}
+
+/// The Euler characteristic of each component of a closed mesh; `component` gives that of every
+/// vertex, as [`components`] does.
+pub fn component_characteristics(triangles: &[[u32; 3]], component: &[u32]) -> Vec<i64> {
+    // V - E + F with 2E = 3F, doubled.
+    let mut doubled = vec![0i64; component_count(component)];
+    for &c in component {
+        doubled[c as usize] += 2;
+    }
+    for corners in triangles {
+        doubled[component[corners[0] as usize] as usize] -= 1;
+    }
+    doubled.into_iter().map(|d| d / 2).collect()
+}
+
+/// The signed volume of each component, mm³: positive where its triangles face outward,
+/// negative where it bounds a cavity. `component` gives the component of every vertex, as
+/// [`components`] does.
 pub fn component_volumes(vertices: &[Vec3], triangles: &[[u32; 3]], component: &[u32]) -> Vec<f64> {
-    let count = component.iter().max().map_or(0, |c| *c as usize + 1);
-    // About a vertex of its own, to keep digits far from the origin.
+    let count = component_count(component);
+    // Relative to a vertex of the component: far from the origin digits would cancel.
     let mut origin = vec![None; count];
     let mut volumes = vec![0.0; count];
     for t in triangles {
@@ -208,23 +163,25 @@ mod tests {
             with(&|t| {
                 t.pop();
             }),
-            Defect::OpenEdge { .. }
+            MeshDefect::OpenEdge { .. }
         ));
         assert!(matches!(
             with(&|t| t[0].swap(0, 1)),
-            Defect::TurnedTriangles { .. }
+            MeshDefect::OrientationConflict { .. }
         ));
         assert!(matches!(
             with(&|t| t.push(t[0])),
-            Defect::NonManifoldEdge { .. }
+            MeshDefect::NonManifoldEdge { .. }
         ));
         assert!(matches!(
             with(&|t| t[0][0] = t[0][1]),
-            Defect::DegenerateTriangle { triangle: 0 }
+            MeshDefect::DegenerateTriangle {
+                triangle: FaceId(0)
+            }
         ));
         assert!(matches!(
             check_triangles(n + 1, &sphere.triangles).unwrap_err(),
-            Defect::UnusedVertex { .. }
+            MeshDefect::UnusedVertex { .. }
         ));
         // Two tetrahedra that share one vertex.
         let t = shapes::tetrahedron(1.0).triangles;
@@ -232,12 +189,14 @@ mod tests {
         pair.extend(t.iter().map(|t| t.map(|v| if v == 0 { 0 } else { v + 3 })));
         assert_eq!(
             check_triangles(7, &pair).unwrap_err(),
-            Defect::NonManifoldVertex { vertex: 0 }
+            MeshDefect::NonManifoldVertex {
+                vertex: VertexId(0)
+            }
         );
         // Two triangles glued back to back.
         assert!(matches!(
             check_triangles(3, &[[0, 1, 2], [0, 2, 1]]).unwrap_err(),
-            Defect::DoubledTriangle { .. }
+            MeshDefect::DuplicateTriangle { .. }
         ));
     }
 }

@@ -16,7 +16,7 @@ use crate::locate::cup::Cup;
 use crate::locate::localisation as localise;
 use crate::locate::localisation::Hints;
 use crate::mesh::TriMesh;
-use crate::mesh::topology::{self, Defect};
+use crate::mesh::topology::{self, MeshDefect};
 use crate::progress::{Cancelled, Monitor};
 
 /// Why a mesh cannot be a model to fit.
@@ -24,7 +24,7 @@ use crate::progress::{Cancelled, Monitor};
 pub enum TemplateError {
     /// Not a closed manifold.
     #[error("the model is not a closed surface: {0}")]
-    Topology(#[from] Defect),
+    Topology(#[from] MeshDefect),
     /// A coordinate is not finite.
     #[error("vertex {vertex} of the model is not finite")]
     NotFinite {

@@ -1,7 +1,13 @@
 //! Numerical methods that several stages share.
 //!
+//! - [`conjugate_gradient`]: the solver of sparse symmetric positive definite systems;
+//! - [`block_matrix`]: such systems of 3×3 blocks;
+//! - [`disjoint_sets`]: union-find on a list of parents;
+//! - [`order`]: order statistics;
 //! - [`round_step`]: round numbers for scales.
-//! - [`conjugate_gradient`]: sparse symmetric positive definite systems.
 
+pub mod block_matrix;
 pub mod conjugate_gradient;
+pub mod disjoint_sets;
+pub mod order;
 pub mod round_step;

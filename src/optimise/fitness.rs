@@ -1,43 +1,72 @@
-//! The four-term fitness of an edge configuration.
+//! The four-term fitness of an edge and its neighbourhood.
 //!
-//! A configuration p is an edge (a, b) with its two triangles. The paper judges it by
+//! A configuration p is an edge (a, b) with its two triangles. The paper assesses it by
 //!
-//! * A, the angle between the two triangles' normals (0 = flat);
-//! * B, the mean of the four angles between those triangles and their outer neighbours: the
-//!   mean of A over the configuration's four sides;
+//! * A, the dihedral angle: the angle between the normals of the two triangles (0 = flat);
+//! * B, the mean dihedral angle at the other four sides of the two triangles;
 //! * C, the mean of R/(2r) over the two triangles (1 = equilateral);
-//! * D, the distance of the edge's midpoint to the reference surface S,
+//! * D, the distance of the edge's midpoint from the reference surface S,
 //!
-//! and rates it F(p) = Σ wᵢ/w · sᵢ / max(Xᵢ, fᵢ), the model by the mean of F over all edges.
-//! The paper states neither units nor floors, so that its absolute figures cannot be compared
-//! with anybody's; ours are stated in [`Scales`]. A floor fᵢ says below which value a term is
-//! as good as perfect; without one a single flat pair would outweigh the whole mesh.
+//! and its fitness is F(p) = Σ wᵢ/w · sᵢ / max(Xᵢ, fᵢ), where w is the sum of the weights. The
+//! fitness of a model is the mean of F over all edges.
+//!
+//! The paper states neither the units of the terms nor the floors fᵢ, so its absolute values
+//! cannot be compared with any others; ours are in [`Scales`]. Below its floor a term counts as
+//! perfect; without floors a single flat pair of triangles would outweigh the whole mesh.
 
-use super::FitnessForm;
+/// The form of the fitness: in which units, and up to which value, its terms count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FitnessForm {
+    /// The paper's reciprocal terms, limited to 20.
+    Raw,
+    /// Every term in (0, 1].
+    Normalised,
+    /// Reciprocals of angles in degrees and of millimetres, for comparisons between programs.
+    Robust,
+}
 
 /// The four terms of one configuration: A and B in radians, C a ratio, D in millimetres.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Terms {
-    /// Angle between the normals of the edge's two triangles.
+pub struct FitnessTerms {
+    /// Dihedral angle at the edge.
     pub a: f64,
-    /// Mean angle to the four outer neighbours.
+    /// Mean dihedral angle at the other four sides of the two triangles.
     pub b: f64,
     /// Mean R/(2r) of the two triangles.
     pub c: f64,
-    /// Distance of the edge's midpoint to S.
+    /// Distance of the edge's midpoint from S.
     pub d: f64,
 }
 
-/// The lengths that distances are held against, mm.
+/// Means of the fitness and of its terms over all edges of a mesh.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct FitnessSummary {
+    /// Mean fitness in the raw form.
+    pub raw: f64,
+    /// Mean fitness in the normalised form, 0..=1.
+    pub normalised: f64,
+    /// Mean fitness in the robust form with equal weights.
+    pub robust: f64,
+    /// Mean of A, the dihedral angle, radians.
+    pub a_mean: f64,
+    /// Mean of B, the dihedral angles at the neighbouring edges, radians.
+    pub b_mean: f64,
+    /// Mean of C, R/(2r); 1 = equilateral.
+    pub c_mean: f64,
+    /// Mean of D, the distance of the edge's midpoint from S, mm.
+    pub d_mean: f64,
+}
+
+/// The lengths to which distances are related, mm.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Lengths {
     /// Smallest voxel spacing.
     pub voxel: f64,
-    /// Edge of the equilateral triangles that would cover S, as many as the mesh has.
+    /// Edge length of equilateral triangles of which as many as the mesh has would cover S.
     pub edge: f64,
 }
 
-/// Numerators and floors of the four terms, in the units of [`Terms`].
+/// Numerators and floors of the four terms, in the units of [`FitnessTerms`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scales {
     /// sᵢ.
@@ -51,14 +80,14 @@ impl Scales {
     pub fn new(form: FitnessForm, lengths: Lengths) -> Self {
         let degree = 1f64.to_radians();
         match form {
-            // Angles in radians, D in voxels, no term above 20: the paper's reciprocals.
+            // The paper's reciprocals: angles in radians, D in voxels, no term above 20.
             FitnessForm::Raw => Self {
                 numerator: [1.0, 1.0, 1.0, lengths.voxel],
                 floor: [0.05, 0.05, 1.0, 0.05 * lengths.voxel],
             },
-            // Flat within 10 degrees and as close as a hundredth of an edge counts as perfect: 1.
-            // A chord of a curve of curvature k strays by k/8 of its squared length: measured
-            // in voxels, a finer mesh would be perfect before it is close.
+            // Angles up to 10 degrees and distances up to a hundredth of an edge count as
+            // perfect, 1. A chord of a curve of curvature k is off by k/8 of its squared
+            // length: measured in voxels, a finer mesh would count as perfect too early.
             FitnessForm::Normalised => Self {
                 numerator: [10.0 * degree, 10.0 * degree, 1.0, 0.01 * lengths.edge],
                 floor: [10.0 * degree, 10.0 * degree, 1.0, 0.01 * lengths.edge],
@@ -72,7 +101,7 @@ impl Scales {
     }
 }
 
-/// The rating F of a configuration.
+/// The fitness F with its weights and scales.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fitness {
     weighted: [f64; 4],
@@ -80,8 +109,8 @@ pub struct Fitness {
 }
 
 impl Fitness {
-    /// `form` with `weights` w1..w4 (not negative, not all zero), D measured against `lengths`
-    /// where the form says so.
+    /// The fitness in `form` with `weights` w1..w4 (not negative, not all zero); `lengths` scale D
+    /// in the forms that relate it to them.
     pub fn new(form: FitnessForm, weights: [f64; 4], lengths: Lengths) -> Self {
         let scales = Scales::new(form, lengths);
         let sum: f64 = weights.iter().sum();
@@ -93,7 +122,7 @@ impl Fitness {
     }
 
     /// F of one configuration.
-    pub fn of(&self, terms: &Terms) -> f64 {
+    pub fn of(&self, terms: &FitnessTerms) -> f64 {
         let x = [terms.a, terms.b, terms.c, terms.d];
         (0..4)
             .map(|i| self.weighted[i] / x[i].max(self.floor[i]))
@@ -111,21 +140,21 @@ mod tests {
     };
 
     #[test]
-    fn a_perfect_configuration_rates_one_in_the_normalised_form() {
+    fn a_perfect_configuration_has_fitness_one_in_the_normalised_form() {
         let fitness = Fitness::new(FitnessForm::Normalised, [1.0, 2.0, 3.0, 4.0], LENGTHS);
-        let perfect = Terms {
+        let perfect = FitnessTerms {
             c: 1.0,
-            ..Terms::default()
+            ..FitnessTerms::default()
         };
         assert!((fitness.of(&perfect) - 1.0).abs() < 1e-15);
         // Twice as far as a hundredth of an edge of 12 mm.
-        let worse = Terms { d: 0.24, ..perfect };
+        let worse = FitnessTerms { d: 0.24, ..perfect };
         assert!((fitness.of(&worse) - (0.6 + 0.4 / 2.0)).abs() < 1e-15);
     }
 
     #[test]
     fn raw_and_robust_forms_follow_their_units_and_floors() {
-        let terms = Terms {
+        let terms = FitnessTerms {
             a: 0.2,
             b: 0.5,
             c: 1.25,
@@ -136,9 +165,9 @@ mod tests {
         let robust = Fitness::new(FitnessForm::Robust, [1.0; 4], LENGTHS).of(&terms);
         let expected = 1.0 / 0.2f64.to_degrees() + 1.0 / 0.5f64.to_degrees() + 0.8 + 2.0;
         assert!((robust - expected / 4.0).abs() < 1e-12);
-        let flat = Terms {
+        let flat = FitnessTerms {
             c: 1.0,
-            ..Terms::default()
+            ..FitnessTerms::default()
         };
         let capped = Fitness::new(FitnessForm::Raw, [1.0; 4], LENGTHS).of(&flat);
         assert!((capped - (20.0 + 20.0 + 1.0 + 20.0) / 4.0).abs() < 1e-12);

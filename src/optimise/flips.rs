@@ -1,62 +1,65 @@
-//! Greedy sweeps of edge flips: the paper's Algorithms 1 and 2.
+//! Greedy sweeps of edge flips: Algorithms 1 and 2 of the paper.
 //!
-//! A sweep lists every legal flip that gains, best first (ties by vertex numbers), and takes
-//! them in turn. A flip is *affected*, and skipped until the next sweep, where a triangle that
-//! its gain depends on has changed in this sweep. Sweeps run until none finds a flip.
+//! In: a mesh with the fitness terms of all its edges, and the rules of a good flip. Out: the
+//! triangles after the flips. Each sweep:
 //!
-//! Gains are remembered from sweep to sweep; only edges within [`reach`] of a changed triangle
-//! are judged again, so that all sweeps after the first cost O(changes). The outcome is the
-//! same as judging everything anew (a test compares).
+//! 1. lists every legal flip that gains, best first (ties by vertex numbers);
+//! 2. performs them in this order. A flip is *affected*, and left to the next sweep, if a
+//!    triangle that its gain depends on has changed in this sweep.
+//!
+//! Sweeps are repeated until none finds a flip. Gains are kept from sweep to sweep; only edges
+//! within [`reach`] of a changed triangle are judged again, so every sweep after the first
+//! takes O(changes). The result is the same as if all edges were judged anew (a test compares).
 //!
 //! With [`Gain::Total`] each flip raises the sum of F over all edges by more than
-//! [`LEAST_GAIN`], and since the mesh has finitely many triangulations the sweeps must end.
-//! [`Gain::Local`] has no such potential: sweeps that come back to an earlier triangulation
-//! are stopped, and the best state seen at a sweep's end is returned.
+//! [`MIN_GAIN`]; since there are finitely many triangulations, the sweeps end. With
+//! [`Gain::Local`] nothing rises monotonically: sweeps that return to an earlier triangulation
+//! are stopped, and the best state at the end of a sweep is returned.
 
 use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 
-use super::configurations::{Candidate, Configurations};
-use super::connectivity::Connectivity;
+use super::configurations::{Configurations, FlipCandidate};
 use super::fitness::Fitness;
 use super::legality;
 use super::{Ended, Gain};
 use crate::geometry::Vec3;
-use crate::mesh::adjacency::{next, previous};
+use crate::mesh::half_edges::HalfEdges;
 use crate::mesh::intersections::IntersectionIndex;
+use crate::mesh::{FaceId, HalfEdgeId};
 use crate::progress::{Cancelled, Monitor};
 
-/// Gains below this are rounding.
-const LEAST_GAIN: f64 = 1e-9;
+/// Smaller gains are considered rounding errors.
+const MIN_GAIN: f64 = 1e-9;
 
-/// Sweeps after which a run is given up; the longest seen took 12.
-const MOST_SWEEPS: usize = 200;
+/// Largest number of sweeps; the longest run seen took 12.
+const MAX_SWEEPS: usize = 200;
 
-/// Edges judged between two looks at the cancel token.
+/// Number of edges judged between two checks of the cancel token.
 const EDGES_PER_CHECK: usize = 8192;
 
-/// What makes a flip good.
+/// The rules of a good flip.
 #[derive(Debug, Clone, Copy)]
 pub struct FlipRules {
-    /// Rates a configuration.
+    /// The fitness to increase.
     pub fitness: Fitness,
-    /// What must gain.
+    /// Whose fitness must rise.
     pub gain: Gain,
-    /// Least radius ratio 2r/R of a new triangle.
+    /// Smallest radius ratio 2r/R of a new triangle.
     pub guard: f64,
 }
 
-/// The result of the sweeps.
+/// The result of [`sweep`].
 #[derive(Debug, Clone, PartialEq)]
-pub struct Flipped {
-    /// The triangles.
+pub struct SweepResult {
+    /// The triangles after the flips.
     pub triangles: Vec<[u32; 3]>,
-    /// Flips made on the way to them.
+    /// Number of flips that led to them.
     pub flips: usize,
-    /// Sweeps run.
+    /// Number of sweeps.
     pub sweeps: usize,
-    /// Why they ended.
+    /// Why the sweeps ended.
     pub ended: Ended,
 }
 
@@ -68,11 +71,11 @@ pub fn sweep(
     mut state: Configurations,
     rules: &FlipRules,
     monitor: &Monitor,
-) -> Result<Flipped, Cancelled> {
-    let mut index = intersection_index(state.vertices(), state.connectivity());
-    let mut gains = Gains::new(state.connectivity());
-    let mut best = Best::new(&state, rules);
-    let mut seen = BTreeSet::from([fingerprint(state.connectivity())]);
+) -> Result<SweepResult, Cancelled> {
+    let mut index = intersection_index(state.vertices(), state.half_edges());
+    let mut gains = Gains::new(state.half_edges());
+    let mut best = BestState::new(&state, rules);
+    let mut seen = BTreeSet::from([fingerprint(state.half_edges())]);
     let (mut flips, mut sweeps) = (0, 0);
     let ended = loop {
         gains.refresh(&state, rules, monitor)?;
@@ -82,16 +85,16 @@ pub fn sweep(
             break Ended::NoFlipGains;
         }
         flips += changed.len() / 2;
-        gains.invalidate(state.connectivity(), &changed, rules.gain);
-        best.keep(&state, rules, flips);
-        if !seen.insert(fingerprint(state.connectivity())) {
+        gains.invalidate(state.half_edges(), &changed, rules.gain);
+        best.update(&state, rules, flips);
+        if !seen.insert(fingerprint(state.half_edges())) {
             break Ended::Cycle;
         }
-        if sweeps == MOST_SWEEPS {
+        if sweeps == MAX_SWEEPS {
             break Ended::SweepLimit;
         }
     };
-    Ok(Flipped {
+    Ok(SweepResult {
         triangles: best.triangles,
         flips: best.flips,
         sweeps,
@@ -99,54 +102,55 @@ pub fn sweep(
     })
 }
 
-/// The index that answers whether a flip would pierce.
-pub fn intersection_index(vertices: &[Vec3], connectivity: &Connectivity) -> IntersectionIndex {
-    let edges = connectivity.edges();
-    let length = |h: u32| {
-        let [p, q] = [connectivity.origin(h), connectivity.target(h)];
-        (vertices[p as usize] - vertices[q as usize]).norm()
+/// An index of the mesh's triangles to test flips against.
+pub fn intersection_index(vertices: &[Vec3], half_edges: &HalfEdges) -> IntersectionIndex {
+    let length = |h: HalfEdgeId| {
+        let [p, q] = half_edges.ends(h).map(|v| vertices[v.index()]);
+        (p - q).norm()
     };
-    let mean = edges.map(length).sum::<f64>() * 2.0 / f64::from(connectivity.halfedges().max(1));
-    IntersectionIndex::new(vertices, connectivity.triangles(), mean)
+    let count = half_edges.half_edge_count().max(1) as f64;
+    let mean = half_edges.edges().map(length).sum::<f64>() * 2.0 / count;
+    IntersectionIndex::new(vertices, half_edges.triangles(), mean)
 }
 
-/// One sweep: the triangles that it changed, two for each flip.
+/// Runs one sweep. Returns the triangles that it changed, two for each flip.
 fn run_sweep(
     state: &mut Configurations,
     gains: &Gains,
     rules: &FlipRules,
     index: &mut IntersectionIndex,
-) -> Vec<u32> {
+) -> Vec<FaceId> {
     let vertices = state.vertices();
     let mut changed = Vec::new();
-    let mut is_changed = vec![false; state.connectivity().triangles().len()];
-    for (h, candidate) in gains.listed(state.connectivity()) {
-        let connectivity = state.connectivity();
+    let mut is_changed = vec![false; state.half_edges().face_count()];
+    for (h, candidate) in gains.listed(state.half_edges()) {
+        let half_edges = state.half_edges();
         let mut affected = false;
-        for side in [h, connectivity.twin(h)] {
-            visit_across(connectivity, side, reach(rules.gain), &mut |t| {
-                affected |= is_changed[t as usize];
+        for side in [h, half_edges.twin(h)] {
+            visit_across(half_edges, side, reach(rules.gain), &mut |t| {
+                affected |= is_changed[t.index()];
             });
         }
         if affected
-            || !connectivity.can_flip(h)
-            || legality::pierces(vertices, connectivity, index, h)
+            || !half_edges.can_flip(h)
+            || legality::flip_intersects(vertices, half_edges, index, h)
         {
             continue;
         }
-        let pair = [h / 3, connectivity.twin(h) / 3];
+        let pair = half_edges.faces_of(h);
         state.flip(h, candidate.distance);
-        legality::reindex(vertices, state.connectivity(), index, &pair);
+        legality::reindex(vertices, state.half_edges(), index, &pair);
         for t in pair {
-            is_changed[t as usize] = true;
+            is_changed[t.index()] = true;
             changed.push(t);
         }
     }
     changed
 }
 
-/// How many triangles away a change can matter to a flip's gain: its own fitness looks at the
-/// pair's outer neighbours; the fitness of their edges at two triangles more.
+/// The distance, in triangles, up to which a change affects the gain of a flip. The flipped
+/// edge's own fitness depends on the outer neighbours of its two triangles; the fitness of the
+/// neighbours' edges on triangles up to two further steps away.
 fn reach(gain: Gain) -> usize {
     match gain {
         Gain::Local => 1,
@@ -154,30 +158,35 @@ fn reach(gain: Gain) -> usize {
     }
 }
 
-/// Calls `visit` with the triangle of `h` and all within `depth` steps of it that are reached
-/// through its other two edges; some more than once.
-fn visit_across(connectivity: &Connectivity, h: u32, depth: usize, visit: &mut impl FnMut(u32)) {
-    visit(h / 3);
+/// Calls `visit` with the triangle of `h` and with all that are reached from it in at most
+/// `depth` steps through its other two edges; with some more than once.
+fn visit_across(
+    half_edges: &HalfEdges,
+    h: HalfEdgeId,
+    depth: usize,
+    visit: &mut impl FnMut(FaceId),
+) {
+    visit(h.face());
     if depth > 0 {
-        for side in [next(h), previous(h)] {
-            visit_across(connectivity, connectivity.twin(side), depth - 1, visit);
+        for side in [h.next(), h.previous()] {
+            visit_across(half_edges, half_edges.twin(side), depth - 1, visit);
         }
     }
 }
 
-/// What every edge's flip would gain, as far as it is known.
+/// The known gains of flipping each edge.
 struct Gains {
-    /// By half-edge; only the lower numbered of each edge counts.
-    candidates: Vec<Option<Candidate>>,
+    /// By half-edge; only that of the lower numbered half-edge of an edge is used.
+    candidates: Vec<Option<FlipCandidate>>,
     /// Edges to judge before the next sweep.
-    stale: Vec<u32>,
+    stale: Vec<HalfEdgeId>,
 }
 
 impl Gains {
-    fn new(connectivity: &Connectivity) -> Self {
+    fn new(half_edges: &HalfEdges) -> Self {
         Self {
-            candidates: vec![None; connectivity.halfedges() as usize],
-            stale: connectivity.edges().collect(),
+            candidates: vec![None; half_edges.half_edge_count()],
+            stale: half_edges.edges().collect(),
         }
     }
 
@@ -190,70 +199,70 @@ impl Gains {
     ) -> Result<(), Cancelled> {
         for block in self.stale.chunks(EDGES_PER_CHECK) {
             monitor.check()?;
-            let judged: Vec<Option<Candidate>> = block
+            let judged: Vec<Option<FlipCandidate>> = block
                 .par_iter()
                 .with_min_len(64)
-                .map(|&h| state.candidate(h, &rules.fitness, rules.gain, rules.guard, LEAST_GAIN))
+                .map(|&h| state.candidate(h, &rules.fitness, rules.gain, rules.guard, MIN_GAIN))
                 .collect();
             for (&h, candidate) in block.iter().zip(judged) {
-                self.candidates[h as usize] = candidate;
+                self.candidates[h.index()] = candidate;
             }
         }
         self.stale.clear();
         Ok(())
     }
 
-    /// Forgets what may differ after `changed` triangles.
-    fn invalidate(&mut self, connectivity: &Connectivity, changed: &[u32], gain: Gain) {
-        let mut near = vec![false; connectivity.triangles().len()];
+    /// Marks the edges as stale whose gains may differ after the `changed` triangles.
+    fn invalidate(&mut self, half_edges: &HalfEdges, changed: &[FaceId], gain: Gain) {
+        let mut near = vec![false; half_edges.face_count()];
         for &t in changed {
-            for k in 0..3 {
-                let mut mark = |t: u32| near[t as usize] = true;
-                visit_across(connectivity, 3 * t + k, reach(gain), &mut mark);
+            for h in t.half_edges() {
+                let mut mark = |t: FaceId| near[t.index()] = true;
+                visit_across(half_edges, h, reach(gain), &mut mark);
             }
         }
-        self.stale = connectivity
+        self.stale = half_edges
             .edges()
-            .filter(|&h| near[h as usize / 3] || near[connectivity.twin(h) as usize / 3])
+            .filter(|&h| half_edges.faces_of(h).iter().any(|t| near[t.index()]))
             .collect();
     }
 
     /// The possible flips, best first.
-    fn listed(&self, connectivity: &Connectivity) -> Vec<(u32, Candidate)> {
-        let mut list: Vec<(u32, Candidate)> = connectivity
+    fn listed(&self, half_edges: &HalfEdges) -> Vec<(HalfEdgeId, FlipCandidate)> {
+        let mut list: Vec<(HalfEdgeId, FlipCandidate)> = half_edges
             .edges()
-            .filter_map(|h| Some((h, self.candidates[h as usize]?)))
-            .filter(|&(h, _)| connectivity.can_flip(h))
+            .filter_map(|h| Some((h, self.candidates[h.index()]?)))
+            .filter(|&(h, _)| half_edges.can_flip(h))
             .collect();
         list.sort_by(|(g, x), (h, y)| {
-            let key = |h: u32| ends(connectivity, h);
-            y.gain.total_cmp(&x.gain).then(key(*g).cmp(&key(*h)))
+            let by_vertices = || half_edges.edge_ends(*g).cmp(&half_edges.edge_ends(*h));
+            y.gain.total_cmp(&x.gain).then_with(by_vertices)
         });
         list
     }
 }
 
-/// The best state seen at a sweep's end.
-struct Best {
+/// The state with the highest mean fitness among those at the end of a sweep.
+struct BestState {
     triangles: Vec<[u32; 3]>,
     mean: f64,
     flips: usize,
 }
 
-impl Best {
+impl BestState {
     fn new(state: &Configurations, rules: &FlipRules) -> Self {
         Self {
-            triangles: state.connectivity().triangles().to_vec(),
+            triangles: state.half_edges().triangles().to_vec(),
             mean: state.mean(&rules.fitness),
             flips: 0,
         }
     }
 
-    fn keep(&mut self, state: &Configurations, rules: &FlipRules, flips: usize) {
+    fn update(&mut self, state: &Configurations, rules: &FlipRules, flips: usize) {
         let mean = state.mean(&rules.fitness);
         if mean > self.mean {
             *self = Self {
-                triangles: state.connectivity().triangles().to_vec(),
+                triangles: state.half_edges().triangles().to_vec(),
                 mean,
                 flips,
             };
@@ -261,19 +270,14 @@ impl Best {
     }
 }
 
-fn ends(connectivity: &Connectivity, h: u32) -> [u32; 2] {
-    let (u, v) = (connectivity.origin(h), connectivity.target(h));
-    [u.min(v), u.max(v)]
-}
-
-/// A number that two different sets of edges share with a chance of 2⁻⁶⁴: the sum over the
-/// edges of a scrambled key (splitmix64's finaliser).
-fn fingerprint(connectivity: &Connectivity) -> u64 {
-    connectivity
+/// A hash of the set of edges: the sum over the edges of a scrambled key (splitmix64's
+/// finaliser). Two different sets have the same one with a probability of 2⁻⁶⁴.
+fn fingerprint(half_edges: &HalfEdges) -> u64 {
+    half_edges
         .edges()
         .map(|h| {
-            let [u, v] = ends(connectivity, h);
-            let mut x = (u64::from(u) << 32 | u64::from(v)).wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let [u, v] = half_edges.edge_ends(h).map(|v| u64::from(v.0));
+            let mut x = (u << 32 | v).wrapping_add(0x9e37_79b9_7f4a_7c15);
             x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
             x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
             x ^ (x >> 31)
@@ -285,9 +289,10 @@ fn fingerprint(connectivity: &Connectivity) -> u64 {
 mod tests {
     use super::super::fitness::Lengths;
     use super::*;
-    use crate::mesh::{TriMesh, shapes};
-    use crate::optimise::connectivity::Quad;
-    use crate::optimise::{FitnessForm, Reference, configurations};
+    use crate::mesh::half_edges::Quad;
+    use crate::mesh::{TriMesh, VertexId, shapes};
+    use crate::optimise::fitness::FitnessForm;
+    use crate::optimise::{Reference, configurations};
     use crate::surface::Surface;
 
     const LENGTHS: Lengths = Lengths {
@@ -299,7 +304,7 @@ mod tests {
         Reference::new(&Surface::exact(mesh, spacing))
     }
 
-    /// `mesh` with its vertices jolted by up to `jolt` mm and `flips` random legal flips.
+    /// `mesh` with its vertices moved by up to `jolt` mm and `flips` random legal flips.
     fn disturbed(mut mesh: TriMesh, jolt: f64, flips: usize, seed: u32) -> TriMesh {
         let mut state = seed;
         let mut draw = || {
@@ -309,15 +314,15 @@ mod tests {
         for v in &mut mesh.vertices {
             *v += Vec3::from_fn(|_, _| (f64::from(draw()) / f64::from(1 << 23) - 1.0) * jolt);
         }
-        let mut connectivity = Connectivity::new(mesh.vertices.len(), mesh.triangles).unwrap();
+        let mut half_edges = HalfEdges::new(mesh.vertices.len(), mesh.triangles).unwrap();
         for _ in 0..flips {
-            let h = draw() % connectivity.halfedges();
-            let legal = legality::replacement(&mesh.vertices, &connectivity.quad(h), 0.0).is_some();
-            if legal && connectivity.can_flip(h) {
-                connectivity.flip(h);
+            let h = HalfEdgeId(draw() % half_edges.half_edge_count() as u32);
+            let legal = legality::replacement(&mesh.vertices, &half_edges.quad(h), 0.0).is_some();
+            if legal && half_edges.can_flip(h) {
+                half_edges.flip(h);
             }
         }
-        mesh.triangles = connectivity.into_triangles();
+        mesh.triangles = half_edges.into_triangles();
         mesh
     }
 
@@ -350,7 +355,7 @@ mod tests {
         }
     }
 
-    /// The promised gain is the change of the sum of F over the whole mesh, computed afresh.
+    /// The predicted gain is the change of the sum of F over the whole mesh, computed afresh.
     #[test]
     fn total_gain_is_the_change_of_the_meshs_sum() {
         let mut judged = 0;
@@ -360,16 +365,16 @@ mod tests {
             for form in [FitnessForm::Raw, FitnessForm::Normalised] {
                 let fitness = Fitness::new(form, [1.0, 2.0, 0.5, 1.0], LENGTHS);
                 let before = state.mean(&fitness) * edges;
-                for h in state.connectivity().edges().step_by(3) {
+                for h in state.half_edges().edges().step_by(3) {
                     let found = state.candidate(h, &fitness, Gain::Total, 0.0, -1e9);
-                    let Some(candidate) = found.filter(|_| state.connectivity().can_flip(h)) else {
+                    let Some(candidate) = found.filter(|_| state.half_edges().can_flip(h)) else {
                         continue;
                     };
-                    let mut connectivity = state.connectivity().clone();
-                    connectivity.flip(h);
+                    let mut half_edges = state.half_edges().clone();
+                    half_edges.flip(h);
                     let flipped = TriMesh {
                         vertices: mesh.vertices.clone(),
-                        triangles: connectivity.into_triangles(),
+                        triangles: half_edges.into_triangles(),
                     };
                     let after = configurations(&flipped, &reference).unwrap();
                     let expected = after.mean(&fitness) * edges - before;
@@ -391,13 +396,13 @@ mod tests {
         let state = configurations(&mesh, &reference).unwrap();
         let fitness = rules(FitnessForm::Raw, Gain::Local, 0.0).fitness;
         let mut judged = 0;
-        for h in state.connectivity().edges() {
+        for h in state.half_edges().edges() {
             let found = state.candidate(h, &fitness, Gain::Local, 0.0, -1e9);
-            if let Some(candidate) = found.filter(|_| state.connectivity().can_flip(h)) {
+            if let Some(candidate) = found.filter(|_| state.half_edges().can_flip(h)) {
                 let mut after = state.clone();
                 after.flip(h, candidate.distance);
-                // The new edge is the last of the first triangle.
-                let new_edge = 3 * (h / 3) + 2;
+                // The new edge is the last half-edge of the first triangle.
+                let new_edge = h.face().half_edge(2);
                 let expected = fitness.of(&after.terms(new_edge)) - fitness.of(&state.terms(h));
                 assert!((candidate.gain - expected).abs() < 1e-12);
                 judged += 1;
@@ -406,57 +411,57 @@ mod tests {
         assert!(judged > 100);
     }
 
-    /// Terms kept up to date over many flips are those of a mesh measured afresh.
+    /// Terms that are updated over many flips equal those of a fresh measurement.
     #[test]
     fn terms_stay_those_of_a_fresh_measurement() {
         let (mesh, reference) = cases().swap_remove(2);
         let mut state = configurations(&mesh, &reference).unwrap();
         let rules = rules(FitnessForm::Raw, Gain::Total, 0.0);
-        for h in 0..state.connectivity().halfedges() {
+        for h in state.half_edges().half_edges() {
             let found = state.candidate(h, &rules.fitness, rules.gain, 0.0, -1e9);
-            if let Some(candidate) = found.filter(|_| state.connectivity().can_flip(h)) {
+            if let Some(candidate) = found.filter(|_| state.half_edges().can_flip(h)) {
                 state.flip(h, candidate.distance);
             }
         }
         let vertices = mesh.vertices.clone();
-        let triangles = state.connectivity().triangles().to_vec();
+        let triangles = state.half_edges().triangles().to_vec();
         let flipped = TriMesh {
             vertices,
             triangles,
         };
         let fresh = configurations(&flipped, &reference).unwrap();
-        for h in 0..state.connectivity().halfedges() {
+        for h in state.half_edges().half_edges() {
             assert_eq!(state.terms(h), fresh.terms(h));
         }
     }
 
     #[test]
-    fn remembered_gains_lead_to_the_same_mesh_as_judging_all_anew() {
+    fn stored_gains_lead_to_the_same_mesh_as_judging_all_edges_anew() {
         for (mesh, reference) in cases() {
             for gain in [Gain::Local, Gain::Total] {
                 let rules = rules(FitnessForm::Normalised, gain, 0.0);
                 let state = configurations(&mesh, &reference).unwrap();
-                let remembered = sweep(state.clone(), &rules, &Monitor::silent()).unwrap();
+                let stored = sweep(state.clone(), &rules, &Monitor::silent()).unwrap();
                 let mut anew = state;
-                for _ in 0..remembered.sweeps {
-                    let mut gains = Gains::new(anew.connectivity());
+                for _ in 0..stored.sweeps {
+                    let mut gains = Gains::new(anew.half_edges());
                     gains.refresh(&anew, &rules, &Monitor::silent()).unwrap();
-                    let mut index = intersection_index(anew.vertices(), anew.connectivity());
+                    let mut index = intersection_index(anew.vertices(), anew.half_edges());
                     run_sweep(&mut anew, &gains, &rules, &mut index);
                 }
                 if gain == Gain::Total {
-                    assert!(remembered.flips > 10 && remembered.sweeps > 2);
-                    assert_eq!(anew.connectivity().triangles(), remembered.triangles);
+                    assert!(stored.flips > 10 && stored.sweeps > 2);
+                    assert_eq!(anew.half_edges().triangles(), stored.triangles);
                 }
-                let least = remembered_mean(&mesh, &remembered, &reference, &rules);
+                let least = mean_after(&mesh, &stored, &reference, &rules);
                 assert!(anew.mean(&rules.fitness) <= least + 1e-15);
             }
         }
     }
 
-    fn remembered_mean(
+    fn mean_after(
         mesh: &TriMesh,
-        flipped: &Flipped,
+        flipped: &SweepResult,
         reference: &Reference,
         rules: &FlipRules,
     ) -> f64 {
@@ -478,10 +483,10 @@ mod tests {
                     let state = configurations(&mesh, &reference).unwrap();
                     let before = state.mean(&rules.fitness);
                     let flipped = sweep(state, &rules, &Monitor::silent()).unwrap();
-                    let after = remembered_mean(&mesh, &flipped, &reference, &rules);
+                    let after = mean_after(&mesh, &flipped, &reference, &rules);
                     assert!(after >= before);
                     if gain == Gain::Total {
-                        let least = LEAST_GAIN * flipped.flips as f64 * 0.9;
+                        let least = MIN_GAIN * flipped.flips as f64 * 0.9;
                         let edges = mesh.triangles.len() as f64 * 1.5;
                         assert!((after - before) * edges >= least);
                         assert_eq!(flipped.ended, Ended::NoFlipGains);
@@ -492,7 +497,7 @@ mod tests {
     }
 
     #[test]
-    fn sweeps_keep_the_topology_and_pierce_nothing() {
+    fn sweeps_keep_the_topology_and_add_no_intersection() {
         for (mesh, reference) in cases() {
             let census = crate::mesh::topology::check(&mesh).unwrap();
             let known = crate::mesh::intersections::self_intersections(&mesh).len();
@@ -508,17 +513,16 @@ mod tests {
         }
     }
 
-    /// One edge of a regular mesh flipped the wrong way is the one that gets flipped back.
+    /// If one edge of a regular mesh is flipped, the sweeps flip it back and no other.
     #[test]
-    fn a_single_wrong_edge_is_put_right() {
+    fn a_single_wrong_edge_is_flipped_back() {
         let good = shapes::icosphere(30.0, 2);
         let reference = reference(shapes::icosphere(30.0, 4), 3.0);
-        let mut connectivity =
-            Connectivity::new(good.vertices.len(), good.triangles.clone()).unwrap();
-        connectivity.flip(100);
+        let mut half_edges = HalfEdges::new(good.vertices.len(), good.triangles.clone()).unwrap();
+        half_edges.flip(HalfEdgeId(100));
         let wrong = TriMesh {
             vertices: good.vertices.clone(),
-            triangles: connectivity.into_triangles(),
+            triangles: half_edges.into_triangles(),
         };
         let canonical = |triangles: &[[u32; 3]]| {
             let mut sorted: Vec<[u32; 3]> = triangles
@@ -541,22 +545,22 @@ mod tests {
         }
     }
 
-    /// A flip whose new edge touches S in its middle, at the price of a valley beside it, is
-    /// good by term D alone but not under the guard.
+    /// A flip whose new edge touches S at its midpoint but whose triangles move away from S gains
+    /// by term D alone; the guard refuses it.
     #[test]
-    fn the_guard_refuses_flips_that_stray_from_the_surface() {
+    fn the_guard_refuses_flips_away_from_the_surface() {
         let (mut loose, mut guarded) = (0, 0);
         for (mesh, reference) in cases() {
             let state = configurations(&mesh, &reference).unwrap();
             let fitness = Fitness::new(FitnessForm::Robust, [0.0, 0.0, 0.0, 1.0], LENGTHS);
-            let square = |corners: &[u32]| {
-                let sum: Vec3 = corners.iter().map(|&v| mesh.vertices[v as usize]).sum();
+            let square = |corners: &[VertexId]| {
+                let sum: Vec3 = corners.iter().map(|v| mesh.vertices[v.index()]).sum();
                 let middle = sum / corners.len() as f64;
                 reference.bvh.closest(&middle).unwrap().squared_distance
             };
-            for h in state.connectivity().edges() {
-                let Quad { a, b, c, d } = state.connectivity().quad(h);
-                let judge = |guard| state.candidate(h, &fitness, Gain::Total, guard, LEAST_GAIN);
+            for h in state.half_edges().edges() {
+                let Quad { a, b, c, d } = state.half_edges().quad(h);
+                let judge = |guard| state.candidate(h, &fitness, Gain::Total, guard, MIN_GAIN);
                 let old = square(&[a, b, c]) + square(&[b, a, d]) + square(&[a, b]);
                 let new = square(&[c, a, d]) + square(&[d, b, c]);
                 if new > old + 0.1 && judge(0.0).is_some() {
@@ -569,7 +573,7 @@ mod tests {
     }
 
     #[test]
-    fn a_raised_token_ends_the_sweeps() {
+    fn cancelling_ends_the_sweeps() {
         let (mesh, reference) = cases().swap_remove(0);
         let token = crate::progress::CancelToken::new();
         token.cancel();
@@ -580,16 +584,16 @@ mod tests {
     }
 
     #[test]
-    fn fingerprints_know_the_edges_whatever_the_triangles_order() {
+    fn fingerprints_depend_on_the_edges_but_not_on_the_order_of_triangles() {
         let mut mesh = shapes::icosphere(1.0, 1);
         let n = mesh.vertices.len();
-        let of = |t: &[[u32; 3]]| fingerprint(&Connectivity::new(n, t.to_vec()).unwrap());
+        let of = |t: &[[u32; 3]]| fingerprint(&HalfEdges::new(n, t.to_vec()).unwrap());
         let before = of(&mesh.triangles);
         mesh.triangles.reverse();
         mesh.triangles[3].rotate_left(1);
         assert_eq!(of(&mesh.triangles), before);
-        let mut flipped = Connectivity::new(n, mesh.triangles).unwrap();
-        flipped.flip(5);
+        let mut flipped = HalfEdges::new(n, mesh.triangles).unwrap();
+        flipped.flip(HalfEdgeId(5));
         assert_ne!(fingerprint(&flipped), before);
     }
 }

@@ -1,46 +1,47 @@
-//! Which flips are allowed.
+//! Which edge flips are allowed.
 //!
-//! Topologically, [`Connectivity::can_flip`]; geometrically, [`replacement`]: the new pair may
-//! not be degenerate, turn over, fold, or (with the guard) hold a sliver; and in space,
-//! [`pierces`]: it may not cut through any other triangle, decided exactly.
+//! Three tests, from cheap to costly: topology ([`HalfEdges::can_flip`]); geometry
+//! ([`replacement`]: the new triangles may not be degenerate, turned over, folded or, with the
+//! guard, slivers); and intersections ([`flip_intersects`]: the new triangles may not intersect
+//! any other one, decided exactly).
 
-use super::connectivity::{Connectivity, Quad};
 use crate::geometry::{Vec3, triangle};
+use crate::mesh::half_edges::{HalfEdges, Quad};
 use crate::mesh::intersections::{IntersectionIndex, triangles_intersect};
+use crate::mesh::{FaceId, HalfEdgeId, VertexId};
 
-/// A new pair may fold by as much as this, or as much as the old one did.
-const MOST_FOLD: f64 = 120.0;
+/// Largest dihedral angle of a new pair of triangles, degrees, unless the old one's was larger.
+const MAX_DIHEDRAL: f64 = 120.0;
 
-/// Twice a triangle's area over its longest edge squared, below which it counts as degenerate
+/// Twice a triangle's area over its squared longest edge, below which it counts as degenerate
 /// and its normal as meaningless.
-const LEAST_RELATIVE_AREA: f64 = 1e-9;
+const MIN_RELATIVE_AREA: f64 = 1e-9;
 
 /// The two triangles that a flip would make, in the order of [`Quad::flipped`].
 #[derive(Debug, Clone, Copy)]
 pub struct Replacement {
-    /// Their area normals.
+    /// Their area normals, mm².
     pub normals: [Vec3; 2],
     /// Their radius ratios 2r/R.
     pub radius_ratios: [f64; 2],
-    /// The angle between the normals, radians.
+    /// The dihedral angle between them, radians.
     pub angle: f64,
 }
 
-/// The pair that replaces `quad`'s, or `None` where geometry forbids it. No new triangle may
-/// have a radius ratio 2r/R below `guard` unless the old pair had one as low.
+/// The triangles that a flip would make of those of `quad`, or `None` if geometry forbids it.
+/// No new triangle may have a radius ratio 2r/R below `guard` unless an old one was as bad.
 pub fn replacement(vertices: &[Vec3], quad: &Quad, guard: f64) -> Option<Replacement> {
-    let corners = |t: [u32; 3]| t.map(|v| vertices[v as usize]);
     let normal = |[p, q, r]: &[Vec3; 3]| triangle::area_normal(p, q, r);
     let ratio = |[p, q, r]: &[Vec3; 3]| triangle::radius_ratio(p, q, r);
-    let old = [[quad.a, quad.b, quad.c], [quad.b, quad.a, quad.d]].map(corners);
-    let new = quad.flipped().map(corners);
+    let old = quad.triangles().map(|t| positions(vertices, t));
+    let new = quad.flipped().map(|t| positions(vertices, t));
 
     let normals = [normal(&new[0]), normal(&new[1])];
     let longest = |[p, q, r]: &[Vec3; 3]| {
         let squares = [(p - q), (q - r), (r - p)].map(|e| e.norm_squared());
         squares.into_iter().fold(0.0, f64::max)
     };
-    let degenerate = |k: usize| !(normals[k].norm() > LEAST_RELATIVE_AREA * longest(&new[k]));
+    let degenerate = |k: usize| !(normals[k].norm() > MIN_RELATIVE_AREA * longest(&new[k]));
     if degenerate(0) || degenerate(1) {
         return None;
     }
@@ -50,7 +51,7 @@ pub fn replacement(vertices: &[Vec3], quad: &Quad, guard: f64) -> Option<Replace
         return None;
     }
     let angle = triangle::angle_between(&normals[0], &normals[1]);
-    if angle > MOST_FOLD.to_radians()
+    if angle > MAX_DIHEDRAL.to_radians()
         && angle > triangle::angle_between(&old_normals[0], &old_normals[1])
     {
         return None;
@@ -67,65 +68,70 @@ pub fn replacement(vertices: &[Vec3], quad: &Quad, guard: f64) -> Option<Replace
     })
 }
 
-/// Whether the pair after flipping `h` would meet any other triangle in more than what they
-/// share. `index` must hold the present triangles.
-pub fn pierces(
+/// Whether the two triangles after flipping `h` would intersect each other or any other triangle
+/// in more than shared vertices and edges. `index` must contain the present triangles.
+pub fn flip_intersects(
     vertices: &[Vec3],
-    connectivity: &Connectivity,
+    half_edges: &HalfEdges,
     index: &IntersectionIndex,
-    h: u32,
+    h: HalfEdgeId,
 ) -> bool {
-    let [first, second] = connectivity.quad(h).flipped();
-    let corners = |t: [u32; 3]| t.map(|v| vertices[v as usize]);
-    let (p, q) = (corners(first), corners(second));
-    let old = [h / 3, connectivity.twin(h) / 3];
-    index.pierces(first, &p, &old)
-        || index.pierces(second, &q, &old)
+    let [first, second] = half_edges.quad(h).flipped();
+    let (p, q) = (positions(vertices, first), positions(vertices, second));
+    let old = half_edges.faces_of(h);
+    index.intersects(first, &p, &old)
+        || index.intersects(second, &q, &old)
         || triangles_intersect(first, &p, second, &q)
 }
 
-/// Whether any of the `changed` triangles, as they are now, meets another one in more than
-/// what they share. `index` must hold all others.
-pub fn have_pierced(
+/// Whether any of the `changed` triangles, as they are now, intersects another triangle in more
+/// than shared vertices and edges. `index` must contain all others.
+pub fn any_intersects(
     vertices: &[Vec3],
-    connectivity: &Connectivity,
+    half_edges: &HalfEdges,
     index: &IntersectionIndex,
-    changed: &[u32],
+    changed: &[FaceId],
 ) -> bool {
-    let now = |t: u32| {
-        let ids = connectivity.triangles()[t as usize];
-        (ids, ids.map(|v| vertices[v as usize]))
+    let now = |t: FaceId| {
+        let ids = half_edges.corners(t);
+        (ids, positions(vertices, ids))
     };
     changed.iter().enumerate().any(|(place, &t)| {
         let (ids, corners) = now(t);
-        let meets = |s: &u32| {
+        let intersects = |s: &FaceId| {
             let (others, p) = now(*s);
             triangles_intersect(ids, &corners, others, &p)
         };
-        index.pierces(ids, &corners, changed) || changed[..place].iter().any(meets)
+        index.intersects(ids, &corners, changed) || changed[..place].iter().any(intersects)
     })
 }
 
-/// Tells `index` how the `changed` triangles look now.
+/// Updates the `changed` triangles in `index`.
 pub fn reindex(
     vertices: &[Vec3],
-    connectivity: &Connectivity,
+    half_edges: &HalfEdges,
     index: &mut IntersectionIndex,
-    changed: &[u32],
+    changed: &[FaceId],
 ) {
     for &t in changed {
-        let ids = connectivity.triangles()[t as usize];
-        index.set(t, ids, ids.map(|v| vertices[v as usize]));
+        let ids = half_edges.corners(t);
+        index.set(t, ids, positions(vertices, ids));
     }
+}
+
+/// The positions of three vertices.
+fn positions(vertices: &[Vec3], corners: [VertexId; 3]) -> [Vec3; 3] {
+    corners.map(|v| vertices[v.index()])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::mesh::TriMesh;
+    use crate::mesh::ids::stored;
 
-    /// A flat square of side 1 in the plane z = 0, its diagonal from a to b, apex c left of it
-    /// and d right of it, with c raised by `height`.
+    /// A square of side 1 in the plane z = 0 with the diagonal from a to b, corner c to its left,
+    /// raised by `height`, and corner d to its right.
     fn square(height: f64) -> (Vec<Vec3>, Quad) {
         let vertices = [
             [0.0, 0.0, 0.0],
@@ -134,10 +140,10 @@ mod tests {
             [1.0, 0.0, 0.0],
         ];
         let quad = Quad {
-            a: 0,
-            b: 1,
-            c: 2,
-            d: 3,
+            a: VertexId(0),
+            b: VertexId(1),
+            c: VertexId(2),
+            d: VertexId(3),
         };
         (vertices.map(Vec3::from).to_vec(), quad)
     }
@@ -159,8 +165,8 @@ mod tests {
         // The new triangle (c, a, d) has no area.
         vertices[2] = Vec3::new(-0.5, 0.0, 0.0);
         assert!(replacement(&vertices, &quad, 0.0).is_none());
-        // A roof: the ridge a b is 1 mm long, the eaves c and d lie 2 mm apart and 1 mm down.
-        // The ridge folds by 90 degrees, the valley c d would by 127.
+        // A roof: the ridge a b is 1 mm long, the eaves c and d are 2 mm apart and 1 mm lower.
+        // The dihedral angle at the ridge is 90 degrees, at the valley c d it would be 127.
         let roof = [
             [-0.5, 0.0, 0.0],
             [0.5, 0.0, 0.0],
@@ -182,8 +188,8 @@ mod tests {
 
     #[test]
     fn a_flip_into_another_part_of_the_mesh_is_refused() {
-        // A tetrahedral tent over the square's middle, and a needle that ends just above
-        // where the flipped edge would pass.
+        // A thin tetrahedron whose tip lies just above the middle of the square, where the
+        // flipped edge would pass.
         let (mut vertices, quad) = square(0.6);
         vertices[3].z = 0.6;
         let base = vertices.len() as u32;
@@ -195,7 +201,7 @@ mod tests {
         // The square is closed from below by its mirror image far down.
         let below = vertices.len() as u32;
         vertices.push(Vec3::new(0.5, 0.5, -3.0));
-        let mut triangles = vec![[quad.a, quad.b, quad.c], [quad.b, quad.a, quad.d]];
+        let mut triangles = quad.triangles().map(stored).to_vec();
         for [p, q] in [[1, 2], [2, 0], [0, 3], [3, 1]] {
             triangles.push([q, p, below]);
         }
@@ -207,13 +213,13 @@ mod tests {
         };
         let test = |mesh: &TriMesh, triangles: &[[u32; 3]]| {
             let used = triangles.iter().flatten().max().map_or(0, |v| v + 1) as usize;
-            Connectivity::new(used, triangles.to_vec()).map(|c| {
-                let index = IntersectionIndex::new(&mesh.vertices, c.triangles(), 0.5);
-                pierces(&mesh.vertices, &c, &index, 0)
+            HalfEdges::new(used, triangles.to_vec()).map(|half_edges| {
+                let index = IntersectionIndex::new(&mesh.vertices, half_edges.triangles(), 0.5);
+                flip_intersects(&mesh.vertices, &half_edges, &index, HalfEdgeId(0))
             })
         };
         assert!(test(&mesh, &mesh.triangles).unwrap());
-        // The same without the needle: its vertices go, `below` moves up.
+        // Without the needle: its vertices are removed, so `below` moves up.
         let mut bare = mesh.clone();
         bare.vertices.drain(base as usize..below as usize);
         let moved: Vec<[u32; 3]> = mesh.triangles[..without]

@@ -53,7 +53,7 @@ pub fn tile(
             seed,
             ..parameters.retile.clone()
         };
-        let made = match retile::retile(surface, &own, &monitor.piece(start, parameters.starts)) {
+        let made = match retile::retile(surface, &own, &monitor.part(start, parameters.starts)) {
             Ok(made) => made,
             Err(RetileError::Cancelled(cancelled)) => return Err(cancelled.into()),
             Err(error) if start == 0 => return Err(error),
@@ -109,7 +109,7 @@ fn each<T, U, E>(
 ) -> Result<Vec<U>, E> {
     (0..)
         .zip(starts)
-        .map(|(start, it)| work(it, &monitor.piece(start, starts.len())))
+        .map(|(start, it)| work(it, &monitor.part(start, starts.len())))
         .collect()
 }
 

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::numeric::order::quantile;
 use crate::numeric::round_step::round_step;
 
 /// Mean, spread and percentiles of a list of numbers. All zero for an empty list.
@@ -45,21 +46,12 @@ impl Summary {
                 variance.sqrt() / mean
             },
             min: sorted[0],
-            p5: percentile(&sorted, 5.0),
-            median: percentile(&sorted, 50.0),
-            p95: percentile(&sorted, 95.0),
+            p5: quantile(&sorted, 0.05),
+            median: quantile(&sorted, 0.5),
+            p95: quantile(&sorted, 0.95),
             max: sorted[sorted.len() - 1],
         }
     }
-}
-
-/// The `p`-th percentile of ascending numbers, linear between neighbours (as NumPy's
-/// default); not of an empty list.
-fn percentile(sorted: &[f64], p: f64) -> f64 {
-    let place = p / 100.0 * (sorted.len() - 1) as f64;
-    let below = place.floor() as usize;
-    let above = (below + 1).min(sorted.len() - 1);
-    sorted[below] + (sorted[above] - sorted[below]) * place.fract()
 }
 
 /// Counts over equal bins, before and after optimisation side by side. The bin [lower,

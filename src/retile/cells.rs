@@ -1,49 +1,62 @@
-//! Centroidal cells: the surface's samples shared out among N sites.
+//! Centroidal cells: divides the samples of the surface among N sites.
 //!
-//! Lloyd's relaxation (Du, Faber and Gunzburger, SIAM Review 1999) on samples: every sample
-//! belongs to one site; a round lets each sample go over to a site that one of its
-//! *neighbours* belongs to, where that one is nearer, and then moves every site towards the
-//! [centroid](super::clipping) of its cell. Since a sample only ever follows a neighbour, cells
-//! spread along the surface and never jump through a thin wall, although distances are
-//! straight: within one cell the two differ by a few percent, and the fit that follows
-//! forgives far more. A round costs one look at every sample and no geodesic.
+//! In: the samples and N of them as seeds. Out: the site of every sample, and the sites'
+//! positions. The method is Lloyd's relaxation (Du, Faber and Gunzburger, SIAM Review 1999) on
+//! samples. Every sample belongs to one site. In each round
 //!
-//! Sites have momentum (Polyak's heavy ball). Lloyd's plain steps creep; momentum carries
-//! rows of cells past the little hollows in which these get stuck: on a noisy phantom 78 %
-//! instead of 74 % of 150 cells end with six neighbours (mean of eight seeds). [`Cells::tidy`] makes every cell connected. Cells are never empty.
+//! 1. a sample changes to the site of one of its *neighbours* if that is nearer;
+//! 2. every site moves towards the [centroid](super::clipping) of its cell.
+//!
+//! Since samples only take over the sites of neighbours, cells spread along the surface and
+//! never through a thin wall, although distances are straight. Within one cell straight and
+//! geodesic distances differ by a few percent, which the fit that follows corrects. A round
+//! visits every sample once and computes no geodesics.
+//!
+//! Sites have momentum (Polyak's heavy ball method), which carries rows of cells past local
+//! minima in which Lloyd's small steps end: on a noisy phantom 78 % instead of 74 % of 150 cells
+//! end with six neighbours (mean of eight seeds).
+//!
+//! Guaranteed: cells are never empty, and after [`Cells::tidy`] every cell is connected.
 
 use super::clipping::Patches;
-use super::samples::Samples;
+use super::surface_samples::WeightedSamples;
 use crate::geometry::Vec3;
 use crate::progress::{Cancelled, Monitor};
 use rayon::prelude::*;
 use std::collections::VecDeque;
 
-/// Share of the way to the centroid that a round adds to a site's velocity, and what it keeps
-/// of the velocity before. Stable for shares below 2 (1 + momentum); momentum 0.8 ends less
-/// regular after 80 rounds.
+/// Fraction of the vector to the centroid that a round adds to a site's velocity. Stable below
+/// 2 (1 + momentum).
 const STEP: f64 = 1.5;
+
+/// Fraction of its velocity that a site keeps. With 0.8, cells are less regular after 80 rounds.
 const MOMENTUM: f64 = 0.9;
-/// Last rounds, without momentum: plain Lloyd steps calm the sites.
+
+/// Number of last rounds without momentum, in which the sites come to rest.
 const COOLING_ROUNDS: usize = 10;
-/// Root mean square way to the centroid, in spacings, below which relaxation has settled.
+
+/// Root mean square distance to the centroids, in spacings, below which relaxation ends.
 const SETTLED: f64 = 2e-4;
-/// Samples that one task looks at: few enough that the last of them keeps nobody waiting.
+
+/// Number of samples per parallel task; small, so that threads finish at about the same time.
 const CHUNK: usize = 512;
 
-/// Which site each sample belongs to, and where the sites are.
+/// The label of a sample that has no site yet.
+const UNASSIGNED: u32 = u32::MAX;
+
+/// The site of each sample and the positions of the sites.
 #[derive(Debug, Clone)]
 pub(super) struct Cells {
     /// Site of every sample.
     pub labels: Vec<u32>,
-    /// Position of every site: not on the surface, but at the heart of its cell.
+    /// Position of every site, near the centroid of its cell and not on the surface, mm.
     pub sites: Vec<Vec3>,
 }
 
 impl Cells {
-    /// Cells grown from one sample each, ring by ring.
-    pub fn grow(samples: &Samples, seeds: &[u32]) -> Self {
-        let mut labels = vec![u32::MAX; samples.len()];
+    /// Cells that grow from one sample each, ring by ring.
+    pub fn grow(samples: &WeightedSamples, seeds: &[u32]) -> Self {
+        let mut labels = vec![UNASSIGNED; samples.len()];
         let mut front: VecDeque<u32> = seeds.iter().copied().collect();
         for (site, &v) in (0u32..).zip(seeds) {
             labels[v as usize] = site;
@@ -53,13 +66,13 @@ impl Cells {
         Self { labels, sites }
     }
 
-    /// Relaxes for at most `rounds` rounds; the rounds run.
+    /// Relaxes the sites for at most `rounds` rounds. Returns the number of rounds.
     ///
     /// # Errors
-    /// [`Cancelled`] where the monitor says so.
+    /// [`Cancelled`].
     pub fn relax(
         &mut self,
-        samples: &Samples,
+        samples: &WeightedSamples,
         weights: &[f64],
         rounds: usize,
         monitor: &Monitor,
@@ -67,11 +80,11 @@ impl Cells {
         let area: f64 = samples.area.iter().sum();
         let settled = SETTLED * (area / self.sites.len() as f64).sqrt();
         let patches = Patches::new(samples, weights);
-        let mut following = self.labels.clone();
+        let mut next_labels = self.labels.clone();
         let mut velocities = vec![Vec3::zeros(); self.sites.len()];
         for round in 0..rounds {
             monitor.check()?;
-            self.reassign(samples, &mut following);
+            self.reassign(samples, &mut next_labels);
             let mut centroids = patches.centroids(&self.labels, &self.sites);
             if centroids.contains(&None) {
                 self.fill_empty_cells(samples, weights);
@@ -98,11 +111,12 @@ impl Cells {
         Ok(rounds)
     }
 
-    /// Lets every sample follow a neighbour to a nearer site. All look at the same state, so
-    /// the outcome does not depend on their order.
-    fn reassign(&mut self, samples: &Samples, following: &mut Vec<u32>) {
+    /// Assigns every sample to the nearest of its own and its neighbours' sites. All decisions
+    /// are based on the same state, so the result does not depend on their order. `next_labels`
+    /// is memory for the new labels.
+    fn reassign(&mut self, samples: &WeightedSamples, next_labels: &mut Vec<u32>) {
         let (labels, sites) = (&self.labels, &self.sites);
-        following
+        next_labels
             .par_chunks_mut(CHUNK)
             .enumerate()
             .for_each(|(chunk, out)| {
@@ -110,11 +124,11 @@ impl Cells {
                     *label = nearest_site(samples, labels, sites, chunk * CHUNK + offset);
                 }
             });
-        std::mem::swap(&mut self.labels, following);
+        std::mem::swap(&mut self.labels, next_labels);
     }
 
-    /// Gives a site that lost its last sample the worst placed sample of all.
-    fn fill_empty_cells(&mut self, samples: &Samples, weights: &[f64]) {
+    /// Gives each site without samples the sample that is worst placed in its cell.
+    fn fill_empty_cells(&mut self, samples: &WeightedSamples, weights: &[f64]) {
         let mut count = vec![0u32; self.sites.len()];
         for &site in &self.labels {
             count[site as usize] += 1;
@@ -140,7 +154,7 @@ impl Cells {
         }
     }
 
-    /// Weighted mean of the `positions` of every cell's samples.
+    /// The weighted mean of the `positions` of every cell's samples.
     pub fn centroids(&self, positions: &[Vec3], weights: &[f64]) -> Vec<Vec3> {
         let mut sums = vec![(Vec3::zeros(), 0.0); self.sites.len()];
         for ((&site, position), &weight) in self.labels.iter().zip(positions).zip(weights) {
@@ -153,40 +167,40 @@ impl Cells {
             .collect()
     }
 
-    /// Leaves each cell its largest connected part; the rest goes to the cells around it.
-    pub fn tidy(&mut self, samples: &Samples) {
+    /// Makes every cell connected: it keeps its largest connected part, and the rest goes to the
+    /// cells around it.
+    pub fn tidy(&mut self, samples: &WeightedSamples) {
         let parts = connected_parts(samples, &self.labels);
         let mut size = vec![0u32; parts.iter().map(|p| *p as usize + 1).max().unwrap_or(0)];
         for &part in &parts {
             size[part as usize] += 1;
         }
-        let mut largest = vec![u32::MAX; self.sites.len()];
+        let mut largest = vec![UNASSIGNED; self.sites.len()];
         for (&part, &site) in parts.iter().zip(&self.labels) {
             let best = &mut largest[site as usize];
-            if *best == u32::MAX || size[part as usize] > size[*best as usize] {
+            if *best == UNASSIGNED || size[part as usize] > size[*best as usize] {
                 *best = part;
             }
         }
         let mut front = VecDeque::new();
         for v in 0..self.labels.len() {
             if largest[self.labels[v] as usize] != parts[v] {
-                self.labels[v] = u32::MAX;
+                self.labels[v] = UNASSIGNED;
             }
         }
         for v in 0..self.labels.len() {
-            let beside_lost = |n: &u32| self.labels[*n as usize] == u32::MAX;
-            if self.labels[v] != u32::MAX && samples.around(v).iter().any(beside_lost) {
+            let is_unassigned = |n: &u32| self.labels[*n as usize] == UNASSIGNED;
+            if self.labels[v] != UNASSIGNED && samples.around(v).iter().any(is_unassigned) {
                 front.push_back(v as u32);
             }
         }
         flood(samples, &mut self.labels, &mut front);
     }
 
-    /// Takes `site` from where it is and plants it at the sample of `crowded` farthest from
-    /// that cell's heart.
-    pub fn transplant(&mut self, samples: &Samples, site: u32, crowded: u32) {
-        let heart = self.sites[crowded as usize];
-        let far = |v: usize| (samples.working[v] - heart).norm_squared();
+    /// Moves `site` to the sample of the cell `crowded` that is farthest from that cell's site.
+    pub fn transplant(&mut self, samples: &WeightedSamples, site: u32, crowded: u32) {
+        let centre = self.sites[crowded as usize];
+        let far = |v: usize| (samples.working[v] - centre).norm_squared();
         let target = (0..self.labels.len())
             .filter(|&v| self.labels[v] == crowded)
             .max_by(|&a, &b| far(a).total_cmp(&far(b)).then(b.cmp(&a)));
@@ -194,13 +208,13 @@ impl Cells {
         let mut front = VecDeque::new();
         for label in &mut self.labels {
             if *label == site {
-                *label = u32::MAX;
+                *label = UNASSIGNED;
             }
         }
         self.labels[target] = site;
         self.sites[site as usize] = samples.working[target];
         for v in 0..self.labels.len() {
-            if ![u32::MAX, site].contains(&self.labels[v]) {
+            if ![UNASSIGNED, site].contains(&self.labels[v]) {
                 front.push_back(v as u32);
             }
         }
@@ -208,9 +222,9 @@ impl Cells {
     }
 }
 
-/// The nearest of the sites that sample `v` and its neighbours belong to; the lower number
-/// where two are as near.
-fn nearest_site(samples: &Samples, labels: &[u32], sites: &[Vec3], v: usize) -> u32 {
+/// The nearest of the sites that sample `v` and its neighbours belong to; of two at the same
+/// distance the lower one.
+fn nearest_site(samples: &WeightedSamples, labels: &[u32], sites: &[Vec3], v: usize) -> u32 {
     let own = labels[v];
     let position = samples.working[v];
     let mut best = own;
@@ -231,11 +245,11 @@ fn nearest_site(samples: &Samples, labels: &[u32], sites: &[Vec3], v: usize) -> 
     best
 }
 
-/// Spreads labels from `front` over the samples that have none.
-fn flood(samples: &Samples, labels: &mut [u32], front: &mut VecDeque<u32>) {
+/// Spreads labels from the samples of `front` to all that have none.
+fn flood(samples: &WeightedSamples, labels: &mut [u32], front: &mut VecDeque<u32>) {
     while let Some(v) = front.pop_front() {
         for &n in samples.around(v as usize) {
-            if labels[n as usize] == u32::MAX {
+            if labels[n as usize] == UNASSIGNED {
                 labels[n as usize] = labels[v as usize];
                 front.push_back(n);
             }
@@ -243,13 +257,13 @@ fn flood(samples: &Samples, labels: &mut [u32], front: &mut VecDeque<u32>) {
     }
 }
 
-/// Numbers the connected sets of equally labelled samples.
-fn connected_parts(samples: &Samples, labels: &[u32]) -> Vec<u32> {
-    let mut parts = vec![u32::MAX; labels.len()];
+/// The connected part of every sample, where samples of the same label are connected.
+fn connected_parts(samples: &WeightedSamples, labels: &[u32]) -> Vec<u32> {
+    let mut parts = vec![UNASSIGNED; labels.len()];
     let mut count = 0;
     let mut stack = Vec::new();
     for start in 0..labels.len() {
-        if parts[start] != u32::MAX {
+        if parts[start] != UNASSIGNED {
             continue;
         }
         parts[start] = count;
@@ -257,7 +271,7 @@ fn connected_parts(samples: &Samples, labels: &[u32]) -> Vec<u32> {
         while let Some(v) = stack.pop() {
             for &n in samples.around(v as usize) {
                 let n = n as usize;
-                if parts[n] == u32::MAX && labels[n] == labels[v as usize] {
+                if parts[n] == UNASSIGNED && labels[n] == labels[v as usize] {
                     parts[n] = count;
                     stack.push(n as u32);
                 }

@@ -1,27 +1,30 @@
-//! Centroids of cells, to more than the samples' precision.
+//! Centroids of cells with higher precision than that of the samples.
 //!
-//! Counting whole samples makes centroids jump as samples change sides, and relaxation gets
-//! stuck while cells are still uneven. Here a triangle whose corners belong to different cells
-//! is cut along the bisecting planes of their sites, as in a restricted Voronoi diagram (Yan
-//! et al., "Isotropic remeshing with fast and exact computation of restricted Voronoi
-//! diagram", SGP 2009), and each cell gets its piece. Samples need then only be dense enough
-//! to tell the cells' neighbours.
+//! In: the cell of every sample and the positions of the sites. Out: the centroid of every cell.
+//! If whole samples are counted, centroids jump when samples change their cell, and relaxation
+//! ends while cells are still uneven. Here a triangle whose corners belong to different cells is
+//! cut along the bisecting planes of their sites, as in a restricted Voronoi diagram (Yan et
+//! al., "Isotropic remeshing with fast and exact computation of restricted Voronoi diagram",
+//! SGP 2009), and each cell gets its piece. The samples then only need to be dense enough to
+//! determine which cells are neighbours.
 
 use rayon::prelude::*;
 
-use super::samples::Samples;
+use super::surface_samples::WeightedSamples;
 use crate::geometry::Vec3;
 use crate::geometry::triangle::area_normal;
 
-/// Triangles in one parallel task, and most tasks: each task sums up all cells. They depend on
-/// the surface alone, and so does the order of all sums.
-const LEAST_CHUNK: usize = 1024;
-const MOST_CHUNKS: usize = 16;
+/// Smallest number of triangles in a parallel task. The division into tasks, and with it the
+/// order of all sums, depends on the surface alone.
+const MIN_CHUNK: usize = 1024;
 
-/// Three divisions by 3 cost more than all else at a triangle that is cut.
+/// Largest number of parallel tasks; each has sums for all cells.
+const MAX_CHUNKS: usize = 16;
+
+/// Multiplying by it is faster than dividing by 3, which would take most of the time.
 const THIRD: f64 = 1.0 / 3.0;
 
-/// Moment (mass times place) and mass.
+/// First moment (mass times position) and mass.
 #[derive(Debug, Clone, Copy)]
 struct Moment {
     first: Vec3,
@@ -49,20 +52,20 @@ impl Moment {
     }
 }
 
-/// The triangles of W with their mass.
+/// The triangles of W with their masses.
 pub(super) struct Patches<'a> {
-    samples: &'a Samples,
+    samples: &'a WeightedSamples,
     moments: Vec<Moment>,
 }
 
 impl<'a> Patches<'a> {
     /// `weights` are the samples' areas times their density.
-    pub fn new(samples: &'a Samples, weights: &[f64]) -> Self {
+    pub fn new(samples: &'a WeightedSamples, weights: &[f64]) -> Self {
         let density = |v: u32| weights[v as usize] / samples.area[v as usize];
         let moments = samples
             .triangles
             .par_iter()
-            .with_min_len(LEAST_CHUNK)
+            .with_min_len(MIN_CHUNK)
             .map(|t| {
                 let [a, b, c] = t.map(|v| samples.working[v as usize]);
                 let mass =
@@ -73,10 +76,10 @@ impl<'a> Patches<'a> {
         Self { samples, moments }
     }
 
-    /// The centroid of every cell; `None` where the cell has no mass.
+    /// The centroid of every cell, mm; `None` for a cell without mass.
     pub fn centroids(&self, labels: &[u32], sites: &[Vec3]) -> Vec<Option<Vec3>> {
         let count = self.moments.len();
-        let chunk = LEAST_CHUNK.max(count.div_ceil(MOST_CHUNKS));
+        let chunk = MIN_CHUNK.max(count.div_ceil(MAX_CHUNKS));
         let partial: Vec<Vec<Moment>> = (0..count.div_ceil(chunk))
             .into_par_iter()
             .map(|k| {
@@ -98,7 +101,7 @@ impl<'a> Patches<'a> {
             .collect()
     }
 
-    /// Adds triangle `t` to the cells that hold its corners.
+    /// Divides triangle `t` among the cells of its corners.
     fn share(&self, t: usize, labels: &[u32], sites: &[Vec3], sums: &mut [Moment]) {
         let corners = self.samples.triangles[t];
         let [a, b, c] = corners.map(|v| labels[v as usize]);
@@ -112,7 +115,7 @@ impl<'a> Patches<'a> {
             self.share_among_three(whole, &positions, [a, b, c], sites, sums);
             return;
         }
-        // The corner that stands alone comes first.
+        // The corner whose cell differs from the other two comes first.
         let k = if b == c {
             0
         } else if c == a {
@@ -133,6 +136,7 @@ impl<'a> Patches<'a> {
         });
     }
 
+    /// Divides a triangle whose corners belong to three cells.
     fn share_among_three(
         &self,
         whole: &Moment,
@@ -157,7 +161,7 @@ impl<'a> Patches<'a> {
     }
 }
 
-/// The plane in the middle between two sites; positive on the first one's side.
+/// The bisecting plane of two sites; its positive side is that of the first one.
 struct Bisector {
     normal: Vec3,
     middle: Vec3,
@@ -175,7 +179,8 @@ impl Bisector {
         self.normal.dot(&(p - self.middle))
     }
 
-    /// How far from `p`, which is on the own side, to `q` the plane is met, 0..=1.
+    /// The fraction, 0..=1, of the way from `p`, on the positive side, to `q` at which the plane is
+    /// crossed.
     fn crossing(&self, p: &Vec3, q: &Vec3) -> f64 {
         let (here, there) = (self.side(p).max(0.0), self.side(q).min(0.0));
         if here > there {
@@ -200,7 +205,7 @@ impl Polygon {
         }
     }
 
-    /// The part on the positive side (Sutherland & Hodgman 1974).
+    /// The part on the positive side of the plane (Sutherland and Hodgman 1974).
     fn cut(&self, plane: &Bisector) -> Self {
         let mut kept = Self {
             corners: self.corners,
@@ -225,7 +230,7 @@ impl Polygon {
         kept
     }
 
-    /// Adds the polygon as a fan, `density` per doubled area.
+    /// Adds the polygon's triangles, with mass `density` per doubled area.
     fn add_to(&self, sum: &mut Moment, density: f64) {
         for k in 1..self.count.max(1) - 1 {
             let [a, b, c] = [self.corners[0], self.corners[k], self.corners[k + 1]];
@@ -240,8 +245,8 @@ mod tests {
     use super::*;
     use crate::mesh::shapes;
 
-    /// Sites on a sphere, every sample with its nearest.
-    fn nearest(samples: &Samples, sites: &[Vec3]) -> Vec<u32> {
+    /// The nearest site of every sample on a sphere.
+    fn nearest(samples: &WeightedSamples, sites: &[Vec3]) -> Vec<u32> {
         let near = |x: &Vec3| {
             let distance = |s: &usize| (sites[*s] - x).norm_squared();
             (0..sites.len())
@@ -255,11 +260,11 @@ mod tests {
     fn clipped_centroids_of_few_samples_are_those_of_many() {
         let coarse = shapes::icosphere(10.0, 3);
         let sites = shapes::icosphere(10.0, 0).vertices;
-        // Turned, so that no sample lies on a bisector by symmetry.
+        // Rotated, so that no sample lies on a bisector by symmetry.
         let turn = nalgebra::Rotation3::from_euler_angles(0.3, 0.5, 0.7);
         let sites: Vec<Vec3> = sites.iter().map(|s| turn * s).collect();
         let of = |wanted: usize| {
-            let samples = Samples::new(
+            let samples = WeightedSamples::new(
                 &coarse.vertices,
                 &coarse.vertices,
                 &coarse.triangles,
@@ -270,7 +275,7 @@ mod tests {
             let centroids = patches.centroids(&labels, &sites).into_iter();
             centroids.map(Option::unwrap).collect::<Vec<Vec3>>()
         };
-        // The same flat triangles, cut in 64: counting samples would be off by 0.06.
+        // The same flat triangles split in 64. Counting whole samples would be off by 0.06.
         for (a, b) in of(0).iter().zip(of(40_000)) {
             assert!((a - b).norm() < 0.01, "{}", (a - b).norm());
         }

@@ -1,25 +1,23 @@
-//! The surface as the geodesic steps see it: lengths and neighbours, no positions needed.
+//! A closed surface with the tables for paths on it: connectivity and edge lengths.
 //!
-//! Every triangle lies flat in its own frame: corner 0 at the origin, corner 1 on the x axis,
-//! corner 2 above it. Edge k joins corners k and k+1.
+//! Every triangle has a flat frame of its own: corner 0 at the origin, corner 1 on the x axis,
+//! corner 2 above it. Distances and directions along the surface follow from these frames and
+//! from how they join at the edges; positions in space are not needed.
 
 use super::SurfacePoint;
 use crate::geometry::{Vec2, Vec3};
-use crate::mesh::adjacency::Adjacency;
-use crate::mesh::topology::Defect;
+use crate::mesh::half_edges::HalfEdges;
+use crate::mesh::topology::MeshDefect;
+use crate::mesh::{FaceId, HalfEdgeId};
 
-/// A closed triangle surface with the tables that walking on it needs.
+/// A closed triangle surface with its connectivity and edge lengths.
 #[derive(Debug, Clone)]
 pub(crate) struct Domain {
-    /// Positions, millimetres.
+    /// Positions of the vertices, mm.
     pub vertices: Vec<Vec3>,
-    /// Counter-clockwise corners.
-    pub triangles: Vec<[u32; 3]>,
-    /// Neighbours of half-edges.
-    pub adjacency: Adjacency,
-    /// A half-edge that leaves each vertex.
-    pub outgoing: Vec<u32>,
-    /// Length of every half-edge, millimetres.
+    /// Connectivity.
+    pub half_edges: HalfEdges,
+    /// Length of every half-edge, mm.
     pub lengths: Vec<f64>,
     /// Total area, mm².
     pub area: f64,
@@ -29,19 +27,12 @@ impl Domain {
     /// Prepares a closed manifold.
     ///
     /// # Errors
-    /// The first [`Defect`] where it is none.
-    pub fn new(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self, Defect> {
-        let adjacency = Adjacency::new(&triangles)?;
-        let mut outgoing = Vec::with_capacity(vertices.len());
-        for (v, h) in Adjacency::outgoing(&triangles, vertices.len())
-            .into_iter()
-            .enumerate()
-        {
-            outgoing.push(h.ok_or(Defect::UnusedVertex { vertex: v as u32 })?);
-        }
-        let mut lengths = Vec::with_capacity(3 * triangles.len());
+    /// The first [`MeshDefect`] of a mesh that is not one.
+    pub fn new(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshDefect> {
+        let half_edges = HalfEdges::new(vertices.len(), triangles)?;
+        let mut lengths = Vec::with_capacity(half_edges.half_edge_count());
         let mut area = 0.0;
-        for t in &triangles {
+        for t in half_edges.triangles() {
             let p = t.map(|v| vertices[v as usize]);
             for k in 0..3 {
                 lengths.push((p[(k + 1) % 3] - p[k]).norm());
@@ -50,42 +41,46 @@ impl Domain {
         }
         Ok(Self {
             vertices,
-            triangles,
-            adjacency,
-            outgoing,
+            half_edges,
             lengths,
             area,
         })
     }
 
-    /// The corners of triangle `t` in its own frame.
-    pub fn flat(&self, t: u32) -> [Vec2; 3] {
-        let h = 3 * t as usize;
-        let (x, y) = apex(self.lengths[h], self.lengths[h + 2], self.lengths[h + 1]);
+    /// The length of half-edge `h`, mm.
+    pub fn length(&self, h: HalfEdgeId) -> f64 {
+        self.lengths[h.index()]
+    }
+
+    /// The corners of triangle `t` in its own frame, mm.
+    pub fn flat(&self, t: FaceId) -> [Vec2; 3] {
+        let base = t.half_edge(0);
+        let (x, y) = self.apex(base);
         [
             Vec2::zeros(),
-            Vec2::new(self.lengths[h], 0.0),
+            Vec2::new(self.length(base), 0.0),
             Vec2::new(x, y),
         ]
     }
 
-    /// A value given at every vertex, at a point.
-    pub fn interpolate(&self, values: &[f64], point: &SurfacePoint) -> f64 {
-        let corners = self.triangles[point.triangle as usize];
-        (0..3)
-            .map(|k| point.barycentric[k] * values[corners[k] as usize])
-            .sum()
+    /// The third corner of the triangle of `h` in the frame in which `h` runs from the origin
+    /// along the x axis, mm.
+    pub fn apex(&self, h: HalfEdgeId) -> (f64, f64) {
+        let [base, left, right] = [h, h.previous(), h.next()].map(|h| self.length(h));
+        apex(base, left, right)
     }
 
-    /// The two vertices of half-edge `h`.
-    pub fn ends(&self, h: u32) -> [u32; 2] {
-        let t = &self.triangles[h as usize / 3];
-        [t[h as usize % 3], t[(h as usize + 1) % 3]]
+    /// The value at a point, interpolated from values at the vertices.
+    pub fn interpolate(&self, values: &[f64], point: &SurfacePoint) -> f64 {
+        let corners = self.half_edges.corners(point.triangle);
+        (0..3)
+            .map(|k| point.barycentric[k] * values[corners[k].index()])
+            .sum()
     }
 }
 
-/// Where the third corner lies over a side of length `base` from the origin along x, `left`
-/// and `right` away from the side's ends.
+/// The third corner over a side that runs from the origin along the x axis: `base` is the length
+/// of the side, `left` and `right` are the distances of the corner from its start and end.
 pub(crate) fn apex(base: f64, left: f64, right: f64) -> (f64, f64) {
     let x = (left * left + base * base - right * right) / (2.0 * base);
     (x, (left * left - x * x).max(0.0).sqrt())

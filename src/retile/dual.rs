@@ -1,31 +1,33 @@
-//! Triangles from cells: the dual of a partition of the surface.
+//! The dual mesh of a partition of the surface into cells.
 //!
-//! Where three cells meet in one triangle of the samples, their sites are joined by a triangle
-//! of the same orientation (the dual of a discrete Voronoi diagram; Valette and Chassery,
-//! Computer Graphics Forum 2004). No predicate decides, and no co-circular case exists. The
-//! dual is accepted only if it *is* what was asked for: every site used, closed, edge- and
-//! vertex-manifold, with the surface's Euler characteristic and number of components. Where
-//! it is not, the offending sites are named.
+//! In: the cell of every sample. Out: triangles over the sites of the cells. Where three cells
+//! meet in one triangle of the samples, their sites are joined by a triangle of the same
+//! orientation (the dual of a discrete Voronoi diagram; Valette and Chassery, Computer Graphics
+//! Forum 2004). This needs no geometric predicates and has no co-circular case.
+//!
+//! The dual is accepted only if all sites are used and it is closed, edge- and vertex-manifold,
+//! with the surface's Euler characteristic and number of components. Otherwise the sites
+//! concerned are returned.
 
-use super::samples::Samples;
-use crate::mesh::topology::{self, Defect};
+use super::surface_samples::WeightedSamples;
+use crate::mesh::topology::{self, MeshDefect};
 
-/// Why the cells have no usable dual.
+/// The reason why the cells have no valid dual.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Offence {
+pub(super) struct InvalidDual {
     /// Sites whose cells are too large for the shape of the surface there; may be empty.
     pub sites: Vec<u32>,
 }
 
-/// The dual of the cells given by `labels` over `sites` sites.
+/// The dual of the cells given by `labels`, with `sites` sites.
 pub(super) fn triangulate(
-    samples: &Samples,
+    samples: &WeightedSamples,
     labels: &[u32],
     sites: usize,
-) -> Result<Vec<[u32; 3]>, Offence> {
+) -> Result<Vec<[u32; 3]>, InvalidDual> {
     let rings = cells_with_holes(samples, labels, sites);
     if !rings.is_empty() {
-        return Err(Offence { sites: rings });
+        return Err(InvalidDual { sites: rings });
     }
     let dual: Vec<[u32; 3]> = samples
         .triangles
@@ -33,21 +35,21 @@ pub(super) fn triangulate(
         .map(|t| t.map(|v| labels[v as usize]))
         .filter(|[a, b, c]| a != b && b != c && c != a)
         .collect();
-    let census = topology::check_triangles(sites, &dual).map_err(|defect| Offence {
-        sites: offenders(defect, &dual),
+    let census = topology::check_triangles(sites, &dual).map_err(|defect| InvalidDual {
+        sites: sites_at(defect, &dual),
     })?;
     let wanted = topology::components(samples.len(), &samples.triangles);
-    let components = wanted.iter().max().map_or(0, |m| *m as usize + 1);
+    let components = topology::component_count(&wanted);
     let edges = samples.triangles.len() as i64 * 3 / 2;
     let euler = samples.len() as i64 - edges + samples.triangles.len() as i64;
     if census.euler_characteristic != euler || census.components != components {
-        return Err(Offence { sites: Vec::new() });
+        return Err(InvalidDual { sites: Vec::new() });
     }
     Ok(dual)
 }
 
-/// Cells that are no discs: V - E + F of the samples, edges and triangles inside is not 1.
-fn cells_with_holes(samples: &Samples, labels: &[u32], sites: usize) -> Vec<u32> {
+/// Cells that are not discs: V - E + F of the samples, edges and triangles inside is not 1.
+fn cells_with_holes(samples: &WeightedSamples, labels: &[u32], sites: usize) -> Vec<u32> {
     let mut euler = vec![0i32; sites];
     for v in 0..samples.len() {
         let own = labels[v];
@@ -69,14 +71,16 @@ fn cells_with_holes(samples: &Samples, labels: &[u32], sites: usize) -> Vec<u32>
         .collect()
 }
 
-fn offenders(defect: Defect, dual: &[[u32; 3]]) -> Vec<u32> {
+/// The sites at a defect of the dual.
+fn sites_at(defect: MeshDefect, dual: &[[u32; 3]]) -> Vec<u32> {
     match defect {
-        Defect::OpenEdge { edge }
-        | Defect::NonManifoldEdge { edge }
-        | Defect::TurnedTriangles { edge } => edge.to_vec(),
-        Defect::NonManifoldVertex { vertex } | Defect::UnusedVertex { vertex } => vec![vertex],
-        Defect::DegenerateTriangle { triangle } | Defect::DoubledTriangle { triangle } => {
-            dual[triangle as usize].to_vec()
+        MeshDefect::OpenEdge { edge }
+        | MeshDefect::NonManifoldEdge { edge }
+        | MeshDefect::OrientationConflict { edge } => edge.map(|v| v.0).to_vec(),
+        MeshDefect::NonManifoldVertex { vertex } | MeshDefect::UnusedVertex { vertex } => {
+            vec![vertex.0]
         }
+        MeshDefect::DegenerateTriangle { triangle }
+        | MeshDefect::DuplicateTriangle { triangle } => dual[triangle.index()].to_vec(),
     }
 }

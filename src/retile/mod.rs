@@ -1,69 +1,73 @@
-//! Exactly N evenly spread points on the surface, joined to triangles.
+//! Re-tiling: replaces a surface by a mesh with exactly N evenly distributed vertices.
 //!
-//! In: a closed surface S with its smoothed twin W. Out: a closed mesh with exactly N vertices
-//! that lie on S, of S's topology. After Turk, "Re-Tiling Polygonal Surfaces", SIGGRAPH 1992
-//! (doi:10.1145/133994.134008), in two ways:
+//! In: a closed surface S with its smoothed twin W. Out: a closed mesh with exactly N vertices,
+//! which lie on S, and the topology of S. After Turk, "Re-Tiling Polygonal Surfaces", SIGGRAPH
+//! 1992 (doi:10.1145/133994.134008), by two methods.
 //!
-//! [`Method::Paper`]
-//! 1. [`placement`]: random points, uniform by area.
-//! 2. [`repulsion`]: they push each other apart along the surface ([`geodesics`]: [`log_map`],
-//!    or [`exact`] for validation; straight moves: [`trace`]).
-//! 3. [`tessellate`]: mutual tessellation by constrained Delaunay, old vertices removed.
+//! [`Method::Paper`]:
+//! 1. [`placement`]: random points, uniform by area;
+//! 2. [`repulsion`]: the points push each other apart along the surface ([`geodesics`]) and move
+//!    on straight paths ([`trace`]);
+//! 3. [`tessellate`]: mutual tessellation by constrained Delaunay triangulation, then removal of
+//!    the old vertices.
 //!
-//! [`Method::Refined`]
-//! 1. [`samples`]: the surface's vertices, cut finely enough for N cells.
-//! 2. [`cells`]: centroidal cells of samples, grown from random ones.
-//! 3. [`dual`]: a triangle where three cells meet; where that does not carry the topology or
-//!    pierces itself, [`refined`] transplants points and tries again.
+//! [`Method::Refined`]:
+//! 1. [`surface_samples`]: the vertices of the surface, subdivided finely enough for N cells;
+//! 2. [`cells`]: centroidal cells of these samples, grown from random ones;
+//! 3. [`dual`]: a triangle where three cells meet. If the result has another topology or
+//!    intersects itself, [`refined`] moves points and tries again.
 //!
-//! [`sizing`] makes the points denser where the surface bends, in both ways. Lengths are
-//! taken on W, since noise and voxel steps make S longer than it is; a point (triangle and
-//! barycentric coordinates) lies on both.
+//! In both methods [`sizing`] makes the points denser where curvature is high. Lengths are
+//! measured on W, since noise and voxel steps make paths on S too long. A point, given by a
+//! triangle and barycentric coordinates, lies on both.
 //!
-//! **Guaranteed** for what is returned: exactly N vertices, closed, edge- and vertex-manifold,
-//! components and Euler characteristic of S, each component facing as on S ([`orientation`]),
-//! no self-intersection (checked exactly). **Not** guaranteed: that N points can carry every
-//! surface; [`RetileError::TooFewPoints`] names a number that does. The same input gives the same bytes on any number of threads.
+//! Guaranteed for the result:
+//! - exactly N vertices;
+//! - closed, edge- and vertex-manifold, with the components and the Euler characteristic of S;
+//! - every component has the orientation that it has on S ([`orientation`]);
+//! - no self-intersection (tested exactly);
+//! - the same input gives the same bytes, whatever the number of threads.
+//!
+//! Not guaranteed: that N points suffice for every surface. [`RetileError::TooFewPoints`] names a
+//! number that does.
 
 mod cells;
 mod clipping;
 mod domain;
 mod dual;
-mod exact;
 pub mod geodesics;
-mod log_map;
 mod orientation;
 mod paper;
 mod placement;
 mod quotas;
 mod refined;
 mod repulsion;
-mod samples;
 mod sizing;
+mod surface_samples;
 pub mod tessellate;
 mod trace;
 
 use crate::geometry::Vec3;
-use crate::mesh::TriMesh;
-use crate::mesh::topology::Defect;
+use crate::mesh::topology::MeshDefect;
+use crate::mesh::{FaceId, TriMesh};
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::surface::Surface;
 
 pub use geodesics::Geodesics;
 
-/// Fewest points a model may have: an icosahedron's.
+/// Smallest number of points of a model: that of an icosahedron.
 pub const LEAST_POINTS: usize = 12;
 
-/// Most points a model may have.
+/// Largest number of points of a model.
 pub const MOST_POINTS: usize = 50_000;
 
-/// Which route makes the model.
+/// The method of re-tiling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
-    /// The paper's: random points, geodesic repulsion, mutual tessellation by constrained
-    /// Delaunay, removal of the old vertices.
+    /// The paper's method: random points, geodesic repulsion, mutual tessellation by constrained
+    /// Delaunay triangulation, removal of the old vertices.
     Paper,
-    /// Centroidal Voronoi points, their dual, and a least-squares fit to the surface.
+    /// Centroidal Voronoi cells and their dual mesh.
     Refined,
 }
 
@@ -76,21 +80,22 @@ pub struct RetileParameters {
     pub seed: u64,
     /// Default [`Method::Refined`].
     pub method: Method,
-    /// Curvature-adaptive density: spacing ∝ curvature^-γ, γ in 0..=1, 0 for even spacing.
-    /// Default 0.25; 0 is the paper's.
+    /// Exponent γ of the adaptation to curvature, spacing ∝ curvature^-γ, 0..=1. 0 is even
+    /// spacing, as in the paper. Default 0.25.
     pub adaptive: f64,
-    /// Rise of the surface's arc over one edge of even spacing, in percent of the square root of
-    /// the surface's area, 0..=100, from which on spacing adapts: what N even points resolve
-    /// needs no denser ones. Default 0.8; 0 adapts everywhere.
+    /// Where spacing starts to adapt: the rise of the surface's arc over one edge of evenly
+    /// spaced points, in percent of the square root of the surface's area, 0..=100. What such
+    /// points resolve needs no denser ones. 0 adapts everywhere. Default 0.8.
     pub adaptive_from: f64,
-    /// Rounds of geodesic repulsion ([`Method::Paper`]), 0..=1000. Default 40.
+    /// Number of rounds of repulsion ([`Method::Paper`]), 0..=1000. Default 40.
     pub repulsion_iterations: usize,
-    /// Share of the overlap that one round of repulsion moves, (0, 1]. Default 0.15 (Turk).
+    /// Fraction of the overlap by which one round of repulsion moves points, (0, 1].
+    /// Default 0.15 (Turk).
     pub repulsion_strength: f64,
-    /// Distances that repulsion goes by ([`Method::Paper`]). Default
-    /// [`Geodesics::Approximate`]; exact ones are for validation.
+    /// Distances that repulsion uses ([`Method::Paper`]). Default [`Geodesics::Approximate`];
+    /// exact ones are for validation.
     pub geodesics: Geodesics,
-    /// Most rounds of centroidal relaxation ([`Method::Refined`]), 0..=1000. Default 80.
+    /// Largest number of rounds of relaxation ([`Method::Refined`]), 0..=1000. Default 80.
     pub relaxation_iterations: usize,
 }
 
@@ -110,20 +115,19 @@ impl Default for RetileParameters {
     }
 }
 
-/// A point that lives on the surface: it lies on S and on W at the same time, since both
-/// share their connectivity.
+/// A point on the surface: on S and on W at the same time, since both have the same triangles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePoint {
-    /// Index of the triangle.
-    pub triangle: u32,
-    /// Barycentric coordinates in it, each positive, sum 1.
+    /// The triangle that contains the point.
+    pub triangle: FaceId,
+    /// Barycentric coordinates in it: positive, with sum 1.
     pub barycentric: [f64; 3],
 }
 
 impl SurfacePoint {
-    /// The point's position for the given vertex positions (S's or W's).
+    /// The position of the point for the given positions of the vertices, those of S or of W.
     pub fn position(&self, vertices: &[Vec3], triangles: &[[u32; 3]]) -> Vec3 {
-        let [a, b, c] = triangles[self.triangle as usize].map(|v| vertices[v as usize]);
+        let [a, b, c] = triangles[self.triangle.index()].map(|v| vertices[v as usize]);
         let [u, v, w] = self.barycentric;
         a * u + b * v + c * w
     }
@@ -132,87 +136,89 @@ impl SurfacePoint {
 /// The re-tiled surface.
 #[derive(Debug, Clone)]
 pub struct Tiled {
-    /// Exactly N vertices on S (LPS mm), closed, same topology as S.
+    /// Closed mesh with exactly N vertices on S (LPS mm) and the topology of S.
     pub mesh: TriMesh,
-    /// Target spacing at each vertex relative to the mean (1 everywhere unless adaptive).
+    /// Wanted spacing at each vertex relative to the mean: 1 everywhere unless adaptive.
     pub sizing: Vec<f64>,
     /// What was done.
     pub facts: RetileFacts,
 }
 
-/// What [`retile`] did; goes into the report.
+/// What [`retile`] did; part of the report.
 #[derive(Debug, Clone, Default)]
 pub struct RetileFacts {
     /// Seed of every random choice.
     pub seed: u64,
-    /// Rounds of repulsion run.
+    /// Number of rounds of repulsion.
     pub repulsion_rounds: usize,
-    /// Rounds of centroidal relaxation run.
+    /// Number of rounds of centroidal relaxation.
     pub relaxation_rounds: usize,
-    /// Tries (reseeding, repairs) until the tessellation carried the topology.
+    /// Number of attempts (new seeds, repairs) until the mesh had the surface's topology.
     pub attempts: usize,
-    /// Things a user should know, as sentences.
+    /// Warnings for the user, as sentences.
     pub warnings: Vec<String>,
 }
 
-/// Why the surface cannot be re-tiled.
+/// Why a surface could not be re-tiled.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RetileError {
-    /// Asked to stop.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
     /// The surface is not a closed manifold.
     #[error("the surface is not a closed manifold: {0}")]
-    OpenSurface(#[from] Defect),
+    OpenSurface(#[from] MeshDefect),
     /// The surface has no area, or a coordinate that is not finite.
-    #[error("the surface has no finite, positive area")]
+    #[error("the area of the surface is not a positive, finite number")]
     NoArea,
-    /// N points cannot carry the surface's handles and components.
-    #[error("{points} points cannot carry the surface's topology; {needed} do")]
+    /// N points are too few for the surface's handles and components.
+    #[error("{points} points are too few for the topology of the surface; {needed} suffice")]
     TooFewPoints {
-        /// Points asked for.
+        /// The requested number of points.
         points: usize,
-        /// Points that do, with the same method and seed.
+        /// A number that suffices, with the same method and seed.
         needed: usize,
     },
-    /// Nor can any larger number that was tried.
-    #[error("{points} points cannot carry the surface's topology, nor do up to {tried}")]
+    /// N points are too few for the surface's topology, and so are all larger numbers tried.
+    #[error(
+        "{points} points are too few for the topology of the surface, and so are all numbers tried, up to {tried}"
+    )]
     NotCarried {
-        /// Points asked for.
+        /// The requested number of points.
         points: usize,
         /// The largest number tried.
         tried: usize,
     },
-    /// More points than the surface can carry.
-    #[error("{points} points are more than the surface can carry; at most {limit}")]
+    /// More points than are supported.
+    #[error("{points} points are too many; at most {limit} are supported")]
     TooManyPoints {
-        /// Points asked for.
+        /// The requested number of points.
         points: usize,
-        /// Most points possible.
+        /// The largest supported number.
         limit: usize,
     },
-    /// The surface's own triangles pierce each other: the model's would, too.
+    /// The surface intersects itself, so a mesh of that many points on it would, too.
     #[error(
-        "the surface pierces itself near ({:.1}, {:.1}, {:.1}) mm (LPS), and so would \
-         {points} points",
+        "the surface intersects itself near ({:.1}, {:.1}, {:.1}) mm (LPS), and so would a mesh \
+         of {points} points",
         place[0], place[1], place[2]
     )]
     SelfIntersecting {
-        /// Points asked for.
+        /// The requested number of points.
         points: usize,
-        /// Where, LPS mm.
+        /// Position of the intersection, LPS mm.
         place: [f64; 3],
     },
-    /// A parameter is out of its range.
-    #[error("{name} is {value}, outside {range}")]
+    /// A parameter is outside its range.
+    #[error("{name} is {value}; it must lie in {range}")]
     BadParameter {
         /// The field of [`RetileParameters`].
         name: &'static str,
         /// Its value.
         value: f64,
-        /// What it may be.
+        /// The allowed range.
         range: &'static str,
     },
+    /// Cancelled by the caller.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 /// Re-tiles `surface`.
@@ -239,14 +245,15 @@ pub fn retile(
     Ok(tiled)
 }
 
-/// To tell which N would do, N is doubled as long as it stays below this multiple of the first
-/// number tried (or this number).
+/// In the search for a sufficient N, N is doubled up to this multiple of the first number tried,
+/// or up to [`LEAST_TRIED`] if that is more.
 const NEEDED_FACTOR: usize = 16;
+
+/// See [`NEEDED_FACTOR`].
 const LEAST_TRIED: usize = 2000;
 
-/// The error to give up with where `parameters.points` do not carry the topology of `surface`.
-/// It names a larger number that does: `carries` begins as [`retile`] does with the parameters
-/// it is handed, and tells whether that went well.
+/// The error if `parameters.points` are too few for the topology of `surface`. It names a larger
+/// number that suffices: `carries` tells whether re-tiling works with the given parameters.
 fn too_few(
     surface: &Surface,
     parameters: &RetileParameters,

@@ -1,40 +1,42 @@
-//! Which way the components of a mesh face.
+//! The orientation of the components of a mesh: outward or inward.
 //!
-//! A component with very few points may come out inside out, although its triangles run as
-//! the surface's do: four points about a small ball are joined in one way only, whether or
-//! not the ball's order of them is that of the tetrahedron. A tetrahedron is simply turned;
-//! anything larger that faces the wrong way has too few points for its shape.
+//! In: a mesh and, for each component, the signed volume that it has on the surface. A component
+//! with very few points may come out inside out although its triangles have the order of the
+//! surface's: four points on a small ball make one tetrahedron only, which may have the opposite
+//! orientation. A tetrahedron is simply reversed; a larger component with the wrong orientation
+//! has too few points for its shape.
 
 use crate::mesh::TriMesh;
 use crate::mesh::topology::component_volumes;
 
-/// Makes every component of `mesh` face as the surface's does, whose volumes are `wanted`;
-/// `component` gives the component on the surface of every vertex of `mesh`.
+/// Gives every component of `mesh` the orientation that it has on the surface. `wanted` are the
+/// signed volumes of the surface's components, `component` is the component of every vertex of
+/// `mesh`.
 ///
 /// # Errors
-/// The vertices of the components that face the wrong way and are no tetrahedra, ascending.
+/// The vertices of the components with the wrong orientation that are not tetrahedra, ascending.
 pub(super) fn face_alike(
     mesh: &mut TriMesh,
     component: &[u32],
     wanted: &[f64],
 ) -> Result<(), Vec<u32>> {
     let found = component_volumes(&mesh.vertices, &mesh.triangles, component);
-    let is_turned = |c: u32| !(found[c as usize] * wanted[c as usize] > 0.0);
+    let is_reversed = |c: u32| !(found[c as usize] * wanted[c as usize] > 0.0);
     let mut vertices = vec![0; found.len()];
     for &c in component {
         vertices[c as usize] += 1;
     }
     for t in &mut mesh.triangles {
         let c = component[t[0] as usize];
-        if is_turned(c) && vertices[c as usize] == 4 {
+        if is_reversed(c) && vertices[c as usize] == 4 {
             t.swap(1, 2);
         }
     }
-    let stray = |v: &u32| {
+    let irreparable = |v: &u32| {
         let c = component[*v as usize];
-        is_turned(c) && (vertices[c as usize] != 4 || found[c as usize] == 0.0)
+        is_reversed(c) && (vertices[c as usize] != 4 || found[c as usize] == 0.0)
     };
-    let wrong: Vec<u32> = (0..component.len() as u32).filter(stray).collect();
+    let wrong: Vec<u32> = (0..component.len() as u32).filter(irreparable).collect();
     if wrong.is_empty() { Ok(()) } else { Err(wrong) }
 }
 
@@ -44,7 +46,7 @@ mod tests {
     use crate::mesh::shapes;
 
     #[test]
-    fn tetrahedra_are_turned_and_larger_ones_named() {
+    fn tetrahedra_are_reversed_and_larger_components_reported() {
         let (mut ball, mut small) = (shapes::icosphere(3.0, 1), shapes::tetrahedron(1.0));
         let count = ball.vertices.len() as u32;
         small.triangles.iter_mut().for_each(|t| t.swap(0, 1));

@@ -1,7 +1,10 @@
-//! The paper's route: repulsion, mutual tessellation, removal of the old vertices.
+//! The paper's method: random points, repulsion, mutual tessellation, removal of the old vertices.
+//!
+//! In: the surface and N. Out: N points on it, joined to triangles, or the reason why not. If the
+//! points cannot be joined, the next of several seeds is tried.
 
 use super::domain::Domain;
-use super::samples::Samples;
+use super::surface_samples::WeightedSamples;
 use super::tessellate::{TessellateError, tessellate};
 use super::{
     RetileError, RetileFacts, RetileParameters, SurfacePoint, Tiled, placement, quotas, repulsion,
@@ -11,53 +14,54 @@ use crate::mesh::TriMesh;
 use crate::progress::{Monitor, Stage};
 use crate::surface::Surface;
 
-/// Seeds tried before the surface is refused.
+/// Number of seeds tried before re-tiling fails.
 const SEEDS: u64 = 4;
 
-/// Share of the stage that repulsion takes.
+/// Fraction of the stage's time that repulsion takes.
 const REPULSION_SHARE: f64 = 0.6;
 
-/// Re-tiles `surface` as the paper does.
+/// Re-tiles `surface` by the paper's method.
 pub(super) fn retile(
     surface: &Surface,
     parameters: &RetileParameters,
     monitor: &Monitor,
 ) -> Result<Tiled, RetileError> {
     let least = quotas::least_points(&surface.mesh);
-    let job = Job::new(surface, parameters, monitor)?;
+    let run = PaperRun::new(surface, parameters, monitor)?;
     if parameters.points < least {
-        return Err(refusal(&job, None));
+        return Err(refusal(&run, None));
     }
-    tile(&job, SEEDS)?.map_err(|error| refusal(&job, Some(error)))
+    tile(&run, SEEDS)?.map_err(|error| refusal(&run, Some(error)))
 }
 
-/// The same where another route gave up: `None` where this one must, too, with so many seeds.
+/// Tries the paper's method with `seeds` seeds; `None` if it fails with all of them.
 pub(super) fn attempt(
     surface: &Surface,
     parameters: &RetileParameters,
     seeds: u64,
     monitor: &Monitor,
 ) -> Result<Option<Tiled>, RetileError> {
-    let job = Job::new(surface, parameters, monitor)?;
-    Ok(tile(&job, seeds)?.ok())
+    let run = PaperRun::new(surface, parameters, monitor)?;
+    Ok(tile(&run, seeds)?.ok())
 }
 
-/// Tries one seed after the other, at least one; the last one's failure where all fail.
-fn tile(job: &Job, seeds: u64) -> Result<Result<Tiled, TessellateError>, RetileError> {
+/// Tries one seed after the other, at least one. If all fail, the inner error is that of the
+/// last.
+fn tile(run: &PaperRun, seeds: u64) -> Result<Result<Tiled, TessellateError>, RetileError> {
     let mut attempt = 0;
     loop {
-        let points = spread(job, job.parameters.points, attempt)?;
+        let points = spread(run, run.parameters.points, attempt)?;
         attempt += 1;
-        match join(job, &points) {
+        match join(run, &points) {
             Ok(mesh) => {
                 let facts = RetileFacts {
-                    repulsion_rounds: job.parameters.repulsion_iterations,
+                    repulsion_rounds: run.parameters.repulsion_iterations,
                     attempts: attempt as usize,
                     ..RetileFacts::default()
                 };
                 let sizing = points
                     .iter()
-                    .map(|p| job.domain.interpolate(&job.spacing, p))
+                    .map(|p| run.domain.interpolate(&run.spacing, p))
                     .collect();
                 return Ok(Ok(Tiled {
                     mesh,
@@ -72,17 +76,18 @@ fn tile(job: &Job, seeds: u64) -> Result<Result<Tiled, TessellateError>, RetileE
     }
 }
 
-struct Job<'a> {
+/// What all seeds share.
+struct PaperRun<'a> {
     surface: &'a Surface,
     parameters: &'a RetileParameters,
     monitor: &'a Monitor<'a>,
-    /// W.
+    /// The smoothed surface W.
     domain: Domain,
-    /// Relative spacing wanted at every vertex.
+    /// Wanted relative spacing at every vertex.
     spacing: Vec<f64>,
 }
 
-impl<'a> Job<'a> {
+impl<'a> PaperRun<'a> {
     fn new(
         surface: &'a Surface,
         parameters: &'a RetileParameters,
@@ -90,7 +95,7 @@ impl<'a> Job<'a> {
     ) -> Result<Self, RetileError> {
         let (mesh, working) = (&surface.mesh, &surface.working);
         let domain = Domain::new(working.clone(), mesh.triangles.clone())?;
-        let samples = Samples::new(&mesh.vertices, working, &mesh.triangles, 0);
+        let samples = WeightedSamples::new(&mesh.vertices, working, &mesh.triangles, 0);
         Ok(Self {
             surface,
             parameters,
@@ -101,46 +106,47 @@ impl<'a> Job<'a> {
     }
 }
 
-/// Points after repulsion; `attempt` changes the seed.
-fn spread(job: &Job, count: usize, attempt: u64) -> Result<Vec<SurfacePoint>, RetileError> {
-    let seed = job.parameters.seed.wrapping_add(attempt << 32);
-    let mut points = placement::place(&job.surface.mesh, &job.domain, &job.spacing, count, seed);
+/// The points after repulsion; every `attempt` has its own seed.
+fn spread(run: &PaperRun, count: usize, attempt: u64) -> Result<Vec<SurfacePoint>, RetileError> {
+    let seed = run.parameters.seed.wrapping_add(attempt << 32);
+    let mut points = placement::place(&run.surface.mesh, &run.domain, &run.spacing, count, seed);
     repulsion::repel(
-        &job.domain,
-        &job.spacing,
+        &run.domain,
+        &run.spacing,
         &mut points,
-        job.parameters,
+        run.parameters,
         |share| {
             if attempt == 0 {
-                job.monitor.report(Stage::Retile, REPULSION_SHARE * share)
+                run.monitor.report(Stage::Retile, REPULSION_SHARE * share)
             } else {
-                job.monitor.check()
+                run.monitor.check()
             }
         },
     )?;
     Ok(points)
 }
 
-fn join(job: &Job, points: &[SurfacePoint]) -> Result<TriMesh, TessellateError> {
-    let mesh = &job.surface.mesh;
-    tessellate(&mesh.vertices, &mesh.triangles, points, job.monitor)
+fn join(run: &PaperRun, points: &[SurfacePoint]) -> Result<TriMesh, TessellateError> {
+    let mesh = &run.surface.mesh;
+    tessellate(&mesh.vertices, &mesh.triangles, points, run.monitor)
 }
 
-/// The error to give up with: for a topology that N points do not carry, a number that does.
-fn refusal(job: &Job, last: Option<TessellateError>) -> RetileError {
+/// The error after the last seed failed. If N points are too few for the topology, it names a
+/// number that suffices.
+fn refusal(run: &PaperRun, last: Option<TessellateError>) -> RetileError {
     match last {
         Some(TessellateError::OpenSurface(defect)) => RetileError::OpenSurface(defect),
         Some(TessellateError::SelfIntersecting { pairs, mesh, .. }) => {
             let [t, _] = pairs[0];
-            let [a, b, c] = mesh.corners(t as usize);
+            let [a, b, c] = mesh.corners(t.index());
             RetileError::SelfIntersecting {
-                points: job.parameters.points,
+                points: run.parameters.points,
                 place: ((a + b + c) / 3.0).into(),
             }
         }
-        _ => too_few(job.surface, job.parameters, |larger| {
-            let job = Job::new(job.surface, larger, job.monitor)?;
-            match join(&job, &spread(&job, larger.points, 0)?) {
+        _ => too_few(run.surface, run.parameters, |larger| {
+            let run = PaperRun::new(run.surface, larger, run.monitor)?;
+            match join(&run, &spread(&run, larger.points, 0)?) {
                 Ok(_) => Ok(true),
                 Err(TessellateError::Cancelled(cancelled)) => Err(cancelled.into()),
                 Err(_) => Ok(false),

@@ -1,7 +1,8 @@
-//! Random points on the surface: the paper's first step.
+//! Random points on the surface: the first step of the paper's method.
 //!
-//! A triangle is drawn with probability proportional to its area times the wanted density, a
-//! place in it uniformly. Every component gets its share ([`quotas`]) of the points.
+//! In: the surface, the wanted relative spacing and the number of points. Out: that many points.
+//! A triangle is drawn with a probability proportional to its area times the wanted density, a
+//! position in it uniformly. Every component gets its share of the points ([`quotas`]).
 
 use rand::RngExt;
 
@@ -10,11 +11,13 @@ use super::trace::inset;
 use super::{SurfacePoint, quotas};
 use crate::geometry::random::{self, Purpose};
 use crate::geometry::triangle::area_normal;
+use crate::mesh::FaceId;
 use crate::mesh::TriMesh;
-use crate::mesh::topology::components;
+use crate::mesh::topology::{component_count, components};
 
-/// Draws exactly `count` points, as dense as the relative `spacing` at every vertex wants.
-/// `count` is at least [`quotas::least_points`] of `mesh`, whose connectivity the domain has.
+/// Draws exactly `count` points with a density that corresponds to the relative `spacing` at
+/// every vertex. `count` must be at least [`quotas::least_points`] of `mesh`, which has the same
+/// connectivity as `domain`.
 pub(crate) fn place(
     mesh: &TriMesh,
     domain: &Domain,
@@ -22,11 +25,10 @@ pub(crate) fn place(
     count: usize,
     seed: u64,
 ) -> Vec<SurfacePoint> {
-    let component_of = components(domain.vertices.len(), &domain.triangles);
-    let number = component_of.iter().max().map_or(0, |c| *c as usize + 1);
+    let component_of = components(mesh.vertices.len(), &mesh.triangles);
     // Triangles of each component with the running sum of area / h².
-    let mut running: Vec<Vec<(f64, u32)>> = vec![Vec::new(); number];
-    for (t, corners) in (0u32..).zip(&domain.triangles) {
+    let mut running: Vec<Vec<(f64, FaceId)>> = vec![Vec::new(); component_count(&component_of)];
+    for (t, corners) in FaceId::first(mesh.triangles.len()).zip(&mesh.triangles) {
         let list = &mut running[component_of[corners[0] as usize] as usize];
         let before = list.last().map_or(0.0, |l| l.0);
         let [a, b, c] = corners.map(|v| domain.vertices[v as usize]);

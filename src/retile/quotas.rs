@@ -1,48 +1,37 @@
-//! How many points each component of the surface gets.
+//! The number of points that each component of the surface gets.
 //!
-//! In proportion to its area over the square of the wanted spacing, but never fewer than any
-//! triangulation of its genus has.
+//! In: the surface and the load of each component, its area over the square of the wanted
+//! spacing. Out: numbers proportional to the loads that add up to N, but none smaller than the
+//! smallest triangulation of the component's genus needs.
 
 use std::cmp::Ordering;
 
 use crate::mesh::{TriMesh, topology};
 
-/// The fewest vertices of any triangulation with the mesh's components and handles.
+/// The smallest number of vertices of any mesh with the same components and handles.
 pub(super) fn least_points(mesh: &TriMesh) -> usize {
     least_of_components(mesh).iter().sum()
 }
 
-/// The same for each component, numbered as [`topology::components`] does.
+/// The same for each component, numbered as by [`topology::components`].
 pub(super) fn least_of_components(mesh: &TriMesh) -> Vec<usize> {
-    characteristics(mesh).into_iter().map(heawood).collect()
+    let component = topology::components(mesh.vertices.len(), &mesh.triangles);
+    let characteristics = topology::component_characteristics(&mesh.triangles, &component);
+    characteristics.into_iter().map(least_vertices).collect()
 }
 
-/// Heawood's bound for a closed orientable surface, attained but for genus 2, which takes one
-/// vertex more (Jungerman and Ringel 1980).
-fn heawood(euler: i64) -> usize {
+/// The smallest number of vertices of any triangulation of the closed orientable surface with
+/// this Euler characteristic: Heawood's bound, except for genus 2, which takes one vertex more
+/// (Jungerman and Ringel 1980).
+pub(super) fn least_vertices(euler: i64) -> usize {
     match euler {
         -2 => 10,
         e => ((7.0 + (49.0 - 24.0 * e as f64).sqrt()) / 2.0).ceil() as usize,
     }
 }
 
-/// Euler characteristic of each component.
-fn characteristics(mesh: &TriMesh) -> Vec<i64> {
-    let components = topology::components(mesh.vertices.len(), &mesh.triangles);
-    let count = components.iter().max().map_or(0, |m| *m as usize + 1);
-    // V - E + F with 2E = 3F, doubled.
-    let mut doubled = vec![0i64; count];
-    for &c in &components {
-        doubled[c as usize] += 2;
-    }
-    for corners in &mesh.triangles {
-        doubled[components[corners[0] as usize] as usize] -= 1;
-    }
-    doubled.into_iter().map(|d| d / 2).collect()
-}
-
-/// Shares `points` among the components by `load`, each with what its topology needs; the sum
-/// is `points`, which must be at least [`least_points`].
+/// Divides `points` among the components in proportion to `load`, giving each at least what its
+/// topology needs. The sum is `points`, which must be at least [`least_points`].
 pub(super) fn share(mesh: &TriMesh, load: &[f64], points: usize) -> Vec<usize> {
     let least = least_of_components(mesh);
     let total: f64 = load.iter().sum();
@@ -50,7 +39,7 @@ pub(super) fn share(mesh: &TriMesh, load: &[f64], points: usize) -> Vec<usize> {
     let mut quotas: Vec<usize> = (least.iter().zip(&fair))
         .map(|(least, fair)| (*fair as usize).max(*least))
         .collect();
-    // Rounding and minima are settled with the component that is farthest from its share.
+    // The difference goes to, or comes from, the component farthest from its fair share.
     loop {
         let sum: usize = quotas.iter().sum();
         let surplus = |c: usize| quotas[c] as f64 - fair[c];

@@ -1,19 +1,22 @@
-//! The refined route: centroidal cells and their dual.
+//! The refined method: centroidal cells and their dual mesh.
 //!
-//! 1. [`samples`](super::samples): the working surface, fine enough for N cells;
-//! 2. N samples at random, as dense as [`sizing`] wants them;
-//! 3. [`cells`](super::cells): relaxed until each site is the centroid of its cell;
+//! In: the surface and N. Out: N points on it, joined to triangles.
+//!
+//! 1. [`surface_samples`](super::surface_samples): the vertices of the surface, as many as N
+//!    cells need;
+//! 2. N of them at random, with the density that [`sizing`] asks for;
+//! 3. [`cells`](super::cells): relaxed until each site is at the centroid of its cell;
 //! 4. [`dual`]: one triangle where three cells meet;
-//! 5. each vertex goes to the point of its own cell's part of S closest to the cell's centroid.
+//! 5. each vertex is placed at the point of its cell's part of S closest to the cell's centroid.
 //!
-//! Where a cell is too large for the shape of the surface (it runs round a handle, or the
-//! two sides of a thin wall would touch), the least loaded site elsewhere is transplanted
-//! there and the cells settle again; N never changes. Where that does not end well (necks no
-//! wider than a few samples), the points are spread and joined as the route of [`paper`]
-//! does, on the surface itself, if that is not too large.
+//! If a cell is too large for the shape of the surface (it extends around a handle, or the two
+//! sides of a thin wall would intersect), the site with the least load elsewhere is moved there
+//! and the cells are relaxed again; N never changes. If that fails, as at necks only a few
+//! samples wide, the points are distributed and joined by the method of [`paper`], on the
+//! surface itself, unless it has too many triangles for that.
 
 use super::cells::Cells;
-use super::samples::Samples;
+use super::surface_samples::WeightedSamples;
 use super::{
     RetileError, RetileFacts, RetileParameters, Tiled, dual, orientation, paper, quotas, sizing,
     too_few,
@@ -21,34 +24,43 @@ use super::{
 use crate::geometry::random::{Purpose, stream};
 use crate::geometry::{Vec3, triangle};
 use crate::mesh::intersections::self_intersections;
-use crate::mesh::{TriMesh, topology};
+use crate::mesh::{FaceId, TriMesh, topology};
 use crate::progress::{Monitor, Stage};
 use crate::surface::Surface;
 use rand::RngExt;
 use rayon::prelude::*;
 
-/// Samples that a cell has at least: enough to tell its neighbours. Twice or
-/// half as many changed the final radius ratios by less than 0.001 on phantoms.
+/// Smallest mean number of samples per cell. It suffices to determine the neighbours of a cell:
+/// half or twice as many changed the final radius ratios by less than 0.001 on phantoms.
 const SAMPLES_PER_CELL: usize = 20;
-/// Rounds that let the cells settle after a transplantation.
+
+/// Rounds of relaxation after a repair.
 const SETTLING_ROUNDS: usize = 20;
-/// Transplantations before giving up on a start.
+
+/// Largest number of repairs after one random start.
 const REPAIRS: usize = 24;
-/// Sites that one repair moves at most.
+
+/// Largest number of sites that one repair moves.
 const TRANSPLANTS: usize = 4;
-/// Factor by which a repair raises the density round a crowded cell; spacing goes with its
-/// fourth root.
-const THICKENING: f64 = 3.0;
-/// Random starts before giving up on N.
+
+/// Factor by which a repair raises the density around a crowded cell. The spacing changes with
+/// its fourth root.
+const DENSITY_FACTOR: f64 = 3.0;
+
+/// Number of random starts.
 const STARTS: u64 = 3;
-/// Seeds of the paper's route before giving up on N.
+
+/// Number of seeds with which the paper's method is tried afterwards.
 const PAPER_SEEDS: u64 = 2;
-/// Triangles of a surface on which that route is tried. Each point's repulsion looks at all
-/// triangles about it, and each old vertex is removed: a plate of 260 000 took minutes.
+
+/// Largest number of triangles for the paper's method, whose time grows with the triangles around
+/// each point and with the old vertices: on a plate of 260 000 triangles it took minutes.
 const PAPER_TRIANGLES: usize = 40_000;
-/// Parts in which all triangles are looked through; each keeps a place for every cell.
-const MOST_TASKS: usize = 8;
-/// Repairs of each number that is tried to tell which N would do.
+
+/// Number of parallel tasks of the closest-point search; each has a result for every cell.
+const MAX_TASKS: usize = 8;
+
+/// Largest number of repairs while searching for a sufficient N.
 const HURRIED_REPAIRS: usize = 6;
 
 /// Re-tiles `surface` by centroidal cells.
@@ -60,10 +72,10 @@ pub(super) fn retile(
     if parameters.points < quotas::least_points(&surface.mesh) {
         return Err(refusal(surface, parameters, monitor));
     }
-    let job = Job::new(surface, parameters);
+    let run = RefinedRun::new(surface, parameters);
     let mut facts = RetileFacts::default();
     for start in 0..STARTS {
-        if let Some((mesh, sizing)) = job.attempt(start, REPAIRS, &mut facts, monitor)? {
+        if let Some((mesh, sizing)) = run.attempt(start, REPAIRS, &mut facts, monitor)? {
             return Ok(Tiled {
                 mesh,
                 sizing,
@@ -82,21 +94,21 @@ pub(super) fn retile(
     Err(refusal(surface, parameters, monitor))
 }
 
-/// The error to give up with, which names a number of points that does.
+/// The error if N points are too few; it names a number that suffices.
 fn refusal(surface: &Surface, parameters: &RetileParameters, monitor: &Monitor) -> RetileError {
     too_few(surface, parameters, |larger| {
-        // The quicker of the two first.
+        // The faster of the two methods first.
         if by_repulsion(surface, larger, 1, monitor)?.is_some() {
             return Ok(true);
         }
-        let job = Job::new(surface, larger);
+        let run = RefinedRun::new(surface, larger);
         let mut ignored = RetileFacts::default();
-        let made = job.attempt(0, HURRIED_REPAIRS, &mut ignored, monitor)?;
+        let made = run.attempt(0, HURRIED_REPAIRS, &mut ignored, monitor)?;
         Ok(made.is_some())
     })
 }
 
-/// The paper's way with so many seeds, where the surface is not too large for it.
+/// The paper's method with `seeds` seeds; `None` if it fails or the surface is too large for it.
 fn by_repulsion(
     surface: &Surface,
     parameters: &RetileParameters,
@@ -109,28 +121,29 @@ fn by_repulsion(
     paper::attempt(surface, parameters, seeds, monitor)
 }
 
-/// What every attempt shares.
-struct Job<'a> {
+/// What all random starts share.
+struct RefinedRun<'a> {
     surface: &'a Surface,
     parameters: &'a RetileParameters,
     points: usize,
-    samples: Samples,
-    /// Relative spacing wanted at every sample.
+    samples: WeightedSamples,
+    /// Wanted relative spacing h at every sample.
     spacing: Vec<f64>,
-    /// Component of the surface of every sample.
+    /// Component of the surface to which every sample belongs.
     components: Vec<u32>,
-    /// The fewest points that each component takes.
+    /// Smallest number of points for each component.
     least: Vec<usize>,
     /// Signed volume of each component of S, mm³.
     volumes: Vec<f64>,
-    /// Area times density: h^-4 makes centroidal cells as large as h² (Du et al. 1999).
+    /// Area times density of every sample. With the density h^-4 the area of a centroidal cell is
+    /// proportional to h² (Du et al. 1999).
     weights: Vec<f64>,
 }
 
-impl<'a> Job<'a> {
+impl<'a> RefinedRun<'a> {
     fn new(surface: &'a Surface, parameters: &'a RetileParameters) -> Self {
         let points = parameters.points;
-        let samples = Samples::new(
+        let samples = WeightedSamples::new(
             &surface.mesh.vertices,
             &surface.working,
             &surface.mesh.triangles,
@@ -158,8 +171,8 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// One random start with its repairs: mesh and sizing, or `None` where the topology did
-    /// not come out.
+    /// One random start with its repairs. Returns the mesh and the relative spacing at each
+    /// vertex, or `None` if the mesh would not have the surface's topology.
     fn attempt(
         &self,
         start: u64,
@@ -181,16 +194,16 @@ impl<'a> Job<'a> {
             monitor.report(Stage::Retile, 0.8)?;
             cells.tidy(&self.samples);
             let crowded = match dual::triangulate(&self.samples, &cells.labels, self.points) {
-                Err(offence) => offence.sites,
+                Err(invalid) => invalid.sites,
                 Ok(triangles) => {
                     let mut mesh = TriMesh {
                         vertices: self.vertices(&cells),
                         triangles,
                     };
-                    let crossing = self_intersections(&mesh);
+                    let intersecting = self_intersections(&mesh);
                     let component = self.components_of_sites(&cells);
-                    if !crossing.is_empty() {
-                        sites_of(&mesh, &crossing)
+                    if !intersecting.is_empty() {
+                        sites_of(&mesh, &intersecting)
                     } else if let Err(inside_out) =
                         orientation::face_alike(&mut mesh, &component, &self.volumes)
                     {
@@ -203,7 +216,7 @@ impl<'a> Job<'a> {
             if crowded.is_empty() {
                 return Ok(None);
             }
-            self.thicken(&cells, &crowded, &mut weights);
+            self.raise_density(&cells, &crowded, &mut weights);
             for &site in crowded.iter().take(TRANSPLANTS) {
                 let Some(light) = self.least_loaded(&cells, &weights, &crowded, site, &moved)
                 else {
@@ -219,9 +232,9 @@ impl<'a> Job<'a> {
         Ok(None)
     }
 
-    /// Makes the density higher in the crowded cells and those around them, so that the sites
-    /// which move there stay there.
-    fn thicken(&self, cells: &Cells, crowded: &[u32], weights: &mut [f64]) {
+    /// Raises the density in the crowded cells and those around them, so that the sites that are
+    /// moved there stay there.
+    fn raise_density(&self, cells: &Cells, crowded: &[u32], weights: &mut [f64]) {
         let mut is_crowded = vec![false; self.points];
         for &site in crowded {
             is_crowded[site as usize] = true;
@@ -235,12 +248,12 @@ impl<'a> Job<'a> {
         }
         for (weight, &site) in weights.iter_mut().zip(&cells.labels) {
             if near[site as usize] {
-                *weight *= THICKENING;
+                *weight *= DENSITY_FACTOR;
             }
         }
     }
 
-    /// Distinct random samples, each component getting its share but at least as many as its
+    /// Distinct random samples; each component gets its share of them, and at least as many as its
     /// topology needs.
     fn seeds(&self, start: u64) -> Vec<u32> {
         let mut random = stream(
@@ -279,8 +292,8 @@ impl<'a> Job<'a> {
         seeds
     }
 
-    /// The site with the lightest cell that may go to the cell of `to`: not crowded
-    /// itself, not moved lately, and none that its component cannot do without.
+    /// The site with the lightest cell that may be moved to the cell of `to`. It must not be
+    /// crowded itself, not have been moved recently, and not be needed by its component.
     fn least_loaded(
         &self,
         cells: &Cells,
@@ -307,7 +320,7 @@ impl<'a> Job<'a> {
             .min_by(|a, b| load[*a as usize].total_cmp(&load[*b as usize]))
     }
 
-    /// The component of the surface that each site's cell lies on.
+    /// The component of the surface to which each cell belongs.
     fn components_of_sites(&self, cells: &Cells) -> Vec<u32> {
         let mut component = vec![0; self.points];
         for (&site, &c) in cells.labels.iter().zip(&self.components) {
@@ -316,7 +329,7 @@ impl<'a> Job<'a> {
         component
     }
 
-    /// For every site the point of its cell's part of S closest to the cell's centroid on S.
+    /// The point of each cell's part of S that is closest to the cell's centroid on S, mm.
     fn vertices(&self, cells: &Cells) -> Vec<Vec3> {
         let positions = &self.samples.surface;
         let centroids = cells.centroids(positions, &self.weights);
@@ -342,9 +355,9 @@ impl<'a> Job<'a> {
             best
         };
         let triangles = &self.samples.triangles;
-        let chunk = triangles.len().div_ceil(MOST_TASKS).max(1);
+        let chunk = triangles.len().div_ceil(MAX_TASKS).max(1);
         let parts: Vec<_> = triangles.par_chunks(chunk).map(nearest).collect();
-        // Of equals the first, as if there were one part.
+        // Of equal distances the first counts, as it would without parallel tasks.
         (0..self.points)
             .map(|site| {
                 let found = parts.iter().map(|part| part[site]);
@@ -359,7 +372,7 @@ impl<'a> Job<'a> {
             .collect()
     }
 
-    /// Mean wanted spacing of every cell.
+    /// The mean of the wanted relative spacing over every cell.
     fn sizing(&self, cells: &Cells) -> Vec<f64> {
         let mut sums = vec![(0.0, 0u32); self.points];
         for (&site, h) in cells.labels.iter().zip(&self.spacing) {
@@ -372,12 +385,12 @@ impl<'a> Job<'a> {
     }
 }
 
-/// The sites whose triangles cross, each once, in order of their number.
-fn sites_of(mesh: &TriMesh, crossing: &[[u32; 2]]) -> Vec<u32> {
-    let corners = crossing
+/// The sites at the corners of intersecting triangles, ascending, each once.
+fn sites_of(mesh: &TriMesh, intersecting: &[[FaceId; 2]]) -> Vec<u32> {
+    let corners = intersecting
         .iter()
         .flatten()
-        .map(|&t| mesh.triangles[t as usize]);
+        .map(|t| mesh.triangles[t.index()]);
     let mut sites: Vec<u32> = corners.flatten().collect();
     sites.sort_unstable();
     sites.dedup();

@@ -1,34 +1,36 @@
-//! Points that push each other apart on the surface, after Turk (1992).
+//! Repulsion between points on the surface: the second step of Turk's method (1992).
 //!
-//! Every point looks round itself within r = 2√(A/N) along the surface. A neighbour at
-//! geodesic distance d < r pushes it by k (r - d), away along the geodesic's direction at the
-//! point. All points move at once, straight on over the surface, at most r/2. Here k falls
-//! linearly to a tenth over the rounds: with a constant k the points keep trembling by a
-//! tenth of their spacing.
+//! In: points on the surface and the wanted relative spacing. Out: the same points, evenly
+//! distributed. In each round every point is pushed by its neighbours within r = 2√(A/N) along
+//! the surface: one at geodesic distance d < r pushes by k (r - d), away along the direction in
+//! which its geodesic leaves the point. Then all points move at once, along straight paths, by
+//! at most r/2. Unlike in the paper, k falls linearly to a tenth over the rounds; with a
+//! constant k the points keep oscillating by a tenth of their spacing.
 //!
-//! Why along the surface: r exceeds the thickness of a ventricle's wall, and points of the
-//! opposite side must not push.
+//! Distances are measured along the surface because r exceeds the thickness of a ventricle's
+//! wall, and points on its opposite side must not push.
 
 use rayon::prelude::*;
 
 use super::domain::Domain;
-use super::exact::ExactMap;
-use super::geodesics::{GeodesicMap, Geodesics};
-use super::log_map::LogMap;
+use super::geodesics::{ExactMap, GeodesicMap, Geodesics, LogMap};
 use super::trace::walk;
 use super::{RetileParameters, SurfacePoint};
 use crate::geometry::Vec2;
+use crate::mesh::FaceId;
 use crate::progress::Cancelled;
 
-/// Share of k that is taken off by the last round.
+/// Fraction by which k has fallen after the last round.
 const ANNEALED: f64 = 0.9;
 
-/// Largest move in one round, as a share of the radius.
+/// Longest move in one round, as a fraction of the radius.
 const LONGEST_MOVE: f64 = 0.5;
 
+/// The end of a list of points.
 const NONE: u32 = u32::MAX;
 
-/// Relaxes `points` in place, for the relative `spacing` at every vertex; `tick` is told the share done and may cancel.
+/// Moves `points` apart for the relative `spacing` at every vertex. `tick` is called with the
+/// fraction done and may cancel.
 pub(crate) fn repel(
     domain: &Domain,
     spacing: &[f64],
@@ -70,13 +72,16 @@ fn repel_by<M: GeodesicMap>(
     Ok(())
 }
 
-/// The points with their radii, listed by triangle.
+/// The points with their radii, as one linked list per triangle.
 struct Neighbourhood<'a> {
     domain: &'a Domain,
     points: &'a [SurfacePoint],
+    /// Radius r of each point, mm.
     radii: Vec<f64>,
     largest: f64,
+    /// First point on each triangle.
     first: Vec<u32>,
+    /// The next point on the same triangle.
     next: Vec<u32>,
 }
 
@@ -86,11 +91,11 @@ impl<'a> Neighbourhood<'a> {
             .iter()
             .map(|p| radius * domain.interpolate(spacing, p))
             .collect();
-        let mut first = vec![NONE; domain.triangles.len()];
+        let mut first = vec![NONE; domain.half_edges.face_count()];
         let mut next = vec![NONE; points.len()];
         for (i, p) in points.iter().enumerate().rev() {
-            next[i] = first[p.triangle as usize];
-            first[p.triangle as usize] = i as u32;
+            next[i] = first[p.triangle.index()];
+            first[p.triangle.index()] = i as u32;
         }
         let largest = radii.iter().copied().fold(0.0, f64::max);
         Self {
@@ -103,7 +108,7 @@ impl<'a> Neighbourhood<'a> {
         }
     }
 
-    /// The move of point `p`, in the frame of its triangle.
+    /// The move of point `p`, mm in the frame of its triangle.
     fn push(&self, map: &mut impl GeodesicMap, p: usize, strength: f64) -> Vec2 {
         let own = &self.points[p];
         let reach = (self.radii[p] + self.largest) / 2.0;
@@ -116,7 +121,7 @@ impl<'a> Neighbourhood<'a> {
                 step -= towards * (strength * (range - distance) / distance);
             }
         };
-        let mut add_all_on = |t: u32| {
+        let mut add_all_on = |t: FaceId| {
             for q in self.on_triangle(t) {
                 if let Some(towards) = map.reach_point(self.domain, &self.points[q as usize]) {
                     add(q, towards.vector);
@@ -128,17 +133,13 @@ impl<'a> Neighbourhood<'a> {
             if map.reach(v).is_none() {
                 continue;
             }
-            for h in self
-                .domain
-                .adjacency
-                .around(self.domain.outgoing[v as usize])
-            {
-                let t = h / 3;
-                let corners = self.domain.triangles[t as usize];
-                if self.first[t as usize] == NONE || t == own.triangle {
+            for h in self.domain.half_edges.around(v) {
+                let t = h.face();
+                if self.first[t.index()] == NONE || t == own.triangle {
                     continue;
                 }
-                // Each triangle once, and only those that lie wholly within the radius.
+                // Each triangle once, and only those entirely within the radius.
+                let corners = self.domain.half_edges.corners(t);
                 if corners.iter().all(|c| *c >= v && map.reach(*c).is_some()) {
                     add_all_on(t);
                 }
@@ -152,8 +153,9 @@ impl<'a> Neighbourhood<'a> {
         step
     }
 
-    fn on_triangle(&self, t: u32) -> impl Iterator<Item = u32> + '_ {
-        let mut q = self.first[t as usize];
+    /// The points on triangle `t`.
+    fn on_triangle(&self, t: FaceId) -> impl Iterator<Item = u32> + '_ {
+        let mut q = self.first[t.index()];
         std::iter::from_fn(move || {
             let this = q;
             if this == NONE {

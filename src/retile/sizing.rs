@@ -1,31 +1,38 @@
-//! How far apart points shall lie, place by place.
+//! The wanted spacing of the points, as a function of curvature.
 //!
-//! Spacing h falls with curvedness: h ∝ κ^-γ, where κ = sqrt((κ1² + κ2²)/2) (Koenderink and van
-//! Doorn 1992) is the root mean square of |Δn|/|Δx| over the edges of a vertex, smoothed over
-//! the surface and held between its 5th and 97th percentile, so that noise and corners do
-//! not pile points up. Where even points resolve the surface, that is where the arc over one
-//! edge between them rises by less than a given share of the whole's size, spacing stays even.
-//! So few points gather where the surface bends, while many stay as even as they can be.
-//! h is relative: its area-weighted mean density is that of even spacing.
+//! In: samples of the surface and the number of points. Out: a relative spacing h at each sample,
+//! scaled so that the total density is that of even spacing.
+//!
+//! Spacing falls with curvedness, h ∝ κ^-γ with κ = sqrt((κ1² + κ2²)/2) (Koenderink and van
+//! Doorn 1992). κ is estimated as the root mean square of |Δn|/|Δx| over the edges of a vertex,
+//! smoothed over the surface and limited to its 5th and 97th percentile, so that points do not
+//! accumulate at noise and corners. Where evenly spaced points resolve the surface, that is,
+//! where the arc over one edge rises by less than a given fraction of the surface's size,
+//! spacing stays even. Few points therefore concentrate where curvature is high; many are
+//! spaced evenly.
 
 use super::RetileParameters;
-use super::samples::Samples;
-use crate::geometry::Vec3;
-use crate::geometry::triangle::area_normal;
+use super::surface_samples::WeightedSamples;
+use crate::mesh::vertex_normals;
 
-/// Largest over smallest spacing.
+/// Largest ratio of two spacings.
 const LARGEST_RATIO: f64 = 2.5;
-/// Umbrella averages of the curvature.
+
+/// Number of times that the curvature is averaged over neighbours.
 const SMOOTHING_ROUNDS: usize = 10;
 
-/// Relative spacing at every sample: 1 on average; all 1 for γ = 0.
-pub(super) fn spacing(samples: &Samples, parameters: &RetileParameters, points: usize) -> Vec<f64> {
+/// The relative spacing at every sample: 1 on average; 1 everywhere for γ = 0.
+pub(super) fn spacing(
+    samples: &WeightedSamples,
+    parameters: &RetileParameters,
+    points: usize,
+) -> Vec<f64> {
     let gamma = parameters.adaptive;
     if gamma == 0.0 {
         return vec![1.0; samples.len()];
     }
     let area: f64 = samples.area.iter().sum();
-    // Each of even points has two equilateral triangles.
+    // Edge length of evenly spaced points: each has two equilateral triangles.
     let edge = (2.0 * area / (3f64.sqrt() * points as f64)).sqrt();
     // An arc of curvature k rises by k/8 of its squared chord.
     let rise = parameters.adaptive_from / 100.0 * area.sqrt();
@@ -52,7 +59,7 @@ pub(super) fn spacing(samples: &Samples, parameters: &RetileParameters, points: 
         .iter()
         .map(|k| k.clamp(low, high).powf(-gamma))
         .collect();
-    // As many points as even spacing takes: the sum of area/h² is the area.
+    // The same number of points as with even spacing: the sum of area/h² must be the area.
     let needed: f64 = (0..samples.len())
         .map(|v| samples.area[v] / spacing[v].powi(2))
         .sum();
@@ -61,18 +68,9 @@ pub(super) fn spacing(samples: &Samples, parameters: &RetileParameters, points: 
     spacing
 }
 
-fn curvedness(samples: &Samples) -> Vec<f64> {
-    let mut normals = vec![Vec3::zeros(); samples.len()];
-    for t in &samples.triangles {
-        let [a, b, c] = t.map(|v| &samples.working[v as usize]);
-        let n = area_normal(a, b, c);
-        for v in t {
-            normals[*v as usize] += n;
-        }
-    }
-    for n in &mut normals {
-        *n = n.try_normalize(0.0).unwrap_or_else(Vec3::zeros);
-    }
+/// The curvedness κ at every sample of W, 1/mm.
+fn curvedness(samples: &WeightedSamples) -> Vec<f64> {
+    let normals = vertex_normals(&samples.working, &samples.triangles);
     (0..samples.len())
         .map(|v| {
             let around = samples.around(v);
@@ -94,13 +92,14 @@ mod tests {
     #[test]
     fn a_sphere_is_evenly_curved_and_a_torus_denser_inside() {
         let sphere = shapes::icosphere(20.0, 4);
-        let samples = Samples::new(&sphere.vertices, &sphere.vertices, &sphere.triangles, 0);
+        let samples =
+            WeightedSamples::new(&sphere.vertices, &sphere.vertices, &sphere.triangles, 0);
         for k in curvedness(&samples) {
-            // At the twelve corners of valence 5 area normals and chords differ most.
+            // The estimate is worst at the twelve vertices of valence 5.
             assert!((k * 20.0 - 1.0).abs() < 0.07, "{k}");
         }
         let torus = shapes::torus(30.0, 12.0, 80, 40);
-        let samples = Samples::new(&torus.vertices, &torus.vertices, &torus.triangles, 0);
+        let samples = WeightedSamples::new(&torus.vertices, &torus.vertices, &torus.triangles, 0);
         for (v, k) in curvedness(&samples).into_iter().enumerate() {
             let p = samples.working[v];
             let from_axis = p.xy().norm();
@@ -119,7 +118,7 @@ mod tests {
             .sum();
         assert!((density / torus.area() - 1.0).abs() < 1e-9);
         assert!(h.iter().any(|h| *h > 1.01) && h.iter().any(|h| *h < 0.99));
-        // Without adaptation, or where no place bends enough for it, spacing is even.
+        // Without adaptation, or if the curvature is too low for it, spacing is even.
         for (parameters, points) in [(with(0.0, 0.0), 100), (with(0.5, 1.0), 10_000)] {
             let h = spacing(&samples, &parameters, points);
             assert!(h.iter().all(|h| (h - 1.0).abs() < 1e-12));

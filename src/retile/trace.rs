@@ -1,52 +1,55 @@
-//! Walking straight on the surface.
+//! Straight paths on the surface.
 //!
-//! A straightest geodesic (Polthier & Schmies 1998) crosses an edge as if the next triangle
-//! were turned into the plane of the last one. The crossing is kept a hair away from the
-//! edge's ends, so the walk never meets a vertex, where "straight" has no single meaning.
+//! In: a point of the surface and a step in the frame of its triangle. Out: the point at the end
+//! of the straightest geodesic in that direction (Polthier and Schmies 1998): at each edge the
+//! path continues as if the next triangle were unfolded into the plane of the last one.
+//! Crossings are kept slightly away from the ends of the edge, so a path never meets a vertex,
+//! where "straight" is not unique.
 
 use super::SurfacePoint;
 use super::domain::Domain;
 use crate::geometry::Vec2;
 
-/// How near, as a share of the edge, a crossing may come to its ends.
+/// Smallest distance of a crossing from the ends of the edge, as a fraction of its length.
 const END_MARGIN: f64 = 1e-7;
 
-/// Most edges one walk may cross: far beyond any walk on a sane surface.
-const MOST_CROSSINGS: usize = 10_000;
+/// Largest number of edges that one path crosses; no path on a regular surface comes near it.
+const MAX_CROSSINGS: usize = 10_000;
 
-/// How far points are kept from their triangle's edges, as a share towards its centroid.
+/// How far points near an edge of their triangle are moved towards its centroid, as a fraction of
+/// the way.
 pub(crate) const INSET: f64 = 2e-3;
 
-/// Walks `step` (mm, in the frame of the start's triangle) and returns where that ends and the
-/// direction there (unit length, in the frame of the last triangle).
+/// Follows the straight path of length and direction `step` (mm, in the frame of the start's
+/// triangle). Returns its end and the unit direction there (in the frame of the last triangle).
 pub(crate) fn walk(domain: &Domain, start: &SurfacePoint, step: Vec2) -> (SurfacePoint, Vec2) {
     let mut triangle = start.triangle;
     let mut corners = domain.flat(triangle);
     let [u, v, w] = start.barycentric;
     let mut here = corners[0] * u + corners[1] * v + corners[2] * w;
-    let mut left = step.norm();
-    if !(left > 0.0) {
+    let mut remaining = step.norm();
+    if !(remaining > 0.0) {
         return (*start, Vec2::x());
     }
-    let mut direction = step / left;
+    let mut direction = step / remaining;
     let mut entry = None;
-    for _ in 0..MOST_CROSSINGS {
+    for _ in 0..MAX_CROSSINGS {
         let Some((edge, distance, share)) = exit(&corners, here, direction, entry) else {
             break;
         };
-        if distance >= left {
-            here += direction * left;
+        if distance >= remaining {
+            here += direction * remaining;
             break;
         }
-        left -= distance;
+        remaining -= distance;
         let (a, b) = (corners[edge], corners[(edge + 1) % 3]);
         let along = (b - a).normalize();
         let turned = Vec2::new(direction.dot(&along), along.perp(&direction));
-        let twin = domain.adjacency.twin(3 * triangle + edge as u32);
-        triangle = twin / 3;
-        let k = twin as usize % 3;
+        let twin = domain.half_edges.twin(triangle.half_edge(edge));
+        triangle = twin.face();
+        let k = twin.corner();
         corners = domain.flat(triangle);
-        // The same edge runs the other way in the next triangle.
+        // In the next triangle the edge runs in the opposite direction.
         let (a, b) = (corners[(k + 1) % 3], corners[k]);
         let along = (b - a).normalize();
         here = a + (b - a) * share;
@@ -60,7 +63,8 @@ pub(crate) fn walk(domain: &Domain, start: &SurfacePoint, step: Vec2) -> (Surfac
     (point, direction)
 }
 
-/// The edge by which the ray leaves the triangle, the way to it and where on it.
+/// The edge through which the ray leaves the triangle, the distance to it and the position on it
+/// as a fraction of its length.
 fn exit(
     corners: &[Vec2; 3],
     here: Vec2,
@@ -73,7 +77,7 @@ fn exit(
             continue;
         }
         let (a, edge) = (corners[k], corners[(k + 1) % 3] - corners[k]);
-        // Outward means to the right of the edge.
+        // Outside is to the right of the edge.
         let speed = direction.perp(&edge);
         if !(speed > 0.0) {
             continue;
@@ -99,8 +103,8 @@ fn barycentric(corners: &[Vec2; 3], p: &Vec2) -> [f64; 3] {
     [1.0 - v - w, v, w]
 }
 
-/// Barycentric coordinates that are positive, sum to 1 and keep off the triangle's edges:
-/// those that come too near are pulled towards the centroid.
+/// Barycentric coordinates that are positive, add up to 1 and are not too close to an edge:
+/// points close to one are moved towards the centroid.
 pub(crate) fn inset(barycentric: [f64; 3]) -> [f64; 3] {
     let clipped = barycentric.map(|x| x.max(0.0));
     let sum: f64 = clipped.iter().sum();
@@ -114,7 +118,7 @@ pub(crate) fn inset(barycentric: [f64; 3]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes;
+    use crate::mesh::{FaceId, shapes};
 
     fn domain(mesh: crate::mesh::TriMesh) -> Domain {
         Domain::new(mesh.vertices, mesh.triangles).unwrap()
@@ -125,14 +129,15 @@ mod tests {
         let domain = domain(shapes::torus(9.0, 3.0, 40, 17));
         for (n, angle) in [0.1, 0.9, 2.2, 3.3, 4.9, 6.0].into_iter().enumerate() {
             let start = SurfacePoint {
-                triangle: 100 * n as u32,
+                triangle: FaceId(100 * n as u32),
                 barycentric: [0.2, 0.5, 0.3],
             };
             let step = Vec2::new(f64::cos(angle), f64::sin(angle)) * 7.0;
             let (end, heading) = walk(&domain, &start, step);
             let (back, heading) = walk(&domain, &end, -heading * 7.0);
-            // The far end may have been moved off an edge by a fraction of its triangle.
-            let position = |p: &SurfacePoint| p.position(&domain.vertices, &domain.triangles);
+            // The far end may have been moved away from an edge.
+            let position =
+                |p: &SurfacePoint| p.position(&domain.vertices, domain.half_edges.triangles());
             assert!((position(&back) - position(&start)).norm() < 5e-3, "{n}");
             assert!((heading + step / 7.0).norm() < 5e-3 || back.triangle != start.triangle);
         }
@@ -140,15 +145,15 @@ mod tests {
 
     #[test]
     fn every_geodesic_of_a_tetrahedron_closes() {
-        // A regular tetrahedron unrolls to the triangular lattice: going 2 edges along a
-        // side's direction leads back to the same place.
+        // A regular tetrahedron unfolds to the triangular lattice: a path two edges long and
+        // parallel to a side returns to its start.
         let domain = domain(shapes::tetrahedron(10.0));
         let start = SurfacePoint {
-            triangle: 0,
+            triangle: FaceId(0),
             barycentric: [0.5, 0.3, 0.2],
         };
         let (end, heading) = walk(&domain, &start, Vec2::new(20.0, 0.0));
-        assert_eq!(end.triangle, 0);
+        assert_eq!(end.triangle, FaceId(0));
         for k in 0..3 {
             assert!((end.barycentric[k] - start.barycentric[k]).abs() < 1e-9);
         }

@@ -24,7 +24,7 @@ pub fn template(monitor: &Monitor<'_>) -> Result<Template, Cancelled> {
     if let Some(template) = TEMPLATE.get() {
         return Ok(template.clone());
     }
-    let made = make(&monitor.untold())?;
+    let made = make(&monitor.without_observer())?;
     Ok(TEMPLATE.get_or_init(|| made).clone())
 }
 
@@ -77,7 +77,7 @@ mod tests {
         let cancel = CancelToken::new();
         cancel.cancel();
         let monitor = Monitor::new(&Silent, cancel);
-        assert!(make(&monitor.untold()).is_err());
+        assert!(make(&monitor.without_observer()).is_err());
     }
 
     #[test]

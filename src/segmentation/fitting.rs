@@ -105,7 +105,7 @@ pub fn try_all(
     let mut search = OrganSearch::default();
     for (index, NamedTemplate { name, template }) in templates.iter().enumerate() {
         let place = search.place(volume, template, parameters, monitor)?;
-        let monitor = monitor.piece(index, templates.len());
+        let monitor = monitor.part(index, templates.len());
         let name = name.clone();
         match fit_at(place, volume, template, parameters, &monitor) {
             Ok(fit) => {

@@ -30,11 +30,11 @@ pub fn from_files(
 ) -> Result<SegmentedVolume, SegmentationError> {
     let frame = order.parameters.frame;
     let parts = 1 + usize::from(order.expert.is_some());
-    let reading = read(order.volume, frame, limits, &monitor.piece(0, parts))
+    let reading = read(order.volume, frame, limits, &monitor.part(0, parts))
         .map_err(|error| unusable(error, SegmentationError::Volume))?;
     let expert = order
         .expert
-        .map(|files| read(files, None, limits, &monitor.piece(1, parts)))
+        .map(|files| read(files, None, limits, &monitor.part(1, parts)))
         .transpose()
         .map_err(|error| unusable(error, SegmentationError::ExpertVolume))?;
     let parameters = FitParameters {

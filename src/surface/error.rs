@@ -1,7 +1,7 @@
 //! Why there is no surface.
 
 use super::marching_cubes::{self, MarchingCubesError};
-use crate::mesh::topology::Defect;
+use crate::mesh::topology::MeshDefect;
 use crate::progress::Cancelled;
 
 /// Why there is no surface.
@@ -98,7 +98,7 @@ pub enum SurfaceError {
     TooManyVertices(#[from] marching_cubes::TooManyVertices),
     /// A mesh handed to [`from_mesh`](super::from_mesh) is not a closed manifold.
     #[error("the mesh is not a closed, oriented manifold: {0}")]
-    NotClosed(#[from] Defect),
+    NotClosed(#[from] MeshDefect),
     /// A mesh handed to [`from_mesh`](super::from_mesh) has coordinates that are not finite.
     #[error("vertex {vertex} is not finite")]
     BadVertex {

@@ -47,7 +47,7 @@ fn generate_stored(
             assert!(model.mesh.volume() > 0.0);
             assert_eq!(
                 intersections::self_intersections(&model.mesh),
-                Vec::<[u32; 2]>::new()
+                Vec::<[ventriform::mesh::FaceId; 2]>::new()
             );
             let text = model.report.to_json_text();
             assert!(serde_json::from_str::<serde_json::Value>(&text).is_ok());

@@ -56,7 +56,10 @@ fn our_models_are_fitter_than_the_reference_of_as_many_points() {
             );
             for mesh in [&ours, &reference] {
                 assert_eq!(mesh.vertices.len(), points);
-                assert_eq!(self_intersections(mesh), Vec::<[u32; 2]>::new());
+                assert_eq!(
+                    self_intersections(mesh),
+                    Vec::<[ventriform::mesh::FaceId; 2]>::new()
+                );
             }
         }
     }

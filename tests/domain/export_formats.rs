@@ -1,9 +1,9 @@
-//! Every format, read back by a reader of the test's own, gives the mesh that was written.
+//! Writes a mesh in every format and reads it back with readers that are part of this test.
 //!
-//! The files stay in `target/tmp/formats/`, where `scripts/check_formats.sh` shows them to
-//! the programs that people use: Khronos' validator, trimesh and VTK.
+//! The files are kept in `target/tmp/formats/`, where `scripts/check_formats.sh` checks them with
+//! other programs: Khronos' validator, trimesh and VTK.
 
-// A test's helpers state their expectations by panicking, as the test does.
+// The helpers of a test state their expectations by panicking, as the test does.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeSet;
@@ -14,7 +14,7 @@ use ventriform::export::{ExportError, Format, Metadata, encode};
 use ventriform::geometry::Vec3;
 use ventriform::mesh::{TriMesh, shapes};
 
-/// A cup where a heart lies, with coordinates that no short decimal names.
+/// A cup at the position of a heart, with coordinates that have no short decimals.
 fn cup() -> TriMesh {
     let mut mesh = shapes::cup(80.0, 32.0, 10.0, 17);
     let turn = nalgebra::Rotation3::from_euler_angles(0.3, -0.7, 0.2);
@@ -81,7 +81,7 @@ fn chunks(glb: &[u8]) -> (Value, &[u8]) {
 }
 
 #[test]
-fn all_formats_are_left_for_the_other_readers() {
+fn all_formats_are_written_for_the_other_readers() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("formats");
     std::fs::create_dir_all(&folder).unwrap();
     for format in Format::ALL {
@@ -92,7 +92,7 @@ fn all_formats_are_left_for_the_other_readers() {
 }
 
 #[test]
-fn names_lead_back_to_the_format() {
+fn extensions_and_media_types_identify_the_format() {
     for format in Format::ALL {
         assert_eq!(Format::from_extension(format.extension()), Some(format));
         assert_eq!(Format::from_media_type(format.media_type()), Some(format));
@@ -107,7 +107,7 @@ fn names_lead_back_to_the_format() {
 }
 
 #[test]
-fn glb_holds_every_vertex_once_in_patient_millimetres() {
+fn glb_has_every_vertex_once_in_patient_millimetres() {
     let mesh = cup();
     let glb = bytes(Format::Glb);
     let (document, buffer) = chunks(&glb);
@@ -130,7 +130,7 @@ fn glb_holds_every_vertex_once_in_patient_millimetres() {
         let column = || mesh.vertices.iter().map(|v| f64::from(v[r] as f32));
         let min = column().fold(f64::INFINITY, f64::min);
         let max = column().fold(f64::NEG_INFINITY, f64::max);
-        // serde_json may read the last bit of a decimal wrong; as f32 it is right again.
+        // serde_json may read the last bit of a decimal incorrectly, which does not affect an f32.
         let single = |x: &Value| f64::from(x.as_f64().unwrap() as f32);
         assert_eq!(single(&accessors[0]["min"][r]), min);
         assert_eq!(single(&accessors[0]["max"][r]), max);
@@ -146,7 +146,7 @@ fn glb_holds_every_vertex_once_in_patient_millimetres() {
 }
 
 #[test]
-fn the_one_node_stands_the_patient_upright_in_metres() {
+fn the_node_converts_to_metres_with_the_patient_upright() {
     let glb = bytes(Format::Glb);
     let (document, _) = chunks(&glb);
     assert_eq!(document["nodes"].as_array().unwrap().len(), 1);
@@ -175,7 +175,7 @@ fn gltf_is_the_same_model_with_its_buffer_embedded() {
 }
 
 #[test]
-fn more_than_65535_vertices_take_wide_indices() {
+fn more_than_65535_vertices_need_wide_indices() {
     let mesh = shapes::torus(60.0, 20.0, 400, 170);
     assert_eq!(mesh.vertices.len(), 68_000);
     let glb = encode(Format::Glb, &mesh, &metadata()).unwrap();
@@ -186,7 +186,7 @@ fn more_than_65535_vertices_take_wide_indices() {
 }
 
 #[test]
-fn stl_holds_every_triangle_and_its_normal() {
+fn stl_has_every_triangle_and_its_normal() {
     let mesh = cup();
     let stl = bytes(Format::Stl);
     assert!(stl.starts_with(b"SPACE=LPS UNIT=mm"));
@@ -268,13 +268,13 @@ fn vtp_keeps_double_precision() {
 }
 
 #[test]
-fn json_keeps_double_precision_and_names_its_frame() {
+fn json_keeps_double_precision_and_states_its_frame() {
     let mesh = cup();
     let text = String::from_utf8(bytes(Format::Json)).unwrap();
     let document: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(document["frame"], "LPS");
     assert_eq!(document["unit"], "mm");
-    // serde_json may read the last bit of a decimal wrong, so this reads the text itself.
+    // serde_json may read the last bit of a decimal incorrectly, so the text itself is parsed.
     let numbers = |key: &str| -> Vec<f64> {
         let rows = &text[text.find(&format!("\"{key}\":[[")).unwrap() + key.len() + 5..];
         let rows = &rows[..rows.find("]]").unwrap()];
@@ -290,9 +290,9 @@ fn json_keeps_double_precision_and_names_its_frame() {
 }
 
 #[test]
-fn vertices_joined_by_rounding_stay_apart_in_single_precision() {
+fn vertices_that_rounding_would_join_stay_distinct() {
     let mut mesh = cup();
-    // Two vertices of one edge, a nanometre apart at half a metre's distance.
+    // The two vertices of an edge, a nanometre apart and half a metre from the origin.
     let [a, b, _] = mesh.triangles[40].map(|v| v as usize);
     mesh.vertices[b] = mesh.vertices[a] + Vec3::new(0.0, 0.0, 1e-6);
     let stl = encode(Format::Stl, &mesh, &metadata()).unwrap();
@@ -310,7 +310,7 @@ fn vertices_joined_by_rounding_stay_apart_in_single_precision() {
 }
 
 #[test]
-fn what_is_no_mesh_is_refused_with_its_place() {
+fn errors_name_the_invalid_vertex_or_triangle() {
     let mesh = cup();
     for format in Format::ALL {
         let refuse = |change: &dyn Fn(&mut TriMesh)| {

@@ -1,4 +1,4 @@
-//! The same bytes whatever the number of threads.
+//! The optimised mesh has the same bytes for any number of threads.
 
 use ventriform::geometry::Vec3;
 use ventriform::mesh::{TriMesh, shapes};

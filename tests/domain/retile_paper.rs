@@ -1,4 +1,5 @@
-//! The paper's route on whole surfaces: exactly N points, closed, the surface's topology.
+//! The paper's method on whole surfaces. A result has exactly N vertices, is closed and has the
+//! topology of the surface.
 
 use ventriform::geometry::Vec3;
 use ventriform::mesh::intersections::self_intersections;
@@ -31,7 +32,10 @@ fn check(surface: &Surface, points: usize, tiled: &Tiled) {
     assert_eq!(before.euler_characteristic, after.euler_characteristic);
     assert_eq!(before.components, after.components);
     assert!(tiled.mesh.volume() > 0.0);
-    assert_eq!(self_intersections(&tiled.mesh), Vec::<[u32; 2]>::new());
+    assert_eq!(
+        self_intersections(&tiled.mesh),
+        Vec::<[ventriform::mesh::FaceId; 2]>::new()
+    );
 }
 
 #[test]
@@ -67,7 +71,7 @@ fn repulsion_spreads_points_over_the_sphere() {
         .iter()
         .map(nearest)
         .fold(f64::INFINITY, f64::min);
-    // A hexagonal lattice has 1.07 √(A/N); random points come as near as 0.04.
+    // In a hexagonal lattice the distance is 1.07 √(A/N); random points come as close as 0.04.
     let spacing = (surface.mesh.area() / 150.0).sqrt();
     assert!(least > 0.7 * spacing, "{}", least / spacing);
 }
@@ -86,8 +90,8 @@ fn several_components_share_the_points() {
 }
 
 #[test]
-fn too_few_points_are_refused_with_a_number_that_does() {
-    // Two tori take 7 vertices each, in any triangulation.
+fn the_error_for_too_few_points_names_a_sufficient_number() {
+    // Any triangulation of a torus has at least 7 vertices.
     let mut mesh = shapes::torus(30.0, 12.0, 30, 15);
     let first = mesh.vertices.len() as u32;
     let high = Vec3::new(0.0, 0.0, 60.0);
@@ -99,20 +103,20 @@ fn too_few_points_are_refused_with_a_number_that_does() {
     mesh.triangles.extend(moved);
     let surface = surface(mesh);
     let Err(RetileError::TooFewPoints { points, needed }) = paper(&surface, 12, 1) else {
-        panic!("12 points cannot carry two tori");
+        panic!("12 points are too few for two tori");
     };
     assert!(points == 12 && needed >= 14);
     check(&surface, needed, &paper(&surface, needed, 1).unwrap());
 }
 
 #[test]
-fn a_thin_ring_is_carried_by_the_fewest_points() {
+fn few_points_suffice_for_a_thin_ring() {
     let surface = surface(shapes::torus(60.0, 4.0, 120, 10));
     check(&surface, 12, &paper(&surface, 12, 1).unwrap());
 }
 
 #[test]
-fn the_same_on_any_number_of_threads_and_other_for_another_seed() {
+fn results_depend_on_the_seed_but_not_on_the_number_of_threads() {
     let surface = surface(shapes::cup(60.0, 30.0, 11.0, 40));
     let on = |threads: usize| {
         rayon::ThreadPoolBuilder::new()
@@ -128,7 +132,7 @@ fn the_same_on_any_number_of_threads_and_other_for_another_seed() {
 }
 
 #[test]
-fn a_raised_token_ends_the_work() {
+fn cancelling_ends_the_work() {
     let token = CancelToken::new();
     token.cancel();
     let surface = surface(shapes::icosphere(20.0, 3));

@@ -1,5 +1,6 @@
-//! The refined route on many surfaces: exactly N points, closed, the surface's topology, no
-//! piercing; evenly spread; the same on any number of threads.
+//! The refined method on many surfaces. A result has exactly N vertices, evenly distributed; it is
+//! closed, has the topology of the surface, does not intersect itself, and does not depend on the
+//! number of threads.
 
 use rand::RngExt;
 use ventriform::geometry::random::{Purpose, stream};
@@ -31,7 +32,10 @@ fn check(surface: &Surface, points: usize, tiled: &Tiled) {
     assert_eq!(before.euler_characteristic, after.euler_characteristic);
     assert_eq!(before.components, after.components);
     assert!(tiled.mesh.volume() > 0.0);
-    assert_eq!(self_intersections(&tiled.mesh), Vec::<[u32; 2]>::new());
+    assert_eq!(
+        self_intersections(&tiled.mesh),
+        Vec::<[ventriform::mesh::FaceId; 2]>::new()
+    );
 }
 
 fn radius_ratios(mesh: &TriMesh) -> (f64, f64) {
@@ -43,7 +47,7 @@ fn radius_ratios(mesh: &TriMesh) -> (f64, f64) {
     (sum / mesh.triangles.len() as f64, least)
 }
 
-/// A shape drawn at random, stretched, bent and roughened.
+/// A random shape, stretched, bent and with noise.
 fn any_surface(seed: u64) -> Surface {
     let mut random = stream(seed, Purpose::PhantomShape);
     let mut draw = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
@@ -68,7 +72,7 @@ fn any_surface(seed: u64) -> Surface {
 }
 
 #[test]
-fn any_surface_is_retiled_or_refused_with_a_number_that_does() {
+fn any_surface_is_retiled_or_the_error_names_a_sufficient_number() {
     let mut refused = 0;
     for seed in 0..120 {
         let surface = any_surface(seed);
@@ -113,7 +117,7 @@ fn triangles_are_nearly_equilateral() {
 }
 
 #[test]
-fn curvature_draws_points_together() {
+fn points_are_denser_where_curvature_is_high() {
     let surface = surface(shapes::cup(60.0, 30.0, 8.0, 64));
     let with = |adaptive| {
         let parameters = RetileParameters {
@@ -159,7 +163,7 @@ fn several_components_share_the_points() {
 }
 
 #[test]
-fn the_same_on_any_number_of_threads_and_other_for_another_seed() {
+fn results_depend_on_the_seed_but_not_on_the_number_of_threads() {
     let surface = surface(shapes::cup(60.0, 30.0, 11.0, 80));
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new()
@@ -175,7 +179,7 @@ fn the_same_on_any_number_of_threads_and_other_for_another_seed() {
 }
 
 #[test]
-fn parameters_out_of_range_are_named() {
+fn errors_name_the_parameter_out_of_range() {
     let surface = surface(shapes::icosphere(20.0, 3));
     let with = |change: &dyn Fn(&mut RetileParameters)| {
         let mut parameters = RetileParameters::default();

@@ -14,7 +14,7 @@ use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::mesh::shapes;
 use ventriform::parameters::FitParameters;
-use ventriform::progress::{CancelToken, Gauge, Monitor, Observer, Plan, Stage};
+use ventriform::progress::{CancelToken, Monitor, Observer, Plan, Stage, TotalProgress};
 use ventriform::segmentation::{SegmentationFilesError, SegmentationOrder, from_files};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
@@ -208,7 +208,7 @@ fn templates_are_imported_into_a_data_folder() {
 
 /// Records the stages and the progress of the whole, and cancels at one of them.
 struct Watcher {
-    gauge: Gauge,
+    gauge: TotalProgress,
     stages: Mutex<Vec<Stage>>,
     whole: Mutex<f64>,
     stop_at: Option<Stage>,
@@ -219,7 +219,7 @@ struct Watcher {
 impl Watcher {
     fn new(stop_at: Option<Stage>) -> Self {
         Self {
-            gauge: Gauge::new(Plan::SEGMENTATION),
+            gauge: TotalProgress::new(Plan::SEGMENTATION),
             stages: Mutex::default(),
             whole: Mutex::new(0.0),
             stop_at,

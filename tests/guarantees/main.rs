@@ -81,7 +81,11 @@ fn demand(surface: &Surface, points: usize, mesh: &TriMesh, what: &str) {
         "{what}"
     );
     assert_eq!(components(mesh), components(&surface.mesh), "{what}");
-    assert_eq!(self_intersections(mesh), Vec::<[u32; 2]>::new(), "{what}");
+    assert_eq!(
+        self_intersections(mesh),
+        Vec::<[ventriform::mesh::FaceId; 2]>::new(),
+        "{what}"
+    );
 }
 
 /// Tests `seeds` surfaces of a family (or `VENTRIFORM_SEEDS`). `refusable` is the largest share of

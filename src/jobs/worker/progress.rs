@@ -1,6 +1,6 @@
 //! Progress reports, from the computing threads to the jobs table.
 
-use crate::progress::{Gauge, Observer, Plan, Stage};
+use crate::progress::{Observer, Plan, Stage, TotalProgress};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 use tokio::sync::mpsc;
@@ -40,7 +40,7 @@ impl WriteLimiter {
 /// a stage.
 pub(super) struct ProgressSender {
     reports: mpsc::UnboundedSender<ProgressReport>,
-    gauge: Gauge,
+    gauge: TotalProgress,
     /// Stage and percentage of the last report, as one number.
     last_sent: AtomicU32,
     started: Instant,
@@ -51,7 +51,7 @@ impl ProgressSender {
     pub fn new(plan: Plan, reports: mpsc::UnboundedSender<ProgressReport>) -> Self {
         Self {
             reports,
-            gauge: Gauge::new(plan),
+            gauge: TotalProgress::new(plan),
             last_sent: AtomicU32::new(u32::MAX),
             started: Instant::now(),
         }

@@ -1,24 +1,29 @@
-//! Do two triangles meet? Decided exactly.
+//! The exact intersection test of two triangles.
 //!
-//! Every decision is the sign of a determinant from Shewchuk's adaptive predicates (1997), so
-//! the answer is that of the corners' stored coordinates, not of rounded constructions. No
-//! position is special: coplanar, touching and degenerate triangles (a segment, a point) are
-//! treated as the closed sets that they are.
+//! Every decision is the sign of a determinant computed by Shewchuk's adaptive predicates
+//! (1997), so the answer is exact for the stored coordinates. There are no special positions:
+//! coplanar, touching and degenerate triangles (segments, points) are handled as closed sets.
 
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
+use crate::mesh::VertexId;
 
-/// Whether the closed triangles `s` and `t` meet in more than the vertices and edges that
-/// they share.
+/// Whether the closed triangles `s` and `t` have more in common than the vertices and edges
+/// that they share.
 ///
-/// `s_ids` and `t_ids` are the corners' vertex indices; equal indices mean a shared vertex.
-/// - nothing shared: any common point counts, touching too;
-/// - a shared vertex: any common point besides it;
-/// - a shared edge: one triangle folded onto the other;
-/// - all three shared: always.
-pub fn triangles_intersect(s_ids: [u32; 3], s: &[Vec3; 3], t_ids: [u32; 3], t: &[Vec3; 3]) -> bool {
+/// `s_ids` and `t_ids` are the vertices at the corners; equal ones mean a shared vertex.
+/// - No shared vertex: any common point counts, including touching.
+/// - One shared vertex: any other common point counts.
+/// - A shared edge: they intersect if one is folded onto the other.
+/// - Three shared vertices: they always intersect.
+pub fn triangles_intersect(
+    s_ids: [VertexId; 3],
+    s: &[Vec3; 3],
+    t_ids: [VertexId; 3],
+    t: &[Vec3; 3],
+) -> bool {
     let from_s = [0, 1, 2].map(|i| t_ids.contains(&s_ids[i]));
     match from_s.iter().filter(|shared| **shared).count() {
         0 => closed_triangles_meet(s, t),
@@ -42,7 +47,7 @@ fn turned(t: &[Vec3; 3], first: usize) -> [Vec3; 3] {
     [0, 1, 2].map(|k| t[(first + k) % 3])
 }
 
-/// Nothing shared. If two triangles meet, an edge of one meets the other.
+/// For triangles without a shared vertex: if they meet, an edge of one meets the other.
 fn closed_triangles_meet(s: &[Vec3; 3], t: &[Vec3; 3]) -> bool {
     if beside(s, t) || beside(t, s) {
         return false;
@@ -59,9 +64,9 @@ fn beside(s: &[Vec3; 3], t: &[Vec3; 3]) -> bool {
     first != 0 && side(s, &t[1]) == first && side(s, &t[2]) == first
 }
 
-/// The first corners are the shared vertex. Two convex sets that share it and another point
-/// share the segment between; prolonged, it leaves one of the triangles through the edge
-/// opposite to the vertex.
+/// For triangles whose first corners are a shared vertex. If two convex sets have that vertex and
+/// another point in common, they have the segment in between; extended, it leaves one of the
+/// triangles through the edge opposite to the vertex.
 fn meet_beyond_vertex(s: &[Vec3; 3], t: &[Vec3; 3]) -> bool {
     let apart = |s: &[Vec3; 3], t: &[Vec3; 3]| {
         let first = side(s, &t[1]);
@@ -76,7 +81,7 @@ fn meet_beyond_vertex(s: &[Vec3; 3], t: &[Vec3; 3]) -> bool {
 fn opposite_edge_meets(s: &[Vec3; 3], t: &[Vec3; 3]) -> bool {
     let [v, a, b] = s;
     if is_collinear(s) {
-        // The edge may run through the vertex: only the ends are beyond it.
+        // The edge may contain the vertex itself, so only its ends are tested.
         return [a, b]
             .iter()
             .any(|end| *end != v && segment_meets_triangle(end, end, t));
@@ -84,8 +89,8 @@ fn opposite_edge_meets(s: &[Vec3; 3], t: &[Vec3; 3]) -> bool {
     segment_meets_triangle(a, b, t)
 }
 
-/// The triangles `u v a` and `u v b`: they meet beyond `u v` only where they are coplanar
-/// with `a` and `b` on the same side.
+/// For the triangles `u v a` and `u v b`: they meet beyond `u v` only if they are coplanar with
+/// `a` and `b` on the same side.
 fn meet_beyond_edge(u: &Vec3, v: &Vec3, a: &Vec3, b: &Vec3) -> bool {
     if side(&[*u, *v, *a], b) != 0 {
         return false;
@@ -96,7 +101,7 @@ fn meet_beyond_edge(u: &Vec3, v: &Vec3, a: &Vec3, b: &Vec3) -> bool {
             return at_a == at_b;
         }
     }
-    // Both are segments. On one line they share more than the edge where their boxes do.
+    // Both are segments. If these lie on one line, their boxes decide.
     if !is_collinear(&[*u, *a, *b]) {
         return false;
     }
@@ -104,7 +109,8 @@ fn meet_beyond_edge(u: &Vec3, v: &Vec3, a: &Vec3, b: &Vec3) -> bool {
     s.min.sup(&t.min) != edge.min || s.max.inf(&t.max) != edge.max
 }
 
-/// Closed segment (also a point) against closed triangle (also a segment or a point).
+/// Whether a closed segment, possibly a point, meets a closed triangle, possibly a segment or a
+/// point.
 fn segment_meets_triangle(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
     let (at_p, at_q) = (side(t, p), side(t, q));
     if at_p * at_q > 0 {
@@ -123,14 +129,14 @@ fn segment_meets_triangle(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
     first * third >= 0 && second * third >= 0
 }
 
-/// The segment lies in the triangle's plane, or the triangle has none.
+/// [`segment_meets_triangle`] for a segment in the triangle's plane, or a degenerate triangle.
 fn flat_segment_meets_triangle(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
     let [a, b, c] = t;
     let edges = [(a, b), (b, c), (c, a)];
     let Some((axis, orientation)) = projection(t) else {
         return edges.iter().any(|(r, s)| segments_meet(p, q, r, s));
     };
-    // Where no edge is met, the segment lies inside or outside as a whole.
+    // A segment that meets no edge lies entirely inside or entirely outside.
     edges.iter().any(|(r, s)| {
         coplanar_segments_meet(axis, p, q, r, s).unwrap_or_else(|| boxes_meet(p, q, r, s))
     }) || edges
@@ -138,8 +144,8 @@ fn flat_segment_meets_triangle(p: &Vec3, q: &Vec3, t: &[Vec3; 3]) -> bool {
         .all(|(r, s)| turn(axis, r, s, p) == orientation)
 }
 
-/// An axis along which the triangle's projection is not flat, and how it turns there; the
-/// widest projection is looked at first, for it is decided fastest.
+/// An axis along which the triangle's projection has an area, and its orientation there. The
+/// widest projection is tried first, since its sign is decided fastest.
 fn projection([a, b, c]: &[Vec3; 3]) -> Option<(usize, i8)> {
     let widest = (b - a).cross(&(c - a)).iamax();
     (0..3)
@@ -148,7 +154,7 @@ fn projection([a, b, c]: &[Vec3; 3]) -> Option<(usize, i8)> {
         .find(|(_, turn)| *turn != 0)
 }
 
-/// Two closed segments anywhere.
+/// Whether two closed segments meet.
 fn segments_meet(p: &Vec3, q: &Vec3, r: &Vec3, s: &Vec3) -> bool {
     side(&[*p, *q, *r], s) == 0
         && (0..3)
@@ -156,19 +162,20 @@ fn segments_meet(p: &Vec3, q: &Vec3, r: &Vec3, s: &Vec3) -> bool {
             .unwrap_or_else(|| boxes_meet(p, q, r, s))
 }
 
-/// Two closed coplanar segments, seen along `axis`; `None` where they look collinear.
+/// Whether two closed coplanar segments meet, decided in the projection along `axis`; `None` if
+/// they are collinear there.
 fn coplanar_segments_meet(axis: usize, p: &Vec3, q: &Vec3, r: &Vec3, s: &Vec3) -> Option<bool> {
     let (of_r, of_s) = (turn(axis, p, q, r), turn(axis, p, q, s));
     if of_r * of_s > 0 {
         return Some(false);
     }
     let (of_p, of_q) = (turn(axis, r, s, p), turn(axis, r, s, q));
-    // A triple that turns shows that the projection keeps the common plane a plane.
+    // A triple that is not collinear shows that the projection keeps the common plane a plane.
     let seen = [of_r, of_s, of_p, of_q].iter().any(|turn| *turn != 0);
     seen.then_some(of_p * of_q <= 0)
 }
 
-/// Decides for collinear segments.
+/// Whether two collinear segments meet.
 fn boxes_meet(p: &Vec3, q: &Vec3, r: &Vec3, s: &Vec3) -> bool {
     Aabb::of([p, q]).overlaps(&Aabb::of([r, s]))
 }
@@ -177,7 +184,7 @@ fn is_collinear([a, b, c]: &[Vec3; 3]) -> bool {
     (0..3).all(|axis| turn(axis, a, b, c) == 0)
 }
 
-/// On which side of the plane of `t` the point lies: -1, 0 or 1; 0 where `t` has no plane.
+/// The side of the plane of `t` on which the point lies: -1, 0 or 1; 0 if `t` is degenerate.
 fn side(t: &[Vec3; 3], p: &Vec3) -> i8 {
     let [a, b, c, d] = [&t[0], &t[1], &t[2], p].map(|p| Coord3D {
         x: p.x,
@@ -187,7 +194,7 @@ fn side(t: &[Vec3; 3], p: &Vec3) -> i8 {
     sign(orient3d(a, b, c, d))
 }
 
-/// How `a b c` turns in the projection along `axis`: -1, 0 or 1.
+/// The orientation of `a b c` in the projection along `axis`: -1, 0 or 1.
 fn turn(axis: usize, a: &Vec3, b: &Vec3, c: &Vec3) -> i8 {
     let [a, b, c] = [a, b, c].map(|p| Coord {
         x: p[(axis + 1) % 3],
@@ -204,9 +211,10 @@ fn sign(x: f64) -> i8 {
 mod tests {
     use super::*;
     use crate::geometry::random::{Purpose, stream};
+    use crate::mesh::ids::typed;
     use rand::RngExt;
 
-    /// Exact fractions, for the truth.
+    /// Exact fractions.
     #[derive(Clone, Copy, PartialEq, Debug)]
     struct Fraction(i128, i128);
 
@@ -259,9 +267,9 @@ mod tests {
         consistent.then(|| (0..n).map(|c| m[c][n].div(m[c][c])).collect())
     }
 
-    /// The truth by linear programming over the fractions: the common points of two triangles
-    /// are the images of {λ, μ >= 0, Σλ = Σμ = 1, Σλs = Σμt}; the vertices of that polytope are
-    /// its basic solutions, and the common set is the hull of their images.
+    /// The common points of two triangles by exact linear programming. They are the images of
+    /// {λ, μ >= 0, Σλ = Σμ = 1, Σλs = Σμt}; the vertices of that polytope are its basic
+    /// solutions, and the common set is the convex hull of their images.
     fn common_hull(s: &Corners, t: &Corners) -> Vec<[Fraction; 3]> {
         let columns: Vec<[i32; 5]> = (0..6)
             .map(|k| match k {
@@ -310,7 +318,7 @@ mod tests {
             && first.is_some_and(|f| f.0 >= 0 && f.sub(whole(1)).0 <= 0)
     }
 
-    fn truth(s_ids: [u32; 3], s: &Corners, t_ids: [u32; 3], t: &Corners) -> bool {
+    fn intersect_exactly(s_ids: [u32; 3], s: &Corners, t_ids: [u32; 3], t: &Corners) -> bool {
         let shared: Vec<[i32; 3]> = (0..3)
             .filter(|&k| t_ids.contains(&s_ids[k]))
             .map(|k| s[k])
@@ -328,7 +336,7 @@ mod tests {
         let mut rng = stream(1, Purpose::Measure);
         let mut seen = [[0; 2]; 3];
         for round in 0..9000 {
-            // Small ranges make coplanar, touching and degenerate pairs frequent.
+            // In small ranges coplanar, touching and degenerate pairs are frequent.
             let reach = [1, 2, 3, 8][round % 4];
             let flat = round % 5 == 0;
             let mut points = [[0i32; 3]; 6];
@@ -353,14 +361,15 @@ mod tests {
             let of = |ids: [u32; 3]| ids.map(|v| points[v as usize]);
             let real = |c: Corners| c.map(|p| Vec3::from(p.map(f64::from)));
             let (s, t) = (of(s_ids), of(t_ids));
-            let expected = truth(s_ids, &s, t_ids, &t);
+            let expected = intersect_exactly(s_ids, &s, t_ids, &t);
             seen[shared][usize::from(expected)] += 1;
-            let found = triangles_intersect(s_ids, &real(s), t_ids, &real(t));
+            let [i, j] = [s_ids, t_ids].map(typed);
+            let found = triangles_intersect(i, &real(s), j, &real(t));
             assert_eq!(found, expected, "{s:?} {t:?} {t_ids:?}");
-            let found = triangles_intersect(t_ids, &real(t), s_ids, &real(s));
+            let found = triangles_intersect(j, &real(t), i, &real(s));
             assert_eq!(found, expected, "{s:?} {t:?} {t_ids:?} exchanged");
         }
-        // The sample must hold both answers for every kind of pair.
+        // Both answers must occur for every kind of pair.
         assert!(seen.iter().flatten().all(|count| *count > 60), "{seen:?}");
     }
 
@@ -382,7 +391,7 @@ mod tests {
                 Vec3::new(3.0, 2.0, 2.0),
             ];
             assert_eq!(
-                triangles_intersect([0, 1, 2], &t, [3, 4, 5], &spike),
+                triangles_intersect(typed([0, 1, 2]), &t, typed([3, 4, 5]), &spike),
                 expected
             );
         }
@@ -392,9 +401,9 @@ mod tests {
     fn all_shared_is_an_intersection() {
         let t = [Vec3::x(), Vec3::y(), Vec3::z()];
         assert!(triangles_intersect(
-            [0, 1, 2],
+            typed([0, 1, 2]),
             &t,
-            [2, 1, 0],
+            typed([2, 1, 0]),
             &[t[2], t[1], t[0]]
         ));
     }

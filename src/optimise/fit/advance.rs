@@ -1,81 +1,83 @@
-//! One step, made only as far as it does no harm.
+//! One step of the fit, shortened where it would damage the mesh.
+//!
+//! In: vertices, triangles and a displacement for each vertex. The step is tried in full; at the
+//! vertices of damaged triangles it is halved and tried again, and after [`MAX_HALVINGS`]
+//! halvings dropped there. A triangle is damaged if its normal turns by a right angle or more,
+//! if its component turns inside out, or if it comes to intersect another triangle.
 
 use crate::geometry::{Vec3, triangle};
 use crate::mesh::intersections::self_intersections;
-use crate::mesh::{TriMesh, topology};
-use crate::optimise::connectivity::Connectivity;
+use crate::mesh::{FaceId, TriMesh, topology};
 
-/// How often a step is halved before the vertices concerned stay where they are.
-const MOST_HALVINGS: usize = 5;
+/// How often a step is halved before the vertices concerned stay in place.
+const MAX_HALVINGS: usize = 5;
 
-/// Adds `step` to `vertices`, as much of it as turns no triangle over and no component inside
-/// out, and makes no triangle pierce another that it did not pierce before. Returns whether that
-/// was less than asked for.
-pub fn advance(vertices: &mut [Vec3], connectivity: &Connectivity, step: &[Vec3]) -> bool {
-    let triangles = connectivity.triangles();
+/// Adds `step` to `vertices`, or as much of it as turns no triangle over and no component inside
+/// out, and adds no pair of intersecting triangles. Returns whether the step was shortened.
+pub fn advance(vertices: &mut [Vec3], triangles: &[[u32; 3]], step: &[Vec3]) -> bool {
     let component = topology::components(vertices.len(), triangles);
     let mut share = vec![1.0; vertices.len()];
     let mut shortened = false;
-    for halving in 0..=MOST_HALVINGS + 1 {
+    for halving in 0..=MAX_HALVINGS + 1 {
         let moved: Vec<Vec3> = (0..vertices.len())
             .map(|v| vertices[v] + step[v] * share[v])
             .collect();
-        let mut harmed = turned(vertices, &moved, triangles);
-        if harmed.is_empty() {
-            harmed = inside_out(vertices, &moved, triangles, &component);
+        let mut damaged = turned_over(vertices, &moved, triangles);
+        if damaged.is_empty() {
+            damaged = inside_out(vertices, &moved, triangles, &component);
         }
-        if harmed.is_empty() {
-            harmed = newly_pierced(vertices, &moved, triangles);
+        if damaged.is_empty() {
+            damaged = newly_intersecting(vertices, &moved, triangles);
         }
-        if harmed.is_empty() {
+        if damaged.is_empty() {
             vertices.copy_from_slice(&moved);
             return shortened;
         }
         shortened = true;
-        let factor = if halving < MOST_HALVINGS { 0.5 } else { 0.0 };
-        for v in harmed.into_iter().flat_map(|t| triangles[t as usize]) {
+        let factor = if halving < MAX_HALVINGS { 0.5 } else { 0.0 };
+        for v in damaged.into_iter().flat_map(|t| triangles[t.index()]) {
             share[v as usize] *= factor;
         }
     }
-    // Not even that helped: nobody moves.
+    // Even that did not help: no vertex moves.
     true
 }
 
 /// The triangles whose normal turns by a right angle or more.
-fn turned(before: &[Vec3], after: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
+fn turned_over(before: &[Vec3], after: &[Vec3], triangles: &[[u32; 3]]) -> Vec<FaceId> {
     let normal = |vertices: &[Vec3], t: &[u32; 3]| {
         let [a, b, c] = t.map(|v| vertices[v as usize]);
         triangle::area_normal(&a, &b, &c)
     };
-    (0..)
+    FaceId::first(triangles.len())
         .zip(triangles)
         .filter(|(_, t)| !(normal(before, t).dot(&normal(after, t)) > 0.0))
-        .map(|(index, _)| index)
+        .map(|(face, _)| face)
         .collect()
 }
 
-/// The triangles of components whose volume changes its sign. A flat one, of few points, can:
-/// one of its sides goes through the other, and no triangle turns by much.
+/// The triangles of components whose volume changes its sign. In a flat component of few
+/// vertices one side can pass through the other without any triangle turning by much.
 fn inside_out(
     before: &[Vec3],
     after: &[Vec3],
     triangles: &[[u32; 3]],
     component: &[u32],
-) -> Vec<u32> {
+) -> Vec<FaceId> {
     let volumes = |vertices| topology::component_volumes(vertices, triangles, component);
     let (before, after) = (volumes(before), volumes(after));
-    (0..)
+    FaceId::first(triangles.len())
         .zip(triangles)
         .filter(|(_, t)| {
             let c = component[t[0] as usize] as usize;
             !(before[c] * after[c] > 0.0)
         })
-        .map(|(index, _)| index)
+        .map(|(face, _)| face)
         .collect()
 }
 
-/// The triangles of pairs that pierce each other after the step but did not before.
-fn newly_pierced(before: &[Vec3], after: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
+/// The triangles of pairs that intersect after the step but not before.
+fn newly_intersecting(before: &[Vec3], after: &[Vec3], triangles: &[[u32; 3]]) -> Vec<FaceId> {
     let pairs = |vertices: &[Vec3]| {
         self_intersections(&TriMesh {
             vertices: vertices.to_vec(),
@@ -100,23 +102,22 @@ mod tests {
     use crate::mesh::shapes;
 
     #[test]
-    fn a_flat_tetrahedron_does_not_go_through_itself() {
+    fn a_flat_tetrahedron_does_not_turn_inside_out() {
         let mut mesh = shapes::tetrahedron(10.0);
         let apex = mesh.vertices[0];
         let base = (mesh.vertices[1] + mesh.vertices[2] + mesh.vertices[3]) / 3.0;
         mesh.vertices[0] = base + (apex - base) * 0.01;
-        let connectivity = Connectivity::new(4, mesh.triangles.clone()).unwrap();
         let mut step = vec![Vec3::zeros(); 4];
         step[0] = (base - apex) * 0.02;
         let mut moved = mesh.vertices.clone();
         for (v, s) in moved.iter_mut().zip(&step) {
             *v += s;
         }
-        assert!(turned(&mesh.vertices, &moved, &mesh.triangles).is_empty());
-        assert!(newly_pierced(&mesh.vertices, &moved, &mesh.triangles).is_empty());
+        assert!(turned_over(&mesh.vertices, &moved, &mesh.triangles).is_empty());
+        assert!(newly_intersecting(&mesh.vertices, &moved, &mesh.triangles).is_empty());
         let volume = mesh.volume();
         assert!(volume > 0.0);
-        assert!(advance(&mut mesh.vertices, &connectivity, &step));
+        assert!(advance(&mut mesh.vertices, &mesh.triangles, &step));
         assert!(mesh.volume() > 0.0 && mesh.volume() < volume);
     }
 }

@@ -1,39 +1,42 @@
-//! Least squares over the vertices' displacements: normal equations and their solution.
+//! The normal equations of the fit and their solution.
 //!
-//! Unknowns are one displacement (3 numbers) for each of N vertices. Every term of the fit
-//! couples the corners of one triangle only, so the matrix has one 3×3 block on the diagonal
-//! for each vertex and one off it for each edge of the mesh; one further row, over all
-//! vertices at once, is kept apart as a rank-one update. It is solved by conjugate
-//! gradients with the inverted diagonal blocks as preconditioner. All sums run in a fixed
-//! order, on any number of threads.
+//! The unknowns are the displacements of the N vertices. Every term of the fit couples only the
+//! corners of one triangle, so the matrix has a 3×3 block on the diagonal for each vertex and
+//! one off it for each edge of the mesh. One further term, over all vertices at once, is stored
+//! separately as a rank-one update. The system is solved by [conjugate
+//! gradients](crate::numeric::conjugate_gradient) with the inverted diagonal blocks as
+//! preconditioner. All sums run in a fixed order, whatever the number of threads.
 
 use nalgebra::{Matrix3, Vector6};
 use rayon::prelude::*;
 
 use crate::geometry::Vec3;
-use crate::optimise::connectivity::Connectivity;
+use crate::mesh::half_edges::HalfEdges;
+use crate::mesh::{HalfEdgeId, VertexId};
+use crate::numeric::conjugate_gradient::{LinearSystem, Tolerance, dot, solve_observed};
 use crate::progress::{Cancelled, Monitor};
 
 /// A symmetric 3×3 block: xx, yy, zz, xy, xz, yz.
 type Block = Vector6<f64>;
 
-/// Sums of fewer vertices or edges are not worth another thread.
-const LEAST_SHARED: usize = 512;
+/// Fewer vertices or edges than this are not worth another thread.
+const MIN_PER_THREAD: usize = 512;
 
-/// What the terms of one triangle add to the system.
+/// The contributions of one triangle's terms to the system.
 #[derive(Debug, Clone, Default)]
 pub struct Element {
     /// The block of each corner k with itself.
     corners: [Block; 3],
-    /// The block of each corner k with corner k + 1, for one of both orders: blocks of a term
-    /// are symmetric.
+    /// The block of each corner k with corner k + 1; that of the opposite order is the same,
+    /// since all blocks are symmetric.
     edges: [Block; 3],
+    /// The contribution to the right-hand side at each corner.
     right: [Vec3; 3],
 }
 
 impl Element {
-    /// Adds weight·(n·Σ bₖ xₖ − r)² over the corners k: a plane with normal `n` from which the
-    /// point with barycentric coordinates `b` is to move by `r`.
+    /// Adds weight·(n·Σ bₖ xₖ − r)² over the corners k: the point with barycentric coordinates `b`
+    /// should move by `r` along the unit normal `n`.
     pub fn add_plane(&mut self, b: &[f64; 3], n: &Vec3, r: f64, weight: f64) {
         let nn = Block::new(
             n.x * n.x,
@@ -51,8 +54,9 @@ impl Element {
         }
     }
 
-    /// Adds weight·Σₖ |P((xₖ − x̄) − rₖ)|² over the corners k, where x̄ is their mean and P the
-    /// projection onto the plane with unit normal `n`: the triangle's shape is to change by r.
+    /// Adds weight·Σₖ |P((xₖ − x̄) − rₖ)|² over the corners k, where x̄ is the mean of the xₖ and P
+    /// the projection onto the plane with unit normal `n`: the triangle's shape should change
+    /// by r.
     pub fn add_shape(&mut self, r: &[Vec3; 3], n: &Vec3, weight: f64) {
         let projection = Block::new(
             1.0 - n.x * n.x,
@@ -80,7 +84,7 @@ fn times(block: &Block, x: &Vec3) -> Vec3 {
     )
 }
 
-/// The inverse; the identity where there is none.
+/// The inverse; the identity for a singular block.
 fn inverse(block: &Block) -> Block {
     let [xx, yy, zz, xy, xz, yz] = block.data.0[0];
     let inverted = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz).try_inverse();
@@ -95,43 +99,42 @@ fn inverse(block: &Block) -> Block {
     )
 }
 
-/// A symmetric positive semidefinite system A x = g over 3-vectors at vertices.
+/// A symmetric positive semidefinite system over the displacements of all vertices.
 #[derive(Debug, Clone)]
 pub struct NormalEquations {
     diagonal: Vec<Block>,
-    /// The blocks (i, j) with i ≠ j, one for each edge, which stand at (j, i) as well.
-    off_diagonal: Vec<(u32, u32, Block)>,
+    /// The blocks (i, j) with i ≠ j, one for each edge; the same block belongs at (j, i).
+    off_diagonal: Vec<(VertexId, VertexId, Block)>,
     right: Vec<Vec3>,
-    /// The row over all vertices: its coefficients and weight.
+    /// The term over all vertices: its coefficients and weight.
     global: Option<(Vec<Vec3>, f64)>,
 }
 
 impl NormalEquations {
-    /// The sum of the `elements` of all triangles, and damping·|x_v|² for every vertex. Each
-    /// vertex and edge gathers from the triangles round it in their cyclic order, whichever
-    /// thread does so.
-    pub fn new(elements: &[Element], connectivity: &Connectivity, damping: f64) -> Self {
+    /// The sum of the `elements` of all triangles and of damping·|x_v|² for every vertex. Each
+    /// vertex and edge sums the triangles around it in their cyclic order, on any thread.
+    pub fn new(elements: &[Element], half_edges: &HalfEdges, damping: f64) -> Self {
         let damping = Block::new(damping, damping, damping, 0.0, 0.0, 0.0);
-        let place = |h: u32| (&elements[h as usize / 3], h as usize % 3);
-        let gather = |v: u32| {
+        let place = |h: HalfEdgeId| (&elements[h.face().index()], h.corner());
+        let gather = |v: VertexId| {
             let start = (damping, Vec3::zeros());
-            connectivity.around(v).fold(start, |(block, right), h| {
+            half_edges.around(v).fold(start, |(block, right), h| {
                 let (element, k) = place(h);
                 (block + element.corners[k], right + element.right[k])
             })
         };
-        let (diagonal, right) = (0..connectivity.vertices())
+        let (diagonal, right) = (0..half_edges.vertex_count() as u32)
             .into_par_iter()
-            .with_min_len(LEAST_SHARED)
-            .map(gather)
+            .with_min_len(MIN_PER_THREAD)
+            .map(|v| gather(VertexId(v)))
             .unzip();
-        let join = |h: u32| {
-            let ((here, k), (there, l)) = (place(h), place(connectivity.twin(h)));
+        let join = |h: HalfEdgeId| {
+            let ((here, k), (there, l)) = (place(h), place(half_edges.twin(h)));
             let block = here.edges[k] + there.edges[l];
-            (connectivity.origin(h), connectivity.target(h), block)
+            (half_edges.origin(h), half_edges.target(h), block)
         };
-        let edges: Vec<u32> = connectivity.edges().collect();
-        let edges = edges.par_iter().with_min_len(LEAST_SHARED);
+        let edges: Vec<HalfEdgeId> = half_edges.edges().collect();
+        let edges = edges.par_iter().with_min_len(MIN_PER_THREAD);
         Self {
             diagonal,
             off_diagonal: edges.map(|&h| join(h)).collect(),
@@ -140,7 +143,7 @@ impl NormalEquations {
         }
     }
 
-    /// Sets the one row weight·(Σ_v c_v·x_v − r)² that couples all vertices.
+    /// Sets the one term that couples all vertices, weight·(Σ_v c_v·x_v − r)².
     pub fn set_global(&mut self, coefficients: Vec<Vec3>, r: f64, weight: f64) {
         for (right, c) in self.right.iter_mut().zip(&coefficients) {
             *right += c * (r * weight);
@@ -148,73 +151,63 @@ impl NormalEquations {
         self.global = Some((coefficients, weight));
     }
 
-    /// The solution, to a residual of `tolerance` times the right-hand side's norm (in the
-    /// preconditioner's metric), or after `most` steps.
+    /// The solution, up to a residual of `tolerance` times the right-hand side (in the norm of
+    /// the preconditioner) or after `limit` rounds.
     ///
     /// # Errors
     /// [`Cancelled`].
     pub fn solve(
         &self,
         tolerance: f64,
-        most: usize,
+        limit: usize,
         monitor: &Monitor,
     ) -> Result<Vec<Vec3>, Cancelled> {
-        let inverse: Vec<Block> = self.diagonal.iter().map(inverse).collect();
-        let precondition = |r: &[Vec3]| products(&inverse, r);
+        let system = PreconditionedEquations {
+            equations: self,
+            inverse: self.diagonal.iter().map(inverse).collect(),
+        };
         let mut x = vec![Vec3::zeros(); self.right.len()];
-        let mut residual = self.right.clone();
-        let mut z = precondition(&residual);
-        let mut direction = z.clone();
-        let mut rz = dot(&residual, &z);
-        let goal = tolerance * tolerance * rz;
-        for _ in 0..most {
-            monitor.check()?;
-            if !(rz > goal) {
-                break;
-            }
-            let image = self.times(&direction);
-            let curvature = dot(&direction, &image);
-            if !(curvature > 0.0) {
-                break;
-            }
-            let step = rz / curvature;
-            for i in 0..x.len() {
-                x[i] += direction[i] * step;
-                residual[i] -= image[i] * step;
-            }
-            z = precondition(&residual);
-            let following = dot(&residual, &z);
-            let ratio = following / rz;
-            rz = following;
-            for i in 0..x.len() {
-                direction[i] = z[i] + direction[i] * ratio;
-            }
-        }
+        // At x = 0 the residual is the right-hand side.
+        let residual = self.right.clone();
+        let tolerance = Tolerance::OfFirst(tolerance);
+        solve_observed(&system, &mut x, residual, tolerance, limit, || {
+            monitor.check()
+        })?;
         Ok(x)
     }
+}
 
-    fn times(&self, x: &[Vec3]) -> Vec<Vec3> {
-        let mut y = products(&self.diagonal, x);
-        for (i, j, block) in &self.off_diagonal {
-            y[*i as usize] += times(block, &x[*j as usize]);
-            y[*j as usize] += times(block, &x[*i as usize]);
+/// Normal equations with their inverted diagonal blocks.
+struct PreconditionedEquations<'a> {
+    equations: &'a NormalEquations,
+    inverse: Vec<Block>,
+}
+
+impl LinearSystem for PreconditionedEquations<'_> {
+    fn multiply(&self, x: &[Vec3], y: &mut [Vec3]) {
+        let equations = self.equations;
+        multiply_blocks(&equations.diagonal, x, y);
+        for (i, j, block) in &equations.off_diagonal {
+            y[i.index()] += times(block, &x[j.index()]);
+            y[j.index()] += times(block, &x[i.index()]);
         }
-        if let Some((coefficients, weight)) = &self.global {
+        if let Some((coefficients, weight)) = &equations.global {
             let along = weight * dot(coefficients, x);
             for (y, c) in y.iter_mut().zip(coefficients) {
                 *y += c * along;
             }
         }
-        y
+    }
+
+    fn precondition(&self, r: &[Vec3], z: &mut [Vec3]) {
+        multiply_blocks(&self.inverse, r, z);
     }
 }
 
-fn products(blocks: &[Block], x: &[Vec3]) -> Vec<Vec3> {
-    blocks.iter().zip(x).map(|(b, x)| times(b, x)).collect()
-}
-
-fn dot(x: &[Vec3], y: &[Vec3]) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x.dot(y)).sum()
+fn multiply_blocks(blocks: &[Block], x: &[Vec3], y: &mut [Vec3]) {
+    for ((y, block), x) in y.iter_mut().zip(blocks).zip(x) {
+        *y = times(block, x);
+    }
 }
 
 #[cfg(test)]
@@ -227,7 +220,7 @@ mod tests {
     fn the_solution_is_that_of_the_dense_normal_equations() {
         let mesh = shapes::icosphere(10.0, 1);
         let n = mesh.vertices.len();
-        let connectivity = Connectivity::new(n, mesh.triangles.clone()).unwrap();
+        let half_edges = HalfEdges::new(n, mesh.triangles.clone()).unwrap();
         let mut elements = vec![Element::default(); mesh.triangles.len()];
         let mut rows: Vec<(Vec<f64>, f64)> = Vec::new();
         let mut number = 0.3f64;
@@ -274,7 +267,7 @@ mod tests {
             row[unknown] = 0.05f64.sqrt();
             rows.push((row, 0.0));
         }
-        let mut equations = NormalEquations::new(&elements, &connectivity, 0.05);
+        let mut equations = NormalEquations::new(&elements, &half_edges, 0.05);
         let coefficients: Vec<Vec3> = (0..n).map(|_| Vec3::new(draw(), draw(), draw())).collect();
         let row = coefficients
             .iter()

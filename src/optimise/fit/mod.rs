@@ -1,94 +1,96 @@
-//! Moves the vertices off the reference surface S so that the whole model lies closest to it.
+//! Moves the vertices off the reference surface S so that the whole model lies close to it.
 //!
-//! A model whose vertices stand on S cuts every bulge off and loses volume. Here the vertices
-//! may leave S. Each round solves one sparse least-squares problem for their displacements:
+//! A model whose vertices lie on S cuts off every bulge and loses volume. Here the vertices may
+//! leave S. In: vertices, connectivity, the wanted relative spacing and S. Out: moved vertices
+//! and, after some flips, new triangles. Each round solves one sparse least-squares problem for
+//! the displacements of the vertices, with these terms:
 //!
-//! 1. distance: every sample of S is drawn to its partner on the model along S's normal;
-//! 2. the model's own edge midpoints and triangle centres are drawn to S alike;
-//! 3. shape: every triangle is drawn to the equilateral triangle that fits it best, within
-//!    its own plane;
-//! 4. bends: how the model bends is to change little from vertex to vertex;
-//! 5. volume: the whole is to enclose what S encloses;
-//! 6. damping: a little weight on staying put.
+//! 1. distance: every sample of S is pulled to its partner on the model along the normal of S;
+//! 2. midpoints: the model's edge midpoints and triangle centres are pulled to S in the same way;
+//! 3. shape: every triangle is pulled to the best-fitting equilateral triangle in its plane;
+//! 4. fairing: dihedral angles should change little from vertex to vertex ([`fairing`]);
+//! 5. volume: the model should enclose the volume that S encloses;
+//! 6. damping: a small weight on staying in place.
 //!
-//! Steps have momentum (Polyak's heavy ball): vertices slide slowly along S, where only the
-//! triangles' shapes and far samples pull, and momentum gets them further in as many rounds.
-//! The last rounds go without, so that the vertices come to rest.
+//! Steps have momentum (Polyak's heavy ball method): along S the vertices move slowly, since
+//! only shapes and distant samples pull them there, and momentum takes them farther in the same
+//! number of rounds. The last rounds have none, so that the vertices come to rest.
 //!
-//! After every second round edges are flipped where that betters shapes and valences; in the
-//! first half of the rounds irregular vertices are moved together until they cancel.
+//! After every second round edges are flipped where that improves shapes and valences; in the
+//! first half of the rounds irregular vertices are also moved until they cancel ([`polish`]).
 //!
-//! Guaranteed: no triangle turns over in a round and none comes to pierce another; where a
-//! step would do so, the vertices concerned make half of it, or less, or none.
+//! Guaranteed: in no round does a triangle turn over or come to intersect another one. Where a
+//! step would cause that, the vertices concerned make half of it, less, or none ([`advance`]).
 
 mod advance;
-mod bends;
 mod equations;
+mod fairing;
 mod polish;
 mod samples;
 mod terms;
 
 use advance::advance;
-use samples::{Sample, find_partners, follow_partners, spread};
+use samples::{SurfaceSample, find_partners, follow_partners, spread};
 
-use super::connectivity::Connectivity;
-use super::{FitParameters, Reference};
+use super::{LeastSquaresParameters, Reference};
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
+use crate::mesh::half_edges::HalfEdges;
 use crate::progress::{Cancelled, Monitor, Stage};
 
-/// Last rounds, without momentum.
-const CALM_ROUNDS: usize = 5;
+/// Number of last rounds without momentum.
+const ROUNDS_WITHOUT_MOMENTUM: usize = 5;
 
-/// The mesh on its way, and what it is drawn to.
-struct Model<'a> {
+/// The model between two rounds, and what it is fitted to.
+struct FitState<'a> {
     vertices: Vec<Vec3>,
-    connectivity: Connectivity,
-    samples: Vec<Sample>,
-    /// For the midpoints and the centre of each triangle the triangle of the reference that was
-    /// closest in the last round: where the next search begins.
+    half_edges: HalfEdges,
+    samples: Vec<SurfaceSample>,
+    /// For the edge midpoints and the centre of each triangle, the triangle of S that was
+    /// closest in the previous round; the next search starts there.
     near: Vec<[Option<u32>; 4]>,
+    /// Wanted relative spacing at each vertex.
     sizing: &'a [f64],
     reference: &'a Reference,
-    /// That of the reference, mm³.
+    /// Volume enclosed by S, mm³.
     volume: f64,
-    /// A voxel's size against the model's edges, at most 1: how much of what it could follow is
-    /// the grid's and the noise's.
+    /// Voxel spacing over the model's edge length, at most 1: the smaller the triangles, the
+    /// more of what they can follow is noise and voxel facets.
     fineness: f64,
-    parameters: &'a FitParameters,
+    parameters: &'a LeastSquaresParameters,
 }
 
-/// The fitted mesh.
+/// The result of [`fit`].
 #[derive(Debug, Clone)]
-pub struct Fitted {
-    /// Moved vertices, flipped triangles.
+pub struct FittedMesh {
+    /// Moved vertices and, after flips, new triangles.
     pub mesh: TriMesh,
-    /// Rounds run.
+    /// Number of rounds.
     pub rounds: usize,
-    /// Edges flipped on the way.
+    /// Number of edges flipped.
     pub flips: usize,
-    /// Steps that had to be shortened.
+    /// Number of steps that were shortened.
     pub shortened: usize,
 }
 
-/// Fits the mesh of `connectivity` with vertices at `start` to `reference`; `sizing` is the
-/// wanted relative spacing at each vertex.
+/// Fits the mesh of `half_edges` with its vertices at `start` (LPS mm) to `reference`; `sizing`
+/// is the wanted relative spacing at each vertex.
 ///
 /// # Errors
 /// [`Cancelled`].
 pub fn fit(
     start: &[Vec3],
-    connectivity: Connectivity,
+    half_edges: HalfEdges,
     sizing: &[f64],
     reference: &Reference,
-    parameters: &FitParameters,
+    parameters: &LeastSquaresParameters,
     monitor: &Monitor,
-) -> Result<Fitted, Cancelled> {
-    let count = parameters.samples_per_triangle * connectivity.triangles().len();
-    let lengths = reference.lengths(connectivity.triangles().len());
-    let mut model = Model {
+) -> Result<FittedMesh, Cancelled> {
+    let count = parameters.samples_per_triangle * half_edges.face_count();
+    let lengths = reference.lengths(half_edges.face_count());
+    let mut state = FitState {
         vertices: start.to_vec(),
-        connectivity,
+        half_edges,
         samples: spread(reference, count),
         near: Vec::new(),
         sizing,
@@ -97,37 +99,38 @@ pub fn fit(
         fineness: (lengths.voxel / lengths.edge).min(1.0),
         parameters,
     };
-    find_partners(&mut model);
+    find_partners(&mut state);
     let (mut flips, mut shortened) = (0, 0);
     let mut velocity = vec![Vec3::zeros(); start.len()];
     for round in 0..parameters.rounds {
         let fraction = round as f64 / (parameters.rounds + 1) as f64;
         monitor.report(Stage::Optimise, fraction)?;
-        let mut step = terms::displacement(&mut model, monitor)?;
-        if round + CALM_ROUNDS < parameters.rounds {
+        let mut step = terms::displacement(&mut state, monitor)?;
+        if round + ROUNDS_WITHOUT_MOMENTUM < parameters.rounds {
             for (step, velocity) in step.iter_mut().zip(&velocity) {
                 *step += velocity * parameters.momentum;
             }
         }
-        velocity.copy_from_slice(&model.vertices);
-        shortened += usize::from(advance(&mut model.vertices, &model.connectivity, &step));
-        for (velocity, vertex) in velocity.iter_mut().zip(&model.vertices) {
+        velocity.copy_from_slice(&state.vertices);
+        let triangles = state.half_edges.triangles();
+        shortened += usize::from(advance(&mut state.vertices, triangles, &step));
+        for (velocity, vertex) in velocity.iter_mut().zip(&state.vertices) {
             *velocity = vertex - *velocity;
         }
         monitor.check()?;
         if round % 2 == 1 && round + 1 < parameters.rounds {
-            // Early, so that enough rounds are left to even the triangles out.
+            // Only early, so that enough rounds remain to regularise the triangles.
             let early = 2 * round < parameters.rounds;
             let glide = if early { parameters.glide } else { 0 };
-            flips += polish::polish(&mut model, glide, monitor)?;
+            flips += polish::polish(&mut state, glide, monitor)?;
             monitor.check()?;
         }
-        follow_partners(&mut model);
+        follow_partners(&mut state);
     }
-    Ok(Fitted {
+    Ok(FittedMesh {
         mesh: TriMesh {
-            vertices: model.vertices,
-            triangles: model.connectivity.into_triangles(),
+            vertices: state.vertices,
+            triangles: state.half_edges.into_triangles(),
         },
         rounds: parameters.rounds,
         flips,
@@ -139,24 +142,25 @@ pub fn fit(
 mod tests {
     use super::*;
     use crate::mesh::intersections::self_intersections;
-    use crate::mesh::shapes;
+    use crate::mesh::{HalfEdgeId, shapes};
     use crate::surface::Surface;
 
     fn reference(mesh: TriMesh) -> Reference {
         Reference::new(&Surface::exact(mesh, 2.0))
     }
 
-    fn fitted(start: &TriMesh, reference: &Reference, parameters: &FitParameters) -> Fitted {
+    fn fitted(start: &TriMesh, reference: &Reference) -> FittedMesh {
         let n = start.vertices.len();
-        let connectivity = Connectivity::new(n, start.triangles.clone()).unwrap();
+        let half_edges = HalfEdges::new(n, start.triangles.clone()).unwrap();
         let monitor = Monitor::silent();
+        let parameters = LeastSquaresParameters::default();
         let sizing = vec![1.0; n];
         fit(
             &start.vertices,
-            connectivity,
+            half_edges,
             &sizing,
             reference,
-            parameters,
+            &parameters,
             &monitor,
         )
         .unwrap()
@@ -176,7 +180,7 @@ mod tests {
             let start = stretched(shapes::icosphere(30.0, 2), axes);
             let exact = reference.mesh.volume();
             assert!(start.volume() / exact < 0.98);
-            let found = fitted(&start, &reference, &FitParameters::default());
+            let found = fitted(&start, &reference);
             let error = found.mesh.volume() / exact - 1.0;
             assert!(error.abs() < 1e-3, "{error}");
         }
@@ -186,32 +190,31 @@ mod tests {
     fn the_fitted_mesh_lies_closer_to_the_surface_than_one_with_vertices_on_it() {
         let reference = reference(shapes::cup(60.0, 30.0, 10.0, 90));
         let start = shapes::cup(60.0, 30.0, 10.0, 16);
-        let found = fitted(&start, &reference, &FitParameters::default());
-        let (parameters, sizing) = (FitParameters::default(), Vec::new());
+        let found = fitted(&start, &reference);
+        let (parameters, sizing) = (LeastSquaresParameters::default(), Vec::new());
         let mean_distance = |mesh: &TriMesh| {
-            let model = model(mesh, &reference, &parameters, &sizing);
-            let distance = |s: &Sample| {
-                let ids = mesh.triangles[s.triangle as usize];
+            let state = state(mesh, &reference, &parameters, &sizing);
+            let distance = |s: &SurfaceSample| {
+                let ids = mesh.corner_ids(s.triangle);
                 let place: Vec3 = (0..3)
-                    .map(|k| mesh.vertices[ids[k] as usize] * s.barycentric[k])
+                    .map(|k| mesh.vertices[ids[k].index()] * s.barycentric[k])
                     .sum();
                 (place - s.point).norm()
             };
-            model.samples.iter().map(distance).sum::<f64>() / model.samples.len() as f64
+            state.samples.iter().map(distance).sum::<f64>() / state.samples.len() as f64
         };
         let (before, after) = (mean_distance(&start), mean_distance(&found.mesh));
         assert!(after < 0.5 * before, "{before} {after}");
     }
 
-    /// Walls much thinner than the triangles are long: the sheets must stay apart.
+    /// The walls are much thinner than the triangles are long: their two sides must stay apart.
     #[test]
-    fn thin_shells_are_not_pierced() {
+    fn thin_shells_do_not_intersect_themselves() {
         for wall in [1.5, 3.0, 6.0] {
             let reference = reference(shapes::cup(60.0, 30.0, wall, 90));
             let start = shapes::cup(60.0, 30.0, wall, 14);
             let known = self_intersections(&start);
-            let parameters = FitParameters::default();
-            let found = fitted(&start, &reference, &parameters);
+            let found = fitted(&start, &reference);
             let pairs = self_intersections(&found.mesh);
             assert!(pairs.len() <= known.len(), "wall {wall}: {pairs:?}");
             crate::mesh::topology::check(&found.mesh).unwrap();
@@ -228,12 +231,11 @@ mod tests {
     fn a_step_through_the_opposite_wall_is_shortened() {
         let mesh = shapes::cup(60.0, 30.0, 4.0, 24);
         let n = mesh.vertices.len();
-        let connectivity = Connectivity::new(n, mesh.triangles.clone()).unwrap();
         let mut vertices = mesh.vertices.clone();
         let mut step = vec![Vec3::zeros(); n];
-        // The outer apex jumps 20 mm up, through the cavity's floor.
+        // The outer apex moves 20 mm up, through the floor of the cavity.
         step[0].z = 20.0;
-        assert!(advance(&mut vertices, &connectivity, &step));
+        assert!(advance(&mut vertices, &mesh.triangles, &step));
         assert!(vertices[0].z - mesh.vertices[0].z < 4.0);
         let moved = TriMesh {
             vertices,
@@ -242,15 +244,15 @@ mod tests {
         assert!(self_intersections(&moved).is_empty());
     }
 
-    fn model<'a>(
+    fn state<'a>(
         mesh: &TriMesh,
         reference: &'a Reference,
-        parameters: &'a FitParameters,
+        parameters: &'a LeastSquaresParameters,
         sizing: &'a [f64],
-    ) -> Model<'a> {
-        let mut model = Model {
+    ) -> FitState<'a> {
+        let mut state = FitState {
             vertices: mesh.vertices.clone(),
-            connectivity: Connectivity::new(mesh.vertices.len(), mesh.triangles.clone()).unwrap(),
+            half_edges: HalfEdges::new(mesh.vertices.len(), mesh.triangles.clone()).unwrap(),
             samples: spread(reference, 5000),
             near: Vec::new(),
             sizing,
@@ -259,47 +261,46 @@ mod tests {
             fineness: 0.2,
             parameters,
         };
-        find_partners(&mut model);
-        model
+        find_partners(&mut state);
+        state
     }
 
     #[test]
-    fn polishing_flips_mend_a_disturbed_sphere() {
+    fn polishing_flips_repair_a_disturbed_sphere() {
         let reference = reference(shapes::icosphere(30.0, 4));
         let mesh = shapes::icosphere(30.0, 2);
         let n = mesh.vertices.len();
-        let (parameters, sizing) = (FitParameters::default(), vec![1.0; n]);
-        let mut model = model(&mesh, &reference, &parameters, &sizing);
+        let (parameters, sizing) = (LeastSquaresParameters::default(), vec![1.0; n]);
+        let mut state = state(&mesh, &reference, &parameters, &sizing);
         for h in [10, 100, 200, 300, 400] {
-            model.connectivity.flip(h);
+            state.half_edges.flip(HalfEdgeId(h));
         }
-        follow_partners(&mut model);
-        assert!(irregularity(&model.connectivity) > 12);
-        assert!(polish::polish(&mut model, 0, &Monitor::silent()).unwrap() >= 5);
-        assert_eq!(irregularity(&model.connectivity), 12);
+        follow_partners(&mut state);
+        assert!(irregularity(&state.half_edges) > 12);
+        assert!(polish::polish(&mut state, 0, &Monitor::silent()).unwrap() >= 5);
+        assert_eq!(irregularity(&state.half_edges), 12);
     }
 
     /// Σ (valence - 6)²: 12 on a sphere whose only irregular vertices are twelve fives.
-    fn irregularity(connectivity: &Connectivity) -> u32 {
-        (0..)
-            .zip(connectivity.triangles().iter().flatten())
-            .map(|(h, _)| connectivity.valence(connectivity.origin(h)))
-            // Every vertex is met once for each triangle round it.
+    fn irregularity(mesh: &HalfEdges) -> u32 {
+        mesh.half_edges()
+            .map(|h| mesh.valence(mesh.origin(h)))
+            // Every vertex occurs once for each triangle around it.
             .map(|valence| 420 * valence.abs_diff(6).pow(2) / valence)
             .sum::<u32>()
             / 420
     }
 
-    /// Two pairs of irregular vertices that have travelled apart: no single flip helps.
+    /// Two pairs of irregular vertices that have moved apart: no single flip helps.
     #[test]
     fn gliding_brings_separated_irregular_vertices_together() {
         let reference = reference(shapes::icosphere(30.0, 4));
         let mesh = shapes::icosphere(30.0, 3);
         let n = mesh.vertices.len();
-        let (parameters, sizing) = (FitParameters::default(), vec![1.0; n]);
-        let fresh = model(&mesh, &reference, &parameters, &sizing);
-        let after = |connectivity: &Connectivity, h: u32| {
-            let mut flipped = connectivity.clone();
+        let (parameters, sizing) = (LeastSquaresParameters::default(), vec![1.0; n]);
+        let fresh = state(&mesh, &reference, &parameters, &sizing);
+        let after = |half_edges: &HalfEdges, h: HalfEdgeId| {
+            let mut flipped = half_edges.clone();
             let legal = flipped.can_flip(h)
                 && super::super::legality::replacement(&mesh.vertices, &flipped.quad(h), 0.0)
                     .is_some();
@@ -308,24 +309,24 @@ mod tests {
                 flipped
             })
         };
-        let stuck = |connectivity: &Connectivity| {
-            let now = irregularity(connectivity);
-            let mut flips = connectivity.edges().filter_map(|h| after(connectivity, h));
+        let stuck = |half_edges: &HalfEdges| {
+            let now = irregularity(half_edges);
+            let mut flips = half_edges.edges().filter_map(|h| after(half_edges, h));
             flips.all(|flipped| irregularity(&flipped) >= now)
         };
-        let torn = fresh.connectivity.edges().find_map(|first| {
-            let pair = after(&fresh.connectivity, first)?;
-            let near = pair.around(pair.origin(first)).collect::<Vec<u32>>();
+        let torn = fresh.half_edges.edges().find_map(|first| {
+            let pair = after(&fresh.half_edges, first)?;
+            let near = pair.around(pair.origin(first)).collect::<Vec<_>>();
             near.into_iter().find_map(|second| {
                 let apart = after(&pair, second)?;
                 (irregularity(&apart) == irregularity(&pair) && stuck(&apart)).then_some(apart)
             })
         });
-        let mut model = fresh;
-        model.connectivity = torn.unwrap();
-        follow_partners(&mut model);
-        assert!(irregularity(&model.connectivity) > 12);
-        polish::polish(&mut model, 3, &Monitor::silent()).unwrap();
-        assert_eq!(irregularity(&model.connectivity), 12);
+        let mut state = fresh;
+        state.half_edges = torn.unwrap();
+        follow_partners(&mut state);
+        assert!(irregularity(&state.half_edges) > 12);
+        polish::polish(&mut state, 3, &Monitor::silent()).unwrap();
+        assert_eq!(irregularity(&state.half_edges), 12);
     }
 }

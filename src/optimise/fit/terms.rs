@@ -1,84 +1,88 @@
-//! The least-squares terms of one round.
+//! The least-squares terms of one round of the fit: see the list in [`super`].
+//!
+//! In: the state of the fit. Out: a displacement for each vertex. The terms of one triangle are
+//! summed into its [`Element`], triangle by triangle on any thread; the elements make up the
+//! [`NormalEquations`].
 
 use rayon::prelude::*;
 
-use super::Model;
-use super::bends::Bends;
+use super::FitState;
 use super::equations::{Element, NormalEquations};
-use super::samples::{LEAST_FACING, Sample};
+use super::fairing::Fairing;
+use super::samples::{MIN_FACING, SurfaceSample};
 use crate::geometry::{Vec3, triangle};
+use crate::mesh::{FaceId, VertexId};
 use crate::progress::{Cancelled, Monitor};
 
-/// How many times the mean square a squared distance may count as, where peaks weigh more.
+/// Largest emphasis of a squared distance, as a multiple of the mean square.
 const PEAK_CAP: f64 = 20.0;
 
-/// Relative residual at which a round's equations count as solved: the partners change by
-/// more from round to round.
+/// Relative residual at which a round's equations count as solved; the partners change by more
+/// from round to round.
 const TOLERANCE: f64 = 1e-3;
 
-/// Weight of the volume against that of all distances: enough to leave an error of a few
-/// hundredths of a percent.
+/// Weight of the volume relative to that of all distances: leaves an error of a few hundredths
+/// of a percent.
 const VOLUME_WEIGHT: f64 = 1000.0;
 
-/// Share of their root mean square up to which midpoints' distances count squared.
+/// Distance, relative to the root mean square, up to which midpoints count squared.
 const NEAR: f64 = 0.2;
 
-/// Most steps of conjugate gradients in a round.
-const MOST_STEPS: usize = 200;
+/// Largest number of rounds of conjugate gradients per round of the fit.
+const MAX_SOLVER_ROUNDS: usize = 200;
 
-/// Triangles that one task looks at, at least.
+/// Smallest number of triangles per parallel task.
 const TRIANGLES_PER_TASK: usize = 16;
 
-/// The displacement of every vertex that one round asks for.
+/// The displacement of every vertex that solves this round's least-squares problem, mm.
 ///
 /// # Errors
 /// [`Cancelled`].
-pub fn displacement(model: &mut Model, monitor: &Monitor) -> Result<Vec<Vec3>, Cancelled> {
-    let midpoints = Midpoints::new(model);
+pub fn displacement(state: &mut FitState, monitor: &Monitor) -> Result<Vec<Vec3>, Cancelled> {
+    let midpoints = Midpoints::new(state);
     monitor.check()?;
-    let distances = Distances::new(model);
-    let shapes = Shapes::new(model);
-    let bends = Bends::new(model);
-    // A triangle's terms are its own: which thread sums them up does not matter.
-    let elements: Vec<Element> = (0..model.connectivity.triangles().len())
+    let distances = Distances::new(state);
+    let shapes = Shapes::new(state);
+    let fairing = Fairing::new(state);
+    let elements: Vec<Element> = (0..state.half_edges.face_count() as u32)
         .into_par_iter()
         .with_min_len(TRIANGLES_PER_TASK)
         .map(|t| {
-            let mut element = Element::default();
+            let (t, mut element) = (FaceId(t), Element::default());
             distances.add_to(&mut element, t);
             midpoints.add_to(&mut element, t);
             shapes.add_to(&mut element, t);
-            bends.add_to(&mut element, t);
+            fairing.add_to(&mut element, t);
             element
         })
         .collect();
     monitor.check()?;
-    let damping = model.parameters.damping / model.vertices.len() as f64;
-    let mut equations = NormalEquations::new(&elements, &model.connectivity, damping);
-    set_volume(&mut equations, model);
-    equations.solve(TOLERANCE, MOST_STEPS, monitor)
+    let damping = state.parameters.damping / state.vertices.len() as f64;
+    let mut equations = NormalEquations::new(&elements, &state.half_edges, damping);
+    set_volume(&mut equations, state);
+    equations.solve(TOLERANCE, MAX_SOLVER_ROUNDS, monitor)
 }
 
-/// Draws the samples of S to their partners.
+/// Pulls the samples of S and their partners together.
 struct Distances<'a> {
-    samples: &'a [Sample],
-    /// The admitted samples in the order of their partners' triangles; those of triangle t
-    /// stand at `first[t]..first[t + 1]`.
+    samples: &'a [SurfaceSample],
+    /// Indices of the admitted samples, sorted by their partners' triangles; those of triangle t
+    /// are at `first[t]..first[t + 1]`.
     sorted: Vec<u32>,
     first: Vec<usize>,
-    /// Mean square of their distances, mm².
+    /// Mean square of the admitted samples' distances, mm².
     square: f64,
     peak_weight: f64,
 }
 
 impl<'a> Distances<'a> {
-    fn new(model: &'a Model) -> Self {
-        let samples = &model.samples;
+    fn new(state: &'a FitState) -> Self {
+        let samples = &state.samples;
         let admitted = || (0..).zip(samples).filter(|(_, s)| s.admitted);
-        let mut first = vec![0; model.connectivity.triangles().len() + 1];
+        let mut first = vec![0; state.half_edges.face_count() + 1];
         let mut square = 0.0;
         for (_, s) in admitted() {
-            first[s.triangle as usize + 1] += 1;
+            first[s.triangle.index() + 1] += 1;
             square += s.distance * s.distance;
         }
         for t in 1..first.len() {
@@ -87,7 +91,7 @@ impl<'a> Distances<'a> {
         let mut next = first.clone();
         let mut sorted = vec![0; first[first.len() - 1]];
         for (index, s) in admitted() {
-            let place = &mut next[s.triangle as usize];
+            let place = &mut next[s.triangle.index()];
             sorted[*place] = index;
             *place += 1;
         }
@@ -96,12 +100,13 @@ impl<'a> Distances<'a> {
             square: (square / sorted.len().max(1) as f64).max(f64::MIN_POSITIVE),
             sorted,
             first,
-            peak_weight: model.parameters.peak_weight,
+            peak_weight: state.parameters.peak_weight,
         }
     }
 
-    fn add_to(&self, element: &mut Element, t: usize) {
-        for &index in &self.sorted[self.first[t]..self.first[t + 1]] {
+    fn add_to(&self, element: &mut Element, t: FaceId) {
+        let range = self.first[t.index()]..self.first[t.index() + 1];
+        for &index in &self.sorted[range] {
             let s = &self.samples[index as usize];
             let emphasis = (s.distance * s.distance / self.square).min(PEAK_CAP);
             let weight = (1.0 + self.peak_weight * emphasis) / self.sorted.len() as f64;
@@ -110,21 +115,22 @@ impl<'a> Distances<'a> {
     }
 }
 
-/// A plane of S, its unit normal and how far it lies from a point, mm.
-type Plane = (Vec3, f64);
+/// A tangent plane of S: its unit normal and its distance from a point of the model, mm.
+type TangentPlane = (Vec3, f64);
 
-/// Draws the model's own points, its edges' midpoints and triangles' centres, to S: samples of
-/// S alone would not notice a triangle that strays.
+/// Pulls the midpoints of the model's edges and the centres of its triangles to S. The samples
+/// of S alone would not register a triangle that none of them has as its partner.
 struct Midpoints {
-    /// For each triangle those of its points that have one: see [`PLACES`].
-    planes: Vec<[Option<Plane>; 4]>,
+    /// For each triangle the plane at each of its [`PLACES`]; `None` for a midpoint that belongs
+    /// to the other triangle of the edge, or if S has no triangle that faces the same way.
+    planes: Vec<[Option<TangentPlane>; 4]>,
     weight: f64,
-    /// Distances up to this count squared, mm.
+    /// Distance up to which distances count squared, mm.
     near: f64,
 }
 
-/// The midpoints of a triangle's edges and its centre, in barycentric coordinates. A midpoint
-/// belongs to the lower half-edge.
+/// The midpoints of a triangle's edges and its centre, in barycentric coordinates. The midpoint
+/// of an edge belongs to the lower half-edge.
 const PLACES: [[f64; 3]; 4] = [
     [0.5, 0.5, 0.0],
     [0.0, 0.5, 0.5],
@@ -133,18 +139,18 @@ const PLACES: [[f64; 3]; 4] = [
 ];
 
 impl Midpoints {
-    fn new(model: &mut Model) -> Self {
-        let Model {
-            connectivity,
+    fn new(state: &mut FitState) -> Self {
+        let FitState {
+            half_edges,
             vertices,
             reference,
             parameters,
             near: guesses,
             ..
-        } = model;
+        } = state;
         let normals = &reference.normals;
-        guesses.resize(connectivity.triangles().len(), [None; 4]);
-        let planes: Vec<[Option<Plane>; 4]> = connectivity
+        guesses.resize(half_edges.face_count(), [None; 4]);
+        let planes: Vec<[Option<TangentPlane>; 4]> = half_edges
             .triangles()
             .par_iter()
             .zip(guesses)
@@ -155,11 +161,13 @@ impl Midpoints {
                 let Some(facing) = triangle::area_normal(&a, &b, &c).try_normalize(0.0) else {
                     return [None; 4];
                 };
-                let faces = |s: u32| normals[s as usize].dot(&facing) > LEAST_FACING;
+                let faces = |s: u32| normals[s as usize].dot(&facing) > MIN_FACING;
                 std::array::from_fn(|k| {
-                    let h = (3 * t + k) as u32;
-                    if k < 3 && connectivity.edge(h) != h {
-                        return None;
+                    if k < 3 {
+                        let h = FaceId::from_index(t).half_edge(k);
+                        if half_edges.edge(h) != h {
+                            return None;
+                        }
                     }
                     let place = a * PLACES[k][0] + b * PLACES[k][1] + c * PLACES[k][2];
                     let found = reference.bvh.closest_from(&place, guesses[k], faces)?;
@@ -179,12 +187,11 @@ impl Midpoints {
         }
     }
 
-    fn add_to(&self, element: &mut Element, t: usize) {
-        for (b, plane) in PLACES.iter().zip(&self.planes[t]) {
+    fn add_to(&self, element: &mut Element, t: FaceId) {
+        for (b, plane) in PLACES.iter().zip(&self.planes[t.index()]) {
             if let Some((n, r)) = plane {
-                // Beyond `near` the distance itself counts, no longer its square: term D
-                // rewards the midpoints that come very close, and the others must not
-                // outvote them.
+                // Beyond `near` the distance counts linearly: term D of the fitness rewards
+                // midpoints very close to S, and the distant ones must not outweigh them.
                 let far = r.abs() > self.near;
                 let flattened = if far { self.near / r.abs() } else { 1.0 };
                 element.add_plane(b, n, *r, self.weight * flattened);
@@ -193,18 +200,15 @@ impl Midpoints {
     }
 }
 
-/// Asks for S's volume: to first order a displacement x changes the volume by Σ_v c_v·x_v, where
-/// c_v is a third of the area normals round v. Scaled so that the row reads as a mean distance.
-fn set_volume(equations: &mut NormalEquations, model: &Model) {
-    let Model {
-        connectivity,
-        vertices,
-        ..
-    } = model;
+/// Adds the term for the volume of S. To first order a displacement x changes the volume by
+/// Σ_v c_v·x_v, where c_v is a third of the sum of the area vectors around v. Divided by the area,
+/// the term is a squared mean distance.
+fn set_volume(equations: &mut NormalEquations, state: &FitState) {
+    let (half_edges, vertices) = (&state.half_edges, &state.vertices);
     let origin = vertices[0];
     let mut coefficients = vec![Vec3::zeros(); vertices.len()];
     let (mut volume, mut area) = (0.0, 0.0);
-    for t in connectivity.triangles() {
+    for t in half_edges.triangles() {
         let [a, b, c] = t.map(|v| vertices[v as usize] - origin);
         let normal = triangle::area_normal(&a, &b, &c);
         area += normal.norm() / 2.0;
@@ -216,21 +220,21 @@ fn set_volume(equations: &mut NormalEquations, model: &Model) {
     for c in &mut coefficients {
         *c /= area;
     }
-    equations.set_global(coefficients, (model.volume - volume) / area, VOLUME_WEIGHT);
+    equations.set_global(coefficients, (state.volume - volume) / area, VOLUME_WEIGHT);
 }
 
-/// Draws every triangle to the equilateral one that fits it best, within its own plane.
+/// Pulls every triangle towards the equilateral triangle that fits it best, in its own plane.
 struct Shapes<'a> {
-    model: &'a Model<'a>,
-    /// Edge length of equilateral triangles that cover the same area at the wanted relative
-    /// sizes, for size 1, mm.
+    state: &'a FitState<'a>,
+    /// Edge length of a triangle of relative size 1, mm, such that equilateral triangles of the
+    /// wanted relative sizes cover the model's area.
     unit: f64,
 }
 
 impl<'a> Shapes<'a> {
-    fn new(model: &'a Model) -> Self {
-        let mut shapes = Self { model, unit: 0.0 };
-        let triangles = 0..model.connectivity.triangles().len();
+    fn new(state: &'a FitState) -> Self {
+        let mut shapes = Self { state, unit: 0.0 };
+        let triangles = state.half_edges.faces();
         let doubled_area = |t| {
             let [a, b, c] = shapes.corners(t);
             triangle::area_normal(&a, &b, &c).norm()
@@ -241,46 +245,50 @@ impl<'a> Shapes<'a> {
         shapes
     }
 
-    fn corners(&self, t: usize) -> [Vec3; 3] {
-        self.model.connectivity.triangles()[t].map(|v| self.model.vertices[v as usize])
+    fn corners(&self, t: FaceId) -> [Vec3; 3] {
+        let position = |v: VertexId| self.state.vertices[v.index()];
+        self.state.half_edges.corners(t).map(position)
     }
 
     /// The wanted relative size of triangle `t`.
-    fn size(&self, t: usize) -> f64 {
-        let sizes = self.model.connectivity.triangles()[t].map(|v| self.model.sizing[v as usize]);
+    fn size(&self, t: FaceId) -> f64 {
+        let corners = self.state.half_edges.corners(t);
+        let sizes = corners.map(|v| self.state.sizing[v.index()]);
         sizes.iter().sum::<f64>() / 3.0
     }
 
-    fn add_to(&self, element: &mut Element, t: usize) {
-        let parameters = self.model.parameters;
+    fn add_to(&self, element: &mut Element, t: FaceId) {
+        let parameters = self.state.parameters;
         let p = self.corners(t);
         let Some(target) = equilateral(&p, self.unit * self.size(t), parameters.free_size) else {
             return;
         };
         let badness = 1.0 / triangle::radius_ratio(&p[0], &p[1], &p[2]).max(0.05) - 1.0;
-        let triangles = self.model.connectivity.triangles().len() as f64;
+        let triangles = self.state.half_edges.face_count() as f64;
         let weight =
             parameters.shape_weight / triangles * (1.0 + parameters.worst_weight * badness);
         element.add_shape(&target.change, &target.normal, weight);
     }
 }
 
-struct Target {
-    /// What must be added to the corners (less their mean).
+/// The change that would make a triangle equilateral.
+struct EquilateralTarget {
+    /// Displacement of each corner, relative to the mean displacement, mm.
     change: [Vec3; 3],
     /// Unit normal of the triangle's plane.
     normal: Vec3,
 }
 
-/// The equilateral triangle that lies best on `p` in its plane. Its edge is `edge`, or, as far
-/// as `free` (0..=1) goes, that which fits best. `None` for a degenerate triangle.
-fn equilateral(p: &[Vec3; 3], edge: f64, free: f64) -> Option<Target> {
+/// The equilateral triangle in the plane of `p` that fits `p` best. Its edge length lies between
+/// `edge` (for `free` = 0) and the best-fitting one (for `free` = 1). `None` for a degenerate
+/// triangle.
+fn equilateral(p: &[Vec3; 3], edge: f64, free: f64) -> Option<EquilateralTarget> {
     let centre = (p[0] + p[1] + p[2]) / 3.0;
     let n = triangle::area_normal(&p[0], &p[1], &p[2]).try_normalize(0.0)?;
     let e1 = (p[0] - centre).try_normalize(0.0)?;
     let e2 = n.cross(&e1);
-    // In the plane as complex numbers: corner k of the unit triangle is ω^k/√3; the best
-    // similarity takes it to α ω^k/√3 with α = Σ z_k ω^-k / √3.
+    // With positions in the plane as complex numbers, corner k of the unit triangle is ω^k/√3;
+    // the best similarity maps it to α ω^k/√3 with α = Σ z_k ω^-k / √3.
     let unit = [0, 1, 2].map(|k| {
         let turn = std::f64::consts::TAU * f64::from(k) / 3.0;
         (turn.cos() / 3f64.sqrt(), turn.sin() / 3f64.sqrt())
@@ -302,5 +310,5 @@ fn equilateral(p: &[Vec3; 3], edge: f64, free: f64) -> Option<Target> {
         let corner = e1 * (scale * (re * ux - im * uy)) + e2 * (scale * (re * uy + im * ux));
         corner - (p[k] - centre)
     });
-    Some(Target { change, normal: n })
+    Some(EquilateralTarget { change, normal: n })
 }

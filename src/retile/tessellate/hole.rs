@@ -1,10 +1,14 @@
-//! Closing the hole that a vertex leaves.
+//! Closes the hole that a removed vertex leaves.
 //!
-//! The paper triangulates the ring of neighbours in a plane: constrained Delaunay in the plane
-//! across the star's mean normal, wherever the ring's projection is simple. On rims and thin
-//! walls it is not; and a flat triangulation may ask for an edge that exists already. There a
-//! dynamic programme over the ring takes the best of all triangulations in space (after
-//! Barequet & Sharir 1995), with the forbidden chords and triangles left out.
+//! In: the mesh, the star of the vertex and the demands on new triangles. Out: the triangles that
+//! close the hole, or what prevents it.
+//!
+//! 1. As in the paper, the ring of neighbours is triangulated in the plane perpendicular to the
+//!    star's mean normal (constrained Delaunay), if its projection is a simple polygon.
+//! 2. At rims and thin walls it is not, and a triangulation in the plane may need an edge that
+//!    exists already. Then dynamic programming over the ring finds the best of all
+//!    triangulations in space (after Barequet and Sharir 1995) without forbidden chords and
+//!    triangles. Triangles that turn out to intersect others are forbidden and it is repeated.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,35 +16,38 @@ use super::patchwork::{Patchwork, Star};
 use super::planar::constrained_delaunay;
 use crate::geometry::{Vec2, Vec3, triangle};
 use crate::mesh::intersections::triangles_intersect;
+use crate::mesh::{FaceId, VertexId};
 
-/// What a new triangle must satisfy besides piercing nothing and keeping the mesh a manifold of
-/// its kind.
+/// What a new triangle must satisfy, besides intersecting no others and keeping the topology.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Demand {
-    /// It faces as the surface did and folds nowhere by more than 120°.
+    /// It faces as the old star did, and its dihedral angles are at most 120°.
     Smooth,
-    /// Nothing more.
+    /// Nothing else.
     Embedded,
 }
 
-/// Cosine under which a new triangle has turned away from the old star.
-const LEAST_FACING: f64 = 0.05;
+/// Smallest cosine between the normals of a new triangle and of the old star.
+const MIN_FACING: f64 = 0.05;
 
-/// Cosine of the sharpest fold against a triangle outside of the hole.
-const SHARPEST_FOLD: f64 = -0.5;
+/// Cosine of the largest dihedral angle between a new triangle and one outside the hole.
+const MIN_DIHEDRAL_COSINE: f64 = -0.5;
 
-/// Longest ring for the dynamic programme, which takes the third power of it.
+/// Longest ring for the dynamic programming, which takes its third power.
 const LONGEST_RING: usize = 32;
 
-/// Most times that the programme is run again without the triangles that pierced something.
-const MOST_RETRIES: usize = 24;
+/// How often the dynamic programming is repeated at most.
+const MAX_RETRIES: usize = 24;
 
-/// Why a hole stays open: nothing around it, and these triangles. As long as neither changes,
-/// another try fails as well.
+/// A triangle of a hole: places k < l < m in the ring.
+type RingTriangle = [u32; 3];
+
+/// Why a hole could not be closed. Another attempt fails as well as long as neither its ring nor
+/// these triangles change.
 #[derive(Debug)]
 pub(super) struct Blocked {
-    /// One triangle that each pierced proposal met.
-    pub(super) by: Vec<u32>,
+    /// For each proposed triangle that intersected others, one of these.
+    pub(super) by: Vec<FaceId>,
 }
 
 /// The triangles that close the hole of `star` under `demand`.
@@ -48,13 +55,13 @@ pub(super) fn close(
     mesh: &Patchwork,
     star: &Star,
     demand: Demand,
-) -> Result<Vec<[u32; 3]>, Blocked> {
+) -> Result<Vec<[VertexId; 3]>, Blocked> {
     let hole = Hole::new(mesh, star, demand);
     if let Some(flat) = hole.flat_triangulation()
         && hole.admits_all(&flat)
-        && hole.offenders(&flat, &mut BTreeMap::new()).is_empty()
+        && hole.intersecting(&flat, &mut BTreeMap::new()).is_empty()
     {
-        return Ok(hole.named(&flat));
+        return Ok(hole.vertices_of(&flat));
     }
     hole.best_triangulation()
 }
@@ -63,17 +70,18 @@ struct Hole<'a> {
     mesh: &'a Patchwork,
     star: &'a Star,
     demand: Demand,
+    /// Positions of the ring, mm.
     corners: Vec<Vec3>,
     /// Unit mean normal of the star.
     normal: Vec3,
-    /// Unit normal of the triangle outside of ring edge k, k + 1.
+    /// Unit normal of the triangle outside ring edge k, k + 1.
     outer: Vec<Vec3>,
 }
 
 impl<'a> Hole<'a> {
     fn new(mesh: &'a Patchwork, star: &'a Star, demand: Demand) -> Self {
         let unit = |n: Vec3| n.try_normalize(0.0).unwrap_or_else(Vec3::zeros);
-        let area_normal = |t: u32| {
+        let area_normal = |t: FaceId| {
             let [a, b, c] = mesh.corners(mesh.triangle(t));
             triangle::area_normal(&a, &b, &c)
         };
@@ -93,13 +101,14 @@ impl<'a> Hole<'a> {
         }
     }
 
-    fn named(&self, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
-        let name = |t: &[u32; 3]| t.map(|k| self.star.ring[k as usize]);
-        triangles.iter().map(name).collect()
+    /// The vertices of triangles that are given by places in the ring.
+    fn vertices_of(&self, triangles: &[RingTriangle]) -> Vec<[VertexId; 3]> {
+        let vertices = |t: &RingTriangle| t.map(|k| self.star.ring[k as usize]);
+        triangles.iter().map(vertices).collect()
     }
 
-    /// The paper's way, where it works.
-    fn flat_triangulation(&self) -> Option<Vec<[u32; 3]>> {
+    /// The triangulation in the plane, if the ring's projection is a simple polygon.
+    fn flat_triangulation(&self) -> Option<Vec<RingTriangle>> {
         let n = &self.normal;
         let across = Vec3::ith(n.iamin(), 1.0).cross(n).try_normalize(0.0)?;
         let along = n.cross(&across);
@@ -117,7 +126,8 @@ impl<'a> Hole<'a> {
         constrained_delaunay(&flat, flat.len()).ok()
     }
 
-    fn admits_all(&self, triangles: &[[u32; 3]]) -> bool {
+    /// Whether all chords and triangles are allowed, apart from intersections.
+    fn admits_all(&self, triangles: &[RingTriangle]) -> bool {
         triangles.iter().all(|t| {
             let mut sorted = t.map(|k| k as usize);
             sorted.sort_unstable();
@@ -129,7 +139,7 @@ impl<'a> Hole<'a> {
         })
     }
 
-    /// Whether i, j (i < j) is a side of the hole, or an edge that the mesh has not yet.
+    /// Whether i, j (i < j) is a side of the hole or an edge that the mesh does not have yet.
     fn admits_chord(&self, i: usize, j: usize) -> bool {
         let k = self.star.ring.len();
         j == i + 1
@@ -137,8 +147,8 @@ impl<'a> Hole<'a> {
             || !self.mesh.has_edge(self.star.ring[i], self.star.ring[j])
     }
 
-    /// What the triangle i < k < j costs: shape, and how far it turns from the star and the
-    /// triangles outside. `None` where the demand forbids it.
+    /// The cost of the triangle i < k < j: its shape, and the angles between its normal and those
+    /// of the star and of the triangles outside. `None` if `demand` forbids it.
     fn cost(&self, i: usize, k: usize, j: usize, demand: Demand) -> Option<f64> {
         let [a, b, c] = [i, k, j].map(|m| self.corners[m]);
         let n = triangle::area_normal(&a, &b, &c);
@@ -157,74 +167,77 @@ impl<'a> Hole<'a> {
         let mut turned = 2.0 * (1.0 - facing);
         let mut sharpest = 1.0f64;
         for side in sides.into_iter().flatten() {
-            let fold = n.dot(&self.outer[side]);
-            sharpest = sharpest.min(fold);
-            turned += 1.0 - fold;
+            let cosine = n.dot(&self.outer[side]);
+            sharpest = sharpest.min(cosine);
+            turned += 1.0 - cosine;
         }
-        if demand == Demand::Smooth && (facing < LEAST_FACING || sharpest < SHARPEST_FOLD) {
+        if demand == Demand::Smooth && (facing < MIN_FACING || sharpest < MIN_DIHEDRAL_COSINE) {
             return None;
         }
         Some(1.0 / triangle::radius_ratio(&a, &b, &c).max(0.05) + 2.0 * turned)
     }
 
-    /// The triangles of the proposal that pierce the mesh or an earlier one of the proposal.
-    /// `pierced` remembers what the mesh answered.
-    fn offenders(
+    /// The proposed triangles that intersect the mesh or an earlier one of the proposal. `known`
+    /// keeps, for every triangle tested, the triangle of the mesh that it intersects.
+    fn intersecting(
         &self,
-        triangles: &[[u32; 3]],
-        pierced: &mut BTreeMap<[u32; 3], Option<u32>>,
-    ) -> Vec<[u32; 3]> {
-        let named = self.named(triangles);
-        if self.closes_a_tetrahedron(&named) {
+        triangles: &[RingTriangle],
+        known: &mut BTreeMap<RingTriangle, Option<FaceId>>,
+    ) -> Vec<RingTriangle> {
+        let proposed = self.vertices_of(triangles);
+        if self.closes_a_tetrahedron(&proposed) {
             return triangles.to_vec();
         }
-        let meets_earlier = |k: usize| {
-            let corners = self.mesh.corners(named[k]);
-            named[..k].iter().any(|other| {
-                triangles_intersect(named[k], &corners, *other, &self.mesh.corners(*other))
+        let intersects_earlier = |k: usize| {
+            let corners = self.mesh.corners(proposed[k]);
+            proposed[..k].iter().any(|other| {
+                triangles_intersect(proposed[k], &corners, *other, &self.mesh.corners(*other))
             })
         };
-        (0..named.len())
+        let first_in_mesh = |k: usize| {
+            self.mesh
+                .first_intersecting(proposed[k], &self.star.triangles)
+        };
+        (0..proposed.len())
             .filter(|&k| {
-                pierced
+                let in_mesh = known
                     .entry(triangles[k])
-                    .or_insert_with(|| self.mesh.first_pierced(named[k], &self.star.triangles))
-                    .is_some()
-                    || meets_earlier(k)
+                    .or_insert_with(|| first_in_mesh(k));
+                in_mesh.is_some() || intersects_earlier(k)
             })
             .map(|k| triangles[k])
             .collect()
     }
 
-    /// Three neighbours and one vertex more, and that is the whole component: closing the hole
-    /// would glue two triangles back to back.
-    fn closes_a_tetrahedron(&self, named: &[[u32; 3]]) -> bool {
-        let [[a, b, c]] = *named else { return false };
+    /// Whether the vertex, its three neighbours and the triangles between them are the whole
+    /// component. Closing the hole would leave two triangles with the same vertices.
+    fn closes_a_tetrahedron(&self, proposed: &[[VertexId; 3]]) -> bool {
+        let [[a, b, c]] = *proposed else { return false };
         self.mesh
             .triangle_along(b, a)
             .is_some_and(|(_, third)| third == c)
     }
 
-    /// The cheapest triangulation in space that pierces nothing.
-    fn best_triangulation(&self) -> Result<Vec<[u32; 3]>, Blocked> {
+    /// The cheapest triangulation in space without intersections.
+    fn best_triangulation(&self) -> Result<Vec<[VertexId; 3]>, Blocked> {
         if self.corners.len() > LONGEST_RING {
             return Err(Blocked { by: Vec::new() });
         }
-        let (mut forbidden, mut pierced) = (BTreeSet::new(), BTreeMap::new());
+        let (mut forbidden, mut known) = (BTreeSet::new(), BTreeMap::new());
         let table = self.cost_table();
-        for _ in 0..MOST_RETRIES {
+        for _ in 0..MAX_RETRIES {
             let cheapest = cheapest(self.corners.len(), |i, k, j| {
                 let t = [i, k, j].map(|m| m as u32);
                 table[self.place(i, k, j)].filter(|_| !forbidden.contains(&t))
             });
             let Some(triangles) = cheapest else { break };
-            let offenders = self.offenders(&triangles, &mut pierced);
-            if offenders.is_empty() {
-                return Ok(self.named(&triangles));
+            let intersecting = self.intersecting(&triangles, &mut known);
+            if intersecting.is_empty() {
+                return Ok(self.vertices_of(&triangles));
             }
-            forbidden.extend(offenders);
+            forbidden.extend(intersecting);
         }
-        let mut by: Vec<u32> = pierced.into_values().flatten().collect();
+        let mut by: Vec<FaceId> = known.into_values().flatten().collect();
         by.sort_unstable();
         by.dedup();
         Err(Blocked { by })
@@ -234,6 +247,7 @@ impl<'a> Hole<'a> {
         (i * self.corners.len() + k) * self.corners.len() + j
     }
 
+    /// The cost of every triangle i < k < j; `None` if forbidden.
     fn cost_table(&self) -> Vec<Option<f64>> {
         let m = self.corners.len();
         let mut chord = vec![true; m * m];
@@ -256,9 +270,12 @@ impl<'a> Hole<'a> {
     }
 }
 
-/// The cheapest triangulation of a ring of `m` corners, where `cost` prices the triangle
-/// i < k < j or forbids it. O(m³).
-fn cheapest(m: usize, cost: impl Fn(usize, usize, usize) -> Option<f64>) -> Option<Vec<[u32; 3]>> {
+/// The cheapest triangulation of a ring of `m` corners; `cost` is that of the triangle i < k < j,
+/// or `None` if it is forbidden. Takes O(m³).
+fn cheapest(
+    m: usize,
+    cost: impl Fn(usize, usize, usize) -> Option<f64>,
+) -> Option<Vec<RingTriangle>> {
     let mut least = vec![0.0f64; m * m];
     let mut through = vec![0usize; m * m];
     for span in 2..m {
@@ -296,7 +313,7 @@ fn cheapest(m: usize, cost: impl Fn(usize, usize, usize) -> Option<f64>) -> Opti
 mod tests {
     use super::*;
 
-    /// All triangulations of a convex polygon, by brute force.
+    /// The cost of the cheapest triangulation of a convex polygon, by brute force.
     fn brute_force(i: usize, j: usize, cost: &dyn Fn(usize, usize, usize) -> Option<f64>) -> f64 {
         if j < i + 2 {
             return 0.0;
@@ -309,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn the_programme_finds_the_cheapest_triangulation() {
+    fn dynamic_programming_finds_the_cheapest_triangulation() {
         for seed in 0..40usize {
             let m = 3 + seed % 7;
             let cost = move |i: usize, k: usize, j: usize| {

@@ -1,26 +1,27 @@
-//! The paper's mutual tessellation: from points on a surface to a mesh of exactly them.
+//! The paper's mutual tessellation: joins points on a surface to a mesh.
 //!
 //! In: a closed surface and points on its triangles. Out: a closed mesh whose vertices are
 //! exactly the points, in their order. After Turk, "Re-Tiling Polygonal Surfaces", SIGGRAPH
 //! 1992 (doi:10.1145/133994.134008), section 4:
 //!
-//! 1. [`mutual`]: every triangle that carries points is triangulated with them (constrained
-//!    Delaunay, sides fixed). Same surface, old vertices and points together.
-//! 2. [`removal`]: the old vertices go one by one, lowest valence first; the [`hole`] that each
-//!    leaves is triangulated anew.
+//! 1. [`mutual`]: every triangle that contains points is triangulated with them (constrained
+//!    Delaunay triangulation, sides fixed). The surface stays the same; its vertices are now the
+//!    old ones and the points.
+//! 2. [`removal`]: the old vertices are removed one by one, lowest valence first, and the
+//!    [`hole`] that each leaves is triangulated.
 //!
-//! Beyond the paper: holes whose ring has no simple projection are closed in space; every new
-//! triangle is tested exactly against all others, so that an embedded surface stays embedded;
-//! stuck vertices lose edges by flips.
+//! Beyond the paper: holes whose boundary has no simple projection are closed in space; every
+//! new triangle is tested exactly against all others, so an embedded surface stays embedded; at
+//! vertices that cannot be removed, edges are flipped.
 //!
-//! **Guaranteed** for what is returned: exactly N vertices in order, closed, edge- and
-//! vertex-manifold, components, genus and orientation of the surface, no self-intersection.
-//! **Not** guaranteed: that there is an answer. Too few points for a handle or a thin wall
-//! end in an error that names them. Nothing is said about the shape of the triangles; flips
-//! see to that afterwards.
+//! Guaranteed for the result: exactly N vertices in their order; closed, edge- and
+//! vertex-manifold; the components, genus and orientation of the surface; no self-intersection;
+//! determined by the input alone.
 //!
-//! Deterministic: the answer depends on the input alone. O(n log n) in surface triangles and
-//! points.
+//! Not guaranteed: that there is a result. If a handle or a thin wall has too few points, the
+//! error names what is stuck. Nor are the triangles well-shaped; flips improve that later.
+//!
+//! Takes O(n log n) in the number of triangles and points.
 
 mod hole;
 mod mutual;
@@ -28,61 +29,59 @@ mod patchwork;
 mod planar;
 mod removal;
 #[cfg(test)]
-mod samples;
+mod test_surfaces;
 
-use crate::geometry::Vec3;
-use crate::mesh::TriMesh;
+use crate::geometry::{Vec3, triangle};
+use crate::mesh::ids::stored;
 use crate::mesh::intersections::self_intersections;
-use crate::mesh::topology::{self, Census, Defect};
+use crate::mesh::topology::{self, Census, MeshDefect};
+use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::progress::{Cancelled, Monitor};
-use crate::retile::{SurfacePoint, orientation};
+use crate::retile::{SurfacePoint, orientation, quotas};
 
 use patchwork::Patchwork;
 
-/// Why the points cannot be joined to a mesh.
+/// Why the points could not be joined to a mesh.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TessellateError {
-    /// Asked to stop.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
     /// The surface is not a closed manifold.
     #[error("the surface is not a closed manifold: {0}")]
-    OpenSurface(#[from] Defect),
-    /// The point names no triangle of the surface, or its coordinates are not finite.
+    OpenSurface(#[from] MeshDefect),
+    /// The point's triangle does not exist, or its barycentric coordinates are invalid.
     #[error("point {point} does not lie on the surface")]
     UnusablePoint {
         /// Index of the point.
         point: u32,
     },
-    /// Two points lie in the same place.
-    #[error("points {points:?} lie in the same place")]
+    /// Two points have the same position.
+    #[error("points {} and {} have the same position", points[0], points[1])]
     CoincidentPoints {
         /// Indices of the points.
         points: [u32; 2],
     },
-    /// A component of the surface has fewer points than any mesh of its genus needs.
+    /// A component of the surface has fewer points than any mesh of its genus.
     #[error(
-        "component {component} of the surface (genus {genus}) carries {points} points; \
-         {needed} are the least that can"
+        "component {component} of the surface (genus {genus}) has {points} points; a mesh of its \
+         topology has at least {needed}"
     )]
     TooFewPoints {
-        /// Number of the component, as [`topology::components`] counts.
+        /// Number of the component, as in [`topology::components`].
         component: u32,
-        /// Its handles.
+        /// Number of its handles.
         genus: i64,
-        /// The points on it.
+        /// Number of points on it.
         points: usize,
-        /// The least that any mesh of this genus has.
+        /// The smallest number of vertices of any mesh of this genus.
         needed: usize,
     },
-    /// Vertices of the surface stayed: without them the points would lose its topology.
+    /// Vertices of the surface could not be removed without changing its topology.
     #[error("{} vertices of the surface cannot be removed without changing its topology", vertices.len())]
     Stuck {
         /// The vertices, ascending.
-        vertices: Vec<u32>,
+        vertices: Vec<VertexId>,
     },
-    /// The mesh is not of the surface's kind. Step two cannot do that; were there a mistake in it,
-    /// the mesh would end here.
+    /// The mesh has another topology than the surface. The method cannot cause that; the check
+    /// guards against mistakes in its implementation.
     #[error("the mesh has another topology than the surface: {after:?} instead of {before:?}")]
     TopologyChanged {
         /// The surface.
@@ -90,24 +89,28 @@ pub enum TessellateError {
         /// The mesh.
         after: Census,
     },
-    /// A component faces the other way than on the surface: too few points for its shape.
-    #[error("the triangles of {} points face the wrong way", points.len())]
+    /// A component has the opposite orientation than on the surface: it has too few points for
+    /// its shape.
+    #[error("the triangles at {} points have the wrong orientation", points.len())]
     InsideOut {
-        /// The component's points, ascending.
+        /// Indices of the component's points, ascending.
         points: Vec<u32>,
     },
-    /// Triangles pierce each other, as they did on the surface: removal adds none.
-    #[error("{} pairs of triangles pierce each other", pairs.len())]
+    /// Triangles intersect that did so on the surface already; removal adds no intersections.
+    #[error("{} pairs of triangles intersect", pairs.len())]
     SelfIntersecting {
         /// Pairs of triangles of `mesh`.
-        pairs: Vec<[u32; 2]>,
-        /// The mesh, right in all but this.
+        pairs: Vec<[FaceId; 2]>,
+        /// The mesh, which meets all other guarantees.
         mesh: Box<TriMesh>,
     },
+    /// Cancelled by the caller.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
-/// Joins `points` on the closed surface `vertices`, `triangles` to a mesh. Positions are
-/// millimetres; the result faces as the surface does.
+/// Joins `points` on the closed surface `vertices` (mm), `triangles` to a mesh with the
+/// orientation of the surface.
 ///
 /// # Errors
 /// See [`TessellateError`].
@@ -130,10 +133,10 @@ pub fn tessellate(
         .collect();
     let cell = grid_spacing(&positions, &all, points.len());
     let mut mesh = Patchwork::new(positions, all, cell);
-    let kept = points.len() as u32;
-    let stuck = removal::remove_old_vertices(&mut mesh, kept, monitor)?;
+    let stuck = removal::remove_old_vertices(&mut mesh, points.len(), monitor)?;
     if !stuck.is_empty() {
-        let vertices = stuck.into_iter().map(|v| v - kept).collect();
+        let original = |v: VertexId| VertexId::from_index(v.index() - points.len());
+        let vertices = stuck.into_iter().map(original).collect();
         return Err(TessellateError::Stuck { vertices });
     }
     let mut mesh = verify(finished(mesh, points.len()), &census)?;
@@ -142,7 +145,7 @@ pub fn tessellate(
         vertices: vertices.to_vec(),
         triangles: triangles.to_vec(),
     };
-    let of_point = |p: &SurfacePoint| component[triangles[p.triangle as usize][0] as usize];
+    let of_point = |p: &SurfacePoint| component[triangles[p.triangle.index()][0] as usize];
     let of_points: Vec<u32> = points.iter().map(of_point).collect();
     let volumes = topology::component_volumes(&surface.vertices, &surface.triangles, &component);
     orientation::face_alike(&mut mesh, &of_points, &volumes)
@@ -153,7 +156,7 @@ pub fn tessellate(
 fn check_points(triangles: &[[u32; 3]], points: &[SurfacePoint]) -> Result<(), TessellateError> {
     let usable = |p: &SurfacePoint| {
         let sum: f64 = p.barycentric.iter().sum();
-        (p.triangle as usize) < triangles.len()
+        p.triangle.index() < triangles.len()
             && p.barycentric.iter().all(|x| *x >= 0.0)
             && (sum - 1.0).abs() < 1e-6
     };
@@ -165,35 +168,25 @@ fn check_points(triangles: &[[u32; 3]], points: &[SurfacePoint]) -> Result<(), T
     }
 }
 
-/// Demands the least number of vertices that each component's genus needs.
+/// Checks that every component has as many points as its genus needs.
 fn check_counts(
     vertices: usize,
     triangles: &[[u32; 3]],
     points: &[SurfacePoint],
 ) -> Result<(), TessellateError> {
     let component_of = topology::components(vertices, triangles);
-    let count = component_of.iter().max().map_or(0, |c| *c as usize + 1);
-    let of_triangle = |t: usize| component_of[triangles[t][0] as usize] as usize;
-    let mut characteristic = vec![0i64; count];
-    for &c in &component_of {
-        characteristic[c as usize] += 2;
-    }
-    // V - E + F with E = 3F/2, doubled.
-    for t in 0..triangles.len() {
-        characteristic[of_triangle(t)] -= 1;
-    }
-    let mut carried = vec![0usize; count];
+    let characteristics = topology::component_characteristics(triangles, &component_of);
+    let mut counts = vec![0usize; characteristics.len()];
     for p in points {
-        carried[of_triangle(p.triangle as usize)] += 1;
+        counts[component_of[triangles[p.triangle.index()][0] as usize] as usize] += 1;
     }
-    for component in 0..count {
-        let genus = 1 - characteristic[component] / 4;
-        let needed = least_vertices(genus);
-        if carried[component] < needed {
+    for (component, (euler, points)) in (0u32..).zip(characteristics.into_iter().zip(counts)) {
+        let needed = quotas::least_vertices(euler);
+        if points < needed {
             return Err(TessellateError::TooFewPoints {
-                component: component as u32,
-                genus,
-                points: carried[component],
+                component,
+                genus: 1 - euler / 2,
+                points,
                 needed,
             });
         }
@@ -201,31 +194,26 @@ fn check_counts(
     Ok(())
 }
 
-/// The fewest vertices of any triangulation of the closed orientable surface of `genus`
-/// (Jungerman & Ringel 1980).
-fn least_vertices(genus: i64) -> usize {
-    let bound = f64::midpoint(7.0, (1.0 + 48.0 * genus as f64).sqrt()).ceil() as usize;
-    if genus == 2 { bound + 1 } else { bound }
-}
-
-/// Between the triangles that there are and those that there will be.
+/// The geometric mean of the edge lengths before and after the removal of the old vertices, mm.
 fn grid_spacing(positions: &[Vec3], triangles: &[[u32; 3]], points: usize) -> f64 {
     let area: f64 = triangles
         .iter()
         .map(|t| {
             let [a, b, c] = t.map(|v| positions[v as usize]);
-            crate::geometry::triangle::area_normal(&a, &b, &c).norm() / 2.0
+            triangle::area_normal(&a, &b, &c).norm() / 2.0
         })
         .sum();
     let edge = |count: usize| (4.0 / 3f64.sqrt() * area / count.max(1) as f64).sqrt();
     (edge(triangles.len()) * edge(2 * points)).sqrt()
 }
 
-/// The triangles in a canonical order: each begins with its lowest vertex, the list is sorted.
+/// The mesh of the remaining triangles in a canonical order: each begins with its lowest vertex,
+/// and the list is sorted.
 fn finished(mesh: Patchwork, points: usize) -> TriMesh {
     let mut triangles: Vec<[u32; 3]> = mesh
         .live_triangles()
-        .map(|mut t| {
+        .map(|t| {
+            let mut t = stored(t);
             let lowest = (0..3).min_by_key(|&k| t[k]).unwrap_or(0);
             t.rotate_left(lowest);
             t
@@ -240,7 +228,7 @@ fn finished(mesh: Patchwork, points: usize) -> TriMesh {
     }
 }
 
-/// Nothing leaves that has not been looked at as a whole.
+/// Checks topology and self-intersections of the finished mesh.
 fn verify(mesh: TriMesh, surface: &Census) -> Result<TriMesh, TessellateError> {
     let census = topology::check(&mesh)?;
     let kind = |c: &Census| (c.euler_characteristic, c.components);
@@ -262,7 +250,7 @@ fn verify(mesh: TriMesh, surface: &Census) -> Result<TriMesh, TessellateError> {
 
 #[cfg(test)]
 mod tests {
-    use super::samples::{double_torus, jittered, scattered, squeezed, together};
+    use super::test_surfaces::{double_torus, jittered, scattered, squeezed, together};
     use super::*;
     use crate::geometry::random::{Purpose, stream};
     use crate::mesh::shapes;
@@ -279,7 +267,7 @@ mod tests {
         )
     }
 
-    fn demand_guarantees(surface: &TriMesh, n: usize, seed: u64, mesh: &TriMesh) {
+    fn check_guarantees(surface: &TriMesh, n: usize, seed: u64, mesh: &TriMesh) {
         let expected: Vec<Vec3> = scattered(surface, n, seed)
             .iter()
             .map(|p| p.position(&surface.vertices, &surface.triangles))
@@ -292,18 +280,18 @@ mod tests {
         assert_eq!(after.euler_characteristic, before.euler_characteristic);
         assert_eq!(after.components, before.components);
         assert_eq!(mesh.volume() > 0.0, surface.volume() > 0.0);
-        assert_eq!(self_intersections(mesh), Vec::<[u32; 2]>::new());
+        assert_eq!(self_intersections(mesh), Vec::<[FaceId; 2]>::new());
     }
 
-    /// Tiles and demands every guarantee.
+    /// Tiles a surface and checks every guarantee.
     fn check(surface: &TriMesh, n: usize, seed: u64) -> TriMesh {
         let mesh = tile(surface, n, seed).unwrap();
-        demand_guarantees(surface, n, seed, &mesh);
+        check_guarantees(surface, n, seed, &mesh);
         mesh
     }
 
     #[test]
-    fn spheres_and_cups_carry_any_number_of_points() {
+    fn spheres_and_cups_are_tiled_with_any_number_of_points() {
         let sphere = shapes::icosphere(30.0, 3);
         let cup = shapes::cup(70.0, 33.0, 10.0, 48);
         for seed in 0..12 {
@@ -376,8 +364,8 @@ mod tests {
             }
             let n = rng.random_range(40..160);
             match tile(&surface, n, seed) {
-                Ok(mesh) => demand_guarantees(&surface, n, seed, &mesh),
-                // Points are scattered blindly: the small sphere may go without.
+                Ok(mesh) => check_guarantees(&surface, n, seed, &mesh),
+                // The points are scattered at random: the small sphere may get too few.
                 Err(TessellateError::TooFewPoints { .. }) => {}
                 Err(TessellateError::Stuck { .. } | TessellateError::InsideOut { .. }) => {
                     refused += 1;
@@ -385,7 +373,7 @@ mod tests {
                 Err(other) => panic!("seed {seed}: {other}"),
             }
         }
-        // Nor are there always points where walls are thin and tubes narrow.
+        // Nor do thin walls and narrow tubes always get enough points.
         assert!(refused < 30, "{refused}");
     }
 
@@ -397,8 +385,8 @@ mod tests {
     }
 
     #[test]
-    fn the_surface_is_followed() {
-        // 300 points on a sphere: chords of about 0.2 radii cost two per cent of the volume.
+    fn the_mesh_follows_the_surface() {
+        // With 300 points on a sphere, chords of about 0.2 radii lose two percent of the volume.
         let sphere = shapes::icosphere(30.0, 4);
         let mesh = check(&sphere, 300, 1);
         let lost = 1.0 - mesh.volume() / sphere.volume();
@@ -417,11 +405,12 @@ mod tests {
                 ..
             })
         ));
-        assert_eq!([0, 1, 2, 3].map(least_vertices), [4, 7, 10, 10]);
+        let least_of_genus = |genus: i64| quotas::least_vertices(2 - 2 * genus);
+        assert_eq!([0, 1, 2, 3].map(least_of_genus), [4, 7, 10, 10]);
     }
 
     #[test]
-    fn sparse_points_end_in_an_answer_or_a_reason() {
+    fn sparse_points_give_a_mesh_or_an_error() {
         let (two, sheet) = (double_torus(), shapes::cup(70.0, 33.0, 0.5, 32));
         for seed in 0..20 {
             for outcome in [tile(&two, 14, seed), tile(&sheet, 40, seed)] {
@@ -435,14 +424,14 @@ mod tests {
         }
     }
 
-    /// Few points mend such a surface, for no triangle of it is left; many lie on triangles that
-    /// pierce each other, or between which old vertices stay.
+    /// Few points repair such a surface, since none of its triangles is left. Many points lie on
+    /// intersecting triangles, or old vertices between them cannot be removed.
     #[test]
-    fn a_surface_that_pierces_itself_is_mended_or_refused() {
+    fn a_self_intersecting_surface_is_repaired_or_refused() {
         let surface = jittered(&shapes::icosphere(30.0, 2), 5.0, 1);
         assert!(!self_intersections(&surface).is_empty());
-        let mended = tile(&surface, 150, 1).unwrap();
-        assert_eq!(self_intersections(&mended), Vec::<[u32; 2]>::new());
+        let repaired = tile(&surface, 150, 1).unwrap();
+        assert_eq!(self_intersections(&repaired), Vec::<[FaceId; 2]>::new());
         let refused = tile(&surface, 5000, 1);
         assert!(matches!(
             refused,
@@ -451,12 +440,12 @@ mod tests {
     }
 
     #[test]
-    fn bad_points_are_named() {
+    fn invalid_points_are_reported() {
         let sphere = shapes::icosphere(1.0, 1);
         for (triangle, x) in [(80, 0.2), (3, f64::NAN), (3, -0.1), (3, 0.9)] {
             let mut points = scattered(&sphere, 20, 1);
             points[5] = SurfacePoint {
-                triangle,
+                triangle: FaceId(triangle),
                 barycentric: [x, 0.3, 0.5],
             };
             let outcome = tessellate(
@@ -470,7 +459,7 @@ mod tests {
     }
 
     #[test]
-    fn cancellation_ends_it() {
+    fn cancelling_ends_the_tessellation() {
         let sphere = shapes::icosphere(1.0, 2);
         let token = CancelToken::new();
         token.cancel();
@@ -484,7 +473,7 @@ mod tests {
     }
 
     #[test]
-    fn same_input_same_mesh() {
+    fn the_mesh_does_not_depend_on_the_number_of_threads() {
         let cup = shapes::cup(70.0, 33.0, 10.0, 32);
         let one = rayon::ThreadPoolBuilder::new()
             .num_threads(1)

@@ -1,49 +1,52 @@
-//! Step one: the mutual tessellation, which has the old vertices and the points.
+//! Step one: the mutual tessellation of old vertices and points.
 //!
-//! Every triangle that carries points is triangulated in its own plane with its three sides
-//! as constraints. No side is split, so neighbours fit and the surface stays the same set of
-//! points; only its triangles become smaller.
+//! In: the surface and the points. Out: triangles over both. Every triangle that contains points
+//! is triangulated in its own plane with its three sides as constraints. No side is split, so
+//! neighbours still match and the surface stays the same set; only its triangles are smaller.
 
 use rayon::prelude::*;
 
 use super::TessellateError;
 use super::planar::{PlanarError, constrained_delaunay};
 use crate::geometry::{Vec2, Vec3};
+use crate::mesh::FaceId;
 use crate::retile::SurfacePoint;
 
-/// Smallest barycentric coordinate with which a point enters its triangle's plane: keeps it
-/// off the sides, where rounding could put it on the wrong one.
+/// Smallest barycentric coordinate of a point in its triangle's plane. It keeps points off the
+/// sides, beyond which rounding could put them.
 const SMALLEST_SHARE: f64 = 1e-6;
 
-/// Triangles flatter than this (height over longest side) are laid out as equilateral ones:
-/// in their own frame rounding would decide.
+/// Height over longest side below which a triangle is triangulated as if it were equilateral; in
+/// its own frame the result would depend on rounding.
 const FLATTEST: f64 = 1e-6;
 
-/// The triangles over points (numbered first) and old vertices (numbered behind them).
+/// The triangles over the points, which are numbered first, and the old vertices, numbered after
+/// them.
 pub(super) fn mutual_tessellation(
     vertices: &[Vec3],
     triangles: &[[u32; 3]],
     points: &[SurfacePoint],
 ) -> Result<Vec<[u32; 3]>, TessellateError> {
-    let mut carried: Vec<(u32, u32)> = (0..).zip(points).map(|(i, p)| (p.triangle, i)).collect();
-    carried.sort_unstable();
-    let behind = |v: u32| v + points.len() as u32;
-    let mut loaded = vec![false; triangles.len()];
-    for &(t, _) in &carried {
-        loaded[t as usize] = true;
+    let mut contained: Vec<(FaceId, u32)> =
+        (0..).zip(points).map(|(i, p)| (p.triangle, i)).collect();
+    contained.sort_unstable();
+    let old_vertex = |v: u32| v + points.len() as u32;
+    let mut has_points = vec![false; triangles.len()];
+    for (t, _) in &contained {
+        has_points[t.index()] = true;
     }
-    let plain = (0..triangles.len()).filter(|&t| !loaded[t]);
-    let mut all: Vec<[u32; 3]> = plain.map(|t| triangles[t].map(behind)).collect();
-    let groups: Vec<&[(u32, u32)]> = carried.chunk_by(|p, q| p.0 == q.0).collect();
+    let plain = (0..triangles.len()).filter(|&t| !has_points[t]);
+    let mut all: Vec<[u32; 3]> = plain.map(|t| triangles[t].map(old_vertex)).collect();
+    let groups: Vec<&[(FaceId, u32)]> = contained.chunk_by(|p, q| p.0 == q.0).collect();
     let split: Vec<Result<Vec<[u32; 3]>, TessellateError>> = groups
         .into_par_iter()
         .map(|group| {
-            let triangle = triangles[group[0].0 as usize];
+            let triangle = triangles[group[0].0.index()];
             let corners = triangle.map(|v| vertices[v as usize]);
             let ids: Vec<u32> = group.iter().map(|p| p.1).collect();
             split_triangle(&corners, &ids, points).map(|parts| {
                 let id = |number: u32| match number {
-                    0..3 => behind(triangle[number as usize]),
+                    0..3 => old_vertex(triangle[number as usize]),
                     _ => ids[number as usize - 3],
                 };
                 parts.into_iter().map(|part| part.map(id)).collect()
@@ -56,7 +59,7 @@ pub(super) fn mutual_tessellation(
     Ok(all)
 }
 
-/// The parts of one triangle: 0, 1, 2 are its corners, 3.. the points `ids`.
+/// The parts of one triangle. Vertices 0, 1, 2 are its corners, those from 3 on the points `ids`.
 fn split_triangle(
     corners: &[Vec3; 3],
     ids: &[u32],
@@ -82,12 +85,12 @@ fn split_triangle(
         PlanarError::Coincident([i, j]) if i >= 3 => TessellateError::CoincidentPoints {
             points: [ids[i as usize - 3], ids[j as usize - 3]],
         },
-        // In the equilateral frame every point lies well inside.
+        // Cannot happen in the equilateral frame, where every point lies well inside.
         _ => TessellateError::UnusablePoint { point: ids[0] },
     })
 }
 
-/// The triangle laid into the plane isometrically but for scale, `None` where it is too flat.
+/// The triangle in its own plane, with its longest side scaled to 1; `None` if it is too flat.
 fn own_frame([a, b, c]: &[Vec3; 3]) -> Option<[Vec2; 3]> {
     let (ab, ac) = (b - a, c - a);
     let longest = ab.norm().max(ac.norm()).max((c - b).norm());
@@ -110,7 +113,7 @@ fn equilateral() -> [Vec2; 3] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::scattered;
+    use super::super::test_surfaces::scattered;
     use super::*;
     use crate::mesh::{TriMesh, shapes, topology};
 
@@ -142,10 +145,10 @@ mod tests {
     }
 
     #[test]
-    fn points_in_one_place_are_named() {
+    fn points_with_the_same_position_are_reported() {
         let mesh = shapes::tetrahedron(1.0);
         let point = |w: f64| SurfacePoint {
-            triangle: 2,
+            triangle: FaceId(2),
             barycentric: [0.5, 0.5 - w, w],
         };
         let points = [point(0.1), point(0.3), point(0.2), point(0.3)];
@@ -156,11 +159,11 @@ mod tests {
     }
 
     #[test]
-    fn slivers_and_points_on_sides_are_carried() {
+    fn slivers_and_points_on_sides_are_triangulated() {
         let vertices = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.0, 0.0]].map(Vec3::from);
         let points =
             [[0.0, 0.5, 0.5], [1.0, 0.0, 0.0], [0.2, 0.3, 0.5]].map(|barycentric| SurfacePoint {
-                triangle: 0,
+                triangle: FaceId(0),
                 barycentric,
             });
         let parts = mutual_tessellation(&vertices, &[[0, 1, 2]], &points).unwrap();

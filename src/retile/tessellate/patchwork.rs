@@ -1,38 +1,44 @@
-//! A closed triangle mesh that loses vertices and flips edges.
+//! A closed triangle mesh from which vertices are removed and in which edges are flipped.
+//!
+//! A half-edge structure is of no use here, since a removal replaces a whole star of triangles at
+//! once. The mesh stores the triangles at every vertex instead, a spatial index to test new
+//! triangles against, and a count of changes, from which a failed removal can tell whether
+//! another attempt is worthwhile.
 
 use crate::geometry::Vec3;
+use crate::mesh::ids::typed;
 use crate::mesh::intersections::IntersectionIndex;
+use crate::mesh::{FaceId, VertexId};
 
-/// Stands for a triangle that is no more.
-const DEAD: [u32; 3] = [u32::MAX; 3];
-
-/// The mesh while it changes: triangles, the triangles at every vertex, and where they lie.
-/// Always a closed, oriented 2-manifold.
+/// The mesh between two changes: always a closed, oriented 2-manifold.
 pub(super) struct Patchwork {
     pub(super) positions: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
+    /// `None` for removed triangles.
+    triangles: Vec<Option<[VertexId; 3]>>,
     /// Triangles at each vertex, in no order.
-    incident: Vec<Vec<u32>>,
+    incident: Vec<Vec<FaceId>>,
     index: IntersectionIndex,
-    /// Number of changes so far; the last one at each vertex and of each triangle.
+    /// Number of changes so far.
     clock: u64,
+    /// The number of the last change at each vertex.
     changed: Vec<u64>,
+    /// The number of the last change of each triangle.
     replaced: Vec<u64>,
 }
 
 /// The triangles around a vertex.
 pub(super) struct Star {
-    /// The neighbours, counter-clockwise, beginning with the lowest id.
-    pub(super) ring: Vec<u32>,
-    /// Triangle k lies between neighbours k and k + 1.
-    pub(super) triangles: Vec<u32>,
+    /// The neighbours, counter-clockwise, beginning with the lowest.
+    pub(super) ring: Vec<VertexId>,
+    /// Triangle k is that between neighbours k and k + 1.
+    pub(super) triangles: Vec<FaceId>,
 }
 
 impl Patchwork {
-    /// `triangles` must be a closed manifold; `cell` is the grid's spacing (mm).
+    /// `triangles` must be a closed manifold; `cell` is the spacing of the index's grid, mm.
     pub(super) fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, cell: f64) -> Self {
         let mut incident = vec![Vec::with_capacity(8); positions.len()];
-        for (t, triangle) in (0u32..).zip(&triangles) {
+        for (t, triangle) in FaceId::first(triangles.len()).zip(&triangles) {
             for &v in triangle {
                 incident[v as usize].push(t);
             }
@@ -43,27 +49,29 @@ impl Patchwork {
             replaced: vec![0; triangles.len()],
             clock: 0,
             positions,
-            triangles,
+            triangles: triangles.into_iter().map(|t| Some(typed(t))).collect(),
             incident,
             index,
         }
     }
 
-    pub(super) fn position(&self, v: u32) -> Vec3 {
-        self.positions[v as usize]
+    pub(super) fn position(&self, v: VertexId) -> Vec3 {
+        self.positions[v.index()]
     }
 
-    pub(super) fn corners(&self, triangle: [u32; 3]) -> [Vec3; 3] {
+    /// The positions of three vertices.
+    pub(super) fn corners(&self, triangle: [VertexId; 3]) -> [Vec3; 3] {
         triangle.map(|v| self.position(v))
     }
 
-    /// Number of neighbours.
-    pub(super) fn valence(&self, v: u32) -> usize {
-        self.incident[v as usize].len()
+    /// The number of neighbours of `v`.
+    pub(super) fn valence(&self, v: VertexId) -> usize {
+        self.incident[v.index()].len()
     }
 
-    pub(super) fn triangle(&self, t: u32) -> [u32; 3] {
-        self.triangles[t as usize]
+    /// The corners of triangle `t`, which must not have been removed.
+    pub(super) fn triangle(&self, t: FaceId) -> [VertexId; 3] {
+        self.triangles[t.index()].expect("only triangles that still exist are asked for")
     }
 
     /// Number of changes so far.
@@ -72,48 +80,47 @@ impl Patchwork {
     }
 
     /// The number of the last change at `v`.
-    pub(super) fn changed(&self, v: u32) -> u64 {
-        self.changed[v as usize]
+    pub(super) fn changed(&self, v: VertexId) -> u64 {
+        self.changed[v.index()]
     }
 
     /// The number of the last change of triangle `t`.
-    pub(super) fn replaced(&self, t: u32) -> u64 {
-        self.replaced[t as usize]
+    pub(super) fn replaced(&self, t: FaceId) -> u64 {
+        self.replaced[t.index()]
     }
 
-    /// The triangles that there are.
-    pub(super) fn live_triangles(&self) -> impl Iterator<Item = [u32; 3]> {
-        self.triangles.iter().copied().filter(|t| *t != DEAD)
+    /// The triangles that have not been removed.
+    pub(super) fn live_triangles(&self) -> impl Iterator<Item = [VertexId; 3]> {
+        self.triangles.iter().copied().flatten()
     }
 
-    pub(super) fn has_edge(&self, a: u32, b: u32) -> bool {
-        let at = |v: u32| &self.incident[v as usize];
+    /// Whether an edge joins `a` and `b`.
+    pub(super) fn has_edge(&self, a: VertexId, b: VertexId) -> bool {
+        let at = |v: VertexId| &self.incident[v.index()];
         let (fewer, other) = if at(a).len() <= at(b).len() {
             (a, b)
         } else {
             (b, a)
         };
-        at(fewer)
-            .iter()
-            .any(|t| self.triangles[*t as usize].contains(&other))
+        at(fewer).iter().any(|t| self.triangle(*t).contains(&other))
     }
 
-    /// The triangle that runs from `a` to `b`, and its third vertex.
-    pub(super) fn triangle_along(&self, a: u32, b: u32) -> Option<(u32, u32)> {
-        self.incident[a as usize].iter().find_map(|&t| {
-            let corners = self.triangles[t as usize];
+    /// The triangle with the directed edge from `a` to `b`, and its third vertex.
+    pub(super) fn triangle_along(&self, a: VertexId, b: VertexId) -> Option<(FaceId, VertexId)> {
+        self.incident[a.index()].iter().find_map(|&t| {
+            let corners = self.triangle(t);
             let k = (0..3).find(|&k| corners[k] == a && corners[(k + 1) % 3] == b)?;
             Some((t, corners[(k + 2) % 3]))
         })
     }
 
     /// The star of `v`.
-    pub(super) fn star(&self, v: u32) -> Star {
-        // Neighbour, the one after it, the triangle between.
-        let mut spokes: Vec<(u32, u32, u32)> = self.incident[v as usize]
+    pub(super) fn star(&self, v: VertexId) -> Star {
+        // A neighbour, the next one, and the triangle between them.
+        let mut spokes: Vec<(VertexId, VertexId, FaceId)> = self.incident[v.index()]
             .iter()
             .map(|&t| {
-                let corners = self.triangles[t as usize];
+                let corners = self.triangle(t);
                 let k = (0..3).find(|&k| corners[k] == v).unwrap_or(0);
                 (corners[(k + 1) % 3], corners[(k + 2) % 3], t)
             })
@@ -135,38 +142,42 @@ impl Patchwork {
         star
     }
 
-    /// A triangle, not of `except`, that this one would meet beyond shared corners and sides.
-    pub(super) fn first_pierced(&self, triangle: [u32; 3], except: &[u32]) -> Option<u32> {
+    /// A triangle, not one of `except`, that a new one would intersect in more than shared
+    /// corners and sides.
+    pub(super) fn first_intersecting(
+        &self,
+        triangle: [VertexId; 3],
+        except: &[FaceId],
+    ) -> Option<FaceId> {
         self.index
-            .first_pierced(triangle, &self.corners(triangle), except)
+            .first_intersecting(triangle, &self.corners(triangle), except)
     }
 
-    /// Whether there is one.
-    pub(super) fn pierces(&self, triangle: [u32; 3], except: &[u32]) -> bool {
-        self.first_pierced(triangle, except).is_some()
+    /// Whether there is such a triangle.
+    pub(super) fn intersects(&self, triangle: [VertexId; 3], except: &[FaceId]) -> bool {
+        self.first_intersecting(triangle, except).is_some()
     }
 
-    /// Puts `new` in the place of the triangles `old`; both cover the same hole. Not more new
-    /// ones than old ones.
-    pub(super) fn replace(&mut self, old: &[u32], new: &[[u32; 3]]) {
+    /// Replaces the triangles `old` by `new`, which cover the same hole and are not more.
+    pub(super) fn replace(&mut self, old: &[FaceId], new: &[[VertexId; 3]]) {
         debug_assert!(new.len() <= old.len());
         self.clock += 1;
         for &t in old {
-            for v in self.triangles[t as usize] {
-                self.changed[v as usize] = self.clock;
-                self.incident[v as usize].retain(|other| *other != t);
+            for v in self.triangle(t) {
+                self.changed[v.index()] = self.clock;
+                self.incident[v.index()].retain(|other| *other != t);
             }
         }
         for (k, &t) in old.iter().enumerate() {
-            self.replaced[t as usize] = self.clock;
-            if let Some(&triangle) = new.get(k) {
-                self.triangles[t as usize] = triangle;
+            let replacement = new.get(k).copied();
+            self.replaced[t.index()] = self.clock;
+            self.triangles[t.index()] = replacement;
+            if let Some(triangle) = replacement {
                 for v in triangle {
-                    self.incident[v as usize].push(t);
+                    self.incident[v.index()].push(t);
                 }
                 self.index.set(t, triangle, self.corners(triangle));
             } else {
-                self.triangles[t as usize] = DEAD;
                 self.index.remove(t);
             }
         }

@@ -1,25 +1,28 @@
 //! Constrained Delaunay triangulation of a simple polygon with points inside, by `spade`.
+//!
+//! In: the polygon's corners, counter-clockwise, followed by points inside it. Out: triangles over
+//! all of them that cover exactly the polygon, or an error.
 
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 
 use crate::geometry::Vec2;
 
-/// Why there is no triangulation.
+/// Why a polygon could not be triangulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum PlanarError {
     /// Two of the points have the same position.
     Coincident([u32; 2]),
-    /// The polygon touches or crosses itself, runs clockwise, or a point is not inside.
+    /// The polygon touches or crosses itself or is clockwise, or a point is not inside.
     NotSimple,
 }
 
-/// A point that knows its number, so that results are read by number, never by coordinates.
-struct Site {
+/// A point with its number, by which results are read.
+struct NumberedPoint {
     position: Point2<f64>,
     number: u32,
 }
 
-impl HasPosition for Site {
+impl HasPosition for NumberedPoint {
     type Scalar = f64;
 
     fn position(&self) -> Point2<f64> {
@@ -28,22 +31,22 @@ impl HasPosition for Site {
 }
 
 /// Triangulates the polygon of the first `corners` points (counter-clockwise) with the other
-/// points in its inside: counter-clockwise triples of numbers that index `points`.
+/// points inside it. Returns counter-clockwise triples of indices into `points`.
 ///
-/// The predicates are exact, so the answer is a triangulation of exactly the polygon:
-/// `corners - 2 + 2 * inner` triangles, or an error.
+/// The predicates are exact, so the result covers exactly the polygon, with
+/// `corners - 2 + 2 * inner` triangles, or is an error.
 pub(super) fn constrained_delaunay(
     points: &[Vec2],
     corners: usize,
 ) -> Result<Vec<[u32; 3]>, PlanarError> {
-    let mut delaunay = ConstrainedDelaunayTriangulation::<Site>::new();
+    let mut delaunay = ConstrainedDelaunayTriangulation::<NumberedPoint>::new();
     let mut handles = Vec::with_capacity(points.len());
     for (number, p) in (0..).zip(points) {
-        // Spade refuses numbers that are closer to zero than this without being it.
+        // Spade accepts no coordinates other than zero that are closer to zero than this.
         let [x, y] = [p.x, p.y].map(|x| if x.abs() < 1e-40 { 0.0 } else { x });
         let position = Point2::new(x, y);
         let handle = delaunay
-            .insert(Site { position, number })
+            .insert(NumberedPoint { position, number })
             .map_err(|_| PlanarError::NotSimple)?;
         if handle.index() < handles.len() {
             let earlier = handles.iter().position(|h| *h == handle).unwrap_or(0);
@@ -69,8 +72,8 @@ pub(super) fn constrained_delaunay(
     }
 }
 
-/// The triangles outside of the polygon, in the pockets of its hull, have corners of the
-/// polygon only, and see them in the opposite order.
+/// Whether a triangle lies inside the polygon. Those outside, between the polygon and its convex
+/// hull, have corners of the polygon only, and in the opposite order.
 fn is_inside(&[a, b, c]: &[u32; 3], corners: usize) -> bool {
     let ascents = [a < b, b < c, c < a];
     let in_order = ascents.iter().filter(|up| **up).count() == 2;
@@ -114,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn says_what_is_wrong() {
+    fn errors_name_the_reason() {
         let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from);
         let twisted = [square[0], square[2], square[1], square[3]];
         assert_eq!(

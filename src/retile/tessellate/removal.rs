@@ -1,126 +1,132 @@
-//! Step two: the old vertices go, one by one.
+//! Step two: removes the old vertices, one by one.
 //!
-//! In rounds: the vertices that are left are taken in ascending order of valence, then id; one
-//! whose neighbour went in the same round waits for the next, so that the surface thins out
-//! evenly and log n rounds suffice. Every hole is closed by [`hole::close`] under the
-//! strictest [`Demand`]. A round without any removal steps down the [`ladder`]: longer rings,
-//! triangles that may turn, edges flipped at the vertices that are stuck. Any removal brings the
-//! strictest demand back.
+//! In: the mutual tessellation. Out: the same mesh without old vertices, or those that could not
+//! be removed. The method works in rounds. Each round visits the remaining old vertices in
+//! ascending order of valence, then number. A vertex with a neighbour that was removed in the
+//! same round waits for the next, so that the surface is thinned out evenly and log n rounds
+//! suffice. Every hole is closed by [`hole::close`] under the strictest [`Demand`]. After a round
+//! without a removal the next step of the [`schedule`] applies: longer rings, triangles that may
+//! turn, edge flips at the vertices that are stuck. After a removal the demand is strict again.
 //!
-//! A hole is a disc and is closed by a disc whose inner edges are new: closedness, orientation,
-//! genus and components cannot change. Nor can an embedded surface come to cut itself. (To let
-//! triangles pierce each other where nothing else helps, and to mend that by flips afterwards, saved 2
-//! of 183 surfaces that came to it.)
+//! Guaranteed: a hole is a disc and is closed by a disc whose inner edges are new, so the mesh
+//! stays closed and oriented with the same genus and components, and an embedded surface stays
+//! embedded. (An alternative, to allow intersections where nothing else helps and to repair them
+//! by flips later, saved only 2 of 183 surfaces on which it was tried.)
 
 use std::collections::BTreeMap;
 
 use super::hole::{self, Demand};
 use super::patchwork::{Patchwork, Star};
-use crate::geometry::triangle;
+use crate::geometry::{Vec3, triangle};
 use crate::mesh::intersections::triangles_intersect;
+use crate::mesh::{FaceId, VertexId};
 use crate::progress::{Cancelled, Monitor};
 
-/// Vertices of higher valence wait until nothing else moves: their rings are long, and they
-/// shrink as the neighbours go.
+/// Vertices of higher valence wait until nothing else can be removed: their rings are long and
+/// become shorter as neighbours are removed.
 const HIGH_VALENCE: usize = 14;
 
-/// Rounds of flips that each demand gets without a removal in between.
-const MOST_FLIP_ROUNDS: usize = 12;
+/// Number of successive rounds with flips under each demand.
+const MAX_FLIP_ROUNDS: usize = 12;
 
 /// What a round may do.
 #[derive(Debug, Clone, Copy)]
-struct Rung {
+struct RoundRules {
+    /// The demand on triangles that close holes.
     demand: Demand,
+    /// Whether vertices of high valence may be removed.
     any_valence: bool,
-    /// What flips must satisfy that precede the round, if there are any.
+    /// The demand on flips before the round; `None` for no flips.
     flips: Option<Demand>,
 }
 
-/// The ladder's last rung without flips.
-const NO_FLIPS: usize = 2;
+/// The last step of the schedule without flips.
+const LAST_WITHOUT_FLIPS: usize = 2;
 
-/// From strict to lenient: a round without a removal steps down; a removal leads back to
-/// where flips are not needed.
-fn ladder() -> Vec<Rung> {
-    let rung = |demand, any_valence, flips| Rung {
+/// The rules of the rounds, from strict to lenient. A round without a removal is followed by the
+/// next step, one with a removal by a step without flips.
+fn schedule() -> Vec<RoundRules> {
+    let rules = |demand, any_valence, flips| RoundRules {
         demand,
         any_valence,
         flips,
     };
-    let mut ladder = vec![
-        rung(Demand::Smooth, false, None),
-        rung(Demand::Smooth, true, None),
-        rung(Demand::Embedded, true, None),
+    let mut schedule = vec![
+        rules(Demand::Smooth, false, None),
+        rules(Demand::Smooth, true, None),
+        rules(Demand::Embedded, true, None),
     ];
     for flips in [Demand::Smooth, Demand::Embedded] {
-        ladder.extend([rung(Demand::Embedded, true, Some(flips)); MOST_FLIP_ROUNDS]);
+        schedule.extend([rules(Demand::Embedded, true, Some(flips)); MAX_FLIP_ROUNDS]);
     }
-    ladder
+    schedule
 }
 
-/// Holes that may be tried in vain before the way back up the ladder is closed, for each old
-/// vertex and to begin with. Where walls are thinner than the points' spacing there would be
-/// no end to trying; of 145 surfaces that went well the hardest took .85 tries for each old vertex.
-const PATIENCE: [usize; 2] = [2, 1000];
+/// Number of failed attempts to close a hole, per old vertex and in addition, after which the
+/// schedule is only followed to its end. Without it the method would not end where walls are
+/// thinner than the points' spacing. Of 145 surfaces on which it succeeded, the hardest took .85
+/// attempts per old vertex.
+const FAILED_ATTEMPTS: [usize; 2] = [2, 1000];
 
-/// Removes all vertices from `kept` on. Returns those that could not be removed, ascending.
+/// Removes all vertices from number `kept` on. Returns those that could not be removed,
+/// ascending.
 pub(super) fn remove_old_vertices(
     mesh: &mut Patchwork,
-    kept: u32,
+    kept: usize,
     monitor: &Monitor,
-) -> Result<Vec<u32>, Cancelled> {
-    let left: Vec<u32> = (kept..mesh.positions.len() as u32).collect();
+) -> Result<Vec<VertexId>, Cancelled> {
+    let remaining: Vec<VertexId> = VertexId::first(mesh.positions.len()).skip(kept).collect();
     let mut removal = Removal {
-        patience: PATIENCE[0] * left.len() + PATIENCE[1],
-        left,
+        attempts_left: FAILED_ATTEMPTS[0] * remaining.len() + FAILED_ATTEMPTS[1],
+        remaining,
         round: 0,
         touched: vec![0; mesh.positions.len()],
         failures: BTreeMap::new(),
     };
-    let ladder = ladder();
+    let schedule = schedule();
     let mut step = 0;
-    while let Some(rung) = ladder.get(step) {
-        if let Some(demand) = rung.flips {
-            let turn = step % MOST_FLIP_ROUNDS;
-            flip_round(mesh, &removal.left, demand, turn, monitor)?;
+    while let Some(rules) = schedule.get(step) {
+        if let Some(demand) = rules.flips {
+            let turn = step % MAX_FLIP_ROUNDS;
+            flip_round(mesh, &removal.remaining, demand, turn, monitor)?;
         }
-        let before = removal.left.len();
-        removal.run_round(mesh, *rung, monitor)?;
-        if removal.left.is_empty() {
+        let before = removal.remaining.len();
+        removal.run_round(mesh, *rules, monitor)?;
+        if removal.remaining.is_empty() {
             break;
         }
-        let progress = removal.left.len() < before && removal.patience > 0;
+        let progress = removal.remaining.len() < before && removal.attempts_left > 0;
         step = if progress {
-            step.min(NO_FLIPS)
+            step.min(LAST_WITHOUT_FLIPS)
         } else {
             step + 1
         };
     }
-    removal.left.sort_unstable();
-    Ok(removal.left)
+    removal.remaining.sort_unstable();
+    Ok(removal.remaining)
 }
 
 struct Removal {
-    /// Old vertices that are left.
-    left: Vec<u32>,
-    /// Holes that may still be tried in vain.
-    patience: usize,
+    /// Old vertices that have not been removed yet.
+    remaining: Vec<VertexId>,
+    /// Number of attempts that may still fail.
+    attempts_left: usize,
     round: u32,
-    /// The round in which a neighbour of the vertex went last.
+    /// For each vertex the last round in which a neighbour was removed.
     touched: Vec<u32>,
     /// The last failure at each vertex.
-    failures: BTreeMap<u32, Failure>,
+    failures: BTreeMap<VertexId, FailedClosing>,
 }
 
-/// A hole that could not be closed, and what would have to change for another try to be worth
-/// its while.
-struct Failure {
+/// A hole that could not be closed, and what must change before another attempt.
+struct FailedClosing {
     clock: u64,
     demand: Demand,
-    blockers: Vec<u32>,
+    blockers: Vec<FaceId>,
 }
 
-impl Failure {
+impl FailedClosing {
+    /// Whether another attempt under `demand` would fail again.
     fn still_holds(&self, mesh: &Patchwork, star: &Star, demand: Demand) -> bool {
         demand <= self.demand
             && star.ring.iter().all(|&w| mesh.changed(w) <= self.clock)
@@ -132,31 +138,32 @@ impl Failure {
 }
 
 impl Removal {
-    /// One round over what is left.
+    /// Tries to remove each of the remaining vertices once.
     fn run_round(
         &mut self,
         mesh: &mut Patchwork,
-        rung: Rung,
+        rules: RoundRules,
         monitor: &Monitor,
     ) -> Result<(), Cancelled> {
         self.round += 1;
-        self.left.sort_by_cached_key(|&v| (mesh.valence(v), v));
+        self.remaining.sort_by_cached_key(|&v| (mesh.valence(v), v));
         let mut remaining = Vec::new();
-        for (count, v) in std::mem::take(&mut self.left).into_iter().enumerate() {
+        for (count, v) in std::mem::take(&mut self.remaining).into_iter().enumerate() {
             if count % 64 == 0 {
                 monitor.check()?;
             }
-            let waits = self.touched[v as usize] == self.round
-                || (!rung.any_valence && mesh.valence(v) > HIGH_VALENCE);
-            if waits || !self.remove(mesh, v, rung.demand) {
+            let waits = self.touched[v.index()] == self.round
+                || (!rules.any_valence && mesh.valence(v) > HIGH_VALENCE);
+            if waits || !self.remove(mesh, v, rules.demand) {
                 remaining.push(v);
             }
         }
-        self.left = remaining;
+        self.remaining = remaining;
         Ok(())
     }
 
-    fn remove(&mut self, mesh: &mut Patchwork, v: u32, demand: Demand) -> bool {
+    /// Removes `v` if its hole can be closed. Returns whether it could.
+    fn remove(&mut self, mesh: &mut Patchwork, v: VertexId, demand: Demand) -> bool {
         let star = mesh.star(v);
         let known = self.failures.get(&v);
         if known.is_some_and(|failure| failure.still_holds(mesh, &star, demand)) {
@@ -165,8 +172,8 @@ impl Removal {
         match hole::close(mesh, &star, demand) {
             Ok(new) => mesh.replace(&star.triangles, &new),
             Err(blocked) => {
-                self.patience = self.patience.saturating_sub(1);
-                let failure = Failure {
+                self.attempts_left = self.attempts_left.saturating_sub(1);
+                let failure = FailedClosing {
                     clock: mesh.clock(),
                     demand,
                     blockers: blocked.by,
@@ -176,17 +183,17 @@ impl Removal {
             }
         }
         for neighbour in star.ring {
-            self.touched[neighbour as usize] = self.round;
+            self.touched[neighbour.index()] = self.round;
         }
         true
     }
 }
 
-/// Flips an edge at every stuck vertex that has one to flip. In odd rounds (`turn`) other edges
-/// than the spokes come first, lest the same ones flip to and fro.
+/// Flips one edge near every stuck vertex, if possible. In odd rounds (`turn`) other edges than
+/// the spokes come first, so that the same edges are not flipped back and forth.
 fn flip_round(
     mesh: &mut Patchwork,
-    stuck: &[u32],
+    stuck: &[VertexId],
     demand: Demand,
     turn: usize,
     monitor: &Monitor,
@@ -205,25 +212,25 @@ fn flip_round(
     Ok(())
 }
 
-/// The flip that leaves the best shape, of those that the demand admits.
-fn best_flip(mesh: &Patchwork, edges: &[[u32; 2]], demand: Demand) -> Option<Flip> {
-    let mut flips: Vec<Flip> = edges
+/// The flip that results in the best shapes, of those that the demand admits.
+fn best_flip(mesh: &Patchwork, edges: &[[VertexId; 2]], demand: Demand) -> Option<EdgeFlip> {
+    let mut flips: Vec<EdgeFlip> = edges
         .iter()
-        .filter_map(|&[v, w]| Flip::new(mesh, v, w, demand))
+        .filter_map(|&[v, w]| EdgeFlip::new(mesh, v, w, demand))
         .collect();
     flips.sort_by(|f, g| g.shape.total_cmp(&f.shape).then(f.edge.cmp(&g.edge)));
-    // Asked last, for it costs most.
-    flips.into_iter().find(|flip| !flip.pierces(mesh))
+    // The intersection test takes longest, so it comes last.
+    flips.into_iter().find(|flip| !flip.intersects(mesh))
 }
 
 /// The edges from `v` to its ring: flipping one lowers the valence of `v`.
-fn spokes(v: u32, ring: &[u32]) -> Vec<[u32; 2]> {
+fn spokes(v: VertexId, ring: &[VertexId]) -> Vec<[VertexId; 2]> {
     ring.iter().map(|&w| [v, w]).collect()
 }
 
-/// The pairs of neighbours that may be joined outside of the star, which forbids to join them
-/// inside. On the throat of a handle nothing else is in the way.
-fn chords(ring: &[u32]) -> Vec<[u32; 2]> {
+/// The pairs of neighbours that may be joined by an edge outside the star, so that none inside
+/// is possible. At the narrowest part of a handle such edges are the only obstacle.
+fn chords(ring: &[VertexId]) -> Vec<[VertexId; 2]> {
     let m = ring.len();
     (0..m)
         .flat_map(|i| (i + 2..m).map(move |j| (i, j)))
@@ -232,25 +239,25 @@ fn chords(ring: &[u32]) -> Vec<[u32; 2]> {
         .collect()
 }
 
-/// The edges opposite to `v`: flipping one changes the hole's form.
-fn rim(ring: &[u32]) -> Vec<[u32; 2]> {
+/// The edges opposite to `v`: flipping one changes the shape of the hole.
+fn rim(ring: &[VertexId]) -> Vec<[VertexId; 2]> {
     let m = ring.len();
     (0..m).map(|i| [ring[i], ring[(i + 1) % m]]).collect()
 }
 
-/// An edge that may be flipped.
-struct Flip {
-    old: [u32; 2],
-    new: [[u32; 3]; 2],
-    edge: [u32; 2],
-    /// Worse radius ratio of the two new triangles.
+/// A flip that keeps the topology.
+struct EdgeFlip {
+    old: [FaceId; 2],
+    new: [[VertexId; 3]; 2],
+    edge: [VertexId; 2],
+    /// The smaller radius ratio 2r/R of the two new triangles.
     shape: f64,
 }
 
-impl Flip {
-    /// The flip of edge `v w`, or `None` where it would break the mesh or, under
-    /// [`Demand::Smooth`], turn a triangle. Piercing is [`Flip::pierces`]' business.
-    fn new(mesh: &Patchwork, v: u32, w: u32, demand: Demand) -> Option<Self> {
+impl EdgeFlip {
+    /// The flip of edge `v w`, or `None` if it would change the topology or, under
+    /// [`Demand::Smooth`], turn a triangle over. [`EdgeFlip::intersects`] tests intersections.
+    fn new(mesh: &Patchwork, v: VertexId, w: VertexId, demand: Demand) -> Option<Self> {
         let (t0, c) = mesh.triangle_along(v, w)?;
         let (t1, d) = mesh.triangle_along(w, v)?;
         if c == d || mesh.has_edge(c, d) || mesh.valence(v) < 4 || mesh.valence(w) < 4 {
@@ -258,7 +265,7 @@ impl Flip {
         }
         let (old, new) = ([t0, t1], [[v, d, c], [w, c, d]]);
         let corners = new.map(|t| mesh.corners(t));
-        let normal = |[a, b, c]: &[crate::geometry::Vec3; 3]| triangle::area_normal(a, b, c);
+        let normal = |[a, b, c]: &[Vec3; 3]| triangle::area_normal(a, b, c);
         if demand == Demand::Smooth {
             let before = old.map(|t| normal(&mesh.corners(mesh.triangle(t))));
             let mean = before[0] + before[1];
@@ -278,11 +285,11 @@ impl Flip {
         })
     }
 
-    /// Whether the new triangles pierce others or each other.
-    fn pierces(&self, mesh: &Patchwork) -> bool {
+    /// Whether the new triangles intersect others or each other.
+    fn intersects(&self, mesh: &Patchwork) -> bool {
         let [s, t] = self.new;
-        mesh.pierces(s, &self.old)
-            || mesh.pierces(t, &self.old)
+        mesh.intersects(s, &self.old)
+            || mesh.intersects(t, &self.old)
             || triangles_intersect(s, &mesh.corners(s), t, &mesh.corners(t))
     }
 }

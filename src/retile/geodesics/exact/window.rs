@@ -1,59 +1,60 @@
-//! One window: the part of an edge that a source sees through a strip of unfolded triangles.
+//! A window: the part of an edge that is visible from a source through a strip of unfolded
+//! triangles.
 //!
-//! A window lies on a half-edge of the triangle it looks *into*. That triangle is laid into
-//! the plane with the half-edge's origin at 0, its end on the x axis, the apex above; the
-//! source, unfolded into the same plane, lies below.
+//! A window lies on a half-edge and is followed into the triangle of that half-edge. In the
+//! window's frame the half-edge runs from the origin along the x axis, the third corner (apex)
+//! of the triangle lies above, and the unfolded source below.
 
 use crate::geometry::Vec2;
-use crate::mesh::adjacency::{next, previous};
-use crate::retile::domain::{Domain, apex};
+use crate::mesh::HalfEdgeId;
+use crate::retile::domain::Domain;
 
-/// How far beyond its ends, as a share of the edge, a window still sees: neighbouring windows
-/// must not leave a gap where a ray meets a vertex.
+/// How far a window extends beyond its ends, as a fraction of the edge. Otherwise neighbouring
+/// windows could leave a gap where a ray meets a vertex.
 const OVERLAP: f64 = 1e-9;
 
-/// Windows narrower than this share of their edge are dropped; far less than [`OVERLAP`].
+/// Width, as a fraction of the edge, below which windows are dropped; far less than [`OVERLAP`].
 const NARROWEST: f64 = 1e-14;
 
-/// See the module's page.
+/// The visible part of an edge, in its own frame; see the module's documentation.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Window {
-    /// Half-edge of the triangle that the window looks into.
-    pub half_edge: u32,
-    /// First and last place that is seen, from the half-edge's origin, mm.
+pub(super) struct EdgeWindow {
+    /// Half-edge of the triangle on the far side of the window.
+    pub half_edge: HalfEdgeId,
+    /// Start and end of the visible part, mm from the half-edge's origin.
     pub interval: [f64; 2],
-    /// The (pseudo-)source, unfolded.
+    /// The source or pseudo-source, unfolded, mm.
     pub source: Vec2,
-    /// The window's x axis in the frame of the first source's triangle, as cosine and sine.
+    /// The window's x axis in the frame of the source's triangle, as cosine and sine.
     pub turn: Vec2,
-    /// Which (pseudo-)source sees.
+    /// Index of the source or pseudo-source.
     pub root: u32,
 }
 
 /// The third corner of a window's triangle.
 pub(super) struct Apex {
-    /// Where it lies.
+    /// Position, mm.
     pub at: Vec2,
-    /// Its distance from the unfolded source, mm.
+    /// Distance from the unfolded source, mm.
     pub distance: f64,
-    /// Where on the edge the ray to it passes, mm from the origin.
+    /// Place at which the ray to it crosses the edge, mm from the origin.
     pub crossing: f64,
-    /// Whether that is inside the window.
+    /// Whether the ray passes through the window.
     pub seen: bool,
 }
 
-/// Complex product: `b` turned by `a`.
+/// The complex product: `b` rotated by `a`.
 pub(super) fn turned(a: Vec2, b: Vec2) -> Vec2 {
     Vec2::new(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x)
 }
 
-/// Coordinates of `p` along and across the unit vector `axis`.
+/// The coordinates of `p` along and across the unit vector `axis`.
 pub(super) fn in_frame(axis: Vec2, p: Vec2) -> Vec2 {
     Vec2::new(axis.dot(&p), axis.perp(&p))
 }
 
-impl Window {
-    /// Where on the x axis the ray from the source to `p` (above the axis) passes.
+impl EdgeWindow {
+    /// The place at which the ray from the source to `p` (above the x axis) crosses the x axis.
     fn crossing(&self, p: Vec2) -> f64 {
         let rise = p.y - self.source.y;
         if rise > 0.0 {
@@ -68,14 +69,14 @@ impl Window {
         crossing >= first - OVERLAP * edge && crossing <= last + OVERLAP * edge
     }
 
-    /// The distance from the source to the nearest place of the window, mm.
+    /// The smallest distance from the source to the window, mm.
     pub fn nearest(&self) -> f64 {
         let [first, last] = self.interval;
         let x = self.source.x.clamp(first, last);
         (self.source.x - x).hypot(self.source.y)
     }
 
-    /// The source's distance from place `x` of the edge, mm.
+    /// The distance from the source to place `x` on the edge, mm.
     pub fn distance_at(&self, x: f64) -> f64 {
         (self.source.x - x).hypot(self.source.y)
     }
@@ -83,50 +84,49 @@ impl Window {
     /// The third corner of the triangle.
     pub fn apex(&self, domain: &Domain) -> Apex {
         let h = self.half_edge;
-        let length = |h: u32| domain.lengths[h as usize];
-        let (x, y) = apex(length(h), length(previous(h)), length(next(h)));
+        let (x, y) = domain.apex(h);
         let at = Vec2::new(x, y);
         let crossing = self.crossing(at);
         Apex {
             at,
             distance: (at - self.source).norm(),
             crossing,
-            seen: self.sees(crossing, length(h)),
+            seen: self.sees(crossing, domain.length(h)),
         }
     }
 
-    /// The vector from the source to `p` of the triangle, if `p` is seen.
+    /// The vector from the source to `p`, a point of the triangle, if it passes through the window.
     pub fn sight(&self, domain: &Domain, p: Vec2) -> Option<Vec2> {
-        let edge = domain.lengths[self.half_edge as usize];
+        let edge = domain.length(self.half_edge);
         (self.sees(self.crossing(p), edge)).then(|| p - self.source)
     }
 
-    /// What is seen of the edge from the half-edge's origin to the apex, and where the
-    /// half-edge's end lies in that window's frame.
+    /// The window on the edge from the half-edge's origin to the apex, and the half-edge's end in
+    /// that window's frame.
     pub fn left(&self, domain: &Domain, apex: &Apex) -> Option<(Self, Vec2)> {
         let [first, last] = self.interval;
         let seen = [first, last.min(apex.crossing)];
-        let across = domain.adjacency.twin(previous(self.half_edge));
-        let end = Vec2::new(domain.lengths[self.half_edge as usize], 0.0);
+        let across = domain.half_edges.twin(self.half_edge.previous());
+        let end = Vec2::new(domain.length(self.half_edge), 0.0);
         self.through(domain, across, Vec2::zeros(), apex.at, seen, end)
     }
 
-    /// What is seen of the edge from the apex to the half-edge's end, and where the
-    /// half-edge's origin lies in that window's frame.
+    /// The window on the edge from the apex to the half-edge's end, and the half-edge's origin in
+    /// that window's frame.
     pub fn right(&self, domain: &Domain, apex: &Apex) -> Option<(Self, Vec2)> {
         let [first, last] = self.interval;
         let seen = [first.max(apex.crossing), last];
-        let across = domain.adjacency.twin(next(self.half_edge));
-        let end = Vec2::new(domain.lengths[self.half_edge as usize], 0.0);
+        let across = domain.half_edges.twin(self.half_edge.next());
+        let end = Vec2::new(domain.length(self.half_edge), 0.0);
         self.through(domain, across, apex.at, end, seen, Vec2::zeros())
     }
 
-    /// The window on the edge `from` - `to`, through the places `seen` of this one; the third
-    /// corner comes along into the new frame.
+    /// The window on the edge from `from` to `to` that is visible through the part `seen` of this
+    /// one, and `third` in that window's frame.
     fn through(
         &self,
         domain: &Domain,
-        half_edge: u32,
+        half_edge: HalfEdgeId,
         from: Vec2,
         to: Vec2,
         seen: [f64; 2],
@@ -135,7 +135,7 @@ impl Window {
         if !(seen[1] > seen[0]) {
             return None;
         }
-        let length = domain.lengths[half_edge as usize];
+        let length = domain.length(half_edge);
         let axis = (to - from) / length;
         let mut source = in_frame(axis, self.source - from);
         source.y = source.y.min(0.0);

@@ -1,16 +1,15 @@
-//! Exact geodesics against unrolled solids, against the search through all strips, and as the
-//! oracle of the log map.
+//! Tests of the exact geodesics against unfolded solids and a brute-force search, and of the log
+//! map against the exact geodesics.
 
 use rand::RngExt;
 
 use super::{ExactMap, brute_force};
 use crate::geometry::random::{Purpose, stream};
 use crate::geometry::{Vec2, Vec3};
-use crate::mesh::{TriMesh, shapes};
+use crate::mesh::{FaceId, TriMesh, VertexId, shapes};
 use crate::retile::SurfacePoint;
 use crate::retile::domain::Domain;
-use crate::retile::geodesics::{GeodesicMap, Geodesics, distances};
-use crate::retile::log_map::LogMap;
+use crate::retile::geodesics::{GeodesicMap, Geodesics, LogMap, distances};
 use crate::retile::trace::{inset, walk};
 
 fn domain(mesh: &TriMesh) -> Domain {
@@ -19,12 +18,12 @@ fn domain(mesh: &TriMesh) -> Domain {
 
 fn point(triangle: u32, barycentric: [f64; 3]) -> SurfacePoint {
     SurfacePoint {
-        triangle,
+        triangle: FaceId(triangle),
         barycentric,
     }
 }
 
-/// Every vertex as a point of some triangle.
+/// Every vertex as a point of one of its triangles.
 fn vertices(mesh: &TriMesh) -> Vec<SurfacePoint> {
     (0..mesh.vertices.len() as u32)
         .map(|v| {
@@ -89,7 +88,7 @@ fn as_short_as_the_shortest_of_all_unfolded_strips() {
             4 => (shapes::torus(2.0, 0.9, 5, 4), 0.15),
             _ => (shapes::tetrahedron(1.0), 0.05),
         };
-        // Thin and obtuse ones among them.
+        // Some of the triangles are thin and obtuse.
         let stretch = [[1.0; 3], [1.0, 1.0, 0.1], [8.0, 1.0, 1.0]][seed as usize / 6 % 3];
         let mesh = jittered(base, share, stretch, seed);
         let mut points = vertices(&mesh);
@@ -115,7 +114,7 @@ fn as_short_as_the_shortest_of_all_unfolded_strips() {
 }
 
 #[test]
-fn opposite_corners_of_a_cube_are_the_root_of_five_apart() {
+fn opposite_corners_of_a_cube_have_distance_root_five() {
     let corner = |n: u32| Vec3::new(f64::from(n & 1), f64::from(n >> 1 & 1), f64::from(n >> 2));
     let sides = [
         [0, 2, 3, 1],
@@ -136,15 +135,15 @@ fn opposite_corners_of_a_cube_are_the_root_of_five_apart() {
     for (i, j) in [(0, 7), (1, 6), (2, 5), (3, 4)] {
         assert!((found[i][j] - 5f64.sqrt()).abs() < 1e-12);
     }
-    // The middles of opposite sides.
+    // The centres of opposite sides.
     let middles = [point(0, [0.5, 0.0, 0.5]), point(2, [0.5, 0.0, 0.5])];
     assert!((exact(&mesh, &middles)[0][1] - 2.0).abs() < 1e-12);
 }
 
 #[test]
-fn a_cone_is_unrolled() {
-    // Eleven flat sides round the apex: places at slants p and q with the angle b between
-    // them are sqrt(p² + q² - 2pq cos b) apart while b stays below π.
+fn a_cone_is_unfolded() {
+    // Eleven flat sides around the apex: points at slant heights p and q with an angle b between
+    // them have the distance sqrt(p² + q² - 2pq cos b) as long as b is below π.
     let (sides, height) = (11u32, 3.0);
     let ring = |k: u32| {
         let angle = std::f64::consts::TAU * f64::from(k) / f64::from(sides);
@@ -163,7 +162,7 @@ fn a_cone_is_unrolled() {
     let slant = height.hypot(1.0);
     let edge = (ring(1) - ring(0)).norm();
     let side = 2.0 * (edge / (2.0 * slant)).asin();
-    // Near the apex, so that no path is shorter over the base.
+    // Near the apex, so that no path over the base is shorter.
     let points: Vec<_> = (0..sides).map(|k| point(2 * k, [0.2, 0.0, 0.8])).collect();
     let found = exact(&mesh, &points);
     for (k, distance) in found[0].iter().enumerate() {
@@ -174,8 +173,8 @@ fn a_cone_is_unrolled() {
 }
 
 #[test]
-fn a_cylinder_is_unrolled() {
-    // A prism of 16 sides, long enough that no path runs over its ends.
+fn a_cylinder_is_unfolded() {
+    // A prism with 16 sides, so long that no shortest path runs over its ends.
     let (around, rows) = (16u32, 9u32);
     let mut mesh = shapes::torus(1.0, 0.1, around, 3);
     mesh.vertices.clear();
@@ -256,29 +255,29 @@ fn distances_are_symmetric_and_obey_the_triangle_inequality() {
 }
 
 #[test]
-fn whoever_sets_out_as_told_arrives() {
-    // Convex, so no path bends at a vertex: walking straight on ends at the target.
+fn straight_paths_in_the_computed_direction_arrive() {
+    // The surface is convex, so no path turns at a vertex: a straight path ends at the target.
     let mesh = jittered(shapes::icosphere(20.0, 3), 0.0, [1.0, 0.7, 1.3], 1);
     let domain = domain(&mesh);
     let mut map = ExactMap::over(&domain);
     let at = |p: &SurfacePoint| p.position(&mesh.vertices, &mesh.triangles);
     let points: Vec<_> = scattered(&mesh, 40, 3)
         .into_iter()
-        .filter(|p| p.barycentric.iter().all(|x| *x > 0.01)) // Walks start inside.
+        .filter(|p| p.barycentric.iter().all(|x| *x > 0.01)) // Paths start inside a triangle.
         .collect();
     for source in &points {
         map.spread(&domain, source, 200.0);
         for target in &points {
             let way: Vec2 = map.reach_point(&domain, target).unwrap().vector;
             let (end, _) = walk(&domain, source, way);
-            // The walk's end is kept a hair off its triangle's edges.
+            // The end of a path is kept slightly away from the edges of its triangle.
             assert!((at(&end) - at(target)).norm() < 1e-2);
         }
     }
 }
 
 #[test]
-fn the_radius_cuts_off_and_nothing_else() {
+fn exactly_the_distances_within_the_radius_are_known() {
     let mesh = jittered(shapes::torus(9.0, 3.0, 20, 12), 0.03, [1.0; 3], 4);
     let points = scattered(&mesh, 30, 4);
     let all = exact(&mesh, &points);
@@ -291,7 +290,7 @@ fn the_radius_cuts_off_and_nothing_else() {
 }
 
 #[test]
-fn points_that_lie_nowhere_are_named() {
+fn points_beside_the_surface_are_reported() {
     let mesh = shapes::icosphere(1.0, 1);
     let good = point(3, [0.2, 0.3, 0.5]);
     for bad in [
@@ -305,7 +304,7 @@ fn points_that_lie_nowhere_are_named() {
     }
 }
 
-/// Two spacings of 150 points, the widest that repulsion looks: errors of the log map there.
+/// Errors of the log map within two spacings of 150 points, the largest radius of repulsion.
 #[test]
 fn the_log_map_is_close_to_exact_within_two_spacings() {
     let mut all = Vec::new();
@@ -326,10 +325,10 @@ fn the_log_map_is_close_to_exact_within_two_spacings() {
         let (mut approximate, mut exact) = (LogMap::over(&domain), ExactMap::over(&domain));
         let (mut sum, mut worst, mut count) = (0.0, 0.0f64, 0);
         for mut source in scattered(&mesh, 80, 9) {
-            source.barycentric = inset(source.barycentric); // As repulsion has them.
+            source.barycentric = inset(source.barycentric); // As in repulsion.
             approximate.spread(&domain, &source, radius);
             exact.spread(&domain, &source, radius);
-            for v in 0..mesh.vertices.len() as u32 {
+            for v in VertexId::first(mesh.vertices.len()) {
                 let (Some(a), Some(e)) = (approximate.reach(v), exact.reach(v)) else {
                     continue;
                 };

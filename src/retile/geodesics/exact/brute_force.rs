@@ -1,16 +1,17 @@
-//! The oracle of the exact geodesics: every strip of triangles unfolded, nothing dropped.
+//! Exact distances by brute force, to test the exact geodesics against.
 //!
-//! From every vertex and every given point all places that a straight line reaches are looked
-//! up, by unfolding all sequences of triangles that a ray can take up to a length; a shortest
-//! path is a chain of such lines from vertex to vertex (Dijkstra over the complete graph).
-//! Shares no code with the windows: an unfolded triangle is kept by the places of its corners.
+//! From every vertex and every given point, all sequences of triangles that a ray can pass up to
+//! a certain length are unfolded, which gives everything that a straight line reaches. A
+//! shortest path is a chain of such lines from vertex to vertex (shortest paths in the complete
+//! graph). No code is shared with the windows: an unfolded triangle is stored as the positions
+//! of its corners.
 
 use crate::geometry::Vec2;
-use crate::mesh::adjacency::{next, previous};
+use crate::mesh::{FaceId, HalfEdgeId, VertexId};
 use crate::retile::SurfacePoint;
-use crate::retile::domain::{Domain, apex};
+use crate::retile::domain::Domain;
 
-/// Triangles that one strip has at most.
+/// Largest number of triangles in one strip.
 const DEEPEST: usize = 40;
 
 /// Exact distances between all `points`, in their order.
@@ -21,19 +22,19 @@ pub(super) fn distances(domain: &Domain, points: &[SurfacePoint]) -> Vec<Vec<f64
     let mut direct = vec![vec![f64::INFINITY; nodes]; nodes];
     for (node, seen) in direct.iter_mut().enumerate() {
         seen[node] = 0.0;
-        let mut search = Search {
+        let mut search = StripSearch {
             domain,
             points,
             longest,
             seen,
         };
         if node < vertices {
-            for h in domain.adjacency.around(domain.outgoing[node]) {
+            for h in domain.half_edges.around(VertexId::from_index(node)) {
                 let flat = from_corner(domain, h);
-                search.look(h / 3, flat, None, None, 0);
+                search.look(h.face(), flat, None, None, 0);
             }
         } else {
-            for (t, weights) in holding(domain, &points[node - vertices]) {
+            for (t, weights) in containing(domain, &points[node - vertices]) {
                 let mut flat = domain.flat(t);
                 let here = flat[0] * weights[0] + flat[1] * weights[1] + flat[2] * weights[2];
                 flat.iter_mut().for_each(|c| *c -= here);
@@ -41,7 +42,7 @@ pub(super) fn distances(domain: &Domain, points: &[SurfacePoint]) -> Vec<Vec<f64
             }
         }
     }
-    // Lines to a point are lines from it; then paths that bend at vertices.
+    // Lines to a point are lines from it. Then follow the paths that turn at vertices.
     for i in 0..nodes {
         for j in 0..i {
             let least = direct[i][j].min(direct[j][i]);
@@ -62,13 +63,13 @@ pub(super) fn distances(domain: &Domain, points: &[SurfacePoint]) -> Vec<Vec<f64
         .collect()
 }
 
-/// No shortest path is longer than the longest shortest way along edges and two edges more.
+/// An upper bound of all distances: the largest distance along edges plus two edges.
 fn upper_bound(domain: &Domain) -> f64 {
     let n = domain.vertices.len();
     let mut way = vec![vec![f64::INFINITY; n]; n];
-    for h in 0..domain.lengths.len() as u32 {
-        let [a, b] = domain.ends(h).map(|v| v as usize);
-        way[a][b] = domain.lengths[h as usize];
+    for h in domain.half_edges.half_edges() {
+        let [a, b] = domain.half_edges.ends(h).map(VertexId::index);
+        way[a][b] = domain.length(h);
         way[a][a] = 0.0;
     }
     for via in 0..n {
@@ -82,44 +83,43 @@ fn upper_bound(domain: &Domain) -> f64 {
     way.iter().flatten().copied().fold(0.0, f64::max) + 2.0 * edge
 }
 
-/// The triangles that hold a point, with its coordinates there: two where it lies on an edge.
-/// (A point on a vertex is as near as the vertex, which looks all round.)
-fn holding(domain: &Domain, point: &SurfacePoint) -> Vec<(u32, [f64; 3])> {
+/// The triangles that contain a point, with its coordinates there: two if it lies on an edge.
+/// (A point on a vertex has the distances of that vertex, from which all triangles are searched.)
+fn containing(domain: &Domain, point: &SurfacePoint) -> Vec<(FaceId, [f64; 3])> {
     let mut found = vec![(point.triangle, point.barycentric)];
     if let Some(k) = (0..3).find(|&k| point.barycentric[k] == 0.0) {
-        let twin = domain.adjacency.twin(next(3 * point.triangle + k as u32));
+        let twin = domain.half_edges.twin(point.triangle.half_edge(k).next());
         let mut weights = [0.0; 3];
-        weights[twin as usize % 3] = point.barycentric[(k + 2) % 3];
-        weights[(twin as usize + 1) % 3] = point.barycentric[(k + 1) % 3];
-        found.push((twin / 3, weights));
+        weights[twin.corner()] = point.barycentric[(k + 2) % 3];
+        weights[twin.next().corner()] = point.barycentric[(k + 1) % 3];
+        found.push((twin.face(), weights));
     }
     found
 }
 
 /// The triangle of `h` with the origin of `h` at 0, in the triangle's own order of corners.
-fn from_corner(domain: &Domain, h: u32) -> [Vec2; 3] {
-    let length = |h: u32| domain.lengths[h as usize];
-    let (x, y) = apex(length(h), length(previous(h)), length(next(h)));
-    let k = h as usize % 3;
+fn from_corner(domain: &Domain, h: HalfEdgeId) -> [Vec2; 3] {
+    let (x, y) = domain.apex(h);
+    let k = h.corner();
     let mut corners = [Vec2::zeros(); 3];
-    corners[(k + 1) % 3] = Vec2::new(length(h), 0.0);
+    corners[(k + 1) % 3] = Vec2::new(domain.length(h), 0.0);
     corners[(k + 2) % 3] = Vec2::new(x, y);
     corners
 }
 
-struct Search<'a> {
+struct StripSearch<'a> {
     domain: &'a Domain,
     points: &'a [SurfacePoint],
     longest: f64,
     seen: &'a mut [f64],
 }
 
-impl Search<'_> {
-    /// Notes everything of triangle `t`, laid out round the viewer at 0, that lies between the
-    /// two rays, and goes on through all its edges but the one of entry.
+impl StripSearch<'_> {
+    /// Records everything in triangle `t`, unfolded around the viewer at 0, that lies between the
+    /// two rays of `view`, and continues through all its edges except the one of entry.
     fn look(
         &mut self,
-        t: u32,
+        t: FaceId,
         flat: [Vec2; 3],
         view: Option<[Vec2; 2]>,
         entry: Option<usize>,
@@ -133,10 +133,10 @@ impl Search<'_> {
             }
         };
         let vertices = self.domain.vertices.len();
-        let ids = self.domain.triangles[t as usize];
+        let ids = self.domain.half_edges.corners(t);
         for k in 0..3 {
             if in_view(&flat[k]) {
-                let slot = &mut self.seen[ids[k] as usize];
+                let slot = &mut self.seen[ids[k].index()];
                 *slot = slot.min(flat[k].norm());
             }
         }
@@ -158,7 +158,7 @@ impl Search<'_> {
         }
         for k in (0..3).filter(|&k| Some(k) != entry) {
             let (a, b) = (flat[k], flat[(k + 1) % 3]);
-            // Seen from inside, a lies to the right of b.
+            // Seen from inside, a is to the right of b.
             let area = a.perp(&b);
             if !(area > 1e-12 * a.norm() * b.norm()) {
                 continue;
@@ -183,12 +183,11 @@ impl Search<'_> {
             if nearest > self.longest {
                 continue;
             }
-            let twin = self.domain.adjacency.twin(3 * t + k as u32);
-            let (across, l) = (twin / 3, twin as usize % 3);
-            let length = |h: u32| self.domain.lengths[h as usize];
+            let twin = self.domain.half_edges.twin(t.half_edge(k));
+            let (across, l) = (twin.face(), twin.corner());
             // The twin runs from b to a.
-            let (x, y) = apex(length(twin), length(previous(twin)), length(next(twin)));
-            let axis = (a - b) / length(twin);
+            let (x, y) = self.domain.apex(twin);
+            let axis = (a - b) / self.domain.length(twin);
             let mut unfolded = [Vec2::zeros(); 3];
             unfolded[l] = b;
             unfolded[(l + 1) % 3] = a;

@@ -1,13 +1,13 @@
-//! Surfaces and points for the tests of this folder.
+//! Surfaces and points for the tests of the mutual tessellation.
 
 use rand::RngExt;
 
 use crate::geometry::Vec3;
 use crate::geometry::random::{Purpose, stream};
-use crate::mesh::{TriMesh, shapes};
+use crate::mesh::{FaceId, TriMesh, shapes};
 use crate::retile::SurfacePoint;
 
-/// `n` points spread evenly by area, inside of their triangles.
+/// `n` points distributed evenly by area, inside their triangles.
 pub(super) fn scattered(mesh: &TriMesh, n: usize, seed: u64) -> Vec<SurfacePoint> {
     let mut rng = stream(seed, Purpose::Placement);
     let mut reached = 0.0;
@@ -20,19 +20,19 @@ pub(super) fn scattered(mesh: &TriMesh, n: usize, seed: u64) -> Vec<SurfacePoint
     (0..n)
         .map(|_| {
             let at = rng.random_range(0.0..reached);
-            let triangle = sums.partition_point(|s| *s <= at).min(sums.len() - 1) as u32;
+            let triangle = sums.partition_point(|s| *s <= at).min(sums.len() - 1);
             let (r, s): (f64, f64) = (rng.random::<f64>().sqrt(), rng.random());
             let inner = [1.0 - r, r * (1.0 - s), r * s];
             SurfacePoint {
-                triangle,
-                // A little towards the middle: never on a side.
+                triangle: FaceId::from_index(triangle),
+                // Moved slightly towards the centroid, never on a side.
                 barycentric: inner.map(|x| 0.998 * x + 0.002 / 3.0),
             }
         })
         .collect()
 }
 
-/// Meshes side by side as one.
+/// Several meshes as one.
 pub(super) fn together(parts: &[TriMesh]) -> TriMesh {
     let mut all = TriMesh::default();
     for part in parts {
@@ -54,15 +54,15 @@ pub(super) fn double_torus() -> TriMesh {
         v.x += 58.0;
     }
     let vertices_left = left.vertices.len() as u32;
-    // The outermost quadrilateral of each: at angle 0, and at half a turn.
-    let (door_left, door_right) = (0, 2 * 20 * 18);
-    let a = left.triangles[door_left];
-    let b = right.triangles[door_right].map(|v| v + vertices_left);
+    // The triangles of each that face the other torus: at angle 0, and at half a turn.
+    let (end_left, end_right) = (0, 2 * 20 * 18);
+    let a = left.triangles[end_left];
+    let b = right.triangles[end_right].map(|v| v + vertices_left);
     let mut mesh = together(&[left.clone(), right]);
-    mesh.triangles.remove(left.triangles.len() + door_right);
-    mesh.triangles.remove(door_left);
-    // The doors face each other, hence run in opposite ways; of three ways to join them the
-    // least twisted one.
+    mesh.triangles.remove(left.triangles.len() + end_right);
+    mesh.triangles.remove(end_left);
+    // The two triangles have opposite orientations; of the three ways to join them the least
+    // twisted one is taken.
     let at = |v: u32| mesh.vertices[v as usize];
     let ways = [0, 1, 2].map(|turn| [0, 1, 2].map(|k| b[(turn + 3 - k) % 3]));
     let twist = |way: &[u32; 3]| -> f64 { (0..3).map(|k| (at(a[k]) - at(way[k])).norm()).sum() };
@@ -78,7 +78,7 @@ pub(super) fn double_torus() -> TriMesh {
     mesh
 }
 
-/// Every vertex moved by up to `reach` mm along each axis.
+/// The mesh with every vertex moved by up to `reach` mm along each axis.
 pub(super) fn jittered(mesh: &TriMesh, reach: f64, seed: u64) -> TriMesh {
     let mut rng = stream(seed, Purpose::PhantomShape);
     let mut moved = mesh.clone();
@@ -88,7 +88,7 @@ pub(super) fn jittered(mesh: &TriMesh, reach: f64, seed: u64) -> TriMesh {
     moved
 }
 
-/// Scaled along the axes.
+/// The mesh scaled along the axes.
 pub(super) fn squeezed(mesh: &TriMesh, scales: [f64; 3]) -> TriMesh {
     let mut changed = mesh.clone();
     for v in &mut changed.vertices {
@@ -98,7 +98,7 @@ pub(super) fn squeezed(mesh: &TriMesh, scales: [f64; 3]) -> TriMesh {
 }
 
 #[test]
-fn the_samples_are_what_they_are_called() {
+fn the_test_surfaces_have_the_properties_they_are_named_for() {
     use crate::mesh::{intersections::self_intersections, topology};
     let census = topology::check(&double_torus()).unwrap();
     assert_eq!((census.genus(), census.components), (2, 1));

@@ -1,19 +1,24 @@
-//! Distances and directions along the surface, in two ways.
+//! Distances and directions along the surface.
 //!
-//! A [`GeodesicMap`] tells, for everything within a radius of one surface point, how far it
-//! lies along the surface and in which direction a walker must set out to get there.
-//! [`LogMap`] approximates (fast; what repulsion uses), [`ExactMap`] is exact (some ten times
-//! slower; the oracle of the former, and a parameter of the paper's route for validation).
+//! In: a closed surface, a source point on it and a radius. Out: for every vertex and point
+//! within the radius, its distance along the surface and the direction at the source in which
+//! the path to it starts. There are two implementations of [`GeodesicMap`]: [`LogMap`] is an
+//! approximation and fast, and is what repulsion uses; [`ExactMap`] is exact and about ten times
+//! slower, and serves to validate the former and, as a parameter, the paper's method.
+
+mod exact;
+mod log_map;
 
 use super::SurfacePoint;
 use super::domain::Domain;
-use super::exact::ExactMap;
-use super::log_map::LogMap;
 use crate::geometry::Vec2;
-use crate::mesh::TriMesh;
-use crate::mesh::topology::Defect;
+use crate::mesh::topology::MeshDefect;
+use crate::mesh::{TriMesh, VertexId};
 
-/// Which distances repulsion goes by.
+pub(super) use exact::ExactMap;
+pub(super) use log_map::LogMap;
+
+/// The distances that repulsion uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Geodesics {
     /// Discrete geodesic polar coordinates (Melvær & Reimers 2012).
@@ -22,26 +27,25 @@ pub enum Geodesics {
     Exact,
 }
 
-/// A place as seen from the source: the vector in the source triangle's frame that a walker
-/// must take to get there, and its length.
+/// The shortest path known from the source to some place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Reach {
-    /// Direction times distance, in the frame of the source's triangle, mm.
+    /// Initial direction times distance, in the frame of the source's triangle, mm.
     pub vector: Vec2,
     /// Geodesic distance, mm.
     pub distance: f64,
 }
 
 impl Reach {
-    /// Nowhere yet.
+    /// No path is known yet.
     pub const UNKNOWN: Self = Self {
         vector: Vec2::new(0.0, 0.0),
         distance: f64::INFINITY,
     };
 }
 
-/// The surroundings of one source at a time, and the memory for the next one: clearing costs
-/// what was visited.
+/// Distances and directions from one source. The memory is reused for the next source; clearing
+/// it takes time proportional to what was visited.
 pub(crate) trait GeodesicMap {
     /// An empty map.
     fn over(domain: &Domain) -> Self;
@@ -49,32 +53,32 @@ pub(crate) trait GeodesicMap {
     /// Maps everything within `radius` mm of `source`.
     fn spread(&mut self, domain: &Domain, source: &SurfacePoint, radius: f64);
 
-    /// The vertex as seen from the source, if it lies within the radius.
-    fn reach(&self, vertex: u32) -> Option<Reach>;
+    /// The path to a vertex, if that lies within the radius.
+    fn reach(&self, vertex: VertexId) -> Option<Reach>;
 
-    /// The vertices within the radius, in no particular order, and those just beyond.
-    fn visited(&self) -> &[u32];
+    /// The vertices within the radius and some just beyond it, in no particular order.
+    fn visited(&self) -> &[VertexId];
 
-    /// A point of the surface as seen from the source, if it lies well within the radius.
+    /// The path to a point of the surface, if that lies well within the radius.
     fn reach_point(&self, domain: &Domain, point: &SurfacePoint) -> Option<Reach>;
 }
 
-/// Why there are no distances.
+/// Why distances could not be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GeodesicsError {
     /// The mesh is not a closed manifold.
     #[error("the surface is not a closed manifold: {0}")]
-    OpenSurface(#[from] Defect),
-    /// A point names no triangle, or its coordinates are no barycentric ones.
+    OpenSurface(#[from] MeshDefect),
+    /// The triangle of a point does not exist, or its barycentric coordinates are invalid.
     #[error("point {point} does not lie on the surface")]
     NotOnSurface {
-        /// Index among sources, then targets.
+        /// Its index among the sources followed by the targets.
         point: usize,
     },
 }
 
-/// Distances along `mesh` from each source (row) to each target (column), mm; `None` beyond
-/// `radius` mm. Points may lie on edges and vertices.
+/// The distances along `mesh` from each source (row) to each target (column), mm; `None` if
+/// larger than `radius` mm. Points may lie on edges and vertices.
 ///
 /// # Errors
 /// See [`GeodesicsError`].
@@ -88,7 +92,7 @@ pub fn distances(
     let domain = Domain::new(mesh.vertices.clone(), mesh.triangles.clone())?;
     let stray = |p: &SurfacePoint| {
         let sum: f64 = p.barycentric.iter().sum();
-        p.triangle as usize >= mesh.triangles.len()
+        p.triangle.index() >= mesh.triangles.len()
             || !p.barycentric.iter().all(|x| *x >= 0.0)
             || !((sum - 1.0).abs() < 1e-6)
     };

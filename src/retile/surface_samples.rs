@@ -1,31 +1,32 @@
-//! The working surface as weighted samples: fine enough to carry N cells.
+//! The vertices of the surface as weighted samples, as many as N cells need.
 //!
-//! The vertices of the surface, after as many midpoint subdivisions as N asks for, each with
-//! the area round it. Subdivision changes neither S nor W: every new vertex lies in the
-//! middle of an edge of both.
+//! In: the surface S and its smoothed twin W, which share their triangles. Out: their vertices,
+//! after as many midpoint subdivisions as are needed, with neighbours and the area around each.
+//! Subdivision changes neither surface: every new vertex is the midpoint of an edge.
 
 use crate::geometry::Vec3;
 use crate::geometry::triangle::area_normal;
 use rayon::prelude::*;
 
-/// Vertices with neighbours and weights.
+/// The vertices of S and W with neighbours and areas.
 #[derive(Debug, Clone)]
-pub(super) struct Samples {
+pub(super) struct WeightedSamples {
     /// Positions on W, mm.
     pub working: Vec<Vec3>,
     /// Positions on S, mm.
     pub surface: Vec<Vec3>,
     /// Triangles over the vertices.
     pub triangles: Vec<[u32; 3]>,
-    /// A third of the area of the triangles round each vertex on W, mm².
+    /// A third of the area of the triangles around each vertex on W, mm².
     pub area: Vec<f64>,
+    /// The neighbours of v are `neighbours[first[v]..first[v + 1]]`.
     first: Vec<u32>,
     neighbours: Vec<u32>,
 }
 
-impl Samples {
-    /// Samples of the surface with at least `wanted` vertices, but not more than one
-    /// subdivision beyond that.
+impl WeightedSamples {
+    /// Samples of the surface with at least `wanted` vertices, subdivided no more often than
+    /// needed for that.
     pub fn new(surface: &[Vec3], working: &[Vec3], triangles: &[[u32; 3]], wanted: usize) -> Self {
         let mut samples = Self::of(surface.to_vec(), working.to_vec(), triangles.to_vec());
         while samples.len() < wanted {
@@ -64,11 +65,11 @@ impl Samples {
         &self.neighbours[self.first[v] as usize..self.first[v + 1] as usize]
     }
 
-    /// Every triangle cut in four.
+    /// The samples with every triangle split in four.
     fn subdivided(&self) -> Self {
         let old = self.len() as u32;
-        // An edge is named by the half-edge that leaves its lower vertex; its middle gets the
-        // next free number in that order.
+        // Edges are numbered by the half-edge that leaves their lower vertex; their midpoints get
+        // the next free vertex numbers in that order.
         let mut middle = vec![0u32; self.neighbours.len()];
         let (mut surface, mut working) = (self.surface.clone(), self.working.clone());
         for a in 0..old {
@@ -100,8 +101,8 @@ impl Samples {
     }
 }
 
-/// Neighbour lists in one array: those of `v` stand at `first[v]..first[v + 1]`. In a closed
-/// oriented manifold the half-edges that leave a vertex name each neighbour once.
+/// The neighbours of all vertices in one array; those of `v` are at `first[v]..first[v + 1]`. In
+/// a closed oriented manifold the half-edges that leave a vertex end at each neighbour once.
 fn neighbours(vertices: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<u32>) {
     let mut first = vec![0u32; vertices + 1];
     for &v in triangles.iter().flatten() {
@@ -130,8 +131,8 @@ mod tests {
     #[test]
     fn subdivision_keeps_area_and_topology() {
         let mesh = shapes::torus(9.0, 3.0, 14, 9);
-        let coarse = Samples::new(&mesh.vertices, &mesh.vertices, &mesh.triangles, 0);
-        let fine = Samples::new(&mesh.vertices, &mesh.vertices, &mesh.triangles, 1000);
+        let coarse = WeightedSamples::new(&mesh.vertices, &mesh.vertices, &mesh.triangles, 0);
+        let fine = WeightedSamples::new(&mesh.vertices, &mesh.vertices, &mesh.triangles, 1000);
         assert!(fine.len() >= 1000 && coarse.len() == mesh.vertices.len());
         let as_mesh = TriMesh {
             vertices: fine.surface.clone(),

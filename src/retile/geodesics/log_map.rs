@@ -1,32 +1,32 @@
-//! Distances and directions from one point of the surface to all others near it.
+//! Approximate distances and directions: discrete geodesic polar coordinates.
 //!
-//! Discrete geodesic polar coordinates (Melvær & Reimers, "Geodesic polar coordinates on
-//! polygonal meshes", Computer Graphics Forum 2012): a wave runs over the vertices in the
-//! order of distance, as in Dijkstra's algorithm. Where two corners i, j of a triangle are
-//! known, the triangle and a virtual source at the right distances from i and j are laid into
-//! the plane; the third corner's distance is that to the virtual source, and its direction
-//! divides the directions of i and j as the ray divides the angle between them.
+//! After Melvær and Reimers, "Geodesic polar coordinates on polygonal meshes", Computer Graphics
+//! Forum 2012. The vertices are processed in the order of their distances, as in Dijkstra's
+//! algorithm. If two corners i and j of a triangle are known, the triangle is unfolded into a
+//! plane together with a virtual source at the known distances from i and j. The third corner's
+//! distance is that from the virtual source, and its direction divides those of i and j as the
+//! ray divides the angle between them.
 //!
-//! Over obtuse corners the wave may first come the long way along an edge, so a vertex is taken
-//! up again whenever it is reached sooner (without that, distances just behind the source's
-//! triangle were up to 40 % too long).
+//! At obtuse corners a vertex may first be reached by the longer way along an edge, so it is
+//! processed again whenever a shorter distance is found. (Without that, distances just behind
+//! the source's triangle were up to 40 % too long.)
 //!
-//! Exact wherever no vertex bends the wave (planes, and developable surfaces laid flat);
-//! elsewhere an approximation from above and below: against [`super::exact`] within two
-//! spacings 0.05 to 0.08 % on average and 1.2 % at worst (that module's tests).
+//! The result is exact where the surface can be unfolded into a plane. Elsewhere it is an
+//! approximation that may be too long or too short: within two spacings it differs from the
+//! exact distance by 0.05 to 0.08 % on average and 1.2 % at most (tests of [`super::exact`]).
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::SurfacePoint;
-use super::domain::{Domain, apex};
-use super::geodesics::{GeodesicMap, Reach};
-use crate::mesh::adjacency::previous;
+use super::{GeodesicMap, Reach};
+use crate::mesh::{FaceId, VertexId};
+use crate::retile::SurfacePoint;
+use crate::retile::domain::{Domain, apex};
 
-/// The third corner of a triangle whose corners i (at the origin) and j (at `base` on the x
-/// axis) are known, the third being `left` from i and `right` from j. `None` where the ray
-/// from the virtual source does not pass between i and j.
-pub(crate) fn unfold(i: &Reach, j: &Reach, base: f64, left: f64, right: f64) -> Option<Reach> {
+/// The third corner of a triangle whose corners i (at the origin) and j (at `base` on the x axis)
+/// are known; its distances from these are `left` and `right`. `None` if the ray from the virtual
+/// source does not pass between i and j.
+fn unfold(i: &Reach, j: &Reach, base: f64, left: f64, right: f64) -> Option<Reach> {
     let (ri, rj) = (i.distance, j.distance);
     let sx = (ri * ri - rj * rj + base * base) / (2.0 * base);
     let depth = ri * ri - sx * sx;
@@ -35,14 +35,14 @@ pub(crate) fn unfold(i: &Reach, j: &Reach, base: f64, left: f64, right: f64) -> 
     }
     let sy = depth.sqrt();
     let (kx, ky) = apex(base, left, right);
-    // From the source at (sx, -sy) to k: where does the ray cross the edge?
+    // The place where the ray from the source at (sx, -sy) to k crosses the edge.
     let (dx, dy) = (kx - sx, ky + sy);
     let crossing = sx * dy + dx * sy;
     if !(crossing > 0.0 && crossing < base * dy) {
         return None;
     }
     let distance = dx.hypot(dy);
-    // k = a i + b j as vectors from the source; the same combination of the directions.
+    // As vectors from the source, k = a i + b j; the directions are combined likewise.
     let whole = base * sy;
     let a = (dy * (base - sx) - dx * sy) / whole;
     let b = (sx * dy + dx * sy) / whole;
@@ -57,8 +57,8 @@ pub(crate) fn unfold(i: &Reach, j: &Reach, base: f64, left: f64, right: f64) -> 
     })
 }
 
-/// The vertex at the end of an edge of `length`, reached straight through the vertex `from`.
-pub(crate) fn along_edge(from: &Reach, length: f64) -> Reach {
+/// The path through the vertex `from` and along an edge of `length` mm.
+fn along_edge(from: &Reach, length: f64) -> Reach {
     let distance = from.distance + length;
     let stretch = if from.distance > 0.0 {
         distance / from.distance
@@ -71,8 +71,8 @@ pub(crate) fn along_edge(from: &Reach, length: f64) -> Reach {
     }
 }
 
-/// The three corners of the source's own triangle: exact.
-pub(crate) fn first_corners(domain: &Domain, source: &SurfacePoint) -> [Reach; 3] {
+/// The paths to the three corners of the source's own triangle, which are exact.
+fn first_corners(domain: &Domain, source: &SurfacePoint) -> [Reach; 3] {
     let flat = domain.flat(source.triangle);
     let [u, v, w] = source.barycentric;
     let here = flat[0] * u + flat[1] * v + flat[2] * w;
@@ -85,26 +85,33 @@ pub(crate) fn first_corners(domain: &Domain, source: &SurfacePoint) -> [Reach; 3
     })
 }
 
-/// A queue entry: distance (rounded to f32, whose bits sort as it does) above the vertex.
-pub(crate) fn queue_key(distance: f64, vertex: u32) -> Reverse<u64> {
-    Reverse((u64::from((distance as f32).to_bits()) << 32) | u64::from(vertex))
+/// A queue entry: in the high bits the distance, rounded to f32, whose bits have the order of its
+/// values; in the low bits the vertex.
+fn queue_key(distance: f64, vertex: VertexId) -> Reverse<u64> {
+    Reverse((u64::from((distance as f32).to_bits()) << 32) | u64::from(vertex.0))
 }
 
-/// Share by which a distance must fall to be taken up again: beyond rounding, so that the wave
-/// ends.
+/// Factor by which a distance must fall for its vertex to be processed again. It exceeds rounding
+/// errors, so that the process ends.
 const SHORTER: f64 = 1.0 + 1e-9;
 
-const UNSEEN: u8 = 0;
-const SEEN: u8 = 1;
-const DONE: u8 = 2;
+/// What is known of a vertex.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum VertexState {
+    /// No distance is known.
+    Unseen,
+    /// A distance is known; the vertex is in the queue.
+    Queued,
+    /// Its neighbours have been reached from it.
+    Done,
+}
 
-/// The map round one source, and the memory for the next one: clearing costs what was
-/// visited.
+/// The approximate map around one source.
 #[derive(Debug, Clone)]
-pub(crate) struct LogMap {
+pub(in crate::retile) struct LogMap {
     reach: Vec<Reach>,
-    state: Vec<u8>,
-    visited: Vec<u32>,
+    state: Vec<VertexState>,
+    visited: Vec<VertexId>,
     queue: BinaryHeap<Reverse<u64>>,
     source: SurfacePoint,
 }
@@ -114,11 +121,11 @@ impl GeodesicMap for LogMap {
         let vertices = domain.vertices.len();
         Self {
             reach: vec![Reach::UNKNOWN; vertices],
-            state: vec![UNSEEN; vertices],
+            state: vec![VertexState::Unseen; vertices],
             visited: Vec::new(),
             queue: BinaryHeap::new(),
             source: SurfacePoint {
-                triangle: u32::MAX,
+                triangle: FaceId(u32::MAX),
                 barycentric: [0.0; 3],
             },
         }
@@ -127,36 +134,38 @@ impl GeodesicMap for LogMap {
     fn spread(&mut self, domain: &Domain, source: &SurfacePoint, radius: f64) {
         self.clear();
         self.source = *source;
-        let corners = domain.triangles[source.triangle as usize];
+        let corners = domain.half_edges.corners(source.triangle);
         for (v, reach) in corners.into_iter().zip(first_corners(domain, source)) {
             self.offer(v, reach);
         }
         while let Some(Reverse(key)) = self.queue.pop() {
-            let i = key as u32;
-            let here = self.reach[i as usize];
-            if self.state[i as usize] == DONE || queue_key(here.distance, i) != Reverse(key) {
+            let i = VertexId(key as u32);
+            let here = self.reach[i.index()];
+            let state = &mut self.state[i.index()];
+            if *state == VertexState::Done || queue_key(here.distance, i) != Reverse(key) {
                 continue;
             }
             if here.distance > radius {
                 break;
             }
-            self.state[i as usize] = DONE;
+            *state = VertexState::Done;
             self.relax_around(domain, i, here);
         }
     }
 
-    fn reach(&self, vertex: u32) -> Option<Reach> {
-        (self.state[vertex as usize] == DONE).then(|| self.reach[vertex as usize])
+    fn reach(&self, vertex: VertexId) -> Option<Reach> {
+        let is_done = self.state[vertex.index()] == VertexState::Done;
+        is_done.then(|| self.reach[vertex.index()])
     }
 
-    fn visited(&self) -> &[u32] {
+    fn visited(&self) -> &[VertexId] {
         &self.visited
     }
 
-    /// The mean of the corners' vectors; exact in the source's own triangle. `None` where a
-    /// corner lies beyond the radius.
+    /// Interpolates the vectors of the corners, which is exact in the source's own triangle.
+    /// `None` if a corner lies beyond the radius.
     fn reach_point(&self, domain: &Domain, point: &SurfacePoint) -> Option<Reach> {
-        let corners = domain.triangles[point.triangle as usize];
+        let corners = domain.half_edges.corners(point.triangle);
         let vectors = if point.triangle == self.source.triangle {
             first_corners(domain, &self.source).map(|r| r.vector)
         } else {
@@ -173,17 +182,17 @@ impl GeodesicMap for LogMap {
 }
 
 impl LogMap {
-    fn relax_around(&mut self, domain: &Domain, i: u32, here: Reach) {
-        for out in domain.adjacency.around(domain.outgoing[i as usize]) {
+    /// Reaches the neighbours of vertex `i`, along edges and through the triangles around it.
+    fn relax_around(&mut self, domain: &Domain, i: VertexId, here: Reach) {
+        let half_edges = &domain.half_edges;
+        for out in half_edges.around(i) {
             // The triangle i, a, b.
-            let back = previous(out);
-            let [a, b] = [domain.ends(out)[1], domain.ends(back)[0]];
-            let across = domain.lengths[3 * (out as usize / 3) + (out as usize + 1) % 3];
-            let (to_a, to_b) = (domain.lengths[out as usize], domain.lengths[back as usize]);
+            let [a, b] = [half_edges.target(out), half_edges.origin(out.previous())];
+            let [to_a, across, to_b] = [out, out.next(), out.previous()].map(|h| domain.length(h));
             self.offer(a, along_edge(&here, to_a));
             for (known, sought, base, left) in [(a, b, to_a, to_b), (b, a, to_b, to_a)] {
-                if self.state[known as usize] != UNSEEN {
-                    let j = self.reach[known as usize];
+                if self.state[known.index()] != VertexState::Unseen {
+                    let j = self.reach[known.index()];
                     if let Some(k) = unfold(&here, &j, base, left, across) {
                         self.offer(sought, k);
                     }
@@ -192,21 +201,22 @@ impl LogMap {
         }
     }
 
-    fn offer(&mut self, vertex: u32, reach: Reach) {
-        let v = vertex as usize;
-        if self.state[v] == UNSEEN {
+    /// Stores a path to `vertex` if it is shorter than the one known.
+    fn offer(&mut self, vertex: VertexId, reach: Reach) {
+        let v = vertex.index();
+        if self.state[v] == VertexState::Unseen {
             self.visited.push(vertex);
         } else if reach.distance * SHORTER >= self.reach[v].distance {
             return;
         }
-        self.state[v] = SEEN;
+        self.state[v] = VertexState::Queued;
         self.reach[v] = reach;
         self.queue.push(queue_key(reach.distance, vertex));
     }
 
     fn clear(&mut self) {
-        for &v in &self.visited {
-            self.state[v as usize] = UNSEEN;
+        for v in &self.visited {
+            self.state[v.index()] = VertexState::Unseen;
         }
         self.visited.clear();
         self.queue.clear();
@@ -224,7 +234,7 @@ mod tests {
         Domain::new(mesh.vertices, mesh.triangles).unwrap()
     }
 
-    /// A tetrahedron of edge 20, flat but for its four corners, its faces cut into small ones.
+    /// A tetrahedron of edge 20 whose faces are subdivided into small triangles.
     fn flat_sided() -> Domain {
         let mut mesh = shapes::tetrahedron(20.0);
         for _ in 0..4 {
@@ -248,22 +258,22 @@ mod tests {
 
     fn centre(triangle: u32) -> SurfacePoint {
         SurfacePoint {
-            triangle,
+            triangle: FaceId(triangle),
             barycentric: [0.3, 0.45, 0.25],
         }
     }
 
     #[test]
-    fn distances_on_a_flat_side_are_straight_ones() {
+    fn distances_on_a_flat_side_are_straight() {
         let domain = flat_sided();
         let mut map = LogMap::over(&domain);
-        // 256 triangles on each side; those of side 0 are the first.
+        // Each side has 256 triangles; those of side 0 come first.
         for t in [0, 37, 100, 200, 255] {
             let source = centre(t);
-            let x = source.position(&domain.vertices, &domain.triangles);
+            let x = source.position(&domain.vertices, domain.half_edges.triangles());
             map.spread(&domain, &source, 30.0);
-            for &v in domain.triangles[..256].iter().flatten() {
-                let exact = (domain.vertices[v as usize] - x).norm();
+            for v in FaceId::first(256).flat_map(|t| domain.half_edges.corners(t)) {
+                let exact = (domain.vertices[v.index()] - x).norm();
                 let found = map.reach(v).unwrap();
                 assert!((found.distance - exact).abs() < 1e-9 * exact);
                 assert!((found.vector.norm() - exact).abs() < 1e-9 * exact);
@@ -276,23 +286,23 @@ mod tests {
         let domain = flat_sided();
         let mut map = LogMap::over(&domain);
         let source = SurfacePoint {
-            triangle: 255,
+            triangle: FaceId(255),
             barycentric: [1.0 / 3.0; 3],
         };
-        let x = source.position(&domain.vertices, &domain.triangles);
+        let x = source.position(&domain.vertices, domain.half_edges.triangles());
         map.spread(&domain, &source, 14.0);
         let original = shapes::tetrahedron(20.0);
         let corners = original.corners(0);
         let inward = original.area_normal(0).normalize();
         let mut compared = 0;
-        for v in 0..domain.vertices.len() as u32 {
-            let p = domain.vertices[v as usize];
+        for v in domain.half_edges.vertices() {
+            let p = domain.vertices[v.index()];
             let height = (corners[0] - p).dot(&inward);
             let Some(found) = map.reach(v) else { continue };
             if height < 1e-9 {
                 continue;
             }
-            // Rolled over each side's three edges, the nearest image counts.
+            // The nearest image of p, unfolded over each of the three edges.
             let exact = (0..3)
                 .filter_map(|k| {
                     let (a, b) = (corners[k], corners[(k + 1) % 3]);
@@ -329,12 +339,12 @@ mod tests {
         for t in [0u32, 1234, 5000, 17_000] {
             let source = centre(t);
             let x = source
-                .position(&domain.vertices, &domain.triangles)
+                .position(&domain.vertices, domain.half_edges.triangles())
                 .normalize();
             map.spread(&domain, &source, radius);
-            for v in 0..domain.vertices.len() as u32 {
+            for v in domain.half_edges.vertices() {
                 let Some(found) = map.reach(v) else { continue };
-                let angle = Vec3::dot(&x, &domain.vertices[v as usize].normalize()).acos();
+                let angle = Vec3::dot(&x, &domain.vertices[v.index()].normalize()).acos();
                 if angle * radius > 2.0 {
                     let error = (found.distance / (angle * radius) - 1.0).abs();
                     worst = worst.max(error);

@@ -1,0 +1,53 @@
+//! The reference surface S, prepared for distance queries.
+
+use super::fitness::Lengths;
+use crate::geometry::bvh::Bvh;
+use crate::geometry::{Vec3, triangle};
+use crate::mesh::TriMesh;
+use crate::surface::Surface;
+
+/// The reference surface S with its search tree.
+#[derive(Debug, Clone)]
+pub struct Reference {
+    /// S, LPS mm.
+    pub mesh: TriMesh,
+    /// Unit normal of every triangle of S; zero for a degenerate one.
+    pub normals: Vec<Vec3>,
+    /// Search tree over the triangles of S.
+    pub bvh: Bvh,
+    /// Smallest voxel spacing of the volume that S was extracted from, mm.
+    pub spacing: f64,
+}
+
+impl Reference {
+    /// Prepares `surface` for distance queries.
+    pub fn new(surface: &Surface) -> Self {
+        let mesh = surface.mesh.clone();
+        let normals = (0..mesh.triangles.len())
+            .map(|t| triangle::unit_normal(&mesh.corners(t)))
+            .collect();
+        let bvh = Bvh::new(&mesh.vertices, &mesh.triangles);
+        Self {
+            mesh,
+            normals,
+            bvh,
+            spacing: surface.spacing,
+        }
+    }
+
+    /// The lengths to which the distances of a mesh of `triangles` triangles are related.
+    pub fn lengths(&self, triangles: usize) -> Lengths {
+        let each = self.mesh.area() / triangles.max(1) as f64;
+        Lengths {
+            voxel: self.spacing,
+            edge: (4.0 * each / 3f64.sqrt()).sqrt(),
+        }
+    }
+
+    /// The distance from `point` to S, mm; infinite if S is empty.
+    pub fn distance(&self, point: &Vec3) -> f64 {
+        self.bvh
+            .closest(point)
+            .map_or(f64::INFINITY, |found| found.squared_distance.sqrt())
+    }
+}
