@@ -3,8 +3,8 @@
 use super::error::DeformError;
 use super::parameters::DeformParameters;
 use crate::grid::Volume;
-use crate::locate::body::{self, Blob};
 use crate::locate;
+use crate::locate::body::{self, Blob};
 use crate::locate::localisation::Localisation;
 use crate::locate::patient_orientation::{PatientOrientation, Superior};
 use crate::model::Template;
@@ -47,7 +47,9 @@ impl OrganPlace {
                 let found =
                     locate::find(volume, &parameters.hints, monitor)?.localisation(monitor)?;
                 let orientation = match parameters.superior {
-                    Superior::Body => PatientOrientation::of_body(volume, &found.cup.centre, monitor)?,
+                    Superior::Body => {
+                        PatientOrientation::of_body(volume, &found.cup.centre, monitor)?
+                    }
                     Superior::Frame => PatientOrientation::FRAME,
                 };
                 OrganPlace::Ventricle { found, orientation }

@@ -74,7 +74,7 @@ enum Decision {
     /// Rays and the cup at their proposal agree.
     Rays(Cavity),
     /// The best of the cups in the whole volume, LPS mm; none where all are doubtful.
-    Cups(Cups, Option<Vec3>),
+    Cups(Box<Cups>, Option<Vec3>),
 }
 
 /// Decides where the left ventricle is in `volume`.
@@ -99,7 +99,7 @@ pub fn find<'v>(
                 Err(LocateError::NoHeart { .. }) => None,
                 Err(error) => return Err(error),
             };
-            Decision::Cups(cups, place)
+            Decision::Cups(Box::new(cups), place)
         }
     };
     Ok(Heart {

@@ -147,9 +147,7 @@ fn cup_of(mesh: &TriMesh, monitor: &Monitor) -> Result<Cup, TemplateError> {
         Ok(found) => Err(TemplateError::NoCup {
             correlation: found.correlation,
         }),
-        Err(LocateError::NoHeart { correlation, .. }) => {
-            Err(TemplateError::NoCup { correlation })
-        }
+        Err(LocateError::NoHeart { correlation, .. }) => Err(TemplateError::NoCup { correlation }),
         Err(LocateError::Cancelled(c)) => Err(c.into()),
         Err(_) => Err(none),
     }

@@ -387,6 +387,7 @@ fn surface_advice(error: &SurfaceError) -> String {
         SurfaceError::OutsideVolume { shape, .. } => {
             format!("Give voxel indices below {shape:?}, counted from 0.")
         }
+        SurfaceError::HintOutside => "Give a hint inside the volume, or none.".into(),
         SurfaceError::EmptyBox { .. } => "Give the lower corner of the box first.".into(),
         SurfaceError::SeedOutside { value, .. } => {
             format!("Choose a voxel inside the wall, or an `iso` below {value}.")
