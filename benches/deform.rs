@@ -8,7 +8,7 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use ventriform::deform::{DeformParameters, fit};
 use ventriform::grid::voxelise::voxelise;
-use ventriform::locate::localisation as localise;
+use ventriform::locate;
 use ventriform::model::{Organ, Template};
 use ventriform::parameters::ModelParameters;
 use ventriform::progress::Monitor;
@@ -53,7 +53,10 @@ fn benchmarks(criterion: &mut Criterion) {
         b.iter(|| generate(black_box(&volume)));
     });
     group.bench_function("localise 128³", |b| {
-        b.iter(|| localise::localise(black_box(&volume), &settings.hints, &monitor));
+        b.iter(|| {
+            let heart = locate::find(black_box(&volume), &settings.hints, &monitor);
+            heart.and_then(|heart| heart.localisation(&monitor))
+        });
     });
     group.bench_function("fit 150 points 128³", |b| {
         b.iter(|| fit(black_box(&volume), &template, &settings, &monitor));

@@ -1,6 +1,6 @@
 //! Why there is no fit.
 
-use crate::locate::localisation::LocaliseError;
+use crate::locate::LocateError;
 use crate::progress::Cancelled;
 
 /// Why there is no fit.
@@ -34,7 +34,7 @@ pub enum DeformError {
     HintNotFinite,
     /// The organ was not found.
     #[error(transparent)]
-    Localise(#[from] LocaliseError),
+    Localise(#[from] LocateError),
     /// The caller asked for an end.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

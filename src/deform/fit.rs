@@ -4,8 +4,9 @@ use super::dynamics::StopReason;
 use super::flags::Flag;
 use crate::geometry::Vec3;
 use crate::locate::cup::Cup;
-use crate::locate::localisation::{Hints, Localisation, LocaliseError, NotAHeart};
-use crate::locate::patient_orientation::Posture;
+use crate::locate::localisation::Localisation;
+use crate::locate::patient_orientation::PatientOrientation;
+use crate::locate::{Hints, LocateError, NotAHeart};
 use crate::mesh::TriMesh;
 use crate::model::wall::VentricleWall;
 use nalgebra::Rotation3;
@@ -27,7 +28,7 @@ pub struct Fit {
     /// The long axis of the fitted model; `None` for other organs.
     pub cup: Option<Cup>,
     /// The patient's orientation in the frame; ventricles only.
-    pub patient_orientation: Option<Posture>,
+    pub patient_orientation: Option<PatientOrientation>,
     /// The wall seen from the long axis; ventricles only.
     pub wall: Option<VentricleWall>,
     /// Volume that the model encloses, the wall's of a ventricle, ml.
@@ -66,14 +67,14 @@ impl Fit {
     /// Refuses a ventricle whose model found no wall, unless a hint says that it is there.
     ///
     /// # Errors
-    /// [`LocaliseError::NoHeart`].
-    pub(super) fn require_wall(&self, hints: &Hints) -> Result<(), LocaliseError> {
+    /// [`LocateError::NoHeart`].
+    pub(super) fn require_wall(&self, hints: &Hints) -> Result<(), LocateError> {
         let (active, residual) = (self.active, self.residual);
         match &self.localisation {
             Some(found)
                 if hints.centre.is_none() && active < EDGELESS.0 && !(residual < EDGELESS.1) =>
             {
-                Err(LocaliseError::NoHeart {
+                Err(LocateError::NoHeart {
                     centre: found.cup.centre.into(),
                     correlation: found.correlation,
                     reason: NotAHeart::Edgeless { active, residual },

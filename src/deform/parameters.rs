@@ -4,7 +4,7 @@ use super::dynamics::Motion;
 use super::elastic::Stiffness;
 use super::error::DeformError;
 use super::sensors::SensorKind;
-use crate::locate::localisation::Hints;
+use crate::locate::Hints;
 use crate::locate::patient_orientation::Superior;
 
 /// Parameters of [`fit`](super::fit).

@@ -3,9 +3,10 @@
 use super::error::DeformError;
 use super::parameters::DeformParameters;
 use crate::grid::Volume;
+use crate::locate;
 use crate::locate::body::{self, Blob};
-use crate::locate::localisation::{self, Localisation};
-use crate::locate::patient_orientation::{Posture, Superior};
+use crate::locate::localisation::Localisation;
+use crate::locate::patient_orientation::{PatientOrientation, Superior};
 use crate::model::Template;
 use crate::progress::{Monitor, Stage};
 
@@ -17,7 +18,7 @@ pub enum OrganPlace {
         /// Where it was found.
         found: Localisation,
         /// The patient's orientation in the frame.
-        orientation: Posture,
+        orientation: PatientOrientation,
     },
     /// Any other organ.
     Body {
@@ -43,10 +44,13 @@ impl OrganPlace {
         monitor.report(Stage::Localise, 0.0)?;
         let place = match template.cup {
             Some(_) => {
-                let found = localisation::localise(volume, &parameters.hints, monitor)?;
+                let found =
+                    locate::find(volume, &parameters.hints, monitor)?.localisation(monitor)?;
                 let orientation = match parameters.superior {
-                    Superior::Body => Posture::of_body(volume, &found.cup.centre, monitor)?,
-                    Superior::Frame => Posture::FRAME,
+                    Superior::Body => {
+                        PatientOrientation::of_body(volume, &found.cup.centre, monitor)?
+                    }
+                    Superior::Frame => PatientOrientation::FRAME,
                 };
                 OrganPlace::Ventricle { found, orientation }
             }
@@ -62,10 +66,10 @@ impl OrganPlace {
     }
 
     /// The patient's orientation in the frame; the frame's own for organs other than ventricles.
-    pub(super) fn patient_orientation(&self) -> Posture {
+    pub(super) fn patient_orientation(&self) -> PatientOrientation {
         match self {
             OrganPlace::Ventricle { orientation, .. } => *orientation,
-            OrganPlace::Body { .. } => Posture::FRAME,
+            OrganPlace::Body { .. } => PatientOrientation::FRAME,
         }
     }
 

@@ -10,7 +10,7 @@ use crate::geometry::bvh::Aabb;
 use crate::grid::Volume;
 use crate::grid::field::Field;
 use crate::locate::localisation::Localisation;
-use crate::locate::patient_orientation::Posture;
+use crate::locate::patient_orientation::PatientOrientation;
 use crate::mesh::TriMesh;
 use crate::model::Template;
 use crate::model::pose::TemplatePose;
@@ -33,7 +33,7 @@ pub struct FitSetup {
     /// Where the ventricle was found; `None` for other organs.
     pub localisation: Option<Localisation>,
     /// The patient's orientation in the frame.
-    pub patient_orientation: Posture,
+    pub patient_orientation: PatientOrientation,
     /// Where the template goes.
     pub pose: TemplatePose,
     /// The template there, LPS mm.

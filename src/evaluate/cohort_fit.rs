@@ -10,7 +10,7 @@ use crate::deform::Fit;
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
 use crate::locate::cup::Cup;
-use crate::locate::patient_orientation::Posture;
+use crate::locate::patient_orientation::PatientOrientation;
 use crate::mesh::TriMesh;
 use crate::segmentation::slices::Cut;
 use std::collections::BTreeMap;
@@ -40,7 +40,7 @@ impl CohortFit {
             agreed: [None; 2],
             figures: BTreeMap::new(),
             cup: None,
-            superior: Posture::FRAME.superior,
+            superior: PatientOrientation::FRAME.superior,
             vertices: Vec::new(),
         }
     }
@@ -85,7 +85,7 @@ impl CohortFit {
             }),
             superior: fit
                 .patient_orientation
-                .unwrap_or(Posture::FRAME)
+                .unwrap_or(PatientOrientation::FRAME)
                 .superior
                 .map(rounded),
             vertices: fit.mesh.vertices.iter().map(|v| v.map(rounded)).collect(),

@@ -43,7 +43,7 @@ pub struct ContourDistances {
     pub hausdorff95_mm: f64,
 }
 
-/// The masks cannot be compared.
+/// The masks lie on different grids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the masks have {a:?} and {b:?} voxels; they must lie on one grid")]
 pub struct GridsDiffer {
@@ -53,13 +53,13 @@ pub struct GridsDiffer {
     pub b: [usize; 3],
 }
 
-/// Why two masks were not compared.
+/// Why there is no comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum CompareError {
-    /// They cannot be.
+    /// The masks lie on different grids.
     #[error(transparent)]
     GridsDiffer(#[from] GridsDiffer),
-    /// The caller asked for an end.
+    /// The caller cancelled the comparison.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
@@ -113,7 +113,7 @@ fn contour_distances(
     spacing: [f64; 3],
     monitor: &Monitor,
 ) -> Result<ContourDistances, Cancelled> {
-    let window = Window::around(a, b, monitor)?;
+    let window = MaskWindow::around(a, b, monitor)?;
     let contours = [window.contour(a, monitor)?, window.contour(b, monitor)?];
     let distances = |scale: [f64; 3]| {
         let between = |from: &[usize], to: &[usize]| {
@@ -143,13 +143,13 @@ fn contour_distances(
     })
 }
 
-/// The box of both masks inside the grid.
-struct Window {
+/// The part of the grid that holds both masks.
+struct MaskWindow {
     first: [usize; 3],
     shape: [usize; 3],
 }
 
-impl Window {
+impl MaskWindow {
     fn around(a: &Mask, b: &Mask, monitor: &Monitor) -> Result<Self, Cancelled> {
         let mut first = a.shape;
         let mut last = [0; 3];

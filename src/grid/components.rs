@@ -2,7 +2,7 @@
 //!
 //! A run is a stretch of equal labels in a row. Runs of neighbouring rows that overlap are
 //! united (union-find), so the cost follows the number of runs, not of voxels. The object is
-//! 6-connected and its background 26-connected, the pair that Marching Cubes' table obeys.
+//! 6-connected and its background 26-connected, as in the table of Marching Cubes.
 
 use crate::grid::labels::Labels;
 use crate::numeric::disjoint_sets::{set_numbers, singletons, unite};

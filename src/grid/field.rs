@@ -8,6 +8,7 @@ use nalgebra::Matrix3;
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
+use crate::grid::blocks::{self, BlockMeans, Window};
 use crate::grid::blur::{Kernel, blur};
 use crate::grid::volume::Volume;
 use crate::progress::{Cancelled, Monitor};
@@ -43,7 +44,7 @@ impl Field {
         monitor: &Monitor,
     ) -> Result<Self, Cancelled> {
         let window = region.map_or_else(
-            || [0, 1, 2].map(|a| (0, volume.shape[a])),
+            || blocks::whole(volume),
             |region| index_window(volume, region),
         );
         let shape = window.map(|(first, end)| end - first);
@@ -62,38 +63,38 @@ impl Field {
         Ok(field)
     }
 
-    /// The whole volume at low resolution: the mean of every block of about `spacing` mm.
+    /// The mean of every block of about `spacing` mm: a small picture of the whole volume, or of
+    /// the blocks that `region` touches (LPS mm), which are the same as those of the whole.
+    /// Values that are not finite count as 0.
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub fn coarse(volume: &Volume, spacing: f64, monitor: &Monitor) -> Result<Self, Cancelled> {
-        let block = volume.frame.spacing().map(|s| {
-            let n = (spacing / s).round();
-            if n >= 1.0 { n as usize } else { 1 }
+    pub fn coarse(
+        volume: &Volume,
+        region: Option<&Aabb>,
+        spacing: f64,
+        monitor: &Monitor,
+    ) -> Result<Self, Cancelled> {
+        let fine = volume.frame.spacing();
+        let factor = [0, 1, 2].map(|a| {
+            let n = (spacing / fine[a]).round();
+            (if n >= 1.0 { n as usize } else { 1 }).min(volume.shape[a])
         });
-        let shape = [0, 1, 2].map(|a| (volume.shape[a] / block[a]).max(1));
-        let mut values = vec![0f32; shape.iter().product()];
-        let used = [0, 1, 2].map(|a| (shape[a] * block[a]).min(volume.shape[a]));
-        for k in 0..used[2] {
-            monitor.check()?;
-            for j in 0..used[1] {
-                let row = volume.shape[0] * (j + volume.shape[1] * k);
-                let out = shape[0] * (j / block[1] + shape[1] * (k / block[2]));
-                for i in 0..used[0] {
-                    let v = volume.voxels[row + i];
-                    values[out + i / block[0]] += if v.is_finite() { v } else { 0.0 };
-                }
-            }
-        }
-        let count: usize = [0, 1, 2]
-            .map(|a| used[a].div_ceil(shape[a]))
-            .iter()
-            .product();
-        values.iter_mut().for_each(|v| *v /= count as f32);
-        let step = Matrix3::from_diagonal(&Vec3::from_fn(|a, _| block[a] as f64));
-        // The centre of a block of n voxels is (n - 1) / 2 voxels behind its first voxel.
-        let offset = Vec3::from_fn(|a, _| (block[a] as f64 - 1.0) / 2.0);
-        Ok(Self::assemble(shape, values, volume, &offset, &step))
+        let window = region.map_or_else(
+            || blocks::whole(volume),
+            |region| aligned(index_window(volume, region), factor, volume.shape),
+        );
+        let means = BlockMeans::new(volume, window, factor, monitor)?;
+        let step = Matrix3::from_diagonal(&Vec3::from_fn(|a, _| factor[a] as f64));
+        // The centre of a block of n voxels lies (n - 1) / 2 behind its first voxel.
+        let offset = Vec3::from_fn(|a, _| means.origin[a] as f64 + (factor[a] as f64 - 1.0) / 2.0);
+        Ok(Self::assemble(
+            means.shape,
+            means.values,
+            volume,
+            &offset,
+            &step,
+        ))
     }
 
     fn from_parts(
@@ -224,7 +225,7 @@ fn split(x: f64, last: f64) -> (usize, f32) {
 }
 
 /// The index ranges of `volume` that `region` touches, never empty.
-fn index_window(volume: &Volume, region: &Aabb) -> [(usize, usize); 3] {
+fn index_window(volume: &Volume, region: &Aabb) -> Window {
     let mut low = Vec3::repeat(f64::INFINITY);
     let mut high = Vec3::repeat(f64::NEG_INFINITY);
     for corner in 0..8 {
@@ -244,6 +245,16 @@ fn index_window(volume: &Volume, region: &Aabb) -> [(usize, usize); 3] {
         let first = (low[a].floor().max(0.0) as usize).min(last);
         let end = (high[a].ceil().max(0.0) as usize).min(last);
         (first, end.max(first) + 1)
+    })
+}
+
+/// `window` widened to whole blocks of the grid that starts at the first voxel.
+fn aligned(window: Window, factor: [usize; 3], shape: [usize; 3]) -> Window {
+    [0, 1, 2].map(|a| {
+        let (first, end) = window[a];
+        let last = shape[a] / factor[a] - 1;
+        let block = |voxel: usize| (voxel / factor[a]).min(last);
+        (block(first) * factor[a], (block(end - 1) + 1) * factor[a])
     })
 }
 
@@ -271,7 +282,8 @@ mod tests {
             Field::new(&v, None, 0.0),
             Field::new(&v, None, 3.0),
             Field::new(&v, Some(&around), 2.0),
-            Field::coarse(&v, 6.0, &Monitor::silent()).unwrap(),
+            Field::coarse(&v, None, 6.0, &Monitor::silent()).unwrap(),
+            Field::coarse(&v, Some(&around), 6.0, &Monitor::silent()).unwrap(),
         ] {
             assert!(
                 (field.at(&p) - f(&p)).abs() < 0.01,

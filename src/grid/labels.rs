@@ -2,7 +2,7 @@
 //!
 //! A [`Labels`] covers a box of the volume and one layer more on every side; that layer is
 //! always outside, so the object's surface is always closed. Rows run along i and are packed
-//! in 64-bit words; questions about neighbours become shifts of whole rows.
+//! in 64-bit words; comparing neighbours is a shift of whole rows.
 
 use rayon::prelude::*;
 

@@ -2,6 +2,7 @@
 //!
 //! - [`volume`]: voxels and the map from voxel indices to LPS millimetres;
 //! - [`survey`]: range, missing values, and whether a volume is a label map;
+//! - [`blocks`]: means over blocks of voxels, a volume at low resolution;
 //! - [`mod@blur`]: separable Gaussian blur;
 //! - [`field`]: a blurred volume as a smooth function of position;
 //! - [`labels`], [`components`]: sets of voxels, their topology and connected parts;
@@ -9,6 +10,7 @@
 //! - [`agreement`]: how well two masks agree (Jaccard, contour distance, Dice, Hausdorff).
 
 pub mod agreement;
+pub mod blocks;
 pub mod blur;
 pub mod components;
 pub mod field;

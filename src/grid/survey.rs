@@ -1,4 +1,4 @@
-//! One look over a volume: range, missing values, label map or not.
+//! Range of a volume, missing values, and whether it is a label map.
 
 use std::collections::BTreeMap;
 
@@ -9,8 +9,8 @@ use crate::progress::{Cancelled, Monitor};
 
 /// More distinct values than this are intensities.
 const MOST_LABELS: usize = 256;
-/// Share of labelled voxels whose next voxel along i carries the same label: a label map is
-/// made of pieces, a picture with few counts is not.
+/// Least share of labelled voxels whose next voxel along i carries the same label: a label map
+/// consists of pieces, an image with few counts does not.
 const PIECEWISE: f64 = 0.5;
 
 /// What a volume holds.
@@ -28,28 +28,14 @@ pub struct Survey {
     pub labels: Option<BTreeMap<i64, usize>>,
 }
 
-/// Looks at every voxel once.
+/// Finds the range of `volume`, counts the missing values, and counts the labels if it is a label
+/// map.
 ///
 /// # Errors
 /// [`Cancelled`].
 pub fn survey(volume: &Volume, monitor: &Monitor) -> Result<Survey, Cancelled> {
-    let parts: Vec<(f32, f32, usize)> = volume
-        .voxels
-        .par_chunks(1 << 18)
-        .map(|part| {
-            monitor.check()?;
-            Ok(range(part))
-        })
-        .collect::<Result<_, Cancelled>>()?;
-    let minimum = parts.iter().map(|p| p.0).fold(f32::INFINITY, f32::min);
-    let maximum = parts.iter().map(|p| p.1).fold(f32::NEG_INFINITY, f32::max);
-    let not_finite = parts.iter().map(|p| p.2).sum();
+    let (minimum, maximum, not_finite) = range(&volume.voxels, monitor)?;
     let finite = volume.voxels.len() - not_finite;
-    let (minimum, maximum) = if finite == 0 {
-        (0.0, 0.0)
-    } else {
-        (minimum, maximum)
-    };
     Ok(Survey {
         minimum,
         maximum,
@@ -59,8 +45,28 @@ pub fn survey(volume: &Volume, monitor: &Monitor) -> Result<Survey, Cancelled> {
     })
 }
 
-/// Smallest and largest finite value, and how many are not finite.
-fn range(values: &[f32]) -> (f32, f32, usize) {
+/// Smallest and largest finite value (0 where there is none), and how many are not finite.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn range(values: &[f32], monitor: &Monitor) -> Result<(f32, f32, usize), Cancelled> {
+    let parts: Vec<(f32, f32, usize)> = values
+        .par_chunks(1 << 18)
+        .map(|part| {
+            monitor.check()?;
+            Ok(range_of_part(part))
+        })
+        .collect::<Result<_, Cancelled>>()?;
+    let minimum = parts.iter().map(|p| p.0).fold(f32::INFINITY, f32::min);
+    let maximum = parts.iter().map(|p| p.1).fold(f32::NEG_INFINITY, f32::max);
+    let not_finite = parts.iter().map(|p| p.2).sum();
+    Ok(match not_finite == values.len() {
+        true => (0.0, 0.0, not_finite),
+        false => (minimum, maximum, not_finite),
+    })
+}
+
+fn range_of_part(values: &[f32]) -> (f32, f32, usize) {
     let (mut minimum, mut maximum) = (f32::INFINITY, f32::NEG_INFINITY);
     let mut not_finite = 0;
     for chunk in values.chunks(1 << 10) {
@@ -70,7 +76,7 @@ fn range(values: &[f32]) -> (f32, f32, usize) {
         let mut highs = [f32::NEG_INFINITY; LANES];
         let mut sums = [0f32; LANES];
         let (groups, rest) = chunk.as_chunks::<LANES>();
-        // What does not fill the lanes is looked at twice.
+        // Values that do not fill the lanes are read twice.
         let mut last = [chunk[0]; LANES];
         last[..rest.len()].copy_from_slice(rest);
         for group in groups.iter().chain([&last]) {
@@ -100,7 +106,7 @@ fn range(values: &[f32]) -> (f32, f32, usize) {
     (minimum, maximum, not_finite)
 }
 
-/// Counts the labels, or `None` as soon as a value shows that these are intensities.
+/// Counts the voxels of every label; `None` if the values are intensities.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -131,7 +137,7 @@ pub fn label_map(
             }
         }
     }
-    // A constant volume is no map of anything.
+    // A constant volume is no label map.
     let everything = labelled == volume.voxels.len() && counts.len() == 1;
     let piecewise = counts.len() <= 1 || same as f64 >= PIECEWISE * labelled as f64;
     Ok((labelled > 0 && piecewise && !everything).then_some(counts))
@@ -229,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn otsu_parts_two_heaps() {
+    fn otsu_separates_two_clusters() {
         let values: Vec<f32> = (0..1000)
             .map(|n| if n % 4 == 0 { 9.0 } else { 1.0 } + (n % 10) as f32 * 0.05)
             .collect();

@@ -1,17 +1,18 @@
-//! The start for organs that are no ventricle: one bright body.
+//! One bright body: where to start for organs other than the ventricle.
 //!
 //! The largest connected part (6-neighbours) of the coarse picture above 40 % of its
-//! maximum, or the part that holds the hinted centre. Its centroid and volume give shift and
-//! scale; the turn is left to the alignment, because an intensity blob shows none reliably.
+//! maximum, or the part nearest to the hinted centre. Its centroid and volume give shift and scale;
+//! it shows no reliable rotation, which is left to the alignment.
 //!
-//! A map of several labels is no picture of one body: the label at the hinted centre, else the
-//! most frequent one, is taken as a mask, and the others count as nothing.
+//! In a map of several labels, the label nearest to the hinted centre, or else the most frequent
+//! one, is taken as a mask; the others count as background.
 
+use super::error::LocateError;
+use super::hints::Hints;
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::grid::survey::label_map;
 use crate::grid::volume::Volume;
-use crate::locate::localisation::{Hints, LocaliseError};
 use crate::progress::{Cancelled, Monitor};
 use std::collections::BTreeMap;
 
@@ -34,13 +35,13 @@ pub struct Blob {
 /// Finds the body in `volume`.
 ///
 /// # Errors
-/// [`LocaliseError::Blank`] where nothing is bright, [`LocaliseError::HintOutside`] where the
-/// hints leave nothing of it.
-pub fn find(volume: &Volume, hints: &Hints, monitor: &Monitor) -> Result<Blob, LocaliseError> {
-    let field = Field::coarse(volume, COARSE, monitor)?;
+/// [`LocateError::Blank`] if no value is positive, [`LocateError::HintOutside`] if no part lies in
+/// the hinted region.
+pub fn find(volume: &Volume, hints: &Hints, monitor: &Monitor) -> Result<Blob, LocateError> {
+    let field = Field::coarse(volume, None, COARSE, monitor)?;
     let level = LEVEL * field.values().iter().fold(0f32, |a, b| a.max(*b));
     if !(level > 0.0) {
-        return Err(LocaliseError::Blank);
+        return Err(LocateError::Blank);
     }
     let mut label = vec![0u32; field.values().len()];
     let mut best: Option<Blob> = None;
@@ -61,7 +62,7 @@ pub fn find(volume: &Volume, hints: &Hints, monitor: &Monitor) -> Result<Blob, L
             }
         }
     }
-    best.ok_or(LocaliseError::HintOutside)
+    best.ok_or(LocateError::HintOutside)
 }
 
 /// The mask of one label of a map that has several; `None` for any other volume.

@@ -1,25 +1,27 @@
-//! Places that may be ventricles: where a hollow ball agrees with the image.
+//! Cavity candidates: places where a hollow ball agrees with the picture.
 //!
-//! A coarse picture goes in, the centres of the best balls come out, best first. A ball is a
-//! bright shell with a darker middle and darker surroundings, of three radii; it is asked for its
-//! correlation with the picture every 8 mm, and local maxima stay. Balls know no direction, which
-//! makes them a hundred times cheaper than cups; what looks like one may be anything hollow.
+//! In: a coarse picture. Out: the centres of the best balls, best first. A ball is a bright shell
+//! with a darker middle and darker surroundings, in three radii. It is correlated with the picture
+//! every 8 mm, and the local maxima are kept. Balls have no direction, which makes them a hundred
+//! times cheaper than cups; any hollow structure can match one.
 //!
-//! Guaranteed: the hinted centre is among the places. Not guaranteed: that the ventricle is,
-//! though it was among the first 60 in every simulated and clinical scan tried.
+//! Guaranteed: the hinted centre is among the places. Not guaranteed: that the ventricle is; it was
+//! among the first 60 in every simulated and clinical scan tried.
 
+use rayon::prelude::*;
+
+use super::cup::Moments;
+use super::hints::Hints;
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
-use crate::locate::cup::Moments;
-use crate::locate::localisation::{DISTINCT, Hints};
 use crate::mesh::shapes;
 use crate::progress::{Cancelled, Monitor};
 
-/// Distance of the places where hollow balls are tried, mm.
+/// Spacing of the places where hollow balls are tried, mm.
 const STRIDE: f64 = 8.0;
-/// Places that go on to the next step.
+/// Most places returned.
 const PLACES: usize = 60;
-/// A ball whose shell is darker than this share of the brightest value is nothing.
+/// Balls whose shell is darker than this share of the brightest value are left out.
 const FAINT: f64 = 0.08;
 
 /// Where hollow balls fit best: local maxima of their correlation, best first.
@@ -44,23 +46,26 @@ pub fn places(
         if n >= 1.0 { n as usize } else { 1 }
     });
     let least = (FAINT * brightest) as f32;
-    let mut row = Row::default();
-    for k in (0..nz).step_by(stride[2]) {
-        monitor.check()?;
-        for j in (0..ny).step_by(stride[1]) {
-            let place = |i: usize| field.to_patient(&Vec3::new(i as f64, j as f64, k as f64));
-            let admitted = |i: &usize| admitted(&place(*i), hints);
-            let asked: Vec<usize> = (0..nx).step_by(stride[0]).filter(admitted).collect();
-            let (Some(first), Some(last)) = (asked.first(), asked.last()) else {
-                continue;
-            };
-            let at = padded.index(*first, j, k);
-            row.correlate(&balls, &padded.values, at, 1 + last - first, least);
-            for i in &asked {
-                scores[i + nx * (j + ny * k)] = row.best[i - first];
+    let planes = scores.par_chunks_mut(nx * ny).enumerate();
+    planes
+        .step_by(stride[2])
+        .try_for_each_init(Row::default, |row, (k, plane)| {
+            monitor.check()?;
+            for j in (0..ny).step_by(stride[1]) {
+                let place = |i: usize| field.to_patient(&Vec3::new(i as f64, j as f64, k as f64));
+                let admitted = |i: &usize| hints.admit(&place(*i));
+                let asked: Vec<usize> = (0..nx).step_by(stride[0]).filter(admitted).collect();
+                let (Some(first), Some(last)) = (asked.first(), asked.last()) else {
+                    continue;
+                };
+                let at = padded.index(*first, j, k);
+                row.correlate(&balls, &padded.values, at, 1 + last - first, least);
+                for i in &asked {
+                    plane[i + nx * j] = row.best[i - first];
+                }
             }
-        }
-    }
+            Ok(())
+        })?;
     let mut maxima: Vec<(f32, Vec3)> = Vec::new();
     for k in 0..nz {
         for j in 0..ny {
@@ -78,17 +83,6 @@ pub fn places(
     let mut places: Vec<Vec3> = maxima.into_iter().map(|m| m.1).collect();
     places.extend(hints.centre);
     Ok(places)
-}
-
-fn admitted(p: &Vec3, hints: &Hints) -> bool {
-    let near = hints
-        .centre
-        .is_none_or(|centre| (p - centre).norm() <= DISTINCT);
-    let inside = hints
-        .region
-        .as_ref()
-        .is_none_or(|region| region.squared_distance(p) == 0.0);
-    near && inside
 }
 
 fn is_maximum(
@@ -112,7 +106,7 @@ fn is_maximum(
     true
 }
 
-/// The coarse picture with its border continued, so that every ball fits everywhere.
+/// The coarse picture, its border values continued so that every ball fits everywhere.
 struct Padded {
     shape: [usize; 3],
     margin: [usize; 3],
@@ -153,7 +147,7 @@ struct Ball {
     groups: [Vec<isize>; 3],
 }
 
-/// What the wall, the hollow and the outside of the ball show.
+/// Expected value of the shell, the middle and the outside of a ball, shell = 1.
 const EXPECTED: [f64; 3] = [1.0, 0.45, 0.3];
 /// Values above this share of the wall's mean are cut off.
 const CAP: f32 = 1.3;
@@ -185,8 +179,9 @@ impl Ball {
     }
 }
 
-/// Correlations of balls about neighbouring places in a row of the picture. A row is done at
-/// once because its places ask for neighbouring values: every offset is one run along memory.
+/// Correlations of balls about neighbouring places in a row of the picture. A whole row is
+/// computed at once because its places read neighbouring values: every offset is one run along
+/// memory.
 #[derive(Default)]
 struct Row {
     cap: Vec<f32>,
@@ -289,7 +284,7 @@ mod tests {
             ..PhantomParameters::default()
         };
         let scan = phantom(&parameters, &Monitor::silent()).expect("a usual phantom");
-        let mut field = Field::coarse(&scan.volume, 5.0, &Monitor::silent()).unwrap();
+        let mut field = Field::coarse(&scan.volume, None, 5.0, &Monitor::silent()).unwrap();
         field.blur(4.0, &Monitor::silent()).unwrap();
         let padded = Padded::new(&field);
         let balls = [22.0, 33.0].map(|radius| Ball::new(radius, &field, &padded));

@@ -1,27 +1,27 @@
 //! The connected parts of a volume at every threshold.
 //!
-//! A component tree (max-tree; Salembier, Oliveras & Garrido, IEEE TIP 1998) on some fifty
-//! levels, built by letting the threshold sink: voxels are sorted by level with a counting
-//! sort and united with their 6-neighbours (union-find). The tree itself is not kept; parts
-//! whose volume and spread are within bounds are offered as the threshold passes.
+//! A component tree (max-tree; Salembier, Oliveras & Garrido, IEEE TIP 1998) on some fifty levels,
+//! built by lowering a threshold: voxels are sorted by level with a counting sort and united with
+//! their 6-neighbours (union-find). The tree itself is not kept; parts whose volume and spread are
+//! within bounds are listed as the threshold passes.
 
+use super::grey_blocks::GreyBlocks;
 use crate::geometry::Vec3;
-use crate::locate::coarse::Coarse;
 use crate::progress::{Cancelled, Monitor};
 
 /// Ratio of neighbouring levels.
 const RATIO: f64 = 0.93;
 /// Number of levels: down to 4 % of the maximum.
 const LEVELS: usize = 44;
-/// The threshold stops sinking where more than this lies above it, mm³: twice a heart, liver
-/// and gut together. What follows is background.
+/// The threshold is not lowered further once more than this lies above it, mm³: twice a heart,
+/// liver and gut together. Below that is background.
 const MOST_ABOVE: f64 = 8e6;
-/// Volumes that are offered, mm³.
+/// Volumes of the parts listed, mm³.
 const VOLUMES: std::ops::Range<f64> = 15e3..500e3;
-/// Root-mean-square distances from the centroid that are offered, mm.
+/// Root-mean-square distances from the centroid of the parts listed, mm.
 const SPREADS: std::ops::Range<f64> = 12.0..55.0;
 
-/// A part is offered again once it has grown by this factor.
+/// A part is listed again once it has grown by this factor.
 const GROWN: f64 = 1.4;
 
 /// A connected part above a threshold.
@@ -39,36 +39,39 @@ struct Sums {
     count: f64,
     position: Vec3,
     square: f64,
-    /// Count when the part was last offered.
-    offered: f64,
+    /// Count when the part was last listed.
+    listed: f64,
 }
 
 /// The parts that could be a ventricle, from the highest threshold down.
 ///
 /// # Errors
 /// [`Cancelled`].
-pub fn parts(coarse: &Coarse, monitor: &Monitor) -> Result<Vec<Part>, Cancelled> {
-    let (order, ends) = sort_by_level(coarse);
-    let [nx, ny, nz] = coarse.shape;
+pub fn parts(blocks: &GreyBlocks, monitor: &Monitor) -> Result<Vec<Part>, Cancelled> {
+    if !(blocks.maximum > 0.0) {
+        return Ok(Vec::new());
+    }
+    let (order, ends) = sort_by_level(blocks);
+    let [nx, ny, nz] = blocks.shape;
     // The place in `order` of every voxel that the threshold has passed.
-    let mut rank = vec![u32::MAX; coarse.values.len()];
+    let mut rank = vec![u32::MAX; blocks.values.len()];
     let mut parent: Vec<u32> = (0..order.len() as u32).collect();
     let mut sums: Vec<Sums> = Vec::with_capacity(order.len());
     let mut roots: Vec<u32> = Vec::new();
-    let mut offered = Vec::new();
-    let voxel = coarse.spacing.iter().product::<f64>();
+    let mut listed = Vec::new();
+    let voxel = blocks.spacing.iter().product::<f64>();
     let mut begin = 0;
     for (level, &end) in ends.iter().enumerate() {
         monitor.check()?;
         for here in begin..end {
             let at = order[here] as usize;
             let (i, j, k) = (at % nx, at / nx % ny, at / (nx * ny));
-            let position = coarse.position([i, j, k]);
+            let position = blocks.position([i, j, k]);
             sums.push(Sums {
                 count: 1.0,
                 position,
                 square: position.norm_squared(),
-                offered: 0.0,
+                listed: 0.0,
             });
             rank[at] = here as u32;
             let mut neighbours = [usize::MAX; 6];
@@ -100,7 +103,7 @@ pub fn parts(coarse: &Coarse, monitor: &Monitor) -> Result<Vec<Part>, Cancelled>
         roots.retain(|&r| parent[r as usize] == r);
         for &r in &roots {
             let s = &mut sums[r as usize];
-            if !VOLUMES.contains(&(s.count * voxel)) || s.count < GROWN * s.offered {
+            if !VOLUMES.contains(&(s.count * voxel)) || s.count < GROWN * s.listed {
                 continue;
             }
             let centroid = s.position / s.count;
@@ -108,23 +111,23 @@ pub fn parts(coarse: &Coarse, monitor: &Monitor) -> Result<Vec<Part>, Cancelled>
                 .max(0.0)
                 .sqrt();
             if SPREADS.contains(&spread) {
-                s.offered = s.count;
-                offered.push(Part {
-                    level: f64::from(coarse.maximum) * RATIO.powi(level as i32 + 1),
+                s.listed = s.count;
+                listed.push(Part {
+                    level: f64::from(blocks.maximum) * RATIO.powi(level as i32 + 1),
                     centroid,
                 });
             }
         }
         begin = end;
     }
-    Ok(offered)
+    Ok(listed)
 }
 
 /// Voxels in order of falling level, and where each level ends.
-fn sort_by_level(coarse: &Coarse) -> (Vec<u32>, Vec<usize>) {
+fn sort_by_level(blocks: &GreyBlocks) -> (Vec<u32>, Vec<usize>) {
     // A fine linear table instead of a logarithm for each voxel.
     const STEPS: usize = 2048;
-    let scale = STEPS as f32 / coarse.maximum;
+    let scale = STEPS as f32 / blocks.maximum;
     let table: Vec<u8> = (0..=STEPS)
         .map(|step| {
             let share = (step as f64 + 0.5) / STEPS as f64;
@@ -132,13 +135,13 @@ fn sort_by_level(coarse: &Coarse) -> (Vec<u32>, Vec<usize>) {
         })
         .collect();
     let step_of = |v: f32| ((v * scale) as usize).min(STEPS);
-    let voxel = coarse.spacing.iter().product::<f64>();
+    let voxel = blocks.spacing.iter().product::<f64>();
     let floor = table
         .iter()
         .position(|&l| l < LEVELS as u8)
         .unwrap_or(STEPS);
     let floor = floor.max(lowest_step(
-        coarse,
+        blocks,
         STEPS,
         step_of,
         (MOST_ABOVE / voxel) as usize,
@@ -146,7 +149,7 @@ fn sort_by_level(coarse: &Coarse) -> (Vec<u32>, Vec<usize>) {
     let floor_value = floor as f32 / scale;
     let mut counts = vec![0; LEVELS + 1];
     let mut passed: Vec<(u32, u8)> = Vec::new();
-    for (at, &v) in coarse.values.iter().enumerate() {
+    for (at, &v) in blocks.values.iter().enumerate() {
         if v >= floor_value {
             let level = table[step_of(v)].min(LEVELS as u8 - 1);
             counts[level as usize + 1] += 1;
@@ -168,13 +171,13 @@ fn sort_by_level(coarse: &Coarse) -> (Vec<u32>, Vec<usize>) {
 
 /// The lowest step that no more than `most` voxels reach.
 fn lowest_step(
-    coarse: &Coarse,
+    blocks: &GreyBlocks,
     steps: usize,
     step_of: impl Fn(f32) -> usize,
     most: usize,
 ) -> usize {
     let mut histogram = vec![0usize; steps + 1];
-    for &v in coarse.values.iter().filter(|v| **v > 0.0) {
+    for &v in blocks.values.iter().filter(|v| **v > 0.0) {
         histogram[step_of(v)] += 1;
     }
     let mut above = 0;
@@ -202,5 +205,5 @@ fn unite(parent: &mut [u32], sums: &mut [Sums], a: u32, b: u32) {
     kept.count += joined.count;
     kept.position += joined.position;
     kept.square += joined.square;
-    kept.offered = kept.offered.max(joined.offered);
+    kept.listed = kept.listed.max(joined.listed);
 }

@@ -1,10 +1,10 @@
-//! The left ventricle as a cup: the picture that the search compares with.
+//! The left ventricle as a cup: the shape that the search compares the picture with.
 //!
 //! A surface of revolution about the long axis. Radii are those of the blurred wall's middle
 //! as shares of the length from the base plane to the outer apex, the mean of 19 simulated
 //! hearts (`lv_apparent` of the cohort; standard deviation 0.02 to 0.04 of the length).
-//! [`Cup::match_score`] asks a [`Field`] along the wall, in the cavity and outside and
-//! correlates the answers with what a ventricle shows there.
+//! [`Cup::match_score`] samples a [`Field`] along the wall, in the cavity and outside and
+//! correlates the samples with those of a healthy ventricle.
 
 use std::f64::consts::TAU;
 
@@ -12,7 +12,7 @@ use crate::geometry::Vec3;
 use crate::grid::field::Field;
 
 /// Middle of the wall: (share of the length behind the base plane, share as radius).
-const MIDDLE: [(f64, f64, usize); 6] = [
+pub(super) const MIDDLE: [(f64, f64, usize); 6] = [
     (0.05, 0.350, 12),
     (0.22, 0.350, 12),
     (0.40, 0.345, 12),
@@ -22,22 +22,20 @@ const MIDDLE: [(f64, f64, usize); 6] = [
 ];
 
 /// Where the middle of the wall crosses the axis at the apex.
-const APEX: f64 = 0.91;
+pub(super) const APEX: f64 = 0.91;
 
 /// Rings up to this share of the length are basal: segments 1 to 6 and most of 7 to 12.
 const BASAL: f64 = 0.6;
-/// This share of the length before the base plane the wall has come to its end.
+/// The wall has ended at this share of the length before the base plane.
 const BEYOND: f64 = 0.18;
-/// Breadth of cups whose length is not seen: the mean of those found in simulated hearts.
-const USUAL_BREADTH: f64 = 1.08;
 
 /// The point on the axis about which poses turn and scale.
-const CENTRE: f64 = 0.45;
+pub(super) const CENTRE: f64 = 0.45;
 
-/// A place of the cup in the patient.
+/// Place, direction and size of a left ventricle in the patient.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cup {
-    /// Point on the axis in the midst of the cavity, LPS mm.
+    /// Point on the axis in the middle of the cavity, LPS mm.
     pub centre: Vec3,
     /// Unit vector from base to apex.
     pub axis: Vec3,
@@ -47,7 +45,7 @@ pub struct Cup {
     pub breadth: f64,
 }
 
-/// One question to the image.
+/// One sample of the image.
 #[derive(Clone, Copy)]
 struct Sample {
     /// Share of the length along the axis, from the centre towards the apex.
@@ -64,7 +62,7 @@ struct Sample {
     weight: f64,
 }
 
-/// The questions, made once.
+/// The samples of a cup of unit size, and what they are expected to show.
 pub struct Pattern(Vec<Sample>);
 
 /// What the wall, the cavity and the surroundings of a healthy heart show, wall = 1.
@@ -74,7 +72,7 @@ const OUTSIDE: f64 = 0.25;
 const CLEARANCE: f64 = 17.0;
 
 impl Default for Pattern {
-    /// Lays the samples out.
+    /// All samples of wall, cavity and surroundings.
     fn default() -> Self {
         let mut samples = Vec::new();
         for (row, &(along, across, count)) in MIDDLE.iter().enumerate() {
@@ -138,8 +136,8 @@ impl Default for Pattern {
 }
 
 impl Pattern {
-    /// What the basal half shows: the wall's rings, their cavity and surroundings, and the end of
-    /// the wall at the base. For hearts whose apex does not show.
+    /// The samples of the basal half: the wall's rings, their cavity and surroundings, and the end
+    /// of the wall at the base. For hearts whose apex does not show.
     pub fn basal() -> Self {
         let basal = |s: &Sample| s.along + CENTRE < BASAL;
         let mut samples = Self::default().0;
@@ -158,7 +156,7 @@ impl Pattern {
     }
 }
 
-/// `count` copies of `at` round the axis; odd rows stand in the gaps of the even ones.
+/// Appends `count` copies of `at` round the axis; odd rows lie in the gaps of the even ones.
 fn ring(samples: &mut Vec<Sample>, count: usize, row: usize, at: &Sample) {
     let stagger = 0.5 * (row % 2) as f64;
     samples.extend((0..count).map(|step| {
@@ -188,8 +186,8 @@ impl Cup {
     }
 
     /// Weighted correlation, -1..=1, of the image with a ventricle at this place. Hot
-    /// neighbours are cut off at 1.3 times the wall's mean, so that they cannot outshout
-    /// the wall.
+    /// neighbours are cut off at 1.3 times the wall's mean, so that they do not dominate the
+    /// correlation.
     pub fn match_score(&self, pattern: &Pattern, field: &Field, scratch: &mut Vec<f64>) -> Match {
         let (e1, e2) = perpendicular(&self.axis);
         let centre = field.to_index(&self.centre);
@@ -222,50 +220,9 @@ impl Cup {
         }
     }
 
-    /// The cup of the same base and radius that is as long as hearts of this radius are.
-    pub fn in_proportion(&self) -> Self {
-        let length = self.length * self.breadth / USUAL_BREADTH;
-        Self {
-            centre: self.base() + self.axis * (CENTRE * length),
-            length,
-            breadth: USUAL_BREADTH,
-            ..*self
-        }
-    }
-
-    /// Uptake of the apical wall (segments 13 to 17) against that of the brighter half of the
-    /// basal rings: the median of the ridges on rays from the cavity through it. A ridge nearer
-    /// or farther than the cup's own wall is found as well; the median lets no organ that
-    /// touches the heart somewhere pass for the wall.
-    pub fn apex_uptake(&self, field: &Field) -> f64 {
-        let (e1, e2) = perpendicular(&self.axis);
-        let place = |along: f64, across: Vec3| {
-            self.axis * ((along - CENTRE) * self.length) + across * (self.length * self.breadth)
-        };
-        let ring = |&(along, radius, count): &(f64, f64, usize)| -> Vec<Vec3> {
-            let angles = (0..count).map(|n| TAU * n as f64 / count as f64);
-            angles
-                .map(|a| place(along, (e1 * a.cos() + e2 * a.sin()) * radius))
-                .collect()
-        };
-        let ridge = |p: Vec3| {
-            let far = (12..=24).map(|n| field.at(&(self.centre + p * (0.05 * f64::from(n)))));
-            far.fold(f64::NEG_INFINITY, f64::max)
-        };
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        let tip = place(APEX, Vec3::zeros());
-        let apical = MIDDLE[4..].iter().flat_map(ring).chain([tip]).map(ridge);
-        let mut apical: Vec<f64> = apical.collect();
-        apical.sort_by(f64::total_cmp);
-        let basal = MIDDLE[..3].iter().flat_map(ring);
-        let mut basal: Vec<f64> = basal.map(|p| field.at(&(self.centre + p))).collect();
-        basal.sort_by(f64::total_cmp);
-        apical[apical.len() / 2] / mean(&basal[basal.len() / 2..])
-    }
-
     /// How bright it is across the base, wall = 1: the brightest of the discs about the axis
     /// from 0.3 of the length behind the base plane to 0.2 before it. A ventricle is open
-    /// there (blood, atrium, lung); a stomach, a skull or a ball is closed.
+    /// there (blood, atrium, lung); a stomach, a skull or a ball is closed there.
     pub fn lid(&self, field: &Field, wall: f64) -> f64 {
         let (e1, e2) = perpendicular(&self.axis);
         let disc = |along: f64| {
@@ -283,7 +240,7 @@ impl Cup {
     }
 }
 
-/// A weighted mean on the way.
+/// Running sums of a weighted mean.
 #[derive(Default)]
 struct Mean {
     sum: f64,
@@ -324,7 +281,7 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Takes one pair in.
+    /// Adds one pair.
     pub fn add(&mut self, w: f64, x: f64, y: f64) {
         self.w += w;
         self.x += w * x;
@@ -334,8 +291,8 @@ impl Moments {
         self.yy += w * y * y;
     }
 
-    /// Takes many pairs with the same `x` in, whose weights sum to 1, by the mean of their `y`
-    /// and of its square.
+    /// Adds many pairs with the same `x`, whose weights sum to 1, by the mean of their `y` and of
+    /// its square.
     pub fn add_group(&mut self, x: f64, mean: f64, square: f64) {
         self.w += 1.0;
         self.x += x;

@@ -1,34 +1,35 @@
 //! Which way is up in the patient: the body's long axis, read off its outline.
 //!
-//! Segments are counted from the patient's superior direction. The volume's frame says where
-//! that is, but a patient may lie askew in it, and so does every image that was turned. A
-//! torso is nearly a cylinder: its skin runs along the long axis, and where the camera's
-//! field of view ends it is cut across. In go a volume and a point in the heart; out comes a
-//! [`Posture`].
+//! Segments are counted from the patient's superior direction. The volume's frame defines one, but
+//! a patient may lie askew in it, and an image may have been rotated. A torso is nearly a cylinder:
+//! its skin runs along the long axis, and the end of the camera's field of view cuts it across.
+//!
+//! In: a volume and a point in the heart. Out: a [`PatientOrientation`].
 //!
 //! 1. A coarse picture of the whole volume, blurred. The body is what is connected with the
 //!    heart's surroundings above a share of their median, its holes (lungs, blood) filled.
 //! 2. The normals u of its outline: gradients of the blurred mask, weighted by their squares.
 //! 3. The direction d with the least mean of sin²(2φ), φ the angle between u and d. It is 0
 //!    for skin along d and for cuts across it, 8/15 for normals in all directions alike.
-//!    With c = u·d it is 4 (c² - c⁴), so the second and fourth moments of u say it for all d
+//!    With c = u·d it is 4 (c² - c⁴), so the second and fourth moments of u give it for all d
 //!    at once (a structure tensor of fourth order).
-//! 4. A weak pull to the frame's superior settles what the outline leaves open.
+//! 4. A weak pull to the frame's superior direction decides where the outline is ambiguous.
 //!
-//! Over 19 simulated scans the answer is the frame's within 2 degrees, and with the image turned
-//! by 15 and 30 degrees about x, y and z it turns along within 3.1 degrees (median 0.5). Where less
-//! than [`LEAST_BODY`] of body is in view, or its outline is no cylinder's ([`DISORDER`]), or the
-//! answer is more than [`CONE`] degrees away, the frame's superior is taken. Not seen: a turn by
-//! more than that, and a patient lying head down in a frame that denies it.
+//! Over 19 simulated scans the answer is within 2 degrees of the frame's. With the image rotated by
+//! 15 and 30 degrees about x, y and z, it follows within 3.1 degrees (median 0.5). The frame's
+//! superior direction is taken if less than [`LEAST_BODY`] of the body is in view, if its outline
+//! is no cylinder's ([`DISORDER`]), or if the answer is more than [`CONE`] degrees away. Not
+//! detected: a rotation by more than that, and a patient lying head down in a frame that says
+//! otherwise.
 
 use nalgebra::{Rotation3, SMatrix, Vector6};
 
+use super::cup::perpendicular;
 use crate::geometry::Vec3;
 use crate::grid::components::Components;
 use crate::grid::field::Field;
 use crate::grid::labels::Labels;
 use crate::grid::volume::Volume;
-use crate::locate::cup::perpendicular;
 use crate::progress::{Cancelled, Monitor};
 
 /// Voxels of the coarse picture, mm.
@@ -52,7 +53,7 @@ pub const CONE: f64 = 45.0;
 /// Pull to the frame's superior, in the measure of the mean of sin²(2φ).
 const PULL: f64 = 0.05;
 
-/// From where segments are counted.
+/// Which superior direction segments are counted from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Superior {
     /// From the superior end of the body's outline where it is seen, else from the frame's.
@@ -63,16 +64,16 @@ pub enum Superior {
 
 /// The patient's superior direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Posture {
+pub struct PatientOrientation {
     /// Unit vector, LPS.
     pub superior: Vec3,
-    /// What says so.
+    /// What it was read from.
     pub source: Superior,
-    /// 0 (the frame's word alone) to 1 (the outline is a cylinder's).
+    /// 0 (taken from the frame) to 1 (the outline is a cylinder's).
     pub confidence: f64,
 }
 
-impl Posture {
+impl PatientOrientation {
     /// The superior direction of the frame.
     pub const FRAME: Self = Self {
         superior: Vec3::new(0.0, 0.0, 1.0),
@@ -96,10 +97,10 @@ impl Posture {
     /// # Errors
     /// [`Cancelled`].
     pub fn of_body(volume: &Volume, heart: &Vec3, monitor: &Monitor) -> Result<Self, Cancelled> {
-        let mut field = Field::coarse(volume, COARSE, monitor)?;
+        let mut field = Field::coarse(volume, None, COARSE, monitor)?;
         monitor.check()?;
         field.blur(BLUR, monitor)?;
-        let Some(body) = Body::around(&field, heart) else {
+        let Some(body) = Torso::around(&field, heart) else {
             return Ok(Self::FRAME);
         };
         monitor.check()?;
@@ -123,12 +124,12 @@ impl Posture {
 }
 
 /// The voxels of the body, 1, among others, 0.
-struct Body {
+struct Torso {
     mask: Vec<f32>,
     litres: f64,
 }
 
-impl Body {
+impl Torso {
     fn around(field: &Field, heart: &Vec3) -> Option<Self> {
         let shape = field.shape();
         let [nx, ny, _] = shape;
@@ -182,7 +183,7 @@ struct Outline {
 }
 
 impl Outline {
-    /// Of the blurred mask. At the volume's border nothing is known of what lies beyond.
+    /// Of the blurred mask, without the volume's border: what lies beyond it is unknown.
     fn of(mask: &Field) -> Self {
         let [nx, ny, nz] = mask.shape();
         let f = mask.values();
@@ -283,9 +284,9 @@ mod tests {
 
     const HEART: [f64; 3] = [40.0, -30.0, -20.0];
 
-    fn seen(volume: &Volume, turn: &Rotation3<f64>) -> Posture {
+    fn seen(volume: &Volume, turn: &Rotation3<f64>) -> PatientOrientation {
         let heart = turn * Vec3::from(HEART);
-        Posture::of_body(volume, &heart, &Monitor::silent()).unwrap()
+        PatientOrientation::of_body(volume, &heart, &Monitor::silent()).unwrap()
     }
 
     #[test]
@@ -301,26 +302,26 @@ mod tests {
             [-18.0, 16.0, 14.0],
         ] {
             let turn = Rotation3::from_scaled_axis(Vec3::from(lean.map(f64::to_radians)));
-            let posture = seen(&torso(&turn, 480.0), &turn);
-            assert_eq!(posture.source, Superior::Body, "{lean:?}");
+            let orientation = seen(&torso(&turn, 480.0), &turn);
+            assert_eq!(orientation.source, Superior::Body, "{lean:?}");
             let up = turn * Vec3::z();
-            let off = posture.superior.angle(&up).to_degrees();
+            let off = orientation.superior.angle(&up).to_degrees();
             assert!(off < 3.0, "{lean:?}: off by {off}");
-            assert!((posture.turn() * Vec3::z() - posture.superior).norm() < 1e-9);
+            assert!((orientation.turn() * Vec3::z() - orientation.superior).norm() < 1e-9);
         }
     }
 
     #[test]
-    fn the_frame_is_believed_where_too_little_of_the_body_is_in_view() {
+    fn the_frame_decides_where_too_little_of_the_body_is_in_view() {
         let turn = Rotation3::from_scaled_axis(Vec3::new(0.4, 0.0, 0.0));
-        assert_eq!(seen(&torso(&turn, 180.0), &turn), Posture::FRAME);
+        assert_eq!(seen(&torso(&turn, 180.0), &turn), PatientOrientation::FRAME);
         let mut nothing = torso(&turn, 180.0);
         nothing.voxels.fill(0.0);
-        assert_eq!(seen(&nothing, &turn), Posture::FRAME);
+        assert_eq!(seen(&nothing, &turn), PatientOrientation::FRAME);
         nothing.voxels.fill(f32::NAN);
-        assert_eq!(seen(&nothing, &turn), Posture::FRAME);
+        assert_eq!(seen(&nothing, &turn), PatientOrientation::FRAME);
         nothing.voxels.fill(1.0);
-        assert_eq!(seen(&nothing, &turn), Posture::FRAME);
+        assert_eq!(seen(&nothing, &turn), PatientOrientation::FRAME);
         // A heart in the dark.
         let volume = torso(&turn, 480.0);
         let heart = turn * Vec3::from(HEART);
@@ -329,8 +330,9 @@ mod tests {
             .voxels
             .iter_mut()
             .for_each(|v| *v *= f32::from(u8::from(*v == 10.0)));
-        let far = Posture::of_body(&alone, &(heart + Vec3::repeat(1e6)), &Monitor::silent());
-        assert_eq!(far.unwrap(), Posture::FRAME);
-        assert_eq!(seen(&alone, &turn), Posture::FRAME);
+        let far =
+            PatientOrientation::of_body(&alone, &(heart + Vec3::repeat(1e6)), &Monitor::silent());
+        assert_eq!(far.unwrap(), PatientOrientation::FRAME);
+        assert_eq!(seen(&alone, &turn), PatientOrientation::FRAME);
     }
 }

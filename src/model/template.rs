@@ -13,8 +13,7 @@ use crate::grid::Volume;
 use crate::grid::field::Field;
 use crate::grid::voxelise::voxelise;
 use crate::locate::cup::Cup;
-use crate::locate::localisation as localise;
-use crate::locate::localisation::Hints;
+use crate::locate::{LocateError, localisation};
 use crate::mesh::TriMesh;
 use crate::mesh::topology::{self, MeshDefect};
 use crate::progress::{Cancelled, Monitor};
@@ -139,19 +138,17 @@ fn cup_of(mesh: &TriMesh, monitor: &Monitor) -> Result<Cup, TemplateError> {
         frame,
         integral: false,
     };
-    match localise::localise(&picture, &Hints::default(), monitor) {
+    match localisation::of_model(&picture, monitor) {
         Ok(found) if found.correlation > 0.6 => {
-            let mut sharper = Field::coarse(&picture, SPACING, monitor)?;
+            let mut sharper = Field::coarse(&picture, None, SPACING, monitor)?;
             sharper.blur(5.5, monitor)?;
-            Ok(localise::refine(&sharper, &found.cup).cup)
+            Ok(localisation::refine(&sharper, &found.cup))
         }
         Ok(found) => Err(TemplateError::NoCup {
             correlation: found.correlation,
         }),
-        Err(localise::LocaliseError::NoHeart { correlation, .. }) => {
-            Err(TemplateError::NoCup { correlation })
-        }
-        Err(localise::LocaliseError::Cancelled(c)) => Err(c.into()),
+        Err(LocateError::NoHeart { correlation, .. }) => Err(TemplateError::NoCup { correlation }),
+        Err(LocateError::Cancelled(c)) => Err(c.into()),
         Err(_) => Err(none),
     }
 }

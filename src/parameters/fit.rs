@@ -4,7 +4,7 @@ use super::ParameterError;
 use crate::deform::DeformParameters;
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
-use crate::locate::localisation::Hints;
+use crate::locate::Hints;
 use crate::model::Organ;
 use crate::polar::PolarParameters;
 use crate::volume::Volume;

@@ -3,7 +3,7 @@
 use super::expert_mask::ExpertMaskError;
 use crate::deform::DeformError;
 use crate::export::read_json::ReadMeshError;
-use crate::locate::localisation::LocaliseError;
+use crate::locate::LocateError;
 use crate::model::TemplateError;
 use crate::parameters::ParameterError;
 use crate::progress::Cancelled;
@@ -62,7 +62,7 @@ pub enum SegmentationError {
     ExpertMask(ExpertMaskError),
     /// The organ is not found in the volume.
     #[error(transparent)]
-    NotFound(LocaliseError),
+    NotFound(LocateError),
     /// No model could be fitted: the first one's error, if it is not that the organ is not found.
     #[error(transparent)]
     Fit(DeformError),
@@ -91,7 +91,7 @@ impl From<DeformError> for SegmentationError {
     fn from(error: DeformError) -> Self {
         match error {
             DeformError::Cancelled(cancelled)
-            | DeformError::Localise(LocaliseError::Cancelled(cancelled)) => cancelled.into(),
+            | DeformError::Localise(LocateError::Cancelled(cancelled)) => cancelled.into(),
             DeformError::Localise(error) => SegmentationError::NotFound(error),
             error => SegmentationError::Fit(error),
         }

@@ -75,6 +75,9 @@ pub enum SurfaceError {
         /// Last voxel given.
         last: [usize; 3],
     },
+    /// The hinted centre or region leaves no place to search.
+    #[error("the hinted centre or region lies outside the volume")]
+    HintOutside,
     /// The seed's voxel is below the iso-value.
     #[error("isolate: the seed {seed:?} has the value {value}, below the iso-value {iso}")]
     SeedOutside {

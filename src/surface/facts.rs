@@ -1,4 +1,4 @@
-//! What was seen and changed on the way from a volume to its surface.
+//! Facts about a volume and the changes made on the way to its surface.
 
 /// What the volume holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -12,7 +12,7 @@ pub enum VolumeKind {
     Labels,
 }
 
-/// What [`extract`](super::extract) saw and did; goes into the report.
+/// What [`extract`](super::extract) found and changed; part of the report.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SurfaceFacts {
     /// The iso-value used, in the volume's units (for masks: level of the smoothed mask, 0..1).

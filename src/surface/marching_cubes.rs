@@ -10,7 +10,7 @@
 //! Lorensen & Cline (1987), organised like Flying Edges (Schroeder, Maynard & Geveci, LDAV
 //! 2015): a first pass over rows counts crossed edges and triangles, a prefix sum gives every
 //! row its place in the output, a second pass writes. Labels are bits, so that 64 cells are
-//! dismissed at once. A vertex belongs to the row in which its edge begins; rows are numbered
+//! skipped at once. A vertex belongs to the row in which its edge begins; rows are numbered
 //! along x-, then y-, then z-edges. Hence vertices are welded by construction and the result
 //! does not depend on the number of threads.
 
@@ -63,7 +63,7 @@ pub struct TooManyVertices {
 /// Why there is no mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum MarchingCubesError {
-    /// Asked to stop.
+    /// The caller cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
     /// See [`TooManyVertices`].
@@ -255,7 +255,7 @@ fn write_vertices(
     }
 }
 
-/// All that places a vertex on its edge.
+/// What determines a vertex's place on its edge.
 struct Placement<'a> {
     samples: &'a Samples<'a>,
     iso: f32,
@@ -294,7 +294,7 @@ impl<'a> Placement<'a> {
             // In f64: the difference of two large f32 may overflow.
             let f0 = f64::from(f0);
             let t = (f64::from(self.iso) - f0) / (f64::from(f1) - f0);
-            // An infinite sample leaves no ratio; the middle is as good as any place.
+            // An infinite sample leaves no ratio: take the middle.
             if t.is_finite() {
                 return (t as f32).clamp(CLAMP, 1.0 - CLAMP);
             }

@@ -1,13 +1,13 @@
 //! From voxels to a closed triangle surface of the wall.
 //!
 //! In: a [`Volume`] of intensities or labels. Out: a [`Surface`]: closed, oriented, manifold,
-//! LPS millimetres, and [`SurfaceFacts`] about everything that was seen and changed.
+//! LPS millimetres, and [`SurfaceFacts`] about the volume and every change made.
 //!
 //! 1. [`survey`](mod@crate::grid::survey): range, missing values, label map or intensities.
-//! 2. Region ([`object`]). Intensities ([`intensity`]): the left ventricle is searched
-//!    ([`crate::locate`]) and cut from its neighbours
-//!    ([`region`]), or taken as asked for. Labels: the mask is made grey ([`masks`]).
-//! 3. Iso-value: half the wall's reference intensity unless asked otherwise.
+//! 2. Region ([`select`]). Intensities ([`intensity`]): the left ventricle is searched
+//!    ([`crate::locate`]) and cut from its neighbours ([`region`]), or a part is taken as asked
+//!    for. Labels ([`label`]): the mask is made grey ([`masks`]).
+//! 3. Iso-value ([`iso_value`]): half the wall's reference intensity unless asked otherwise.
 //! 4. [`topology_control`]: one component without cavities and handles.
 //! 5. [`marching_cubes`] (with its generated [`table`]) on [`labels`](crate::grid::labels).
 //! 6. [`smoothing`]: the smoothed twin for geodesics and curvature.
@@ -15,17 +15,20 @@
 //! Guaranteed: the mesh is a closed, oriented 2-manifold; with [`TopologyMode::Genus0`] it is a
 //! sphere; vertices lie at the linear crossings of the iso-value except where voxels were cut
 //! or filled (there in the middle of the edge) and within 0.05 voxel of an edge's ends; the
-//! same bytes on any number of threads. Not guaranteed: that a doubtful ventricle is the right
-//! one - `facts.ventricle_score` and the warnings say how sure the search is.
+//! same bytes on any number of threads. Not guaranteed: that a doubtful ventricle is the right one;
+//! `facts.ventricle_score` and the warnings say how sure the search is.
 
 mod error;
 mod facts;
 mod intensity;
+mod iso_value;
+mod label;
 pub mod marching_cubes;
 pub mod masks;
 mod object;
 mod parameters;
 pub mod region;
+mod select;
 pub mod smoothing;
 pub mod table;
 pub mod topology_control;
@@ -44,7 +47,7 @@ use marching_cubes::Samples;
 use object::Object;
 pub use parameters::{IsoLevel, Isolate, SurfaceParameters, TopologyMode};
 
-/// A closed, oriented surface in patient space and what was done to get it.
+/// A closed, oriented surface in patient space and how it was made.
 #[derive(Debug, Clone)]
 pub struct Surface {
     /// The reference surface S: LPS millimetres, closed manifold, facing outward.
@@ -54,7 +57,7 @@ pub struct Surface {
     pub working: Vec<Vec3>,
     /// Smallest voxel spacing, mm.
     pub spacing: f64,
-    /// What was seen and changed on the way.
+    /// About the volume and the changes made.
     pub facts: SurfaceFacts,
 }
 
@@ -73,10 +76,10 @@ impl Surface {
 
 /// Passes of Taubin's smoothing that make the working surface.
 const WORKING_PASSES: usize = 15;
-/// Passes that take the rest of the staircase off a mask's surface.
+/// Passes that smooth the rest of the staircase off a mask's surface.
 const MASK_PASSES: usize = 10;
 /// Share of the region's voxels from which a change of topology is warned of.
-const MUCH: f64 = 0.02;
+const LARGE_CHANGE: f64 = 0.02;
 
 /// Extracts the surface.
 ///
@@ -91,7 +94,7 @@ pub fn extract(
     parameters.check(volume)?;
     let survey = crate::grid::survey::survey(volume, monitor)?;
     let mut facts = SurfaceFacts::default();
-    let mut object = object::select(volume, parameters, &survey, &mut facts, monitor)?;
+    let mut object = select::select(volume, parameters, &survey, &mut facts, monitor)?;
     monitor.report(Stage::Surface, 0.5)?;
     control_topology(&mut object, parameters.topology, &mut facts, monitor)?;
     monitor.report(Stage::Surface, 0.7)?;
@@ -126,7 +129,7 @@ pub fn extract(
     Ok(surface)
 }
 
-/// Takes any closed, oriented manifold over as a surface.
+/// Makes a surface of any closed, oriented manifold.
 ///
 /// `spacing` (mm) is the voxel size that tolerances refer to.
 ///
@@ -180,7 +183,7 @@ fn beyond(iso: f32, survey: &Survey, is_mask: bool) -> f32 {
     }
     let range = survey.maximum - survey.minimum;
     let value = iso - range;
-    // A range that is lost against the iso-value, or no f32 at all, still needs a value below.
+    // The range may vanish against the iso-value or overflow f32; a value below is still needed.
     if value.is_finite() && value < iso {
         value
     } else {
@@ -239,9 +242,9 @@ fn warn_of_topology(facts: &mut SurfaceFacts, largest: usize) {
         facts.voxels_filled,
         100.0 * share
     );
-    facts.warnings.push(if share > MUCH {
+    facts.warnings.push(if share > LARGE_CHANGE {
         format!(
-            "{what}: THIS IS MUCH. The object may truly have handles or cavities; topology: keep retains them, another iso-value may avoid them"
+            "{what}: this is a large change. The object may truly have handles or cavities; topology: keep retains them, another iso-value may avoid them"
         )
     } else {
         what

@@ -1,13 +1,14 @@
-//! What decides the surface that comes out of a volume.
+//! Parameters of the surface's extraction.
 
 use super::SurfaceError;
+use crate::locate::Hints;
 use crate::volume::Volume;
 
 /// How the iso-value is chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum IsoLevel {
-    /// The region's own choice: a fraction of the ventricle's maximum that does not merge it
-    /// with its neighbours; for masks the level that keeps their volume.
+    /// Half the ventricle's reference intensity, or another fraction near by where that tears the
+    /// wall or closes the cavity; for masks the level that keeps their volume.
     Auto,
     /// A fraction (0, 1) of the ventricle's reference maximum.
     Fraction(f64),
@@ -32,12 +33,13 @@ pub enum Isolate {
     Label(i64),
 }
 
-/// What becomes of handles, cavities and further components.
+/// How handles, cavities and further components are treated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TopologyMode {
-    /// Make one component without handles or cavities (a digital ball) and say what it took.
+    /// Remove them, so that one component without handles or cavities remains (a digital ball), and
+    /// report the changes.
     Genus0,
-    /// Leave everything as the iso-surface has it.
+    /// Keep them.
     Keep,
 }
 
@@ -48,6 +50,8 @@ pub struct SurfaceParameters {
     pub iso: IsoLevel,
     /// Default [`Isolate::Auto`].
     pub isolate: Isolate,
+    /// What is known of the ventricle's place, for [`Isolate::Auto`]. Default: nothing.
+    pub hints: Hints,
     /// Default [`TopologyMode::Genus0`].
     pub topology: TopologyMode,
     /// Gaussian sigma in voxels that smooths binary masks before surfacing, 0..=3. Default
@@ -60,6 +64,7 @@ impl Default for SurfaceParameters {
         Self {
             iso: IsoLevel::Auto,
             isolate: Isolate::Auto,
+            hints: Hints::default(),
             topology: TopologyMode::Genus0,
             mask_smoothing: 0.8,
         }
@@ -67,10 +72,10 @@ impl Default for SurfaceParameters {
 }
 
 impl SurfaceParameters {
-    /// Checks the numbers, also against the volume.
+    /// Checks the parameters against their ranges and the volume.
     ///
     /// # Errors
-    /// The first one that cannot be used.
+    /// The first one out of range.
     pub(super) fn check(&self, volume: &Volume) -> Result<(), SurfaceError> {
         let bad_iso = |value, expected| Err(SurfaceError::BadIso { value, expected });
         match self.iso {

@@ -1,14 +1,14 @@
 //! The ventricle's voxels at the iso-value, cut from its neighbours.
 //!
-//! In: the place of the ventricle ([`crate::locate::cavity`]) and the voxels. Out: its labels
+//! In: the place of the ventricle ([`crate::locate::rays::Cavity`]) and the voxels. Out: its labels
 //! at full resolution, and the reference intensity that fractions refer to.
 //!
 //! 1. The reference is the 98th percentile of the wall's voxels above 0.3 of its maximum (not
 //!    the single hottest voxel).
 //! 2. The component at the iso-value that holds most of the wall is taken.
 //! 3. Where it reaches more than 24 mm beyond the middle of the wall, it has leaked into a
-//!    neighbour. A watershed from two markers, the wall and everything that far out, sinks
-//!    from bright to dark and meets in the valley between them (Vincent & Soille, PAMI 1991;
+//!    neighbour. A watershed from two markers, the wall and everything that far out, floods
+//!    from bright to dark and separates them along the valley between them (Vincent & Soille, PAMI 1991;
 //!    marker flooding after Meyer 1994).
 
 use std::collections::BinaryHeap;
@@ -18,22 +18,23 @@ use rayon::prelude::*;
 use crate::geometry::Vec3;
 use crate::grid::components::Components;
 use crate::grid::labels::Labels;
-use crate::locate::cavity::{Compass, Ventricle};
+use crate::locate::directions::Compass;
+use crate::locate::rays::Cavity;
 use crate::progress::{Cancelled, Monitor};
 use crate::volume::Volume;
 
-/// Beyond this distance behind the middle of the wall nothing is ventricle, mm.
+/// Greatest distance of the ventricle's voxels outward from the middle of the wall, mm.
 const OUTER: f64 = 24.0;
-/// Within this distance of the middle a voxel is the wall's own, mm.
+/// Voxels within this distance of the middle of the wall belong to its core, mm.
 const CORE: f64 = 8.0;
 /// The same for the search of the reference, mm.
 const WALL: f64 = 12.0;
 
-/// The ventricle in a box of the volume.
+/// The wall about a cavity, in a box of the volume that holds it.
 #[derive(Debug, Clone)]
-pub struct Wall<'a> {
+pub struct WallShell<'a> {
     volume: &'a Volume,
-    ventricle: &'a Ventricle,
+    cavity: &'a Cavity,
     compass: Compass,
     spacing: [f64; 3],
     origin: [usize; 3],
@@ -47,7 +48,7 @@ pub struct Wall<'a> {
 pub struct Region {
     /// The ventricle's voxels.
     pub labels: Labels,
-    /// Voxels given to a neighbour that touches at the iso-value.
+    /// Voxels cut off with a neighbour that touches at the iso-value.
     pub cut_voxels: usize,
     /// Area of the cut, mm².
     pub cut_area: f64,
@@ -69,7 +70,7 @@ impl Region {
     }
 }
 
-/// Where a voxel lies against the wall.
+/// Where a voxel lies with respect to the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Zone {
     Core,
@@ -77,24 +78,22 @@ enum Zone {
     Beyond,
 }
 
-impl<'a> Wall<'a> {
+impl<'a> WallShell<'a> {
     /// Measures the wall's intensity.
-    pub fn new(volume: &'a Volume, ventricle: &'a Ventricle) -> Self {
+    pub fn new(volume: &'a Volume, cavity: &'a Cavity) -> Self {
         let spacing = volume.frame.spacing();
-        let reach = ventricle.distances.iter().copied().fold(0.0, f64::max) + OUTER + 6.0;
+        let reach = cavity.distances.iter().copied().fold(0.0, f64::max) + OUTER + 6.0;
         let mut origin = [0; 3];
         let mut extent = [0; 3];
         for r in 0..3 {
-            let low = ((ventricle.centre[r] - reach) / spacing[r])
-                .floor()
-                .max(0.0) as usize;
-            let high = ((ventricle.centre[r] + reach) / spacing[r]).ceil().max(0.0) as usize + 1;
+            let low = ((cavity.centre[r] - reach) / spacing[r]).floor().max(0.0) as usize;
+            let high = ((cavity.centre[r] + reach) / spacing[r]).ceil().max(0.0) as usize + 1;
             origin[r] = low.min(volume.shape[r] - 1);
             extent[r] = high.clamp(origin[r] + 1, volume.shape[r]) - origin[r];
         }
         let mut wall = Self {
             volume,
-            ventricle,
+            cavity,
             compass: Compass::new(),
             spacing,
             origin,
@@ -114,12 +113,12 @@ impl<'a> Wall<'a> {
     /// (negative towards the cavity), and whether the wall was seen there.
     fn depth(&self, p: [usize; 3]) -> (f64, bool) {
         let offset = Vec3::from_fn(|r, _| {
-            (p[r] + self.origin[r]) as f64 * self.spacing[r] - self.ventricle.centre[r]
+            (p[r] + self.origin[r]) as f64 * self.spacing[r] - self.cavity.centre[r]
         });
         let n = self.compass.nearest(&offset);
         (
-            offset.norm() - self.ventricle.distances[n],
-            self.ventricle.seen[n],
+            offset.norm() - self.cavity.distances[n],
+            self.cavity.seen[n],
         )
     }
 
@@ -132,7 +131,7 @@ impl<'a> Wall<'a> {
     }
 
     fn measure(&self) -> f32 {
-        let level = self.ventricle.level as f32 * 0.5;
+        let level = self.cavity.level as f32 * 0.5;
         let values = &self.volume.voxels;
         let bright = Labels::threshold(values, self.volume.shape, self.origin, self.extent, level);
         let mut wall: Vec<f32> = bright

@@ -1,7 +1,7 @@
 //! Taubin smoothing (SIGGRAPH 1995): the working surface W.
 //!
-//! Passes alternate between a shrinking and a growing umbrella step, which takes the
-//! staircase and the noise off without shrinking the whole.
+//! Passes alternate between a shrinking and a growing umbrella step, which removes the staircase
+//! and the noise without shrinking the surface.
 
 use crate::geometry::Vec3;
 

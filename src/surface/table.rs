@@ -1,4 +1,4 @@
-//! The 256 cases of Marching Cubes, worked out instead of pasted.
+//! The 256 cases of Marching Cubes, computed instead of listed.
 //!
 //! A cube has corners 0..8 (bit 0 of the number = x, bit 1 = y, bit 2 = z) and twelve edges:
 //! edge `4a + m` runs along axis a, and m's two bits are the other two coordinates in

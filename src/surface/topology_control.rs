@@ -1,18 +1,18 @@
 //! A digital ball: one component, no cavity, no handle.
 //!
-//! In: labels and values. Out: labels whose surface is a sphere, as near to the given ones as
-//! two greedy passes come, and what they changed.
+//! In: labels and values. Out: labels whose surface is a sphere, close to the given ones (two
+//! greedy passes), and the number of voxels changed.
 //!
 //! A voxel is *simple* if adding or removing it changes no topology: around it there is exactly
 //! one component of the object (6-connected, within the 18-neighbourhood) that touches its face
 //! and exactly one of the background (26-connected) (Bertrand & Malandain 1994).
 //! 1. The largest component is kept; cavities are filled.
 //! 2. *Cut*: a ball grows from the object's brightest voxel by simple voxels of the object,
-//!    brightest first. The fronts meet where the object is darkest: what stays out is the cut.
+//!    brightest first. Its fronts meet where the object is darkest: the voxels left out are the cut.
 //! 3. *Fill*: the object's bounding box shrinks by simple voxels outside the object, darkest
-//!    first. What stays closes the handles.
-//! 4. The way that changes fewer voxels is taken: a hole in a wall is filled with a film
-//!    instead of being slit open to the rim.
+//!    first. The voxels that remain close the handles.
+//! 4. The result that changes fewer voxels is kept: a hole in a wall is filled with a thin film
+//!    rather than slit open to the rim.
 
 use std::collections::BinaryHeap;
 
@@ -24,7 +24,7 @@ use crate::progress::{Cancelled, Monitor};
 /// The most voxels of a bounding box that is filled from outside; larger ones are only cut.
 const MOST_FILLED: usize = 8_000_000;
 
-/// What topology control saw and changed.
+/// What topology control changed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Changes {
     /// Voxels taken away to open handles.
@@ -108,7 +108,7 @@ fn grow(
             continue;
         }
         ball.cells[at] |= INSIDE;
-        // A neighbour that was refused before may have become simple.
+        // A neighbour that was not simple before may have become so.
         ball.push_around(
             at,
             &mut front,
@@ -160,8 +160,8 @@ fn shrink(
     Ok(ball.into_labels(object))
 }
 
-/// Voxels to look at, by falling key, of equals the first in array order. A voxel waits once:
-/// a second look without a change between could only come to the same end.
+/// Queue of voxels by falling key, of equals the first in array order. A voxel is queued once: a
+/// second test without a change in between would give the same result.
 #[derive(Default)]
 struct Front(BinaryHeap<(u32, std::cmp::Reverse<usize>)>);
 
@@ -182,7 +182,7 @@ impl Front {
 const INSIDE: u8 = 1;
 /// The voxel belongs to the given object.
 const OBJECT: u8 = 2;
-/// The voxel waits in the front.
+/// The voxel is in the queue.
 const WAITING: u8 = 4;
 
 /// A box of voxels as bytes with a border of one voxel, where neighbours are plain offsets.
@@ -239,7 +239,7 @@ impl Grid {
         bits
     }
 
-    /// Lets the neighbours that `wanted` names by their flags wait, unless they do already.
+    /// Queues the neighbours whose flags are `wanted`, unless they are queued already.
     fn push_around(
         &mut self,
         at: usize,
@@ -370,7 +370,7 @@ mod tests {
         assert!(is_simple(1 << 12));
     }
 
-    /// Shrinking with every change of a neighbour asking for one look more: the oracle.
+    /// The oracle: shrinking that tests a voxel again after every change of a neighbour.
     fn shrink_plainly(object: &Labels, value: impl Fn([usize; 3]) -> f32) -> Labels {
         let mut ball = Grid::new(object, [0; 3], object.extent);
         let mut front = BinaryHeap::new();

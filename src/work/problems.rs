@@ -9,7 +9,7 @@ use super::page::PageError;
 use crate::deform::DeformError;
 use crate::export::read_json::ReadMeshError;
 use crate::jobs::{Failure, Fault, WorkError};
-use crate::locate::localisation::LocaliseError;
+use crate::locate::LocateError;
 use crate::model::{Organ, TemplateError};
 use crate::parameters::ParameterError;
 use crate::pipeline::PipelineError;
@@ -195,32 +195,32 @@ impl Explain for SegmentationError {
     }
 }
 
-impl Explain for LocaliseError {
+impl Explain for LocateError {
     fn explain(&self) -> Failure {
         let (kind, field, advice) = match self {
-            LocaliseError::NoHeart { .. } => (
+            LocateError::NoHeart { .. } => (
                 (Fault::Content, "no-heart"),
                 Some("center"),
                 "Check that the file is a reconstructed heart scan; if it is, give the heart's \
                  centre as `center` (x,y,z in LPS millimetres).",
             ),
-            LocaliseError::HintOutside => (
+            LocateError::HintOutside => (
                 (Fault::Request, "hint-outside"),
                 None,
                 "Give `center` or `box` inside the volume, or leave them out.",
             ),
-            LocaliseError::Blank => (
+            LocateError::Blank => (
                 (Fault::Content, "blank-volume"),
                 None,
                 "Check that this is the right file and, for a 4-D one, the right `frame`.",
             ),
-            LocaliseError::Cancelled(_) => (CANCELLED, None, START_AGAIN),
+            LocateError::Cancelled(_) => (CANCELLED, None, START_AGAIN),
         };
         failure(kind, self, field, advice.into())
     }
 
     fn is_cancelled(&self) -> bool {
-        matches!(self, LocaliseError::Cancelled(_))
+        matches!(self, LocateError::Cancelled(_))
     }
 }
 
@@ -387,6 +387,7 @@ fn surface_advice(error: &SurfaceError) -> String {
         SurfaceError::OutsideVolume { shape, .. } => {
             format!("Give voxel indices below {shape:?}, counted from 0.")
         }
+        SurfaceError::HintOutside => "Give a hint inside the volume, or none.".into(),
         SurfaceError::EmptyBox { .. } => "Give the lower corner of the box first.".into(),
         SurfaceError::SeedOutside { value, .. } => {
             format!("Choose a voxel inside the wall, or an `iso` below {value}.")

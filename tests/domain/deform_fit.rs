@@ -13,7 +13,7 @@ use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::grid::agreement::compare;
 use ventriform::grid::field::Field;
 use ventriform::grid::voxelise::voxelise;
-use ventriform::locate::localisation::{Hints, LocaliseError};
+use ventriform::locate::{Hints, LocateError};
 use ventriform::mesh::{TriMesh, shapes};
 use ventriform::model::struts::struts;
 use ventriform::model::{Organ, Template, TemplateError};
@@ -283,7 +283,7 @@ fn a_volume_without_a_heart_is_an_error() {
     let blank = picture(40, 0.0, |_| 7.0);
     assert!(matches!(
         fit_to(&blank),
-        Err(DeformError::Localise(LocaliseError::Blank))
+        Err(DeformError::Localise(LocateError::Blank))
     ));
     let shell = |p: &Vec3, radius: f64, wall: f64| {
         ball(p, &Vec3::zeros(), radius) - ball(p, &Vec3::zeros(), radius - wall)
@@ -311,7 +311,7 @@ fn a_volume_without_a_heart_is_an_error() {
     ];
     for (name, volume) in &others {
         match fit_to(volume) {
-            Err(DeformError::Localise(LocaliseError::NoHeart { .. })) => {}
+            Err(DeformError::Localise(LocateError::NoHeart { .. })) => {}
             other => panic!("{name}: {:?}", other.map(|f| f.localisation)),
         }
     }

@@ -9,8 +9,7 @@ use std::path::Path;
 
 use nalgebra::Matrix4;
 use ventriform::geometry::frame::VoxelToPatient;
-use ventriform::grid::survey;
-use ventriform::locate::cavity as left_ventricle;
+use ventriform::locate;
 use ventriform::mesh::topology;
 use ventriform::progress::Monitor;
 use ventriform::surface::{SurfaceParameters, extract, region};
@@ -111,11 +110,9 @@ fn every_patients_ventricle_is_found() {
             2
         );
         let iso = surface.facts.iso_value as f32;
-        let seen = survey::survey(&volume, &Monitor::silent()).unwrap();
-        let found = left_ventricle::find(&volume, &seen, &Monitor::silent())
-            .unwrap()
-            .unwrap();
-        let region = region::Wall::new(&volume, &found)
+        let heart = locate::find(&volume, &locate::Hints::default(), &Monitor::silent()).unwrap();
+        let found = heart.cavity(&Monitor::silent()).unwrap().unwrap();
+        let region = region::WallShell::new(&volume, &found)
             .region(iso, &Monitor::silent())
             .unwrap()
             .unwrap();

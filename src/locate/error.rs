@@ -1,0 +1,28 @@
+//! Why no ventricle was found.
+
+use super::doubt::NotAHeart;
+use crate::progress::Cancelled;
+
+/// Why no ventricle was found.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum LocateError {
+    /// All values of the volume are equal, or none is finite and positive.
+    #[error("the volume is blank: it holds no positive values that differ")]
+    Blank,
+    /// No place looks like a ventricle.
+    #[error("no heart found: the best candidate, at {centre:.0?} mm (LPS), {reason}")]
+    NoHeart {
+        /// Best candidate's centre, LPS mm.
+        centre: [f64; 3],
+        /// Its correlation with a ventricle.
+        correlation: f64,
+        /// Why it is not a heart.
+        reason: NotAHeart,
+    },
+    /// No place in the volume meets the hints.
+    #[error("the hinted centre or region lies outside the volume")]
+    HintOutside,
+    /// The caller cancelled the search.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
