@@ -97,47 +97,65 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod draw;
 pub mod geometry;
-pub mod grid;
-pub mod mesh;
+
 pub mod numeric;
+
+pub mod mesh;
+
 pub mod progress;
+
+pub mod grid;
+
+pub mod draw;
 
 pub mod volume;
 
 pub mod locate;
+
 pub mod surface;
 
-pub mod decimate;
-pub mod optimise;
 pub mod retile;
+
+pub mod optimise;
+
+pub mod decimate;
 
 pub mod export;
 
-pub mod deform;
 pub mod model;
+
+pub mod deform;
+
 pub mod polar;
 
 pub mod report;
 
-pub mod evaluate;
 pub mod parameters;
+
 pub mod pipeline;
+
 pub mod segmentation;
+
+pub mod evaluate;
+
+#[cfg(feature = "service")]
+pub mod jobs;
+
+#[cfg(feature = "service")]
+pub mod store;
+
+#[cfg(feature = "service")]
+pub mod work;
+
+#[cfg(feature = "service")]
+pub mod config;
+
+#[cfg(feature = "service")]
+pub mod http;
 
 #[cfg(feature = "service")]
 pub mod cli;
-#[cfg(feature = "service")]
-pub mod config;
-#[cfg(feature = "service")]
-pub mod http;
-#[cfg(feature = "service")]
-pub mod jobs;
-#[cfg(feature = "service")]
-pub mod store;
-#[cfg(feature = "service")]
-pub mod work;
 
 pub use export::{Format, Metadata, encode};
 pub use grid::agreement::{Agreement, compare};
