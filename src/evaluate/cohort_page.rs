@@ -231,7 +231,7 @@ fn table_line(rows: &[FitRow], case: &str, cells: &[(ModelKind, Option<Cell>)]) 
                         }
                     }
                     Some(cell) => { td.n { (format_args!("{:.3} / -", cell.jaccard)) } }
-                    None => { td.n { (why_empty(rows, case)) } }
+                    None => { td { (why_empty(rows, case)) } }
                 }
             }
         }
