@@ -8,7 +8,7 @@
 
 use rayon::prelude::*;
 
-use super::fitness::{Fitness, FitnessForm, FitnessSummary, FitnessTerms};
+use super::fitness::{FitnessForm, FitnessFunction, FitnessSummary, FitnessTerms};
 use super::legality::{Replacement, replacement};
 use super::parameters::Gain;
 use super::reference::Reference;
@@ -112,7 +112,7 @@ impl<'a> Configurations<'a> {
     }
 
     /// Mean fitness over all edges.
-    pub fn mean(&self, fitness: &Fitness) -> f64 {
+    pub fn mean(&self, fitness: &FitnessFunction) -> f64 {
         let edges = self.half_edges.edges();
         let sum: f64 = edges.map(|h| fitness.of(&self.terms(h))).sum();
         sum / self.edge_count()
@@ -121,7 +121,7 @@ impl<'a> Configurations<'a> {
     /// Means of the fitness, in all forms, and of its terms over all edges.
     pub fn summary(&self, weights: [f64; 4]) -> FitnessSummary {
         let lengths = self.reference.lengths(self.half_edges.face_count());
-        let form = |form, weights| Fitness::new(form, weights, lengths);
+        let form = |form, weights| FitnessFunction::new(form, weights, lengths);
         let term = |pick: fn(&FitnessTerms) -> f64| {
             let edges = self.half_edges.edges();
             let sum: f64 = edges.map(|h| pick(&self.terms(h))).sum();
@@ -143,7 +143,7 @@ impl<'a> Configurations<'a> {
     pub fn candidate(
         &self,
         h: HalfEdgeId,
-        fitness: &Fitness,
+        fitness: &FitnessFunction,
         gain: Gain,
         guard: f64,
         least: f64,
@@ -316,14 +316,14 @@ impl<'a, 'b> FlippedTerms<'a, 'b> {
     }
 
     /// Sum of F over the flipped edge, its sides and the outer edges before the flip.
-    fn around_before(&self, fitness: &Fitness) -> f64 {
+    fn around_before(&self, fitness: &FitnessFunction) -> f64 {
         let rate = |h: HalfEdgeId| fitness.of(&self.now.terms(h));
         let sides: f64 = self.sides.iter().map(|&s| rate(s)).sum();
         rate(self.h) + sides + self.outer_edges().map(rate).sum::<f64>()
     }
 
     /// Sum of F over the sides and the outer edges after the flip.
-    fn around_after(&self, fitness: &Fitness) -> f64 {
+    fn around_after(&self, fitness: &FitnessFunction) -> f64 {
         let sides: f64 = (0..4).map(|k| fitness.of(&self.side(k))).sum();
         let outer = self.outer_edges().map(|o| fitness.of(&self.outer(o)));
         sides + outer.sum::<f64>()

@@ -103,12 +103,12 @@ impl Scales {
 
 /// The fitness F with its weights and scales.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Fitness {
+pub struct FitnessFunction {
     weighted: [f64; 4],
     floor: [f64; 4],
 }
 
-impl Fitness {
+impl FitnessFunction {
     /// The fitness in `form` with `weights` w1..w4 (not negative, not all zero); `lengths` scale D
     /// in the forms that relate it to them.
     pub fn new(form: FitnessForm, weights: [f64; 4], lengths: Lengths) -> Self {
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn a_perfect_configuration_has_fitness_one_in_the_normalised_form() {
-        let fitness = Fitness::new(FitnessForm::Normalised, [1.0, 2.0, 3.0, 4.0], LENGTHS);
+        let fitness = FitnessFunction::new(FitnessForm::Normalised, [1.0, 2.0, 3.0, 4.0], LENGTHS);
         let perfect = FitnessTerms {
             c: 1.0,
             ..FitnessTerms::default()
@@ -160,16 +160,16 @@ mod tests {
             c: 1.25,
             d: 0.5,
         };
-        let raw = Fitness::new(FitnessForm::Raw, [1.0; 4], LENGTHS).of(&terms);
+        let raw = FitnessFunction::new(FitnessForm::Raw, [1.0; 4], LENGTHS).of(&terms);
         assert!((raw - (5.0 + 2.0 + 0.8 + 4.0) / 4.0).abs() < 1e-12);
-        let robust = Fitness::new(FitnessForm::Robust, [1.0; 4], LENGTHS).of(&terms);
+        let robust = FitnessFunction::new(FitnessForm::Robust, [1.0; 4], LENGTHS).of(&terms);
         let expected = 1.0 / 0.2f64.to_degrees() + 1.0 / 0.5f64.to_degrees() + 0.8 + 2.0;
         assert!((robust - expected / 4.0).abs() < 1e-12);
         let flat = FitnessTerms {
             c: 1.0,
             ..FitnessTerms::default()
         };
-        let capped = Fitness::new(FitnessForm::Raw, [1.0; 4], LENGTHS).of(&flat);
+        let capped = FitnessFunction::new(FitnessForm::Raw, [1.0; 4], LENGTHS).of(&flat);
         assert!((capped - (20.0 + 20.0 + 1.0 + 20.0) / 4.0).abs() < 1e-12);
     }
 }

@@ -21,7 +21,7 @@ use std::collections::BTreeSet;
 use rayon::prelude::*;
 
 use super::configurations::{Configurations, FlipCandidate};
-use super::fitness::Fitness;
+use super::fitness::FitnessFunction;
 use super::legality;
 use super::{Ended, Gain};
 use crate::geometry::Vec3;
@@ -43,7 +43,7 @@ const EDGES_PER_CHECK: usize = 8192;
 #[derive(Debug, Clone, Copy)]
 pub struct FlipRules {
     /// The fitness to increase.
-    pub fitness: Fitness,
+    pub fitness: FitnessFunction,
     /// Whose fitness must rise.
     pub gain: Gain,
     /// Smallest radius ratio 2r/R of a new triangle.
@@ -349,7 +349,7 @@ mod tests {
 
     fn rules(form: FitnessForm, gain: Gain, guard: f64) -> FlipRules {
         FlipRules {
-            fitness: Fitness::new(form, [1.0; 4], LENGTHS),
+            fitness: FitnessFunction::new(form, [1.0; 4], LENGTHS),
             gain,
             guard,
         }
@@ -363,7 +363,7 @@ mod tests {
             let state = configurations(&mesh, &reference).unwrap();
             let edges = mesh.triangles.len() as f64 * 1.5;
             for form in [FitnessForm::Raw, FitnessForm::Normalised] {
-                let fitness = Fitness::new(form, [1.0, 2.0, 0.5, 1.0], LENGTHS);
+                let fitness = FitnessFunction::new(form, [1.0, 2.0, 0.5, 1.0], LENGTHS);
                 let before = state.mean(&fitness) * edges;
                 for h in state.half_edges().edges().step_by(3) {
                     let found = state.candidate(h, &fitness, Gain::Total, 0.0, -1e9);
@@ -552,7 +552,7 @@ mod tests {
         let (mut loose, mut guarded) = (0, 0);
         for (mesh, reference) in cases() {
             let state = configurations(&mesh, &reference).unwrap();
-            let fitness = Fitness::new(FitnessForm::Robust, [0.0, 0.0, 0.0, 1.0], LENGTHS);
+            let fitness = FitnessFunction::new(FitnessForm::Robust, [0.0, 0.0, 0.0, 1.0], LENGTHS);
             let square = |corners: &[VertexId]| {
                 let sum: Vec3 = corners.iter().map(|v| mesh.vertices[v.index()]).sum();
                 let middle = sum / corners.len() as f64;

@@ -40,7 +40,7 @@ use crate::mesh::topology::MeshDefect;
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::retile::Tiled;
 
-pub use fitness::{Fitness, FitnessForm, FitnessSummary, Lengths};
+pub use fitness::{FitnessForm, FitnessFunction, FitnessSummary, Lengths};
 pub use parameters::{Gain, LeastSquaresParameters, OptimiseParameters};
 pub use reference::Reference;
 
@@ -240,8 +240,8 @@ fn fit_if_better(
     facts.fit_rounds = fitted.rounds;
     let state = configurations(&fitted.mesh, reference)?;
     let lengths = reference.lengths(tiled.mesh.triangles.len());
-    let robust = Fitness::new(FitnessForm::Robust, [1.0; 4], lengths);
-    let falls = |fitness: &Fitness| state.mean(fitness) < start.mean(fitness);
+    let robust = FitnessFunction::new(FitnessForm::Robust, [1.0; 4], lengths);
+    let falls = |fitness: &FitnessFunction| state.mean(fitness) < start.mean(fitness);
     if falls(&parameters.fitness(lengths)) && falls(&robust) {
         let warning = "the least-squares fit would have lowered the fitness and was not used";
         facts.warnings.push(warning.to_owned());

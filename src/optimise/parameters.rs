@@ -1,7 +1,7 @@
 //! Parameters of the optimisation, their defaults and ranges.
 
 use super::OptimiseError;
-use super::fitness::{Fitness, FitnessForm, Lengths};
+use super::fitness::{FitnessForm, FitnessFunction, Lengths};
 
 /// The criterion by which a flip counts as an improvement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -98,8 +98,8 @@ impl Default for OptimiseParameters {
 }
 
 impl OptimiseParameters {
-    pub(super) fn fitness(&self, lengths: Lengths) -> Fitness {
-        Fitness::new(self.fitness, self.weights, lengths)
+    pub(super) fn fitness(&self, lengths: Lengths) -> FitnessFunction {
+        FitnessFunction::new(self.fitness, self.weights, lengths)
     }
 
     /// Checks every field against its range.
