@@ -5,12 +5,11 @@ use super::files;
 use super::jobs::filing::{self, UploadJob};
 use super::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
 use super::problem::Answer;
-use super::products::{DownloadBody, Offer, ProductCollection, SoftwareBody};
-use super::wire::{path_of, rfc3339};
+use super::products::{Offer, ProductCollection, body_of_product};
+use super::wire::path_of;
 use crate::jobs::{Product, Resource};
 use axum::extract::{RawQuery, Request, State};
 use serde::Serialize;
-use serde_json::{Map, Value};
 use utoipa::ToSchema;
 
 /// The collection of models.
@@ -27,31 +26,14 @@ impl ProductCollection for Models {
     type FileAnswer = openapi::ModelFileAnswer;
 }
 
-/// A model: what it was made from, its main figures, and its files.
-#[derive(Serialize, ToSchema)]
-#[schema(as = Model)]
-pub struct ModelBody {
-    /// Derived from volume, parameters and mesh, so it is the same on every machine.
-    #[schema(example = "mdl_2c26b46b68ffc68ff99b453c1d304134")]
-    id: String,
-    /// When it was made (RFC 3339).
-    #[schema(format = DateTime)]
-    created_at: String,
-    /// The volume it was made from.
-    volume: String,
-    /// The parameters used, including every default.
-    #[schema(value_type = Object)]
-    parameters: Map<String, Value>,
-    /// Counts and main figures; the report has all figures.
-    #[schema(value_type = Object)]
-    summary: Map<String, Value>,
-    /// The program that made it.
-    software: SoftwareBody,
-    /// Its files.
-    files: Vec<DownloadBody>,
-    /// Related paths.
-    links: ModelLinks,
-}
+body_of_product!(
+    /// A model: what it was made of, its main figures, and its files.
+    ModelBody,
+    Model,
+    ModelLinks,
+    "Counts and main figures; the report has all figures.",
+    "mdl_2c26b46b68ffc68ff99b453c1d304134"
+);
 
 /// Paths of one model.
 #[derive(Serialize, ToSchema)]
@@ -69,25 +51,15 @@ struct ModelLinks {
     volume: String,
 }
 
-impl From<Product> for ModelBody {
-    fn from(product: Product) -> Self {
-        let itself = path_of(&product.id);
-        let volume = product.volume.clone().unwrap_or_default();
+impl ModelLinks {
+    fn of(model: &Product) -> Self {
+        let itself = path_of(&model.id);
         Self {
-            created_at: rfc3339(product.created_at),
-            files: DownloadBody::all(&product),
-            software: SoftwareBody::of(&product),
-            links: ModelLinks {
-                mesh: format!("{itself}/mesh"),
-                report: format!("{itself}/report"),
-                page: format!("{itself}/{}", files::PAGE),
-                volume: path_of(&volume),
-                itself,
-            },
-            volume,
-            id: product.id,
-            parameters: product.parameters,
-            summary: product.summary,
+            mesh: format!("{itself}/mesh"),
+            report: format!("{itself}/report"),
+            page: format!("{itself}/{}", files::PAGE),
+            volume: path_of(model.volume.as_deref().unwrap_or_default()),
+            itself,
         }
     }
 }

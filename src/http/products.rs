@@ -168,6 +168,54 @@ impl DownloadBody {
     }
 }
 
+/// Declares the JSON of a kind of product that is made of a volume: its doc comments, its name, the
+/// name of its schema, the type of its links, what its summary holds, and an example of an id.
+macro_rules! body_of_product {
+    ($(#[doc = $doc:tt])+ $name:ident, $schema:ident, $links:ident, $summary:tt, $example:tt) => {
+        $(#[doc = $doc])+
+        #[derive(serde::Serialize, utoipa::ToSchema)]
+        #[schema(as = $schema)]
+        pub struct $name {
+            /// Derived from volume, parameters and mesh, so it is the same on every machine.
+            #[schema(example = $example)]
+            id: String,
+            /// When it was made (RFC 3339).
+            #[schema(format = DateTime)]
+            created_at: String,
+            /// The volume it was made of.
+            volume: String,
+            /// The parameters used, including every default.
+            #[schema(value_type = Object)]
+            parameters: serde_json::Map<String, serde_json::Value>,
+            #[doc = $summary]
+            #[schema(value_type = Object)]
+            summary: serde_json::Map<String, serde_json::Value>,
+            /// The program that made it.
+            software: $crate::http::products::SoftwareBody,
+            /// Its files.
+            files: Vec<$crate::http::products::DownloadBody>,
+            /// Related paths.
+            links: $links,
+        }
+
+        impl From<$crate::jobs::Product> for $name {
+            fn from(product: $crate::jobs::Product) -> Self {
+                Self {
+                    created_at: $crate::http::wire::rfc3339(product.created_at),
+                    volume: product.volume.clone().unwrap_or_default(),
+                    software: $crate::http::products::SoftwareBody::of(&product),
+                    files: $crate::http::products::DownloadBody::all(&product),
+                    links: $links::of(&product),
+                    id: product.id,
+                    parameters: product.parameters,
+                    summary: product.summary,
+                }
+            }
+        }
+    };
+}
+pub(super) use body_of_product;
+
 /// A media type that a client may ask for, and the file that has it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Offer {

@@ -6,12 +6,11 @@ use super::files;
 use super::jobs::filing::{self, UploadJob};
 use super::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
 use super::problem::Answer;
-use super::products::{DownloadBody, Offer, ProductCollection, SoftwareBody};
-use super::wire::{path_of, rfc3339};
+use super::products::{Offer, ProductCollection, body_of_product};
+use super::wire::path_of;
 use crate::jobs::{Product, Resource};
 use axum::extract::{RawQuery, Request, State};
 use serde::Serialize;
-use serde_json::{Map, Value};
 use utoipa::ToSchema;
 
 const MASK: &str = "mask.nii.gz";
@@ -38,32 +37,15 @@ impl ProductCollection for Segmentations {
     type FileAnswer = openapi::SegmentationFileAnswer;
 }
 
-/// A segmentation: a model fitted to a volume, with its main figures and its reliability.
-#[derive(Serialize, ToSchema)]
-#[schema(as = Segmentation)]
-pub struct SegmentationBody {
-    /// Derived from volume, parameters and fitted mesh, so it is the same on every machine.
-    #[schema(example = "seg_2c26b46b68ffc68ff99b453c1d304134")]
-    id: String,
-    /// When it was made (RFC 3339).
-    #[schema(format = DateTime)]
-    created_at: String,
-    /// The volume that was segmented.
-    volume: String,
-    /// The parameters used, including every default.
-    #[schema(value_type = Object)]
-    parameters: Map<String, Value>,
-    /// The chosen model and the merit of every candidate, why the fit stopped, its confidence,
-    /// volumes, agreement with the expert's mask, and warnings; the report has all figures.
-    #[schema(value_type = Object)]
-    summary: Map<String, Value>,
-    /// The program that made it.
-    software: SoftwareBody,
-    /// Its files.
-    files: Vec<DownloadBody>,
-    /// Related paths.
-    links: SegmentationLinks,
-}
+body_of_product!(
+    /// A segmentation: a model fitted to a volume, with its main figures and its reliability.
+    SegmentationBody,
+    Segmentation,
+    SegmentationLinks,
+    "The chosen model and the merit of every candidate, why the fit stopped, its confidence, \
+     volumes, agreement with the expert's mask, and warnings; the report has all figures.",
+    "seg_2c26b46b68ffc68ff99b453c1d304134"
+);
 
 /// Paths of one segmentation.
 #[derive(Serialize, ToSchema)]
@@ -86,28 +68,18 @@ struct SegmentationLinks {
     volume: String,
 }
 
-impl From<Product> for SegmentationBody {
-    fn from(product: Product) -> Self {
-        let itself = path_of(&product.id);
-        let volume = product.volume.clone().unwrap_or_default();
-        let polar = product.file("polar.svg");
+impl SegmentationLinks {
+    fn of(segmentation: &Product) -> Self {
+        let itself = path_of(&segmentation.id);
+        let polar = segmentation.file("polar.svg");
         Self {
-            created_at: rfc3339(product.created_at),
-            files: DownloadBody::all(&product),
-            software: SoftwareBody::of(&product),
-            links: SegmentationLinks {
-                mask: format!("{itself}/{MASK}"),
-                mesh: format!("{itself}/mesh"),
-                report: format!("{itself}/report"),
-                page: format!("{itself}/{}", files::PAGE),
-                polar: polar.map(|file| format!("{itself}/{}", file.name)),
-                volume: path_of(&volume),
-                itself,
-            },
-            volume,
-            id: product.id,
-            parameters: product.parameters,
-            summary: product.summary,
+            mask: format!("{itself}/{MASK}"),
+            mesh: format!("{itself}/mesh"),
+            report: format!("{itself}/report"),
+            page: format!("{itself}/{}", files::PAGE),
+            polar: polar.map(|file| format!("{itself}/{}", file.name)),
+            volume: path_of(segmentation.volume.as_deref().unwrap_or_default()),
+            itself,
         }
     }
 }

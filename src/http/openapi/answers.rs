@@ -5,7 +5,7 @@ use crate::http::problem::{MEDIA_TYPE, ProblemBody};
 use std::collections::BTreeMap;
 use utoipa::openapi::header::HeaderBuilder;
 use utoipa::openapi::schema::{ObjectBuilder, Schema, Type};
-use utoipa::openapi::{Content, ContentBuilder, Ref, RefOr, Response, ResponseBuilder};
+use utoipa::openapi::{Content, Ref, RefOr, Response, ResponseBuilder};
 use utoipa::{IntoResponses, PartialSchema, ToSchema};
 
 /// The schema of a job, which the handlers register.
@@ -124,59 +124,31 @@ impl IntoResponses for WaitAnswers {
     }
 }
 
-/// 200 with a mesh in one of the formats.
-pub struct MeshAnswer;
+/// Declares types that document the answer 200 with a file of one of several kinds.
+macro_rules! files {
+    ($(#[doc = $doc:literal] $name:ident: $description:literal, $contents:expr;)+) => {$(
+        #[doc = $doc]
+        pub struct $name;
 
-impl IntoResponses for MeshAnswer {
-    fn responses() -> Responses {
-        file_answer("The mesh", mesh_contents())
-    }
-}
-
-/// 200 with a report.
-pub struct ReportAnswer;
-
-impl IntoResponses for ReportAnswer {
-    fn responses() -> Responses {
-        file_answer("The report", report_contents())
-    }
-}
-
-/// 200 with the mask, mesh or report of a segmentation.
-pub struct SegmentationAnswer;
-
-impl IntoResponses for SegmentationAnswer {
-    fn responses() -> Responses {
-        let mut contents = mesh_contents();
-        contents.extend(mask_contents());
-        file_answer("The mask, the mesh or the report", contents)
-    }
-}
-
-/// 200 with any of a segmentation's files.
-pub struct SegmentationFileAnswer;
-
-impl IntoResponses for SegmentationFileAnswer {
-    fn responses() -> Responses {
-        let mut contents = mesh_contents();
-        contents.extend(mask_contents());
-        for picture in ["image/svg+xml", "image/png"] {
-            contents.insert(picture, Content::new(Some(binary())));
+        impl IntoResponses for $name {
+            fn responses() -> Responses {
+                file_answer($description, $contents.into_iter().flatten())
+            }
         }
-        contents.extend(report_contents());
-        file_answer("The file", contents)
-    }
+    )+};
 }
 
-/// 200 with any of a model's files.
-pub struct ModelFileAnswer;
-
-impl IntoResponses for ModelFileAnswer {
-    fn responses() -> Responses {
-        let mut contents = mesh_contents();
-        contents.extend(report_contents());
-        file_answer("The file", contents)
-    }
+files! {
+    /// 200 with a mesh in one of the formats.
+    MeshAnswer: "The mesh", [meshes()];
+    /// 200 with a report.
+    ReportAnswer: "The report", [reports()];
+    /// 200 with the mask, mesh or report of a segmentation.
+    SegmentationAnswer: "The mask, the mesh or the report", [meshes(), masks()];
+    /// 200 with any of a segmentation's files.
+    SegmentationFileAnswer: "The file", [meshes(), masks(), pictures(), reports()];
+    /// 200 with any of a model's files.
+    ModelFileAnswer: "The file", [meshes(), reports()];
 }
 
 /// 200 with a job's changes; the schema is that of one event.
@@ -201,7 +173,13 @@ impl IntoResponses for EventsAnswer {
     }
 }
 
-fn file_answer(description: &str, contents: BTreeMap<&'static str, Content>) -> Responses {
+/// Media types and what is sent under each.
+type Contents = Vec<(&'static str, Content)>;
+
+fn file_answer(
+    description: &str,
+    contents: impl Iterator<Item = (&'static str, Content)>,
+) -> Responses {
     let text = || HeaderBuilder::new().schema(Some(ObjectBuilder::new().schema_type(Type::String)));
     let mut response = ResponseBuilder::new()
         .description(description)
@@ -215,13 +193,14 @@ fn file_answer(description: &str, contents: BTreeMap<&'static str, Content>) -> 
             "Content-Location",
             text().description(Some("The file's own path")).build(),
         );
+    let contents: BTreeMap<_, _> = contents.collect();
     for (media_type, content) in contents {
         response = response.content(media_type, content);
     }
     [("200".to_owned(), response.build().into())].into()
 }
 
-fn mesh_contents() -> BTreeMap<&'static str, Content> {
+fn meshes() -> Contents {
     Format::ALL
         .into_iter()
         .map(|format| {
@@ -234,28 +213,30 @@ fn mesh_contents() -> BTreeMap<&'static str, Content> {
         .collect()
 }
 
-fn mask_contents() -> BTreeMap<&'static str, Content> {
-    [
+fn masks() -> Contents {
+    files_of([
         "application/gzip",
         "application/nifti",
         "application/x-nifti",
-    ]
-    .map(|media_type| (media_type, Content::new(Some(binary()))))
-    .into()
+    ])
 }
 
-fn report_contents() -> BTreeMap<&'static str, Content> {
+fn pictures() -> Contents {
+    files_of(["image/svg+xml", "image/png"])
+}
+
+fn files_of<const N: usize>(media_types: [&'static str; N]) -> Contents {
+    media_types
+        .map(|media_type| (media_type, Content::new(Some(binary()))))
+        .into()
+}
+
+fn reports() -> Contents {
     let page = ObjectBuilder::new().schema_type(Type::String);
-    [
+    vec![
         ("application/json", Content::new(Some(object()))),
-        (
-            "text/html",
-            ContentBuilder::new()
-                .schema(Some(Schema::from(page)))
-                .build(),
-        ),
+        ("text/html", Content::new(Some(Schema::from(page)))),
     ]
-    .into()
 }
 
 fn object() -> Schema {

@@ -62,46 +62,40 @@ fn file(description: &str) -> ObjectBuilder {
         .description(Some(description))
 }
 
-/// A form whose files are a volume.
-pub struct UploadForm;
+/// Declares types that document forms; the first file is required.
+macro_rules! forms {
+    ($(#[doc = $doc:literal] $name:ident { $first:literal: $help:literal, $($more:literal: $more_help:literal,)* })+) => {$(
+        #[doc = $doc]
+        pub struct $name;
 
-impl ToSchema for UploadForm {
-    fn name() -> Cow<'static, str> {
-        "UploadForm".into()
-    }
+        impl ToSchema for $name {
+            fn name() -> Cow<'static, str> {
+                stringify!($name).into()
+            }
+        }
+
+        impl PartialSchema for $name {
+            fn schema() -> RefOr<Schema> {
+                let form = ObjectBuilder::new()
+                    .property($first, file($help))
+                    .required($first)
+                    $(.property($more, file($more_help)))*
+                    .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
+                Schema::from(form).into()
+            }
+        }
+    )+};
 }
 
-impl PartialSchema for UploadForm {
-    fn schema() -> RefOr<Schema> {
-        let file = file("The volume; several files make up one: a .hdr/.img pair, a DICOM series");
-        let form = ObjectBuilder::new()
-            .property("file", file)
-            .required("file")
-            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
-        Schema::from(form).into()
+forms! {
+    /// A form whose files are a volume.
+    UploadForm {
+        "file": "The volume; several files make up one: a .hdr/.img pair, a DICOM series",
     }
-}
-
-/// A form with a volume and an expert's mask.
-pub struct SegmentationForm;
-
-impl ToSchema for SegmentationForm {
-    fn name() -> Cow<'static, str> {
-        "SegmentationForm".into()
-    }
-}
-
-impl PartialSchema for SegmentationForm {
-    fn schema() -> RefOr<Schema> {
-        let form = ObjectBuilder::new()
-            .property("volume", file("The volume; several files make up one"))
-            .property(
-                "expert",
-                file("An expert's mask (above 0.5) to measure against"),
-            )
-            .required("volume")
-            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
-        Schema::from(form).into()
+    /// A form with a volume and an expert's mask.
+    SegmentationForm {
+        "volume": "The volume; several files make up one",
+        "expert": "An expert's mask (above 0.5) to measure against",
     }
 }
 
