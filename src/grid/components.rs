@@ -208,11 +208,7 @@ mod tests {
     fn runs_and_flood_fill_find_the_same_components() {
         let mut random = stream(7, Purpose::PhantomNoise);
         for round in 0..60 {
-            let extent = if round % 5 == 0 {
-                [70, 4, 3]
-            } else {
-                [7, 6, 5]
-            };
+            let extent = [[70, 4, 3], [7, 6, 5]][usize::from(round % 5 > 0)];
             let density = 0.2 + 0.1 * f64::from(round % 7);
             let mut labels = Labels::empty([0; 3], extent);
             for n in 0..extent.iter().product::<usize>() {

@@ -215,18 +215,26 @@ impl Row {
             }
             let mean = 1.0 / wall.len() as f32;
             self.cap.iter_mut().for_each(|c| *c *= mean);
-            if self.cap.iter().all(|mean| *mean < least) {
+            // Places with a dark wall stay out, in one piece at either end of the row.
+            let bright = |mean: &f32| *mean >= least;
+            let ends = (
+                self.cap.iter().position(bright),
+                self.cap.iter().rposition(bright),
+            );
+            let (Some(low), Some(high)) = ends else {
                 continue;
-            }
+            };
+            let cap = &mut self.cap[low..=high];
+            let run = |o: &isize| &run(o)[low..=high];
             // Hot neighbours are cut off, as in `Cup::match_score`.
-            self.cap.iter_mut().for_each(|c| *c *= CAP);
-            refill(&mut self.moments, count, Moments::default());
+            cap.iter_mut().for_each(|c| *c *= CAP);
+            refill(&mut self.moments, cap.len(), Moments::default());
             for (group, expected) in ball.groups.iter().zip(EXPECTED) {
-                refill(&mut self.sum, count, 0.0);
-                refill(&mut self.squares, count, 0.0);
+                refill(&mut self.sum, cap.len(), 0.0);
+                refill(&mut self.squares, cap.len(), 0.0);
                 for o in group {
                     let sums = self.sum.iter_mut().zip(&mut self.squares);
-                    for ((v, cap), (sum, squares)) in run(o).iter().zip(&self.cap).zip(sums) {
+                    for ((v, cap), (sum, squares)) in run(o).iter().zip(&*cap).zip(sums) {
                         let value = if v < cap { *v } else { *cap };
                         *sum += value;
                         *squares += value * value;
@@ -239,7 +247,8 @@ impl Row {
                     m.add_group(expected, sum, squares);
                 }
             }
-            for ((best, m), cap) in self.best.iter_mut().zip(&self.moments).zip(&self.cap) {
+            let best = self.best[low..=high].iter_mut();
+            for ((best, m), cap) in best.zip(&self.moments).zip(&*cap) {
                 if *cap >= least * CAP {
                     *best = best.max(m.correlation() as f32);
                 }

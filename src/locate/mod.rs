@@ -19,8 +19,13 @@
 //! count as 0. Their sizes differ: rays need the wall resolved (4 mm), connected parts and cups
 //! need organs without noise (7 mm, 6.5 mm and a blur).
 //!
-//! Not guaranteed: that a doubtful heart is the right one. Of the simulated scans with a heart,
-//! none was lost; where the heart was erased, cups found none.
+//! Of 172 simulated scans with a heart (19 patients, 114 distorted copies of them, 39 further hearts
+//! with infarcts, motion, hot gut, liver or right ventricle), rays and cups alone chose another
+//! structure in one: rays took the gut, with a doubtful score. In one, with an infarct of two
+//! territories, neither is sure. In 22 scans without a heart rays score 0.37 at most. Cups refuse 10
+//! of these; in the others they correlate by 0.61 to 0.69 with a confidence of 0.28 at most.
+//!
+//! Not guaranteed: that a doubtful heart is the right one.
 //!
 //! - [`body`]: one bright body, for organs that are no ventricle;
 //! - [`patient_orientation`]: which way is up in the patient.
