@@ -73,7 +73,7 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
         .filter(|m| m.as_os_str() != AUTO)
         .collect();
     if !named.is_empty() && named.len() < args.model.len() {
-        bail!("--model {AUTO} stands for the built-in model; give either {AUTO} or files");
+        bail!("--model {AUTO} stands for the built-in model; give {AUTO} or files, not both");
     }
     let volume: Vec<VolumeFile> = args.input.iter().map(VolumeFile::at).collect();
     let expert = args.expert.as_ref().map(|path| [VolumeFile::at(path)]);

@@ -1,5 +1,5 @@
 //! The paper's evaluation on a cohort: how well models segment, against which gold standard,
-//! and what the paper's findings become.
+//! and whether the findings of the paper are confirmed.
 //!
 //! In goes a folder of scans with gold standards; out come tables, a page, the models and every
 //! fit ([`evaluate`]).
