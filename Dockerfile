@@ -8,13 +8,13 @@ COPY benches benches
 RUN mkdir src \
  && echo 'fn main() {}' > src/main.rs \
  && touch src/lib.rs \
- && cargo build --release --locked --bin ventriform \
+ && cargo build --profile dist --locked --bin ventriform \
  && rm -rf src
 COPY src src
 COPY README.md ./
 # cargo compares modification times: the sources must be newer than the placeholders above.
 RUN find src -exec touch {} + \
- && cargo build --release --locked --bin ventriform
+ && cargo build --profile dist --locked --bin ventriform
 
 # Runtime image: the program, one volume, an unprivileged user.
 FROM debian:bookworm-slim
@@ -22,7 +22,7 @@ LABEL org.opencontainers.image.title="ventriform" \
       org.opencontainers.image.description="Surface models of the left ventricle from cardiac SPECT" \
       org.opencontainers.image.licenses="MIT OR Apache-2.0"
 RUN install -d -o 10001 -g 10001 -m 0750 /data
-COPY --from=build /build/target/release/ventriform /usr/local/bin/ventriform
+COPY --from=build /build/target/dist/ventriform /usr/local/bin/ventriform
 ENV VENTRIFORM_LISTEN=0.0.0.0:8080 \
     VENTRIFORM_DATA_DIR=/data \
     VENTRIFORM_LOG_FORMAT=json

@@ -4,8 +4,9 @@
 //! The time until it stops is processor time of the working thread. Other load on the machine
 //! lengthens wall time, but not processor time.
 
-#![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
+#![cfg(feature = "service")]
 #![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
 
 use std::collections::BTreeMap;
 use std::fs;

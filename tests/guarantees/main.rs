@@ -9,6 +9,7 @@
 //! of each family than CI does and prints how many models were refused. `VENTRIFORM_DUMP=DIR`
 //! writes some of the models to DIR, so that other programs can check them.
 
+#![cfg(feature = "service")]
 #![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
 
 mod families;
