@@ -7,7 +7,7 @@ use crate::progress::Cancelled;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LocateError {
     /// All values of the volume are equal, or none is finite and positive.
-    #[error("the volume is blank: it holds no positive values that differ")]
+    #[error("the volume shows nothing: it holds no positive values that differ")]
     Blank,
     /// No place looks like a ventricle.
     #[error("no heart found: the best candidate, at {centre:.0?} mm (LPS), {reason}")]
