@@ -1,7 +1,7 @@
 //! Fits a model to a patient: a spring-mass model with torsion and sensors.
 //!
 //! After Dornheim, Tönnies and Dixon (MICCAI 2005). A volume and a
-//! [`Template`](crate::model::Template) go in. Out comes a [`Fit`]: the model in the patient's
+//! [`Template`] go in. Out comes a [`Fit`]: the model in the patient's
 //! place and shape, with the nodes and triangles of the template, and the figures needed to judge
 //! it.
 //!

@@ -7,7 +7,7 @@ use super::sensors::SensorKind;
 use crate::locate::Hints;
 use crate::locate::patient_orientation::Superior;
 
-/// Parameters of [`fit`](super::fit).
+/// Parameters of [`fit`](super::fit()).
 #[derive(Debug, Clone, PartialEq)]
 pub struct DeformParameters {
     /// What is known of the organ's place. Default: nothing.

@@ -10,7 +10,7 @@
 //! 3. [`fits`]: every model fitted to every patient by the functions of
 //!    [`crate::segmentation`]; results are kept in [`record`]s, so that a run that was stopped
 //!    continues where it ended.
-//! 4. [`rows`]: the table of all fits, and means over it; [`findings`]: what they say about
+//! 4. [`rows`]: the table of all fits, and means over it; [`findings`](mod@findings): what they say about
 //!    each of the paper's findings.
 //! 5. [`pictures`], [`table`], [`cohort_page`]: slices, CSV and JSON, and one page with charts.
 //!

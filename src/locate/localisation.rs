@@ -1,11 +1,11 @@
 //! A ventricle's place as a cup, and how sure that is.
 //!
-//! In: every cup that [`cup_search`](super::cup_search) found in a volume. Out: the
+//! In: every cup that [`cup_search`] found in a volume. Out: the
 //! [`Localisation`] of the best one, or of the best one near a place that was decided on.
 //!
 //! Candidates that are closed at the base (stomach, skull) are left out.
 //! [`Localisation::confidence`] combines the correlation with its margin over the best candidate
-//! elsewhere. Where the apical wall does not show, [`apex`](super::apex) places the cup by its base.
+//! elsewhere. Where the apical wall does not show, [`apex`] places the cup by its base.
 
 use super::apex;
 use super::cup::Cup;

@@ -4,7 +4,7 @@
 //! measures against an expert's mask, slices and a report.
 //!
 //! 1. [`SegmentationOrder`]: the files, models and parameters.
-//! 2. [`from_files`] reads the volume and the expert's mask and completes the parameters with what
+//! 2. [`from_files`](mod@from_files) reads the volume and the expert's mask and completes the parameters with what
 //!    depends on the volume ([`FitParameters::on`](crate::parameters::FitParameters::on)).
 //! 3. The models are checked and prepared; without a model, the built-in one is taken. A model
 //!    that was named must be usable; of several that are merely available, unusable ones are left
@@ -13,7 +13,7 @@
 //! 5. Every template is fitted, with one search for the organ ([`OrganSearch`]), and the fit with
 //!    the greatest [`Fit::merit`](crate::deform::Fit::merit) is chosen, the first of equals. A
 //!    template whose fit fails is left out, unless all fail.
-//! 6. [`segment`] makes mask, measures, polar map and [`slices`] of the fit.
+//! 6. [`segment`](mod@segment) makes mask, measures, polar map and [`slices`] of the fit.
 //! 7. [`report_json`] is the report; [`SegmentedVolume::files`] are the files written, the same on
 //!    the command line and over HTTP.
 

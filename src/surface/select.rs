@@ -1,5 +1,5 @@
-//! Which voxels are the object: by [`label`](super::label) in label maps, by
-//! [`intensity`](super::intensity) in all other volumes.
+//! Which voxels are the object: by [`label`] in label maps, by
+//! [`intensity`] in all other volumes.
 
 use super::error::describe_labels;
 use super::object::Object;

@@ -77,7 +77,7 @@ pub async fn file_upload(
     }
 }
 
-/// A job on a stored volume, for [`file`].
+/// A job on a stored volume, for [`file()`].
 pub fn new_job(
     work: &dyn Work,
     volume: String,

@@ -20,7 +20,7 @@
 //! first half of the rounds irregular vertices are also moved until they cancel ([`polish`]).
 //!
 //! Guaranteed: in no round does a triangle turn over or come to intersect another one. Where a
-//! step would cause that, the vertices concerned make half of it, less, or none ([`advance`]).
+//! step would cause that, the vertices concerned make half of it, less, or none ([`mod@advance`]).
 
 mod advance;
 mod equations;
