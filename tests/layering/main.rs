@@ -332,25 +332,3 @@ fn every_module_opens_with_its_method() {
         assert!(!text.contains("STUB"), "{} is a stub", path.display());
     }
 }
-
-/// Prints the rows of [`USES`] as they are, for pasting: `cargo test --test layering -- --ignored --show-output`.
-#[test]
-#[ignore = "prints the table"]
-fn print_the_table() {
-    let mut left = used_modules();
-    while !left.is_empty() {
-        let free: Vec<String> = left
-            .iter()
-            .filter(|(_, uses)| uses.iter().all(|u| !left.contains_key(u)))
-            .map(|(module, _)| module.clone())
-            .collect();
-        assert!(
-            !free.is_empty(),
-            "modules use each other in a circle: {left:?}"
-        );
-        for module in free {
-            let uses = left.remove(&module).unwrap_or_default();
-            println!("    (\"{module}\", &{:?}),", uses);
-        }
-    }
-}
