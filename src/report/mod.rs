@@ -31,8 +31,8 @@ pub use measure::{MeasureParameters, Measures, measure};
 pub use model_page::model_page;
 pub use model_report::{ModelReport, ReportInput};
 pub use sections::{
-    FitnessForms, FitnessSection, FitnessTerms, Program, RetileSection, Stages, StartSummary,
-    SurfaceSection,
+    FitnessForms, FitnessSection, FitnessTermsSection, Program, RetileSection, Stages,
+    StartSummary, SurfaceSection,
 };
 pub use segmentation_page::{SegmentationPage, segmentation_page};
 pub use segmentation_report::SegmentationReport;

@@ -8,7 +8,7 @@ use super::distance::Direction;
 use super::distance_pictures;
 use super::elements::Shape;
 use super::model_report::ModelReport;
-use super::sections::{FitnessForms, FitnessTerms};
+use super::sections::{FitnessForms, FitnessTermsSection};
 use super::summary::{Histogram, Summary};
 use crate::draw::chart::{self, Bins};
 use crate::draw::document::{self, HeadlineFigure, HtmlDocument, Sign};
@@ -249,7 +249,7 @@ fn direction_row(name: &str, direction: &Direction) -> Markup {
 fn fitness(report: &ModelReport) -> Markup {
     let fitness = &report.fitness;
     let terms = &fitness.terms;
-    let term = |pick: fn(&FitnessTerms) -> f64| {
+    let term = |pick: fn(&FitnessTermsSection) -> f64| {
         [&terms.retiled, &terms.fitted, &terms.optimised].map(pick)
     };
     let forms = &fitness.forms;

@@ -7,7 +7,8 @@ use super::distance::Distance;
 use super::elements::{Elements, Histograms, MeshFacts, Shape, Smoothness};
 use super::measure::Measures;
 use super::sections::{
-    FitnessSection, FitnessTerms, Program, RetileSection, Stages, StartSummary, SurfaceSection,
+    FitnessSection, FitnessTermsSection, Program, RetileSection, Stages, StartSummary,
+    SurfaceSection,
 };
 use super::stage_facts;
 use crate::optimise::{FitnessSummary, OptimiseParameters, Optimised};
@@ -248,8 +249,8 @@ fn fitness(optimised: &Optimised, parameters: &OptimiseParameters) -> FitnessSec
     }
 }
 
-fn terms(summary: &&FitnessSummary) -> FitnessTerms {
-    FitnessTerms {
+fn terms(summary: &&FitnessSummary) -> FitnessTermsSection {
+    FitnessTermsSection {
         a_deg: summary.a_mean.to_degrees(),
         b_deg: summary.b_mean.to_degrees(),
         c: summary.c_mean,

@@ -93,7 +93,7 @@ pub struct FitnessSection {
     /// All forms after each stage.
     pub forms: Stages<FitnessForms>,
     /// Mean terms after each stage.
-    pub terms: Stages<FitnessTerms>,
+    pub terms: Stages<FitnessTermsSection>,
 }
 
 /// The same figures after each stage.
@@ -121,7 +121,7 @@ pub struct FitnessForms {
 
 /// Means of the four terms over all edges.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct FitnessTerms {
+pub struct FitnessTermsSection {
     /// A: angle between the edge's triangles' normals, degrees.
     pub a_deg: f64,
     /// B: mean angle to the four outer neighbours, degrees.

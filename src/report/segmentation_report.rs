@@ -18,7 +18,7 @@ pub struct SegmentationReport {
     /// Models that were fitted.
     pub candidates: Vec<CandidateFigures>,
     /// Models that could not be fitted.
-    pub refused: Vec<RefusedTemplate>,
+    pub refused: Vec<RefusedTemplateEntry>,
     /// Where the organ was found.
     pub localisation: Option<Map<String, Value>>,
     /// How the fit went.
@@ -60,7 +60,7 @@ pub struct CandidateFigures {
 /// A model that could not be fitted.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
 #[serde(default)]
-pub struct RefusedTemplate {
+pub struct RefusedTemplateEntry {
     /// The model's name.
     pub template: Option<String>,
     /// Why.

@@ -24,7 +24,7 @@ pub enum SurfaceError {
     },
     /// Nothing of the volume reaches the iso-value.
     #[error(
-        "there is no surface at the iso-value {iso}: the volume's values run from {minimum} to {maximum}; choose an iso-value between them"
+        "there is no surface at the iso-value {iso}: the volume's values run from {minimum} to {maximum}"
     )]
     NoSurface {
         /// The iso-value.

@@ -118,7 +118,7 @@ pub fn marching_cubes(
         pieces.push((k, v, t));
     }
     let turn = frame.is_left_handed();
-    let placement = Placement::new(labels, samples, iso, frame);
+    let placement = VertexPlacement::new(labels, samples, iso, frame);
     pieces.into_par_iter().try_for_each(|(k, v, t)| {
         if !v.is_empty() {
             write_vertices(labels, &places[rows * k..], &placement, k, v);
@@ -227,7 +227,7 @@ fn places(slabs: &[(Vec<RowCount>, usize)], rows: usize) -> Vec<Place> {
 fn write_vertices(
     labels: &Labels,
     places: &[Place],
-    placement: &Placement,
+    placement: &VertexPlacement,
     k: usize,
     out: &mut [Vec3],
 ) {
@@ -256,7 +256,7 @@ fn write_vertices(
 }
 
 /// What determines a vertex's place on its edge.
-struct Placement<'a> {
+struct VertexPlacement<'a> {
     samples: &'a Samples<'a>,
     iso: f32,
     /// Steps along i, j, k and the place of the border's first voxel, mm.
@@ -266,7 +266,7 @@ struct Placement<'a> {
     first: [usize; 3],
 }
 
-impl<'a> Placement<'a> {
+impl<'a> VertexPlacement<'a> {
     fn new(labels: &Labels, samples: &'a Samples, iso: f32, frame: &VoxelToPatient) -> Self {
         let corner = Vec3::from_fn(|r, _| labels.origin[r] as f64 - 1.0);
         Self {
