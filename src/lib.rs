@@ -143,6 +143,9 @@ pub mod evaluate;
 pub mod jobs;
 
 #[cfg(feature = "service")]
+pub mod access;
+
+#[cfg(feature = "service")]
 pub mod store;
 
 #[cfg(feature = "service")]

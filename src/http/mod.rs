@@ -9,6 +9,7 @@
 //! | the paths, the layers around them | [`router`] |
 //! | uploads, jobs, results | [`volumes`], [`jobs`], [`models`], [`segmentations`], [`templates`] |
 //! | what several of them share | [`collection`] (list, show, erase), [`products`] (meshes, reports, files), [`files`] (ranges, validators) |
+//! | who sent a request | [`caller`] |
 //! | errors and their wording | [`problem`]; 404 and 410 in [`problem::not_found`] |
 //! | limits on bodies and connections | [`limits`], [`connections`] |
 //! | reading requests | [`request`], [`negotiate`], [`pagination`], [`idempotency`], [`upload`] |
@@ -23,6 +24,7 @@
 //! behind a proxy that has.
 
 mod app;
+pub mod caller;
 mod collection;
 mod connections;
 mod files;

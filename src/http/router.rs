@@ -11,8 +11,8 @@ use super::segmentations::Segmentations;
 use super::templates::{MESH_SIZE, Templates};
 use super::volumes::Volumes;
 use super::{
-    collection, front_page, health, idempotency, jobs, models, products, segmentations, templates,
-    volumes,
+    caller, collection, front_page, health, idempotency, jobs, models, products, segmentations,
+    templates, volumes,
 };
 use crate::config::Settings;
 use axum::Router;
@@ -96,6 +96,7 @@ pub fn router(app: App) -> Router {
                 .on_failure(()),
         )
         .layer(CatchPanicLayer::custom(from_panic))
+        .layer(middleware::from_fn(caller::identify))
         .layer(SetResponseHeaderLayer::if_not_present(
             header::X_CONTENT_TYPE_OPTIONS,
             HeaderValue::from_static("nosniff"),

@@ -26,7 +26,7 @@
 //!
 //! | where | what |
 //! |---|---|
-//! | `job`, `resource`, `ids`, `failure` | a job and its states, kinds of ids, reasons for failing |
+//! | `job`, `resource`, `ids`, `failure`, `tenant` | a job and its states, kinds of ids, reasons for failing, owners |
 //! | `work` | what a kind of job must provide, its input and its output |
 //! | `queue` | filing, waiting for and cancelling jobs; publishing results; recovery, retention |
 //! | `worker` | claiming jobs, renewing leases, reporting progress, committing |
@@ -39,6 +39,7 @@ mod job;
 mod queue;
 mod resource;
 mod storage;
+mod tenant;
 mod work;
 mod worker;
 
@@ -54,6 +55,7 @@ pub use storage::{
     JobStore, Lease, ListPage, ListRequest, LocalFile, Product, ProductFile, QueueLoad,
     StagedFiles, StoreError, StoreResult, StoredVolume,
 };
+pub use tenant::{InvalidTenant, Tenant};
 pub use work::{
     GivenParameters, Needs, OutputFile, StoredItem, Work, WorkError, WorkInput, WorkOutput, Works,
 };

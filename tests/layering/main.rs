@@ -112,6 +112,7 @@ const USES: &[(&str, &[&str])] = &[
         ],
     ),
     ("jobs", &["progress"]),
+    ("access", &[]),
     ("store", &["jobs"]),
     (
         "work",
@@ -135,7 +136,15 @@ const USES: &[(&str, &[&str])] = &[
     ("config", &[]),
     (
         "http",
-        &["export", "parameters", "jobs", "store", "work", "config"],
+        &[
+            "export",
+            "parameters",
+            "jobs",
+            "access",
+            "store",
+            "work",
+            "config",
+        ],
     ),
     (
         "cli",
@@ -187,7 +196,7 @@ const SERVICE_CRATES: &[&str] = &[
 ];
 
 /// The service: what stands here may name [`SERVICE_CRATES`].
-const SERVICE: &[&str] = &["jobs", "work", "store", "config", "http", "cli"];
+const SERVICE: &[&str] = &["jobs", "access", "work", "store", "config", "http", "cli"];
 
 /// Standard-library facilities that would make a result depend on more than its input.
 const IMPURE: &[&str] = &["std::time", "std::env", "std::net", "HashMap", "HashSet"];
