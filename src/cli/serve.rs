@@ -75,6 +75,7 @@ pub fn check_health(args: &HealthcheckArgs) -> Result<()> {
             SocketAddr::V6(_) => std::net::Ipv6Addr::LOCALHOST.into(),
         });
     }
+    http::install_cryptography();
     Runtime::new()?.block_on(async {
         let client = reqwest::Client::builder().timeout(HEALTH_TIMEOUT).build()?;
         let answer = client

@@ -27,6 +27,7 @@ mod app;
 pub mod caller;
 mod collection;
 mod connections;
+mod cryptography;
 mod files;
 mod front_page;
 mod health;
@@ -51,6 +52,7 @@ mod volumes;
 mod wire;
 
 pub use app::App;
+pub use cryptography::install_cryptography;
 pub use server::{Running, ServeError, serve, start};
 
 /// The OpenAPI document, as committed under `openapi/`.

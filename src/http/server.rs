@@ -2,6 +2,7 @@
 
 use super::app::App;
 use super::connections::{self, ConnectionLimits};
+use super::cryptography::install_cryptography;
 use super::router::router;
 use crate::config::Settings;
 use crate::jobs::{
@@ -72,6 +73,7 @@ pub async fn start(
     engine: Engine,
     listener: TcpListener,
 ) -> Result<Running, ServeError> {
+    install_cryptography();
     let workers = worker_settings(&settings);
     let store = Store::open(&settings.data_dir).await?;
     let queue = Arc::new(Queue::new(

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use ventriform::config::Settings;
 use ventriform::export::{self, Format, Metadata};
-use ventriform::http::{Running, start};
+use ventriform::http::{Running, install_cryptography, start};
 use ventriform::jobs::{
     Failure, Fault, GivenParameters, LocalFile, Needs, OutputFile, Resource, StoredItem, Work,
     WorkError, WorkInput, WorkOutput,
@@ -35,6 +35,7 @@ pub struct Api {
 
 impl Api {
     fn new(url: String) -> Self {
+        install_cryptography();
         let client = Client::new();
         Self { client, url }
     }
