@@ -86,3 +86,32 @@ pub fn main() -> ExitCode {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn help_describes_every_argument_of_every_command() {
+        let mut open = vec![Cli::command()];
+        let mut described = 0;
+        while let Some(mut command) = open.pop() {
+            let name = command.get_name().to_owned();
+            assert!(command.get_about().is_some(), "{name}");
+            let help = command.render_long_help().to_string();
+            for argument in command.get_arguments() {
+                let text = argument.get_help().map(ToString::to_string);
+                let text = text.unwrap_or_else(|| panic!("{name}: {}", argument.get_id()));
+                assert!(text.len() > 8, "{name}: {}: {text}", argument.get_id());
+                assert!(
+                    help.contains(text.split_whitespace().next().unwrap()),
+                    "{name}: {}",
+                    argument.get_id()
+                );
+                described += 1;
+            }
+            open.extend(command.get_subcommands().cloned());
+        }
+        assert!(described > 100, "{described}");
+    }
+}

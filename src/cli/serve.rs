@@ -160,23 +160,27 @@ async fn shutdown_signal() -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::variable_name;
     use clap::Command;
 
     #[test]
-    fn help_describes_every_setting() {
-        let mut command = ServeArgs::augment_args(Command::new("serve"));
-        let help = command.render_help().to_string();
-        for name in Settings::NAMES {
-            let flag = command
-                .get_arguments()
-                .find(|flag| flag.get_id() == name)
-                .unwrap();
-            let text = flag.get_help().unwrap().to_string();
-            assert!(
-                text.len() > 20 && text.contains("[default: "),
-                "{name}: {text}"
-            );
-            assert!(help.contains(&format!("--{}", name.replace('_', "-"))));
+    fn help_describes_every_setting_with_its_variable_and_default() {
+        let mut command = ServeArgs::augment_args(Command::new("serve")).term_width(0);
+        let help = command.render_long_help().to_string();
+        for row in Settings::ROWS {
+            let start = help
+                .find(&format!("{} <", row.flag()))
+                .unwrap_or_else(|| panic!("{} is missing", row.flag()));
+            let text = help[start..].lines().take(2).collect::<Vec<_>>().join(" ");
+            assert!(row.summary().len() > 10, "{}", row.name);
+            for part in [
+                row.summary(),
+                format!("[env: {}]", variable_name(row.name)),
+                row.default.to_owned(),
+            ] {
+                assert!(text.contains(&part), "{part}: {text}");
+            }
+            assert!(help.contains(&format!("{}:\n", row.group)), "{}", row.group);
         }
     }
 }

@@ -87,19 +87,59 @@ impl Display for Origin {
     }
 }
 
-/// The help of a flag: the setting's description and default.
-fn help(lines: &[&str], default: &str) -> String {
-    let lines: Vec<&str> = lines.iter().map(|line| line.trim()).collect();
-    format!("{} [default: {default}]", lines.join(" "))
+/// One row of the table of settings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SettingRow {
+    /// The heading that it stands under in `--help`.
+    pub group: &'static str,
+    /// Its name, as it is written in the file.
+    pub name: &'static str,
+    /// The lines of its description.
+    pub description: &'static [&'static str],
+    /// Its default, as it would be written in the file; empty if there is none.
+    pub default: &'static str,
 }
 
-/// Generates the struct of settings, the flags and the resolver from one table.
+impl SettingRow {
+    /// Its description as one line.
+    pub fn summary(&self) -> String {
+        let lines: Vec<&str> = self.description.iter().map(|line| line.trim()).collect();
+        lines.join(" ")
+    }
+
+    /// The command-line flag.
+    pub fn flag(&self) -> String {
+        format!("--{}", self.name.replace('_', "-"))
+    }
+
+    /// The help of its flag: description, environment variable and default.
+    fn help(&self) -> String {
+        let default = match self.default {
+            "" => String::new(),
+            value => format!(" [default: {value}]"),
+        };
+        format!(
+            "{} [env: {}]{default}",
+            self.summary(),
+            variable_name(self.name)
+        )
+    }
+}
+
+fn row(setting: &str) -> &'static SettingRow {
+    let mut rows = Settings::ROWS.iter();
+    rows.find(|row| row.name == setting)
+        .expect("every setting has a row")
+}
+
+/// Generates the struct of settings, the flags and the resolver from one table. A heading in
+/// brackets begins a group.
 macro_rules! settings {
-    ($($(#[doc = $doc:literal])+ $name:ident: $kind:ty = $default:literal;)+) => {
+    ($([$group:literal] $($(#[doc = $doc:literal])+ $name:ident: $kind:ty = $default:literal;)+)+) => {
         /// Every setting of the service.
         #[derive(Debug, Clone, PartialEq)]
         pub struct Settings {
-            $($(#[doc = $doc])+ pub $name: $kind,)+
+            $($($(#[doc = $doc])+ pub $name: $kind,)+)+
         }
 
         /// The settings as flags of `ventriform serve`, all optional.
@@ -109,42 +149,53 @@ macro_rules! settings {
             /// [env: VENTRIFORM_CONFIG]
             #[arg(long, value_name = "FILE")]
             pub config: Option<PathBuf>,
-            $(
+            $($(
                 $(#[doc = $doc])+
-                #[arg(long, value_name = "VALUE", help = help(&[$($doc),+], $default))]
+                #[arg(long, value_name = "VALUE", help_heading = $group, help = row(stringify!($name)).help())]
                 pub $name: Option<$kind>,
-            )+
+            )+)+
         }
 
         impl Settings {
             /// Every setting's name, in the order of the documentation.
-            pub const NAMES: &'static [&'static str] = &[$(stringify!($name)),+];
+            pub const NAMES: &'static [&'static str] = &[$($(stringify!($name)),+),+];
+
+            /// Every setting's description and default, in the order of the documentation.
+            pub const ROWS: &'static [SettingRow] = &[$($(SettingRow {
+                group: $group,
+                name: stringify!($name),
+                description: &[$($doc),+],
+                default: $default,
+            }),+),+];
 
             fn resolve(flags: &Flags, layers: &Layers) -> Result<(Self, Vec<Origin>), ConfigError> {
                 let mut origins = Vec::new();
                 let settings = Self {
-                    $($name: {
+                    $($($name: {
                         let (value, origin) =
                             layers.pick(stringify!($name), flags.$name.clone(), $default)?;
                         origins.push(origin);
                         value
-                    },)+
+                    },)+)+
                 };
                 Ok((settings, origins))
             }
 
             fn values(&self) -> Vec<String> {
-                vec![$(self.$name.shown()),+]
+                vec![$($(self.$name.shown()),+),+]
             }
         }
     };
 }
 
 settings! {
+    ["Service"]
     /// Address and port to listen on; port 0 takes any free one
     listen: SocketAddr = "127.0.0.1:8080";
     /// Folder for the database and the files; created if missing, used by one process at a time
     data_dir: PathBuf = "ventriform-data";
+
+    ["Jobs"]
     /// Jobs computed at the same time; `auto` is one per two cores
     workers: Count = "auto";
     /// Threads of one job; `auto` is two, or one on a single core
@@ -158,6 +209,8 @@ settings! {
     job_time_limit: Span = "10m";
     /// How long a worker's claim on a job lasts without renewal
     lease: Span = "30s";
+
+    ["Uploads and requests"]
     /// Largest upload
     body_limit: Size = "1GiB";
     /// Largest number of files in one upload (a DICOM series has one per slice)
@@ -172,8 +225,12 @@ settings! {
     wait_limit: Span = "60s";
     /// Largest number of templates in the library
     template_limit: u32 = "50";
+
+    ["Retention"]
     /// Age at which finished jobs, volumes, models and segmentations are deleted; `off` keeps them
     retention: Retention = "off";
+
+    ["Connections"]
     /// Largest number of open connections; more are closed immediately
     connection_limit: usize = "4096";
     /// Time limit for the headers of a request, and for an idle connection
@@ -182,6 +239,8 @@ settings! {
     body_timeout: Span = "30s";
     /// Longest time for an upload, from the first to the last byte
     upload_time_limit: Span = "1h";
+
+    ["Shutdown and log"]
     /// After SIGTERM or Ctrl-C: time for running jobs to end before they return to the queue
     shutdown_grace: Span = "30s";
     /// Log lines as `text` or `json`
