@@ -1,7 +1,7 @@
 //! A job and its states: `queued -> running -> succeeded | failed | cancelled`, and from
 //! `running` back to `queued` when its worker was lost.
 
-use super::{Failure, Timestamp};
+use super::{Failure, Tenant, Timestamp};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
@@ -57,6 +57,8 @@ impl JobState {
 pub struct Job {
     /// `job_...`
     pub id: String,
+    /// Whose job it is; only this tenant sees it.
+    pub tenant: Tenant,
     /// Position in the order of filing.
     pub sequence: i64,
     /// The kind of work: `model`, `segmentation`.
@@ -92,6 +94,8 @@ pub struct Job {
 /// A job to be filed.
 #[derive(Debug, Clone)]
 pub struct NewJob {
+    /// See [`Job::tenant`].
+    pub tenant: Tenant,
     /// See [`Job::kind`].
     pub kind: String,
     /// See [`Job::volume`].
@@ -104,7 +108,8 @@ pub struct NewJob {
     pub idempotency: Option<Idempotency>,
 }
 
-/// Marks repeated requests as one: the same key with the same fingerprint files one job.
+/// Marks repeated requests of a tenant as one: the same key with the same fingerprint files one
+/// job.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Idempotency {
     /// The key.

@@ -1,7 +1,7 @@
 //! From rows of SQLite to the records of `jobs`, and JSON columns both ways.
 
 use crate::jobs::{
-    Job, JobState, ListPage, ListRequest, Product, StoreError, StoreResult, StoredVolume,
+    Job, JobState, ListPage, ListRequest, Product, StoreError, StoreResult, StoredVolume, Tenant,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -13,6 +13,7 @@ pub(super) fn job(row: SqliteRow) -> StoreResult<Job> {
     let failure: Option<&str> = row.try_get("failure")?;
     Ok(Job {
         id: row.try_get("id")?,
+        tenant: tenant(&row)?,
         sequence: row.try_get("sequence")?,
         kind: row.try_get("kind")?,
         volume: row.try_get("volume")?,
@@ -54,6 +55,12 @@ pub(super) fn product(row: SqliteRow) -> StoreResult<Product> {
         software: row.try_get("software")?,
         files: json(&row, "files")?,
     })
+}
+
+/// The tenant of a row.
+fn tenant(row: &SqliteRow) -> StoreResult<Tenant> {
+    let name: String = row.try_get("tenant")?;
+    Tenant::try_from(name).map_err(|e| StoreError::Database(format!("damaged row: {e}")))
 }
 
 /// Converts the rows of a list by `record`.

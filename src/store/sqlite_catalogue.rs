@@ -86,7 +86,7 @@ impl Catalogue for SqliteStore {
     }
 
     async fn erased_at(&self, id: &str) -> StoreResult<Option<Timestamp>> {
-        let row = sqlx::query("SELECT erased_at FROM tombstones WHERE id = ?")
+        let row = sqlx::query("SELECT erased_at FROM erased WHERE tenant = 'default' AND id = ?")
             .bind(id)
             .fetch_optional(&self.readers)
             .await?;
@@ -173,7 +173,7 @@ pub(super) async fn record_deletion(
     id: &str,
     now: Timestamp,
 ) -> StoreResult<()> {
-    sqlx::query("INSERT OR REPLACE INTO tombstones (id, erased_at) VALUES (?, ?)")
+    sqlx::query("INSERT OR REPLACE INTO erased (tenant, id, erased_at) VALUES ('default', ?, ?)")
         .bind(id)
         .bind(now)
         .execute(to)
@@ -183,7 +183,7 @@ pub(super) async fn record_deletion(
 
 /// Removes the record of a deletion: the item exists again.
 async fn forget_deletion(to: &mut SqliteConnection, id: &str) -> StoreResult<()> {
-    sqlx::query("DELETE FROM tombstones WHERE id = ?")
+    sqlx::query("DELETE FROM erased WHERE tenant = 'default' AND id = ?")
         .bind(id)
         .execute(to)
         .await?;

@@ -4,8 +4,8 @@
 use super::rows::{self, to_json};
 use super::sqlite::SqliteStore;
 use crate::jobs::{
-    Deleted, Failure, Filed, Interrupted, Job, JobOutcome, JobState, JobStore, Lease, ListPage,
-    ListRequest, NewJob, QueueLoad, Resource, StoreResult, Timestamp, random_id,
+    Deleted, Failure, Filed, Idempotency, Interrupted, Job, JobOutcome, JobState, JobStore, Lease,
+    ListPage, ListRequest, NewJob, QueueLoad, Resource, StoreResult, Tenant, Timestamp, random_id,
 };
 use async_trait::async_trait;
 use sqlx::Row;
@@ -23,8 +23,8 @@ impl JobStore for SqliteStore {
         let key = job.idempotency.as_ref();
         let inserted = sqlx::query(
             "INSERT INTO jobs (id, kind, volume, parameters, created_at, idempotency_key,
-                               fingerprint, needs)
-             SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?9
+                               fingerprint, needs, tenant)
+             SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?9, ?10
              WHERE (SELECT count(*) FROM jobs WHERE state = 'queued') < ?8
                AND EXISTS (SELECT 1 FROM volumes WHERE id = ?3)
                AND NOT EXISTS
@@ -39,10 +39,11 @@ impl JobStore for SqliteStore {
         .bind(&job.volume)
         .bind(to_json(&job.parameters)?)
         .bind(now)
-        .bind(key.map(|k| &k.key))
+        .bind(key.map(|k| stored_key(&job.tenant, k)))
         .bind(key.map(|k| &k.fingerprint))
         .bind(i64::try_from(queue_limit).unwrap_or(i64::MAX))
         .bind(to_json(&job.needs)?)
+        .bind(job.tenant.as_str())
         .fetch_optional(&self.writer)
         .await?;
         if let Some(row) = inserted {
@@ -325,7 +326,7 @@ impl SqliteStore {
             return Ok(None);
         };
         let row = sqlx::query("SELECT * FROM jobs WHERE idempotency_key = ?")
-            .bind(&key.key)
+            .bind(stored_key(&job.tenant, key))
             .fetch_optional(&self.readers)
             .await?;
         row.map(|row| {
@@ -340,4 +341,9 @@ impl SqliteStore {
         })
         .transpose()
     }
+}
+
+/// A key as the table holds it: unique among all tenants, as no tenant's name contains a slash.
+fn stored_key(tenant: &Tenant, promise: &Idempotency) -> String {
+    format!("{tenant}/{}", promise.key)
 }

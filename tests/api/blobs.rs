@@ -16,7 +16,7 @@ use std::time::Duration;
 use tokio::io::{AsyncWrite, AsyncWriteExt};
 use ventriform::jobs::{
     BlobError, BlobStore, BlobStream, BlobWriter, Filed, JobState, LocalFile, NewJob, Queue,
-    QueueSettings, StagedFiles, StoredVolume, SystemClock, WorkerSettings, Workers,
+    QueueSettings, StagedFiles, StoredVolume, SystemClock, Tenant, WorkerSettings, Workers,
 };
 use ventriform::store::Store;
 
@@ -180,6 +180,7 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
     let workers = Workers::start(&queue, &engine.works, settings).unwrap();
     let work = engine.work("model").unwrap();
     let job = NewJob {
+        tenant: Tenant::default(),
         kind: "model".into(),
         volume: "vol_1".into(),
         needs: BTreeMap::new(),

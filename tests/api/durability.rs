@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use std::time::Duration;
 use ventriform::jobs::{
     Catalogue, Failure, Fault, Filed, JobOutcome, JobState, JobStore, Lease, ListRequest, NewJob,
-    Resource, StoredVolume,
+    Resource, StoredVolume, Tenant,
 };
 use ventriform::store::Store;
 
@@ -146,6 +146,7 @@ async fn filed(store: &Store) -> String {
         .parameters_from_json(json!({"points": 67}).as_object().unwrap())
         .unwrap();
     let order = NewJob {
+        tenant: Tenant::default(),
         kind: "model".into(),
         volume: "vol_1".into(),
         needs: Default::default(),

@@ -23,4 +23,5 @@ mod openapi;
 mod operations;
 mod segmentations;
 mod shutdown;
+mod tenants;
 mod volumes;

@@ -11,7 +11,7 @@ use crate::http::products::{self, Offer};
 use crate::http::request::query_pairs;
 use crate::http::wire::path_of;
 use crate::http::{idempotency, negotiate, upload};
-use crate::jobs::{Filed, Job, JobState, NewJob, Resource, Work};
+use crate::jobs::{Filed, Job, JobState, NewJob, Resource, Tenant, Work};
 use axum::Json;
 use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
@@ -86,6 +86,7 @@ pub fn new_job(
 ) -> NewJob {
     let kind = work.makes().noun();
     NewJob {
+        tenant: Tenant::default(),
         kind: kind.into(),
         idempotency: idempotency::promise(key, kind, &volume, &parameters),
         needs: work.needs(&parameters).items,
