@@ -39,7 +39,7 @@ pub struct ImportArgs {
 pub fn import(args: &ImportArgs) -> Result<()> {
     Runtime::new()?.block_on(async {
         let store = Store::open(&args.data_dir).await?;
-        let queue = Queue::new(
+        let queue = Arc::new(Queue::new(
             store.rows.clone(),
             store.rows.clone(),
             store.blobs.clone(),
@@ -48,7 +48,7 @@ pub fn import(args: &ImportArgs) -> Result<()> {
                 limit: Settings::default().queue_limit,
                 workers: 1,
             },
-        );
+        ));
         let engine = Engine::new(ReadLimits::default());
         for path in &args.models {
             let id = add(&queue, &engine, path, &args.organ)
@@ -60,7 +60,7 @@ pub fn import(args: &ImportArgs) -> Result<()> {
     })
 }
 
-async fn add(queue: &Queue, engine: &Engine, path: &Path, organ: &str) -> Result<String> {
+async fn add(queue: &Arc<Queue>, engine: &Engine, path: &Path, organ: &str) -> Result<String> {
     let mesh = std::fs::read(path)?;
     let output = engine
         .reader

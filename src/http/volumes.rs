@@ -176,8 +176,9 @@ pub async fn create_volume(
     if let Some((name, _)) = upload.fields.first() {
         return Err(unknown("form field", name, &[]));
     }
-    let (volume, new) = upload.volume.store(&app).await?;
-    let status = if new {
+    let stored = upload.volume.store(&app).await?;
+    let volume = stored.volume;
+    let status = if stored.new {
         StatusCode::CREATED
     } else {
         StatusCode::OK

@@ -48,7 +48,7 @@ pub use failure::{Failure, Fault};
 pub(crate) use ids::hex;
 pub use ids::{content_id, random_id};
 pub use job::{Filed, Idempotency, Job, JobState, NewJob};
-pub use queue::{Queue, QueuePosition, QueueSettings, Upkeep, recover_after_crash};
+pub use queue::{Hold, Queue, QueuePosition, QueueSettings, Upkeep, recover_after_crash};
 pub use resource::Resource;
 pub use storage::{
     BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Deleted, Interrupted, JobOutcome,

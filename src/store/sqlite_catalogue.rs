@@ -14,8 +14,8 @@ impl Catalogue for SqliteStore {
     async fn add_volume(&self, volume: &StoredVolume) -> StoreResult<bool> {
         let mut transaction = self.writer.begin().await?;
         let done = sqlx::query(
-            "INSERT INTO volumes (id, created_at, bytes, files, facts) VALUES (?, ?, ?, ?, ?)
-             ON CONFLICT (id) DO NOTHING",
+            "INSERT INTO volumes (id, created_at, used_at, bytes, files, facts)
+             VALUES (?1, ?2, ?2, ?3, ?4, ?5) ON CONFLICT (id) DO NOTHING",
         )
         .bind(&volume.id)
         .bind(volume.created_at)
@@ -27,6 +27,16 @@ impl Catalogue for SqliteStore {
         forget_deletion(&mut transaction, &volume.id).await?;
         transaction.commit().await?;
         Ok(done.rows_affected() == 1)
+    }
+
+    async fn renew_volume(&self, id: &str, now: Timestamp) -> StoreResult<Option<StoredVolume>> {
+        let row =
+            sqlx::query("UPDATE volumes SET used_at = max(used_at, ?) WHERE id = ? RETURNING *")
+                .bind(now)
+                .bind(id)
+                .fetch_optional(&self.writer)
+                .await?;
+        row.map(rows::volume).transpose()
     }
 
     async fn volume(&self, id: &str) -> StoreResult<Option<StoredVolume>> {
@@ -97,7 +107,7 @@ impl Catalogue for SqliteStore {
         let rows = sqlx::query(
             "SELECT id FROM jobs WHERE finished_at < ?1
              UNION ALL SELECT id FROM products WHERE created_at < ?1 AND kind != 'template'
-             UNION ALL SELECT id FROM volumes WHERE created_at < ?1",
+             UNION ALL SELECT id FROM volumes WHERE used_at < ?1",
         )
         .bind(before)
         .fetch_all(&self.readers)

@@ -17,6 +17,7 @@ mod durability;
 mod end_to_end;
 mod events;
 mod hostile;
+mod items;
 mod jobs;
 mod models;
 mod openapi;

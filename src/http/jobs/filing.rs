@@ -62,15 +62,20 @@ pub async fn file_upload(
     let upload = upload::receive(app, request, job.apart).await?;
     let given = pairs.len();
     pairs.extend(upload.fields);
+    // Held until the job is filed: from then on the job keeps them.
+    let mut holds = Vec::new();
     for (name, files) in upload.others {
-        let (volume, _) = files.store(app).await.map_err(|p| p.at(name))?;
-        pairs.push((name.to_owned(), volume.id));
+        let stored = files.store(app).await.map_err(|p| p.at(name))?;
+        pairs.push((name.to_owned(), stored.volume.id));
+        holds.push(stored.hold);
     }
     if pairs.len() > given {
         parameters = work.parameters_from_text(&pairs)?;
     }
-    let (volume, _) = upload.volume.store(app).await?;
-    let filed = file(app, &new_job(&**work, volume.id, parameters, key)).await?;
+    let stored = upload.volume.store(app).await?;
+    holds.push(stored.hold);
+    let filed = file(app, &new_job(&**work, stored.volume.id, parameters, key)).await?;
+    drop(holds);
     match patience {
         Some(patience) => wait(app, filed, patience, &headers, &job.offers).await,
         None => accepted(app, filed).await,

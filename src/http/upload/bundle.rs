@@ -2,7 +2,7 @@
 
 use crate::http::app::App;
 use crate::http::problem::{Answer, Problem};
-use crate::jobs::{BlobError, Resource, StagedFiles, StoredVolume, hex};
+use crate::jobs::{BlobError, Hold, Resource, StagedFiles, StoredVolume, hex};
 use axum::body::Bytes;
 use futures::{Stream, StreamExt};
 use sha2::{Digest, Sha256};
@@ -15,6 +15,16 @@ const WRITE_BYTES: usize = 1 << 20;
 pub struct Bundle {
     staged: Box<dyn StagedFiles>,
     files: Vec<Received>,
+}
+
+/// A stored volume, which is not deleted while this exists.
+pub struct Stored {
+    /// Its record.
+    pub volume: StoredVolume,
+    /// Whether it was not stored before.
+    pub new: bool,
+    /// Keeps it from being deleted.
+    pub hold: Hold,
 }
 
 /// One received file.
@@ -111,17 +121,20 @@ impl Bundle {
         Ok(&mut self.files[last])
     }
 
-    /// Checks and stores the volume; also returns whether it is new.
+    /// Checks and stores the volume. One that is stored already is not checked again; its age
+    /// counts from now.
     ///
     /// # Errors
     /// 413 or 422 if the files are not a usable volume.
-    pub async fn store(mut self, app: &App) -> Answer<(StoredVolume, bool)> {
-        // The order of the form's parts has no meaning, so it must not change the id.
-        self.files
-            .sort_by(|a, b| (a.kind, a.digest).cmp(&(b.kind, b.digest)));
+    pub async fn store(mut self, app: &App) -> Answer<Stored> {
         let id = self.volume_id();
-        if let Some(known) = app.queue.catalogue.volume(&id).await? {
-            return Ok((known, false));
+        let hold = app.queue.hold(&id).await;
+        if let Some(volume) = app.queue.renew_volume(&id).await? {
+            return Ok(Stored {
+                volume,
+                new: false,
+                hold,
+            });
         }
         let names = self.name_files().await?;
         let mut files = Vec::with_capacity(names.len());
@@ -138,12 +151,16 @@ impl Bundle {
             facts: facts.to_json(),
             id,
         };
-        Ok(app.queue.add_volume(volume, self.staged).await?)
+        let (volume, new) = app.queue.add_volume(volume, self.staged).await?;
+        Ok(Stored { volume, new, hold })
     }
 
-    /// Of one file: the first 32 digits of its SHA-256. Of several: the same of the list of their
+    /// The id that the volume has or will have. Of one file: the first 32 digits of its SHA-256. Of several: the same of the list of their
     /// kinds and hashes.
-    fn volume_id(&self) -> String {
+    pub fn volume_id(&mut self) -> String {
+        // The order of the form's parts has no meaning, so it must not change the id.
+        self.files
+            .sort_by(|a, b| (a.kind, a.digest).cmp(&(b.kind, b.digest)));
         let prefix = Resource::Volume.prefix();
         if let [file] = &self.files[..] {
             return format!("{prefix}{}", hex(&file.digest[..16]));

@@ -1,15 +1,18 @@
 //! The queue: filing, watching and cancelling jobs.
 
 mod input;
+mod items;
 mod publish;
 mod upkeep;
 
+pub use items::Hold;
 pub use upkeep::{Upkeep, recover_after_crash};
 
 use super::{
     BlobStore, Catalogue, Clock, Filed, Interrupted, Job, JobStore, NewJob, QueueLoad, StoreError,
 };
 use crate::progress::CancelToken;
+use items::Items;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -47,9 +50,7 @@ pub struct Queue {
     pub blobs: Arc<dyn BlobStore>,
     /// The time of day.
     pub clock: Arc<dyn Clock>,
-    /// Held while the files and the record of one item are added or deleted, so that the two
-    /// always agree.
-    publishing: tokio::sync::Mutex<()>,
+    items: Items,
     settings: QueueSettings,
     filed: Notify,
     changes: broadcast::Sender<Arc<Job>>,
@@ -70,7 +71,7 @@ impl Queue {
             catalogue,
             blobs,
             clock,
-            publishing: tokio::sync::Mutex::new(()),
+            items: Items::default(),
             settings,
             filed: Notify::new(),
             changes: broadcast::Sender::new(CHANGES_BUFFERED),
@@ -99,6 +100,12 @@ impl Queue {
     /// If the database fails.
     pub async fn is_full(&self) -> Result<bool, StoreError> {
         Ok(self.jobs.load().await?.queued >= self.settings.limit as u64)
+    }
+
+    /// Keeps an item from being deleted, by request or by age, until the hold is dropped. The item
+    /// need not exist yet. To be taken before the item is looked for or added.
+    pub async fn hold(&self, id: &str) -> Hold {
+        self.items.hold(id).await
     }
 
     /// Cancels a waiting job; asks a running one to stop.

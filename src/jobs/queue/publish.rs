@@ -1,14 +1,18 @@
 //! Adding volumes and products: first the files, then the record that makes them visible.
+//!
+//! The two steps run in a task of their own, which goes on if the caller goes away: a client that
+//! hangs up leaves neither files without a record nor a record that nobody waited for.
 
 use super::Queue;
 use crate::jobs::{
-    BlobError, Failure, Fault, Job, JobOutcome, OutputFile, Product, ProductFile, Resource,
+    BlobError, Failure, Fault, Job, JobOutcome, Lease, OutputFile, Product, ProductFile, Resource,
     StagedFiles, StoreError, StoredVolume, WorkOutput, content_id, hex,
 };
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
+use std::sync::Arc;
 use tokio::io::AsyncWriteExt;
-use tokio::sync::MutexGuard;
+use tracing::Instrument;
 
 impl Queue {
     /// Adds an uploaded volume durably. Returns the record, and whether it is new.
@@ -16,15 +20,29 @@ impl Queue {
     /// # Errors
     /// If the files or the record cannot be written.
     pub async fn add_volume(
-        &self,
+        self: &Arc<Self>,
         volume: StoredVolume,
         files: Box<dyn StagedFiles>,
     ) -> Result<(StoredVolume, bool), StoreError> {
-        let _publishing = self.publishing().await;
-        files.publish(&volume.id).await?;
-        let new = self.catalogue.add_volume(&volume).await?;
-        let stored = self.catalogue.volume(&volume.id).await?;
-        Ok((stored.unwrap_or(volume), new))
+        let queue = self.clone();
+        to_its_end(async move {
+            let _lock = queue.items.lock(&volume.id).await;
+            queue.items.unsettle(&volume.id);
+            files.publish(&volume.id).await?;
+            let new = queue.catalogue.add_volume(&volume).await?;
+            queue.items.settle(&volume.id);
+            let stored = queue.catalogue.volume(&volume.id).await?;
+            Ok((stored.unwrap_or(volume), new))
+        })
+        .await
+    }
+
+    /// The volume with that id, whose age counts from now: it was uploaded again.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn renew_volume(&self, id: &str) -> Result<Option<StoredVolume>, StoreError> {
+        self.catalogue.renew_volume(id, self.clock.now()).await
     }
 
     /// Adds a template to the library, durably. Returns the record, and whether it is new: the
@@ -33,7 +51,7 @@ impl Queue {
     /// # Errors
     /// If the files or the record cannot be written.
     pub async fn add_template(
-        &self,
+        self: &Arc<Self>,
         name: &str,
         organ: &str,
         output: WorkOutput,
@@ -43,30 +61,43 @@ impl Queue {
             .into_iter()
             .collect();
         let template = self.product(Resource::Template, &[organ], None, parameters, &output);
-        let _publishing = self.publishing().await;
-        self.write_files(&template.id, output).await?;
-        let new = self.catalogue.add_product(&template).await?;
-        let stored = self.catalogue.product(&template.id).await?;
-        Ok((stored.unwrap_or(template), new))
+        let queue = self.clone();
+        to_its_end(async move {
+            let _lock = queue.items.lock(&template.id).await;
+            queue.items.unsettle(&template.id);
+            queue.write_files(&template.id, &output).await?;
+            let new = queue.catalogue.add_product(&template).await?;
+            queue.items.settle(&template.id);
+            let stored = queue.catalogue.product(&template.id).await?;
+            Ok((stored.unwrap_or(template), new))
+        })
+        .await
     }
 
-    /// Writes the files that a job made. Its record is added with the commit of the job, until
-    /// which the caller must hold [`Queue::publishing`].
-    pub(in crate::jobs) async fn publish(
+    /// Stores what a job made and ends the job: the files first, then, in one commit, the record
+    /// and the job's state. `None` if the lease was lost. May be called again after an error.
+    ///
+    /// # Errors
+    /// If the database fails; then the job is still running.
+    pub(in crate::jobs) async fn finish_with(
         &self,
         made: Resource,
         job: &Job,
-        output: WorkOutput,
-    ) -> JobOutcome {
+        lease: &Lease,
+        output: &WorkOutput,
+    ) -> Result<Option<Job>, StoreError> {
         let parameters = Value::Object(job.parameters.clone()).to_string();
         let product = self.product(
             made,
             &[&job.volume, &parameters],
             Some(&job.volume),
             job.parameters.clone(),
-            &output,
+            output,
         );
-        match self.write_files(&product.id, output).await {
+        let id = product.id.clone();
+        let _lock = self.items.lock(&id).await;
+        self.items.unsettle(&id);
+        let outcome = match self.write_files(&id, output).await {
             Ok(()) => JobOutcome::Succeeded(Box::new(product)),
             Err(error) => {
                 tracing::error!(job = %job.id, %error, "the result could not be stored");
@@ -79,17 +110,17 @@ impl Queue {
                     .fix("Ask the operator to free disk space, then start the job again."),
                 )
             }
+        };
+        let ended = self.jobs.finish(lease, &outcome, self.clock.now()).await?;
+        if ended.is_some() && matches!(outcome, JobOutcome::Succeeded(_)) {
+            self.items.settle(&id);
         }
+        Ok(ended)
     }
 
-    /// The lock to hold while the files and the record of one item are added or deleted.
-    pub(in crate::jobs) async fn publishing(&self) -> MutexGuard<'_, ()> {
-        self.publishing.lock().await
-    }
-
-    async fn write_files(&self, id: &str, output: WorkOutput) -> Result<(), BlobError> {
+    async fn write_files(&self, id: &str, output: &WorkOutput) -> Result<(), BlobError> {
         let staged = self.blobs.stage().await?;
-        for file in output.files {
+        for file in &output.files {
             let mut writer = staged.create(&file.name).await?;
             writer.write_all(&file.bytes).await?;
             writer.shutdown().await?;
@@ -122,6 +153,15 @@ impl Queue {
             files,
         }
     }
+}
+
+/// Runs a section to its end even if the caller is dropped meanwhile.
+pub(super) async fn to_its_end<T: Send + 'static>(
+    section: impl Future<Output = Result<T, StoreError>> + Send + 'static,
+) -> Result<T, StoreError> {
+    tokio::spawn(section.in_current_span())
+        .await
+        .unwrap_or_else(|error| Err(BlobError(error.to_string()).into()))
 }
 
 /// The hash of the mesh, which stands for the whole result.

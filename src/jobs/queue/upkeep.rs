@@ -1,6 +1,7 @@
 //! Periodic upkeep: recovery after a crash, failing jobs that never end, deleting old items.
 
 use super::Queue;
+use super::publish::to_its_end;
 use crate::jobs::{Deleted, Failure, Fault, Resource, StoreError};
 use std::sync::Arc;
 use std::time::Duration;
@@ -30,16 +31,36 @@ pub async fn recover_after_crash(queue: &Queue, attempt_limit: u32) -> Result<()
 async fn delete_orphans(queue: &Queue) -> Result<u64, StoreError> {
     let mut orphans = 0;
     for id in queue.blobs.ids().await? {
-        let known = match Resource::of(&id) {
-            Some(Resource::Volume) => queue.catalogue.volume(&id).await?.is_some(),
-            _ => queue.catalogue.product(&id).await?.is_some(),
-        };
-        if !known {
+        if !has_record(queue, &id).await? {
             queue.blobs.delete(&id).await?;
             orphans += 1;
         }
     }
     Ok(orphans)
+}
+
+async fn has_record(queue: &Queue, id: &str) -> Result<bool, StoreError> {
+    Ok(match Resource::of(id) {
+        Some(Resource::Volume) => queue.catalogue.volume(id).await?.is_some(),
+        _ => queue.catalogue.product(id).await?.is_some(),
+    })
+}
+
+/// Deletes the files of items that were added or deleted by halves because the storage failed.
+/// Nobody was told that they are stored, or somebody was told that they are deleted.
+async fn settle_items(queue: &Queue) -> Result<(), StoreError> {
+    for id in queue.items.unsettled() {
+        let _lock = queue.items.lock(&id).await;
+        if !queue.items.is_unsettled(&id) {
+            continue;
+        }
+        if !has_record(queue, &id).await? {
+            queue.blobs.delete(&id).await?;
+            tracing::info!(id, "deleted files that have no record");
+        }
+        queue.items.settle(&id);
+    }
+    Ok(())
 }
 
 async fn end_unclaimable(queue: &Queue, attempt_limit: u32) -> Result<(), StoreError> {
@@ -95,6 +116,7 @@ impl Upkeep {
     /// If the database fails.
     pub async fn run_once(&self) -> Result<(), StoreError> {
         end_unclaimable(&self.queue, self.attempt_limit).await?;
+        settle_items(&self.queue).await?;
         let Some(age) = self.retention else {
             return Ok(());
         };
@@ -111,21 +133,34 @@ impl Queue {
     /// Deletes a job that has ended, or an item that no unfinished job needs, with its files.
     ///
     /// # Errors
-    /// If the database fails. Files that could not be deleted are deleted at the next start.
-    pub async fn erase(&self, id: &str) -> Result<Deleted, StoreError> {
+    /// If the database fails. Files that could not be deleted are deleted by the upkeep, or by the
+    /// next start.
+    pub async fn erase(self: &Arc<Self>, id: &str) -> Result<Deleted, StoreError> {
+        let (queue, id) = (self.clone(), id.to_owned());
+        to_its_end(async move { queue.erase_to_the_end(&id).await }).await
+    }
+
+    async fn erase_to_the_end(&self, id: &str) -> Result<Deleted, StoreError> {
         let now = self.clock.now();
-        let _publishing = self.publishing().await;
+        let _lock = self.items.lock(id).await;
+        if self.items.is_held(id) {
+            return Ok(Deleted::InUse);
+        }
+        self.items.unsettle(id);
         let deleted = match Resource::of(id) {
-            Some(Resource::Job) => return self.jobs.delete_job(id, now).await,
+            Some(Resource::Job) => self.jobs.delete_job(id, now).await?,
             Some(Resource::Volume) => self.catalogue.delete_volume(id, now).await?,
             Some(_) => self.catalogue.delete_product(id, now).await?,
             None => Deleted::Unknown,
         };
         if deleted == Deleted::Done
+            && Resource::of(id) != Some(Resource::Job)
             && let Err(error) = self.blobs.delete(id).await
         {
-            tracing::warn!(id, %error, "files could not be deleted; the next start deletes them");
+            tracing::warn!(id, %error, "files could not be deleted; the upkeep tries again");
+            return Ok(deleted);
         }
+        self.items.settle(id);
         Ok(deleted)
     }
 }

@@ -21,6 +21,9 @@ pub trait Catalogue: Send + Sync + 'static {
     /// Adds a volume. `false` if it exists already.
     async fn add_volume(&self, volume: &StoredVolume) -> StoreResult<bool>;
 
+    /// The volume with that id, whose age counts from `now` on; `None` if it does not exist.
+    async fn renew_volume(&self, id: &str, now: Timestamp) -> StoreResult<Option<StoredVolume>>;
+
     /// The volume with that id.
     async fn volume(&self, id: &str) -> StoreResult<Option<StoredVolume>>;
 
@@ -45,7 +48,8 @@ pub trait Catalogue: Send + Sync + 'static {
     /// When the item with that id was deleted; `None` if it never existed.
     async fn erased_at(&self, id: &str) -> StoreResult<Option<Timestamp>>;
 
-    /// Ids of the finished jobs, volumes, models and segmentations older than `before`.
+    /// Ids of the finished jobs, volumes, models and segmentations older than `before`. The age of
+    /// a volume counts from its last upload, or from when a job on it was last filed or ended.
     /// Templates are not listed, as they are kept.
     async fn older_than(&self, before: Timestamp) -> StoreResult<Vec<String>>;
 }

@@ -189,7 +189,7 @@ impl JobRunner {
         self.queue.jobs.finish(lease, &outcome, now).await
     }
 
-    /// Publishes the files, then commits the row. If the process ends in between, the next start
+    /// Stores the files, then commits the row. If the process ends in between, the next start
     /// deletes the files and computes the job again.
     async fn commit_output(
         &self,
@@ -197,13 +197,13 @@ impl JobRunner {
         lease: &Lease,
         output: WorkOutput,
     ) -> Result<Option<Job>, StoreError> {
-        let _publishing = self.queue.publishing().await;
-        let outcome = match self.works.of_kind(&job.kind) {
-            Some(work) => self.queue.publish(work.makes(), job, output).await,
-            None => JobOutcome::Failed(unknown_kind()),
+        let Some(work) = self.works.of_kind(&job.kind) else {
+            let outcome = JobOutcome::Failed(unknown_kind());
+            let now = self.queue.clock.now();
+            return self.queue.jobs.finish(lease, &outcome, now).await;
         };
-        let now = self.queue.clock.now();
-        self.queue.jobs.finish(lease, &outcome, now).await
+        let made = work.makes();
+        self.queue.finish_with(made, job, lease, &output).await
     }
 
     fn too_long(&self) -> Failure {

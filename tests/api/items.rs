@@ -1,0 +1,213 @@
+//! Single items under concurrent requests, failures and age: files and records agree.
+
+use crate::helpers::{TestApp, problem, text, volume};
+use reqwest::StatusCode;
+use serde_json::json;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+use tokio::io::AsyncWriteExt;
+use ventriform::jobs::{
+    BlobStore, Catalogue, Clock, Deleted, Queue, QueueSettings, StagedFiles, StoredVolume,
+    Timestamp, Upkeep,
+};
+use ventriform::store::Store;
+
+/// A clock that a test sets.
+#[derive(Default)]
+struct TestClock(AtomicI64);
+
+impl Clock for TestClock {
+    fn now(&self) -> Timestamp {
+        self.0.load(Ordering::SeqCst)
+    }
+}
+
+impl TestClock {
+    fn set(&self, now: Timestamp) {
+        self.0.store(now, Ordering::SeqCst);
+    }
+}
+
+/// A queue without workers on a folder of its own.
+struct Bench {
+    queue: Arc<Queue>,
+    clock: Arc<TestClock>,
+    store: Store,
+    folder: TempDir,
+}
+
+impl Bench {
+    async fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path()).await.unwrap();
+        let clock = Arc::new(TestClock::default());
+        let settings = QueueSettings {
+            limit: 10,
+            workers: 1,
+        };
+        let queue = Queue::new(
+            store.rows.clone(),
+            store.rows.clone(),
+            store.blobs.clone(),
+            clock.clone(),
+            settings,
+        );
+        Self {
+            queue: Arc::new(queue),
+            clock,
+            store,
+            folder,
+        }
+    }
+
+    async fn staged(&self) -> Box<dyn StagedFiles> {
+        let staged = self.store.blobs.stage().await.unwrap();
+        let mut file = staged.create("volume.nii").await.unwrap();
+        file.write_all(b"voxels").await.unwrap();
+        file.shutdown().await.unwrap();
+        staged
+    }
+
+    fn volume(&self, id: &str) -> StoredVolume {
+        StoredVolume {
+            id: id.into(),
+            sequence: 0,
+            created_at: self.clock.now(),
+            bytes: 6,
+            files: vec!["volume.nii".into()],
+            facts: json!({}),
+        }
+    }
+
+    async fn add(&self, id: &str) {
+        let files = self.staged().await;
+        self.queue.add_volume(self.volume(id), files).await.unwrap();
+    }
+
+    fn has_files(&self, id: &str) -> bool {
+        self.folder.path().join("volumes").join(id).exists()
+    }
+
+    fn upkeep(&self, retention: Option<Duration>) -> Upkeep {
+        Upkeep {
+            queue: self.queue.clone(),
+            attempt_limit: 3,
+            retention,
+            every: Duration::from_secs(60),
+        }
+    }
+}
+
+async fn database(folder: &TempDir) -> sqlx::SqliteConnection {
+    let options =
+        sqlx::sqlite::SqliteConnectOptions::new().filename(folder.path().join("ventriform.db"));
+    sqlx::ConnectOptions::connect(&options).await.unwrap()
+}
+
+async fn run(database: &mut sqlx::SqliteConnection, statement: &'static str) {
+    sqlx::query(statement).execute(database).await.unwrap();
+}
+
+#[tokio::test]
+async fn an_upload_is_stored_to_its_end_although_the_client_hangs_up() {
+    let app = TestApp::start().await;
+    let mut database = database(&app.data).await;
+    // The record has to wait for this transaction, so the client leaves between files and record.
+    run(&mut database, "BEGIN IMMEDIATE").await;
+    let request = app.post("/v1/volumes").body(volume("sphere")).send();
+    let client = tokio::spawn(request);
+    let deadline = Instant::now() + Duration::from_secs(5);
+    let folders = || std::fs::read_dir(app.data.path().join("volumes")).unwrap();
+    while folders().next().is_none() {
+        assert!(Instant::now() < deadline, "nothing is published");
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    client.abort();
+    assert!(client.await.unwrap_err().is_cancelled());
+    tokio::time::sleep(Duration::from_millis(50)).await;
+    run(&mut database, "ROLLBACK").await;
+    let id = folders().next().unwrap().unwrap().file_name();
+    let path = format!("/v1/volumes/{}", id.to_str().unwrap());
+    while app.get(&path).send().await.unwrap().status() != StatusCode::OK {
+        assert!(Instant::now() < deadline, "files without a record");
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+}
+
+#[tokio::test]
+async fn files_whose_record_could_not_be_written_are_deleted_by_the_upkeep() {
+    let bench = Bench::new().await;
+    let mut database = database(&bench.folder).await;
+    run(&mut database, "ALTER TABLE volumes RENAME TO hidden").await;
+    let files = bench.staged().await;
+    let added = bench.queue.add_volume(bench.volume("vol_1"), files).await;
+    assert!(added.is_err());
+    assert!(bench.has_files("vol_1"));
+    let upkeep = bench.upkeep(None);
+    assert!(upkeep.run_once().await.is_err(), "it cannot tell yet");
+    assert!(bench.has_files("vol_1"));
+    run(&mut database, "ALTER TABLE hidden RENAME TO volumes").await;
+    upkeep.run_once().await.unwrap();
+    assert!(!bench.has_files("vol_1"));
+    bench.add("vol_1").await;
+    upkeep.run_once().await.unwrap();
+    assert!(bench.has_files("vol_1"));
+}
+
+#[tokio::test]
+async fn an_item_on_hold_is_deleted_neither_by_request_nor_by_age() {
+    let bench = Bench::new().await;
+    bench.add("vol_1").await;
+    let hold = bench.queue.hold("vol_1").await;
+    bench.clock.set(10_000);
+    let upkeep = bench.upkeep(Some(Duration::from_secs(1)));
+    assert_eq!(bench.queue.erase("vol_1").await.unwrap(), Deleted::InUse);
+    upkeep.run_once().await.unwrap();
+    assert!(bench.has_files("vol_1"));
+    drop(hold);
+    upkeep.run_once().await.unwrap();
+    assert!(!bench.has_files("vol_1"));
+}
+
+#[tokio::test]
+async fn the_age_of_a_volume_counts_from_its_last_upload() {
+    let bench = Bench::new().await;
+    bench.add("vol_1").await;
+    let upkeep = bench.upkeep(Some(Duration::from_secs(5)));
+    for (now, kept) in [(4_000, true), (8_000, true), (14_000, false)] {
+        bench.clock.set(now);
+        upkeep.run_once().await.unwrap();
+        let found = bench.store.rows.volume("vol_1").await.unwrap().is_some();
+        assert_eq!(found, kept, "at {now}");
+        if now == 4_000 {
+            bench.queue.renew_volume("vol_1").await.unwrap();
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_request_that_carries_its_volume_finds_it_although_others_delete_it() {
+    let app = TestApp::start().await;
+    for round in 0..20 {
+        let words = format!("sphere {round}");
+        let id = app.volume(&words).await;
+        let delete = app.delete(&format!("/v1/volumes/{id}")).send();
+        let file = app.post("/v1/models").body(volume(&words)).send();
+        let (deleted, filed) = tokio::join!(delete, file);
+        let filed = filed.unwrap();
+        assert_eq!(filed.status(), StatusCode::ACCEPTED, "round {round}");
+        let job = app
+            .until(&filed.json().await.unwrap(), &["succeeded"])
+            .await;
+        assert_eq!(text(&job["volume"]), id);
+        let deleted = deleted.unwrap();
+        match deleted.status() {
+            StatusCode::NO_CONTENT => {}
+            _ => {
+                problem(deleted, 409, "in-use").await;
+            }
+        }
+    }
+}
