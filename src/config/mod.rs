@@ -10,7 +10,9 @@
 
 mod units;
 
-pub use units::{Auto, Count, Keyword, LogFormat, Off, OrKeyword, Retention, Size, Span};
+pub use units::{
+    Auto, Count, Keyword, LogFormat, Networks, Off, OptionalPath, OrKeyword, Retention, Size, Span,
+};
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -221,6 +223,11 @@ settings! {
     voxel_limit: u64 = "268435456";
     /// Largest volume after decompression
     decompressed_limit: Size = "2GiB";
+    /// Memory that uploads and previews being decoded take together; more of them wait
+    decoding_memory: Size = "256MiB";
+    /// Largest number of uploads and previews that wait to be decoded; more are answered with
+    /// status 503
+    decoding_queue: usize = "256";
     /// Longest time a request with `Prefer: wait` waits
     wait_limit: Span = "60s";
     /// Largest number of templates in the library
@@ -231,14 +238,36 @@ settings! {
     retention: Retention = "off";
 
     ["Connections"]
-    /// Largest number of open connections; more are closed immediately
+    /// Largest number of open connections. At the limit, a new connection takes the place of the one
+    /// whose client has kept the service waiting the longest; if there is none, it is answered only on
+    /// /healthz and /readyz
     connection_limit: usize = "4096";
-    /// Time limit for the headers of a request, and for an idle connection
+    /// Largest number of open connections of one client address, counted as for connection_limit
+    client_connection_limit: usize = "3072";
+    /// Proxies whose X-Forwarded-For or Forwarded header names the client: addresses and networks,
+    /// separated by commas. The limit on one client's connections does not apply to them
+    trusted_proxies: Networks = "";
+    /// Time limit for the headers of a request, for the TLS handshake, and for an idle connection
     header_timeout: Span = "10s";
+    /// Longest pause of a client in reading an answer; it must also read 1 KiB per second on average
+    write_timeout: Span = "30s";
+    /// Largest number of streams of events (/v1/jobs/ID/events); more are answered with status 429
+    event_stream_limit: usize = "1024";
+    /// Largest number of streams of events of one client address
+    client_event_stream_limit: usize = "256";
     /// Longest pause within an upload
     body_timeout: Span = "30s";
     /// Longest time for an upload, from the first to the last byte
     upload_time_limit: Span = "1h";
+
+    ["TLS"]
+    /// PEM file with the certificate chain of the service; with it, only TLS 1.2 and 1.3 are spoken.
+    /// The files are read again when they change and on SIGHUP
+    tls_cert: OptionalPath = "off";
+    /// PEM file with the private key of tls_cert
+    tls_key: OptionalPath = "off";
+    /// PEM file with the authorities whose client certificates are required; `off` requires none
+    tls_client_ca: OptionalPath = "off";
 
     ["Shutdown and log"]
     /// After SIGTERM or Ctrl-C: time for running jobs to end before they return to the queue
@@ -400,7 +429,18 @@ macro_rules! shown_by_display {
 }
 
 shown_by_display!(
-    SocketAddr, Count, Span, Size, Retention, LogFormat, String, usize, u32, u64
+    SocketAddr,
+    Count,
+    Span,
+    Size,
+    Retention,
+    LogFormat,
+    Networks,
+    OptionalPath,
+    String,
+    usize,
+    u32,
+    u64
 );
 
 #[cfg(test)]

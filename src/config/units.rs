@@ -3,9 +3,12 @@
 //! Each value is printed exactly as it may be written, so `--print-config` reads back unchanged.
 //! (`humantime` and `bytesize` print 90 s as `1m 30s` and round sizes to one decimal.)
 
+use ipnet::IpNet;
 use std::fmt;
 use std::marker::PhantomData;
+use std::net::IpAddr;
 use std::num::NonZeroUsize;
+use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -168,6 +171,69 @@ impl fmt::Display for LogFormat {
     }
 }
 
+/// The path of a file, or `off`.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct OptionalPath(pub Option<PathBuf>);
+
+impl FromStr for OptionalPath {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "" => Err(format!("give `{}` or a path", Off::WORD)),
+            Off::WORD => Ok(Self(None)),
+            path => Ok(Self(Some(path.into()))),
+        }
+    }
+}
+
+impl fmt::Display for OptionalPath {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.0 {
+            Some(path) => path.display().fmt(f),
+            None => f.write_str(Off::WORD),
+        }
+    }
+}
+
+/// Networks: addresses and ranges in CIDR notation, separated by commas; may be empty.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Networks(Vec<IpNet>);
+
+impl Networks {
+    /// Whether one of them contains `address`.
+    pub fn contain(&self, address: IpAddr) -> bool {
+        self.0.iter().any(|network| network.contains(&address))
+    }
+}
+
+impl FromStr for Networks {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let network = |part: &str| {
+            let range = part.parse::<IpNet>().ok();
+            range
+                .or_else(|| part.parse::<IpAddr>().ok().map(IpNet::from))
+                .ok_or_else(|| {
+                    format!("`{part}` is no network; give a list such as `10.0.0.0/8, 192.0.2.1`")
+                })
+        };
+        let parts = text
+            .split(',')
+            .map(str::trim)
+            .filter(|part| !part.is_empty());
+        parts.map(network).collect::<Result<_, _>>().map(Self)
+    }
+}
+
+impl fmt::Display for Networks {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names: Vec<String> = self.0.iter().map(IpNet::to_string).collect();
+        f.write_str(&names.join(", "))
+    }
+}
+
 fn scaled(text: &str, units: &[(&str, u64)]) -> Option<u64> {
     let digits = text.find(|c: char| !c.is_ascii_digit())?;
     let (number, unit) = text.split_at(digits);
@@ -197,6 +263,12 @@ mod tests {
         for text in ["1000B", "256KiB", "3MiB", "2GiB"] {
             assert_eq!(text.parse::<Size>().unwrap().to_string(), text);
         }
+        for text in ["off", "/etc/tls/cert.pem"] {
+            assert_eq!(text.parse::<OptionalPath>().unwrap().to_string(), text);
+        }
+        for text in ["", "10.0.0.0/8, 192.0.2.1/32, 2001:db8::/32"] {
+            assert_eq!(text.parse::<Networks>().unwrap().to_string(), text);
+        }
     }
 
     #[test]
@@ -215,5 +287,6 @@ mod tests {
         assert!("18446744073709551615GiB".parse::<Size>().is_err());
         assert!("0".parse::<Count>().is_err());
         assert!("never".parse::<Retention>().is_err());
+        assert!("10.0.0.0/33".parse::<Networks>().is_err());
     }
 }

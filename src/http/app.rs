@@ -1,17 +1,13 @@
 //! The state that all handlers share.
 
+use super::decoding::Decoding;
 use super::metrics::Metrics;
-use super::problem::{Answer, Problem};
+use super::streams::EventStreams;
 use crate::config::Settings;
 use crate::jobs::Queue;
 use crate::work::Engine;
 use std::sync::Arc;
-use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
-
-/// Files decoded at the same time outside of jobs: each may take as much memory as the limit on
-/// decompressed volumes allows.
-const DECODING: usize = 2;
 
 /// The service's shared state.
 #[derive(Clone)]
@@ -27,7 +23,10 @@ pub struct Shared {
     pub settings: Settings,
     /// Cancelled when the service shuts down, so that long answers end.
     pub closing: CancellationToken,
-    decoding: Semaphore,
+    /// Reads files outside of jobs.
+    pub decoding: Decoding,
+    /// The open streams of events.
+    pub streams: EventStreams,
     /// Figures for operators.
     pub metrics: Metrics,
 }
@@ -43,26 +42,12 @@ impl App {
         Self(Arc::new(Shared {
             queue,
             engine,
+            decoding: Decoding::new(&settings),
+            streams: EventStreams::new(&settings),
             settings,
             closing,
-            decoding: Semaphore::new(DECODING),
             metrics: Metrics::new(),
         }))
-    }
-
-    /// Runs work that decodes files on a blocking thread, after waiting for its turn: only a few
-    /// run at the same time.
-    ///
-    /// # Errors
-    /// 500 if the work panics.
-    pub async fn decode<T: Send + 'static>(
-        &self,
-        work: impl FnOnce() -> T + Send + 'static,
-    ) -> Answer<T> {
-        let _turn = self.decoding.acquire().await.map_err(Problem::internal)?;
-        tokio::task::spawn_blocking(work)
-            .await
-            .map_err(Problem::internal)
     }
 }
 

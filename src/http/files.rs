@@ -105,7 +105,8 @@ pub fn path(product: &Product, file: &ProductFile) -> String {
     format!("{}/{}", path_of(&product.id), file.name)
 }
 
-fn matches_any(headers: &HeaderMap, name: &HeaderName, etag: &str) -> bool {
+/// Whether a list of entity tags in the header `name` has `etag`, compared weakly.
+pub fn matches_any(headers: &HeaderMap, name: &HeaderName, etag: &str) -> bool {
     headers
         .get_all(name)
         .iter()

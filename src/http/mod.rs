@@ -11,10 +11,12 @@
 //! | what several of them share | [`collection`] (list, show, erase), [`products`] (meshes, reports, files), [`files`] (ranges, validators) |
 //! | who sent a request | [`caller`] |
 //! | errors and their wording | [`problem`]; 404 and 410 in [`problem::not_found`] |
-//! | limits on bodies and connections | [`limits`], [`connections`] |
+//! | limits on bodies, connections and decoding | [`limits`], [`connections`], [`decoding`] |
+//! | the address that sent a request | [`client`] |
 //! | reading requests | [`request`], [`negotiate`], [`pagination`], [`idempotency`], [`upload`] |
 //! | log, traces, metrics | [`observe`], [`metrics`] |
-//! | the published document | [`openapi`] |
+//! | the published document | [`openapi`], [`document`] |
+//! | streams of events | [`streams`] |
 //!
 //! Guarantees: every error is a problem object (RFC 9457) with a stable `type`, and with `field`
 //! and `fix` where they apply; every body and list has a limit; uploads are streamed to the disk
@@ -25,9 +27,12 @@
 
 mod app;
 pub mod caller;
+mod client;
 mod collection;
 mod connections;
 mod cryptography;
+mod decoding;
+mod document;
 mod files;
 mod front_page;
 mod health;
@@ -46,12 +51,14 @@ mod request;
 mod router;
 mod segmentations;
 mod server;
+mod streams;
 mod templates;
 mod upload;
 mod volumes;
 mod wire;
 
 pub use app::App;
+pub use connections::tls::TlsError;
 pub use cryptography::install_cryptography;
 pub use server::{Running, ServeError, serve, start};
 

@@ -5,6 +5,7 @@
 
 use super::app::App;
 use super::collection::{Collection, find};
+use super::decoding::LITTLE_MEMORY;
 use super::files;
 use super::negotiate;
 use super::openapi::{
@@ -15,6 +16,7 @@ use super::problem::not_found::{missing, no_such_file};
 use super::request::{PathSegments, query_pairs, refuse_unknown};
 use crate::export::Format;
 use crate::jobs::{Catalogue, ListPage, ListRequest, Product, Resource, StoreError};
+use crate::progress::Monitor;
 use axum::extract::{RawQuery, State};
 use axum::http::{HeaderMap, HeaderValue, header};
 use axum::routing::get;
@@ -343,7 +345,8 @@ async fn send_named(app: &App, product: &Product, name: &str, headers: &HeaderMa
                 .queue
                 .with_files(product.clone(), work.page_files())
                 .await?;
-            let page = app.decode(move || work.page(&stored)).await??;
+            let draw = move |_: &Monitor<'_>| work.page(&stored);
+            let page = app.decoding.run(LITTLE_MEMORY, draw).await??;
             files::send_page(product, page, headers).await
         }
         None => {

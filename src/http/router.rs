@@ -1,6 +1,7 @@
 //! The map of the API, and the layers around it.
 
 use super::app::App;
+use super::document::PublishedDocument;
 use super::limits::BodyLimits;
 use super::models::Models;
 use super::observe::{self, REQUEST_ID};
@@ -17,7 +18,7 @@ use super::{
 use crate::config::Settings;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
-use axum::http::{HeaderValue, header};
+use axum::http::{HeaderMap, HeaderValue, header};
 use axum::middleware;
 use axum::routing::get;
 use tower::ServiceBuilder;
@@ -74,7 +75,7 @@ pub fn document() -> utoipa::openapi::OpenApi {
 /// The whole service.
 pub fn router(app: App) -> Router {
     let (api, collected) = routes(&app.settings).split_for_parts();
-    let document = axum::Json(openapi::publish(collected));
+    let document = PublishedDocument::new(&openapi::publish(collected));
     // A request passes the layers from top to bottom, its answer from bottom to top.
     let layers = ServiceBuilder::new()
         .layer(SetSensitiveRequestHeadersLayer::new([
@@ -106,7 +107,7 @@ pub fn router(app: App) -> Router {
     api.route("/", get(front_page::welcome))
         .route(
             "/openapi.json",
-            get(move || async move { document.clone() }),
+            get(move |headers: HeaderMap| async move { document.answer(&headers) }),
         )
         .merge(SwaggerUi::new("/docs").config(utoipa_swagger_ui::Config::from("/openapi.json")))
         .fallback(no_such_path)

@@ -1,6 +1,7 @@
 //! Starting the service from its settings, and shutting it down.
 
 use super::app::App;
+use super::connections::tls::{Tls, TlsError};
 use super::connections::{self, ConnectionLimits};
 use super::cryptography::install_cryptography;
 use super::router::router;
@@ -31,6 +32,9 @@ pub enum ServeError {
     /// The database in the data folder cannot be used.
     #[error(transparent)]
     Rows(#[from] StoreError),
+    /// TLS cannot be used as the settings ask for it.
+    #[error(transparent)]
+    Tls(#[from] TlsError),
     /// The system refused threads or sockets.
     #[error("{0}")]
     System(#[from] io::Error),
@@ -74,6 +78,7 @@ pub async fn start(
     listener: TcpListener,
 ) -> Result<Running, ServeError> {
     install_cryptography();
+    let tls = Tls::of(&settings)?;
     let workers = worker_settings(&settings);
     let store = Store::open(&settings.data_dir).await?;
     let queue = Arc::new(Queue::new(
@@ -98,11 +103,17 @@ pub async fn start(
     let address = listener.local_addr()?;
     let limits = ConnectionLimits {
         connections: settings.connection_limit,
+        of_one_client: settings.client_connection_limit,
+        trusted_proxies: settings.trusted_proxies.clone(),
         head: settings.header_timeout.0,
+        write: settings.write_timeout.0,
         grace: settings.shutdown_grace.0,
     };
     let listener = tokio::net::TcpListener::from_std(listener)?;
-    let server = connections::serve(listener, router(app), limits, closing.clone());
+    if let Some(tls) = &tls {
+        tokio::spawn(tls.clone().follow_changes(closing.clone()));
+    }
+    let server = connections::serve(listener, router(app), tls, limits, closing.clone());
     let server = tokio::spawn(server);
     let upkeep = Upkeep {
         queue: queue.clone(),

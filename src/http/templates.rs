@@ -1,6 +1,7 @@
 //! `/v1/templates`: the library of models that `model=auto` chooses from.
 
 use super::app::App;
+use super::decoding::LITTLE_MEMORY;
 use super::openapi::{self, UploadProblems};
 use super::problem::not_found::field_names_nothing;
 use super::problem::{Answer, Problem, ProblemBody};
@@ -9,6 +10,7 @@ use super::request::{json_bytes, query_pairs, refuse_unknown};
 use super::wire::{path_of, rfc3339};
 use crate::config::Size;
 use crate::jobs::{ListRequest, Product, Resource};
+use crate::progress::Monitor;
 use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{RawQuery, Request, State};
@@ -22,6 +24,9 @@ use utoipa::ToSchema;
 /// Largest mesh: a model to be fitted has at most 5000 points of about 200 bytes, and as many
 /// bytes of triangles.
 pub const MESH_SIZE: Size = Size(4 << 20);
+
+/// Memory for a byte of a JSON mesh: numbers as text, parsed, and as files of several formats.
+const MEMORY_PER_BYTE: u64 = 16;
 
 /// Longest name, characters.
 const NAME_LENGTH: usize = 80;
@@ -132,7 +137,9 @@ pub async fn create_template(
     let mesh = given_mesh(&app, value("model"), json_bytes(request).await?).await?;
     let reader = app.engine.reader.clone();
     let shows = organ.clone();
-    let output = app.decode(move || reader.template(&mesh, &shows)).await??;
+    let memory = LITTLE_MEMORY + MEMORY_PER_BYTE * mesh.len() as u64;
+    let make = move |_: &Monitor<'_>| reader.template(&mesh, &shows);
+    let output = app.decoding.run(memory, make).await??;
     let (template, new) = app.queue.add_template(name, &organ, output).await?;
     let status = if new {
         StatusCode::CREATED

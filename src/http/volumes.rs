@@ -8,7 +8,8 @@ use super::request::{PathSegments, query_pairs, refuse_unknown, unknown};
 use super::upload;
 use super::wire::{path_of, rfc3339};
 use crate::jobs::{Catalogue, ListPage, ListRequest, Resource, StoreError, StoredVolume};
-use crate::work::UploadFacts;
+use crate::progress::Monitor;
+use crate::work::{UploadFacts, preview_memory};
 use axum::Json;
 use axum::extract::{RawQuery, Request, State};
 use axum::http::{StatusCode, header};
@@ -204,7 +205,9 @@ pub async fn preview_volume(
     let files = app.queue.volume_files(&id, &volume.files).await?;
     let files = files.ok_or_else(|| Problem::internal(format!("a file of {id} is missing")))?;
     let reader = app.engine.reader.clone();
-    let preview = app.decode(move || reader.preview(&files)).await?;
+    let memory = preview_memory(UploadFacts::of(&volume)?.shape);
+    let draw = move |monitor: &Monitor<'_>| reader.preview(&files, monitor);
+    let preview = app.decoding.run(memory, draw).await?;
     let png = preview.map_err(Problem::internal)?;
     let headers = [
         (header::CONTENT_TYPE, "image/png"),

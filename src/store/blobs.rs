@@ -85,12 +85,17 @@ impl Drop for StagingFolder {
     }
 }
 
+/// Forces the files of a folder, and its entries, to disk. Costs little if they are there already.
+fn sync_all(folder: &Path) -> std::io::Result<()> {
+    for entry in std::fs::read_dir(folder)? {
+        sync(&entry?.path())?;
+    }
+    sync(folder)
+}
+
 impl StagingFolder {
     fn publish_blocking(&self, place: &Path) -> std::io::Result<()> {
-        for entry in std::fs::read_dir(&self.folder)? {
-            sync(&entry?.path())?;
-        }
-        sync(&self.folder)?;
+        sync_all(&self.folder)?;
         match std::fs::rename(&self.folder, place) {
             // The id has its files already.
             Err(error)
@@ -121,6 +126,14 @@ impl StagedFiles for StagingFolder {
 
     async fn local(&self, name: &str) -> Result<LocalFile, BlobError> {
         Ok(LocalFile::in_place(self.folder.join(name)))
+    }
+
+    async fn settle(&self) -> Result<(), BlobError> {
+        let folder = self.folder.clone();
+        tokio::task::spawn_blocking(move || sync_all(&folder))
+            .await
+            .map_err(|e| BlobError(e.to_string()))??;
+        Ok(())
     }
 
     async fn publish(self: Box<Self>, id: &str) -> Result<(), BlobError> {

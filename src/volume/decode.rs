@@ -136,6 +136,45 @@ impl<'a> VoxelReader<'a> {
             .map_err(|_| VolumeError::Memory {
                 bytes: 4 * count as u64,
             })?;
+        self.portions(end, count, report, |decoder, bytes, _| {
+            decoder.append(bytes, voxels.len(), voxels)
+        })
+    }
+
+    /// Decodes the `count` voxels from byte `begin` on in portions, and gives each to `take` with the
+    /// number of voxels before it. Memory stays under one mebibyte beside what the source holds.
+    ///
+    /// # Errors
+    /// As [`VoxelReader::append`].
+    pub(super) fn stream(
+        &mut self,
+        begin: u64,
+        count: usize,
+        take: &mut dyn FnMut(usize, &[f32]),
+        report: &mut dyn FnMut(f64) -> Result<(), Cancelled>,
+    ) -> Result<(), VolumeError> {
+        let end = begin + count as u64 * self.decoder.format.data_type.size() as u64;
+        self.source.prepare(end)?;
+        self.source.skip_to(begin)?;
+        let mut voxels = Vec::with_capacity(PORTION.min(count));
+        self.portions(end, count, report, |decoder, bytes, done| {
+            voxels.clear();
+            decoder.append(bytes, done, &mut voxels)?;
+            take(done, &voxels);
+            Ok(())
+        })
+    }
+
+    /// Calls `decode` with the bytes of every portion of the next `count` voxels, which end at byte
+    /// `end`, and with the number of voxels before it.
+    fn portions(
+        &mut self,
+        end: u64,
+        count: usize,
+        report: &mut dyn FnMut(f64) -> Result<(), Cancelled>,
+        mut decode: impl FnMut(&mut Decoder, &[u8], usize) -> Result<(), VolumeError>,
+    ) -> Result<(), VolumeError> {
+        let size = self.decoder.format.data_type.size();
         let mut done = 0;
         while done < count {
             report(done as f64 / count as f64)?;
@@ -148,7 +187,7 @@ impl<'a> VoxelReader<'a> {
                     &self.buffer
                 }
             };
-            self.decoder.append(bytes, voxels.len(), voxels)?;
+            decode(&mut self.decoder, bytes, done)?;
             done += portion;
         }
         Ok(report(1.0)?)
@@ -178,7 +217,8 @@ impl<'a> VoxelReader<'a> {
     }
 
     /// Decodes `frames` volumes of `count` voxels each, stored one after the other from byte `begin`
-    /// on, without keeping their voxels.
+    /// on, without keeping their voxels. Each portion is given to `take` as by
+    /// [`VoxelReader::stream`].
     ///
     /// # Errors
     /// As [`VoxelReader::append`].
@@ -187,14 +227,13 @@ impl<'a> VoxelReader<'a> {
         begin: u64,
         count: usize,
         frames: usize,
+        take: &mut dyn FnMut(usize, &[f32]),
         monitor: &Monitor,
     ) -> Result<(), VolumeError> {
         let bytes = count as u64 * self.decoder.format.data_type.size() as u64;
-        let mut voxels = Vec::new();
         for frame in 0..frames {
-            voxels.clear();
             let begin = begin + frame as u64 * bytes;
-            self.append(begin, count, &mut voxels, &mut |done| {
+            self.stream(begin, count, take, &mut |done| {
                 monitor.report(Stage::Read, (frame as f64 + done) / frames as f64)
             })?;
         }

@@ -63,6 +63,6 @@ pub use limits::{ReadLimits, ReadOptions};
 pub use open::{Reading, describe};
 pub use phantom::{Phantom, PhantomParameters, phantom};
 pub use preview::{preview, preview_png};
-pub use read::{inspect, read};
+pub use read::{inspect, preview_files, read};
 pub use source::VolumeFile;
 pub use summary::summarise;

@@ -7,8 +7,10 @@ use super::facts::{
     AffineSource, ByteOrder, FileFormat, IntensitySummary, LengthUnit, VolumeFacts,
 };
 use super::limits::ReadOptions;
-use super::summary::{Tally, judge, summarise};
+use super::preview::MiddlePlanes;
+use super::summary::{Coherence, LabelCounts, Tally, judge, summarise};
 use super::{Volume, VolumeError};
+use crate::draw::Image;
 use crate::geometry::frame::VoxelToPatient;
 use crate::progress::Monitor;
 
@@ -29,8 +31,22 @@ pub(super) trait OpenVolume {
     /// Decodes volume number `frame`, from 0.
     fn decode_frame(&mut self, frame: usize, monitor: &Monitor) -> Result<Decoded, VolumeError>;
 
-    /// Decodes all volumes one after the other without keeping their voxels.
-    fn decode_all(&mut self, monitor: &Monitor) -> Result<(Tally, Vec<String>), VolumeError>;
+    /// Decodes volume number `frame` without keeping its voxels: `take` is called with every portion
+    /// of one or several rows or of a part of a row, and the number in the volume of its first voxel.
+    fn stream_frame(
+        &mut self,
+        frame: usize,
+        take: &mut dyn FnMut(usize, &[f32]),
+        monitor: &Monitor,
+    ) -> Result<(), VolumeError>;
+
+    /// Decodes all volumes one after the other without keeping their voxels: `take` is called with
+    /// every portion and the number of voxels before it in its volume, slices in stored order.
+    fn decode_all(
+        &mut self,
+        take: &mut dyn FnMut(usize, &[f32]),
+        monitor: &Monitor,
+    ) -> Result<(Tally, Vec<String>), VolumeError>;
 }
 
 /// The content of a header that [`VolumeFacts`] repeats.
@@ -99,17 +115,39 @@ pub(super) fn read(
     Ok(Reading { volume, facts })
 }
 
-/// Decodes every volume of `file` and returns the facts.
-pub(super) fn inspect(
-    file: &mut dyn OpenVolume,
+/// Decodes every volume of a file and returns the facts. `open` opens the file; it is called a second
+/// time to count the labels if the first pass shows that the volume may be a label map. No volume is
+/// held in memory.
+pub(super) fn inspect<'a>(
+    open: impl Fn() -> Result<Box<dyn OpenVolume + 'a>, VolumeError>,
     monitor: &Monitor,
 ) -> Result<VolumeFacts, VolumeError> {
-    if file.header().frames == 1 {
-        let only = ReadOptions { frame: Some(0) };
-        return Ok(read(file, only, monitor)?.facts);
+    let mut file = open()?;
+    let (frames, row) = (file.header().frames, file.header().shape[0]);
+    if frames > 1 {
+        let (tally, warnings) = file.decode_all(&mut |_, _| {}, monitor)?;
+        return facts(file.header(), None, tally.summary(None), warnings);
     }
-    let (tally, warnings) = file.decode_all(monitor)?;
-    facts(file.header(), None, tally.summary(None), warnings)
+    let mut coherence = Coherence::new(row);
+    let mut compare = |first, voxels: &[f32]| coherence.add(first, voxels);
+    let (tally, warnings) = file.decode_all(&mut compare, monitor)?;
+    let mut labels = None;
+    if tally.is_whole() && coherence.suits_labels() {
+        let mut counts = LabelCounts::new();
+        open()?.decode_all(&mut |_, voxels| counts.add(voxels), monitor)?;
+        labels = counts.labels();
+    }
+    facts(file.header(), Some(0), tally.summary(labels), warnings)
+}
+
+/// Draws the first volume of `file` without holding it in memory.
+pub(super) fn preview(
+    file: &mut dyn OpenVolume,
+    monitor: &Monitor,
+) -> Result<Image<1>, VolumeError> {
+    let mut planes = MiddlePlanes::new(file.header().shape);
+    file.stream_frame(0, &mut |first, voxels| planes.add(first, voxels), monitor)?;
+    Ok(planes.draw(&file.header().placement.frame))
 }
 
 /// The facts about a volume that comes from an array in memory instead of a file.

@@ -7,6 +7,9 @@
 //! of the sagittal one; superior is at the top of the coronal and the sagittal slice. The grey scale
 //! runs from 0 (or the smallest value, if that is negative) to the 99.5th percentile of the shown
 //! slices, so that a single bright voxel does not darken the rest.
+//!
+//! Only the three planes of voxels through the middle are needed. [`MiddlePlanes`] collects them
+//! while a file is decoded, so that the volume need not be held in memory.
 
 use super::Volume;
 use crate::draw::Image;
@@ -23,23 +26,125 @@ const PERCENTILE: f64 = 0.995;
 
 /// Draws the three middle slices of `volume`; at most 776 x 256 pixels.
 pub fn preview(volume: &Volume) -> Image<1> {
-    let axes = PatientAxes::of(volume);
-    // Columns run to the patient's left or back, rows to the back or feet.
-    let views = [
-        (axes.x, axes.y),
-        (axes.x, axes.z.reversed()),
-        (axes.y, axes.z.reversed()),
-    ];
-    let longest = [axes.x, axes.y, axes.z].map(|a| a.extent_mm);
-    let longest = longest.into_iter().fold(0.0, f64::max);
-    let slices = views.map(|(right, down)| slice(volume, right, down, longest));
-    let window = window(&slices);
-    Image::side_by_side(&slices.map(|slice| slice.grey(window)), GAP)
+    let mut planes = MiddlePlanes::new(volume.shape);
+    planes.add(0, &volume.voxels);
+    planes.draw(&volume.frame)
 }
 
 /// [`preview`] as a PNG file.
 pub fn preview_png(volume: &Volume) -> Vec<u8> {
     preview(volume).png()
+}
+
+/// The voxels of the three planes through the middle of an array.
+pub(super) struct MiddlePlanes {
+    shape: [usize; 3],
+    /// Index of the middle along each axis.
+    middle: [usize; 3],
+    /// The plane across each axis; of the two other axes, the first runs fastest.
+    planes: [Vec<f32>; 3],
+}
+
+impl MiddlePlanes {
+    /// Planes of an array of `shape`; all voxels are missing.
+    pub(super) fn new(shape: [usize; 3]) -> Self {
+        let [nx, ny, nz] = shape;
+        Self {
+            shape,
+            middle: shape.map(|n| (n - 1) / 2),
+            planes: [ny * nz, nx * nz, nx * ny].map(|voxels| vec![f32::NAN; voxels]),
+        }
+    }
+
+    /// Copies what lies in the planes from `voxels`, which begin with voxel number `first` of the
+    /// array.
+    pub(super) fn add(&mut self, first: usize, voxels: &[f32]) {
+        let [nx, ny, _] = self.shape;
+        let [mx, my, mz] = self.middle;
+        let (mut at, mut rest) = (first, voxels);
+        while !rest.is_empty() {
+            let (i, j, k) = (at % nx, at / nx % ny, at / nx / ny);
+            let (line, tail) = rest.split_at(rest.len().min(nx - i));
+            if let Some(voxel) = mx.checked_sub(i).and_then(|n| line.get(n)) {
+                self.planes[0][j + ny * k] = *voxel;
+            }
+            if j == my {
+                self.planes[1][i + nx * k..][..line.len()].copy_from_slice(line);
+            }
+            if k == mz {
+                self.planes[2][i + nx * j..][..line.len()].copy_from_slice(line);
+            }
+            at += line.len();
+            rest = tail;
+        }
+    }
+
+    /// The voxel at `index`, which lies in the plane across `axis`.
+    fn at(&self, axis: usize, index: [usize; 3]) -> f32 {
+        let [i, j, k] = index;
+        let [nx, ny, _] = self.shape;
+        self.planes[axis][[j + ny * k, i + nx * k, i + nx * j][axis]]
+    }
+
+    /// Draws the planes of a volume with that position in the patient.
+    pub(super) fn draw(&self, frame: &VoxelToPatient) -> Image<1> {
+        let axes = PatientAxes::of(self.shape, frame);
+        // Columns run to the patient's left or back, rows to the back or feet.
+        let views = [
+            (axes.x, axes.y),
+            (axes.x, axes.z.reversed()),
+            (axes.y, axes.z.reversed()),
+        ];
+        let longest = [axes.x, axes.y, axes.z].map(|a| a.extent_mm);
+        let longest = longest.into_iter().fold(0.0, f64::max);
+        let slices = views.map(|(right, down)| self.slice(right, down, longest));
+        let window = window(&slices);
+        Image::side_by_side(&slices.map(|slice| slice.grey(window)), GAP)
+    }
+
+    /// The middle slice whose columns run along `right` and rows along `down`.
+    fn slice(&self, right: ArrayAxis, down: ArrayAxis, longest_mm: f64) -> Slice {
+        let pixels = |a: ArrayAxis| {
+            let length = (a.extent_mm / longest_mm * LONGEST_SIDE as f64).round();
+            (length as usize).clamp(1, LONGEST_SIDE)
+        };
+        let (width, height) = (pixels(right), pixels(down));
+        let mut values = Vec::with_capacity(width * height);
+        for row in 0..height {
+            let v = down.index((row as f64 + 0.5) / height as f64);
+            for column in 0..width {
+                let u = right.index((column as f64 + 0.5) / width as f64);
+                values.push(self.bilinear((right.array, u), (down.array, v)));
+            }
+        }
+        Slice {
+            width,
+            height,
+            values,
+        }
+    }
+
+    /// The value interpolated between four voxels of the middle plane of axes `a` and `b`; missing
+    /// voxels count as 0.
+    fn bilinear(&self, a: (usize, f64), b: (usize, f64)) -> f32 {
+        // The axes are 0, 1 and 2.
+        let across = 3 - a.0 - b.0;
+        let mut index = self.middle;
+        let mut value = 0.0;
+        for (da, db) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            let mut weight = 1.0;
+            for ((axis, at), step) in [(a, da), (b, db)] {
+                let share = at - at.floor();
+                weight *= if step == 0 { 1.0 - share } else { share };
+                index[axis] = (at as usize + step).min(self.shape[axis] - 1);
+            }
+            let voxel = self.at(across, index);
+            if weight > 0.0 && !voxel.is_nan() {
+                value += weight * f64::from(voxel);
+            }
+        }
+        value as f32
+    }
 }
 
 /// An array axis, walked in a direction of the patient.
@@ -78,7 +183,7 @@ struct PatientAxes {
 }
 
 impl PatientAxes {
-    fn of(volume: &Volume) -> Self {
+    fn of(shape: [usize; 3], frame: &VoxelToPatient) -> Self {
         const ORDERS: [[usize; 3]; 6] = [
             [0, 1, 2],
             [0, 2, 1],
@@ -87,18 +192,18 @@ impl PatientAxes {
             [2, 0, 1],
             [2, 1, 0],
         ];
-        let cosine = |patient, array| direction_cosine(&volume.frame, patient, array);
+        let cosine = |patient, array| direction_cosine(frame, patient, array);
         let fit = |order: &[usize; 3]| -> f64 { (0..3).map(|p| cosine(p, order[p]).abs()).sum() };
         // Of equally good orders the first is used, so that the choice is deterministic.
         let best = ORDERS.iter().fold(&ORDERS[0], |best, order| {
             if fit(order) > fit(best) { order } else { best }
         });
-        let spacing = volume.frame.spacing();
+        let spacing = frame.spacing();
         let axis = |patient: usize| ArrayAxis {
             array: best[patient],
-            size: volume.shape[best[patient]],
+            size: shape[best[patient]],
             backwards: cosine(patient, best[patient]) < 0.0,
-            extent_mm: volume.shape[best[patient]] as f64 * spacing[best[patient]],
+            extent_mm: shape[best[patient]] as f64 * spacing[best[patient]],
         };
         Self {
             x: axis(0),
@@ -129,53 +234,6 @@ impl Slice {
             pixels: self.values.iter().map(grey).collect(),
         }
     }
-}
-
-/// The middle slice whose columns run along `right` and rows along `down`.
-fn slice(volume: &Volume, right: ArrayAxis, down: ArrayAxis, longest_mm: f64) -> Slice {
-    let pixels = |a: ArrayAxis| {
-        let length = (a.extent_mm / longest_mm * LONGEST_SIDE as f64).round();
-        (length as usize).clamp(1, LONGEST_SIDE)
-    };
-    let (width, height) = (pixels(right), pixels(down));
-    let mut index = volume.shape.map(|n| (n - 1) / 2);
-    let mut values = Vec::with_capacity(width * height);
-    for row in 0..height {
-        let v = down.index((row as f64 + 0.5) / height as f64);
-        for column in 0..width {
-            let u = right.index((column as f64 + 0.5) / width as f64);
-            values.push(bilinear(
-                volume,
-                &mut index,
-                (right.array, u),
-                (down.array, v),
-            ));
-        }
-    }
-    Slice {
-        width,
-        height,
-        values,
-    }
-}
-
-/// The value interpolated between four voxels of the plane of axes `a` and `b` through `index`;
-/// missing voxels count as 0.
-fn bilinear(volume: &Volume, index: &mut [usize; 3], a: (usize, f64), b: (usize, f64)) -> f32 {
-    let mut value = 0.0;
-    for (da, db) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-        let mut weight = 1.0;
-        for ((axis, at), step) in [(a, da), (b, db)] {
-            let share = at - at.floor();
-            weight *= if step == 0 { 1.0 - share } else { share };
-            index[axis] = (at as usize + step).min(volume.shape[axis] - 1);
-        }
-        let voxel = volume.at(index[0], index[1], index[2]);
-        if weight > 0.0 && !voxel.is_nan() {
-            value += weight * f64::from(voxel);
-        }
-    }
-    value as f32
 }
 
 /// The values shown as black and as white.

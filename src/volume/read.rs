@@ -5,6 +5,7 @@ use super::open::{self, OpenVolume, Reading};
 use super::recognise::{Recognised, recognise};
 use super::source::VolumeFile;
 use super::{VolumeError, VolumeFacts, dicom, nifti};
+use crate::draw::Image;
 use crate::progress::Monitor;
 
 /// Reads one volume from `files`: a single file, or a `.hdr` file and its `.img` file in any order.
@@ -23,7 +24,8 @@ pub fn read(
 
 /// Returns the facts about `files`. For several volumes the intensities are taken over all of them.
 ///
-/// Every voxel is decoded once, so that a file that passes here can also be read.
+/// Every voxel is decoded, so that a file that passes here can also be read. The voxels are not kept,
+/// so this needs less memory than [`read()`].
 ///
 /// # Errors
 /// [`VolumeError`].
@@ -32,7 +34,20 @@ pub fn inspect(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<VolumeFacts, VolumeError> {
-    open::inspect(&mut *open(files, limits, monitor)?, monitor)
+    open::inspect(|| open(files, limits, monitor), monitor)
+}
+
+/// Draws the three middle slices of the first volume in `files`; see [`mod@super::preview`]. The
+/// volume is decoded in portions and not held in memory.
+///
+/// # Errors
+/// [`VolumeError`].
+pub fn preview_files(
+    files: &[VolumeFile],
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Image<1>, VolumeError> {
+    open::preview(&mut *open(files, limits, monitor)?, monitor)
 }
 
 /// Recognises the format of `files` and checks the header.

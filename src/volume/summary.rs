@@ -2,6 +2,10 @@
 //!
 //! The reader adds every portion right after decoding it, while it is still in the cache. Sums are
 //! taken within portions, and their results are added in order.
+//!
+//! Labels are counted in two passes. [`Coherence`] compares neighbours in vector lanes, which costs
+//! little and rejects almost every volume that holds counts. Only what passes it and holds whole
+//! numbers alone goes through [`LabelCounts`], which works run by run.
 
 use super::VolumeError;
 use super::facts::{IntensitySummary, LabelCount};
@@ -104,12 +108,17 @@ impl Tally {
         self.fractional |= other.fractional;
     }
 
+    /// Whether all values so far are whole or missing.
+    pub(super) fn is_whole(&self) -> bool {
+        !self.fractional
+    }
+
     /// The figures over `voxels`, all of which have been added, with their labels if they look like a
     /// label map.
     pub(super) fn with_labels(&self, voxels: &[f32], row: usize) -> IntensitySummary {
-        let labels = match self.fractional {
-            false => labels(voxels, row),
-            true => None,
+        let labels = match self.is_whole() {
+            true => labels(voxels, row),
+            false => None,
         };
         self.summary(labels)
     }
@@ -188,38 +197,147 @@ impl Lanes {
 /// The labels of `voxels`, which are whole, if there are few different ones and neighbours are mostly
 /// alike.
 fn labels(voxels: &[f32], row: usize) -> Option<Vec<LabelCount>> {
-    let mut counts: BTreeMap<i64, u64> = BTreeMap::new();
-    let (mut labelled, mut alike) = (0_u64, 0_u64);
-    for line in voxels.chunks(row.max(1)) {
-        let mut previous = 0;
-        for run in line.chunk_by(|a, b| a == b) {
-            let length = run.len() as u64;
-            let label = run[0] as i64;
-            if label == 0 || run[0].is_nan() {
-                previous = 0;
-                continue;
-            }
-            *counts.entry(label).or_default() += length;
-            if counts.len() > MOST_LABELS {
-                return None;
-            }
-            labelled += length;
-            // A voxel next to background counts as coherent: only a neighbour with another label
-            // is evidence against a label map.
-            alike += length - u64::from(previous != 0);
-            previous = label;
+    let mut coherence = Coherence::new(row);
+    let portions = || voxels.chunks(PORTION);
+    for (n, portion) in portions().enumerate() {
+        coherence.add(n * PORTION, portion);
+    }
+    if !coherence.suits_labels() {
+        return None;
+    }
+    let mut counts = LabelCounts::new();
+    portions().for_each(|portion| counts.add(portion));
+    counts.labels()
+}
+
+/// Whether a voxel has a label: not background and not missing.
+fn is_labelled(voxel: f32) -> bool {
+    // Comparisons with NaN are false.
+    (voxel < 0.0) | (voxel > 0.0)
+}
+
+/// How often neighbours along i have different labels. Exact for volumes of whole numbers.
+pub(super) struct Coherence {
+    /// Voxels per row.
+    row: usize,
+    /// The last voxel added.
+    last: f32,
+    labelled: u64,
+    /// Labelled voxels whose predecessor in the row has another label.
+    ///
+    /// A voxel next to background counts as coherent: only a neighbour with another label is
+    /// evidence against a label map.
+    conflicts: u64,
+}
+
+impl Coherence {
+    /// No voxel yet, of rows of `row` voxels.
+    pub(super) fn new(row: usize) -> Self {
+        Self {
+            row: row.max(1),
+            last: 0.0,
+            labelled: 0,
+            conflicts: 0,
         }
     }
-    let coherent = alike as f64 >= LEAST_COHERENCE * labelled as f64;
-    (labelled > 0 && coherent).then(|| {
-        let count = |(label, voxels)| LabelCount { label, voxels };
-        counts.into_iter().map(count).collect()
-    })
+
+    /// Adds the voxels that follow on the first `before` voxels of the volume.
+    pub(super) fn add(&mut self, before: usize, voxels: &[f32]) {
+        let conflict = |a: f32, b: f32| u32::from(is_labelled(a) & is_labelled(b) & (a != b));
+        let within = before % self.row;
+        // The rest of a row that an earlier portion began, then whole rows.
+        let (begun, rows) = match within {
+            0 => (&[][..], voxels),
+            _ => voxels.split_at(voxels.len().min(self.row - within)),
+        };
+        if let [next, ..] = begun {
+            self.conflicts += u64::from(conflict(self.last, *next));
+        }
+        for line in std::iter::once(begun).chain(rows.chunks(self.row)) {
+            // Sums of `u32` fill the lanes of the vector unit; a row has less than 2^32 voxels.
+            let labelled: u32 = line.iter().map(|v| u32::from(is_labelled(*v))).sum();
+            let pairs = line.iter().zip(line.iter().skip(1));
+            let conflicts: u32 = pairs.map(|(a, b)| conflict(*a, *b)).sum();
+            self.labelled += u64::from(labelled);
+            self.conflicts += u64::from(conflicts);
+        }
+        self.last = voxels.last().copied().unwrap_or(self.last);
+    }
+
+    /// Whether there are labels, and neighbours are mostly alike.
+    pub(super) fn suits_labels(&self) -> bool {
+        let alike = self.labelled - self.conflicts;
+        self.labelled > 0 && alike as f64 >= LEAST_COHERENCE * self.labelled as f64
+    }
+}
+
+/// Labels below this number are counted in an array.
+const SMALL_LABELS: usize = 4096;
+
+/// Voxels of each label.
+pub(super) struct LabelCounts {
+    small: Vec<u64>,
+    other: BTreeMap<i64, u64>,
+    /// Number of different labels.
+    different: usize,
+}
+
+impl LabelCounts {
+    /// No voxel yet.
+    pub(super) fn new() -> Self {
+        Self {
+            small: vec![0; SMALL_LABELS],
+            other: BTreeMap::new(),
+            different: 0,
+        }
+    }
+
+    /// Adds voxels, which are whole. After too many different labels nothing is counted any more.
+    pub(super) fn add(&mut self, voxels: &[f32]) {
+        for run in voxels.chunk_by(|a, b| a == b) {
+            if self.different > MOST_LABELS {
+                return;
+            }
+            if !is_labelled(run[0]) {
+                continue;
+            }
+            let label = run[0] as i64;
+            let small = usize::try_from(label).ok();
+            let count = match small.and_then(|label| self.small.get_mut(label)) {
+                Some(count) => count,
+                None => self.other.entry(label).or_default(),
+            };
+            self.different += usize::from(*count == 0);
+            *count += run.len() as u64;
+        }
+    }
+
+    /// The labels in rising order; `None` if there are too many.
+    pub(super) fn labels(self) -> Option<Vec<LabelCount>> {
+        let negative = self
+            .other
+            .range(..0)
+            .map(|(label, voxels)| (*label, *voxels));
+        let small = (0..).zip(self.small.iter().copied());
+        let large = self
+            .other
+            .range(0..)
+            .map(|(label, voxels)| (*label, *voxels));
+        let all = negative.chain(small).chain(large);
+        let present = all.filter(|(_, voxels)| *voxels > 0);
+        (self.different <= MOST_LABELS).then(|| {
+            present
+                .map(|(label, voxels)| LabelCount { label, voxels })
+                .collect()
+        })
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
 
     #[test]
     fn figures_are_those_of_the_definition() {
@@ -254,6 +372,84 @@ mod tests {
         assert_eq!((labels[0].label, labels[0].voxels), (1, 40));
         let counts: Vec<f32> = (0..400).map(|i| (i * 37 % 41) as f32).collect();
         assert!(summarise(&counts, 20).labels.is_none());
+    }
+
+    /// The definition of labels, without regard to speed.
+    fn labels_by_definition(voxels: &[f32], row: usize) -> Option<Vec<LabelCount>> {
+        let mut counts: BTreeMap<i64, u64> = BTreeMap::new();
+        let (mut labelled, mut alike) = (0_u64, 0_u64);
+        for line in voxels.chunks(row.max(1)) {
+            let mut previous = f32::NAN;
+            for &voxel in line {
+                if voxel.is_nan() || voxel == 0.0 {
+                    previous = f32::NAN;
+                    continue;
+                }
+                *counts.entry(voxel as i64).or_default() += 1;
+                labelled += 1;
+                alike += u64::from(previous.is_nan() || previous == voxel);
+                previous = voxel;
+            }
+        }
+        let coherent = alike as f64 >= LEAST_COHERENCE * labelled as f64;
+        (labelled > 0 && counts.len() <= MOST_LABELS && coherent).then(|| {
+            let count = |(label, voxels)| LabelCount { label, voxels };
+            counts.into_iter().map(count).collect()
+        })
+    }
+
+    #[test]
+    fn labels_are_those_of_the_definition() {
+        let mut random = Pcg64::seed_from_u64(7);
+        let rare = [
+            f32::NAN,
+            -0.0,
+            -1.0,
+            4095.0,
+            4096.0,
+            -1e30,
+            1e30,
+            f32::INFINITY,
+        ];
+        let (mut some, mut none) = (0, 0);
+        for round in 0..400 {
+            // Runs of random lengths across the ends of rows and portions.
+            let row = [1, 2, 7, 64, 1000][round % 5];
+            let longest = [1, 2, 3, 9, 5000][round / 5 % 5];
+            let kinds = [1, 3, 255, 256, 257, 5000][round % 6];
+            let length = if round % 40 == 4 {
+                2 * PORTION + 333
+            } else {
+                random.random_range(0..4000)
+            };
+            let mut voxels = Vec::new();
+            while voxels.len() < length {
+                let value = match random.random_range(0..50) {
+                    0 => rare[random.random_range(0..rare.len())],
+                    1..15 => 0.0,
+                    _ => random.random_range(1..=kinds) as f32,
+                };
+                let run = random.random_range(1..=longest).min(length - voxels.len());
+                voxels.extend(std::iter::repeat_n(value, run));
+            }
+            let expected = labels_by_definition(&voxels, row);
+            match &expected {
+                Some(_) => some += 1,
+                None => none += 1,
+            }
+            assert_eq!(labels(&voxels, row), expected, "round {round}");
+            // The same in portions of other lengths.
+            let mut coherence = Coherence::new(row);
+            let (mut before, mut counts) = (0, LabelCounts::new());
+            for portion in voxels.chunks(97) {
+                coherence.add(before, portion);
+                counts.add(portion);
+                before += portion.len();
+            }
+            let found = coherence.suits_labels().then(|| counts.labels()).flatten();
+            assert_eq!(found, expected, "round {round} in portions");
+        }
+        assert!(some > 50 && none > 50, "{some} with labels, {none} without");
     }
 
     #[test]

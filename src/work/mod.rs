@@ -24,7 +24,9 @@ mod upload;
 pub use model::ModelWork;
 pub use page::PageError;
 pub use segmentation::SegmentationWork;
-pub use upload::{DomainReader, IntensityFacts, UploadFacts, UploadReader};
+pub use upload::{
+    DomainReader, INSPECTION_MEMORY, IntensityFacts, UploadFacts, UploadReader, preview_memory,
+};
 
 use crate::jobs::{Work, Works};
 use crate::volume::ReadLimits;

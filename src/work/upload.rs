@@ -5,9 +5,21 @@ use super::problems::Explain;
 use super::template;
 use crate::jobs::{Failure, LocalFile, StoreError, StoredVolume, WorkOutput};
 use crate::progress::Monitor;
-use crate::volume::{self, ReadLimits, ReadOptions};
+use crate::volume::{self, ReadLimits};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+
+/// Most memory that [`UploadReader::inspect`] takes, bytes: a gzipped file of 16 MiB is unpacked in
+/// memory if it holds at most 16 MiB, and everything else is read in portions.
+pub const INSPECTION_MEMORY: u64 = 34 << 20;
+
+/// Most memory that [`UploadReader::preview`] takes for volumes of `shape`, bytes: three planes of
+/// voxels beside what an inspection takes.
+pub fn preview_memory(shape: [usize; 3]) -> u64 {
+    let [x, y, z] = shape.map(|n| n as u64);
+    let voxels = x.saturating_mul(y) + y.saturating_mul(z) + x.saturating_mul(z);
+    INSPECTION_MEMORY + voxels.saturating_mul(size_of::<f32>() as u64)
+}
 
 /// Validates uploads. Its methods are called on blocking threads.
 pub trait UploadReader: Send + Sync + 'static {
@@ -15,13 +27,13 @@ pub trait UploadReader: Send + Sync + 'static {
     ///
     /// # Errors
     /// Why the files do not make up a usable volume.
-    fn inspect(&self, files: &[LocalFile]) -> Result<UploadFacts, Failure>;
+    fn inspect(&self, files: &[LocalFile], monitor: &Monitor<'_>) -> Result<UploadFacts, Failure>;
 
     /// The three orthogonal middle slices as a PNG.
     ///
     /// # Errors
     /// As [`UploadReader::inspect`].
-    fn preview(&self, files: &[LocalFile]) -> Result<Vec<u8>, Failure>;
+    fn preview(&self, files: &[LocalFile], monitor: &Monitor<'_>) -> Result<Vec<u8>, Failure>;
 
     /// Reads and validates a JSON mesh that is to serve as a template of `organ`. Returns its main
     /// figures and every download.
@@ -96,8 +108,8 @@ pub struct DomainReader {
 }
 
 impl UploadReader for DomainReader {
-    fn inspect(&self, files: &[LocalFile]) -> Result<UploadFacts, Failure> {
-        let facts = volume::inspect(&volume_files(files), &self.limits, &Monitor::silent())
+    fn inspect(&self, files: &[LocalFile], monitor: &Monitor<'_>) -> Result<UploadFacts, Failure> {
+        let facts = volume::inspect(&volume_files(files), &self.limits, monitor)
             .map_err(|error| error.explain())?;
         let affine = facts.affine_lps;
         Ok(UploadFacts {
@@ -123,12 +135,10 @@ impl UploadReader for DomainReader {
         })
     }
 
-    fn preview(&self, files: &[LocalFile]) -> Result<Vec<u8>, Failure> {
-        let options = ReadOptions { frame: Some(0) };
-        let files = volume_files(files);
-        let reading = volume::read(&files, &options, &self.limits, &Monitor::silent())
+    fn preview(&self, files: &[LocalFile], monitor: &Monitor<'_>) -> Result<Vec<u8>, Failure> {
+        let picture = volume::preview_files(&volume_files(files), &self.limits, monitor)
             .map_err(|error| error.explain())?;
-        Ok(volume::preview_png(&reading.volume))
+        Ok(picture.png())
     }
 
     fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure> {

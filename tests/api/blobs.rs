@@ -94,6 +94,10 @@ impl StagedFiles for MemoryStaging {
         copy_to_disk(name, &self.files.lock().unwrap()[name])
     }
 
+    async fn settle(&self) -> Result<(), BlobError> {
+        Ok(())
+    }
+
     async fn publish(self: Box<Self>, id: &str) -> Result<(), BlobError> {
         let files = std::mem::take(&mut *self.files.lock().unwrap());
         let mut items = self.store.items.lock().unwrap();

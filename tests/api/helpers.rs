@@ -242,7 +242,7 @@ fn words(files: &[LocalFile]) -> Result<String, Failure> {
 }
 
 impl UploadReader for FakeReader {
-    fn inspect(&self, files: &[LocalFile]) -> Result<UploadFacts, Failure> {
+    fn inspect(&self, files: &[LocalFile], _: &Monitor<'_>) -> Result<UploadFacts, Failure> {
         words(files)?;
         let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
         Ok(UploadFacts {
@@ -270,7 +270,7 @@ impl UploadReader for FakeReader {
         })
     }
 
-    fn preview(&self, files: &[LocalFile]) -> Result<Vec<u8>, Failure> {
+    fn preview(&self, files: &[LocalFile], _: &Monitor<'_>) -> Result<Vec<u8>, Failure> {
         words(files)?;
         Ok(b"\x89PNG\r\n\x1a\n".to_vec())
     }
@@ -455,7 +455,7 @@ impl Service {
             .unwrap();
         let url = line
             .split_whitespace()
-            .find(|word| word.starts_with("http://"))
+            .find(|word| word.starts_with("http"))
             .expect("the first line names the address");
         Self {
             process,
@@ -467,6 +467,14 @@ impl Service {
     pub fn kill(mut self) {
         self.process.kill().unwrap();
         self.process.wait().unwrap();
+    }
+
+    /// Sends a signal to the process.
+    #[cfg(unix)]
+    pub fn signal(&self, name: &str) {
+        let id = self.process.id().to_string();
+        let sent = Command::new("kill").args(["-s", name, &id]).status();
+        assert!(sent.unwrap().success());
     }
 
     /// Waits until the job has ended; returns the job.

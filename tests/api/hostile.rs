@@ -1,6 +1,6 @@
 //! Malicious and broken clients.
 
-use crate::helpers::{TestApp, volume};
+use crate::helpers::{TestApp, problem, volume};
 use std::time::Duration;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
@@ -136,4 +136,85 @@ async fn malformed_requests_are_rejected() {
             .await;
         assert!(answer.unwrap().status().as_u16() < 500, "{name}");
     }
+}
+
+/// Sends requests whose answers are many times as large as what the system buffers.
+async fn ask_for_much(app: &TestApp) -> TcpStream {
+    let socket = tokio::net::TcpSocket::new_v4().unwrap();
+    socket.set_recv_buffer_size(4096).unwrap();
+    let address = app.url.strip_prefix("http://").unwrap();
+    let mut stream = socket.connect(address.parse().unwrap()).await.unwrap();
+    let request = "GET /openapi.json HTTP/1.1\r\nhost: x\r\n\r\n".repeat(100);
+    stream.write_all(request.as_bytes()).await.unwrap();
+    stream
+}
+
+#[tokio::test]
+async fn a_client_that_never_reads_is_cut_off() {
+    let app = TestApp::with(|s| s.write_timeout = "300ms".parse().unwrap()).await;
+    let mut stream = ask_for_much(&app).await;
+    let cut_off = async {
+        // Writing fails once the service has closed the connection.
+        while stream.write_all(b"GET ").await.is_ok() {
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+    };
+    tokio::time::timeout(Duration::from_secs(10), cut_off)
+        .await
+        .expect("the service hangs up");
+}
+
+#[tokio::test]
+async fn a_full_service_still_answers_health_checks() {
+    let app = TestApp::with(|s| s.connection_limit = 2).await;
+    let mut held = [connect(&app).await, connect(&app).await];
+    for stream in &mut held {
+        stream.write_all(b"GET /healthz HT").await.unwrap();
+    }
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    app.json("/healthz").await;
+    app.json("/readyz").await;
+    let refused = app.get("/v1/volumes").send().await.unwrap();
+    assert_eq!(refused.headers()["retry-after"], "1");
+    assert_eq!(refused.status(), 503);
+    let body: serde_json::Value = refused.json().await.unwrap();
+    assert_eq!(body["type"], "urn:ventriform:problem:too-many-connections");
+}
+
+#[tokio::test]
+async fn a_stalled_connection_makes_room_for_a_new_one() {
+    let app = TestApp::with(|s| s.client_connection_limit = 2).await;
+    let mut unread = ask_for_much(&app).await;
+    let mut head = connect(&app).await;
+    head.write_all(b"GET /healthz HT").await.unwrap();
+    tokio::time::sleep(Duration::from_millis(1300)).await;
+    app.json("/v1/volumes").await;
+    // One of them is closed; the other one still has its place.
+    let mut ended = 0;
+    for stream in [&mut unread, &mut head] {
+        let mut said = Vec::new();
+        let read = stream.read_to_end(&mut said);
+        let read = tokio::time::timeout(Duration::from_millis(500), read).await;
+        ended += usize::from(read.is_ok() && said.len() < 5_000_000);
+    }
+    assert!(ended >= 1, "{ended}");
+}
+
+#[tokio::test]
+async fn streams_of_events_are_limited_per_client() {
+    let app = TestApp::with(|s| s.client_event_stream_limit = 1).await;
+    let job = app.file("slow").await;
+    let path = crate::helpers::text(&job["links"]["events"]);
+    let first = app.get(&path).send().await.unwrap();
+    assert_eq!(first.status(), 200);
+    let second = app.get(&path).send().await.unwrap();
+    problem(second, 429, "too-many-streams").await;
+    drop(first);
+    for _ in 0..100 {
+        if app.get(&path).send().await.unwrap().status() == 200 {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    panic!("the place of a closed stream is free again");
 }

@@ -25,4 +25,5 @@ mod operations;
 mod segmentations;
 mod shutdown;
 mod tenants;
+mod tls;
 mod volumes;

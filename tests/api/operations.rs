@@ -105,3 +105,85 @@ async fn request_ids_and_trace_headers_are_returned() {
     assert!(!odd.headers().contains_key("traceparent"));
     assert!(!text(&odd.headers()["x-request-id"].to_str().unwrap().into()).is_empty());
 }
+
+#[tokio::test]
+async fn the_document_has_validators_and_a_compressed_form() {
+    let app = TestApp::start().await;
+    let get = |encoding: &str| app.get("/openapi.json").header("accept-encoding", encoding);
+    let plain = get("identity, gzip;q=0").send().await.unwrap();
+    assert!(!plain.headers().contains_key("content-encoding"));
+    let etag = plain.headers()["etag"].clone();
+    let plain = plain.bytes().await.unwrap();
+    let again = get("").header("if-none-match", &etag).send().await.unwrap();
+    assert_eq!(again.status(), StatusCode::NOT_MODIFIED);
+    assert!(again.bytes().await.unwrap().is_empty());
+    let packed = get("br, gzip;q=0.5").send().await.unwrap();
+    assert_eq!(packed.headers()["content-encoding"], "gzip");
+    assert_ne!(packed.headers()["etag"], etag);
+    let packed = packed.bytes().await.unwrap();
+    let mut unpacked = Vec::new();
+    std::io::copy(
+        &mut flate2::read::GzDecoder::new(&packed[..]),
+        &mut unpacked,
+    )
+    .unwrap();
+    assert_eq!(unpacked, plain);
+}
+
+#[tokio::test]
+async fn head_and_expect_are_answered_as_clients_expect() {
+    use tokio::io::{AsyncReadExt, AsyncWriteExt};
+    let app = TestApp::start().await;
+    let id = app.volume("sphere").await;
+    for path in ["/healthz".to_owned(), format!("/v1/volumes/{id}")] {
+        let head = app.client.head(format!("{}{path}", app.url));
+        let head = head.send().await.unwrap();
+        let full = app.get(&path).send().await.unwrap();
+        assert_eq!(head.status(), full.status(), "{path}");
+        let length = &head.headers()["content-length"];
+        assert_eq!(length, &full.headers()["content-length"], "{path}");
+        assert!(head.bytes().await.unwrap().is_empty());
+    }
+    let address = app.url.strip_prefix("http://").unwrap();
+    let mut stream = tokio::net::TcpStream::connect(address).await.unwrap();
+    let head = "POST /v1/volumes HTTP/1.1\r\nhost: x\r\ncontent-length: 12\r\n\
+        connection: close\r\nexpect: 100-continue\r\n\r\n";
+    stream.write_all(head.as_bytes()).await.unwrap();
+    let mut said = vec![0; 25];
+    stream.read_exact(&mut said).await.unwrap();
+    assert_eq!(said, b"HTTP/1.1 100 Continue\r\n\r\n");
+    stream.write_all(b"VOLUME other").await.unwrap();
+    let mut rest = String::new();
+    stream.read_to_string(&mut rest).await.unwrap();
+    assert!(rest.starts_with("HTTP/1.1 201"), "{rest}");
+}
+
+#[tokio::test]
+async fn log_files_have_no_colours() {
+    for format in ["text", "json"] {
+        let data = tempfile::tempdir().unwrap();
+        let path = data.path().join("log");
+        let log = std::fs::File::create(&path).unwrap();
+        let mut process = std::process::Command::new(env!("CARGO_BIN_EXE_ventriform"))
+            .args(["serve", "--listen", "127.0.0.1:0", "--log-format", format])
+            .arg("--data-dir")
+            .arg(data.path().join("data"))
+            .env_remove("NO_COLOR")
+            .stdout(std::process::Stdio::null())
+            .stderr(log)
+            .spawn()
+            .unwrap();
+        let mut text = String::new();
+        for _ in 0..1000 {
+            text = std::fs::read_to_string(&path).unwrap();
+            if text.contains("listening") {
+                break;
+            }
+            tokio::time::sleep(std::time::Duration::from_millis(20)).await;
+        }
+        process.kill().unwrap();
+        process.wait().unwrap();
+        assert!(text.contains("listening"), "{text}");
+        assert!(!text.contains('\u{1b}'), "{text}");
+    }
+}

@@ -137,6 +137,7 @@ const USES: &[(&str, &[&str])] = &[
     (
         "http",
         &[
+            "progress",
             "export",
             "parameters",
             "jobs",
@@ -193,6 +194,11 @@ const SERVICE_CRATES: &[&str] = &[
     "time",
     "futures",
     "bytes",
+    "rustix",
+    "rustls",
+    "tokio_rustls",
+    "socket2",
+    "x509_parser",
 ];
 
 /// The service: what stands here may name [`SERVICE_CRATES`].

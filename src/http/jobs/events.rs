@@ -8,8 +8,9 @@
 use super::{describe, find};
 use crate::http::app::App;
 use crate::http::openapi::{self, LookupProblems};
-use crate::http::problem::{Answer, Problem};
+use crate::http::problem::{Answer, Problem, ProblemBody};
 use crate::http::request::{PathSegments, query_pairs, refuse_unknown};
+use crate::http::streams::StreamPlace;
 use crate::jobs::Job;
 use axum::extract::{RawQuery, State};
 use axum::http::{HeaderMap, StatusCode};
@@ -34,6 +35,8 @@ const KEEP_ALIVE: Duration = Duration::from_secs(15);
     responses(
         openapi::EventsAnswer,
         (status = 204, description = "The client has already seen the final state"),
+        (status = 429, description = "Too many streams are open", body = ProblemBody,
+            content_type = "application/problem+json"),
         LookupProblems))]
 pub async fn follow_job(
     State(app): State<App>,
@@ -49,7 +52,8 @@ pub async fn follow_job(
     if job.state.is_final() && job.revision <= seen {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
-    Ok(stream(app, job, seen, changes))
+    let place = app.streams.enter()?;
+    Ok(stream(app, job, seen, changes, place))
 }
 
 fn last_event_id(headers: &HeaderMap) -> Answer<i64> {
@@ -67,13 +71,20 @@ fn last_event_id(headers: &HeaderMap) -> Answer<i64> {
     })
 }
 
-fn stream(app: App, job: Job, seen: i64, changes: Receiver<Arc<Job>>) -> Response {
+fn stream(
+    app: App,
+    job: Job,
+    seen: i64,
+    changes: Receiver<Arc<Job>>,
+    place: StreamPlace,
+) -> Response {
     let follower = Follower {
         id: job.id.clone(),
         next: Some(job),
         app,
         seen,
         changes,
+        _place: place,
     };
     Sse::new(follower.events())
         .keep_alive(KeepAlive::new().interval(KEEP_ALIVE))
@@ -86,6 +97,7 @@ struct Follower {
     next: Option<Job>,
     seen: i64,
     changes: Receiver<Arc<Job>>,
+    _place: StreamPlace,
 }
 
 impl Follower {

@@ -3,6 +3,8 @@
 use crate::http::app::App;
 use crate::http::problem::{Answer, Problem};
 use crate::jobs::{BlobError, Hold, Resource, StagedFiles, StoredVolume, hex};
+use crate::progress::Monitor;
+use crate::work::INSPECTION_MEMORY;
 use axum::body::Bytes;
 use futures::{Stream, StreamExt};
 use sha2::{Digest, Sha256};
@@ -142,7 +144,11 @@ impl Bundle {
             files.push(self.staged.local(name).await?);
         }
         let reader = app.engine.reader.clone();
-        let facts = app.decode(move || reader.inspect(&files)).await??;
+        let inspect = move |monitor: &Monitor<'_>| reader.inspect(&files, monitor);
+        // The disk and the processor work at the same time.
+        let inspected = async { Ok(app.decoding.run(INSPECTION_MEMORY, inspect).await??) };
+        let settled = async { Ok::<(), Problem>(self.staged.settle().await?) };
+        let (facts, ()) = tokio::try_join!(inspected, settled)?;
         let volume = StoredVolume {
             sequence: 0,
             created_at: app.queue.clock.now(),

@@ -97,6 +97,10 @@ pub trait StagedFiles: Send + Sync {
     /// A complete file on the local disk.
     async fn local(&self, name: &str) -> Result<LocalFile, BlobError>;
 
+    /// Forces the complete files to the disk. [`StagedFiles::publish`] does so for what is left;
+    /// calling this before allows other work meanwhile.
+    async fn settle(&self) -> Result<(), BlobError>;
+
     /// Makes the files visible under `id`, all at once and durably. If `id` already has files,
     /// these are kept and the new ones discarded.
     async fn publish(self: Box<Self>, id: &str) -> Result<(), BlobError>;

@@ -128,12 +128,50 @@ impl OpenVolume for DicomFile {
         })
     }
 
+    /// Reads the slices of gate `frame` one by one, as they lie in the file.
+    fn stream_frame(
+        &mut self,
+        frame: usize,
+        take: &mut dyn FnMut(usize, &[f32]),
+        monitor: &Monitor,
+    ) -> Result<(), VolumeError> {
+        let pixels = &self.pixels;
+        let voxels = pixels.frame_voxels();
+        let mut stored: Vec<(usize, usize)> = self
+            .order
+            .slices_of(frame)
+            .iter()
+            .copied()
+            .zip(0..)
+            .collect();
+        stored.sort_unstable();
+        let mut reader = VoxelReader::new(pixels.format.clone(), &mut self.source);
+        for (done, (at, slice)) in stored.iter().enumerate() {
+            let begin = pixels.frame_begin(*at);
+            let mut place = |first: usize, part: &[f32]| take(slice * voxels + first, part);
+            reader.stream(begin, voxels, &mut place, &mut |share| {
+                monitor.report(Stage::Read, (done as f64 + share) / stored.len() as f64)
+            })?;
+        }
+        Ok(())
+    }
+
     /// Decodes the frames in stored order, as many at a time as a gate has slices.
-    fn decode_all(&mut self, monitor: &Monitor) -> Result<(Tally, Vec<String>), VolumeError> {
+    fn decode_all(
+        &mut self,
+        take: &mut dyn FnMut(usize, &[f32]),
+        monitor: &Monitor,
+    ) -> Result<(Tally, Vec<String>), VolumeError> {
         let pixels = &self.pixels;
         let count = pixels.frame_voxels() * pixels.shape[2];
         let mut reader = VoxelReader::new(pixels.format.clone(), &mut self.source);
-        reader.tally_all(pixels.frame_begin(0), count, self.order.gates(), monitor)?;
+        reader.tally_all(
+            pixels.frame_begin(0),
+            count,
+            self.order.gates(),
+            take,
+            monitor,
+        )?;
         Ok((reader.tally(), reader.warnings()))
     }
 }

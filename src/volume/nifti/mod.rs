@@ -102,11 +102,27 @@ impl OpenVolume for NiftiFile {
         })
     }
 
-    fn decode_all(&mut self, monitor: &Monitor) -> Result<(Tally, Vec<String>), VolumeError> {
+    fn stream_frame(
+        &mut self,
+        frame: usize,
+        take: &mut dyn FnMut(usize, &[f32]),
+        monitor: &Monitor,
+    ) -> Result<(), VolumeError> {
+        let header = &self.header;
+        let mut reader = VoxelReader::new(header.voxel_format(), &mut self.source);
+        let report = &mut |done| monitor.report(Stage::Read, done);
+        reader.stream(header.frame_begin(frame), header.voxels(), take, report)
+    }
+
+    fn decode_all(
+        &mut self,
+        take: &mut dyn FnMut(usize, &[f32]),
+        monitor: &Monitor,
+    ) -> Result<(Tally, Vec<String>), VolumeError> {
         let header = &self.header;
         let mut reader = VoxelReader::new(header.voxel_format(), &mut self.source);
         let begin = header.frame_begin(0);
-        reader.tally_all(begin, header.voxels(), header.frames, monitor)?;
+        reader.tally_all(begin, header.voxels(), header.frames, take, monitor)?;
         let tally = reader.tally();
         let mut warnings = reader.warnings();
         warnings.extend(reader.finish()?);

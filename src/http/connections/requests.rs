@@ -1,0 +1,188 @@
+//! The requests of one connection: who sent them, and what the connection waits for meanwhile.
+
+use super::registry::{OpenConnection, Phase};
+use super::tls::ClientCertificate;
+use crate::config::Networks;
+use crate::http::client::ClientAddress;
+use crate::http::problem::Problem;
+use axum::Router;
+use axum::body::{Body, Bytes, HttpBody};
+use axum::http::{HeaderValue, Request, Response, StatusCode, header};
+use axum::response::IntoResponse;
+use hyper::body::{Frame, Incoming, SizeHint};
+use hyper::service::Service;
+use std::convert::Infallible;
+use std::net::IpAddr;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll, ready};
+
+/// The paths that are answered on every connection.
+const FOR_OPERATORS: [&str; 2] = ["/healthz", "/readyz"];
+
+/// Answers the requests of one connection.
+pub struct RequestService {
+    /// The routes.
+    pub router: Router,
+    /// The connection.
+    pub connection: Arc<OpenConnection>,
+    /// Whether it belongs to the reserve.
+    pub reserve: bool,
+    /// The address of its other end.
+    pub peer: IpAddr,
+    /// The proxies whose word about their clients is taken.
+    pub trusted_proxies: Networks,
+    /// The client's verified certificate.
+    pub certificate: Option<Arc<ClientCertificate>>,
+    /// Whether a certificate is demanded and the client has none.
+    pub lacks_certificate: bool,
+}
+
+impl Service<Request<Incoming>> for RequestService {
+    type Response = Response<AnswerBody>;
+    type Error = Infallible;
+    type Future = Pin<Box<dyn Future<Output = Result<Self::Response, Infallible>> + Send>>;
+
+    fn call(&self, request: Request<Incoming>) -> Self::Future {
+        let answering = Answering(self.connection.clone());
+        let client = ClientAddress::of_request(self.peer, request.headers(), &self.trusted_proxies);
+        if let Some(problem) = self.refusal(request.uri().path()) {
+            answering.0.enter(Phase::Answer);
+            let mut response = problem.into_response();
+            let close = HeaderValue::from_static("close");
+            response.headers_mut().insert(header::CONNECTION, close);
+            return Box::pin(async move { Ok(response.map(|body| answering.body(body))) });
+        }
+        let mut request = request.map(|body| {
+            let body = ReceivedBody {
+                body,
+                connection: self.connection.clone(),
+            };
+            self.connection.enter(match body.is_end_stream() {
+                true => Phase::Answer,
+                false => Phase::Body,
+            });
+            Body::new(body)
+        });
+        let extensions = request.extensions_mut();
+        extensions.insert(client);
+        if let Some(certificate) = &self.certificate {
+            extensions.insert(certificate.clone());
+        }
+        let mut router = self.router.clone();
+        let answer = tower::Service::call(&mut router, request);
+        Box::pin(async move {
+            let response = client.scope(answer).await?;
+            Ok(response.map(|body| answering.body(body)))
+        })
+    }
+}
+
+impl RequestService {
+    /// Why a request for `path` is not even routed.
+    fn refusal(&self, path: &str) -> Option<Problem> {
+        if FOR_OPERATORS.contains(&path) {
+            return None;
+        }
+        if self.reserve {
+            let full = Problem::new(
+                StatusCode::SERVICE_UNAVAILABLE,
+                "too-many-connections",
+                "The service has as many connections as it may have, in all or of one client.",
+            );
+            return Some(full.header(header::RETRY_AFTER, "1").fix(
+                "Use fewer connections at the same time, or ask the operator to raise \
+                 connection_limit or client_connection_limit.",
+            ));
+        }
+        self.lacks_certificate.then(|| {
+            Problem::new(
+                StatusCode::FORBIDDEN,
+                "client-certificate-required",
+                "The connection has no client certificate.",
+            )
+            .fix("Connect with a certificate of an authority that the operator has named.")
+        })
+    }
+}
+
+/// While this exists, the connection's request is not answered completely.
+pub struct Answering(Arc<OpenConnection>);
+
+impl Answering {
+    fn body(self, body: Body) -> AnswerBody {
+        AnswerBody {
+            body,
+            _answering: self,
+        }
+    }
+}
+
+impl Drop for Answering {
+    fn drop(&mut self) {
+        self.0.enter(Phase::Head);
+    }
+}
+
+/// The body of an answer.
+pub struct AnswerBody {
+    body: Body,
+    _answering: Answering,
+}
+
+impl HttpBody for AnswerBody {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        Pin::new(&mut self.body).poll_frame(context)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}
+
+/// The body of a request. When it has been received, or nobody wants the rest, the connection
+/// waits for the answer.
+struct ReceivedBody {
+    body: Incoming,
+    connection: Arc<OpenConnection>,
+}
+
+impl HttpBody for ReceivedBody {
+    type Data = Bytes;
+    type Error = hyper::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, hyper::Error>>> {
+        let frame = ready!(Pin::new(&mut self.body).poll_frame(context));
+        if self.body.is_end_stream() || !matches!(frame, Some(Ok(_))) {
+            self.connection.leave(Phase::Body, Phase::Answer);
+        }
+        Poll::Ready(frame)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}
+
+impl Drop for ReceivedBody {
+    fn drop(&mut self) {
+        self.connection.leave(Phase::Body, Phase::Answer);
+    }
+}

@@ -1,0 +1,101 @@
+//! `/openapi.json`: serialised and compressed once, with validators.
+
+use super::files::matches_any;
+use crate::jobs::hex;
+use axum::body::Bytes;
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use flate2::{Compression, write::GzEncoder};
+use sha2::{Digest, Sha256};
+use std::io::Write;
+
+/// Another version of the program may publish another document.
+const CACHE_CONTROL: HeaderValue = HeaderValue::from_static("public, max-age=300");
+
+/// A JSON document that stays the same while the program runs.
+#[derive(Clone)]
+pub struct PublishedDocument {
+    plain: Variant,
+    gzip: Variant,
+}
+
+/// The document in one encoding.
+#[derive(Clone)]
+struct Variant {
+    bytes: Bytes,
+    etag: String,
+    encoding: Option<HeaderValue>,
+}
+
+impl Variant {
+    fn new(bytes: Vec<u8>, encoding: Option<&'static str>) -> Self {
+        Self {
+            etag: format!("\"{}\"", hex(&Sha256::digest(&bytes))),
+            bytes: bytes.into(),
+            encoding: encoding.map(HeaderValue::from_static),
+        }
+    }
+}
+
+impl PublishedDocument {
+    /// Serialises and compresses `document`.
+    ///
+    /// # Panics
+    /// Never: the document is plain data, and writing into memory does not fail.
+    pub fn new(document: &utoipa::openapi::OpenApi) -> Self {
+        let plain = serde_json::to_vec(document).expect("the document is plain data");
+        let mut gzip = GzEncoder::new(Vec::new(), Compression::best());
+        let packed = gzip.write_all(&plain).and_then(|()| gzip.finish());
+        Self {
+            plain: Variant::new(plain, None),
+            gzip: Variant::new(packed.expect("memory takes all"), Some("gzip")),
+        }
+    }
+
+    /// The document, or 304 if the client has it.
+    pub fn answer(&self, request: &HeaderMap) -> Response {
+        let variant = match takes_gzip(request) {
+            true => &self.gzip,
+            false => &self.plain,
+        };
+        let known = matches_any(request, &header::IF_NONE_MATCH, &variant.etag);
+        let mut response = match known {
+            true => StatusCode::NOT_MODIFIED.into_response(),
+            false => {
+                let json = HeaderValue::from_static("application/json");
+                let mut response = variant.bytes.clone().into_response();
+                response.headers_mut().insert(header::CONTENT_TYPE, json);
+                if let Some(encoding) = &variant.encoding {
+                    let encoding = encoding.clone();
+                    response
+                        .headers_mut()
+                        .insert(header::CONTENT_ENCODING, encoding);
+                }
+                response
+            }
+        };
+        let headers = response.headers_mut();
+        headers.insert(header::CACHE_CONTROL, CACHE_CONTROL);
+        headers.insert(header::VARY, HeaderValue::from_static("accept-encoding"));
+        if let Ok(etag) = HeaderValue::from_str(&variant.etag) {
+            headers.insert(header::ETAG, etag);
+        }
+        response
+    }
+}
+
+/// Whether the client named gzip among the encodings it takes (RFC 9110, 12.5.3).
+fn takes_gzip(request: &HeaderMap) -> bool {
+    let values = request.get_all(header::ACCEPT_ENCODING).iter();
+    let codings = values.flat_map(|value| value.to_str().unwrap_or_default().split(','));
+    let mut gzip = codings.filter_map(|coding| {
+        let (name, weight) = coding.split_once(';').unwrap_or((coding, ""));
+        name.trim()
+            .eq_ignore_ascii_case("gzip")
+            .then(|| weight.trim())
+    });
+    gzip.next().is_some_and(|weight| {
+        let q = weight.strip_prefix("q=").map_or(Ok(1.0), str::parse::<f32>);
+        q.is_ok_and(|q| q > 0.0)
+    })
+}
