@@ -1,22 +1,24 @@
 //! The file store in a folder: one folder per id, made visible by a rename.
 //!
 //! The files of an id are written into a folder under `staging/`, forced to disk, and then moved
-//! to their place by renaming the folder, which succeeds as a whole or not at all. Reading and
-//! listing go through `object_store`.
+//! to their place by renaming the folder, which succeeds as a whole or not at all. Files are read in
+//! large pieces (`object_store` reads 8 KiB at a time, each on another thread); listing goes through
+//! `object_store`.
 
 use crate::jobs::{
     BlobError, BlobStore, BlobStream, BlobWriter, LocalFile, Resource, StagedFiles, random_id,
 };
 use async_trait::async_trait;
 use bytes::Bytes;
-use futures::{StreamExt, TryStreamExt};
+use futures::StreamExt;
 use object_store::local::LocalFileSystem;
 use object_store::path::Path as Key;
-use object_store::{GetOptions, GetRange, ObjectStore, ObjectStoreExt, PutPayload};
+use object_store::{ObjectStore, ObjectStoreExt, PutPayload};
 use std::fs::File;
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 const STAGING: &str = "staging";
 
@@ -70,12 +72,49 @@ fn sync(path: &Path) -> std::io::Result<()> {
     File::open(path)?.sync_all()
 }
 
+/// Runs blocking `work` on a thread for it.
+async fn on_a_thread<T: Send + 'static>(
+    work: impl FnOnce() -> std::io::Result<T> + Send + 'static,
+) -> Result<T, BlobError> {
+    let done = tokio::task::spawn_blocking(work).await;
+    Ok(done.map_err(|error| BlobError(error.to_string()))??)
+}
+
+/// Largest piece of a file that is read at a time, bytes. Each piece is handed from a blocking
+/// thread to the connection, which costs as much as reading tens of kibibytes.
+const PIECE: u64 = 256 << 10;
+
+/// The part of a file that is still to be read.
+struct OpenPart {
+    file: File,
+    left: u64,
+}
+
+impl OpenPart {
+    fn open(path: &Path, range: Range<u64>) -> std::io::Result<Self> {
+        let mut file = File::open(path)?;
+        file.seek(SeekFrom::Start(range.start))?;
+        let left = range.end - range.start;
+        Ok(Self { file, left })
+    }
+
+    /// The next piece and what is left after it.
+    fn next_piece(mut self) -> std::io::Result<(Bytes, Self)> {
+        let mut piece = vec![0; self.left.min(PIECE) as usize];
+        self.file.read_exact(&mut piece)?;
+        self.left -= piece.len() as u64;
+        Ok((piece.into(), self))
+    }
+}
+
 /// A folder under `staging/`.
 struct StagingFolder {
     /// The folder; deleted on drop.
     folder: PathBuf,
     /// The root of the store.
     root: PathBuf,
+    /// Whether everything in the folder has been forced to disk.
+    settled: AtomicBool,
 }
 
 impl Drop for StagingFolder {
@@ -85,7 +124,7 @@ impl Drop for StagingFolder {
     }
 }
 
-/// Forces the files of a folder, and its entries, to disk. Costs little if they are there already.
+/// Forces the files of a folder, and its entries, to disk.
 fn sync_all(folder: &Path) -> std::io::Result<()> {
     for entry in std::fs::read_dir(folder)? {
         sync(&entry?.path())?;
@@ -95,7 +134,9 @@ fn sync_all(folder: &Path) -> std::io::Result<()> {
 
 impl StagingFolder {
     fn publish_blocking(&self, place: &Path) -> std::io::Result<()> {
-        sync_all(&self.folder)?;
+        if !self.settled.load(Ordering::Acquire) {
+            sync_all(&self.folder)?;
+        }
         match std::fs::rename(&self.folder, place) {
             // The id has its files already.
             Err(error)
@@ -115,11 +156,13 @@ impl StagingFolder {
 #[async_trait]
 impl StagedFiles for StagingFolder {
     async fn create(&self, name: &str) -> Result<BlobWriter, BlobError> {
+        self.settled.store(false, Ordering::Release);
         let file = tokio::fs::File::create(self.folder.join(name)).await?;
         Ok(Box::pin(file))
     }
 
     async fn rename(&self, from: &str, to: &str) -> Result<(), BlobError> {
+        self.settled.store(false, Ordering::Release);
         tokio::fs::rename(self.folder.join(from), self.folder.join(to)).await?;
         Ok(())
     }
@@ -130,18 +173,14 @@ impl StagedFiles for StagingFolder {
 
     async fn settle(&self) -> Result<(), BlobError> {
         let folder = self.folder.clone();
-        tokio::task::spawn_blocking(move || sync_all(&folder))
-            .await
-            .map_err(|e| BlobError(e.to_string()))??;
+        on_a_thread(move || sync_all(&folder)).await?;
+        self.settled.store(true, Ordering::Release);
         Ok(())
     }
 
     async fn publish(self: Box<Self>, id: &str) -> Result<(), BlobError> {
         let place = self.root.join(kind_folder(id)).join(id);
-        tokio::task::spawn_blocking(move || self.publish_blocking(&place))
-            .await
-            .map_err(|e| BlobError(e.to_string()))??;
-        Ok(())
+        on_a_thread(move || self.publish_blocking(&place)).await
     }
 }
 
@@ -153,20 +192,26 @@ impl BlobStore for FileBlobs {
         Ok(Box::new(StagingFolder {
             folder,
             root: self.folder.clone(),
+            settled: AtomicBool::new(false),
         }))
     }
 
     async fn read(&self, id: &str, name: &str, range: Range<u64>) -> Result<BlobStream, BlobError> {
-        let key = Key::from_iter([kind_folder(id), id, name]);
         if range.is_empty() {
             return Ok(futures::stream::empty().boxed());
         }
-        let options = GetOptions {
-            range: Some(GetRange::Bounded(range)),
-            ..GetOptions::default()
-        };
-        let found = self.files.get_opts(&key, options).await.map_err(failed)?;
-        Ok(found.into_stream().map_err(failed).boxed())
+        let path = self.place(id).join(name);
+        // Reading the first piece here reports a missing file before the stream begins.
+        let (first, rest) = on_a_thread(move || OpenPart::open(&path, range)?.next_piece()).await?;
+        let rest = futures::stream::try_unfold(rest, |part: OpenPart| async move {
+            match part.left {
+                0 => Ok(None),
+                _ => on_a_thread(move || part.next_piece()).await.map(Some),
+            }
+        });
+        Ok(futures::stream::once(async move { Ok(first) })
+            .chain(rest)
+            .boxed())
     }
 
     async fn local(&self, id: &str, name: &str) -> Result<Option<LocalFile>, BlobError> {

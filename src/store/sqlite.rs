@@ -32,11 +32,14 @@ impl SqliteStore {
             .busy_timeout(BUSY_TIMEOUT);
         let writer = SqlitePoolOptions::new()
             .max_connections(1)
+            .test_before_acquire(false)
             .connect_with(options.clone())
             .await?;
         sqlx::migrate!("src/store/migrations").run(&writer).await?;
         let readers = SqlitePoolOptions::new()
             .max_connections(READERS)
+            // A file does not hang up. Asking doubles the time of a small query.
+            .test_before_acquire(false)
             .connect_with(options)
             .await?;
         Ok(Self { writer, readers })

@@ -1,6 +1,7 @@
 //! Workers: each claims a job, computes it, commits the result, and claims the next.
 
 mod lease;
+mod priority;
 mod progress;
 mod run;
 mod settings;
@@ -45,6 +46,7 @@ impl Workers {
                 .num_threads(settings.threads)
                 .thread_name(move |thread| format!("worker-{number}-{thread}"))
                 .stack_size(STACK_BYTES)
+                .start_handler(|_| priority::yield_to_requests())
                 .build()
                 .map_err(std::io::Error::other)?;
             let runner = JobRunner {
