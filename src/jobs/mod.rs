@@ -43,7 +43,7 @@ mod tenant;
 mod work;
 mod worker;
 
-pub use clock::{Clock, SystemClock, Timestamp};
+pub use clock::{Clock, SystemClock, Timestamp, parse_rfc3339, rfc3339};
 pub use failure::{Failure, Fault};
 pub(crate) use ids::hex;
 pub use ids::{content_id, random_id};

@@ -16,6 +16,7 @@
 mod blobs;
 mod rows;
 mod sqlite;
+mod sqlite_access;
 mod sqlite_catalogue;
 mod sqlite_jobs;
 

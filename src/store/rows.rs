@@ -85,8 +85,19 @@ pub(super) fn to_json(value: &impl Serialize) -> StoreResult<String> {
     serde_json::to_string(value).map_err(|e| StoreError::Database(e.to_string()))
 }
 
-fn json<T: DeserializeOwned>(row: &SqliteRow, column: &str) -> StoreResult<T> {
+/// The value of a JSON column.
+pub(super) fn json<T: DeserializeOwned>(row: &SqliteRow, column: &str) -> StoreResult<T> {
     from_json(row.try_get(column)?)
+}
+
+/// The value of a text column that has a parser of its own.
+pub(super) fn parsed<T>(row: &SqliteRow, column: &str) -> StoreResult<T>
+where
+    T: std::str::FromStr<Err: std::fmt::Display>,
+{
+    let text: &str = row.try_get(column)?;
+    text.parse()
+        .map_err(|e| StoreError::Database(format!("damaged row: {e}")))
 }
 
 fn from_json<T: DeserializeOwned>(text: &str) -> StoreResult<T> {

@@ -112,8 +112,8 @@ const USES: &[(&str, &[&str])] = &[
         ],
     ),
     ("jobs", &["progress"]),
-    ("access", &[]),
-    ("store", &["jobs"]),
+    ("access", &["jobs"]),
+    ("store", &["jobs", "access"]),
     (
         "work",
         &[

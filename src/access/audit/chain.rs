@@ -1,0 +1,157 @@
+//! The chain of hashes, and its check.
+
+use super::event::{Activity, AuditEvent};
+use crate::access::AccessStore;
+use crate::jobs::{StoreResult, hex};
+use sha2::{Digest, Sha256};
+
+/// The hash before the first row.
+pub const NO_HASH: &str = "0000000000000000000000000000000000000000000000000000000000000000";
+
+/// Rows that the check reads at a time.
+const BATCH: u32 = 1000;
+
+/// A row as the check sees it: the stored text, not its meaning.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AuditLink {
+    /// Its position.
+    pub sequence: i64,
+    /// The stored JSON.
+    pub event: String,
+    /// The stored hash.
+    pub hash: String,
+}
+
+/// The last row that was removed because of its age.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Anchor {
+    /// Its position.
+    pub sequence: i64,
+    /// Its hash, which the next row's hash covers.
+    pub hash: String,
+}
+
+impl Anchor {
+    /// How the event that records a removal names the last row that was removed.
+    pub fn name(&self) -> String {
+        format!("{}:{}", self.sequence, self.hash)
+    }
+}
+
+/// SHA-256 of the hash before it, the position and the text of a row, in hexadecimal digits.
+pub fn chain_hash(previous: &str, sequence: i64, event: &str) -> String {
+    let mut hash = Sha256::new();
+    hash.update(previous.as_bytes());
+    hash.update(sequence.to_be_bytes());
+    hash.update(event.as_bytes());
+    hex(&hash.finalize())
+}
+
+/// The first place where the chain is broken.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum BrokenLink {
+    /// Rows are missing.
+    #[error("the rows {first} to {last} are missing")]
+    Missing {
+        /// The first missing row.
+        first: i64,
+        /// The last.
+        last: i64,
+    },
+    /// A row does not have the hash that the rows before it and its content give.
+    #[error("row {0} was changed: its hash does not follow from its content and the row before it")]
+    Changed(i64),
+    /// Rows were removed, and no event of the chain says so.
+    #[error("the rows up to {0} were removed, but no event of the trail says so")]
+    UnrecordedRemoval(i64),
+}
+
+/// What the check found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AuditReport {
+    /// Rows that were checked.
+    pub rows: u64,
+    /// Position of the newest row.
+    pub newest: i64,
+    /// Hash of the newest row: to be kept in another place.
+    pub head: String,
+    /// The first place where the chain is broken, if it is.
+    pub broken: Option<BrokenLink>,
+}
+
+/// Walks the chain from the oldest row that is kept to the newest.
+///
+/// # Errors
+/// If the database fails.
+pub async fn verify(store: &dyn AccessStore) -> StoreResult<AuditReport> {
+    let anchor = store.anchor().await?;
+    let (mut sequence, mut head) = match &anchor {
+        Some(anchor) => (anchor.sequence, anchor.hash.clone()),
+        None => (0, NO_HASH.to_owned()),
+    };
+    let removal = anchor.as_ref().map(Anchor::name);
+    let mut removal_recorded = anchor.is_none();
+    let mut rows = 0;
+    let broken = 'chain: loop {
+        let links = store.links(sequence, BATCH).await?;
+        if links.is_empty() {
+            break None;
+        }
+        for link in links {
+            if link.sequence != sequence + 1 {
+                break 'chain Some(BrokenLink::Missing {
+                    first: sequence + 1,
+                    last: link.sequence - 1,
+                });
+            }
+            if link.hash != chain_hash(&head, link.sequence, &link.event) {
+                break 'chain Some(BrokenLink::Changed(link.sequence));
+            }
+            if !removal_recorded {
+                removal_recorded = records(&link.event, removal.as_deref());
+            }
+            (sequence, head) = (link.sequence, link.hash);
+            rows += 1;
+        }
+    };
+    let greatest = store.greatest_sequence().await?;
+    let broken = broken.or_else(|| {
+        if greatest > sequence {
+            Some(BrokenLink::Missing {
+                first: sequence + 1,
+                last: greatest,
+            })
+        } else {
+            let anchor = anchor.filter(|_| !removal_recorded)?;
+            Some(BrokenLink::UnrecordedRemoval(anchor.sequence))
+        }
+    });
+    Ok(AuditReport {
+        rows,
+        newest: sequence,
+        head,
+        broken,
+    })
+}
+
+/// Whether the event says that the rows up to `removal` were removed.
+fn records(event: &str, removal: Option<&str>) -> bool {
+    let event: Option<AuditEvent> = serde_json::from_str(event).ok();
+    event.is_some_and(|event| {
+        event.activity == Activity::AuditPruned && event.object.as_deref() == removal
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hash_covers_everything_before_it() {
+        let hash = chain_hash(NO_HASH, 1, "{}");
+        assert_eq!(hash.len(), NO_HASH.len());
+        assert_ne!(hash, chain_hash(NO_HASH, 2, "{}"));
+        assert_ne!(hash, chain_hash(NO_HASH, 1, "{ }"));
+        assert_ne!(hash, chain_hash(&hash, 1, "{}"));
+    }
+}

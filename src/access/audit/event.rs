@@ -1,0 +1,126 @@
+//! One event of the audit trail.
+
+use crate::jobs::{Tenant, Timestamp};
+use serde::{Deserialize, Serialize};
+
+/// What was done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Activity {
+    /// Something was stored: a volume, a template.
+    Create,
+    /// The content of an item was read.
+    Read,
+    /// A list was read.
+    Search,
+    /// An item was changed.
+    Update,
+    /// An item was erased, or a job cancelled.
+    Delete,
+    /// A job was filed.
+    Execute,
+    /// Credentials were refused.
+    SignInRefused,
+    /// A caller asked for more than its scope allows.
+    AccessRefused,
+    /// A key was made.
+    KeyCreated,
+    /// A key was revoked.
+    KeyRevoked,
+    /// The audit trail was read.
+    AuditRead,
+    /// Old rows of the audit trail were removed.
+    AuditPruned,
+    /// Events could not be written and are lost; `count` says how many.
+    AuditGap,
+}
+
+/// How it ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// It was done.
+    Success,
+    /// It was refused.
+    Refused,
+}
+
+/// What happened. The JSON of this is what is stored and hashed.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct AuditEvent {
+    /// When it was recorded.
+    pub recorded: Timestamp,
+    /// What was done.
+    pub activity: Activity,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Whose items it concerns.
+    pub tenant: Tenant,
+    /// Who did it.
+    pub agent: String,
+    /// Id of the key by which it was done.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub key: Option<String>,
+    /// Network address of who did it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub address: Option<String>,
+    /// Id of the item, or the plural of a kind for lists.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub object: Option<String>,
+    /// The request's `x-request-id`, if it was one request.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub request: Option<String>,
+    /// How often it was done within a second.
+    pub count: u64,
+}
+
+impl AuditEvent {
+    /// A successful act of `agent`, done once.
+    pub fn new(recorded: Timestamp, activity: Activity, tenant: Tenant, agent: String) -> Self {
+        Self {
+            recorded,
+            activity,
+            outcome: Outcome::Success,
+            tenant,
+            agent,
+            key: None,
+            address: None,
+            object: None,
+            request: None,
+            count: 1,
+        }
+    }
+
+    /// Sets the item that it concerns.
+    #[must_use]
+    pub fn on(mut self, object: impl Into<String>) -> Self {
+        self.object = Some(object.into());
+        self
+    }
+}
+
+/// One row of the trail.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AuditRecord {
+    /// Its position in the chain.
+    pub sequence: i64,
+    /// What happened.
+    pub event: AuditEvent,
+    /// Its hash.
+    pub hash: String,
+}
+
+/// Which rows to list; `None` lists all.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct AuditFilter {
+    /// Rows of this tenant.
+    pub tenant: Option<Tenant>,
+    /// Rows of this agent.
+    pub agent: Option<String>,
+    /// Rows on this item.
+    pub object: Option<String>,
+    /// Rows recorded at or after this time.
+    pub since: Option<Timestamp>,
+    /// Rows recorded before this time.
+    pub until: Option<Timestamp>,
+}

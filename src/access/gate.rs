@@ -1,0 +1,259 @@
+//! From the `Authorization` of a request to a caller.
+
+use super::{AccessStore, ApiKey, Issuer, IssuerError, KeyState, PresentedKey, Quota, Scope};
+use crate::jobs::{Clock, StoreError, Tenant};
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// How long the record of a key, or the absence of any key, is taken from memory: so long a
+/// revocation by another process may take to show.
+pub const FRESH_FOR: Duration = Duration::from_millis(500);
+
+/// Most records in memory.
+const MOST_KEPT: usize = 1024;
+
+/// Longest credentials, bytes. Tokens with many groups have a few thousand.
+const LONGEST: usize = 16 * 1024;
+
+/// Who sends a request.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Identity {
+    /// Whose items and jobs it sees.
+    pub tenant: Tenant,
+    /// The name of its key, the subject of its token, or `anonymous`.
+    pub name: String,
+    /// What it may do.
+    pub scope: Scope,
+    /// Id of its key.
+    pub key: Option<String>,
+    /// Limits that replace the general ones.
+    pub quota: Quota,
+    /// Tells callers apart where requests are counted; `None` for the anonymous caller.
+    pub account: Option<String>,
+}
+
+/// Why a request was not admitted.
+#[derive(Debug, thiserror::Error)]
+pub enum Refusal {
+    /// It has no credentials, and the service asks for some.
+    #[error("no credentials")]
+    Missing,
+    /// Its `Authorization` is no bearer credential.
+    #[error("no bearer credential")]
+    NotBearer,
+    /// There is no such key.
+    #[error("unknown key")]
+    UnknownKey,
+    /// The key was revoked, or its time is over.
+    #[error("the key is {}", state.as_str())]
+    EndedKey {
+        /// The key's id.
+        key: String,
+        /// Whose key it was.
+        tenant: Tenant,
+        /// How it ended.
+        state: KeyState,
+    },
+    /// The token is not valid here.
+    #[error("the token is refused: {0}")]
+    Token(String),
+    /// The issuer's keys cannot be read, so no token can be checked.
+    #[error("{0}")]
+    Issuer(String),
+    /// The database failed.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+}
+
+/// Knows callers by their credentials.
+pub struct Gate {
+    store: Arc<dyn AccessStore>,
+    clock: Arc<dyn Clock>,
+    issuer: Option<Issuer>,
+    /// What a caller without credentials may do, and whether that holds although keys exist.
+    anonymous: Scope,
+    always_open: bool,
+    /// Set once there is a key, for ever.
+    keys_exist: AtomicBool,
+    /// When the database was last asked whether there is a key.
+    asked: Mutex<Option<Instant>>,
+    kept: Mutex<HashMap<String, (ApiKey, Instant)>>,
+}
+
+impl Gate {
+    /// A gate on these keys and tokens of this issuer. Callers without credentials get the scope
+    /// `anonymous`: for ever if `always_open`, else until the first key is made, and never if
+    /// there is an issuer.
+    pub fn new(
+        store: Arc<dyn AccessStore>,
+        clock: Arc<dyn Clock>,
+        issuer: Option<Issuer>,
+        anonymous: Scope,
+        always_open: bool,
+    ) -> Self {
+        Self {
+            store,
+            clock,
+            issuer,
+            anonymous,
+            always_open,
+            keys_exist: AtomicBool::new(false),
+            asked: Mutex::new(None),
+            kept: Mutex::default(),
+        }
+    }
+
+    /// Who sends a request with this `Authorization`.
+    ///
+    /// # Errors
+    /// If the credentials are missing or wrong, or cannot be checked.
+    pub async fn identify(&self, authorization: Option<&[u8]>) -> Result<Identity, Refusal> {
+        let Some(authorization) = authorization else {
+            return match self.is_open().await? {
+                true => Ok(self.anonymous()),
+                false => Err(Refusal::Missing),
+            };
+        };
+        let credential = bearer(authorization).ok_or(Refusal::NotBearer)?;
+        if let Some(key) = PresentedKey::parse(credential) {
+            return self.owner(key).await;
+        }
+        match &self.issuer {
+            Some(issuer) => issuer.subject(credential).await.map_err(Refusal::from),
+            None => Err(Refusal::UnknownKey),
+        }
+    }
+
+    /// Whether callers need no credentials.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn is_open(&self) -> Result<bool, StoreError> {
+        if self.always_open {
+            return Ok(true);
+        }
+        if self.issuer.is_some() || self.keys_exist.load(Ordering::Relaxed) {
+            return Ok(false);
+        }
+        let fresh = lock(&self.asked).is_some_and(|at| at.elapsed() < FRESH_FOR);
+        if !fresh {
+            // The time is taken first: a key made while the database answers is seen next time.
+            let now = Instant::now();
+            if self.store.any_key().await? {
+                self.keys_exist.store(true, Ordering::Relaxed);
+                return Ok(false);
+            }
+            *lock(&self.asked) = Some(now);
+        }
+        Ok(true)
+    }
+
+    /// Forgets what it keeps, so that a change by this process shows at once.
+    pub fn refresh(&self) {
+        lock(&self.kept).clear();
+        *lock(&self.asked) = None;
+    }
+
+    fn anonymous(&self) -> Identity {
+        Identity {
+            tenant: Tenant::default(),
+            name: "anonymous".into(),
+            scope: self.anonymous,
+            key: None,
+            quota: Quota::default(),
+            account: None,
+        }
+    }
+
+    async fn owner(&self, presented: PresentedKey<'_>) -> Result<Identity, Refusal> {
+        let key = self.key(presented.id).await?.ok_or(Refusal::UnknownKey)?;
+        if !key.has_secret(presented.secret) {
+            return Err(Refusal::UnknownKey);
+        }
+        match key.state(self.clock.now()) {
+            KeyState::Active => Ok(Identity {
+                account: Some(format!("key {}", key.id)),
+                tenant: key.tenant,
+                name: key.name,
+                scope: key.scope,
+                key: Some(key.id),
+                quota: key.quota,
+            }),
+            state => Err(Refusal::EndedKey {
+                key: key.id,
+                tenant: key.tenant,
+                state,
+            }),
+        }
+    }
+
+    /// The record of a key, at most [`FRESH_FOR`] old. Unknown ids are not kept, so strangers
+    /// cannot fill the memory.
+    async fn key(&self, id: &str) -> Result<Option<ApiKey>, StoreError> {
+        let kept = lock(&self.kept).get(id).cloned();
+        if let Some((key, at)) = kept
+            && at.elapsed() < FRESH_FOR
+        {
+            return Ok(Some(key));
+        }
+        let now = Instant::now();
+        let found = self.store.key(id).await?;
+        let mut kept = lock(&self.kept);
+        if let Some(key) = &found {
+            if kept.len() >= MOST_KEPT {
+                kept.clear();
+            }
+            kept.insert(id.to_owned(), (key.clone(), now));
+        }
+        Ok(found)
+    }
+}
+
+impl From<IssuerError> for Refusal {
+    fn from(error: IssuerError) -> Self {
+        match error {
+            IssuerError::Token(reason) => Refusal::Token(reason),
+            IssuerError::Unavailable(reason) => Refusal::Issuer(reason),
+        }
+    }
+}
+
+/// The credential of an `Authorization: Bearer CREDENTIAL` (RFC 6750; the scheme in any case).
+fn bearer(authorization: &[u8]) -> Option<&str> {
+    let text = std::str::from_utf8(authorization).ok()?;
+    let (scheme, credential) = text.split_once(' ')?;
+    let credential = credential.trim();
+    let usable = scheme.eq_ignore_ascii_case("bearer")
+        && !credential.is_empty()
+        && credential.len() <= LONGEST;
+    usable.then_some(credential)
+}
+
+/// A panic cannot leave these values half changed: each use is a single call.
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_bearer_credentials_are_read() {
+        assert_eq!(bearer(b"Bearer abc"), Some("abc"));
+        assert_eq!(bearer(b"bearer  abc "), Some("abc"));
+        for wrong in [
+            &b"abc"[..],
+            b"Basic abc",
+            b"Bearer",
+            b"Bearer ",
+            b"\xff abc",
+        ] {
+            assert_eq!(bearer(wrong), None);
+        }
+        let long = format!("Bearer {}", "x".repeat(LONGEST + 1));
+        assert_eq!(bearer(long.as_bytes()), None);
+    }
+}

@@ -1,0 +1,57 @@
+//! The interface to the tables of keys and of the audit trail.
+
+use super::audit::{Anchor, AuditEvent, AuditFilter, AuditLink, AuditRecord};
+use super::{ApiKey, Usage};
+use crate::jobs::{ListPage, ListRequest, StoreResult, Tenant, Timestamp};
+use async_trait::async_trait;
+
+/// Keys and audit trail. Every method is one transaction and fails only if the database does.
+/// Another process may use the same tables at the same time.
+#[async_trait]
+pub trait AccessStore: Send + Sync + 'static {
+    /// Adds a key, and the event that says so.
+    async fn add_key(&self, key: &ApiKey, event: &AuditEvent) -> StoreResult<()>;
+
+    /// The key with that id.
+    async fn key(&self, id: &str) -> StoreResult<Option<ApiKey>>;
+
+    /// A page of keys, newest first; of one tenant, or of all.
+    async fn keys(
+        &self,
+        tenant: Option<&Tenant>,
+        page: ListRequest,
+    ) -> StoreResult<ListPage<ApiKey>>;
+
+    /// Whether there ever was a key, revoked ones included.
+    async fn any_key(&self) -> StoreResult<bool>;
+
+    /// Revokes a key, and adds the event that says so unless it was revoked already. Returns
+    /// whether there is such a key.
+    async fn revoke_key(&self, id: &str, now: Timestamp, event: &AuditEvent) -> StoreResult<bool>;
+
+    /// What a tenant uses.
+    async fn usage(&self, tenant: &Tenant) -> StoreResult<Usage>;
+
+    /// Appends events to the trail, in their order.
+    async fn append(&self, events: &[AuditEvent]) -> StoreResult<()>;
+
+    /// A page of the trail, newest first.
+    async fn audit(
+        &self,
+        filter: &AuditFilter,
+        page: ListRequest,
+    ) -> StoreResult<ListPage<AuditRecord>>;
+
+    /// The rows of the chain after a sequence number, oldest first.
+    async fn links(&self, after: i64, limit: u32) -> StoreResult<Vec<AuditLink>>;
+
+    /// The row up to which the trail was removed last.
+    async fn anchor(&self) -> StoreResult<Option<Anchor>>;
+
+    /// The greatest sequence number that was ever given to a row.
+    async fn greatest_sequence(&self) -> StoreResult<i64>;
+
+    /// Removes the rows that were recorded before a time, keeps their last hash as the anchor, and
+    /// appends the event that says so. Returns how many were removed.
+    async fn prune(&self, before: Timestamp, now: Timestamp) -> StoreResult<u64>;
+}

@@ -1,0 +1,272 @@
+//! The tables of keys and of the audit trail in SQLite.
+
+use super::rows::{self, to_json};
+use super::sqlite::SqliteStore;
+use crate::access::{
+    AccessStore, Activity, Anchor, ApiKey, AuditEvent, AuditFilter, AuditLink, AuditRecord,
+    NO_HASH, Quota, Usage, chain_hash,
+};
+use crate::jobs::{ListPage, ListRequest, StoreResult, Tenant, Timestamp};
+use async_trait::async_trait;
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Row, SqliteConnection};
+
+#[async_trait]
+impl AccessStore for SqliteStore {
+    async fn add_key(&self, key: &ApiKey, event: &AuditEvent) -> StoreResult<()> {
+        let mut transaction = self.writer.begin().await?;
+        sqlx::query(
+            "INSERT INTO api_keys (id, name, tenant, scope, requests, bytes, jobs, created_at,
+                                   expires_at, revoked_at, digest)
+             VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        )
+        .bind(&key.id)
+        .bind(&key.name)
+        .bind(key.tenant.as_str())
+        .bind(key.scope.as_str())
+        .bind(key.quota.requests.map(signed))
+        .bind(key.quota.bytes.map(signed))
+        .bind(key.quota.jobs.map(signed))
+        .bind(key.created_at)
+        .bind(key.expires_at)
+        .bind(key.revoked_at)
+        .bind(&key.digest)
+        .execute(&mut *transaction)
+        .await?;
+        append(&mut transaction, std::slice::from_ref(event)).await?;
+        transaction.commit().await?;
+        Ok(())
+    }
+
+    async fn key(&self, id: &str) -> StoreResult<Option<ApiKey>> {
+        let row = sqlx::query("SELECT * FROM api_keys WHERE id = ?")
+            .bind(id)
+            .fetch_optional(&self.readers)
+            .await?;
+        row.map(read_key).transpose()
+    }
+
+    async fn keys(
+        &self,
+        tenant: Option<&Tenant>,
+        page: ListRequest,
+    ) -> StoreResult<ListPage<ApiKey>> {
+        let rows = sqlx::query(
+            "SELECT * FROM api_keys
+             WHERE (?1 IS NULL OR tenant = ?1) AND (?2 IS NULL OR sequence < ?2)
+             ORDER BY sequence DESC LIMIT ?3",
+        )
+        .bind(tenant.map(Tenant::as_str))
+        .bind(page.before)
+        .bind(i64::from(page.limit) + 1)
+        .fetch_all(&self.readers)
+        .await?;
+        rows::page(rows, page, read_key, |key| key.sequence)
+    }
+
+    async fn any_key(&self) -> StoreResult<bool> {
+        let row = sqlx::query("SELECT EXISTS (SELECT 1 FROM api_keys)")
+            .fetch_one(&self.readers)
+            .await?;
+        Ok(row.try_get(0)?)
+    }
+
+    async fn revoke_key(&self, id: &str, now: Timestamp, event: &AuditEvent) -> StoreResult<bool> {
+        let mut transaction = self.writer.begin().await?;
+        let done =
+            sqlx::query("UPDATE api_keys SET revoked_at = ? WHERE id = ? AND revoked_at IS NULL")
+                .bind(now)
+                .bind(id)
+                .execute(&mut *transaction)
+                .await?;
+        if done.rows_affected() > 0 {
+            append(&mut transaction, std::slice::from_ref(event)).await?;
+        }
+        transaction.commit().await?;
+        Ok(done.rows_affected() > 0 || self.key(id).await?.is_some())
+    }
+
+    async fn usage(&self, _tenant: &Tenant) -> StoreResult<Usage> {
+        let row = sqlx::query(
+            "SELECT (SELECT coalesce(sum(bytes), 0) FROM volumes),
+                    (SELECT count(*) FROM jobs WHERE state = 'queued')",
+        )
+        .fetch_one(&self.readers)
+        .await?;
+        Ok(Usage {
+            bytes: unsigned(row.try_get(0)?),
+            jobs: unsigned(row.try_get(1)?),
+        })
+    }
+
+    async fn append(&self, events: &[AuditEvent]) -> StoreResult<()> {
+        let mut transaction = self.writer.begin().await?;
+        append(&mut transaction, events).await?;
+        transaction.commit().await?;
+        Ok(())
+    }
+
+    async fn audit(
+        &self,
+        filter: &AuditFilter,
+        page: ListRequest,
+    ) -> StoreResult<ListPage<AuditRecord>> {
+        let rows = sqlx::query(
+            "SELECT sequence, event, hash FROM audit
+             WHERE (?1 IS NULL OR tenant = ?1) AND (?2 IS NULL OR agent = ?2)
+               AND (?3 IS NULL OR object = ?3) AND (?4 IS NULL OR recorded >= ?4)
+               AND (?5 IS NULL OR recorded < ?5) AND (?6 IS NULL OR sequence < ?6)
+             ORDER BY sequence DESC LIMIT ?7",
+        )
+        .bind(filter.tenant.as_ref().map(Tenant::as_str))
+        .bind(&filter.agent)
+        .bind(&filter.object)
+        .bind(filter.since)
+        .bind(filter.until)
+        .bind(page.before)
+        .bind(i64::from(page.limit) + 1)
+        .fetch_all(&self.readers)
+        .await?;
+        rows::page(rows, page, read_record, |record| record.sequence)
+    }
+
+    async fn links(&self, after: i64, limit: u32) -> StoreResult<Vec<AuditLink>> {
+        let rows = sqlx::query(
+            "SELECT sequence, event, hash FROM audit WHERE sequence > ? ORDER BY sequence LIMIT ?",
+        )
+        .bind(after)
+        .bind(i64::from(limit))
+        .fetch_all(&self.readers)
+        .await?;
+        rows::all(rows, |row| {
+            Ok(AuditLink {
+                sequence: row.try_get("sequence")?,
+                event: row.try_get("event")?,
+                hash: row.try_get("hash")?,
+            })
+        })
+    }
+
+    async fn anchor(&self) -> StoreResult<Option<Anchor>> {
+        let row =
+            sqlx::query("SELECT sequence, hash FROM audit_anchors ORDER BY sequence DESC LIMIT 1")
+                .fetch_optional(&self.readers)
+                .await?;
+        row.map(read_anchor).transpose()
+    }
+
+    async fn greatest_sequence(&self) -> StoreResult<i64> {
+        let row = sqlx::query("SELECT seq FROM sqlite_sequence WHERE name = 'audit'")
+            .fetch_optional(&self.readers)
+            .await?;
+        row.map_or(Ok(0), |row| Ok(row.try_get(0)?))
+    }
+
+    async fn prune(&self, before: Timestamp, now: Timestamp) -> StoreResult<u64> {
+        let mut transaction = self.writer.begin().await?;
+        // The event that records the removal remains, so the chain is never empty.
+        let last = sqlx::query(
+            "SELECT sequence, hash FROM audit
+             WHERE sequence < coalesce((SELECT min(sequence) FROM audit WHERE recorded >= ?),
+                                       9223372036854775807)
+             ORDER BY sequence DESC LIMIT 1",
+        )
+        .bind(before)
+        .fetch_optional(&mut *transaction)
+        .await?;
+        let Some(last) = last.map(read_anchor).transpose()? else {
+            transaction.commit().await?;
+            return Ok(0);
+        };
+        sqlx::query("INSERT INTO audit_anchors (sequence, hash, pruned_at) VALUES (?, ?, ?)")
+            .bind(last.sequence)
+            .bind(&last.hash)
+            .bind(now)
+            .execute(&mut *transaction)
+            .await?;
+        let done = sqlx::query("DELETE FROM audit WHERE sequence <= ?")
+            .bind(last.sequence)
+            .execute(&mut *transaction)
+            .await?;
+        let agent = "ventriform".to_owned();
+        let event = AuditEvent {
+            count: done.rows_affected(),
+            ..AuditEvent::new(now, Activity::AuditPruned, Tenant::default(), agent)
+        };
+        append(&mut transaction, &[event.on(last.name())]).await?;
+        transaction.commit().await?;
+        Ok(done.rows_affected())
+    }
+}
+
+/// Appends events to the chain, within a transaction that holds the database's write lock.
+async fn append(to: &mut SqliteConnection, events: &[AuditEvent]) -> StoreResult<()> {
+    let head = sqlx::query(
+        "SELECT sequence, hash FROM (SELECT sequence, hash FROM audit
+                                     UNION ALL SELECT sequence, hash FROM audit_anchors)
+         ORDER BY sequence DESC LIMIT 1",
+    )
+    .fetch_optional(&mut *to)
+    .await?;
+    let (mut sequence, mut hash) = match head.map(read_anchor).transpose()? {
+        Some(head) => (head.sequence, head.hash),
+        None => (0, NO_HASH.to_owned()),
+    };
+    for event in events {
+        let event = to_json(event)?;
+        sequence += 1;
+        hash = chain_hash(&hash, sequence, &event);
+        sqlx::query("INSERT INTO audit (sequence, event, hash) VALUES (?, ?, ?)")
+            .bind(sequence)
+            .bind(event)
+            .bind(&hash)
+            .execute(&mut *to)
+            .await?;
+    }
+    Ok(())
+}
+
+fn read_key(row: SqliteRow) -> StoreResult<ApiKey> {
+    let limit = |column: &str| -> StoreResult<Option<u64>> {
+        Ok(row.try_get::<Option<i64>, _>(column)?.map(unsigned))
+    };
+    Ok(ApiKey {
+        quota: Quota {
+            requests: limit("requests")?,
+            bytes: limit("bytes")?,
+            jobs: limit("jobs")?,
+        },
+        id: row.try_get("id")?,
+        sequence: row.try_get("sequence")?,
+        name: row.try_get("name")?,
+        tenant: rows::parsed(&row, "tenant")?,
+        scope: rows::parsed(&row, "scope")?,
+        created_at: row.try_get("created_at")?,
+        expires_at: row.try_get("expires_at")?,
+        revoked_at: row.try_get("revoked_at")?,
+        digest: row.try_get("digest")?,
+    })
+}
+
+fn read_record(row: SqliteRow) -> StoreResult<AuditRecord> {
+    Ok(AuditRecord {
+        sequence: row.try_get("sequence")?,
+        event: rows::json(&row, "event")?,
+        hash: row.try_get("hash")?,
+    })
+}
+
+fn read_anchor(row: SqliteRow) -> StoreResult<Anchor> {
+    Ok(Anchor {
+        sequence: row.try_get("sequence")?,
+        hash: row.try_get("hash")?,
+    })
+}
+
+fn signed(value: u64) -> i64 {
+    i64::try_from(value).unwrap_or(i64::MAX)
+}
+
+fn unsigned(value: i64) -> u64 {
+    u64::try_from(value).unwrap_or(0)
+}
