@@ -3,6 +3,8 @@
 #
 # The check positive_data_acceptance is off. The service correctly rejects some requests that satisfy the
 # schema: random bytes are rarely a volume, and erased resources answer 410.
+# Authentication is on: every request carries a key of the scope `admin`, and the check ignored_auth
+# sends requests without it and with wrong ones.
 # One worker: CPython 3.11 sometimes fails when two threads parse at once ("AST constructor recursion
 # depth mismatch").
 #
@@ -14,7 +16,10 @@ data=$(mktemp -d)
 # Naming a test gives the libraries the same features as `cargo test` does. Without it cargo would
 # compile them and the program a second time.
 cargo build --quiet --bins --test layering
-target/debug/ventriform serve --listen 127.0.0.1:0 --data-dir "$data" >"$data/log" 2>&1 &
+# The service asks for credentials as soon as there is a key; schemathesis checks that it does.
+key=$(target/debug/ventriform keys create --name schemathesis --scope admin \
+  --requests-per-minute 1000000 --data-dir "$data" 2>/dev/null)
+target/debug/ventriform serve --auth-failure-limit 1000000 --listen 127.0.0.1:0 --data-dir "$data" >"$data/log" 2>&1 &
 service=$!
 trap 'kill $service 2>/dev/null; wait $service 2>/dev/null; rm -rf "$data"' EXIT
 for _ in $(seq 100); do
@@ -23,7 +28,8 @@ for _ in $(seq 100); do
   sleep 0.1
 done
 [ -n "$url" ] || { cat "$data/log"; exit 1; }
-"$(dirname "$python")/schemathesis" run "$url/openapi.json" --max-examples "${EXAMPLES:-15}" \
+"$(dirname "$python")/schemathesis" run "$url/openapi.json" \
+  --header "Authorization: Bearer $key" --max-examples "${EXAMPLES:-15}" \
   --workers 1 --seed 1 --suppress-health-check all \
   --exclude-checks positive_data_acceptance --no-color
 kill -0 "$service"

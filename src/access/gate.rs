@@ -1,6 +1,8 @@
 //! From the `Authorization` of a request to a caller.
 
-use super::{AccessStore, ApiKey, Issuer, IssuerError, KeyState, PresentedKey, Quota, Scope};
+use super::{
+    AccessStore, ApiKey, Identity, Issuer, IssuerError, KeyState, PresentedKey, Quota, Scope,
+};
 use crate::jobs::{Clock, StoreError, Tenant};
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,23 +18,6 @@ const MOST_KEPT: usize = 1024;
 
 /// Longest credentials, bytes. Tokens with many groups have a few thousand.
 const LONGEST: usize = 16 * 1024;
-
-/// Who sends a request.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Identity {
-    /// Whose items and jobs it sees.
-    pub tenant: Tenant,
-    /// The name of its key, the subject of its token, or `anonymous`.
-    pub name: String,
-    /// What it may do.
-    pub scope: Scope,
-    /// Id of its key.
-    pub key: Option<String>,
-    /// Limits that replace the general ones.
-    pub quota: Quota,
-    /// Tells callers apart where requests are counted; `None` for the anonymous caller.
-    pub account: Option<String>,
-}
 
 /// Why a request was not admitted.
 #[derive(Debug, thiserror::Error)]

@@ -19,12 +19,13 @@
 //! | where | what |
 //! |---|---|
 //! | `scope`, `key`, `quota` | what callers may do; keys; limits |
-//! | `gate`, `oidc` | from `Authorization` to a caller; tokens of an issuer |
+//! | `gate`, `oidc`, `identity` | from `Authorization` to a caller; tokens of an issuer |
 //! | `audit` | events, the chain, its check, its writer |
 //! | `storage` | the trait that a database implements |
 
 mod audit;
 mod gate;
+mod identity;
 mod key;
 mod oidc;
 mod quota;
@@ -35,7 +36,8 @@ pub use audit::{
     Activity, Anchor, AuditEvent, AuditFilter, AuditLink, AuditRecord, AuditReport, BrokenLink,
     NO_HASH, NotRecorded, Outcome, Recorder, chain_hash, fhir, verify,
 };
-pub use gate::{FRESH_FOR, Gate, Identity, Refusal};
+pub use gate::{FRESH_FOR, Gate, Refusal};
+pub use identity::Identity;
 pub use key::{ApiKey, KeyError, KeyRequest, KeyState, PresentedKey};
 pub use oidc::{Issuer, IssuerError, IssuerSettings};
 pub use quota::{Allowance, Quota, RequestCounter, Usage, WINDOW};

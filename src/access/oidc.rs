@@ -388,6 +388,43 @@ mod tests {
         assert!(TokenKey::read(&shared).is_none());
     }
 
+    /// Appendix A.2 of RFC 7515: a token of 2011, signed with RS256.
+    #[tokio::test]
+    async fn signatures_of_rsa_keys_are_checked() {
+        let jwk = json!({"kty": "RSA", "e": "AQAB", "n": concat!(
+            "ofgWCuLjybRlzo0tZWJjNiuSfb4p4fAkd_wWJcyQoTbji9k0l8W26mPddxHmfHQp-Vaw-4qPCJrcS2mJPMEzP1Pt",
+            "0Bm4d4QlL-yRT-SFd2lZS-pCgNMsD1W_YpRPEwOWvG6b32690r2jZ47soMZo9wGzjb_7OMg0LOL-bSf63kpaSHSX",
+            "ndS5z5rexMdbBYUsLA9e-KXBdQOS-UTo7WTBEMa2R2CapHg665xsmtdVMTBQY4uDZlxvb3qCo5ZwKh9kG4LT6_I5",
+            "IhlJH7aGhyxXFvUK-DWNmoudF8NAco9_h9iaGNj8q2ethFkMLs91kzk2PAcDTW9gb54h4FRWyuXpoQ")});
+        let token = concat!(
+            "eyJhbGciOiJSUzI1NiJ9.eyJpc3MiOiJqb2UiLA0KICJleHAiOjEzMDA4MTkzODAsDQogImh0dHA6Ly9leGFtcGxlL",
+            "mNvbS9pc19yb290Ijp0cnVlfQ.cC4hiUPoj9Eetdgtv3hF80EGrhuB__dzERat0XF9g2VtQgr9PJbu3XOiZj5RZmh7",
+            "AAuHIm4Bh-0Qc_lF5YKt_O8W2Fp5jujGbds9uJdbF9CUAr7t1dnZcAcQjbKBYNX4BAynRFdiuB--f_nZLgrnbyTyWz",
+            "O75vRK5h6xBArLIARNPvkSjtQBMHlb1L07Qe7K0GarZRmB_eSN9383LcOLn6_dO--xi12jzDwusC-eOkHWEsqtFZES",
+            "c6BfI7noOPqvhJ1phCnvWh6IeYI2w9QOYEUipUTI8np6LbgGY9Fs98rqVt5AXLIhWkWywlVmtVrBp0igcN_IoypGlU",
+            "PQGe77Rw"
+        );
+        let _ = rustls::crypto::ring::default_provider().install_default();
+        let issuer = Issuer::new(IssuerSettings {
+            issuer: "https://joe.example".into(),
+            audience: "ventriform".into(),
+            jwks: None,
+            tenant_claim: None,
+            scope_claim: "scope".into(),
+            leeway: Duration::ZERO,
+        })
+        .unwrap();
+        *issuer.keys.write().unwrap() = Some(Keys {
+            keys: Arc::new(vec![TokenKey::read(&jwk).unwrap()]),
+            read: Instant::now(),
+        });
+        let lacks = refused("it lacks one of exp, iss, aud and sub");
+        assert_eq!(issuer.subject(token).await, Err(lacks));
+        let forged = token.replace("cC4hiU", "cC4hiV");
+        let wrong = refused("its signature is wrong");
+        assert_eq!(issuer.subject(&forged).await, Err(wrong));
+    }
+
     #[test]
     fn issuers_are_reached_by_https_or_on_this_machine() {
         for good in [

@@ -32,6 +32,9 @@ pub trait AccessStore: Send + Sync + 'static {
     /// What a tenant uses.
     async fn usage(&self, tenant: &Tenant) -> StoreResult<Usage>;
 
+    /// Whether a job of this tenant was filed under this idempotency key.
+    async fn is_filed(&self, tenant: &Tenant, key: &str) -> StoreResult<bool>;
+
     /// Appends events to the trail, in their order.
     async fn append(&self, events: &[AuditEvent]) -> StoreResult<()>;
 

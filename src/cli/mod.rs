@@ -1,10 +1,12 @@
 //! The `ventriform` command: arguments in, exit status out.
 
+mod audit;
 mod bar;
 mod cohort_args;
 mod demo;
 mod evaluate;
 mod generate;
+mod keys;
 mod library;
 mod measure;
 mod output;
@@ -45,6 +47,8 @@ enum Command {
     Templates(templates::TemplatesArgs),
     Statistics(statistics::StatisticsArgs),
     Serve(Box<serve::ServeArgs>),
+    Keys(keys::KeysArgs),
+    Audit(audit::AuditArgs),
     Phantom(phantom::PhantomArgs),
     Healthcheck(Box<serve::HealthcheckArgs>),
     /// Print a completion script for a shell
@@ -66,6 +70,8 @@ pub fn main() -> ExitCode {
         Command::Statistics(args) => statistics::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::run(&args),
+        Command::Keys(args) => keys::run(&args),
+        Command::Audit(args) => audit::run(&args),
         Command::Phantom(args) => phantom::run(&args),
         Command::Healthcheck(args) => serve::check_health(&args),
         Command::Completions { shell } => {

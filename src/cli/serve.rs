@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::io::IsTerminal;
 use std::net::{SocketAddr, TcpListener};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tokio::runtime::Runtime;
 use tracing_subscriber::EnvFilter;
@@ -127,6 +127,18 @@ fn engine(settings: &Settings) -> Engine {
         voxels: settings.voxel_limit,
         unpacked_bytes: settings.decompressed_limit.0,
     })
+}
+
+/// The data folder of a command beside the service: the given one, or that of the settings.
+///
+/// # Errors
+/// If a setting is invalid.
+pub fn data_dir(given: Option<&PathBuf>) -> Result<PathBuf> {
+    let flags = Flags {
+        data_dir: given.cloned(),
+        ..Flags::default()
+    };
+    Ok(Settings::load(&flags, variable)?.0.data_dir)
 }
 
 fn variable(name: &str) -> Option<String> {

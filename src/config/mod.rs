@@ -11,7 +11,8 @@
 mod units;
 
 pub use units::{
-    Auto, Count, Keyword, LogFormat, Networks, Off, OptionalPath, OrKeyword, Retention, Size, Span,
+    Auto, Count, Keyword, Limit, LogFormat, Networks, NoLimit, Off, OptionalPath, OrKeyword,
+    Retention, Size, Span, Words,
 };
 
 use std::collections::BTreeMap;
@@ -134,6 +135,14 @@ fn row(setting: &str) -> &'static SettingRow {
         .expect("every setting has a row")
 }
 
+/// Switches need no value on the command line: `--allow-anonymous`.
+fn arity(kind: &str) -> clap::builder::ValueRange {
+    match kind {
+        "bool" => (0..=1).into(),
+        _ => 1.into(),
+    }
+}
+
 /// Generates the struct of settings, the flags and the resolver from one table. A heading in
 /// brackets begins a group.
 macro_rules! settings {
@@ -153,7 +162,8 @@ macro_rules! settings {
             pub config: Option<PathBuf>,
             $($(
                 $(#[doc = $doc])+
-                #[arg(long, value_name = "VALUE", help_heading = $group, help = row(stringify!($name)).help())]
+                #[arg(long, value_name = "VALUE", num_args = arity(stringify!($kind)),
+                    default_missing_value = "true", help_heading = $group, help = row(stringify!($name)).help())]
                 pub $name: Option<$kind>,
             )+)+
         }
@@ -268,6 +278,44 @@ settings! {
     tls_key: OptionalPath = "off";
     /// PEM file with the authorities whose client certificates are required; `off` requires none
     tls_client_ca: OptionalPath = "off";
+
+    ["Access"]
+    /// Serve callers without credentials also on addresses that are not loopback
+    allow_anonymous: bool = "false";
+    /// Serve /metrics to callers without credentials
+    open_metrics: bool = "false";
+    /// Names of this service that the Host header may have, separated by commas; `*` allows any.
+    /// Names of this machine are always answered on loopback, and any name elsewhere if this is
+    /// empty and callers need credentials
+    hosts: Words = "";
+    /// Sites whose pages may use the service, such as https://viewer.example, separated by commas;
+    /// `*` allows any
+    cors_origins: Words = "";
+    /// Requests per minute of each caller; a key can have a limit of its own; `off` is none
+    quota_requests: Limit<u64> = "60000";
+    /// Size of all volumes that one tenant stores; `off` is none
+    quota_bytes: Limit<Size> = "off";
+    /// Waiting jobs of one tenant; `off` is none but queue_limit
+    quota_jobs: Limit<u64> = "off";
+    /// Requests with wrong credentials per minute and client address that are answered with status
+    /// 401; more are answered with 429
+    auth_failure_limit: u64 = "60";
+    /// OpenID Connect issuer whose tokens are accepted (the value of their claim `iss`); empty
+    /// accepts none
+    oidc_issuer: String = "";
+    /// What the claim `aud` of a token must hold
+    oidc_audience: String = "ventriform";
+    /// Address of the issuer's JWKS; empty asks the issuer's discovery document
+    oidc_jwks: String = "";
+    /// Claim that names a caller's tenant; empty puts every caller into the tenant `default`
+    oidc_tenant_claim: String = "tenant";
+    /// Claim that holds a caller's scopes: the words read, submit or admin, also with `ventriform:`
+    /// before them
+    oidc_scope_claim: String = "scope";
+    /// How far the clocks of issuer and service may differ
+    oidc_leeway: Span = "60s";
+    /// Age at which rows of the audit trail are removed; `off` keeps them
+    audit_retention: Retention = "off";
 
     ["Shutdown and log"]
     /// After SIGTERM or Ctrl-C: time for running jobs to end before they return to the queue
@@ -440,7 +488,11 @@ shown_by_display!(
     String,
     usize,
     u32,
-    u64
+    u64,
+    bool,
+    Words,
+    Limit<u64>,
+    Limit<Size>
 );
 
 #[cfg(test)]
@@ -494,6 +546,19 @@ mod tests {
         let error = load(Flags::default(), &[("VENTRIFORM_LEASE", "soon")], None).unwrap_err();
         let text = error.to_string();
         assert!(text.contains("lease") && text.contains("soon") && text.contains("variable"));
+    }
+
+    #[test]
+    fn switches_need_no_value_on_the_command_line() {
+        use clap::{Args, FromArgMatches};
+        let given = |words: &[&str]| {
+            let command = Flags::augment_args(clap::Command::new("serve"));
+            let matches = command.get_matches_from([&["serve"], words].concat());
+            Flags::from_arg_matches(&matches).unwrap().allow_anonymous
+        };
+        assert_eq!(given(&["--allow-anonymous", "--workers", "1"]), Some(true));
+        assert_eq!(given(&["--allow-anonymous=false"]), Some(false));
+        assert_eq!(given(&[]), None);
     }
 
     #[test]

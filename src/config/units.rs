@@ -196,6 +196,49 @@ impl fmt::Display for OptionalPath {
     }
 }
 
+/// The keyword `off` of limits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NoLimit;
+
+impl Keyword for NoLimit {
+    const WORD: &'static str = "off";
+    const EXPECTED: &'static str = "a limit such as 1000, or 10GiB for sizes";
+}
+
+/// A limit, or `off`.
+pub type Limit<T> = OrKeyword<T, NoLimit>;
+
+/// Words, separated by commas or spaces; may be empty.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Words(Vec<String>);
+
+impl Words {
+    /// The words.
+    pub fn iter(&self) -> impl Iterator<Item = &str> {
+        self.0.iter().map(String::as_str)
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+impl FromStr for Words {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let words = text.split([',', ' ']).filter(|word| !word.is_empty());
+        Ok(Self(words.map(str::to_owned).collect()))
+    }
+}
+
+impl fmt::Display for Words {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0.join(", "))
+    }
+}
+
 /// Networks: addresses and ranges in CIDR notation, separated by commas; may be empty.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Networks(Vec<IpNet>);
@@ -265,6 +308,12 @@ mod tests {
         }
         for text in ["off", "/etc/tls/cert.pem"] {
             assert_eq!(text.parse::<OptionalPath>().unwrap().to_string(), text);
+        }
+        for text in ["", "heart.example, *"] {
+            assert_eq!(text.parse::<Words>().unwrap().to_string(), text);
+        }
+        for text in ["off", "10GiB"] {
+            assert_eq!(text.parse::<Limit<Size>>().unwrap().to_string(), text);
         }
         for text in ["", "10.0.0.0/8, 192.0.2.1/32, 2001:db8::/32"] {
             assert_eq!(text.parse::<Networks>().unwrap().to_string(), text);

@@ -1,8 +1,10 @@
 //! The state that all handlers share.
 
 use super::decoding::Decoding;
+use super::guard::state::Guard;
 use super::metrics::Metrics;
 use super::streams::EventStreams;
+use crate::access::AccessStore;
 use crate::config::Settings;
 use crate::jobs::Queue;
 use crate::work::Engine;
@@ -19,6 +21,10 @@ pub struct Shared {
     pub queue: Arc<Queue>,
     /// The kinds of work, and the reader of uploads.
     pub engine: Engine,
+    /// Keys and audit trail.
+    pub access: Arc<dyn AccessStore>,
+    /// Tells and limits callers.
+    pub guard: Guard,
     /// The operator's settings.
     pub settings: Settings,
     /// Cancelled when the service shuts down, so that long answers end.
@@ -36,12 +42,15 @@ impl App {
     pub fn new(
         queue: Arc<Queue>,
         engine: Engine,
+        (access, guard): (Arc<dyn AccessStore>, Guard),
         settings: Settings,
         closing: CancellationToken,
     ) -> Self {
         Self(Arc::new(Shared {
             queue,
             engine,
+            access,
+            guard,
             decoding: Decoding::new(&settings),
             streams: EventStreams::new(&settings),
             settings,

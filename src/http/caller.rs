@@ -1,13 +1,12 @@
-//! Who sent a request: a layer puts the [`Caller`] into every request, and handlers take it as an
-//! extractor.
+//! Who sent a request: the layer [`super::guard`] puts the [`Caller`] into every request, and
+//! handlers take it as an extractor.
 
 use super::problem::{Answer, Problem};
-use crate::access::Scope;
+use crate::access::{Identity, Scope};
 use crate::jobs::Tenant;
-use axum::extract::{FromRequestParts, Request};
+use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
-use axum::middleware::Next;
-use axum::response::Response;
+use axum::http::{StatusCode, header};
 
 /// Who sent the request.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -21,12 +20,40 @@ pub struct Caller {
 }
 
 impl Caller {
-    /// The caller of a service that asks nobody who they are.
-    pub fn anonymous() -> Self {
+    /// Refuses a caller that may not do what `needed` stands for.
+    ///
+    /// # Errors
+    /// 403 if its scope is narrower.
+    pub fn require(&self, needed: Scope) -> Answer<()> {
+        if self.scope.includes(needed) {
+            return Ok(());
+        }
+        Err(Problem::new(
+            StatusCode::FORBIDDEN,
+            "insufficient-scope",
+            format!(
+                "This needs the scope `{needed}`; the credentials of this request have `{}`.",
+                self.scope
+            ),
+        )
+        .fix(format!(
+            "Use a key made by `ventriform keys create --scope {needed}`."
+        ))
+        .header(
+            header::WWW_AUTHENTICATE,
+            format!(
+                "Bearer realm=\"ventriform\", error=\"insufficient_scope\", scope=\"{needed}\""
+            ),
+        ))
+    }
+}
+
+impl From<&Identity> for Caller {
+    fn from(identity: &Identity) -> Self {
         Self {
-            tenant: Tenant::default(),
-            name: "anonymous".into(),
-            scope: Scope::Admin,
+            tenant: identity.tenant.clone(),
+            name: identity.name.clone(),
+            scope: identity.scope,
         }
     }
 }
@@ -38,10 +65,4 @@ impl<S: Send + Sync> FromRequestParts<S> for Caller {
         let caller = parts.extensions.get::<Self>().cloned();
         caller.ok_or_else(|| Problem::internal("this route does not know its callers"))
     }
-}
-
-/// Puts the caller into the request.
-pub async fn identify(mut request: Request, next: Next) -> Response {
-    request.extensions_mut().insert(Caller::anonymous());
-    next.run(request).await
 }

@@ -9,7 +9,7 @@
 //! | the paths, the layers around them | [`router`] |
 //! | uploads, jobs, results | [`volumes`], [`jobs`], [`models`], [`segmentations`], [`templates`] |
 //! | what several of them share | [`collection`] (list, show, erase), [`products`] (meshes, reports, files), [`files`] (ranges, validators) |
-//! | who sent a request | [`caller`] |
+//! | who may do what, and the record of it | [`guard`] (before every handler), [`caller`], [`keys`], [`audit`] |
 //! | errors and their wording | [`problem`]; 404 and 410 in [`problem::not_found`] |
 //! | limits on bodies, connections and decoding | [`limits`], [`connections`], [`decoding`] |
 //! | the address that sent a request | [`client`] |
@@ -22,10 +22,11 @@
 //! and `fix` where they apply; every body and list has a limit; uploads are streamed to the disk
 //! and never held in memory. The published document is derived from the handlers.
 //!
-//! Not guaranteed: authentication. The service has none, so it belongs on a loopback address or
-//! behind a proxy that has.
+//! Not guaranteed: that a service is closed. On a loopback address without keys, and with the
+//! setting `allow_anonymous`, it admits everybody; see `docs/security.md`.
 
 mod app;
+mod audit;
 pub mod caller;
 mod client;
 mod collection;
@@ -35,9 +36,11 @@ mod decoding;
 mod document;
 mod files;
 mod front_page;
+mod guard;
 mod health;
 mod idempotency;
 mod jobs;
+mod keys;
 mod limits;
 mod metrics;
 mod models;

@@ -2,6 +2,7 @@
 
 use super::app::App;
 use super::document::PublishedDocument;
+use super::guard::{self, hosts, pages};
 use super::limits::BodyLimits;
 use super::models::Models;
 use super::observe::{self, REQUEST_ID};
@@ -12,20 +13,19 @@ use super::segmentations::Segmentations;
 use super::templates::{MESH_SIZE, Templates};
 use super::volumes::Volumes;
 use super::{
-    caller, collection, front_page, health, idempotency, jobs, models, products, segmentations,
-    templates, volumes,
+    audit, collection, front_page, health, idempotency, jobs, keys, models, products,
+    segmentations, templates, volumes,
 };
 use crate::config::Settings;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
-use axum::http::{HeaderMap, HeaderValue, header};
+use axum::http::{HeaderMap, header};
 use axum::middleware;
 use axum::routing::get;
 use tower::ServiceBuilder;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::request_id::{PropagateRequestIdLayer, SetRequestIdLayer};
 use tower_http::sensitive_headers::SetSensitiveRequestHeadersLayer;
-use tower_http::set_header::SetResponseHeaderLayer;
 use tower_http::trace::TraceLayer;
 use utoipa::OpenApi;
 use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouter, UtoipaMethodRouterExt};
@@ -47,7 +47,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         products::routes::<Segmentations>(),
         products::routes::<Templates>(),
     ];
-    let of_one_kind: [UtoipaMethodRouter<App>; 12] = [
+    let of_one_kind: [UtoipaMethodRouter<App>; 15] = [
         routes!(volumes::create_volume).layer(upload()),
         routes!(volumes::preview_volume),
         routes!(models::create_model).layer(upload()),
@@ -57,6 +57,9 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(jobs::list_jobs),
         routes!(jobs::get_job, jobs::delete_job),
         routes!(jobs::events::follow_job),
+        routes!(keys::create_key, keys::list_keys).layer(json(settings.json_limit)),
+        routes!(keys::revoke_key),
+        routes!(audit::list_audit_events),
         routes!(health::alive),
         routes!(health::ready),
         routes!(health::metrics),
@@ -97,14 +100,18 @@ pub fn router(app: App) -> Router {
                 .on_failure(()),
         )
         .layer(CatchPanicLayer::custom(from_panic))
-        .layer(middleware::from_fn(caller::identify))
-        .layer(SetResponseHeaderLayer::if_not_present(
-            header::X_CONTENT_TYPE_OPTIONS,
-            HeaderValue::from_static("nosniff"),
+        .layer(middleware::from_fn_with_state(
+            app.settings.tls_cert.0.is_some(),
+            pages::protect,
+        ))
+        .layer(middleware::from_fn_with_state(
+            app.guard.hosts.clone(),
+            hosts::check_host,
         ))
         // The routes that take a body have limits of their own.
         .layer(DefaultBodyLimit::disable());
-    api.route("/", get(front_page::welcome))
+    let api = api
+        .route("/", get(front_page::welcome))
         .route(
             "/openapi.json",
             get(move |headers: HeaderMap| async move { document.answer(&headers) }),
@@ -112,6 +119,11 @@ pub fn router(app: App) -> Router {
         .merge(SwaggerUi::new("/docs").config(utoipa_swagger_ui::Config::from("/openapi.json")))
         .fallback(no_such_path)
         .method_not_allowed_fallback(method_not_allowed)
-        .layer(layers)
-        .with_state(app)
+        .layer(middleware::from_fn_with_state(app.clone(), guard::guard));
+    // Browsers send preflights without credentials, so this stands before the guard.
+    let api = match pages::cors(&app.settings) {
+        Some(cors) => api.layer(cors),
+        None => api,
+    };
+    api.layer(layers).with_state(app)
 }

@@ -4,10 +4,13 @@ use super::app::App;
 use super::connections::tls::{Tls, TlsError};
 use super::connections::{self, ConnectionLimits};
 use super::cryptography::install_cryptography;
+use super::guard::hosts::HostPolicy;
+use super::guard::state::Guard;
 use super::router::router;
+use crate::access::{AccessStore, Gate, Issuer, IssuerError, IssuerSettings, Recorder, Scope};
 use crate::config::Settings;
 use crate::jobs::{
-    Queue, QueueSettings, StoreError, SystemClock, Upkeep, WorkerSettings, Workers,
+    Clock, Queue, QueueSettings, StoreError, SystemClock, Upkeep, WorkerSettings, Workers,
     recover_after_crash,
 };
 use crate::store::{OpenError, Store};
@@ -32,6 +35,16 @@ pub enum ServeError {
     /// The database in the data folder cannot be used.
     #[error(transparent)]
     Rows(#[from] StoreError),
+    /// Callers without credentials would be served on an address that others can reach.
+    #[error(
+        "{0} can be reached from other machines, but there is no API key and no OpenID Connect \
+         issuer. Make a key by `ventriform keys create --name NAME --scope submit --data-dir DIR`, \
+         or set `oidc_issuer`, or serve everybody by `--allow-anonymous`"
+    )]
+    Open(SocketAddr),
+    /// The settings of the OpenID Connect issuer cannot be used.
+    #[error("the OpenID Connect issuer: {0}")]
+    Issuer(#[from] IssuerError),
     /// TLS cannot be used as the settings ask for it.
     #[error(transparent)]
     Tls(#[from] TlsError),
@@ -43,6 +56,7 @@ pub enum ServeError {
 /// A running service.
 pub struct Running {
     address: SocketAddr,
+    app: App,
     queue: Arc<Queue>,
     server: JoinHandle<()>,
     workers: Workers,
@@ -93,14 +107,16 @@ pub async fn start(
     ));
     recover_after_crash(&queue, workers.attempt_limit).await?;
     let closing = CancellationToken::new();
+    listener.set_nonblocking(true)?;
+    let address = listener.local_addr()?;
+    let guard = guard(&settings, store.rows.clone(), address).await?;
     let app = App::new(
         queue.clone(),
         engine.clone(),
+        (store.rows.clone(), guard),
         settings.clone(),
         closing.clone(),
     );
-    listener.set_nonblocking(true)?;
-    let address = listener.local_addr()?;
     let limits = ConnectionLimits {
         connections: settings.connection_limit,
         of_one_client: settings.client_connection_limit,
@@ -113,7 +129,7 @@ pub async fn start(
     if let Some(tls) = &tls {
         tokio::spawn(tls.clone().follow_changes(closing.clone()));
     }
-    let server = connections::serve(listener, router(app), tls, limits, closing.clone());
+    let server = connections::serve(listener, router(app.clone()), tls, limits, closing.clone());
     let server = tokio::spawn(server);
     let upkeep = Upkeep {
         queue: queue.clone(),
@@ -122,10 +138,14 @@ pub async fn start(
         every: UPKEEP_EVERY,
     };
     tokio::spawn(upkeep.run(closing.clone()));
+    if let Some(age) = settings.audit_retention.0 {
+        tokio::spawn(prune_audit(store.rows.clone(), age.0, closing.clone()));
+    }
     let workers = Workers::start(&queue, &engine.works, workers)?;
     tracing::info!(%address, "listening");
     Ok(Running {
         address,
+        app,
         queue,
         server,
         workers,
@@ -154,8 +174,74 @@ impl Running {
         tracing::info!("shutting down");
         self.closing.cancel();
         let (server, ()) = tokio::join!(self.server, self.workers.stop(self.grace));
+        self.app.guard.recorder.flush().await;
         server.map_err(io::Error::other)?;
         Ok(())
+    }
+}
+
+/// How often old rows of the audit trail are removed.
+const PRUNE_EVERY: Duration = Duration::from_secs(3600);
+
+/// Tells callers as the settings say.
+///
+/// # Errors
+/// If the service could be used by strangers and the settings do not say that it shall.
+async fn guard(
+    settings: &Settings,
+    store: Arc<dyn AccessStore>,
+    address: SocketAddr,
+) -> Result<Guard, ServeError> {
+    let clock = Arc::new(SystemClock);
+    let loopback = address.ip().to_canonical().is_loopback();
+    let text = |text: &String| Some(text.clone()).filter(|text| !text.is_empty());
+    let issuer = text(&settings.oidc_issuer).map(|issuer| {
+        Issuer::new(IssuerSettings {
+            issuer,
+            audience: settings.oidc_audience.clone(),
+            jwks: text(&settings.oidc_jwks),
+            tenant_claim: text(&settings.oidc_tenant_claim),
+            scope_claim: settings.oidc_scope_claim.clone(),
+            leeway: settings.oidc_leeway.0,
+        })
+    });
+    // Whoever can reach a loopback address can usually read the data folder too.
+    let anonymous = match loopback {
+        true => Scope::Admin,
+        false => Scope::Submit,
+    };
+    let recorder = Recorder::start(store.clone(), clock.clone());
+    let gate = Gate::new(
+        store,
+        clock,
+        issuer.transpose()?,
+        anonymous,
+        settings.allow_anonymous,
+    );
+    let open = gate.is_open().await?;
+    if open && !loopback && !settings.allow_anonymous {
+        return Err(ServeError::Open(address));
+    }
+    if open && !loopback {
+        tracing::warn!(%address, "callers without credentials are served (allow_anonymous)");
+    }
+    let hosts = HostPolicy {
+        names: settings.hosts.clone(),
+        origins: settings.cors_origins.clone(),
+        loopback,
+        open,
+    };
+    Ok(Guard::new(gate, recorder, hosts, settings, !loopback))
+}
+
+async fn prune_audit(store: Arc<dyn AccessStore>, age: Duration, end: CancellationToken) {
+    let mut round = tokio::time::interval(PRUNE_EVERY);
+    let age = i64::try_from(age.as_millis()).unwrap_or(i64::MAX);
+    while end.run_until_cancelled(round.tick()).await.is_some() {
+        let now = SystemClock.now();
+        if let Err(error) = store.prune(now.saturating_sub(age), now).await {
+            tracing::error!(%error, "old rows of the audit trail could not be removed");
+        }
     }
 }
 

@@ -79,6 +79,47 @@ impl Store {
     }
 }
 
+/// The database of a data folder, for commands beside a service that may be running on it. Creates
+/// folder and database if they are missing.
+///
+/// # Errors
+/// If the folder cannot be used, or a service of another version runs on it.
+pub async fn open_rows(folder: &Path) -> Result<Arc<SqliteStore>, OpenError> {
+    match Store::open(folder).await {
+        Ok(store) => Ok(store.rows),
+        Err(OpenError::InUse(_)) => {
+            let database = folder.join("ventriform.db");
+            let unusable = |reason: String| OpenError::Unusable {
+                path: database.clone(),
+                reason,
+            };
+            if !is_migrated(&database)
+                .await
+                .map_err(|e| unusable(e.to_string()))?
+            {
+                return Err(unusable(
+                    "the service that runs on it has another version than this command".into(),
+                ));
+            }
+            let rows = SqliteStore::open(&database).await;
+            rows.map(Arc::new).map_err(|e| unusable(e.to_string()))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// Whether the tables have the version of this program. A service must not find them changed.
+async fn is_migrated(database: &Path) -> Result<bool, sqlx::Error> {
+    use sqlx::{ConnectOptions, Connection};
+    let options = sqlx::sqlite::SqliteConnectOptions::new().filename(database);
+    let mut connection = options.read_only(true).connect().await?;
+    let done: i64 = sqlx::query_scalar("SELECT count(*) FROM _sqlx_migrations WHERE success")
+        .fetch_one(&mut connection)
+        .await?;
+    connection.close().await?;
+    Ok(usize::try_from(done) == Ok(sqlx::migrate!("src/store/migrations").iter().count()))
+}
+
 fn hold(folder: &Path) -> Result<File, OpenError> {
     let path = folder.join("lock");
     let unusable = |reason: String| OpenError::Unusable {

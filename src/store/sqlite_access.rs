@@ -86,17 +86,27 @@ impl AccessStore for SqliteStore {
         Ok(done.rows_affected() > 0 || self.key(id).await?.is_some())
     }
 
-    async fn usage(&self, _tenant: &Tenant) -> StoreResult<Usage> {
+    async fn usage(&self, tenant: &Tenant) -> StoreResult<Usage> {
         let row = sqlx::query(
-            "SELECT (SELECT coalesce(sum(bytes), 0) FROM volumes),
-                    (SELECT count(*) FROM jobs WHERE state = 'queued')",
+            "SELECT (SELECT coalesce(sum(bytes), 0) FROM volumes WHERE id IN
+                        (SELECT id FROM holdings WHERE tenant = ?1 AND kind = 'volume')),
+                    (SELECT count(*) FROM jobs WHERE tenant = ?1 AND state = 'queued')",
         )
+        .bind(tenant.as_str())
         .fetch_one(&self.readers)
         .await?;
         Ok(Usage {
             bytes: unsigned(row.try_get(0)?),
             jobs: unsigned(row.try_get(1)?),
         })
+    }
+
+    async fn is_filed(&self, tenant: &Tenant, key: &str) -> StoreResult<bool> {
+        let row = sqlx::query("SELECT EXISTS (SELECT 1 FROM jobs WHERE idempotency_key = ?)")
+            .bind(format!("{tenant}/{key}"))
+            .fetch_one(&self.readers)
+            .await?;
+        Ok(row.try_get(0)?)
     }
 
     async fn append(&self, events: &[AuditEvent]) -> StoreResult<()> {

@@ -22,6 +22,7 @@ mod jobs;
 mod models;
 mod openapi;
 mod operations;
+mod security;
 mod segmentations;
 mod shutdown;
 mod tenants;

@@ -162,6 +162,7 @@ const USES: &[(&str, &[&str])] = &[
             "segmentation",
             "evaluate",
             "jobs",
+            "access",
             "store",
             "work",
             "config",

@@ -1,6 +1,6 @@
 //! The chain of hashes, and its check.
 
-use super::event::{Activity, AuditEvent};
+use super::event::{Activity, Anchor, AuditEvent};
 use crate::access::AccessStore;
 use crate::jobs::{StoreResult, hex};
 use sha2::{Digest, Sha256};
@@ -10,33 +10,6 @@ pub const NO_HASH: &str = "00000000000000000000000000000000000000000000000000000
 
 /// Rows that the check reads at a time.
 const BATCH: u32 = 1000;
-
-/// A row as the check sees it: the stored text, not its meaning.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct AuditLink {
-    /// Its position.
-    pub sequence: i64,
-    /// The stored JSON.
-    pub event: String,
-    /// The stored hash.
-    pub hash: String,
-}
-
-/// The last row that was removed because of its age.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Anchor {
-    /// Its position.
-    pub sequence: i64,
-    /// Its hash, which the next row's hash covers.
-    pub hash: String,
-}
-
-impl Anchor {
-    /// How the event that records a removal names the last row that was removed.
-    pub fn name(&self) -> String {
-        format!("{}:{}", self.sequence, self.hash)
-    }
-}
 
 /// SHA-256 of the hash before it, the position and the text of a row, in hexadecimal digits.
 pub fn chain_hash(previous: &str, sequence: i64, event: &str) -> String {

@@ -1,4 +1,4 @@
-//! One event of the audit trail.
+//! One event of the audit trail, and the rows that hold events.
 
 use crate::jobs::{Tenant, Timestamp};
 use serde::{Deserialize, Serialize};
@@ -123,4 +123,31 @@ pub struct AuditFilter {
     pub since: Option<Timestamp>,
     /// Rows recorded before this time.
     pub until: Option<Timestamp>,
+}
+
+/// A row as the check sees it: the stored text, not its meaning.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AuditLink {
+    /// Its position.
+    pub sequence: i64,
+    /// The stored JSON.
+    pub event: String,
+    /// The stored hash.
+    pub hash: String,
+}
+
+/// The last row that was removed because of its age.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Anchor {
+    /// Its position.
+    pub sequence: i64,
+    /// Its hash, which the next row's hash covers.
+    pub hash: String,
+}
+
+impl Anchor {
+    /// How the event that records a removal names the last row that was removed.
+    pub fn name(&self) -> String {
+        format!("{}:{}", self.sequence, self.hash)
+    }
 }

@@ -13,7 +13,7 @@ mod event;
 mod fhir;
 mod recorder;
 
-pub use chain::{Anchor, AuditLink, AuditReport, BrokenLink, NO_HASH, chain_hash, verify};
-pub use event::{Activity, AuditEvent, AuditFilter, AuditRecord, Outcome};
+pub use chain::{AuditReport, BrokenLink, NO_HASH, chain_hash, verify};
+pub use event::{Activity, Anchor, AuditEvent, AuditFilter, AuditLink, AuditRecord, Outcome};
 pub use fhir::fhir;
 pub use recorder::{NotRecorded, Recorder};

@@ -13,7 +13,8 @@ const JOB: &str = "Job";
 
 type Responses = BTreeMap<String, RefOr<Response>>;
 
-fn problem(status: u16, description: &str) -> (String, RefOr<Response>) {
+/// A problem object with this status.
+pub fn problem(status: u16, description: &str) -> (String, RefOr<Response>) {
     let schema = Ref::from_schema_name(ProblemBody::name());
     let response = ResponseBuilder::new()
         .description(description)

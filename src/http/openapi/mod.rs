@@ -7,10 +7,12 @@
 //! | [`inputs`] | parameters: those of a model and a fit come from the tables of [`crate::parameters`], so a new one needs no change here |
 //! | [`bodies`] | request bodies that handlers read piece by piece |
 //! | [`answers`] | answers and problems that several handlers share |
+//! | [`access`] | credentials, and how requests are refused before any handler |
 //! | [`operation`] | operations of handlers that serve several kinds of things |
 //!
 //! [`publish`] completes the document that the routes have collected.
 
+mod access;
 mod answers;
 mod bodies;
 mod inputs;
@@ -49,6 +51,7 @@ use utoipa::openapi::{RefOr, Required};
         (name = "models", description = "Surface models, and one request from volume to model"),
         (name = "segmentations", description = "Models fitted to volumes, and one request from volume to segmentation"),
         (name = "templates", description = "The library of models that `auto` chooses from"),
+        (name = "access", description = "Keys and the audit trail, for the scope `admin`"),
         (name = "operations", description = "For operators"),
     ),
     components(schemas(super::problem::ProblemBody))
@@ -63,5 +66,6 @@ pub fn publish(mut collected: utoipa::openapi::OpenApi) -> utoipa::openapi::Open
         // `model` may name the mesh instead. An optional type would allow the body `null`.
         body.required = Some(Required::False);
     }
+    access::add_access(&mut collected);
     collected
 }

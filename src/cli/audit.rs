@@ -1,0 +1,85 @@
+//! `ventriform audit`: checks the audit trail of a data folder, also while the service runs on it.
+
+use crate::access::{AccessStore, AuditFilter, fhir, verify};
+use crate::jobs::ListRequest;
+use crate::store::open_rows;
+use anyhow::{Result, bail};
+use clap::{Args, Subcommand};
+use std::path::PathBuf;
+use tokio::runtime::Runtime;
+
+/// Check or print the audit trail, also while the service runs
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  ventriform audit verify --data-dir data
+  ventriform audit print --data-dir data > audit.ndjson
+
+`verify` prints the newest hash. Keep it in another place: a trail that was written anew as a
+whole has other hashes.")]
+pub struct AuditArgs {
+    #[command(subcommand)]
+    command: AuditCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum AuditCommand {
+    /// Walk the chain of hashes and name the first break; fails if there is one
+    Verify(TrailArgs),
+    /// Print all events, newest first, one FHIR AuditEvent per line
+    Print(TrailArgs),
+}
+
+#[derive(Debug, Args)]
+struct TrailArgs {
+    /// Data folder of the service [env: VENTRIFORM_DATA_DIR] [default: ventriform-data]
+    #[arg(long, value_name = "DIR")]
+    data_dir: Option<PathBuf>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// If the chain is broken, or the data folder cannot be used.
+pub fn run(args: &AuditArgs) -> Result<()> {
+    Runtime::new()?.block_on(async {
+        match &args.command {
+            AuditCommand::Verify(args) => check(args).await,
+            AuditCommand::Print(args) => print(args).await,
+        }
+    })
+}
+
+async fn check(args: &TrailArgs) -> Result<()> {
+    let store = open_rows(&super::serve::data_dir(args.data_dir.as_ref())?).await?;
+    let report = verify(&*store).await?;
+    if let Some(broken) = report.broken {
+        bail!(
+            "the audit trail is broken: {broken} ({} rows before it are in order)",
+            report.rows
+        );
+    }
+    println!(
+        "{} rows are in order; the newest is {} with the hash {}",
+        report.rows, report.newest, report.head
+    );
+    Ok(())
+}
+
+async fn print(args: &TrailArgs) -> Result<()> {
+    let store = open_rows(&super::serve::data_dir(args.data_dir.as_ref())?).await?;
+    let mut before = None;
+    loop {
+        let page = ListRequest {
+            before,
+            limit: 1000,
+        };
+        let page = store.audit(&AuditFilter::default(), page).await?;
+        for record in &page.items {
+            println!("{}", fhir(record));
+        }
+        before = page.next;
+        if before.is_none() {
+            return Ok(());
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! `ventriform keys`: makes, lists and revokes API keys in a data folder, also while the service
+//! runs on it.
+
+use crate::access::{AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Quota, Scope};
+use crate::config::{Size, Span};
+use crate::jobs::{Clock, ListRequest, SystemClock, Tenant, Timestamp, rfc3339};
+use crate::store::open_rows;
+use anyhow::{Result, bail};
+use clap::{Args, Subcommand};
+use std::path::PathBuf;
+use tokio::runtime::Runtime;
+
+/// Make, list and revoke API keys, also while the service runs
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  ventriform keys create --name scanner-2 --scope submit --data-dir data
+  ventriform keys create --name auditor --scope admin --tenant clinic-b --expires 90d
+  ventriform keys list --data-dir data
+  ventriform keys revoke 0123456789abcdef --data-dir data
+
+Once there is a key, the service answers only requests with `Authorization: Bearer KEY`.")]
+pub struct KeysArgs {
+    #[command(subcommand)]
+    command: KeysCommand,
+}
+
+#[derive(Debug, Subcommand)]
+enum KeysCommand {
+    /// Make a key and print it; it is shown only this once
+    Create(CreateArgs),
+    /// List all keys, newest first
+    List(DataArgs),
+    /// Revoke a key; a running service refuses it within a second
+    Revoke(RevokeArgs),
+}
+
+#[derive(Debug, Args)]
+struct DataArgs {
+    /// Data folder of the service [env: VENTRIFORM_DATA_DIR] [default: ventriform-data]
+    #[arg(long, value_name = "DIR")]
+    data_dir: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+struct CreateArgs {
+    /// What the key is for; shown in lists and in the audit trail
+    #[arg(long, value_name = "NAME")]
+    name: String,
+    /// What it allows: read, submit (also upload, file jobs, erase) or admin (also keys and audit)
+    #[arg(long, value_name = "SCOPE")]
+    scope: Scope,
+    /// Whose items and jobs it opens; tenants see nothing of each other
+    #[arg(long, value_name = "TENANT", default_value = "default")]
+    tenant: Tenant,
+    /// How long it is valid, such as 90d; for ever unless given
+    #[arg(long, value_name = "SPAN")]
+    expires: Option<Span>,
+    /// Requests per minute, instead of the setting quota_requests
+    #[arg(long, value_name = "NUMBER")]
+    requests_per_minute: Option<u64>,
+    /// Size of all volumes of the tenant, such as 10GiB, instead of the setting quota_bytes
+    #[arg(long, value_name = "SIZE")]
+    stored_bytes: Option<Size>,
+    /// Waiting jobs of the tenant, instead of the setting quota_jobs
+    #[arg(long, value_name = "NUMBER")]
+    queued_jobs: Option<u64>,
+    #[command(flatten)]
+    data: DataArgs,
+}
+
+#[derive(Debug, Args)]
+struct RevokeArgs {
+    /// The key's id, as `keys list` shows it
+    id: String,
+    #[command(flatten)]
+    data: DataArgs,
+}
+
+/// Who acts in the audit trail.
+const AGENT: &str = "command line";
+
+/// Runs the command.
+///
+/// # Errors
+/// If an argument or the data folder cannot be used.
+pub fn run(args: &KeysArgs) -> Result<()> {
+    Runtime::new()?.block_on(async {
+        match &args.command {
+            KeysCommand::Create(args) => create(args).await,
+            KeysCommand::List(args) => list(args).await,
+            KeysCommand::Revoke(args) => revoke(args).await,
+        }
+    })
+}
+
+async fn create(args: &CreateArgs) -> Result<()> {
+    let now = SystemClock.now();
+    let span = |span: Span| i64::try_from(span.0.as_millis()).unwrap_or(i64::MAX);
+    let request = KeyRequest {
+        name: args.name.clone(),
+        tenant: args.tenant.clone(),
+        scope: args.scope,
+        quota: Quota {
+            requests: args.requests_per_minute,
+            bytes: args.stored_bytes.map(|size| size.0),
+            jobs: args.queued_jobs,
+        },
+        expires_at: args.expires.map(|s| now.saturating_add(span(s))),
+    };
+    let (key, text) = ApiKey::make(request, now)?;
+    let store = open_rows(&folder(&args.data)?).await?;
+    let event = event(Activity::KeyCreated, &key, now);
+    store.add_key(&key, &event).await?;
+    eprintln!(
+        "key {} of tenant {} with scope {}; it is shown only this once",
+        key.id, key.tenant, key.scope
+    );
+    println!("{text}");
+    Ok(())
+}
+
+async fn list(args: &DataArgs) -> Result<()> {
+    let store = open_rows(&folder(args)?).await?;
+    let now = SystemClock.now();
+    let mut before = None;
+    println!("id\tstate\tscope\ttenant\tcreated\texpires\tname");
+    loop {
+        let page = store.keys(None, ListRequest { before, limit: 100 }).await?;
+        for key in &page.items {
+            println!(
+                "{}\t{}\t{}\t{}\t{}\t{}\t{}",
+                key.id,
+                key.state(now).as_str(),
+                key.scope,
+                key.tenant,
+                rfc3339(key.created_at),
+                key.expires_at.map_or_else(|| "never".to_owned(), rfc3339),
+                key.name,
+            );
+        }
+        before = page.next;
+        if before.is_none() {
+            return Ok(());
+        }
+    }
+}
+
+async fn revoke(args: &RevokeArgs) -> Result<()> {
+    let store = open_rows(&folder(&args.data)?).await?;
+    let Some(key) = store.key(&args.id).await? else {
+        bail!(
+            "there is no key {}; `ventriform keys list` shows all",
+            args.id
+        );
+    };
+    let now = SystemClock.now();
+    let event = event(Activity::KeyRevoked, &key, now);
+    store.revoke_key(&args.id, now, &event).await?;
+    println!("{} is revoked", args.id);
+    Ok(())
+}
+
+fn event(activity: Activity, key: &ApiKey, now: Timestamp) -> AuditEvent {
+    AuditEvent::new(now, activity, key.tenant.clone(), AGENT.into()).on(&key.id)
+}
+
+fn folder(args: &DataArgs) -> Result<PathBuf> {
+    super::serve::data_dir(args.data_dir.as_ref())
+}

@@ -1,0 +1,306 @@
+//! What stands before every handler: a request passes only with credentials that allow it.
+//!
+//! 1. [`hosts`]: the `Host` header must name this service (against DNS rebinding), and a page of
+//!    another site cannot change anything on a service that asks nobody who they are.
+//! 2. The `Authorization` header tells the caller, see [`crate::access::Gate`]; without a valid one the answer is
+//!    401. [`is_open_path`] names the paths that everybody may read.
+//! 3. The caller's requests are counted: 429 beyond the quota. Every answer carries `RateLimit` and
+//!    `RateLimit-Policy` (draft-ietf-httpapi-ratelimit-headers-10).
+//! 4. The scope must include what method and path need: 403 if not.
+//! 5. What the request may add is held against the tenant's quotas, see [`reserve`].
+//! 6. After the handler, [`trail`] writes what was done to the audit trail. An act that changed
+//!    something is answered when its event is on disk.
+//!
+//! `Authorization` decides alone; a caller's address or a forwarded header never does.
+
+pub mod hosts;
+pub mod pages;
+pub mod state;
+
+mod reservations;
+mod reserve;
+mod trail;
+
+pub use trail::{Agent, AlreadyRecorded};
+
+use super::app::App;
+use super::caller::Caller;
+use super::client::ClientAddress;
+use super::problem::{Answer, Problem};
+use crate::access::{Allowance, Identity, Refusal, Scope};
+use crate::config::Settings;
+use axum::extract::{MatchedPath, Request, State};
+use axum::http::request::Parts;
+use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use reservations::Reservation;
+use state::Guard;
+use std::time::Instant;
+
+const RATE_LIMIT: HeaderName = HeaderName::from_static("ratelimit");
+const RATE_LIMIT_POLICY: HeaderName = HeaderName::from_static("ratelimit-policy");
+
+/// The paths under which everything needs the scope `admin`.
+const ADMIN_PATHS: [&str; 2] = ["/v1/keys", "/v1/audit"];
+
+/// Whether everybody may read this path: health, the page for people and the documentation. They
+/// show nothing that is stored.
+fn is_open_path(path: &str, settings: &Settings) -> bool {
+    matches!(
+        path,
+        "/" | "/healthz" | "/readyz" | "/openapi.json" | "/docs"
+    ) || path.starts_with("/docs/")
+        || (settings.open_metrics && path == "/metrics")
+}
+
+/// What a caller needs for this method on this path. `route` is the pattern of the path.
+fn needed(method: &Method, route: Option<&str>) -> Scope {
+    let below = |path: &&str| {
+        let rest = route.and_then(|route| route.strip_prefix(*path));
+        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+    };
+    if ADMIN_PATHS.iter().any(|path| below(&path)) {
+        return Scope::Admin;
+    }
+    match method.is_safe() {
+        true => Scope::Read,
+        false => Scope::Submit,
+    }
+}
+
+/// The layer; see the module.
+pub async fn guard(State(app): State<App>, request: Request, next: Next) -> Response {
+    if is_open_path(request.uri().path(), &app.settings) && request.method().is_safe() {
+        return next.run(request).await;
+    }
+    // A body cannot be shared between threads, so only the head is lent to what waits.
+    let (mut request, body) = request.into_parts();
+    let address = ClientAddress::current().to_string();
+    let identity = match identify(&app, &request, &address).await {
+        Ok(identity) => identity,
+        Err(problem) => return problem.into_response(),
+    };
+    let allowance = count(&app.guard, &identity, &address);
+    let answer = match allowance.filter(|allowance| !allowance.allowed) {
+        Some(refused) => Err(too_many_requests(&refused)),
+        None => admit(&app, &identity, &address, &mut request).await,
+    };
+    let mut response = match answer {
+        Ok(reservation) => {
+            let act = trail::Act::of(&request, &identity, address);
+            request.extensions.insert(act.agent());
+            let response = next.run(Request::from_parts(request, body)).await;
+            drop(reservation);
+            act.record(&app, response).await
+        }
+        Err(problem) => problem.into_response(),
+    };
+    if let Some(allowance) = allowance {
+        add_limits(&mut response, &allowance);
+    }
+    response
+}
+
+/// Who sends the request.
+async fn identify(app: &App, request: &Parts, address: &str) -> Answer<Identity> {
+    let guard = &app.guard;
+    let authorization = request.headers.get(header::AUTHORIZATION);
+    let refusal = match guard
+        .gate
+        .identify(authorization.map(HeaderValue::as_bytes))
+        .await
+    {
+        Ok(identity) => return Ok(identity),
+        Err(Refusal::Store(error)) => return Err(error.into()),
+        Err(Refusal::Issuer(reason)) => return Err(issuer_unavailable(&reason)),
+        Err(refusal) => refusal,
+    };
+    if !matches!(refusal, Refusal::Missing) {
+        trail::sign_in_refused(app, request, address, &refusal).await;
+        let allowance = guard
+            .failures
+            .count(address, guard.failure_limit, Instant::now());
+        if !allowance.allowed {
+            return Err(too_many_failures(&allowance));
+        }
+    }
+    Err(unauthorized(&refusal))
+}
+
+/// Refuses what the caller may not do, and tells the handlers who it is.
+async fn admit(
+    app: &App,
+    identity: &Identity,
+    address: &str,
+    request: &mut Parts,
+) -> Answer<Option<Reservation>> {
+    let caller = Caller::from(identity);
+    if identity.account.is_none() {
+        app.guard.hosts.check_site(request)?;
+    }
+    let route = request.extensions.get::<MatchedPath>();
+    let needed = needed(&request.method, route.map(MatchedPath::as_str));
+    if let Err(problem) = caller.require(needed) {
+        trail::access_refused(app, request, identity, address).await;
+        return Err(problem);
+    }
+    let quota = identity.quota.or(app.guard.quota);
+    let reservation = reserve::reserve(app, request, &caller.tenant, quota).await?;
+    request.extensions.insert(caller);
+    Ok(reservation)
+}
+
+fn count(guard: &Guard, identity: &Identity, address: &str) -> Option<Allowance> {
+    let quota = identity.quota.or(guard.quota).requests?;
+    let anonymous = || format!("address {address}");
+    let account = match &identity.account {
+        Some(account) => account.clone(),
+        None if guard.count_anonymous => anonymous(),
+        None => return None,
+    };
+    Some(guard.requests.count(&account, quota, Instant::now()))
+}
+
+/// Adds `RateLimit` and `RateLimit-Policy`.
+fn add_limits(response: &mut Response, allowance: &Allowance) {
+    let Allowance {
+        quota, remaining, ..
+    } = allowance;
+    let window = crate::access::WINDOW.as_secs();
+    let resets_in = seconds(allowance);
+    let values = [
+        (
+            RATE_LIMIT_POLICY,
+            format!("\"requests\";q={quota};w={window}"),
+        ),
+        (
+            RATE_LIMIT,
+            format!("\"requests\";r={remaining};t={resets_in}"),
+        ),
+    ];
+    for (name, value) in values {
+        if let Ok(value) = HeaderValue::try_from(value) {
+            response.headers_mut().insert(name, value);
+        }
+    }
+}
+
+/// Whole seconds until the window ends, at least 1.
+fn seconds(allowance: &Allowance) -> u64 {
+    allowance.resets_in.as_millis().div_ceil(1000).max(1) as u64
+}
+
+fn too_many_requests(allowance: &Allowance) -> Problem {
+    Problem::new(
+        StatusCode::TOO_MANY_REQUESTS,
+        "too-many-requests",
+        format!(
+            "This caller has sent more than the {} requests that it may send per minute.",
+            allowance.quota
+        ),
+    )
+    .fix("Try again after the number of seconds in Retry-After, or ask the operator for more.")
+    .header(header::RETRY_AFTER, seconds(allowance).to_string())
+}
+
+fn too_many_failures(allowance: &Allowance) -> Problem {
+    Problem::new(
+        StatusCode::TOO_MANY_REQUESTS,
+        "too-many-failures",
+        "Too many requests with wrong credentials have come from this address.",
+    )
+    .fix("Correct the credentials; valid ones are accepted at once.")
+    .header(header::RETRY_AFTER, seconds(allowance).to_string())
+}
+
+fn unauthorized(refusal: &Refusal) -> Problem {
+    let challenge = |error: &str| format!("Bearer realm=\"ventriform\"{error}");
+    let (detail, fix, error) = match refusal {
+        Refusal::Missing => (
+            "This service needs credentials.".to_owned(),
+            "Send `Authorization: Bearer KEY`; the operator makes keys by `ventriform keys create`.",
+            "",
+        ),
+        Refusal::NotBearer => (
+            "The Authorization header holds no bearer credential.".to_owned(),
+            "Send `Authorization: Bearer KEY`.",
+            ", error=\"invalid_request\"",
+        ),
+        Refusal::EndedKey { state, .. } => (
+            format!("The key of this request is {}.", state.as_str()),
+            "Ask the operator for another key.",
+            ", error=\"invalid_token\"",
+        ),
+        Refusal::Token(reason) => (
+            format!("The token of this request is refused: {reason}."),
+            "Get a new token from the issuer that this service accepts.",
+            ", error=\"invalid_token\"",
+        ),
+        _ => (
+            "The key of this request is unknown.".to_owned(),
+            "Check that the whole key was sent; the operator makes keys by `ventriform keys create`.",
+            ", error=\"invalid_token\"",
+        ),
+    };
+    Problem::new(StatusCode::UNAUTHORIZED, "unauthorized", detail)
+        .at("Authorization")
+        .fix(fix)
+        .header(header::WWW_AUTHENTICATE, challenge(error))
+}
+
+fn issuer_unavailable(reason: &str) -> Problem {
+    Problem::new(
+        StatusCode::SERVICE_UNAVAILABLE,
+        "issuer-unavailable",
+        format!("Tokens cannot be checked: {reason}."),
+    )
+    .fix("Try again later, or use an API key.")
+    .header(header::RETRY_AFTER, "30")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_method_needs_the_narrowest_scope_that_fits() {
+        let needs = |method: Method, route| needed(&method, Some(route));
+        assert_eq!(needs(Method::GET, "/v1/volumes/{id}"), Scope::Read);
+        assert_eq!(needs(Method::HEAD, "/v1/volumes/{id}"), Scope::Read);
+        assert_eq!(needs(Method::POST, "/v1/volumes"), Scope::Submit);
+        assert_eq!(needs(Method::DELETE, "/v1/jobs/{id}"), Scope::Submit);
+        assert_eq!(needs(Method::GET, "/v1/keys"), Scope::Admin);
+        assert_eq!(needs(Method::DELETE, "/v1/keys/{id}"), Scope::Admin);
+        assert_eq!(needs(Method::GET, "/v1/audit"), Scope::Admin);
+        assert_eq!(needs(Method::GET, "/v1/auditors"), Scope::Read);
+        assert_eq!(
+            needed(&Method::from_bytes(b"QUERY").unwrap(), None),
+            Scope::Submit
+        );
+    }
+
+    #[test]
+    fn only_pages_and_health_are_open() {
+        let settings = Settings::default();
+        for open in [
+            "/",
+            "/healthz",
+            "/readyz",
+            "/openapi.json",
+            "/docs",
+            "/docs/index.css",
+        ] {
+            assert!(is_open_path(open, &settings), "{open}");
+        }
+        for closed in [
+            "/metrics",
+            "/v1/volumes",
+            "/docsx",
+            "//healthz",
+            "/healthz/",
+        ] {
+            assert!(!is_open_path(closed, &settings), "{closed}");
+        }
+    }
+}

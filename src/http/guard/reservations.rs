@@ -1,0 +1,47 @@
+//! What the requests under way may add to what their tenants use.
+
+use crate::access::Usage;
+use crate::jobs::Tenant;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// What the requests under way may add, for each tenant.
+#[derive(Clone, Default)]
+pub struct Reservations(Arc<Mutex<HashMap<Tenant, Usage>>>);
+
+/// What one request may add. Dropping it ends the reservation.
+pub struct Reservation {
+    all: Reservations,
+    tenant: Tenant,
+    amount: Usage,
+}
+
+impl Reservations {
+    /// Reserves `amount`; returns what is reserved in all.
+    pub fn add(&self, tenant: &Tenant, amount: Usage) -> (Reservation, Usage) {
+        // A panic cannot leave the map half changed: each use is a few plain statements.
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let sum = all.entry(tenant.clone()).or_default();
+        sum.bytes = sum.bytes.saturating_add(amount.bytes);
+        sum.jobs += amount.jobs;
+        let reservation = Reservation {
+            all: self.clone(),
+            tenant: tenant.clone(),
+            amount,
+        };
+        (reservation, *sum)
+    }
+}
+
+impl Drop for Reservation {
+    fn drop(&mut self) {
+        let mut all = self.all.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(sum) = all.get_mut(&self.tenant) {
+            sum.bytes = sum.bytes.saturating_sub(self.amount.bytes);
+            sum.jobs = sum.jobs.saturating_sub(self.amount.jobs);
+            if *sum == Usage::default() {
+                all.remove(&self.tenant);
+            }
+        }
+    }
+}

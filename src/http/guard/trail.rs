@@ -1,0 +1,221 @@
+//! From requests to rows of the audit trail.
+//!
+//! Recorded are: acts that changed something, reads of contents and of lists under `/v1`, refused
+//! credentials, and requests beyond a caller's scope. Not recorded are reads of jobs, which clients
+//! repeat while they wait, and requests that were refused for another reason or found nothing.
+//!
+//! A row names an item by its id and never a path, a query or a name from a file.
+
+use crate::access::{Activity, AuditEvent, Identity, Outcome, Refusal};
+use crate::http::app::App;
+use crate::http::problem::Problem;
+use crate::jobs::{Resource, Tenant, Timestamp};
+use axum::extract::MatchedPath;
+use axum::http::request::Parts;
+use axum::http::{Method, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use tower_http::request_id::RequestId;
+
+/// Longest id that is recorded; others are no ids of this service.
+const LONGEST_ID: usize = 80;
+
+/// Handlers that record their own event, in the same transaction as the act, put this into their
+/// answer.
+#[derive(Debug, Clone, Copy)]
+pub struct AlreadyRecorded;
+
+/// Who sends a request, for events that a handler records itself.
+#[derive(Debug, Clone)]
+pub struct Agent(AuditEvent);
+
+impl Agent {
+    /// What the agent did at that time.
+    pub fn event(&self, activity: Activity, now: Timestamp) -> AuditEvent {
+        AuditEvent {
+            activity,
+            recorded: now,
+            ..self.0.clone()
+        }
+    }
+}
+
+/// A request that may have to be recorded.
+pub struct Act {
+    method: Method,
+    route: String,
+    object: Option<String>,
+    event: AuditEvent,
+}
+
+impl Act {
+    /// The act of this request.
+    pub fn of(request: &Parts, identity: &Identity, address: String) -> Self {
+        let route = request.extensions.get::<MatchedPath>();
+        Self {
+            method: request.method.clone(),
+            route: route.map_or_else(String::new, |route| route.as_str().to_owned()),
+            object: item_of(request.uri.path()),
+            event: event(request, identity, address, Activity::Read),
+        }
+    }
+
+    /// Who sends the request.
+    pub fn agent(&self) -> Agent {
+        Agent(self.event.clone())
+    }
+
+    /// Records what was done, and returns the answer; instead of it 503 if an act that changed
+    /// something could not be recorded.
+    pub async fn record(mut self, app: &App, response: Response) -> Response {
+        let status = response.status();
+        let done = status.is_success() || status == StatusCode::NOT_MODIFIED;
+        if !done || response.extensions().get::<AlreadyRecorded>().is_some() {
+            return response;
+        }
+        let Some(activity) = self.activity(status) else {
+            return response;
+        };
+        self.event.recorded = app.queue.clock.now();
+        self.event.activity = activity;
+        self.event.object = match activity {
+            Activity::Create | Activity::Execute => location(&response).or(self.object),
+            Activity::Search => self.route.split('/').nth(2).map(str::to_owned),
+            _ => self.object,
+        };
+        if self.method.is_safe() {
+            app.guard.recorder.note(self.event).await;
+            return response;
+        }
+        match app.guard.recorder.record(self.event).await {
+            Ok(()) => response,
+            Err(_) => not_recorded().into_response(),
+        }
+    }
+
+    fn activity(&self, status: StatusCode) -> Option<Activity> {
+        let mut segments = self.route.strip_prefix("/v1/")?.split('/');
+        let kind = segments.next()?;
+        let is_list = segments.next().is_none();
+        if self.method.is_safe() {
+            return match (kind, is_list) {
+                ("jobs", _) => None,
+                ("audit", _) => Some(Activity::AuditRead),
+                (_, true) => Some(Activity::Search),
+                _ => Some(Activity::Read),
+            };
+        }
+        Some(match (&self.method, kind) {
+            (&Method::DELETE, _) => Activity::Delete,
+            (&Method::POST, "jobs" | "models" | "segmentations") if is_list => Activity::Execute,
+            (&Method::POST, _) if is_list && status == StatusCode::OK => Activity::Update,
+            (&Method::POST, _) if is_list => Activity::Create,
+            _ => Activity::Update,
+        })
+    }
+}
+
+/// Notes that credentials were refused.
+pub async fn sign_in_refused(app: &App, request: &Parts, address: &str, refusal: &Refusal) {
+    let (tenant, key) = match refusal {
+        Refusal::EndedKey { tenant, key, .. } => (tenant.clone(), Some(key.clone())),
+        // Nobody's: the operator's tenant sees it.
+        _ => (Tenant::default(), None),
+    };
+    let identity = Identity {
+        tenant,
+        name: "unknown".into(),
+        key,
+        scope: crate::access::Scope::Read,
+        quota: crate::access::Quota::default(),
+        account: None,
+    };
+    let refused = event(
+        request,
+        &identity,
+        address.to_owned(),
+        Activity::SignInRefused,
+    );
+    note_refusal(app, refused).await;
+}
+
+/// Notes that a caller asked for more than its scope allows.
+pub async fn access_refused(app: &App, request: &Parts, identity: &Identity, address: &str) {
+    let mut refused = event(
+        request,
+        identity,
+        address.to_owned(),
+        Activity::AccessRefused,
+    );
+    refused.object = item_of(request.uri.path());
+    note_refusal(app, refused).await;
+}
+
+async fn note_refusal(app: &App, mut event: AuditEvent) {
+    event.outcome = Outcome::Refused;
+    event.recorded = app.queue.clock.now();
+    app.guard.recorder.note(event).await;
+}
+
+fn event(request: &Parts, identity: &Identity, address: String, activity: Activity) -> AuditEvent {
+    let id = request.extensions.get::<RequestId>();
+    // A client may send any text as the id of its request; only ids that say nothing are recorded.
+    let id = id.and_then(|id| id.header_value().to_str().ok());
+    let id = id.filter(|id| uuid::Uuid::try_parse(id).is_ok());
+    AuditEvent {
+        key: identity.key.clone(),
+        address: Some(address),
+        request: id.map(str::to_owned),
+        ..AuditEvent::new(0, activity, identity.tenant.clone(), identity.name.clone())
+    }
+}
+
+/// The id in a path `/v1/KIND/ID/...`, if it has the form of one.
+fn item_of(path: &str) -> Option<String> {
+    let id = path.strip_prefix("/v1/")?.split('/').nth(1)?;
+    let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'_';
+    let formed = !id.is_empty() && id.len() <= LONGEST_ID && id.bytes().all(plain);
+    let known = Resource::of(id).is_some() || id.bytes().all(|b| b.is_ascii_hexdigit());
+    (formed && known).then(|| id.to_owned())
+}
+
+/// The id of what the answer's `Location` names.
+fn location(response: &Response) -> Option<String> {
+    let path = response.headers().get(header::LOCATION)?.to_str().ok()?;
+    item_of(path)
+}
+
+fn not_recorded() -> Problem {
+    Problem::new(
+        StatusCode::SERVICE_UNAVAILABLE,
+        "audit-unavailable",
+        "The request was carried out, but the audit trail could not be written.",
+    )
+    .fix("Ask the operator to look at the log and at the disk, then send the request again.")
+    .header(header::RETRY_AFTER, "10")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_ids_are_taken_from_paths() {
+        let item = |path| item_of(path);
+        assert_eq!(
+            item("/v1/volumes/vol_12ab/preview.png").as_deref(),
+            Some("vol_12ab")
+        );
+        assert_eq!(
+            item("/v1/keys/0123456789abcdef").as_deref(),
+            Some("0123456789abcdef")
+        );
+        for path in [
+            "/v1/volumes",
+            "/v1/volumes/Doe%20John",
+            "/healthz",
+            "/v1/volumes/John",
+        ] {
+            assert_eq!(item(path), None, "{path}");
+        }
+    }
+}
