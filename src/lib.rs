@@ -146,6 +146,9 @@ pub mod jobs;
 pub mod access;
 
 #[cfg(feature = "service")]
+pub mod hooks;
+
+#[cfg(feature = "service")]
 pub mod store;
 
 #[cfg(feature = "service")]

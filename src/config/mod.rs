@@ -15,6 +15,7 @@ pub use units::{
     Retention, Size, Span, Words,
 };
 
+use crate::hooks::AllowList;
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::net::SocketAddr;
@@ -317,6 +318,29 @@ settings! {
     /// Age at which rows of the audit trail are removed; `off` keeps them
     audit_retention: Retention = "off";
 
+    ["Webhooks"]
+    /// Hosts, addresses and networks that webhooks may go to although they are not public, separated
+    /// by commas; `http` is for these only
+    webhook_allow: AllowList = "";
+    /// Largest number of attempts of one delivery
+    webhook_attempts: u32 = "12";
+    /// Longest time for which a delivery is tried
+    webhook_age: Span = "3d";
+    /// Pause after the first failed attempt; each is four times the one before, at most 6h
+    webhook_backoff: Span = "5s";
+    /// Longest attempt
+    webhook_timeout: Span = "10s";
+    /// Largest number of deliveries sent at the same time
+    webhook_concurrency: usize = "16";
+    /// Largest number of deliveries sent at the same time to one host and port
+    webhook_destination_concurrency: usize = "4";
+    /// Largest number of pending deliveries to one host and port; the oldest beyond that are given up
+    webhook_backlog: u32 = "10000";
+    /// How long delivered and given-up deliveries are kept
+    webhook_history: Span = "7d";
+    /// Largest number of registered webhooks of one tenant
+    webhook_endpoint_limit: u32 = "20";
+
     ["Shutdown and log"]
     /// After SIGTERM or Ctrl-C: time for running jobs to end before they return to the queue
     shutdown_grace: Span = "30s";
@@ -477,6 +501,7 @@ macro_rules! shown_by_display {
 }
 
 shown_by_display!(
+    AllowList,
     SocketAddr,
     Count,
     Span,

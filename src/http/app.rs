@@ -2,6 +2,7 @@
 
 use super::decoding::Decoding;
 use super::guard::state::Guard;
+use super::hooks::Hooks;
 use super::metrics::Metrics;
 use super::streams::EventStreams;
 use crate::access::AccessStore;
@@ -33,6 +34,8 @@ pub struct Shared {
     pub decoding: Decoding,
     /// The open streams of events.
     pub streams: EventStreams,
+    /// Telling other programs about jobs.
+    pub hooks: Hooks,
     /// Figures for operators.
     pub metrics: Metrics,
 }
@@ -44,6 +47,7 @@ impl App {
         engine: Engine,
         (access, guard): (Arc<dyn AccessStore>, Guard),
         settings: Settings,
+        hooks: Hooks,
         closing: CancellationToken,
     ) -> Self {
         Self(Arc::new(Shared {
@@ -54,6 +58,7 @@ impl App {
             decoding: Decoding::new(&settings),
             streams: EventStreams::new(&settings),
             settings,
+            hooks,
             closing,
             metrics: Metrics::new(),
         }))

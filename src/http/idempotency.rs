@@ -1,9 +1,9 @@
 //! `Idempotency-Key` (draft-ietf-httpapi-idempotency-key-header-07).
 
 use super::problem::{Answer, Problem};
-use crate::jobs::{Idempotency, content_id};
+use crate::jobs::{Idempotency, JobWebhook, content_id};
 use axum::http::{HeaderMap, HeaderName};
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 /// The header's name.
 pub const HEADER: HeaderName = HeaderName::from_static("idempotency-key");
@@ -33,10 +33,14 @@ pub fn promise(
     kind: &str,
     volume: &str,
     parameters: &Map<String, Value>,
+    webhook: Option<&JobWebhook>,
 ) -> Option<Idempotency> {
     let parameters = Value::Object(parameters.clone()).to_string();
+    let webhook = webhook.map(|webhook| json!(webhook).to_string());
+    let parts = [kind, volume, &parameters];
+    let parts = parts.into_iter().chain(webhook.as_deref());
     Some(Idempotency {
         key: key?,
-        fingerprint: content_id("", [kind, volume, &parameters].map(str::as_bytes)),
+        fingerprint: content_id("", parts.map(str::as_bytes)),
     })
 }

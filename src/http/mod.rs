@@ -8,6 +8,7 @@
 //! |---|---|
 //! | the paths, the layers around them | [`router`] |
 //! | uploads, jobs, results | [`volumes`], [`jobs`], [`models`], [`segmentations`], [`templates`] |
+//! | webhooks and what became of their deliveries | [`webhooks`], [`given_webhook`], [`hooks`] |
 //! | what several of them share | [`collection`] (list, show, erase), [`products`] (meshes, reports, files), [`files`] (ranges, validators) |
 //! | who may do what, and the record of it | [`guard`] (before every handler), [`caller`], [`keys`], [`audit`] |
 //! | errors and their wording | [`problem`]; 404 and 410 in [`problem::not_found`] |
@@ -36,8 +37,10 @@ mod decoding;
 mod document;
 mod files;
 mod front_page;
+mod given_webhook;
 mod guard;
 mod health;
+mod hooks;
 mod idempotency;
 mod jobs;
 mod keys;
@@ -58,6 +61,7 @@ mod streams;
 mod templates;
 mod upload;
 mod volumes;
+mod webhooks;
 mod wire;
 
 pub use app::App;

@@ -77,7 +77,8 @@ impl ModelLinks {
         (Vec<u8> = "application/nifti"),
         (openapi::UploadForm = "multipart/form-data"),
     )),
-    params(openapi::ModelQuery, openapi::IdempotencyHeader, openapi::PreferHeader),
+    params(openapi::ModelQuery, openapi::IdempotencyHeader, openapi::PreferHeader,
+        openapi::WebhookInputs),
     responses(openapi::MeshAnswer, WaitAnswers, FileProblems, UploadProblems))]
 pub async fn create_model(
     State(app): State<App>,

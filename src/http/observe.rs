@@ -89,6 +89,12 @@ impl Trace {
     }
 }
 
+/// The trace context that continues in what the request starts.
+pub fn trace_parent(request: &Request) -> Option<String> {
+    let trace = request.extensions().get::<Trace>();
+    trace.map(|trace| trace.parent.clone())
+}
+
 /// The span of a request in the log.
 #[derive(Debug, Clone, Copy)]
 pub struct RequestSpan;

@@ -117,3 +117,18 @@ pub async fn json_object(request: Request) -> Answer<Map<String, Value>> {
         Err(error) => Err(body::malformed_json(&error.to_string())),
     }
 }
+
+/// A string in a JSON object.
+///
+/// # Errors
+/// 422 if it is another value.
+pub fn text<'a>(object: &'a Map<String, Value>, name: &str) -> Answer<Option<&'a str>> {
+    match object.get(name) {
+        None => Ok(None),
+        Some(Value::String(text)) => Ok(Some(text)),
+        Some(_) => Err(
+            Problem::invalid_field(name, format!("`{name}` must be a string."))
+                .fix("Give a JSON string."),
+        ),
+    }
+}

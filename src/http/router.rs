@@ -13,8 +13,8 @@ use super::segmentations::Segmentations;
 use super::templates::{MESH_SIZE, Templates};
 use super::volumes::Volumes;
 use super::{
-    audit, collection, front_page, health, idempotency, jobs, keys, models, products,
-    segmentations, templates, volumes,
+    audit, collection, front_page, given_webhook, health, idempotency, jobs, keys, models,
+    products, segmentations, templates, volumes, webhooks,
 };
 use crate::config::Settings;
 use axum::Router;
@@ -47,7 +47,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         products::routes::<Segmentations>(),
         products::routes::<Templates>(),
     ];
-    let of_one_kind: [UtoipaMethodRouter<App>; 15] = [
+    let of_one_kind: [UtoipaMethodRouter<App>; 20] = [
         routes!(volumes::create_volume).layer(upload()),
         routes!(volumes::preview_volume),
         routes!(models::create_model).layer(upload()),
@@ -60,6 +60,11 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(keys::create_key, keys::list_keys).layer(json(settings.json_limit)),
         routes!(keys::revoke_key),
         routes!(audit::list_audit_events),
+        routes!(webhooks::create_webhook, webhooks::list_webhooks).layer(json(settings.json_limit)),
+        routes!(webhooks::create_webhook_secret),
+        routes!(webhooks::delete_webhook),
+        routes!(webhooks::list_deliveries),
+        routes!(webhooks::redeliver),
         routes!(health::alive),
         routes!(health::ready),
         routes!(health::metrics),
@@ -86,6 +91,7 @@ pub fn router(app: App) -> Router {
             header::PROXY_AUTHORIZATION,
             header::COOKIE,
             idempotency::HEADER,
+            given_webhook::SECRET_HEADER,
         ]))
         .map_request(observe::drop_unusable_id)
         .layer(SetRequestIdLayer::new(REQUEST_ID, observe::TimeOrderedId))

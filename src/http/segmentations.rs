@@ -116,7 +116,8 @@ fn offers() -> Vec<Offer> {
         (Vec<u8> = "application/nifti"),
         (openapi::SegmentationForm = "multipart/form-data"),
     )),
-    params(openapi::SegmentationQuery, openapi::IdempotencyHeader, openapi::PreferHeader),
+    params(openapi::SegmentationQuery, openapi::IdempotencyHeader, openapi::PreferHeader,
+        openapi::WebhookInputs),
     responses(openapi::SegmentationAnswer, WaitAnswers, FileProblems, UploadProblems))]
 pub async fn create_segmentation(
     State(app): State<App>,

@@ -6,9 +6,11 @@ use super::connections::{self, ConnectionLimits};
 use super::cryptography::install_cryptography;
 use super::guard::hosts::HostPolicy;
 use super::guard::state::Guard;
+use super::hooks::Hooks;
 use super::router::router;
 use crate::access::{AccessStore, Gate, Issuer, IssuerError, IssuerSettings, Recorder, Scope};
 use crate::config::Settings;
+use crate::hooks::{Dispatcher, HookSettings, RetrySchedule, UrlGuard};
 use crate::jobs::{
     Clock, Queue, QueueSettings, StoreError, SystemClock, Upkeep, WorkerSettings, Workers,
     recover_after_crash,
@@ -60,6 +62,7 @@ pub struct Running {
     queue: Arc<Queue>,
     server: JoinHandle<()>,
     workers: Workers,
+    dispatcher: JoinHandle<()>,
     closing: CancellationToken,
     grace: Duration,
     // Dropping the store unlocks the data folder, so it is kept to the end.
@@ -110,11 +113,18 @@ pub async fn start(
     listener.set_nonblocking(true)?;
     let address = listener.local_addr()?;
     let guard = guard(&settings, store.rows.clone(), address).await?;
+    let hooks = hooks(&settings, &store, &queue);
+    let dispatcher = tokio::spawn(hooks.dispatcher.clone().run(
+        queue.changes(),
+        closing.clone(),
+        settings.shutdown_grace.0,
+    ));
     let app = App::new(
         queue.clone(),
         engine.clone(),
         (store.rows.clone(), guard),
         settings.clone(),
+        hooks,
         closing.clone(),
     );
     let limits = ConnectionLimits {
@@ -149,6 +159,7 @@ pub async fn start(
         queue,
         server,
         workers,
+        dispatcher,
         closing,
         grace: settings.shutdown_grace.0,
         _store: store,
@@ -173,9 +184,10 @@ impl Running {
     pub async fn stop(self) -> Result<(), ServeError> {
         tracing::info!("shutting down");
         self.closing.cancel();
-        let (server, ()) = tokio::join!(self.server, self.workers.stop(self.grace));
+        let (server, (), dispatcher) =
+            tokio::join!(self.server, self.workers.stop(self.grace), self.dispatcher);
         self.app.guard.recorder.flush().await;
-        server.map_err(io::Error::other)?;
+        server.and(dispatcher).map_err(io::Error::other)?;
         Ok(())
     }
 }
@@ -242,6 +254,33 @@ async fn prune_audit(store: Arc<dyn AccessStore>, age: Duration, end: Cancellati
         if let Err(error) = store.prune(now.saturating_sub(age), now).await {
             tracing::error!(%error, "old rows of the audit trail could not be removed");
         }
+    }
+}
+
+fn hooks(settings: &Settings, store: &Store, queue: &Queue) -> Hooks {
+    let guard = UrlGuard::new(settings.webhook_allow.clone());
+    let sending = HookSettings {
+        retries: RetrySchedule {
+            first: settings.webhook_backoff.0,
+            attempts: settings.webhook_attempts,
+            age: settings.webhook_age.0,
+        },
+        attempt_limit: settings.webhook_timeout.0,
+        places: settings.webhook_concurrency,
+        per_destination: settings.webhook_destination_concurrency,
+        backlog: settings.webhook_backlog,
+        history: settings.webhook_history.0,
+    };
+    let dispatcher = Dispatcher::new(
+        store.rows.clone(),
+        queue.clock.clone(),
+        guard.clone(),
+        sending,
+    );
+    Hooks {
+        store: store.rows.clone(),
+        guard,
+        dispatcher: Arc::new(dispatcher),
     }
 }
 

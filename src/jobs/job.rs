@@ -2,8 +2,10 @@
 //! `running` back to `queued` when its worker was lost.
 
 use super::{Failure, Tenant, Timestamp};
+use serde::Serialize;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
+use std::fmt;
 
 /// The state of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -89,6 +91,8 @@ pub struct Job {
     pub failure: Option<Failure>,
     /// Id of the product it made.
     pub result: Option<String>,
+    /// The W3C trace context of the request that filed it: a value of the header `traceparent`.
+    pub trace_parent: Option<String>,
 }
 
 /// A job to be filed.
@@ -106,6 +110,29 @@ pub struct NewJob {
     pub parameters: Map<String, Value>,
     /// The client's `Idempotency-Key`, with a hash of the request.
     pub idempotency: Option<Idempotency>,
+    /// Where this job is told about.
+    pub webhook: Option<JobWebhook>,
+    /// See [`Job::trace_parent`].
+    pub trace_parent: Option<String>,
+}
+
+/// Where a job is told about, as it is stored with the job. `Debug` does not show it.
+#[derive(Clone, PartialEq, Eq, Serialize)]
+pub struct JobWebhook {
+    /// The receiver.
+    pub url: String,
+    /// Scheme, host and port of the URL.
+    pub destination: String,
+    /// Names of the events to tell.
+    pub events: Vec<String>,
+    /// What signs the deliveries; the tenant's secret if there is none.
+    pub secret: Option<String>,
+}
+
+impl fmt::Debug for JobWebhook {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("JobWebhook(..)")
+    }
 }
 
 /// Marks repeated requests of a tenant as one: the same key with the same fingerprint files one

@@ -47,7 +47,7 @@ pub use clock::{Clock, SystemClock, Timestamp, parse_rfc3339, rfc3339};
 pub use failure::{Failure, Fault};
 pub(crate) use ids::hex;
 pub use ids::{content_id, random_id};
-pub use job::{Filed, Idempotency, Job, JobState, NewJob};
+pub use job::{Filed, Idempotency, Job, JobState, JobWebhook, NewJob};
 pub use queue::{Hold, Queue, QueuePosition, QueueSettings, Upkeep, recover_after_crash};
 pub use resource::Resource;
 pub use storage::{

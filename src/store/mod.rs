@@ -18,6 +18,7 @@ mod rows;
 mod sqlite;
 mod sqlite_access;
 mod sqlite_catalogue;
+mod sqlite_hooks;
 mod sqlite_jobs;
 
 pub use blobs::FileBlobs;

@@ -30,6 +30,7 @@ pub(super) fn job(row: SqliteRow) -> StoreResult<Job> {
         finished_at: row.try_get("finished_at")?,
         failure: failure.map(from_json).transpose()?,
         result: row.try_get("result")?,
+        trace_parent: row.try_get("trace_parent")?,
     })
 }
 
@@ -58,7 +59,7 @@ pub(super) fn product(row: SqliteRow) -> StoreResult<Product> {
 }
 
 /// The tenant of a row.
-fn tenant(row: &SqliteRow) -> StoreResult<Tenant> {
+pub(super) fn tenant(row: &SqliteRow) -> StoreResult<Tenant> {
     let name: String = row.try_get("tenant")?;
     Tenant::try_from(name).map_err(|e| StoreError::Database(format!("damaged row: {e}")))
 }

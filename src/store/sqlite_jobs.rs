@@ -23,8 +23,8 @@ impl JobStore for SqliteStore {
         let key = job.idempotency.as_ref();
         let inserted = sqlx::query(
             "INSERT INTO jobs (id, kind, volume, parameters, created_at, idempotency_key,
-                               fingerprint, needs, tenant)
-             SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?9, ?10
+                               fingerprint, needs, tenant, webhook, trace_parent)
+             SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?9, ?10, ?11, ?12
              WHERE (SELECT count(*) FROM jobs WHERE state = 'queued') < ?8
                AND EXISTS (SELECT 1 FROM volumes WHERE id = ?3)
                AND NOT EXISTS
@@ -44,6 +44,8 @@ impl JobStore for SqliteStore {
         .bind(i64::try_from(queue_limit).unwrap_or(i64::MAX))
         .bind(to_json(&job.needs)?)
         .bind(job.tenant.as_str())
+        .bind(job.webhook.as_ref().map(to_json).transpose()?)
+        .bind(&job.trace_parent)
         .fetch_optional(&self.writer)
         .await?;
         if let Some(row) = inserted {

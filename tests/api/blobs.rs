@@ -190,6 +190,8 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
         needs: BTreeMap::new(),
         parameters: work.parameters_from_text(&[]).unwrap(),
         idempotency: None,
+        webhook: None,
+        trace_parent: None,
     };
     let Filed::New(job) = queue.file(&job).await.unwrap() else {
         panic!("the job was rejected");

@@ -152,6 +152,8 @@ async fn filed(store: &Store) -> String {
         needs: Default::default(),
         parameters,
         idempotency: None,
+        webhook: None,
+        trace_parent: None,
     };
     match store.rows.file(&order, 10, 0).await.unwrap() {
         Filed::New(job) => job.id,

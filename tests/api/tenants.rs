@@ -14,7 +14,7 @@ async fn an_idempotency_key_is_its_tenants_own() {
         sequence: 0,
         created_at: 0,
         bytes: 1,
-        files: vec!["volume.nii".into()],
+        files: Vec::new(),
         facts: json!({}),
     };
     store.rows.add_volume(&volume).await.unwrap();
@@ -28,6 +28,8 @@ async fn an_idempotency_key_is_its_tenants_own() {
             key: "k".into(),
             fingerprint: "f".into(),
         }),
+        webhook: None,
+        trace_parent: None,
     };
     let file = async |tenant: &str| store.rows.file(&order(tenant), 10, 0).await.unwrap();
     let Filed::New(first) = file("a").await else {

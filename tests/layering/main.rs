@@ -113,7 +113,8 @@ const USES: &[(&str, &[&str])] = &[
     ),
     ("jobs", &["progress"]),
     ("access", &["jobs"]),
-    ("store", &["jobs", "access"]),
+    ("hooks", &["jobs"]),
+    ("store", &["jobs", "access", "hooks"]),
     (
         "work",
         &[
@@ -133,7 +134,7 @@ const USES: &[(&str, &[&str])] = &[
             "jobs",
         ],
     ),
-    ("config", &[]),
+    ("config", &["hooks"]),
     (
         "http",
         &[
@@ -142,6 +143,7 @@ const USES: &[(&str, &[&str])] = &[
             "parameters",
             "jobs",
             "access",
+            "hooks",
             "store",
             "work",
             "config",
@@ -203,7 +205,9 @@ const SERVICE_CRATES: &[&str] = &[
 ];
 
 /// The service: what stands here may name [`SERVICE_CRATES`].
-const SERVICE: &[&str] = &["jobs", "access", "work", "store", "config", "http", "cli"];
+const SERVICE: &[&str] = &[
+    "jobs", "access", "hooks", "work", "store", "config", "http", "cli",
+];
 
 /// Standard-library facilities that would make a result depend on more than its input.
 const IMPURE: &[&str] = &["std::time", "std::env", "std::net", "HashMap", "HashSet"];

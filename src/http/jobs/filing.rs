@@ -5,13 +5,14 @@
 
 use super::describe;
 use crate::http::app::App;
+use crate::http::given_webhook::GivenWebhook;
 use crate::http::problem::not_found::field_names_nothing;
 use crate::http::problem::{Answer, Problem};
 use crate::http::products::{self, Offer};
 use crate::http::request::query_pairs;
 use crate::http::wire::path_of;
-use crate::http::{idempotency, negotiate, upload};
-use crate::jobs::{Filed, Job, JobState, NewJob, Resource, Tenant, Work};
+use crate::http::{idempotency, negotiate, observe, upload};
+use crate::jobs::{Filed, Job, JobState, JobWebhook, NewJob, Resource, Tenant, Work};
 use axum::Json;
 use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
@@ -54,6 +55,15 @@ pub async fn file_upload(
     };
     // Whatever can be refused without the body is refused before the body is read.
     let mut pairs = query_pairs(query);
+    let webhook = match GivenWebhook::take_from(&mut pairs, &headers)? {
+        Some(given) => Some(given.of_job(app).await?),
+        None => None,
+    };
+    let filing = Filing {
+        key,
+        webhook,
+        trace_parent: observe::trace_parent(&request),
+    };
     let mut parameters = work.parameters_from_text(&pairs)?;
     require(app, &work.needs(&parameters).items).await?;
     if app.queue.is_full().await? {
@@ -74,7 +84,7 @@ pub async fn file_upload(
     }
     let stored = upload.volume.store(app).await?;
     holds.push(stored.hold);
-    let filed = file(app, &new_job(&**work, stored.volume.id, parameters, key)).await?;
+    let filed = file(app, &new_job(&**work, stored.volume.id, parameters, filing)).await?;
     drop(holds);
     match patience {
         Some(patience) => wait(app, filed, patience, &headers, &job.offers).await,
@@ -82,21 +92,39 @@ pub async fn file_upload(
     }
 }
 
+/// What a request says about a job besides its work.
+pub struct Filing {
+    /// Its idempotency key.
+    pub key: Option<String>,
+    /// Where the job is told about.
+    pub webhook: Option<JobWebhook>,
+    /// The request's trace context.
+    pub trace_parent: Option<String>,
+}
+
 /// A job on a stored volume, for [`file()`].
 pub fn new_job(
     work: &dyn Work,
     volume: String,
     parameters: Map<String, Value>,
-    key: Option<String>,
+    filing: Filing,
 ) -> NewJob {
     let kind = work.makes().noun();
     NewJob {
         tenant: Tenant::default(),
         kind: kind.into(),
-        idempotency: idempotency::promise(key, kind, &volume, &parameters),
+        idempotency: idempotency::promise(
+            filing.key,
+            kind,
+            &volume,
+            &parameters,
+            filing.webhook.as_ref(),
+        ),
         needs: work.needs(&parameters).items,
         volume,
         parameters,
+        webhook: filing.webhook,
+        trace_parent: filing.trace_parent,
     }
 }
 

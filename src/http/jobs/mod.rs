@@ -6,14 +6,17 @@ pub mod filing;
 mod body;
 
 pub use body::{JobBody, describe};
+pub use filing::Filing;
 
 use super::app::App;
+use super::given_webhook::webhook_of;
 use super::idempotency;
+use super::observe;
 use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
 use super::pagination::{list_query, next_cursor};
 use super::problem::not_found::missing;
 use super::problem::{Answer, Problem, shorten};
-use super::request::{PathSegments, json_object, query_pairs, refuse_unknown, unknown};
+use super::request::{PathSegments, json_object, query_pairs, refuse_unknown, text, unknown};
 use crate::jobs::{Deleted, Interrupted, Job, JobState, NewJob, Resource};
 use axum::Json;
 use axum::extract::{RawQuery, Request, State};
@@ -54,15 +57,21 @@ pub async fn create_job(
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let key = idempotency::key(request.headers())?;
+    let trace_parent = observe::trace_parent(&request);
     let object = json_object(request).await?;
-    let job = read_job(&app, &object, key)?;
+    let filing = Filing {
+        key,
+        webhook: webhook_of(&app, &object).await?,
+        trace_parent,
+    };
+    let job = read_job(&app, &object, filing)?;
     let job = filing::file(&app, &job).await?;
     filing::accepted(&app, job).await
 }
 
-const FIELDS: [&str; 3] = ["kind", "volume", "parameters"];
+const FIELDS: [&str; 4] = ["kind", "volume", "parameters", "webhook"];
 
-fn read_job(app: &App, object: &Map<String, Value>, key: Option<String>) -> Answer<NewJob> {
+fn read_job(app: &App, object: &Map<String, Value>, filing: Filing) -> Answer<NewJob> {
     if let Some(name) = object.keys().find(|name| !FIELDS.contains(&name.as_str())) {
         return Err(unknown("field", name, &FIELDS));
     }
@@ -91,18 +100,12 @@ fn read_job(app: &App, object: &Map<String, Value>, key: Option<String>) -> Answ
         }
     };
     let parameters = work.parameters_from_json(parameters)?;
-    Ok(filing::new_job(&**work, volume.to_owned(), parameters, key))
-}
-
-fn text<'a>(object: &'a Map<String, Value>, name: &str) -> Answer<Option<&'a str>> {
-    match object.get(name) {
-        None => Ok(None),
-        Some(Value::String(text)) => Ok(Some(text)),
-        Some(_) => Err(
-            Problem::invalid_field(name, format!("`{name}` must be a string."))
-                .fix("Give a JSON string."),
-        ),
-    }
+    Ok(filing::new_job(
+        &**work,
+        volume.to_owned(),
+        parameters,
+        filing,
+    ))
 }
 
 /// List jobs

@@ -1,6 +1,7 @@
 //! Request bodies that the handlers read piece by piece, so that no Rust type describes them.
 
 use super::inputs::{ModelParametersObject, SegmentationParametersObject};
+use crate::hooks::HookEvent;
 use serde_json::json;
 use std::borrow::Cow;
 use utoipa::openapi::schema::{
@@ -27,6 +28,7 @@ impl ToSchema for JobRequest {
             SegmentationParametersObject::name().into(),
             SegmentationParametersObject::schema(),
         ));
+        schemas.push((WebhookRequest::name().into(), WebhookRequest::schema()));
     }
 }
 
@@ -48,7 +50,50 @@ impl PartialSchema for JobRequest {
             .property("kind", Schema::from(kind))
             .property("volume", Schema::from(volume))
             .property("parameters", Schema::AnyOf(parameters.build()))
+            .property("webhook", Ref::from_schema_name(WebhookRequest::name()))
             .required("volume")
+            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
+        Schema::from(object.build()).into()
+    }
+}
+
+/// A receiver to be told about jobs; `GivenWebhook` reads it field by field.
+pub struct WebhookRequest;
+
+impl ToSchema for WebhookRequest {
+    fn name() -> Cow<'static, str> {
+        "WebhookRequest".into()
+    }
+}
+
+impl PartialSchema for WebhookRequest {
+    fn schema() -> RefOr<Schema> {
+        let text = || ObjectBuilder::new().schema_type(Type::String);
+        let url = text()
+            .description(Some(
+                "Where to send deliveries: https, and a public host unless the operator allows it",
+            ))
+            .format(Some(SchemaFormat::Custom("uri".into())))
+            .max_length(Some(2048))
+            .examples(["https://ris.example.org/hooks/ventriform"]);
+        let events = ArrayBuilder::new()
+            .description(Some("What to tell; the three ends of a job unless given"))
+            .items(RefOr::T(Schema::from(
+                text().enum_values(Some(HookEvent::ALL.map(HookEvent::as_str))),
+            )))
+            .min_items(Some(1));
+        let secret = text()
+            .description(Some(
+                "What signs the deliveries (Standard Webhooks): `whsec_` and base64. Made by the \
+                 service unless given, and never shown again",
+            ))
+            .pattern(Some("^whsec_[A-Za-z0-9+/]{32,88}={0,2}$"))
+            .examples(["whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw"]);
+        let object = ObjectBuilder::new()
+            .property("url", Schema::from(url))
+            .property("events", Schema::Array(events.build()))
+            .property("secret", Schema::from(secret))
+            .required("url")
             .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
         Schema::from(object.build()).into()
     }

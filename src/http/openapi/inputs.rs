@@ -217,6 +217,30 @@ impl IntoParams for IdempotencyHeader {
     }
 }
 
+/// `webhook`, `webhook_events` and `Webhook-Secret`.
+pub struct WebhookInputs;
+
+impl IntoParams for WebhookInputs {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let text = || Schema::from(ObjectBuilder::new().schema_type(Type::String));
+        vec![
+            query("webhook", "URL to be told when the job has ended")
+                .schema(Some(text()))
+                .build(),
+            query(
+                "webhook_events",
+                "What to tell, separated by commas: `started`, `succeeded`, `failed`, `cancelled`",
+            )
+            .schema(Some(text()))
+            .build(),
+            header(
+                "Webhook-Secret",
+                "What signs the deliveries: `whsec_` and base64",
+            ),
+        ]
+    }
+}
+
 /// `Last-Event-ID`.
 pub struct EventHeader;
 

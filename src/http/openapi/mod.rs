@@ -23,10 +23,10 @@ pub use answers::{
     MeshAnswer, ModelFileAnswer, ReportAnswer, SegmentationAnswer, SegmentationFileAnswer,
     UploadProblems, WaitAnswers,
 };
-pub use bodies::{JobRequest, MeshDocument, SegmentationForm, UploadForm};
+pub use bodies::{JobRequest, MeshDocument, SegmentationForm, UploadForm, WebhookRequest};
 pub use inputs::{
     ConditionalHeaders, EventHeader, IdempotencyHeader, ModelQuery, PageParameters, PreferHeader,
-    SegmentationQuery, TemplateQuery,
+    SegmentationQuery, TemplateQuery, WebhookInputs,
 };
 pub use operation::Documented;
 
@@ -51,6 +51,7 @@ use utoipa::openapi::{RefOr, Required};
         (name = "models", description = "Surface models, and one request from volume to model"),
         (name = "segmentations", description = "Models fitted to volumes, and one request from volume to segmentation"),
         (name = "templates", description = "The library of models that `auto` chooses from"),
+        (name = "webhooks", description = "Telling other programs about jobs"),
         (name = "access", description = "Keys and the audit trail, for the scope `admin`"),
         (name = "operations", description = "For operators"),
     ),

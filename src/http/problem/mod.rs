@@ -110,6 +110,13 @@ impl Problem {
         self
     }
 
+    /// Says that the field concerned is inside of the field `outer`.
+    #[must_use]
+    pub fn within(mut self, outer: &str) -> Self {
+        self.body.field = self.body.field.map(|field| format!("{outer}.{field}"));
+        self
+    }
+
     /// Says what to do about it.
     #[must_use]
     pub fn fix(mut self, fix: impl Into<String>) -> Self {

@@ -1,0 +1,58 @@
+//! How attempts to deliver end.
+
+use reqwest::StatusCode;
+
+/// How an attempt ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AttemptOutcome {
+    /// The receiver answered 2xx.
+    Delivered(u16),
+    /// It answered 410: it wants no more.
+    Gone,
+    /// It answered something else. Redirects are not followed.
+    Rejected(u16),
+    /// It did not answer in time.
+    TimedOut,
+    /// There was no connection, or it broke, or its TLS failed.
+    Unreachable,
+    /// The guard did not let it pass.
+    Refused,
+}
+
+impl AttemptOutcome {
+    /// The names of all outcomes.
+    pub const NAMES: [&'static str; 6] = [
+        "delivered",
+        "gone",
+        "rejected",
+        "timed-out",
+        "unreachable",
+        "refused",
+    ];
+
+    /// Its place among [`AttemptOutcome::NAMES`].
+    pub(super) fn index(self) -> usize {
+        match self {
+            AttemptOutcome::Delivered(_) => 0,
+            AttemptOutcome::Gone => 1,
+            AttemptOutcome::Rejected(_) => 2,
+            AttemptOutcome::TimedOut => 3,
+            AttemptOutcome::Unreachable => 4,
+            AttemptOutcome::Refused => 5,
+        }
+    }
+
+    /// Its name in answers, metrics and the database.
+    pub fn as_str(self) -> &'static str {
+        Self::NAMES[self.index()]
+    }
+
+    /// The status of the receiver's answer.
+    pub fn status(self) -> Option<u16> {
+        match self {
+            AttemptOutcome::Delivered(status) | AttemptOutcome::Rejected(status) => Some(status),
+            AttemptOutcome::Gone => Some(StatusCode::GONE.as_u16()),
+            _ => None,
+        }
+    }
+}

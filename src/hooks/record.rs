@@ -1,0 +1,222 @@
+//! Deliveries and endpoints, and the trait that a database implements.
+
+use super::{AttemptOutcome, HookEvent, SigningSecret};
+use crate::jobs::{StoreResult, Tenant, Timestamp};
+use async_trait::async_trait;
+
+/// How far a delivery has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DeliveryState {
+    /// It will be tried.
+    Pending,
+    /// The receiver took it.
+    Delivered,
+    /// It was given up.
+    Dead,
+}
+
+impl DeliveryState {
+    /// Every state.
+    pub const ALL: [DeliveryState; 3] = [
+        DeliveryState::Pending,
+        DeliveryState::Delivered,
+        DeliveryState::Dead,
+    ];
+
+    /// Its name in answers and in the database.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            DeliveryState::Pending => "pending",
+            DeliveryState::Delivered => "delivered",
+            DeliveryState::Dead => "dead",
+        }
+    }
+
+    /// The state of that name.
+    pub fn parse(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|state| state.as_str() == name)
+    }
+}
+
+/// A delivery, for people who ask what became of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Delivery {
+    /// `msg_...`; the header `webhook-id` of every attempt.
+    pub id: String,
+    /// The job it tells of.
+    pub job: String,
+    /// The registered endpoint; `None` for the job's own webhook.
+    pub endpoint: Option<String>,
+    /// Where it goes.
+    pub url: String,
+    /// What it tells.
+    pub event: HookEvent,
+    /// How far it has come.
+    pub state: DeliveryState,
+    /// Number of attempts.
+    pub attempts: u32,
+    /// When the event happened.
+    pub occurred_at: Timestamp,
+    /// When it will be tried next; only while it is pending.
+    pub next_attempt_at: Option<Timestamp>,
+    /// When it was tried last.
+    pub last_attempt_at: Option<Timestamp>,
+    /// The status of the receiver's last answer.
+    pub last_status: Option<u16>,
+    /// How the last attempt ended.
+    pub last_outcome: Option<String>,
+}
+
+/// A delivery whose time has come, with all that its attempt needs.
+#[derive(Debug, Clone)]
+pub struct DueDelivery {
+    /// See [`Delivery::id`].
+    pub id: String,
+    /// Whose job it is.
+    pub tenant: Tenant,
+    /// See [`Delivery::job`].
+    pub job: String,
+    /// See [`Delivery::url`].
+    pub url: String,
+    /// What signs it: its own secret, its endpoint's, or its tenant's. Empty if the tenant has none.
+    pub secrets: Vec<SigningSecret>,
+    /// See [`Delivery::event`].
+    pub event: HookEvent,
+    /// The kind of the job.
+    pub kind: String,
+    /// Id of the product that the job made.
+    pub result: Option<String>,
+    /// Why it failed: the code of the failure.
+    pub cause: Option<String>,
+    /// How often a worker had started the job.
+    pub run: u32,
+    /// See [`Delivery::occurred_at`].
+    pub occurred_at: Timestamp,
+    /// Attempts before this one.
+    pub attempts: u32,
+    /// From when its age counts.
+    pub since: Timestamp,
+}
+
+/// What to write down after an attempt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settlement {
+    /// How the attempt ended.
+    pub outcome: AttemptOutcome,
+    /// When to try again; `None` if this was the last attempt.
+    pub again_at: Option<Timestamp>,
+}
+
+/// A receiver that is told about every job of its tenant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HookEndpoint {
+    /// `whk_...`
+    pub id: String,
+    /// Whose jobs it is told about.
+    pub tenant: Tenant,
+    /// When it was registered.
+    pub created_at: Timestamp,
+    /// Where it is.
+    pub url: String,
+    /// Scheme, host and port of the URL: what shares one place in the order of sending.
+    pub destination: String,
+    /// What it is told.
+    pub events: Vec<HookEvent>,
+    /// Since when it answers 410 and is not told any more.
+    pub gone_at: Option<Timestamp>,
+}
+
+/// How much is kept of deliveries.
+#[derive(Debug, Clone, Copy)]
+pub struct DeliveryLimits {
+    /// Pending deliveries that happened before this are given up.
+    pub pending_since: Timestamp,
+    /// Deliveries that ended before this are deleted.
+    pub ended_since: Timestamp,
+    /// Most pending deliveries of one destination; the oldest beyond that are given up.
+    pub backlog: u32,
+}
+
+/// How much waits to be told.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Backlog {
+    /// Number of pending deliveries.
+    pub pending: u64,
+    /// When the oldest of them happened.
+    pub oldest: Option<Timestamp>,
+    /// Number of dead deliveries that are still kept.
+    pub dead: u64,
+}
+
+/// The tables of webhooks. Every method is one transaction and fails only if the database does.
+#[async_trait]
+pub trait DeliveryStore: Send + Sync + 'static {
+    /// The destinations that have pending deliveries, each with the time when the first is due.
+    async fn destinations(&self) -> StoreResult<Vec<(String, Timestamp)>>;
+
+    /// The deliveries of a destination that are due, the longest due first.
+    async fn due(
+        &self,
+        destination: &str,
+        now: Timestamp,
+        limit: usize,
+    ) -> StoreResult<Vec<DueDelivery>>;
+
+    /// Writes down how an attempt ended. After [`AttemptOutcome::Gone`] the endpoint is not told
+    /// any more, and what it has not been told is given up.
+    async fn settle(&self, id: &str, settled: Settlement, now: Timestamp) -> StoreResult<()>;
+
+    /// Gives up and deletes deliveries beyond the limits; returns how many were given up.
+    async fn expire(&self, limits: DeliveryLimits, now: Timestamp) -> StoreResult<u64>;
+
+    /// How much waits to be told.
+    async fn backlog(&self) -> StoreResult<Backlog>;
+
+    /// The deliveries of a tenant's job, the newest first, at most `limit`.
+    async fn deliveries(
+        &self,
+        tenant: &Tenant,
+        job: &str,
+        limit: u32,
+    ) -> StoreResult<Vec<Delivery>>;
+
+    /// Makes an ended delivery pending again, due at once. Returns it as it is then; `None` if
+    /// that job has no such delivery.
+    async fn redeliver(
+        &self,
+        tenant: &Tenant,
+        job: &str,
+        id: &str,
+        now: Timestamp,
+    ) -> StoreResult<Option<Delivery>>;
+
+    /// Registers an endpoint, unless its tenant has `limit` of them. Returns whether it did.
+    async fn add_endpoint(
+        &self,
+        endpoint: &HookEndpoint,
+        secret: &SigningSecret,
+        limit: u32,
+    ) -> StoreResult<bool>;
+
+    /// The endpoints of a tenant, the oldest first.
+    async fn endpoints(&self, tenant: &Tenant) -> StoreResult<Vec<HookEndpoint>>;
+
+    /// Removes an endpoint and gives up what it has not been told. Returns whether it was there.
+    async fn remove_endpoint(&self, tenant: &Tenant, id: &str, now: Timestamp)
+    -> StoreResult<bool>;
+
+    /// The tenant's signing secret, which is `fresh` if it had none.
+    async fn signing_secret(
+        &self,
+        tenant: &Tenant,
+        fresh: &SigningSecret,
+    ) -> StoreResult<SigningSecret>;
+
+    /// Makes `fresh` the tenant's signing secret. The one before signs too until `former_until`.
+    async fn replace_secret(
+        &self,
+        tenant: &Tenant,
+        fresh: &SigningSecret,
+        former_until: Timestamp,
+    ) -> StoreResult<()>;
+}

@@ -1,0 +1,394 @@
+//! The tables of webhooks in SQLite. Deliveries are written by a trigger of the jobs table; see the
+//! migration.
+
+use super::rows;
+use super::sqlite::SqliteStore;
+use crate::hooks::{
+    AttemptOutcome, Backlog, Delivery, DeliveryLimits, DeliveryState, DeliveryStore, DueDelivery,
+    HookEndpoint, HookEvent, Settlement, SigningSecret,
+};
+use crate::jobs::{StoreResult, Tenant, Timestamp};
+use async_trait::async_trait;
+use sqlx::Row;
+use sqlx::sqlite::{SqliteConnection, SqliteRow};
+
+/// `last_outcome` of deliveries that were given up without an attempt.
+const TOO_OLD: &str = "too-old";
+const TOO_MANY: &str = "too-many";
+const ENDPOINT_REMOVED: &str = "endpoint-removed";
+
+#[async_trait]
+impl DeliveryStore for SqliteStore {
+    async fn destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
+        // Jumps through the index from destination to destination.
+        let rows = sqlx::query(
+            "WITH RECURSIVE found (name) AS (
+                 SELECT min(destination) FROM deliveries WHERE state = 'pending'
+                 UNION ALL
+                 SELECT (SELECT min(destination) FROM deliveries
+                         WHERE state = 'pending' AND destination > found.name)
+                 FROM found WHERE found.name IS NOT NULL)
+             SELECT name, (SELECT min(next_attempt_at) FROM deliveries
+                           WHERE state = 'pending' AND destination = name)
+             FROM found WHERE name IS NOT NULL",
+        )
+        .fetch_all(&self.readers)
+        .await?;
+        rows.iter()
+            .map(|row| Ok((row.try_get(0)?, row.try_get(1)?)))
+            .collect()
+    }
+
+    async fn due(
+        &self,
+        destination: &str,
+        now: Timestamp,
+        limit: usize,
+    ) -> StoreResult<Vec<DueDelivery>> {
+        let rows = sqlx::query(
+            "SELECT d.*, e.secret AS endpoint_secret, s.secret AS tenant_secret,
+                    CASE WHEN s.former_until > ?2 THEN s.former END AS former_secret
+             FROM deliveries AS d
+             LEFT JOIN webhook_endpoints AS e ON e.id = d.endpoint
+             LEFT JOIN webhook_secrets AS s ON s.tenant = d.tenant
+             WHERE d.state = 'pending' AND d.destination = ?1 AND d.next_attempt_at <= ?2
+             ORDER BY d.next_attempt_at LIMIT ?3",
+        )
+        .bind(destination)
+        .bind(now)
+        .bind(i64::try_from(limit).unwrap_or(i64::MAX))
+        .fetch_all(&self.readers)
+        .await?;
+        rows::all(rows, due_delivery)
+    }
+
+    async fn settle(&self, id: &str, settled: Settlement, now: Timestamp) -> StoreResult<()> {
+        let state = match (settled.outcome, settled.again_at) {
+            (AttemptOutcome::Delivered(_), _) => DeliveryState::Delivered,
+            (_, Some(_)) => DeliveryState::Pending,
+            (_, None) => DeliveryState::Dead,
+        };
+        let ended = (state != DeliveryState::Pending).then_some(now);
+        let mut transaction = self.writer.begin().await?;
+        sqlx::query(
+            "UPDATE deliveries SET state = ?1, attempts = attempts + 1, last_attempt_at = ?2,
+                    last_status = ?3, last_outcome = ?4, ended_at = ?5,
+                    next_attempt_at = coalesce(?6, next_attempt_at)
+             WHERE id = ?7 AND state = 'pending'",
+        )
+        .bind(state.as_str())
+        .bind(now)
+        .bind(settled.outcome.status())
+        .bind(settled.outcome.as_str())
+        .bind(ended)
+        .bind(settled.again_at)
+        .bind(id)
+        .execute(&mut *transaction)
+        .await?;
+        if settled.outcome == AttemptOutcome::Gone {
+            let endpoint: Option<String> = sqlx::query(
+                "UPDATE webhook_endpoints SET gone_at = ?1
+                 WHERE id = (SELECT endpoint FROM deliveries WHERE id = ?2) RETURNING id",
+            )
+            .bind(now)
+            .bind(id)
+            .fetch_optional(&mut *transaction)
+            .await?
+            .map(|row| row.get(0));
+            if let Some(endpoint) = endpoint {
+                give_up(&mut transaction, &endpoint, settled.outcome.as_str(), now).await?;
+            }
+        }
+        transaction.commit().await?;
+        Ok(())
+    }
+
+    async fn expire(&self, limits: DeliveryLimits, now: Timestamp) -> StoreResult<u64> {
+        let mut transaction = self.writer.begin().await?;
+        let old = sqlx::query(
+            "UPDATE deliveries SET state = 'dead', ended_at = ?1,
+                    last_outcome = coalesce(last_outcome, ?2)
+             WHERE state = 'pending' AND since < ?3",
+        )
+        .bind(now)
+        .bind(TOO_OLD)
+        .bind(limits.pending_since)
+        .execute(&mut *transaction)
+        .await?
+        .rows_affected();
+        let many = sqlx::query(
+            "UPDATE deliveries SET state = 'dead', ended_at = ?1,
+                    last_outcome = coalesce(last_outcome, ?2)
+             WHERE sequence IN (
+                 SELECT sequence FROM (
+                     SELECT sequence, row_number() OVER
+                         (PARTITION BY destination ORDER BY since DESC, sequence DESC) AS place
+                     FROM deliveries WHERE state = 'pending')
+                 WHERE place > ?3)",
+        )
+        .bind(now)
+        .bind(TOO_MANY)
+        .bind(limits.backlog)
+        .execute(&mut *transaction)
+        .await?
+        .rows_affected();
+        sqlx::query("DELETE FROM deliveries WHERE state != 'pending' AND ended_at < ?")
+            .bind(limits.ended_since)
+            .execute(&mut *transaction)
+            .await?;
+        transaction.commit().await?;
+        Ok(old + many)
+    }
+
+    async fn backlog(&self) -> StoreResult<Backlog> {
+        let row = sqlx::query(
+            "SELECT (SELECT count(*) FROM deliveries WHERE state = 'pending'),
+                    (SELECT min(since) FROM deliveries WHERE state = 'pending'),
+                    (SELECT count(*) FROM deliveries WHERE state = 'dead')",
+        )
+        .fetch_one(&self.readers)
+        .await?;
+        let count = |column: usize| u64::try_from(row.get::<i64, _>(column)).unwrap_or(0);
+        Ok(Backlog {
+            pending: count(0),
+            oldest: row.try_get(1)?,
+            dead: count(2),
+        })
+    }
+
+    async fn deliveries(
+        &self,
+        tenant: &Tenant,
+        job: &str,
+        limit: u32,
+    ) -> StoreResult<Vec<Delivery>> {
+        let rows = sqlx::query(
+            "SELECT * FROM deliveries WHERE job = ?1 AND tenant = ?2
+             ORDER BY sequence DESC LIMIT ?3",
+        )
+        .bind(job)
+        .bind(tenant.as_str())
+        .bind(limit)
+        .fetch_all(&self.readers)
+        .await?;
+        rows::all(rows, delivery)
+    }
+
+    async fn redeliver(
+        &self,
+        tenant: &Tenant,
+        job: &str,
+        id: &str,
+        now: Timestamp,
+    ) -> StoreResult<Option<Delivery>> {
+        let mut transaction = self.writer.begin().await?;
+        sqlx::query(
+            "UPDATE deliveries SET state = 'pending', attempts = 0, since = ?1,
+                    next_attempt_at = ?1, ended_at = NULL
+             WHERE id = ?2 AND job = ?3 AND tenant = ?4 AND state != 'pending'",
+        )
+        .bind(now)
+        .bind(id)
+        .bind(job)
+        .bind(tenant.as_str())
+        .execute(&mut *transaction)
+        .await?;
+        let row = sqlx::query("SELECT * FROM deliveries WHERE id = ? AND job = ? AND tenant = ?")
+            .bind(id)
+            .bind(job)
+            .bind(tenant.as_str())
+            .fetch_optional(&mut *transaction)
+            .await?;
+        transaction.commit().await?;
+        row.map(delivery).transpose()
+    }
+
+    async fn add_endpoint(
+        &self,
+        endpoint: &HookEndpoint,
+        secret: &SigningSecret,
+        limit: u32,
+    ) -> StoreResult<bool> {
+        let events: Vec<&str> = endpoint.events.iter().map(|e| e.as_str()).collect();
+        let mut transaction = self.writer.begin().await?;
+        let done = sqlx::query(
+            "INSERT INTO webhook_endpoints (id, tenant, created_at, url, destination, events, secret)
+             SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7
+             WHERE (SELECT count(*) FROM webhook_endpoints WHERE tenant = ?2) < ?8",
+        )
+        .bind(&endpoint.id)
+        .bind(endpoint.tenant.as_str())
+        .bind(endpoint.created_at)
+        .bind(&endpoint.url)
+        .bind(&endpoint.destination)
+        .bind(rows::to_json(&events)?)
+        .bind(secret.reveal())
+        .bind(limit)
+        .execute(&mut *transaction)
+        .await?;
+        transaction.commit().await?;
+        Ok(done.rows_affected() > 0)
+    }
+
+    async fn endpoints(&self, tenant: &Tenant) -> StoreResult<Vec<HookEndpoint>> {
+        let rows =
+            sqlx::query("SELECT * FROM webhook_endpoints WHERE tenant = ? ORDER BY sequence")
+                .bind(tenant.as_str())
+                .fetch_all(&self.readers)
+                .await?;
+        rows::all(rows, endpoint)
+    }
+
+    async fn remove_endpoint(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        now: Timestamp,
+    ) -> StoreResult<bool> {
+        let mut transaction = self.writer.begin().await?;
+        let done = sqlx::query("DELETE FROM webhook_endpoints WHERE id = ? AND tenant = ?")
+            .bind(id)
+            .bind(tenant.as_str())
+            .execute(&mut *transaction)
+            .await?;
+        let removed = done.rows_affected() > 0;
+        if removed {
+            give_up(&mut transaction, id, ENDPOINT_REMOVED, now).await?;
+        }
+        transaction.commit().await?;
+        Ok(removed)
+    }
+
+    async fn signing_secret(
+        &self,
+        tenant: &Tenant,
+        fresh: &SigningSecret,
+    ) -> StoreResult<SigningSecret> {
+        let mut transaction = self.writer.begin().await?;
+        sqlx::query(
+            "INSERT INTO webhook_secrets (tenant, secret) VALUES (?, ?)
+             ON CONFLICT (tenant) DO NOTHING",
+        )
+        .bind(tenant.as_str())
+        .bind(fresh.reveal())
+        .execute(&mut *transaction)
+        .await?;
+        let row = sqlx::query("SELECT secret FROM webhook_secrets WHERE tenant = ?")
+            .bind(tenant.as_str())
+            .fetch_one(&mut *transaction)
+            .await?;
+        transaction.commit().await?;
+        let stored: &str = row.try_get(0)?;
+        Ok(stored.parse().unwrap_or_else(|_| fresh.clone()))
+    }
+
+    async fn replace_secret(
+        &self,
+        tenant: &Tenant,
+        fresh: &SigningSecret,
+        former_until: Timestamp,
+    ) -> StoreResult<()> {
+        let mut transaction = self.writer.begin().await?;
+        sqlx::query(
+            "INSERT INTO webhook_secrets (tenant, secret) VALUES (?1, ?2)
+             ON CONFLICT (tenant) DO UPDATE SET former = secret, former_until = ?3, secret = ?2",
+        )
+        .bind(tenant.as_str())
+        .bind(fresh.reveal())
+        .bind(former_until)
+        .execute(&mut *transaction)
+        .await?;
+        transaction.commit().await?;
+        Ok(())
+    }
+}
+
+/// Gives up what an endpoint has not been told.
+async fn give_up(
+    connection: &mut SqliteConnection,
+    endpoint: &str,
+    why: &str,
+    now: Timestamp,
+) -> StoreResult<()> {
+    sqlx::query(
+        "UPDATE deliveries SET state = 'dead', ended_at = ?, last_outcome = ?
+         WHERE endpoint = ? AND state = 'pending'",
+    )
+    .bind(now)
+    .bind(why)
+    .bind(endpoint)
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+fn due_delivery(row: SqliteRow) -> StoreResult<DueDelivery> {
+    let secret = |column: &str| -> StoreResult<Option<SigningSecret>> {
+        let text: Option<&str> = row.try_get(column)?;
+        Ok(text.and_then(|text| text.parse().ok()))
+    };
+    let own = secret("secret")?.or(secret("endpoint_secret")?);
+    let secrets = match own {
+        Some(own) => vec![own],
+        None => [secret("tenant_secret")?, secret("former_secret")?]
+            .into_iter()
+            .flatten()
+            .collect(),
+    };
+    Ok(DueDelivery {
+        id: row.try_get("id")?,
+        tenant: rows::tenant(&row)?,
+        job: row.try_get("job")?,
+        url: row.try_get("url")?,
+        secrets,
+        event: event(row.try_get("event")?),
+        kind: row.try_get("kind")?,
+        result: row.try_get("result")?,
+        cause: row.try_get("cause")?,
+        run: count(&row, "run")?,
+        occurred_at: row.try_get("occurred_at")?,
+        attempts: count(&row, "attempts")?,
+        since: row.try_get("since")?,
+    })
+}
+
+fn delivery(row: SqliteRow) -> StoreResult<Delivery> {
+    let state = DeliveryState::parse(row.try_get("state")?).unwrap_or(DeliveryState::Dead);
+    let next_attempt_at: Timestamp = row.try_get("next_attempt_at")?;
+    Ok(Delivery {
+        id: row.try_get("id")?,
+        job: row.try_get("job")?,
+        endpoint: row.try_get("endpoint")?,
+        url: row.try_get("url")?,
+        event: event(row.try_get("event")?),
+        state,
+        attempts: count(&row, "attempts")?,
+        occurred_at: row.try_get("occurred_at")?,
+        next_attempt_at: (state == DeliveryState::Pending).then_some(next_attempt_at),
+        last_attempt_at: row.try_get("last_attempt_at")?,
+        last_status: row.try_get("last_status")?,
+        last_outcome: row.try_get("last_outcome")?,
+    })
+}
+
+fn endpoint(row: SqliteRow) -> StoreResult<HookEndpoint> {
+    let events: Vec<String> = rows::json(&row, "events")?;
+    Ok(HookEndpoint {
+        id: row.try_get("id")?,
+        tenant: rows::tenant(&row)?,
+        created_at: row.try_get("created_at")?,
+        url: row.try_get("url")?,
+        destination: row.try_get("destination")?,
+        events: events.iter().filter_map(|e| HookEvent::parse(e)).collect(),
+        gone_at: row.try_get("gone_at")?,
+    })
+}
+
+/// The event of that name; the trigger writes no others.
+fn event(name: &str) -> HookEvent {
+    HookEvent::parse(name).unwrap_or(HookEvent::Failed)
+}
+
+fn count(row: &SqliteRow, column: &str) -> StoreResult<u32> {
+    Ok(u32::try_from(row.try_get::<i64, _>(column)?).unwrap_or(u32::MAX))
+}
