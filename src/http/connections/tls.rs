@@ -35,14 +35,20 @@ const LOOK_EVERY: Duration = Duration::from_secs(5);
 /// The first byte of a TLS handshake (RFC 8446, section 5.1).
 const HANDSHAKE: u8 = 22;
 
-/// The answer to plain HTTP.
-const PLAIN_HTTP: &str = "HTTP/1.1 400 Bad Request\r\n\
-    content-type: application/problem+json\r\n\
-    content-length: 191\r\n\
-    connection: close\r\n\r\n\
-    {\"type\":\"urn:ventriform:problem:tls-required\",\"title\":\"Tls required\",\"status\":400,\
+/// The body of the answer to plain HTTP.
+const PLAIN_HTTP: &str = "{\"type\":\"urn:ventriform:problem:tls-required\",\
+    \"title\":\"Tls required\",\"status\":400,\
     \"detail\":\"This port speaks TLS, and the request came in plain HTTP.\",\
     \"fix\":\"Use https instead of http.\"}\n";
+
+/// The answer to plain HTTP.
+fn plain_http() -> String {
+    format!(
+        "HTTP/1.1 400 Bad Request\r\ncontent-type: application/problem+json\r\n\
+         content-length: {}\r\nconnection: close\r\n\r\n{PLAIN_HTTP}",
+        PLAIN_HTTP.len()
+    )
+}
 
 /// Why TLS cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -127,7 +133,7 @@ impl Tls {
     ) -> io::Result<Option<TlsStream<WatchedStream<TcpStream>>>> {
         let mut first = [0];
         if stream.get_ref().peek(&mut first).await? == 1 && first[0] != HANDSHAKE {
-            stream.write_all(PLAIN_HTTP.as_bytes()).await?;
+            stream.write_all(plain_http().as_bytes()).await?;
             stream.shutdown().await?;
             // Unread bytes would make the system reset the connection before the client has read
             // the answer.
@@ -317,12 +323,9 @@ mod tests {
 
     #[test]
     fn the_answer_to_plain_http_is_complete() {
-        let (head, body) = PLAIN_HTTP.split_once("\r\n\r\n").unwrap();
-        assert!(
-            head.contains(&format!("content-length: {}\r\n", body.len())),
-            "{}",
-            body.len()
-        );
+        let answer = plain_http();
+        let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+        assert!(head.contains(&format!("content-length: {}\r\n", body.len())));
         let body: serde_json::Value = serde_json::from_str(body).unwrap();
         assert_eq!(body["type"], "urn:ventriform:problem:tls-required");
     }
