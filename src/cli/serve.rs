@@ -210,8 +210,11 @@ mod tests {
         let mut command = ServeArgs::augment_args(Command::new("serve")).term_width(0);
         let help = command.render_long_help().to_string();
         for row in Settings::ROWS {
-            let start = help
-                .find(&format!("{} <", row.flag()))
+            // Switches may have a value: `--flag [<VALUE>]`.
+            let value = [" <", " [<"].map(|value| format!("{}{value}", row.flag()));
+            let start = value
+                .iter()
+                .find_map(|text| help.find(text))
                 .unwrap_or_else(|| panic!("{} is missing", row.flag()));
             let text = help[start..].lines().take(2).collect::<Vec<_>>().join(" ");
             assert!(row.summary().len() > 10, "{}", row.name);
