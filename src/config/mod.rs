@@ -12,7 +12,7 @@ mod units;
 
 pub use units::{
     Auto, Count, Keyword, Limit, LogFormat, Networks, NoLimit, Off, OptionalPath, OrKeyword,
-    Retention, Size, Span, Words,
+    OtlpEndpoint, Retention, Size, Span, Words,
 };
 
 use crate::hooks::AllowList;
@@ -24,6 +24,9 @@ use std::str::FromStr;
 
 /// The prefix of every environment variable.
 pub const VARIABLE_PREFIX: &str = "VENTRIFORM_";
+
+/// The standard variable of OpenTelemetry for `otlp_endpoint`.
+const OTLP_VARIABLE: &str = "OTEL_EXPORTER_OTLP_ENDPOINT";
 
 /// Why the settings cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -341,6 +344,11 @@ settings! {
     /// Largest number of registered webhooks of one tenant
     webhook_endpoint_limit: u32 = "20";
 
+    ["Traces"]
+    /// Address of an OpenTelemetry collector (OTLP over HTTP), such as http://127.0.0.1:4318; the
+    /// variable OTEL_EXPORTER_OTLP_ENDPOINT is read too. `off` sends no traces
+    otlp_endpoint: OtlpEndpoint = "off";
+
     ["Shutdown and log"]
     /// After SIGTERM or Ctrl-C: time for running jobs to end before they return to the queue
     shutdown_grace: Span = "30s";
@@ -379,7 +387,14 @@ impl Settings {
         let layers = Layers {
             variables: Settings::NAMES
                 .iter()
-                .filter_map(|name| Some((*name, variable(&variable_name(name))?)))
+                .filter_map(|name| {
+                    let own = variable(&variable_name(name));
+                    let value = own.or_else(|| match *name {
+                        "otlp_endpoint" => variable(OTLP_VARIABLE).filter(|v| !v.is_empty()),
+                        _ => None,
+                    });
+                    Some((*name, value?))
+                })
                 .collect(),
             file: match path {
                 Some(path) => read_file(&path)?,
@@ -502,6 +517,7 @@ macro_rules! shown_by_display {
 
 shown_by_display!(
     AllowList,
+    OtlpEndpoint,
     SocketAddr,
     Count,
     Span,
@@ -557,6 +573,16 @@ mod tests {
         assert_eq!(settings.lease, "6s".parse().unwrap());
         assert_eq!(settings.parts_limit, 7);
         assert_eq!(settings.listen.port(), 8080);
+    }
+
+    #[test]
+    fn the_collector_is_also_read_from_the_standard_variable() {
+        let standard = ("OTEL_EXPORTER_OTLP_ENDPOINT", "http://c:4318");
+        let own = ("VENTRIFORM_OTLP_ENDPOINT", "off");
+        let endpoint = |variables: &[_]| load(Flags::default(), variables, None).unwrap().0;
+        let set = endpoint(&[standard]).otlp_endpoint;
+        assert_eq!(set.0.as_deref(), Some("http://c:4318"));
+        assert_eq!(endpoint(&[standard, own]).otlp_endpoint.0, None);
     }
 
     #[test]

@@ -134,6 +134,9 @@ pub type Count = OrKeyword<NonZeroUsize, Auto>;
 /// How long results are kept; `off` keeps them until they are deleted.
 pub type Retention = OrKeyword<Span, Off>;
 
+/// The address of a collector; `off` is none.
+pub type OtlpEndpoint = OrKeyword<String, Off>;
+
 impl Count {
     /// The number; `auto` is replaced by the given one, at least 1.
     pub fn or(self, auto: usize) -> usize {

@@ -4,10 +4,11 @@ use super::decoding::Decoding;
 use super::guard::state::Guard;
 use super::hooks::Hooks;
 use super::metrics::Metrics;
+use super::spans::Spans;
 use super::streams::EventStreams;
 use crate::access::AccessStore;
 use crate::config::Settings;
-use crate::jobs::Queue;
+use crate::jobs::{FigureStore, Queue};
 use crate::work::Engine;
 use std::sync::Arc;
 use tokio_util::sync::CancellationToken;
@@ -38,6 +39,20 @@ pub struct Shared {
     pub hooks: Hooks,
     /// Figures for operators.
     pub metrics: Metrics,
+    /// Figures that only the database knows.
+    pub figures: Arc<dyn FigureStore>,
+    /// Traces of requests.
+    pub spans: Spans,
+}
+
+/// How operators watch the service.
+pub struct Watching {
+    /// See [`Shared::metrics`].
+    pub metrics: Metrics,
+    /// See [`Shared::figures`].
+    pub figures: Arc<dyn FigureStore>,
+    /// See [`Shared::spans`].
+    pub spans: Spans,
 }
 
 impl App {
@@ -48,6 +63,7 @@ impl App {
         (access, guard): (Arc<dyn AccessStore>, Guard),
         settings: Settings,
         hooks: Hooks,
+        watching: Watching,
         closing: CancellationToken,
     ) -> Self {
         Self(Arc::new(Shared {
@@ -60,7 +76,9 @@ impl App {
             settings,
             hooks,
             closing,
-            metrics: Metrics::new(),
+            metrics: watching.metrics,
+            figures: watching.figures,
+            spans: watching.spans,
         }))
     }
 }

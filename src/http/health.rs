@@ -1,6 +1,7 @@
 //! `/healthz`, `/readyz` and `/metrics`, for operators.
 
 use super::app::App;
+use super::metrics::MetricReadings;
 use super::openapi::ListProblems;
 use super::problem::{Answer, Problem};
 use super::request::{query_pairs, refuse_unknown};
@@ -68,8 +69,16 @@ pub async fn ready(State(app): State<App>, RawQuery(query): RawQuery) -> Answer<
         content_type = "text/plain"), ListProblems))]
 pub async fn metrics(State(app): State<App>, RawQuery(query): RawQuery) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let load = app.queue.jobs.load().await?;
-    let text = app.metrics.text(&load).map_err(Problem::internal)?;
+    let reading = MetricReadings {
+        load: app.queue.jobs.load().await?,
+        figures: app.figures.queue_figures().await?,
+        backlog: app.hooks.store.backlog().await?,
+        sent: app.hooks.dispatcher.counts(),
+        ready: app.queue.blobs.check().await.is_ok(),
+        settings: &app.settings,
+        now: app.queue.clock.now(),
+    };
+    let text = app.metrics.text(&reading);
     let media_type = format!("{}; charset=utf-8", prometheus::TEXT_FORMAT);
     Ok(([(header::CONTENT_TYPE, media_type)], text).into_response())
 }

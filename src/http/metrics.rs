@@ -1,17 +1,141 @@
 //! Figures for Prometheus.
+//!
+//! Counters and histograms are counted where things happen; gauges are read when somebody asks.
+//! Names follow Prometheus: base units, `_total` for counters. Every label has a fixed set of
+//! values: the pattern of a path and never the path, the code of a failure and never its text.
 
-use crate::jobs::QueueLoad;
-use axum::http::StatusCode;
-use prometheus::{Gauge, IntCounterVec, IntGaugeVec, Opts, Registry, TextEncoder};
+use crate::config::Settings;
+use crate::hooks::{Backlog, DeliveryCounts};
+use crate::jobs::{QueueFigures, QueueLoad, Timestamp};
+use crate::store::disk_space;
+use prometheus::core::Collector;
+use prometheus::{
+    Encoder, Gauge, HistogramOpts, HistogramVec, IntCounter, IntCounterVec, IntGauge, IntGaugeVec,
+    Opts, Registry, TextEncoder,
+};
+use std::path::Path;
 use std::time::Instant;
+
+type Made<T> = Result<T, prometheus::Error>;
+
+/// Upper bounds of an answer's time, seconds.
+const ANSWER_SECONDS: [f64; 12] = [
+    0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0, 30.0,
+];
+
+/// Upper bounds of the time of jobs and stages, seconds.
+const JOB_SECONDS: [f64; 13] = [
+    0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 3600.0,
+];
 
 /// The metrics of one service.
 pub struct Metrics {
     registry: Registry,
-    jobs: IntGaugeVec,
-    answers: IntCounterVec,
-    uptime: Gauge,
+    /// Requests.
+    pub requests: RequestMetrics,
+    /// Jobs, as they change.
+    pub jobs: JobMetrics,
+    stored: Gauges,
     started: Instant,
+}
+
+/// Figures on requests.
+#[derive(Clone)]
+pub struct RequestMetrics {
+    /// Answers by method, route and status.
+    pub answers: IntCounterVec,
+    /// Time until an answer began, by method, route and class of status.
+    pub durations: HistogramVec,
+    /// Requests without an answer yet.
+    pub in_flight: IntGauge,
+    /// Requests whose client went away before the answer.
+    pub abandoned: IntCounter,
+    /// Bytes of bodies that arrived.
+    pub received: IntCounter,
+    /// Bytes of bodies that were sent.
+    pub sent: IntCounter,
+}
+
+/// Figures on jobs.
+#[derive(Clone)]
+pub struct JobMetrics {
+    /// Accepted jobs by kind.
+    pub filed: IntCounterVec,
+    /// Starts by kind.
+    pub attempts: IntCounterVec,
+    /// Starts after the first, by kind.
+    pub retries: IntCounterVec,
+    /// Ended jobs by kind and state.
+    pub finished: IntCounterVec,
+    /// Failed jobs by kind and cause.
+    pub failures: IntCounterVec,
+    /// Time from filing to the first start, by kind.
+    pub waits: HistogramVec,
+    /// Time from the last start to the end, by kind and state.
+    pub durations: HistogramVec,
+    /// Time of stages, by kind and stage.
+    pub stages: HistogramVec,
+}
+
+/// What is read when somebody asks.
+struct Gauges {
+    jobs: IntGaugeVec,
+    oldest_queued: Gauge,
+    queue_limit: IntGauge,
+    items: IntGaugeVec,
+    ready: IntGauge,
+    uptime: Gauge,
+    disk_size: IntGauge,
+    disk_free: IntGauge,
+    database: IntGauge,
+    write_ahead_log: IntGauge,
+    hook_attempts: IntCounterVec,
+    hooks_given_up: IntCounter,
+    hooks_pending: IntGauge,
+    hooks_dead: IntGauge,
+    oldest_hook: Gauge,
+}
+
+/// Makes metrics and registers them.
+struct Maker<'a>(&'a Registry);
+
+impl Maker<'_> {
+    fn keep<M: Collector + Clone + 'static>(&self, metric: Made<M>) -> Made<M> {
+        let metric = metric?;
+        self.0.register(Box::new(metric.clone()))?;
+        Ok(metric)
+    }
+
+    fn counter(&self, name: &str, help: &str) -> Made<IntCounter> {
+        self.keep(IntCounter::new(name, help))
+    }
+
+    fn counters(&self, name: &str, help: &str, labels: &[&str]) -> Made<IntCounterVec> {
+        self.keep(IntCounterVec::new(Opts::new(name, help), labels))
+    }
+
+    fn whole(&self, name: &str, help: &str) -> Made<IntGauge> {
+        self.keep(IntGauge::new(name, help))
+    }
+
+    fn wholes(&self, name: &str, help: &str, labels: &[&str]) -> Made<IntGaugeVec> {
+        self.keep(IntGaugeVec::new(Opts::new(name, help), labels))
+    }
+
+    fn gauge(&self, name: &str, help: &str) -> Made<Gauge> {
+        self.keep(Gauge::new(name, help))
+    }
+
+    fn histograms(
+        &self,
+        name: &str,
+        help: &str,
+        labels: &[&str],
+        bounds: &[f64],
+    ) -> Made<HistogramVec> {
+        let options = HistogramOpts::new(name, help).buckets(bounds.to_vec());
+        self.keep(HistogramVec::new(options, labels))
+    }
 }
 
 impl Metrics {
@@ -23,48 +147,234 @@ impl Metrics {
         Self::registered().expect("the names of the metrics are valid and distinct")
     }
 
-    fn registered() -> Result<Self, prometheus::Error> {
-        let jobs = Opts::new("ventriform_jobs", "Jobs that have not ended.");
-        let answers = Opts::new(
-            "ventriform_http_answers_total",
-            "Answers by class of status.",
-        );
-        let metrics = Self {
-            registry: Registry::new(),
-            jobs: IntGaugeVec::new(jobs, &["state"])?,
-            answers: IntCounterVec::new(answers, &["class"])?,
-            uptime: Gauge::new("ventriform_uptime_seconds", "Time since the start.")?,
+    fn registered() -> Made<Self> {
+        let registry = Registry::new();
+        let make = Maker(&registry);
+        let build = make.wholes("ventriform_build_info", "Always 1.", &["version"])?;
+        build.with_label_values(&[env!("CARGO_PKG_VERSION")]).set(1);
+        #[cfg(target_os = "linux")]
+        registry.register(Box::new(
+            prometheus::process_collector::ProcessCollector::for_self(),
+        ))?;
+        Ok(Self {
+            requests: RequestMetrics::registered(&make)?,
+            jobs: JobMetrics::registered(&make)?,
+            stored: Gauges::registered(&make)?,
+            registry,
             started: Instant::now(),
-        };
-        for class in 1..=5 {
-            metrics.answers.with_label_values(&[format!("{class}xx")]);
-        }
-        metrics.registry.register(Box::new(metrics.jobs.clone()))?;
-        metrics
-            .registry
-            .register(Box::new(metrics.answers.clone()))?;
-        metrics
-            .registry
-            .register(Box::new(metrics.uptime.clone()))?;
-        Ok(metrics)
-    }
-
-    /// Counts an answer.
-    pub fn count_answer(&self, status: StatusCode) {
-        let class = format!("{}xx", status.as_u16() / 100);
-        self.answers.with_label_values(&[class]).inc();
+        })
     }
 
     /// All figures in the text format of Prometheus (version 0.0.4).
-    ///
-    /// # Errors
-    /// Never, as every metric has a value.
-    pub fn text(&self, load: &QueueLoad) -> Result<String, prometheus::Error> {
-        for (state, jobs) in [("queued", load.queued), ("running", load.running)] {
-            let jobs = i64::try_from(jobs).unwrap_or(i64::MAX);
-            self.jobs.with_label_values(&[state]).set(jobs);
-        }
-        self.uptime.set(self.started.elapsed().as_secs_f64());
-        TextEncoder::new().encode_to_string(&self.registry.gather())
+    pub fn text(&self, reading: &MetricReadings<'_>) -> String {
+        self.stored.read(reading);
+        self.stored.uptime.set(self.started.elapsed().as_secs_f64());
+        let mut text = Vec::new();
+        // Writing to memory fails only for metrics without a value, and there are none.
+        let _ = TextEncoder::new().encode(&self.registry.gather(), &mut text);
+        String::from_utf8_lossy(&text).into_owned()
     }
+}
+
+/// What is read from elsewhere when somebody asks.
+pub struct MetricReadings<'a> {
+    /// How busy the queue is.
+    pub load: QueueLoad,
+    /// What waits and what is stored.
+    pub figures: QueueFigures,
+    /// Webhooks that wait.
+    pub backlog: Backlog,
+    /// Webhooks that were sent.
+    pub sent: &'a DeliveryCounts,
+    /// Whether the storage works.
+    pub ready: bool,
+    /// The operator's settings.
+    pub settings: &'a Settings,
+    /// The time of day.
+    pub now: Timestamp,
+}
+
+impl RequestMetrics {
+    fn registered(make: &Maker<'_>) -> Made<Self> {
+        Ok(Self {
+            answers: make.counters(
+                "ventriform_http_requests_total",
+                "Answered requests by method, pattern of the path, and status.",
+                &["method", "route", "status"],
+            )?,
+            durations: make.histograms(
+                "ventriform_http_request_duration_seconds",
+                "Time until an answer began, by method, pattern of the path, and class of status.",
+                &["method", "route", "class"],
+                &ANSWER_SECONDS,
+            )?,
+            in_flight: make.whole(
+                "ventriform_http_requests_in_flight",
+                "Requests that wait for their answer to begin.",
+            )?,
+            abandoned: make.counter(
+                "ventriform_http_requests_abandoned_total",
+                "Requests whose client went away before the answer began.",
+            )?,
+            received: make.counter(
+                "ventriform_http_received_bytes_total",
+                "Bytes of the bodies of requests.",
+            )?,
+            sent: make.counter(
+                "ventriform_http_sent_bytes_total",
+                "Bytes of the bodies of answers.",
+            )?,
+        })
+    }
+}
+
+impl JobMetrics {
+    fn registered(make: &Maker<'_>) -> Made<Self> {
+        Ok(Self {
+            filed: make.counters("ventriform_jobs_filed_total", "Accepted jobs.", &["kind"])?,
+            attempts: make.counters(
+                "ventriform_job_attempts_total",
+                "Times that a worker started a job.",
+                &["kind"],
+            )?,
+            retries: make.counters(
+                "ventriform_job_retries_total",
+                "Times that a worker started a job which had been started before.",
+                &["kind"],
+            )?,
+            finished: make.counters(
+                "ventriform_jobs_finished_total",
+                "Jobs that ended, by final state.",
+                &["kind", "state"],
+            )?,
+            failures: make.counters(
+                "ventriform_job_failures_total",
+                "Jobs that failed, by cause: the last word of the problem's type.",
+                &["kind", "cause"],
+            )?,
+            waits: make.histograms(
+                "ventriform_job_wait_seconds",
+                "Time from the filing of a job to its first start.",
+                &["kind"],
+                &JOB_SECONDS,
+            )?,
+            durations: make.histograms(
+                "ventriform_job_duration_seconds",
+                "Time from the last start of a job to its end, by final state.",
+                &["kind", "state"],
+                &JOB_SECONDS,
+            )?,
+            stages: make.histograms(
+                "ventriform_job_stage_duration_seconds",
+                "Time of a stage of a job; `commit` is the storing of its result.",
+                &["kind", "stage"],
+                &JOB_SECONDS,
+            )?,
+        })
+    }
+}
+
+impl Gauges {
+    fn registered(make: &Maker<'_>) -> Made<Self> {
+        Ok(Self {
+            jobs: make.wholes("ventriform_jobs", "Jobs that have not ended.", &["state"])?,
+            oldest_queued: make.gauge(
+                "ventriform_oldest_queued_job_age_seconds",
+                "Time since the oldest waiting job was filed; 0 if none waits.",
+            )?,
+            queue_limit: make.whole(
+                "ventriform_queue_limit",
+                "Number of waiting jobs beyond which more are rejected.",
+            )?,
+            items: make.wholes("ventriform_stored_items", "Stored items.", &["kind"])?,
+            ready: make.whole("ventriform_ready", "1 if /readyz answers 200, else 0.")?,
+            uptime: make.gauge("ventriform_uptime_seconds", "Time since the start.")?,
+            disk_size: make.whole(
+                "ventriform_disk_size_bytes",
+                "Size of the disk of the data folder.",
+            )?,
+            disk_free: make.whole(
+                "ventriform_disk_free_bytes",
+                "Free space of the disk of the data folder.",
+            )?,
+            database: make.whole("ventriform_database_bytes", "Size of the database.")?,
+            write_ahead_log: make.whole(
+                "ventriform_database_wal_bytes",
+                "Size of the database's write-ahead log.",
+            )?,
+            hook_attempts: make.counters(
+                "ventriform_webhook_attempts_total",
+                "Attempts to deliver webhooks, by how they ended.",
+                &["outcome"],
+            )?,
+            hooks_given_up: make.counter(
+                "ventriform_webhooks_given_up_total",
+                "Webhook deliveries that were given up.",
+            )?,
+            hooks_pending: make.whole(
+                "ventriform_webhooks_pending",
+                "Webhook deliveries that will be tried.",
+            )?,
+            hooks_dead: make.whole(
+                "ventriform_webhooks_dead",
+                "Webhook deliveries that were given up and are still shown.",
+            )?,
+            oldest_hook: make.gauge(
+                "ventriform_oldest_webhook_age_seconds",
+                "Age of the oldest pending webhook delivery; 0 if none is pending.",
+            )?,
+        })
+    }
+
+    fn read(&self, reading: &MetricReadings<'_>) {
+        let MetricReadings {
+            load,
+            figures,
+            backlog,
+            settings,
+            now,
+            ..
+        } = reading;
+        self.ready.set(i64::from(reading.ready));
+        let age = |since: Option<i64>| since.map_or(0.0, |at| (*now - at).max(0) as f64 / 1000.0);
+        for (state, jobs) in [("queued", load.queued), ("running", load.running)] {
+            self.jobs.with_label_values(&[state]).set(signed(jobs));
+        }
+        self.oldest_queued.set(age(figures.oldest_queued_at));
+        self.queue_limit.set(signed(settings.queue_limit as u64));
+        for (kind, count) in &figures.items {
+            self.items
+                .with_label_values(&[kind.noun()])
+                .set(signed(*count));
+        }
+        let folder = &settings.data_dir;
+        if let Some(space) = disk_space(folder) {
+            self.disk_size.set(signed(space.1));
+            self.disk_free.set(signed(space.0));
+        }
+        self.database.set(size_of(&folder.join("ventriform.db")));
+        self.write_ahead_log
+            .set(size_of(&folder.join("ventriform.db-wal")));
+        for (outcome, count) in reading.sent.attempts() {
+            raise(&self.hook_attempts.with_label_values(&[outcome]), count);
+        }
+        raise(&self.hooks_given_up, reading.sent.given_up());
+        self.hooks_pending.set(signed(backlog.pending));
+        self.hooks_dead.set(signed(backlog.dead));
+        self.oldest_hook.set(age(backlog.oldest));
+    }
+}
+
+/// Raises a counter to a count that is kept elsewhere.
+fn raise(counter: &IntCounter, count: u64) {
+    counter.inc_by(count.saturating_sub(counter.get()));
+}
+
+fn signed(count: u64) -> i64 {
+    i64::try_from(count).unwrap_or(i64::MAX)
+}
+
+/// The length of a file; 0 if there is none.
+fn size_of(path: &Path) -> i64 {
+    std::fs::metadata(path).map_or(0, |file| signed(file.len()))
 }

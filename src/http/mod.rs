@@ -15,7 +15,7 @@
 //! | limits on bodies, connections and decoding | [`limits`], [`connections`], [`decoding`] |
 //! | the address that sent a request | [`client`] |
 //! | reading requests | [`request`], [`negotiate`], [`pagination`], [`idempotency`], [`upload`] |
-//! | log, traces, metrics | [`observe`], [`metrics`] |
+//! | log, traces, metrics | [`observe`], [`spans`], [`metrics`], [`job_watch`] |
 //! | the published document | [`openapi`], [`document`] |
 //! | streams of events | [`streams`] |
 //!
@@ -42,6 +42,7 @@ mod guard;
 mod health;
 mod hooks;
 mod idempotency;
+mod job_watch;
 mod jobs;
 mod keys;
 mod limits;
@@ -57,6 +58,7 @@ mod request;
 mod router;
 mod segmentations;
 mod server;
+mod spans;
 mod streams;
 mod templates;
 mod upload;
@@ -68,6 +70,7 @@ pub use app::App;
 pub use connections::tls::TlsError;
 pub use cryptography::install_cryptography;
 pub use server::{Running, ServeError, serve, start};
+pub use spans::OtlpError;
 
 /// The OpenAPI document, as committed under `openapi/`.
 ///

@@ -4,10 +4,17 @@
 //! The log shows the pattern of a path and never the path itself, because ids lead to patients.
 
 use super::app::App;
-use axum::extract::{MatchedPath, Request};
-use axum::http::{HeaderMap, HeaderName, HeaderValue, Response};
+use super::metrics::RequestMetrics;
+use axum::body::{Body, Bytes, HttpBody};
+use axum::extract::{MatchedPath, Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, Response, StatusCode};
 use axum::middleware::Next;
-use std::time::Duration;
+use axum::response::Response as AxumResponse;
+use hyper::body::{Frame, SizeHint};
+use prometheus::IntCounter;
+use std::pin::Pin;
+use std::task::{Context, Poll};
+use std::time::{Duration, Instant};
 use tower_http::request_id::{MakeRequestId, RequestId};
 use tower_http::trace::{MakeSpan, OnResponse};
 use tracing::Span;
@@ -42,14 +49,39 @@ impl MakeRequestId for TimeOrderedId {
     }
 }
 
-/// Continues the client's trace with a span of our own, and names both in the answer.
-pub async fn continue_trace(mut request: Request, next: Next) -> axum::response::Response {
-    let Some(trace) = Trace::of(request.headers()) else {
+/// Continues the client's trace with a span of our own, and names both in the answer. If spans are
+/// sent to a collector, a request without a trace begins one.
+pub async fn continue_trace(
+    State(app): State<App>,
+    mut request: Request,
+    next: Next,
+) -> AxumResponse {
+    let given = Trace::of(request.headers());
+    let route = request.extensions().get::<MatchedPath>();
+    let span = app.spans.request(
+        method_of(&request),
+        route.map_or(NO_ROUTE, MatchedPath::as_str),
+        given
+            .as_ref()
+            .map(|_| request.headers())
+            .and_then(|headers| {
+                let parent = headers.get(TRACE_PARENT)?;
+                parent.to_str().ok()
+            }),
+    );
+    let trace = match &span {
+        Some(span) => Trace::continued_by(&span.trace_parent()),
+        None => given,
+    };
+    let Some(trace) = trace else {
         return next.run(request).await;
     };
     let parent = HeaderValue::try_from(&trace.parent);
     request.extensions_mut().insert(trace);
     let mut response = next.run(request).await;
+    if let Some(span) = span {
+        span.end(response.status().as_u16());
+    }
     if let Ok(parent) = parent {
         response.headers_mut().insert(TRACE_PARENT, parent);
     }
@@ -66,6 +98,15 @@ struct Trace {
 }
 
 impl Trace {
+    /// The trace that a span of ours belongs to.
+    fn continued_by(parent: &str) -> Option<Self> {
+        let id = parent.split('-').nth(1)?;
+        Some(Self {
+            id: id.to_owned(),
+            parent: parent.to_owned(),
+        })
+    }
+
     /// The client's trace, if the header is valid.
     fn of(headers: &HeaderMap) -> Option<Self> {
         let text = headers.get(TRACE_PARENT)?.to_str().ok()?;
@@ -116,15 +157,126 @@ impl<B> MakeSpan<B> for RequestSpan {
     }
 }
 
-/// Logs and counts every answer.
-#[derive(Clone)]
-pub struct Answered(pub App);
+/// Logs every answer.
+#[derive(Debug, Clone, Copy)]
+pub struct Answered;
 
 impl<B> OnResponse<B> for Answered {
     fn on_response(self, response: &Response<B>, latency: Duration, _: &Span) {
         let status = response.status();
         let ms = latency.as_millis() as u64;
         tracing::debug!(status = status.as_u16(), ms, "answered");
-        self.0.metrics.count_answer(status);
+    }
+}
+
+/// The route of requests to paths that do not exist.
+const NO_ROUTE: &str = "none";
+
+/// The method in metrics: a client may send any word.
+fn method_of(request: &Request) -> &'static str {
+    match *request.method() {
+        Method::GET => "GET",
+        Method::HEAD => "HEAD",
+        Method::POST => "POST",
+        Method::PUT => "PUT",
+        Method::PATCH => "PATCH",
+        Method::DELETE => "DELETE",
+        Method::OPTIONS => "OPTIONS",
+        _ => "other",
+    }
+}
+
+/// Counts a request, its answer and their bodies, and times the answer.
+pub async fn measure(State(app): State<App>, request: Request, next: Next) -> AxumResponse {
+    let method = method_of(&request);
+    let route = request.extensions().get::<MatchedPath>();
+    let route = route.map_or(NO_ROUTE, MatchedPath::as_str).to_owned();
+    let metrics = &app.metrics.requests;
+    let waiting = Waiting::begin(metrics.clone());
+    let request = request.map(|body| CountedBody::around(body, &metrics.received));
+    let response = next.run(request).await;
+    waiting.end(method, &route, response.status());
+    response.map(|body| CountedBody::around(body, &metrics.sent))
+}
+
+/// A request without an answer. Dropping it means that the client went away.
+struct Waiting {
+    metrics: RequestMetrics,
+    since: Instant,
+    answered: bool,
+}
+
+impl Waiting {
+    fn begin(metrics: RequestMetrics) -> Self {
+        metrics.in_flight.inc();
+        Self {
+            metrics,
+            since: Instant::now(),
+            answered: false,
+        }
+    }
+
+    fn end(mut self, method: &str, route: &str, status: StatusCode) {
+        self.answered = true;
+        let answers = &self.metrics.answers;
+        answers
+            .with_label_values(&[method, route, status.as_str()])
+            .inc();
+        let class = format!("{}xx", status.as_u16() / 100);
+        let durations = &self.metrics.durations;
+        durations
+            .with_label_values(&[method, route, class.as_str()])
+            .observe(self.since.elapsed().as_secs_f64());
+    }
+}
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        self.metrics.in_flight.dec();
+        if !self.answered {
+            self.metrics.abandoned.inc();
+        }
+    }
+}
+
+/// A body whose bytes are counted as they pass.
+struct CountedBody {
+    body: Body,
+    count: IntCounter,
+}
+
+impl CountedBody {
+    fn around(body: Body, count: &IntCounter) -> Body {
+        if body.is_end_stream() {
+            return body;
+        }
+        let count = count.clone();
+        Body::new(Self { body, count })
+    }
+}
+
+impl HttpBody for CountedBody {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        let polled = Pin::new(&mut self.body).poll_frame(context);
+        if let Poll::Ready(Some(Ok(frame))) = &polled
+            && let Some(data) = frame.data_ref()
+        {
+            self.count.inc_by(data.len() as u64);
+        }
+        polled
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
     }
 }

@@ -96,12 +96,19 @@ pub fn router(app: App) -> Router {
         .map_request(observe::drop_unusable_id)
         .layer(SetRequestIdLayer::new(REQUEST_ID, observe::TimeOrderedId))
         .layer(PropagateRequestIdLayer::new(REQUEST_ID))
-        .layer(middleware::from_fn(observe::continue_trace))
+        .layer(middleware::from_fn_with_state(
+            app.clone(),
+            observe::measure,
+        ))
+        .layer(middleware::from_fn_with_state(
+            app.clone(),
+            observe::continue_trace,
+        ))
         .layer(
             TraceLayer::new_for_http()
                 .make_span_with(observe::RequestSpan)
                 .on_request(())
-                .on_response(observe::Answered(app.clone()))
+                .on_response(observe::Answered)
                 .on_eos(())
                 .on_failure(()),
         )

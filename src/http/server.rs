@@ -1,13 +1,16 @@
 //! Starting the service from its settings, and shutting it down.
 
-use super::app::App;
+use super::app::{App, Watching};
 use super::connections::tls::{Tls, TlsError};
 use super::connections::{self, ConnectionLimits};
 use super::cryptography::install_cryptography;
 use super::guard::hosts::HostPolicy;
 use super::guard::state::Guard;
 use super::hooks::Hooks;
+use super::job_watch::JobWatch;
+use super::metrics::Metrics;
 use super::router::router;
+use super::spans::{OtlpError, Spans};
 use crate::access::{AccessStore, Gate, Issuer, IssuerError, IssuerSettings, Recorder, Scope};
 use crate::config::Settings;
 use crate::hooks::{Dispatcher, HookSettings, RetrySchedule, UrlGuard};
@@ -50,6 +53,9 @@ pub enum ServeError {
     /// TLS cannot be used as the settings ask for it.
     #[error(transparent)]
     Tls(#[from] TlsError),
+    /// Traces cannot be sent as the settings ask for it.
+    #[error(transparent)]
+    Traces(#[from] OtlpError),
     /// The system refused threads or sockets.
     #[error("{0}")]
     System(#[from] io::Error),
@@ -63,6 +69,7 @@ pub struct Running {
     server: JoinHandle<()>,
     workers: Workers,
     dispatcher: JoinHandle<()>,
+    spans: Spans,
     closing: CancellationToken,
     grace: Duration,
     // Dropping the store unlocks the data folder, so it is kept to the end.
@@ -113,6 +120,8 @@ pub async fn start(
     listener.set_nonblocking(true)?;
     let address = listener.local_addr()?;
     let guard = guard(&settings, store.rows.clone(), address).await?;
+    let watching = watching(&settings, &store, &queue)?;
+    let spans = watching.spans.clone();
     let hooks = hooks(&settings, &store, &queue);
     let dispatcher = tokio::spawn(hooks.dispatcher.clone().run(
         queue.changes(),
@@ -125,6 +134,7 @@ pub async fn start(
         (store.rows.clone(), guard),
         settings.clone(),
         hooks,
+        watching,
         closing.clone(),
     );
     let limits = ConnectionLimits {
@@ -160,6 +170,7 @@ pub async fn start(
         server,
         workers,
         dispatcher,
+        spans,
         closing,
         grace: settings.shutdown_grace.0,
         _store: store,
@@ -187,6 +198,7 @@ impl Running {
         let (server, (), dispatcher) =
             tokio::join!(self.server, self.workers.stop(self.grace), self.dispatcher);
         self.app.guard.recorder.flush().await;
+        self.spans.flush().await;
         server.and(dispatcher).map_err(io::Error::other)?;
         Ok(())
     }
@@ -255,6 +267,18 @@ async fn prune_audit(store: Arc<dyn AccessStore>, age: Duration, end: Cancellati
             tracing::error!(%error, "old rows of the audit trail could not be removed");
         }
     }
+}
+
+/// Metrics and traces, which from now on follow the queue's jobs.
+fn watching(settings: &Settings, store: &Store, queue: &Queue) -> Result<Watching, OtlpError> {
+    let metrics = Metrics::new();
+    let spans = Spans::new(settings.otlp_endpoint.0.as_deref())?;
+    queue.observe(Arc::new(JobWatch::new(metrics.jobs.clone(), spans.clone())));
+    Ok(Watching {
+        metrics,
+        figures: store.rows.clone(),
+        spans,
+    })
 }
 
 fn hooks(settings: &Settings, store: &Store, queue: &Queue) -> Hooks {

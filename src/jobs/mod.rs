@@ -36,6 +36,7 @@ mod clock;
 mod failure;
 mod ids;
 mod job;
+mod observer;
 mod queue;
 mod resource;
 mod storage;
@@ -48,12 +49,13 @@ pub use failure::{Failure, Fault};
 pub(crate) use ids::hex;
 pub use ids::{content_id, random_id};
 pub use job::{Filed, Idempotency, Job, JobState, JobWebhook, NewJob};
+pub use observer::JobObserver;
 pub use queue::{Hold, Queue, QueuePosition, QueueSettings, Upkeep, recover_after_crash};
 pub use resource::Resource;
 pub use storage::{
-    BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Deleted, Interrupted, JobOutcome,
-    JobStore, Lease, ListPage, ListRequest, LocalFile, Product, ProductFile, QueueLoad,
-    StagedFiles, StoreError, StoreResult, StoredVolume,
+    BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Deleted, FigureStore, Interrupted,
+    JobOutcome, JobStore, Lease, ListPage, ListRequest, LocalFile, Product, ProductFile,
+    QueueFigures, QueueLoad, StagedFiles, StoreError, StoreResult, StoredVolume,
 };
 pub use tenant::{InvalidTenant, Tenant};
 pub use work::{

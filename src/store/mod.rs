@@ -18,6 +18,7 @@ mod rows;
 mod sqlite;
 mod sqlite_access;
 mod sqlite_catalogue;
+mod sqlite_figures;
 mod sqlite_hooks;
 mod sqlite_jobs;
 
@@ -133,4 +134,18 @@ fn hold(folder: &Path) -> Result<File, OpenError> {
         Err(TryLockError::WouldBlock) => Err(OpenError::InUse(folder.to_owned())),
         Err(TryLockError::Error(e)) => Err(unusable(e.to_string())),
     }
+}
+
+/// Free and total bytes of the disk that holds `folder`; `None` if the system does not tell.
+#[cfg(unix)]
+pub fn disk_space(folder: &Path) -> Option<(u64, u64)> {
+    let found = rustix::fs::statvfs(folder).ok()?;
+    let bytes = |blocks: u64| blocks.saturating_mul(found.f_frsize);
+    Some((bytes(found.f_bavail), bytes(found.f_blocks)))
+}
+
+/// Free and total bytes of the disk that holds `folder`; `None` if the system does not tell.
+#[cfg(not(unix))]
+pub fn disk_space(_folder: &Path) -> Option<(u64, u64)> {
+    None
 }

@@ -12,6 +12,7 @@
 mod helpers;
 
 mod blobs;
+mod canary;
 mod config;
 mod durability;
 mod end_to_end;
@@ -20,6 +21,7 @@ mod hostile;
 mod items;
 mod jobs;
 mod models;
+mod monitoring;
 mod openapi;
 mod operations;
 mod receiver;
@@ -28,5 +30,6 @@ mod segmentations;
 mod shutdown;
 mod tenants;
 mod tls;
+mod traces;
 mod volumes;
 mod webhooks;

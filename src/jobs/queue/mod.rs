@@ -9,12 +9,13 @@ pub use items::Hold;
 pub use upkeep::{Upkeep, recover_after_crash};
 
 use super::{
-    BlobStore, Catalogue, Clock, Filed, Interrupted, Job, JobStore, NewJob, QueueLoad, StoreError,
+    BlobStore, Catalogue, Clock, Filed, Interrupted, Job, JobObserver, JobStore, NewJob, QueueLoad,
+    StoreError,
 };
 use crate::progress::CancelToken;
 use items::Items;
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 use tokio::sync::{Notify, broadcast};
 
@@ -55,6 +56,7 @@ pub struct Queue {
     filed: Notify,
     changes: broadcast::Sender<Arc<Job>>,
     running: Mutex<BTreeMap<String, CancelToken>>,
+    observer: OnceLock<Arc<dyn JobObserver>>,
 }
 
 impl Queue {
@@ -76,6 +78,7 @@ impl Queue {
             filed: Notify::new(),
             changes: broadcast::Sender::new(CHANGES_BUFFERED),
             running: Mutex::default(),
+            observer: OnceLock::new(),
         }
     }
 
@@ -88,7 +91,10 @@ impl Queue {
             .jobs
             .file(job, self.settings.limit, self.clock.now())
             .await?;
-        if let Filed::New(_) = filed {
+        if let Filed::New(job) = &filed {
+            if let Some(observer) = self.observer.get() {
+                observer.filed(job);
+            }
             self.filed.notify_one();
         }
         Ok(filed)
@@ -177,6 +183,19 @@ impl Queue {
         })
     }
 
+    /// Tells the observer that the computation of a job has ended.
+    pub(super) fn computed(&self, job: &Job) {
+        if let Some(observer) = self.observer.get() {
+            observer.computed(job);
+        }
+    }
+
+    /// Tells an observer of every change from now on. To be called once, before jobs run.
+    pub fn observe(&self, observer: Arc<dyn JobObserver>) {
+        // There is an observer already: it stays the only one.
+        let _ = self.observer.set(observer);
+    }
+
     /// Waits until a job is filed.
     pub(super) async fn woken(&self) {
         self.filed.notified().await;
@@ -184,6 +203,9 @@ impl Queue {
 
     /// Sends a changed job to all subscribers.
     pub(super) fn announce(&self, job: &Job) {
+        if let Some(observer) = self.observer.get() {
+            observer.changed(job);
+        }
         // Sending fails if there is no subscriber.
         let _ = self.changes.send(Arc::new(job.clone()));
     }

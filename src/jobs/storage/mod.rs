@@ -5,6 +5,7 @@
 
 mod blobs;
 mod catalogue;
+mod figures;
 mod job_store;
 mod listing;
 mod product;
@@ -12,6 +13,7 @@ mod volume;
 
 pub use blobs::{BlobError, BlobStore, BlobStream, BlobWriter, LocalFile, StagedFiles};
 pub use catalogue::{Catalogue, Deleted};
+pub use figures::{FigureStore, QueueFigures};
 pub use job_store::{Interrupted, JobOutcome, JobStore, Lease, QueueLoad};
 pub use listing::{ListPage, ListRequest};
 pub use product::{Product, ProductFile};

@@ -71,6 +71,7 @@ impl JobRunner {
         let mut computation = self.start(job, cancel).await?;
         let (computed, stop) = self.watch(lease, cancel, &mut computation).await;
         let abandoned = computed.is_none();
+        self.queue.computed(job);
         let ended = self.commit(job, lease, computed, stop).await;
         if abandoned && !computation.result.is_terminated() {
             // The threads are busy until the computation notices the cancel token.
