@@ -51,6 +51,8 @@ enum Command {
     Audit(audit::AuditArgs),
     Phantom(phantom::PhantomArgs),
     Healthcheck(Box<serve::HealthcheckArgs>),
+    #[command(name = serve::COMPUTE, hide = true)]
+    Compute(serve::ComputeArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example: ventriform completions bash > ventriform.bash")]
     Completions {
@@ -73,6 +75,7 @@ pub fn main() -> ExitCode {
         Command::Keys(args) => keys::run(&args),
         Command::Audit(args) => audit::run(&args),
         Command::Phantom(args) => phantom::run(&args),
+        Command::Compute(args) => serve::compute(&args),
         Command::Healthcheck(args) => serve::check_health(&args),
         Command::Completions { shell } => {
             clap_complete::generate(

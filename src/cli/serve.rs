@@ -2,6 +2,7 @@
 
 use crate::config::{Flags, LogFormat, Settings};
 use crate::http::{self, Running};
+use crate::jobs::{Isolation, serve_isolated};
 use crate::volume::ReadLimits;
 use crate::work::Engine;
 use anyhow::{Context, Result, bail};
@@ -123,10 +124,66 @@ fn scheme(settings: &Settings) -> &'static str {
 }
 
 fn engine(settings: &Settings) -> Engine {
-    Engine::new(ReadLimits {
-        voxels: settings.voxel_limit,
-        unpacked_bytes: settings.decompressed_limit.0,
-    })
+    let limits = ComputeArgs {
+        voxel_limit: settings.voxel_limit,
+        unpacked_limit: settings.decompressed_limit.0,
+    };
+    let mut engine = limits.engine();
+    if let Some(isolation) = limits.isolation() {
+        engine.works = engine.works.with_isolation(isolation);
+    }
+    engine
+}
+
+/// The name of the command of [`compute`].
+pub const COMPUTE: &str = "compute-job";
+
+/// Compute the job that standard input describes; started by the service
+#[derive(Debug, Args)]
+pub struct ComputeArgs {
+    /// Largest number of voxels of one volume
+    #[arg(long)]
+    voxel_limit: u64,
+    /// Largest volume after decompression, bytes
+    #[arg(long)]
+    unpacked_limit: u64,
+}
+
+impl ComputeArgs {
+    fn engine(&self) -> Engine {
+        Engine::new(ReadLimits {
+            voxels: self.voxel_limit,
+            unpacked_bytes: self.unpacked_limit,
+        })
+    }
+
+    /// How to start [`compute`] with these limits; `None` if the system does not say which program
+    /// this is.
+    fn isolation(&self) -> Option<Isolation> {
+        // The link names the running program even after its file was replaced by another version.
+        let link = Path::new("/proc/self/exe");
+        let program = match link.exists() {
+            true => link.to_owned(),
+            false => std::env::current_exe().ok()?,
+        };
+        let arguments = [
+            COMPUTE.to_owned(),
+            format!("--voxel-limit={}", self.voxel_limit),
+            format!("--unpacked-limit={}", self.unpacked_limit),
+        ];
+        Some(Isolation {
+            program,
+            arguments: arguments.into_iter().map(Into::into).collect(),
+        })
+    }
+}
+
+/// Computes one job for a service; see [`Isolation`].
+///
+/// # Errors
+/// If standard input holds no job.
+pub fn compute(args: &ComputeArgs) -> Result<()> {
+    serve_isolated(&args.engine().works).context("standard input holds no job of a service")
 }
 
 /// The data folder of a command beside the service: the given one, or that of the settings.

@@ -212,18 +212,18 @@ settings! {
     data_dir: PathBuf = "ventriform-data";
 
     ["Jobs"]
-    /// Jobs computed at the same time; `auto` is one per two cores
+    /// Jobs computed at the same time; `auto` is one per core
     workers: Count = "auto";
-    /// Threads of one job; `auto` is two, or one on a single core
+    /// Threads of one job; `auto` is one. More make a single job faster, but fewer jobs per hour
     threads: Count = "auto";
     /// Largest number of waiting jobs; more are rejected with status 429
     queue_limit: usize = "1000";
-    /// Number of times a job is started before it is failed. A job that crashes the process
-    /// cannot be told from a power cut: if this is too small, power cuts fail good jobs
-    attempt_limit: u32 = "10";
+    /// Number of times a job may end its own process before it is failed. A job that was running
+    /// when the service died is computed in a process of its own, so power cuts do not count
+    attempt_limit: u32 = "3";
     /// Longest computation of one job
     job_time_limit: Span = "10m";
-    /// How long a worker's claim on a job lasts without renewal
+    /// How long another process on the same store would respect a claim that is not renewed
     lease: Span = "30s";
 
     ["Uploads and requests"]

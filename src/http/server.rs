@@ -15,8 +15,8 @@ use crate::access::{AccessStore, Gate, Issuer, IssuerError, IssuerSettings, Reco
 use crate::config::Settings;
 use crate::hooks::{Dispatcher, HookSettings, RetrySchedule, UrlGuard};
 use crate::jobs::{
-    Clock, Queue, QueueSettings, StoreError, SystemClock, Upkeep, WorkerSettings, Workers,
-    recover_after_crash,
+    Clock, DeathLimit, Failure, Fault, Queue, QueueSettings, SteadyClock, StoreError, SystemClock,
+    Upkeep, WorkerSettings, Workers, recover_after_crash,
 };
 use crate::store::{OpenError, Store};
 use crate::work::Engine;
@@ -109,13 +109,15 @@ pub async fn start(
         store.rows.clone(),
         store.rows.clone(),
         store.blobs.clone(),
-        Arc::new(SystemClock),
+        Arc::new(SteadyClock::default()),
         QueueSettings {
             limit: settings.queue_limit,
             workers: workers.workers,
         },
     ));
-    recover_after_crash(&queue, workers.attempt_limit).await?;
+    let limit = death_limit(&settings);
+    let limit = Some(&limit).filter(|_| engine.works.isolation().is_none());
+    recover_after_crash(&queue, limit).await?;
     let closing = CancellationToken::new();
     listener.set_nonblocking(true)?;
     let address = listener.local_addr()?;
@@ -153,7 +155,6 @@ pub async fn start(
     let server = tokio::spawn(server);
     let upkeep = Upkeep {
         queue: queue.clone(),
-        attempt_limit: workers.attempt_limit,
         retention: settings.retention.0.map(|span| span.0),
         every: UPKEEP_EVERY,
     };
@@ -308,11 +309,22 @@ fn hooks(settings: &Settings, store: &Store, queue: &Queue) -> Hooks {
     }
 }
 
+/// When a job is failed by a program that cannot compute it in a process of its own.
+fn death_limit(settings: &Settings) -> DeathLimit {
+    let deaths = settings.attempt_limit;
+    let reason = format!("The service died {deaths} times while the job was running.");
+    DeathLimit {
+        deaths,
+        reason: Failure::new(Fault::Service, "attempt-limit", reason)
+            .fix("Report it with the job's id. Other parameters may work."),
+    }
+}
+
 fn worker_settings(settings: &Settings) -> WorkerSettings {
     let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
     WorkerSettings {
-        workers: settings.workers.or(cores / 2),
-        threads: settings.threads.or(cores.min(2)),
+        workers: settings.workers.or(cores),
+        threads: settings.threads.or(1),
         lease: settings.lease.0,
         attempt_limit: settings.attempt_limit,
         time_limit: settings.job_time_limit.0,

@@ -77,6 +77,11 @@ pub struct Job {
     pub progress: f64,
     /// How often a worker has claimed the job.
     pub attempts: u32,
+    /// How often the service died while the job was running on its threads. From the first time
+    /// on, the job is computed in a process of its own, where that is possible.
+    pub interruptions: u32,
+    /// How often the job's own process died while the service lived.
+    pub crashes: u32,
     /// Increases with every change; the id of the job's events.
     pub revision: i64,
     /// Whether cancellation was requested.
@@ -143,6 +148,18 @@ pub struct Idempotency {
     pub key: String,
     /// A hash of the request sent with the key.
     pub fingerprint: String,
+}
+
+impl Idempotency {
+    /// What became of a request with this key, after `job` was filed under it by the request with
+    /// that fingerprint.
+    pub fn judge(&self, job: Job, fingerprint: &str) -> Filed {
+        if self.fingerprint == fingerprint {
+            Filed::Same(job)
+        } else {
+            Filed::KeyReused
+        }
+    }
 }
 
 /// The result of filing a job.

@@ -1,8 +1,10 @@
 //! What a kind of job provides: its parameters, its computation, its input and output.
 
+use super::isolation::Isolation;
 use super::{Failure, LocalFile, Resource};
 use crate::progress::{Cancelled, Monitor, Plan};
 use serde_json::{Map, Value};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::sync::Arc;
@@ -143,7 +145,7 @@ pub struct OutputFile {
     /// Its name: `mesh.glb`, `report.json` ...
     pub name: String,
     /// Its media type.
-    pub media_type: &'static str,
+    pub media_type: Cow<'static, str>,
     /// Its content.
     pub bytes: Vec<u8>,
 }
@@ -167,7 +169,10 @@ impl From<Cancelled> for WorkError {
 
 /// The kinds of work that this process can do.
 #[derive(Clone)]
-pub struct Works(Vec<Arc<dyn Work>>);
+pub struct Works {
+    kinds: Vec<Arc<dyn Work>>,
+    isolation: Option<Isolation>,
+}
 
 impl Works {
     /// The work of that kind.
@@ -177,12 +182,27 @@ impl Works {
 
     /// Every kind of work.
     pub fn iter(&self) -> std::slice::Iter<'_, Arc<dyn Work>> {
-        self.0.iter()
+        self.kinds.iter()
+    }
+
+    /// The same works, and how to do them in a process of their own.
+    #[must_use]
+    pub fn with_isolation(mut self, isolation: Isolation) -> Self {
+        self.isolation = Some(isolation);
+        self
+    }
+
+    /// How to do a job in a process of its own; `None` if this program cannot.
+    pub fn isolation(&self) -> Option<&Isolation> {
+        self.isolation.as_ref()
     }
 }
 
 impl FromIterator<Arc<dyn Work>> for Works {
     fn from_iter<I: IntoIterator<Item = Arc<dyn Work>>>(works: I) -> Self {
-        Self(works.into_iter().collect())
+        Self {
+            kinds: works.into_iter().collect(),
+            isolation: None,
+        }
     }
 }

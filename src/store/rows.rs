@@ -22,7 +22,9 @@ pub(super) fn job(row: SqliteRow) -> StoreResult<Job> {
             .ok_or_else(|| StoreError::Database(format!("unknown job state `{state}`")))?,
         stage: row.try_get("stage")?,
         progress: row.try_get("progress")?,
-        attempts: u32::try_from(row.try_get::<i64, _>("attempts")?).unwrap_or(u32::MAX),
+        attempts: count(&row, "attempts")?,
+        interruptions: count(&row, "interruptions")?,
+        crashes: count(&row, "crashes")?,
         revision: row.try_get("revision")?,
         cancel_requested: row.try_get("cancel_requested")?,
         created_at: row.try_get("created_at")?,
@@ -32,6 +34,10 @@ pub(super) fn job(row: SqliteRow) -> StoreResult<Job> {
         result: row.try_get("result")?,
         trace_parent: row.try_get("trace_parent")?,
     })
+}
+
+fn count(row: &SqliteRow, column: &str) -> StoreResult<u32> {
+    Ok(u32::try_from(row.try_get::<i64, _>(column)?).unwrap_or(u32::MAX))
 }
 
 pub(super) fn volume(row: SqliteRow) -> StoreResult<StoredVolume> {

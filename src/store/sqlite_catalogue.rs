@@ -126,10 +126,12 @@ impl SqliteStore {
     ) -> StoreResult<Deleted> {
         let mut transaction = self.writer.begin().await?;
         let delete = format!(
-            "DELETE FROM {table} WHERE id = ?1 AND NOT EXISTS
-                (SELECT 1 FROM jobs WHERE state IN ('queued', 'running') AND
-                    (volume = ?1 OR
-                     EXISTS (SELECT 1 FROM json_each(jobs.needs) WHERE value = ?1)))"
+            "DELETE FROM {table} WHERE id = ?1
+               AND NOT EXISTS (SELECT 1 FROM jobs
+                   WHERE volume = ?1 AND state IN ('queued', 'running'))
+               AND NOT EXISTS (SELECT 1 FROM jobs
+                   WHERE needs != '{{}}' AND state IN ('queued', 'running')
+                     AND EXISTS (SELECT 1 FROM json_each(jobs.needs) WHERE value = ?1))"
         );
         let done = sqlx::query(sqlx::AssertSqlSafe(delete))
             .bind(id)

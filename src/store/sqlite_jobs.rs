@@ -4,14 +4,43 @@
 use super::rows::{self, to_json};
 use super::sqlite::SqliteStore;
 use crate::jobs::{
-    Deleted, Failure, Filed, Idempotency, Interrupted, Job, JobOutcome, JobState, JobStore, Lease,
+    Claimant, DeathLimit, Deleted, Filed, Interrupted, Job, JobOutcome, JobState, JobStore, Lease,
     ListPage, ListRequest, NewJob, QueueLoad, Resource, StoreResult, Tenant, Timestamp, random_id,
 };
 use async_trait::async_trait;
-use sqlx::Row;
+use sqlx::{Row, SqliteConnection};
+use std::time::Duration;
 
 /// Number of last succeeded jobs whose durations are averaged.
 const JOBS_AVERAGED: i64 = 20;
+
+/// What every statement sets by which a job leaves its worker without an outcome: `?1` is now, `?2`
+/// the reason for failing it, or null to return it to the queue.
+const LEFT_BY_WORKER: &str = "
+    state = CASE WHEN cancel_requested THEN 'cancelled'
+                 WHEN ?2 IS NOT NULL THEN 'failed' ELSE 'queued' END,
+    failure = CASE WHEN cancel_requested THEN NULL ELSE ?2 END,
+    finished_at = CASE WHEN cancel_requested OR ?2 IS NOT NULL THEN ?1 END,
+    stage = NULL, progress = 0, lease_token = NULL, lease_run = NULL, lease_expires_at = NULL,
+    revision = revision + 1";
+
+fn expiry(now: Timestamp, length: Duration) -> Timestamp {
+    now.saturating_add(i64::try_from(length.as_millis()).unwrap_or(i64::MAX / 2))
+}
+
+/// The age of what a job works on counts from now.
+async fn renew_volumes(to: &mut SqliteConnection, job: &Job, now: Timestamp) -> StoreResult<()> {
+    sqlx::query(
+        "UPDATE volumes SET used_at = max(used_at, ?1)
+         WHERE id = ?2 OR id IN (SELECT value FROM jobs, json_each(jobs.needs) WHERE jobs.id = ?3)",
+    )
+    .bind(now)
+    .bind(&job.volume)
+    .bind(&job.id)
+    .execute(to)
+    .await?;
+    Ok(())
+}
 
 #[async_trait]
 impl JobStore for SqliteStore {
@@ -21,6 +50,7 @@ impl JobStore for SqliteStore {
         }
         let id = random_id(Resource::Job.prefix());
         let key = job.idempotency.as_ref();
+        let mut transaction = self.writer.begin().await?;
         let inserted = sqlx::query(
             "INSERT INTO jobs (id, kind, volume, parameters, created_at, idempotency_key,
                                fingerprint, needs, tenant, webhook, trace_parent)
@@ -39,18 +69,22 @@ impl JobStore for SqliteStore {
         .bind(&job.volume)
         .bind(to_json(&job.parameters)?)
         .bind(now)
-        .bind(key.map(|k| stored_key(&job.tenant, k)))
+        .bind(key.map(|k| stored_key(&job.tenant, &k.key)))
         .bind(key.map(|k| &k.fingerprint))
         .bind(i64::try_from(queue_limit).unwrap_or(i64::MAX))
         .bind(to_json(&job.needs)?)
         .bind(job.tenant.as_str())
         .bind(job.webhook.as_ref().map(to_json).transpose()?)
         .bind(&job.trace_parent)
-        .fetch_optional(&self.writer)
+        .fetch_optional(&mut *transaction)
         .await?;
         if let Some(row) = inserted {
-            return Ok(Filed::New(rows::job(row)?));
+            let job = rows::job(row)?;
+            renew_volumes(&mut transaction, &job, now).await?;
+            transaction.commit().await?;
+            return Ok(Filed::New(job));
         }
+        transaction.commit().await?;
         // Another request with the same key may have been filed in the meantime.
         if let Some(earlier) = self.earlier(job).await? {
             return Ok(earlier);
@@ -67,25 +101,65 @@ impl JobStore for SqliteStore {
     }
 
     async fn jobs(&self, state: Option<JobState>, page: ListRequest) -> StoreResult<ListPage<Job>> {
-        let rows = sqlx::query(
-            "SELECT * FROM jobs
-             WHERE (?1 IS NULL OR state = ?1) AND (?2 IS NULL OR sequence < ?2)
-             ORDER BY sequence DESC LIMIT ?3",
-        )
-        .bind(state.map(JobState::as_str))
-        .bind(page.before)
-        .bind(i64::from(page.limit) + 1)
-        .fetch_all(&self.readers)
-        .await?;
+        // Two statements, because one with `state = ? OR ? IS NULL` would use no index.
+        let query = match state {
+            Some(_) => {
+                "SELECT * FROM jobs WHERE state = ?1 AND sequence < ?2
+                 ORDER BY sequence DESC LIMIT ?3"
+            }
+            None => {
+                "SELECT * FROM jobs WHERE ?1 IS NULL AND sequence < ?2
+                 ORDER BY sequence DESC LIMIT ?3"
+            }
+        };
+        let rows = sqlx::query(query)
+            .bind(state.map(JobState::as_str))
+            .bind(page.before.unwrap_or(i64::MAX))
+            .bind(i64::from(page.limit) + 1)
+            .fetch_all(&self.readers)
+            .await?;
         rows::page(rows, page, rows::job, |job| job.sequence)
     }
 
-    async fn ahead_of(&self, job: &Job) -> StoreResult<u64> {
-        let row = sqlx::query("SELECT count(*) FROM jobs WHERE state = 'queued' AND sequence < ?")
-            .bind(job.sequence)
-            .fetch_one(&self.readers)
+    async fn filed_under(&self, tenant: &Tenant, key: &str) -> StoreResult<Option<(Job, String)>> {
+        let row = sqlx::query("SELECT * FROM jobs WHERE idempotency_key = ?")
+            .bind(stored_key(tenant, key))
+            .fetch_optional(&self.readers)
             .await?;
-        Ok(u64::try_from(row.get::<i64, _>(0)).unwrap_or(0))
+        row.map(|row| {
+            let fingerprint: Option<String> = row.try_get("fingerprint")?;
+            Ok((rows::job(row)?, fingerprint.unwrap_or_default()))
+        })
+        .transpose()
+    }
+
+    async fn ahead_of(&self, sequences: &[i64]) -> StoreResult<Vec<u64>> {
+        // Each part of the queue is counted once, however many jobs are asked for.
+        let rows = sqlx::query(
+            "WITH asked AS
+                 (SELECT value AS upto, lag(value, 1, 0) OVER (ORDER BY value) AS since
+                  FROM json_each(?))
+             SELECT sum((SELECT count(*) FROM jobs WHERE state = 'queued'
+                         AND sequence >= since AND sequence < upto)) OVER (ORDER BY upto)
+             FROM asked ORDER BY upto",
+        )
+        .bind(to_json(&sequences)?)
+        .fetch_all(&self.readers)
+        .await?;
+        let count = |row: sqlx::sqlite::SqliteRow| u64::try_from(row.get::<i64, _>(0)).unwrap_or(0);
+        Ok(rows.into_iter().map(count).collect())
+    }
+
+    async fn last_change(&self) -> StoreResult<Option<Timestamp>> {
+        let row = sqlx::query(
+            "SELECT max(at) FROM (
+                 SELECT (SELECT created_at FROM jobs ORDER BY sequence DESC LIMIT 1) AS at
+                 UNION ALL SELECT (SELECT max(finished_at) FROM jobs WHERE finished_at IS NOT NULL)
+                 UNION ALL SELECT (SELECT max(used_at) FROM volumes))",
+        )
+        .fetch_one(&self.readers)
+        .await?;
+        Ok(row.get(0))
     }
 
     async fn load(&self) -> StoreResult<QueueLoad> {
@@ -107,40 +181,36 @@ impl JobStore for SqliteStore {
         })
     }
 
-    async fn claim(
-        &self,
-        token: &str,
-        attempt_limit: u32,
-        now: Timestamp,
-        until: Timestamp,
-    ) -> StoreResult<Option<Job>> {
+    async fn claim(&self, by: &Claimant, now: Timestamp) -> StoreResult<Option<Job>> {
         let row = sqlx::query(
             "UPDATE jobs SET state = 'running', attempts = attempts + 1, lease_token = ?1,
-                    lease_expires_at = ?2, started_at = ?3, stage = NULL, progress = 0,
-                    revision = revision + 1
+                    lease_run = ?2, lease_expires_at = ?3, started_at = ?4, stage = NULL,
+                    progress = 0, revision = revision + 1
              WHERE sequence = (
-                 SELECT sequence FROM jobs
-                 WHERE (state = 'queued' OR (state = 'running' AND lease_expires_at <= ?3))
-                   AND attempts < ?4 AND NOT cancel_requested
-                 ORDER BY sequence LIMIT 1)
+                 SELECT sequence FROM jobs WHERE state = 'queued' ORDER BY sequence LIMIT 1)
              RETURNING *",
         )
-        .bind(token)
-        .bind(until)
+        .bind(&by.token)
+        .bind(&by.run)
+        .bind(expiry(now, by.lease))
         .bind(now)
-        .bind(attempt_limit)
         .fetch_optional(&self.writer)
         .await?;
         row.map(rows::job).transpose()
     }
 
-    async fn renew_lease(&self, lease: &Lease, until: Timestamp) -> StoreResult<Option<bool>> {
+    async fn renew_lease(
+        &self,
+        lease: &Lease,
+        length: Duration,
+        now: Timestamp,
+    ) -> StoreResult<Option<bool>> {
         let row = sqlx::query(
             "UPDATE jobs SET lease_expires_at = ?
              WHERE id = ? AND lease_token = ? AND state = 'running'
              RETURNING cancel_requested",
         )
-        .bind(until)
+        .bind(expiry(now, length))
         .bind(&lease.job)
         .bind(&lease.token)
         .fetch_optional(&self.writer)
@@ -183,7 +253,8 @@ impl JobStore for SqliteStore {
         let row = sqlx::query(
             "UPDATE jobs SET state = ?1, failure = ?2, result = ?3, finished_at = ?4,
                     progress = CASE ?1 WHEN 'succeeded' THEN 1 ELSE progress END,
-                    lease_token = NULL, lease_expires_at = NULL, revision = revision + 1
+                    lease_token = NULL, lease_run = NULL, lease_expires_at = NULL,
+                    revision = revision + 1
              WHERE id = ?5 AND lease_token = ?6 AND state = 'running'
              RETURNING *",
         )
@@ -196,63 +267,103 @@ impl JobStore for SqliteStore {
         .fetch_optional(&mut *transaction)
         .await?;
         let Some(row) = row else {
+            transaction.commit().await?;
             return Ok(None);
         };
+        let job = rows::job(row)?;
+        renew_volumes(&mut transaction, &job, now).await?;
         if let Some(product) = product {
             super::sqlite_catalogue::insert_product(&mut transaction, product).await?;
         }
         transaction.commit().await?;
-        Ok(Some(rows::job(row)?))
+        Ok(Some(job))
     }
 
-    async fn hand_back(&self, lease: &Lease) -> StoreResult<Option<Job>> {
+    async fn hand_back(&self, lease: &Lease, now: Timestamp) -> StoreResult<Option<Job>> {
+        let given_back = format!(
+            "UPDATE jobs SET attempts = attempts - 1, started_at = NULL, {LEFT_BY_WORKER}
+             WHERE id = ?3 AND lease_token = ?4 AND state = 'running' RETURNING *"
+        );
+        let row = sqlx::query(sqlx::AssertSqlSafe(given_back))
+            .bind(now)
+            .bind(None::<String>)
+            .bind(&lease.job)
+            .bind(&lease.token)
+            .fetch_optional(&self.writer)
+            .await?;
+        row.map(rows::job).transpose()
+    }
+
+    async fn abandon(&self, token: &str) -> StoreResult<Option<Job>> {
         let row = sqlx::query(
-            "UPDATE jobs SET state = 'queued', attempts = attempts - 1, stage = NULL,
-                    progress = 0, started_at = NULL, lease_token = NULL,
-                    lease_expires_at = NULL, revision = revision + 1
-             WHERE id = ? AND lease_token = ? AND state = 'running'
-             RETURNING *",
+            "UPDATE jobs SET state = 'queued', attempts = attempts - 1, started_at = NULL,
+                    lease_token = NULL, lease_run = NULL, lease_expires_at = NULL,
+                    revision = revision + 1
+             WHERE state = 'running' AND lease_token = ? RETURNING *",
         )
-        .bind(&lease.job)
-        .bind(&lease.token)
+        .bind(token)
         .fetch_optional(&self.writer)
         .await?;
         row.map(rows::job).transpose()
     }
 
-    async fn release_all(&self) -> StoreResult<u64> {
-        let done = sqlx::query(
-            "UPDATE jobs SET state = 'queued', stage = NULL, progress = 0, lease_token = NULL,
-                    lease_expires_at = NULL, revision = revision + 1
-             WHERE state = 'running'",
-        )
-        .execute(&self.writer)
-        .await?;
-        Ok(done.rows_affected())
+    async fn crashed(
+        &self,
+        lease: &Lease,
+        limit: &DeathLimit,
+        now: Timestamp,
+    ) -> StoreResult<Option<Job>> {
+        // `?2` is the failure, if this death is the last one allowed.
+        let counted = format!(
+            "UPDATE jobs SET crashes = crashes + 1, {LEFT_BY_WORKER}
+             WHERE id = ?3 AND lease_token = ?4 AND state = 'running' AND (crashes + 1 >= ?5) = ?6
+             RETURNING *"
+        );
+        let reason = to_json(&limit.reason)?;
+        for at_limit in [false, true] {
+            let row = sqlx::query(sqlx::AssertSqlSafe(counted.clone()))
+                .bind(now)
+                .bind(at_limit.then_some(&reason))
+                .bind(&lease.job)
+                .bind(&lease.token)
+                .bind(limit.deaths)
+                .bind(at_limit)
+                .fetch_optional(&self.writer)
+                .await?;
+            if let Some(row) = row {
+                return rows::job(row).map(Some);
+            }
+        }
+        Ok(None)
     }
 
-    async fn end_unclaimable(
+    async fn release_dead(
         &self,
-        attempt_limit: u32,
-        reason: &Failure,
+        run: Option<&str>,
+        limit: Option<&DeathLimit>,
         now: Timestamp,
     ) -> StoreResult<Vec<Job>> {
-        let rows = sqlx::query(
-            "UPDATE jobs SET
-                    state = CASE WHEN cancel_requested THEN 'cancelled' ELSE 'failed' END,
-                    failure = CASE WHEN cancel_requested THEN NULL ELSE ?1 END,
-                    finished_at = ?2, lease_token = NULL, lease_expires_at = NULL,
-                    revision = revision + 1
-             WHERE (state = 'queued' OR (state = 'running' AND lease_expires_at <= ?2))
-               AND (attempts >= ?3 OR cancel_requested)
-             RETURNING *",
-        )
-        .bind(to_json(reason)?)
-        .bind(now)
-        .bind(attempt_limit)
-        .fetch_all(&self.writer)
-        .await?;
-        rows::all(rows, rows::job)
+        let released = format!(
+            "UPDATE jobs SET interruptions = interruptions + 1, {LEFT_BY_WORKER}
+             WHERE state = 'running' AND (interruptions + 1 >= ?3) = ?4
+               AND (?5 IS NULL OR (lease_run IS NOT ?5 AND lease_expires_at <= ?1))
+             RETURNING *"
+        );
+        let reason = limit.map(|limit| to_json(&limit.reason)).transpose()?;
+        let deaths = limit.map_or(i64::MAX, |limit| i64::from(limit.deaths));
+        let mut jobs = Vec::new();
+        for at_limit in [false, true] {
+            let rows = sqlx::query(sqlx::AssertSqlSafe(released.clone()))
+                .bind(now)
+                .bind(reason.as_ref().filter(|_| at_limit))
+                .bind(deaths)
+                .bind(at_limit)
+                .bind(run)
+                .fetch_all(&self.writer)
+                .await?;
+            jobs.extend(rows::all(rows, rows::job)?);
+        }
+        Ok(jobs)
     }
 
     async fn interrupt(&self, id: &str, now: Timestamp) -> StoreResult<Interrupted> {
@@ -324,28 +435,15 @@ impl SqliteStore {
 
     /// The job filed earlier under this job's idempotency key.
     async fn earlier(&self, job: &NewJob) -> StoreResult<Option<Filed>> {
-        let Some(key) = &job.idempotency else {
+        let Some(promise) = &job.idempotency else {
             return Ok(None);
         };
-        let row = sqlx::query("SELECT * FROM jobs WHERE idempotency_key = ?")
-            .bind(stored_key(&job.tenant, key))
-            .fetch_optional(&self.readers)
-            .await?;
-        row.map(|row| {
-            Ok(
-                if row.try_get::<Option<&str>, _>("fingerprint")? == Some(key.fingerprint.as_str())
-                {
-                    Filed::Same(rows::job(row)?)
-                } else {
-                    Filed::KeyReused
-                },
-            )
-        })
-        .transpose()
+        let earlier = self.filed_under(&job.tenant, &promise.key).await?;
+        Ok(earlier.map(|(job, fingerprint)| promise.judge(job, &fingerprint)))
     }
 }
 
 /// A key as the table holds it: unique among all tenants, as no tenant's name contains a slash.
-fn stored_key(tenant: &Tenant, promise: &Idempotency) -> String {
-    format!("{tenant}/{}", promise.key)
+fn stored_key(tenant: &Tenant, key: &str) -> String {
+    format!("{tenant}/{key}")
 }

@@ -27,7 +27,7 @@ pub(super) fn mesh_file(
 ) -> Result<OutputFile, ExportError> {
     Ok(OutputFile {
         name: format!("mesh.{}", format.extension()),
-        media_type: format.media_type(),
+        media_type: format.media_type().into(),
         bytes: export::encode(format, mesh, metadata)?,
     })
 }
@@ -36,7 +36,7 @@ pub(super) fn mesh_file(
 pub(super) fn json_file(name: &str, bytes: Vec<u8>) -> OutputFile {
     OutputFile {
         name: name.into(),
-        media_type: "application/json",
+        media_type: "application/json".into(),
         bytes,
     }
 }

@@ -93,7 +93,7 @@ impl From<NamedFile> for OutputFile {
     fn from(file: NamedFile) -> Self {
         Self {
             name: file.name,
-            media_type: file.media_type,
+            media_type: file.media_type.into(),
             bytes: file.bytes,
         }
     }

@@ -4,8 +4,8 @@ use crate::helpers::{Service, fake_engine, heart, scan, text};
 use serde_json::{Value, json};
 use std::time::Duration;
 use ventriform::jobs::{
-    Catalogue, Failure, Fault, Filed, JobOutcome, JobState, JobStore, Lease, ListRequest, NewJob,
-    Resource, StoredVolume, Tenant,
+    Catalogue, Claimant, DeathLimit, Failure, Fault, Filed, JobOutcome, JobState, JobStore, Lease,
+    ListRequest, NewJob, Resource, StoredVolume, Tenant, random_id,
 };
 use ventriform::store::Store;
 
@@ -64,70 +64,104 @@ async fn every_accepted_job_succeeds_once_although_the_service_is_killed() {
 }
 
 #[tokio::test]
-async fn a_job_that_crashes_the_process_is_failed_after_its_attempts() {
+async fn a_job_is_failed_by_deaths_of_its_own_process_but_not_of_the_service() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     let rows = &store.rows;
-    let job = filed(&store).await;
-    for attempt in 1..=3 {
-        let claimed = rows.claim("token", 3, 0, 10).await.unwrap().unwrap();
-        assert_eq!(
-            (claimed.id.as_str(), claimed.attempts),
-            (job.as_str(), attempt)
-        );
-        assert_eq!(rows.release_all().await.unwrap(), 1);
+    let id = filed(&store).await;
+    for interruption in 1..=9 {
+        rows.claim(&claimant("one"), 0).await.unwrap().unwrap();
+        let released = rows.release_dead(None, None, 0).await.unwrap();
+        assert_eq!(released[0].state, JobState::Queued);
+        assert_eq!(released[0].interruptions, interruption);
     }
-    assert!(rows.claim("token", 3, 0, 10).await.unwrap().is_none());
-    let reason = Failure::new(Fault::Service, "attempt-limit", "The job never ends.");
-    let ended_jobs = rows.end_unclaimable(3, &reason, 5).await.unwrap();
-    assert_eq!(ended_jobs[0].state, JobState::Failed);
-    assert_eq!(ended_jobs[0].failure.as_ref(), Some(&reason));
+    let limit = DeathLimit {
+        deaths: 3,
+        reason: Failure::new(Fault::Service, "attempt-limit", "It ends its process."),
+    };
+    for crash in 1..=3 {
+        let by = claimant("one");
+        rows.claim(&by, 0).await.unwrap().unwrap();
+        let lease = Lease {
+            job: id.clone(),
+            token: by.token,
+        };
+        let job = rows.crashed(&lease, &limit, 5).await.unwrap().unwrap();
+        assert_eq!(job.crashes, crash);
+        let (state, failure) = match crash {
+            3 => (JobState::Failed, Some(&limit.reason)),
+            _ => (JobState::Queued, None),
+        };
+        assert_eq!((job.state, job.failure.as_ref()), (state, failure));
+        assert!(rows.crashed(&lease, &limit, 5).await.unwrap().is_none());
+    }
+    assert!(rows.claim(&claimant("one"), 0).await.unwrap().is_none());
 }
 
 #[tokio::test]
-async fn a_worker_that_lost_its_lease_cannot_write() {
+async fn without_a_process_of_its_own_a_job_is_failed_by_deaths_of_the_service() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let rows = &store.rows;
+    filed(&store).await;
+    let limit = DeathLimit {
+        deaths: 2,
+        reason: Failure::new(Fault::Service, "attempt-limit", "The service died."),
+    };
+    for state in [JobState::Queued, JobState::Failed] {
+        rows.claim(&claimant("one"), 0).await.unwrap().unwrap();
+        let released = rows.release_dead(None, Some(&limit), 0).await.unwrap();
+        assert_eq!(released[0].state, state);
+    }
+}
+
+fn claimant(run: &str) -> Claimant {
+    Claimant {
+        token: random_id(""),
+        run: run.into(),
+        lease: Duration::from_millis(10),
+    }
+}
+
+#[tokio::test]
+async fn a_lease_of_the_living_run_does_not_expire_and_a_lost_one_cannot_write() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     let rows = &store.rows;
     let job = filed(&store).await;
-    let lease = |token: &str| Lease {
+    let lease = |by: &Claimant| Lease {
         job: job.clone(),
-        token: token.into(),
+        token: by.token.clone(),
     };
-    rows.claim("first", 3, 0, 10).await.unwrap().unwrap();
+    let first = claimant("one");
+    rows.claim(&first, 0).await.unwrap().unwrap();
+    let year = 365 * 24 * 3_600_000;
+    for now in [-year, 9, 10, year] {
+        let released = rows.release_dead(Some("one"), None, now).await.unwrap();
+        assert!(released.is_empty(), "its run lives, at {now}");
+        assert!(rows.claim(&claimant("one"), now).await.unwrap().is_none());
+    }
     assert!(
-        rows.claim("second", 3, 9, 20).await.unwrap().is_none(),
-        "it is held"
-    );
-    rows.claim("second", 3, 10, 20).await.unwrap().unwrap();
-    assert_eq!(rows.renew_lease(&lease("first"), 99).await.unwrap(), None);
-    assert!(
-        rows.progress(&lease("first"), "read", 0.5)
+        rows.release_dead(Some("two"), None, 9)
             .await
             .unwrap()
-            .is_none()
+            .is_empty()
     );
-    assert!(rows.hand_back(&lease("first")).await.unwrap().is_none());
+    let released = rows.release_dead(Some("two"), None, 10).await.unwrap();
+    assert_eq!(released.len(), 1);
+    let second = claimant("two");
+    rows.claim(&second, 10).await.unwrap().unwrap();
+    let (lost, held) = (lease(&first), lease(&second));
+    let length = Duration::from_secs(1);
+    assert_eq!(rows.renew_lease(&lost, length, 10).await.unwrap(), None);
+    assert!(rows.progress(&lost, "read", 0.5).await.unwrap().is_none());
+    assert!(rows.hand_back(&lost, 11).await.unwrap().is_none());
     let cancelled = JobOutcome::Cancelled;
-    assert!(
-        rows.finish(&lease("first"), &cancelled, 11)
-            .await
-            .unwrap()
-            .is_none()
-    );
-    let ended = rows
-        .finish(&lease("second"), &cancelled, 12)
-        .await
-        .unwrap()
-        .unwrap();
+    assert!(rows.finish(&lost, &cancelled, 11).await.unwrap().is_none());
+    let ended = rows.finish(&held, &cancelled, 12).await.unwrap().unwrap();
     assert_eq!((ended.state, ended.attempts), (JobState::Cancelled, 2));
-    assert!(
-        rows.finish(&lease("second"), &cancelled, 13)
-            .await
-            .unwrap()
-            .is_none(),
-        "once"
-    );
+    let again = rows.finish(&held, &cancelled, 13).await.unwrap();
+    assert!(again.is_none(), "once");
 }
 
 async fn filed(store: &Store) -> String {

@@ -214,7 +214,7 @@ pub async fn problem(answer: Response, status: u16, code: &str) -> Value {
 }
 
 /// A file that the fake reader accepts as a volume. Its first word decides what the fake
-/// computation does: `sphere`, `slow`, `brief`, `stubborn`, `panic`, `fail`.
+/// computation does: `sphere`, `slow`, `brief`, `stubborn`, `panic`, `abort`, `fail`.
 pub fn volume(words: &str) -> Vec<u8> {
     format!("VOLUME {words}").into_bytes()
 }
@@ -310,6 +310,7 @@ impl Work for FakeWork {
             "brief" => work_for(Duration::from_millis(300), monitor)?,
             "stubborn" => std::thread::sleep(Duration::from_secs(2)),
             "panic" => panic!("as told"),
+            "abort" => std::process::abort(),
             "fail" => {
                 return Err(
                     Failure::new(Fault::Content, "no-surface", "There is no surface.")
@@ -324,7 +325,7 @@ impl Work for FakeWork {
         if self.makes() == Resource::Segmentation {
             output.files.push(OutputFile {
                 name: "mask.nii.gz".into(),
-                media_type: "application/gzip",
+                media_type: "application/gzip".into(),
                 bytes: b"\x1f\x8b a mask".to_vec(),
             });
             let seen = json!({
@@ -370,13 +371,13 @@ fn sphere() -> WorkOutput {
         .zip(Format::ALL)
         .map(|(name, format)| OutputFile {
             name: name.into(),
-            media_type: format.media_type(),
+            media_type: format.media_type().into(),
             bytes: encoded(format),
         })
         .collect();
     files.push(OutputFile {
         name: "report.json".into(),
-        media_type: "application/json",
+        media_type: "application/json".into(),
         bytes: json!({"mesh": {"vertices": 42}}).to_string().into_bytes(),
     });
     WorkOutput {
@@ -424,6 +425,15 @@ pub fn scan() -> Vec<u8> {
     .clone()
 }
 
+/// Sends a signal to a process, by name.
+#[cfg(unix)]
+pub fn send_signal(process: u32, name: &str) {
+    let sent = Command::new("kill")
+        .args([format!("-{name}"), process.to_string()])
+        .status();
+    assert!(sent.unwrap().success());
+}
+
 /// The real program in a separate process.
 pub struct Service {
     process: Child,
@@ -461,6 +471,19 @@ impl Service {
             process,
             api: Api::new(url.to_owned()),
         }
+    }
+
+    /// The processes that this one has started.
+    #[cfg(target_os = "linux")]
+    pub fn children(&self) -> Vec<u32> {
+        let tasks = std::fs::read_dir(format!("/proc/{}/task", self.process.id())).unwrap();
+        let lists = tasks.flatten().map(|task| task.path().join("children"));
+        // A thread may have ended since it was listed.
+        let lists = lists.filter_map(|list| std::fs::read_to_string(list).ok());
+        let ids: Vec<String> = lists
+            .flat_map(|list| list.split(' ').map(str::to_owned).collect::<Vec<_>>())
+            .collect();
+        ids.iter().filter_map(|id| id.trim().parse().ok()).collect()
     }
 
     /// Kills the process without warning, as a power cut would.

@@ -1,6 +1,6 @@
 //! Single items under concurrent requests, failures and age: files and records agree.
 
-use crate::helpers::{TestApp, problem, text, volume};
+use crate::helpers::{TestApp, fake_engine, problem, text, volume};
 use reqwest::StatusCode;
 use serde_json::json;
 use std::sync::Arc;
@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use tokio::io::AsyncWriteExt;
 use ventriform::jobs::{
-    BlobStore, Catalogue, Clock, Deleted, Queue, QueueSettings, StagedFiles, StoredVolume,
-    Timestamp, Upkeep,
+    BlobStore, Catalogue, Clock, Deleted, Filed, JobState, JobStore, NewJob, Queue, QueueSettings,
+    StagedFiles, StoredVolume, Tenant, Timestamp, Upkeep, WorkerSettings, Workers,
 };
 use ventriform::store::Store;
 
@@ -65,7 +65,7 @@ impl Bench {
     async fn staged(&self) -> Box<dyn StagedFiles> {
         let staged = self.store.blobs.stage().await.unwrap();
         let mut file = staged.create("volume.nii").await.unwrap();
-        file.write_all(b"voxels").await.unwrap();
+        file.write_all(b"VOLUME brief").await.unwrap();
         file.shutdown().await.unwrap();
         staged
     }
@@ -75,7 +75,7 @@ impl Bench {
             id: id.into(),
             sequence: 0,
             created_at: self.clock.now(),
-            bytes: 6,
+            bytes: 12,
             files: vec!["volume.nii".into()],
             facts: json!({}),
         }
@@ -93,7 +93,6 @@ impl Bench {
     fn upkeep(&self, retention: Option<Duration>) -> Upkeep {
         Upkeep {
             queue: self.queue.clone(),
-            attempt_limit: 3,
             retention,
             every: Duration::from_secs(60),
         }
@@ -210,4 +209,48 @@ async fn a_request_that_carries_its_volume_finds_it_although_others_delete_it() 
             }
         }
     }
+}
+
+#[tokio::test]
+async fn steps_of_the_clock_neither_expire_a_lease_nor_keep_a_job_for_ever() {
+    let bench = Bench::new().await;
+    bench.add("vol_1").await;
+    let work = fake_engine().work("model").unwrap().clone();
+    let parameters = work.parameters_from_json(&serde_json::Map::new()).unwrap();
+    let order = NewJob {
+        tenant: Tenant::default(),
+        kind: "model".into(),
+        volume: "vol_1".into(),
+        needs: Default::default(),
+        parameters,
+        idempotency: None,
+    };
+    let Filed::New(job) = bench.queue.file(&order).await.unwrap() else {
+        panic!("the queue is empty");
+    };
+    let settings = WorkerSettings {
+        workers: 2,
+        threads: 1,
+        lease: Duration::from_millis(30),
+        attempt_limit: 3,
+        time_limit: Duration::from_secs(60),
+    };
+    let works = fake_engine().works;
+    let workers = Workers::start(&bench.queue, &works, settings).unwrap();
+    let upkeep = bench.upkeep(None);
+    let year = 365 * 24 * 3_600_000;
+    let deadline = Instant::now() + Duration::from_secs(20);
+    for step in [year, -year, 0].into_iter().cycle() {
+        bench.clock.set(step);
+        upkeep.run_once().await.unwrap();
+        let job = bench.store.rows.job(&job.id).await.unwrap().unwrap();
+        assert!(job.attempts <= 1, "{job:?}");
+        if job.state.is_final() {
+            assert_eq!(job.state, JobState::Succeeded);
+            break;
+        }
+        assert!(Instant::now() < deadline, "{job:?}");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    workers.stop(Duration::from_secs(5)).await;
 }

@@ -192,7 +192,9 @@ async fn a_running_job_stops_computing_within_100_ms() {
 
 #[tokio::test]
 async fn deleting_cancels_a_waiting_job_and_erases_an_ended_one() {
-    let app = TestApp::with(|s| s.workers = "1".parse().unwrap()).await;
+    let app = TestApp::with(|s| s.workers = "2".parse().unwrap()).await;
+    let other = app.file("slow").await;
+    app.until(&other, &["running"]).await;
     let running = app.file("slow").await;
     app.until(&running, &["running"]).await;
     let waiting = app.file("sphere").await;
@@ -200,10 +202,23 @@ async fn deleting_cancels_a_waiting_job_and_erases_an_ended_one() {
     let answer = app.delete(&path).send().await.unwrap();
     assert_eq!(answer.status(), StatusCode::OK);
     assert_eq!(answer.json::<Value>().await.unwrap()["state"], "cancelled");
-    assert_eq!(
-        app.delete(&path).send().await.unwrap().status(),
-        StatusCode::NO_CONTENT
-    );
+    let again = app.delete(&path).send().await.unwrap();
+    assert_eq!(again.status(), StatusCode::OK, "a retry loses nothing");
+    assert_eq!(again.json::<Value>().await.unwrap()["state"], "cancelled");
+    let running = text(&running["links"]["self"]);
+    let early = app.delete(&format!("{running}?erase=true")).send();
+    problem(early.await.unwrap(), 409, "not-finished").await;
+    let unclear = app.delete(&format!("{path}?erase=perhaps")).send();
+    problem(unclear.await.unwrap(), 400, "invalid-parameter").await;
+    let erased = app.delete(&format!("{path}?erase=true")).send();
+    assert_eq!(erased.await.unwrap().status(), StatusCode::NO_CONTENT);
+    app.delete(&text(&other["links"]["self"]))
+        .send()
+        .await
+        .unwrap();
+    let ended = app.finished("fail").await;
+    let ended = app.delete(&text(&ended["links"]["self"])).send();
+    assert_eq!(ended.await.unwrap().status(), StatusCode::NO_CONTENT);
     problem(app.get(&path).send().await.unwrap(), 410, "gone").await;
     problem(
         app.delete("/v1/jobs/job_0").send().await.unwrap(),
@@ -281,4 +296,103 @@ fn copy_folder(from: &std::path::Path, to: &std::path::Path) {
             std::fs::copy(entry.path(), target).unwrap();
         }
     }
+}
+
+#[tokio::test]
+async fn a_retry_of_an_accepted_request_gets_its_job_although_the_queue_is_full() {
+    let app = TestApp::with(|s| {
+        s.queue_limit = 2;
+        s.workers = "1".parse().unwrap();
+    })
+    .await;
+    let running = app.file("slow").await;
+    app.until(&running, &["running"]).await;
+    let stored = app.volume("sphere c").await;
+    let post = |path: &str, words: &str, key: &str| {
+        let request = app.post(path).header("idempotency-key", key);
+        match path {
+            "/v1/jobs" => request.json(&json!({"volume": stored})),
+            _ => request.body(volume(words)),
+        }
+    };
+    let paths = ["/v1/models", "/v1/segmentations", "/v1/jobs"];
+    for path in paths {
+        let first = post(path, "sphere a", "key").send().await.unwrap();
+        assert_eq!(first.status(), StatusCode::ACCEPTED, "{path}");
+        let first: Value = first.json().await.unwrap();
+        let filler = app.file("sphere b").await;
+        let full = post(path, "sphere a", "new").send().await.unwrap();
+        problem(full, 429, "queue-full").await;
+        let again = post(path, "sphere a", "key").send().await.unwrap();
+        assert_eq!(again.status(), StatusCode::ACCEPTED, "{path}");
+        assert_eq!(again.json::<Value>().await.unwrap()["id"], first["id"]);
+        if path != "/v1/jobs" {
+            let other = post(path, "sphere d", "key").send().await.unwrap();
+            problem(other, 422, "idempotency-key-reused").await;
+        }
+        for job in [&first, &filler] {
+            let path = text(&job["links"]["self"]);
+            app.delete(&path).send().await.unwrap();
+            let erased = app.delete(&format!("{path}?erase=true")).send().await;
+            assert_eq!(erased.unwrap().status(), StatusCode::NO_CONTENT);
+        }
+    }
+    let volumes = app.json("/v1/volumes").await;
+    let count = volumes["volumes"].as_array().unwrap().len();
+    assert_eq!(count, 4, "a refused or repeated request stores nothing");
+}
+
+#[tokio::test]
+async fn a_list_shows_each_waiting_job_its_place() {
+    let app = TestApp::with(|s| s.workers = "1".parse().unwrap()).await;
+    let running = app.file("slow").await;
+    app.until(&running, &["running"]).await;
+    let mut waiting = Vec::new();
+    for number in 0..5 {
+        waiting.push(app.file(&format!("sphere {number}")).await);
+    }
+    app.delete(&text(&waiting[2]["links"]["self"]))
+        .send()
+        .await
+        .unwrap();
+    let places = |list: &Value| -> Vec<Value> {
+        let jobs = list["jobs"].as_array().unwrap().iter();
+        jobs.map(|job| job["queue_position"].clone()).collect()
+    };
+    let all = app.json("/v1/jobs").await;
+    assert_eq!(json!(places(&all)), json!([4, 3, null, 2, 1, null]));
+    let page = app.json("/v1/jobs?state=queued&limit=2").await;
+    assert_eq!(json!(places(&page)), json!([4, 3]));
+    let cursor = text(&page["next_cursor"]);
+    let next = app
+        .json(&format!("/v1/jobs?state=queued&cursor={cursor}"))
+        .await;
+    assert_eq!(json!(places(&next)), json!([2, 1]));
+}
+
+#[tokio::test]
+async fn a_commit_that_takes_longer_than_the_lease_is_not_a_second_attempt() {
+    let app = TestApp::with(|s| {
+        s.lease = "200ms".parse().unwrap();
+    })
+    .await;
+    let job = app.file("brief").await;
+    app.until(&job, &["running"]).await;
+    let options =
+        sqlx::sqlite::SqliteConnectOptions::new().filename(app.data.path().join("ventriform.db"));
+    let mut database: sqlx::SqliteConnection =
+        sqlx::ConnectOptions::connect(&options).await.unwrap();
+    sqlx::query("BEGIN IMMEDIATE")
+        .execute(&mut database)
+        .await
+        .unwrap();
+    // The computation takes 0.3 s; then its commit fails for longer than the lease.
+    tokio::time::sleep(Duration::from_millis(1800)).await;
+    sqlx::query("ROLLBACK")
+        .execute(&mut database)
+        .await
+        .unwrap();
+    let done = app.until(&job, &["succeeded", "failed"]).await;
+    assert_eq!(done["state"], "succeeded", "{done}");
+    assert_eq!(done["attempts"], 1);
 }

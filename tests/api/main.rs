@@ -18,6 +18,8 @@ mod durability;
 mod end_to_end;
 mod events;
 mod hostile;
+#[cfg(target_os = "linux")]
+mod isolation;
 mod items;
 mod jobs;
 mod models;

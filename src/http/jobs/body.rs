@@ -3,9 +3,10 @@
 use crate::http::app::App;
 use crate::http::problem::{Answer, Problem, ProblemBody};
 use crate::http::wire::{path_of, rfc3339};
-use crate::jobs::{Job, JobState, Resource};
+use crate::jobs::{Job, JobState, QueuePosition, Resource, Timestamp};
 use serde::Serialize;
 use serde_json::{Map, Value};
+use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
 /// An accepted job.
@@ -119,11 +120,20 @@ impl From<JobState> for JobStateName {
 
 /// The JSON of a job, with its place in the queue if it waits.
 pub async fn describe(app: &App, job: Job) -> Answer<JobBody> {
-    let standing = match job.state {
-        JobState::Queued => Some(app.queue.position(&job).await?),
-        _ => None,
-    };
+    let positions = app.queue.positions(std::slice::from_ref(&job)).await?;
+    Ok(body(job, &positions, app.queue.clock.now()))
+}
+
+/// The JSON of each job, with the places in the queue of those that wait.
+pub async fn describe_all(app: &App, jobs: Vec<Job>) -> Answer<Vec<JobBody>> {
+    let positions = app.queue.positions(&jobs).await?;
     let now = app.queue.clock.now();
+    let bodies = jobs.into_iter().map(|job| body(job, &positions, now));
+    Ok(bodies.collect())
+}
+
+fn body(job: Job, positions: &BTreeMap<i64, QueuePosition>, now: Timestamp) -> JobBody {
+    let standing = positions.get(&job.sequence);
     let made = |resource: Resource| {
         let id = job.result.clone();
         id.filter(|id| Resource::of(id) == Some(resource))
@@ -132,7 +142,7 @@ pub async fn describe(app: &App, job: Job) -> Answer<JobBody> {
     let result = job.result.as_deref().map(path_of);
     let below = |name: &str| result.as_ref().map(|path| format!("{path}/{name}"));
     let itself = format!("/v1/jobs/{}", job.id);
-    Ok(JobBody {
+    JobBody {
         state: job.state.into(),
         queue_position: standing.map(|s| s.position),
         estimated_start: standing
@@ -163,5 +173,5 @@ pub async fn describe(app: &App, job: Job) -> Answer<JobBody> {
         revision: job.revision,
         model,
         segmentation,
-    })
+    }
 }

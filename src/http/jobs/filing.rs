@@ -10,8 +10,9 @@ use crate::http::problem::not_found::field_names_nothing;
 use crate::http::problem::{Answer, Problem};
 use crate::http::products::{self, Offer};
 use crate::http::request::query_pairs;
+use crate::http::upload::{self, Upload};
 use crate::http::wire::path_of;
-use crate::http::{idempotency, negotiate, observe, upload};
+use crate::http::{idempotency, negotiate, observe};
 use crate::jobs::{Filed, Job, JobState, JobWebhook, NewJob, Resource, Tenant, Work};
 use axum::Json;
 use axum::extract::Request;
@@ -65,13 +66,24 @@ pub async fn file_upload(
         trace_parent: observe::trace_parent(&request),
     };
     let mut parameters = work.parameters_from_text(&pairs)?;
-    require(app, &work.needs(&parameters).items).await?;
-    if app.queue.is_full().await? {
-        return Err(queue_full(app).await);
+    // A repeated request gets its job, whatever has become of the queue and of what it names.
+    if !key_was_used(app, filing.key.as_deref()).await? {
+        require(app, &work.needs(&parameters).items).await?;
+        if app.queue.is_full().await? {
+            return Err(queue_full(app).await);
+        }
     }
-    let upload = upload::receive(app, request, job.apart).await?;
+    let mut upload = upload::receive(app, request, job.apart).await?;
     let given = pairs.len();
-    pairs.extend(upload.fields);
+    pairs.append(&mut upload.fields);
+    let earlier = match &filing.key {
+        Some(key) => filed_earlier(app, &**work, &pairs, &mut upload, key.clone(), &filing).await?,
+        None => None,
+    };
+    if let Some(filed) = earlier {
+        let filed = accept(app, filed).await?;
+        return answer(app, filed, patience, &headers, &job.offers).await;
+    }
     // Held until the job is filed: from then on the job keeps them.
     let mut holds = Vec::new();
     for (name, files) in upload.others {
@@ -86,8 +98,19 @@ pub async fn file_upload(
     holds.push(stored.hold);
     let filed = file(app, &new_job(&**work, stored.volume.id, parameters, filing)).await?;
     drop(holds);
+    answer(app, filed, patience, &headers, &job.offers).await
+}
+
+/// The answer about a filed job, after waiting for its end if the client prefers that.
+async fn answer(
+    app: &App,
+    filed: Job,
+    patience: Option<Duration>,
+    headers: &HeaderMap,
+    offers: &[Offer],
+) -> Answer {
     match patience {
-        Some(patience) => wait(app, filed, patience, &headers, &job.offers).await,
+        Some(patience) => wait(app, filed, patience, headers, offers).await,
         None => accepted(app, filed).await,
     }
 }
@@ -100,6 +123,47 @@ pub struct Filing {
     pub webhook: Option<JobWebhook>,
     /// The request's trace context.
     pub trace_parent: Option<String>,
+}
+
+/// Whether an earlier request was accepted under that key.
+async fn key_was_used(app: &App, key: Option<&str>) -> Answer<bool> {
+    let Some(key) = key else {
+        return Ok(false);
+    };
+    let tenant = Tenant::default();
+    Ok(app.queue.jobs.filed_under(&tenant, key).await?.is_some())
+}
+
+/// What became of the key of this upload, if it was used before: ids are hashes, so the request can
+/// be compared without storing anything again.
+async fn filed_earlier(
+    app: &App,
+    work: &dyn Work,
+    pairs: &[(String, String)],
+    upload: &mut Upload,
+    key: String,
+    given: &Filing,
+) -> Answer<Option<Filed>> {
+    let mut pairs = pairs.to_vec();
+    for (name, files) in &mut upload.others {
+        pairs.push(((*name).to_owned(), files.volume_id()));
+    }
+    let parameters = work.parameters_from_text(&pairs)?;
+    let filing = Filing {
+        key: Some(key),
+        webhook: given.webhook.clone(),
+        trace_parent: None,
+    };
+    let job = new_job(work, upload.volume.volume_id(), parameters, filing);
+    let Some(promise) = job.idempotency else {
+        return Ok(None);
+    };
+    let earlier = app
+        .queue
+        .jobs
+        .filed_under(&job.tenant, &promise.key)
+        .await?;
+    Ok(earlier.map(|(job, fingerprint)| promise.judge(job, &fingerprint)))
 }
 
 /// A job on a stored volume, for [`file()`].
@@ -181,7 +245,12 @@ async fn require(app: &App, needs: &BTreeMap<String, String>) -> Answer<()> {
 /// 422 if something it needs does not exist or the key was used for another request, 429 if the
 /// queue is full.
 pub async fn file(app: &App, job: &NewJob) -> Answer<Job> {
-    match app.queue.file(job).await? {
+    let filed = app.queue.file(job).await?;
+    accept(app, filed).await
+}
+
+async fn accept(app: &App, filed: Filed) -> Answer<Job> {
+    match filed {
         Filed::New(job) | Filed::Same(job) => Ok(job),
         Filed::QueueFull => Err(queue_full(app).await),
         Filed::KeyReused => Err(Problem::new(
@@ -222,7 +291,10 @@ fn retry_after(seconds: f64) -> String {
 /// 202 with the job.
 pub async fn accepted(app: &App, job: Job) -> Answer {
     let starts_in_ms = match job.state {
-        JobState::Queued => app.queue.position(&job).await?.starts_in_ms,
+        JobState::Queued => {
+            let positions = app.queue.positions(std::slice::from_ref(&job)).await?;
+            positions.get(&job.sequence).and_then(|p| p.starts_in_ms)
+        }
         _ => None,
     };
     let headers = [

@@ -5,7 +5,7 @@ pub mod filing;
 
 mod body;
 
-pub use body::{JobBody, describe};
+pub use body::{JobBody, describe, describe_all};
 pub use filing::Filing;
 
 use super::app::App;
@@ -15,7 +15,7 @@ use super::observe;
 use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
 use super::pagination::{list_query, next_cursor};
 use super::problem::not_found::missing;
-use super::problem::{Answer, Problem, shorten};
+use super::problem::{Answer, Problem, ProblemBody, shorten};
 use super::request::{PathSegments, json_object, query_pairs, refuse_unknown, text, unknown};
 use crate::jobs::{Deleted, Interrupted, Job, JobState, NewJob, Resource};
 use axum::Json;
@@ -118,10 +118,7 @@ pub async fn list_jobs(State(app): State<App>, RawQuery(query): RawQuery) -> Ans
     let state = state.map(|name| parse_state(&name)).transpose()?;
     let page = app.queue.jobs.jobs(state, page).await?;
     let next_cursor = next_cursor(&page);
-    let mut jobs = Vec::with_capacity(page.items.len());
-    for job in page.items {
-        jobs.push(describe(&app, job).await?);
-    }
+    let jobs = describe_all(&app, page.items).await?;
     Ok(Json(JobList { jobs, next_cursor }))
 }
 
@@ -136,6 +133,17 @@ fn parse_state(name: &str) -> Answer<JobState> {
             "Give one of {}.",
             JobState::ALL.map(JobState::as_str).join(", ")
         ))
+    })
+}
+
+fn parse_flag(name: &'static str, text: &str) -> Answer<bool> {
+    text.parse().map_err(|_| {
+        Problem::bad_request(
+            "invalid-parameter",
+            format!("`{name}` must be `true` or `false`."),
+        )
+        .at(name)
+        .fix("Give `true` or `false`, or leave it out for `false`.")
     })
 }
 
@@ -163,27 +171,47 @@ pub async fn get_job(
 
 /// Cancel or erase a job
 ///
-/// A waiting job is cancelled at once; a running job is asked to stop and does so within 100 ms; a
-/// finished job is erased, but its result stays.
+/// A waiting job is cancelled at once; a running job is asked to stop and does so within 100 ms.
+/// Repeating the request changes nothing more: a job that a client has cancelled is shown, not
+/// erased, so a client that lost the answer can ask again. Any other finished job is erased, but
+/// its result stays. With `erase=true`, a finished job is erased however it ended, and an
+/// unfinished one is refused.
 #[utoipa::path(delete, path = "/v1/jobs/{id}", tag = "jobs",
-    params(("id" = String, Path, description = "The job's id")),
+    params(("id" = String, Path, description = "The job's id"),
+        ("erase" = Option<bool>, Query, description = "Whether to erase a job that was cancelled")),
     responses(
-        (status = 200, description = "It was waiting and is cancelled", body = JobBody),
+        (status = 200, description = "It is cancelled, or ended before it could be", body = JobBody),
         (status = 202, description = "It is running and was asked to stop", body = JobBody),
         (status = 204, description = "It was finished and is erased"),
+        (status = 409, description = "It is not finished, so it cannot be erased",
+            body = ProblemBody, content_type = "application/problem+json"),
         LookupProblems))]
 pub async fn delete_job(
     State(app): State<App>,
     PathSegments(id): PathSegments<String>,
     RawQuery(query): RawQuery,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let pairs = query_pairs(query.as_deref());
+    refuse_unknown(&pairs, &["erase"])?;
+    let erase = match pairs.first() {
+        Some((_, value)) => parse_flag("erase", value)?,
+        None => false,
+    };
+    if erase && !find(&app, &id).await?.state.is_final() {
+        return Err(Problem::new(
+            StatusCode::CONFLICT,
+            "not-finished",
+            "The job is not finished, so it cannot be erased.",
+        )
+        .fix("DELETE it without `erase` to cancel it, wait for its end, then erase it."));
+    }
     let (status, job) = match app.queue.interrupt(&id).await? {
         Interrupted::Cancelled(job) => (StatusCode::OK, job),
         Interrupted::Asked(job) => (StatusCode::ACCEPTED, job),
         Interrupted::Unknown => {
             return Err(missing(&*app.queue.catalogue, Resource::Job, &id).await);
         }
+        Interrupted::Finished(job) if job.cancel_requested && !erase => (StatusCode::OK, job),
         Interrupted::Finished(_) => {
             return match app.queue.erase(&id).await? {
                 Deleted::Done => Ok(StatusCode::NO_CONTENT.into_response()),

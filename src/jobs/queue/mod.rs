@@ -9,8 +9,8 @@ pub use items::Hold;
 pub use upkeep::{Upkeep, recover_after_crash};
 
 use super::{
-    BlobStore, Catalogue, Clock, Filed, Interrupted, Job, JobObserver, JobStore, NewJob, QueueLoad,
-    StoreError,
+    BlobStore, Catalogue, Clock, Filed, Interrupted, Job, JobObserver, JobState, JobStore, Lease,
+    NewJob, QueueLoad, StoreError, random_id,
 };
 use crate::progress::CancelToken;
 use items::Items;
@@ -55,8 +55,11 @@ pub struct Queue {
     settings: QueueSettings,
     filed: Notify,
     changes: broadcast::Sender<Arc<Job>>,
-    running: Mutex<BTreeMap<String, CancelToken>>,
+    /// Cancel tokens of the running jobs by lease token, with the ids of the jobs.
+    running: Mutex<BTreeMap<String, (String, CancelToken)>>,
     observer: OnceLock<Arc<dyn JobObserver>>,
+    /// Names this run of the service in the leases of its workers.
+    pub(super) run: String,
 }
 
 impl Queue {
@@ -79,6 +82,7 @@ impl Queue {
             changes: broadcast::Sender::new(CHANGES_BUFFERED),
             running: Mutex::default(),
             observer: OnceLock::new(),
+            run: random_id("run_"),
         }
     }
 
@@ -123,7 +127,9 @@ impl Queue {
         match &outcome {
             Interrupted::Cancelled(job) => self.announce(job),
             Interrupted::Asked(job) => {
-                if let Some(token) = self.running().get(id) {
+                // A worker that has claimed the job but is not in the list yet reads the request
+                // from the table, after it has entered the list.
+                for (_, token) in self.running().values().filter(|(job, _)| job == id) {
                     token.cancel();
                 }
                 self.announce(job);
@@ -163,12 +169,22 @@ impl Queue {
         }
     }
 
-    /// The position of a waiting job.
+    /// The positions of those jobs that wait, by their place in the order of filing. Takes two
+    /// queries, however many jobs there are.
     ///
     /// # Errors
     /// If the database fails.
-    pub async fn position(&self, job: &Job) -> Result<QueuePosition, StoreError> {
-        let ahead = self.jobs.ahead_of(job).await?;
+    pub async fn positions(
+        &self,
+        jobs: &[Job],
+    ) -> Result<BTreeMap<i64, QueuePosition>, StoreError> {
+        let waiting = jobs.iter().filter(|job| job.state == JobState::Queued);
+        let mut sequences: Vec<i64> = waiting.map(|job| job.sequence).collect();
+        if sequences.is_empty() {
+            return Ok(BTreeMap::new());
+        }
+        sequences.sort_unstable();
+        let ahead = self.jobs.ahead_of(&sequences).await?;
         let QueueLoad {
             running,
             mean_duration_ms,
@@ -176,11 +192,17 @@ impl Queue {
         } = self.jobs.load().await?;
         let workers = self.settings.workers as f64;
         // Running jobs are half done on average, and the workers share what is ahead.
-        let work_ahead = (ahead as f64 + running as f64 / 2.0) / workers;
-        Ok(QueuePosition {
-            position: ahead + 1,
-            starts_in_ms: mean_duration_ms.map(|mean| mean * work_ahead),
-        })
+        let position = |ahead: u64| {
+            let work_ahead = (ahead as f64 + running as f64 / 2.0) / workers;
+            QueuePosition {
+                position: ahead + 1,
+                starts_in_ms: mean_duration_ms.map(|mean| mean.max(0.0) * work_ahead),
+            }
+        };
+        Ok(sequences
+            .into_iter()
+            .zip(ahead.into_iter().map(position))
+            .collect())
     }
 
     /// Tells the observer that the computation of a job has ended.
@@ -211,16 +233,17 @@ impl Queue {
     }
 
     /// Registers a running job, so that [`Queue::interrupt`] can stop it.
-    pub(super) fn enter(&self, id: &str, token: CancelToken) {
-        self.running().insert(id.to_owned(), token);
+    pub(super) fn enter(&self, lease: &Lease, cancel: CancelToken) {
+        let job = (lease.job.clone(), cancel);
+        self.running().insert(lease.token.clone(), job);
     }
 
     /// Removes a job registered by [`Queue::enter`].
-    pub(super) fn leave(&self, id: &str) {
-        self.running().remove(id);
+    pub(super) fn leave(&self, lease: &Lease) {
+        self.running().remove(&lease.token);
     }
 
-    fn running(&self) -> std::sync::MutexGuard<'_, BTreeMap<String, CancelToken>> {
+    fn running(&self) -> std::sync::MutexGuard<'_, BTreeMap<String, (String, CancelToken)>> {
         // A panic cannot leave the map half changed: each use is a single call.
         self.running.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -42,6 +42,10 @@ impl Queue {
     /// # Errors
     /// If the database fails.
     pub async fn renew_volume(&self, id: &str) -> Result<Option<StoredVolume>, StoreError> {
+        // Most uploads are new: those shall not wait for a write that changes nothing.
+        if self.catalogue.volume(id).await?.is_none() {
+            return Ok(None);
+        }
         self.catalogue.renew_volume(id, self.clock.now()).await
     }
 
@@ -176,7 +180,7 @@ fn mesh_hash(files: &[ProductFile]) -> &str {
 fn described(file: &OutputFile) -> ProductFile {
     ProductFile {
         name: file.name.clone(),
-        media_type: file.media_type.into(),
+        media_type: file.media_type.clone().into_owned(),
         bytes: file.bytes.len() as u64,
         sha256: hex(&Sha256::digest(&file.bytes)),
     }

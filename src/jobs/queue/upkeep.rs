@@ -2,24 +2,29 @@
 
 use super::Queue;
 use super::publish::to_its_end;
-use crate::jobs::{Deleted, Failure, Fault, Resource, StoreError};
+use crate::jobs::{DeathLimit, Deleted, Resource, StoreError, Timestamp};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio_util::sync::CancellationToken;
 
 /// Makes the table and the files consistent after the previous process ended at any moment:
 /// returns its running jobs to the queue, and deletes files that have no record. To be called
-/// before the first worker starts, by the only process on the store.
+/// before the first worker starts, by the only process on the store. With a `limit`, jobs that were
+/// running when that many processes died are failed; a program that can compute them in a process
+/// of their own needs none.
 ///
 /// # Errors
 /// If the storage fails.
-pub async fn recover_after_crash(queue: &Queue, attempt_limit: u32) -> Result<(), StoreError> {
-    let released = queue.jobs.release_all().await?;
-    end_unclaimable(queue, attempt_limit).await?;
+pub async fn recover_after_crash(
+    queue: &Queue,
+    limit: Option<&DeathLimit>,
+) -> Result<(), StoreError> {
+    let now = queue.clock.now();
+    let released = queue.jobs.release_dead(None, limit, now).await?;
     let orphans = delete_orphans(queue).await?;
-    if released + orphans > 0 {
+    if released.len() as u64 + orphans > 0 {
         tracing::warn!(
-            released,
+            released = released.len(),
             orphans,
             "recovered after the previous process did not stop in order"
         );
@@ -63,31 +68,26 @@ async fn settle_items(queue: &Queue) -> Result<(), StoreError> {
     Ok(())
 }
 
-async fn end_unclaimable(queue: &Queue, attempt_limit: u32) -> Result<(), StoreError> {
-    let reason = Failure::new(
-        Fault::Service,
-        "attempt-limit",
-        format!("The job was started {attempt_limit} times and never ended."),
-    )
-    .fix("Report it with the job's id. Other parameters may work.");
-    let now = queue.clock.now();
-    let ended = queue
-        .jobs
-        .end_unclaimable(attempt_limit, &reason, now)
-        .await?;
-    for job in ended {
-        tracing::error!(job = %job.id, attempts = job.attempts, "job ended without a result");
+/// Returns the jobs of other runs that died to the queue.
+async fn release_dead(queue: &Queue) -> Result<(), StoreError> {
+    let run = Some(queue.run.as_str());
+    let released = queue.jobs.release_dead(run, None, queue.clock.now());
+    for job in released.await? {
+        tracing::warn!(job = %job.id, "the lease of another run of the service has expired");
         queue.announce(&job);
     }
     Ok(())
 }
 
+const HOUR_MS: Timestamp = 3_600_000;
+
+/// How long nothing is erased by age after a start at a doubtful time.
+const DOUBT: Duration = Duration::from_secs(3600);
+
 /// The periodic upkeep of a running service.
 pub struct Upkeep {
     /// The queue to look after.
     pub queue: Arc<Queue>,
-    /// Number of attempts after which a job is failed.
-    pub attempt_limit: u32,
     /// Age at which finished jobs, volumes, models and segmentations are deleted; `None` keeps
     /// them.
     pub retention: Option<Duration>,
@@ -99,15 +99,37 @@ impl Upkeep {
     /// Runs one round every [`Upkeep::every`] until `end` is cancelled.
     pub async fn run(self, end: CancellationToken) {
         let mut round = tokio::time::interval(self.every);
+        let doubtful = self.time_is_doubtful().await;
+        let started = Instant::now();
         loop {
             tokio::select! {
                 _ = round.tick() => {}
                 () = end.cancelled() => return,
             }
-            if let Err(error) = self.run_once().await {
+            let trusted = !doubtful || started.elapsed() >= DOUBT;
+            if let Err(error) = self.run_round(trusted).await {
                 tracing::error!(%error, "upkeep failed; the next round tries again");
             }
         }
+    }
+
+    /// Whether the time since the last change of the store is so long, or so negative, that a
+    /// machine that has started with a wrong clock is likely.
+    async fn time_is_doubtful(&self) -> bool {
+        let last = match self.queue.jobs.last_change().await {
+            Ok(Some(last)) if self.retention.is_some() => last,
+            _ => return false,
+        };
+        let age = self.queue.clock.now().saturating_sub(last);
+        let doubtful = !(-HOUR_MS..=24 * HOUR_MS).contains(&age);
+        if doubtful {
+            tracing::warn!(
+                hours = age / HOUR_MS,
+                "the last change of the store is that long ago, or lies in the future: nothing is \
+                 erased by age for an hour, so that a wrong clock can be set"
+            );
+        }
+        doubtful
     }
 
     /// Runs one round.
@@ -115,9 +137,13 @@ impl Upkeep {
     /// # Errors
     /// If the database fails.
     pub async fn run_once(&self) -> Result<(), StoreError> {
-        end_unclaimable(&self.queue, self.attempt_limit).await?;
+        self.run_round(true).await
+    }
+
+    async fn run_round(&self, time_is_trusted: bool) -> Result<(), StoreError> {
+        release_dead(&self.queue).await?;
         settle_items(&self.queue).await?;
-        let Some(age) = self.retention else {
+        let Some(age) = self.retention.filter(|_| time_is_trusted) else {
             return Ok(());
         };
         let age = i64::try_from(age.as_millis()).unwrap_or(i64::MAX);

@@ -1,8 +1,9 @@
 //! The interface to the jobs table.
 
 use super::{Deleted, ListPage, ListRequest, Product, StoreResult};
-use crate::jobs::{Failure, Filed, Job, JobState, NewJob, Timestamp};
+use crate::jobs::{Failure, Filed, Job, JobState, NewJob, Tenant, Timestamp};
 use async_trait::async_trait;
+use std::time::Duration;
 
 /// A worker's temporary claim on a job.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -11,6 +12,27 @@ pub struct Lease {
     pub job: String,
     /// Known to the holder only; every write to the job must name it.
     pub token: String,
+}
+
+/// A worker that asks for a job.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Claimant {
+    /// See [`Lease::token`].
+    pub token: String,
+    /// The run of the service that the worker belongs to. A lease of a run that lives does not
+    /// expire for workers of the same run, which know that its holder is alive.
+    pub run: String,
+    /// How long the lease lasts for workers of other runs unless it is renewed.
+    pub lease: Duration,
+}
+
+/// When a job is failed because of what happened to the processes that computed it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DeathLimit {
+    /// Number of deaths after which the job is failed.
+    pub deaths: u32,
+    /// Why it is failed then.
+    pub reason: Failure,
 }
 
 /// How a claimed job ended.
@@ -61,25 +83,34 @@ pub trait JobStore: Send + Sync + 'static {
     /// Jobs, newest first: all, or those in `state`.
     async fn jobs(&self, state: Option<JobState>, page: ListRequest) -> StoreResult<ListPage<Job>>;
 
-    /// The number of jobs that wait ahead of `job`.
-    async fn ahead_of(&self, job: &Job) -> StoreResult<u64>;
+    /// The job filed earlier under that idempotency key of a tenant, whatever the request was, with
+    /// the fingerprint of that request.
+    async fn filed_under(&self, tenant: &Tenant, key: &str) -> StoreResult<Option<(Job, String)>>;
+
+    /// For each position in the order of filing, the number of jobs that wait before it; `sequences`
+    /// are in rising order.
+    async fn ahead_of(&self, sequences: &[i64]) -> StoreResult<Vec<u64>>;
+
+    /// When a job was last filed or ended, or a volume last used; `None` if there are none.
+    async fn last_change(&self) -> StoreResult<Option<Timestamp>>;
 
     /// How busy the queue is.
     async fn load(&self) -> StoreResult<QueueLoad>;
 
-    /// Claims the oldest job that is waiting or whose lease has expired: counts the attempt and
-    /// sets a lease until `until`. Skips jobs that have had `attempt_limit` attempts.
-    async fn claim(
-        &self,
-        token: &str,
-        attempt_limit: u32,
-        now: Timestamp,
-        until: Timestamp,
-    ) -> StoreResult<Option<Job>>;
+    /// Claims the oldest waiting job: counts the attempt and sets a lease.
+    ///
+    /// `now` is the time of this process, by which only the stamps of the job are set. A store that
+    /// several machines share must let leases expire by the clock of its database.
+    async fn claim(&self, by: &Claimant, now: Timestamp) -> StoreResult<Option<Job>>;
 
-    /// Extends a lease until `until`. Returns whether cancellation was requested, or `None` if
-    /// the lease was lost.
-    async fn renew_lease(&self, lease: &Lease, until: Timestamp) -> StoreResult<Option<bool>>;
+    /// Extends a lease by `length` from now. Returns whether cancellation was requested, or `None`
+    /// if the lease was lost.
+    async fn renew_lease(
+        &self,
+        lease: &Lease,
+        length: Duration,
+        now: Timestamp,
+    ) -> StoreResult<Option<bool>>;
 
     /// Stores the current stage and the completed fraction. `None` if the lease was lost.
     async fn progress(&self, lease: &Lease, stage: &str, progress: f64)
@@ -94,20 +125,32 @@ pub trait JobStore: Send + Sync + 'static {
         now: Timestamp,
     ) -> StoreResult<Option<Job>>;
 
-    /// Returns a claimed job to the queue without counting the attempt. `None` if the lease was
-    /// lost.
-    async fn hand_back(&self, lease: &Lease) -> StoreResult<Option<Job>>;
+    /// Returns a claimed job to the queue without counting the attempt, or cancels it if that was
+    /// requested. `None` if the lease was lost.
+    async fn hand_back(&self, lease: &Lease, now: Timestamp) -> StoreResult<Option<Job>>;
 
-    /// Returns every running job to the queue, and how many there were. To be called at start by
-    /// the only process on this store: their workers died with the process before it.
-    async fn release_all(&self) -> StoreResult<u64>;
+    /// Returns the job that was claimed with this token, if one was, to the queue as it was before.
+    async fn abandon(&self, token: &str) -> StoreResult<Option<Job>>;
 
-    /// Ends the jobs that no worker will claim any more: fails, with `reason`, those that have had
-    /// `attempt_limit` attempts, and cancels those whose cancellation was requested.
-    async fn end_unclaimable(
+    /// The job's own process died: counts that, and returns the job to the queue, cancels it if
+    /// that was requested, or fails it at the limit. `None` if the lease was lost.
+    async fn crashed(
         &self,
-        attempt_limit: u32,
-        reason: &Failure,
+        lease: &Lease,
+        limit: &DeathLimit,
+        now: Timestamp,
+    ) -> StoreResult<Option<Job>>;
+
+    /// Returns the jobs of dead runs to the queue, or cancels those for which that was requested,
+    /// and counts the interruption. With a `limit`, fails those that were interrupted that often.
+    /// Returns the jobs as they are now.
+    ///
+    /// At start, the only process on this store says that no `run` lives. Later the dead runs are
+    /// those other than `run` whose leases have expired.
+    async fn release_dead(
+        &self,
+        run: Option<&str>,
+        limit: Option<&DeathLimit>,
         now: Timestamp,
     ) -> StoreResult<Vec<Job>>;
 

@@ -14,7 +14,7 @@ mod volume;
 pub use blobs::{BlobError, BlobStore, BlobStream, BlobWriter, LocalFile, StagedFiles};
 pub use catalogue::{Catalogue, Deleted};
 pub use figures::{FigureStore, QueueFigures};
-pub use job_store::{Interrupted, JobOutcome, JobStore, Lease, QueueLoad};
+pub use job_store::{Claimant, DeathLimit, Interrupted, JobOutcome, JobStore, Lease, QueueLoad};
 pub use listing::{ListPage, ListRequest};
 pub use product::{Product, ProductFile};
 pub use volume::StoredVolume;

@@ -1,7 +1,11 @@
-//! Claiming a job and renewing its lease while it is computed.
+//! Claiming a job and renewing its lease while it is computed and committed.
+//!
+//! A lease names the run of the service. No worker of the same run takes the job, whatever the
+//! clocks say and however long the process stood still: the holder is alive, or the whole run is
+//! dead. The expiry is for other runs on the same store.
 
 use super::WorkerSettings;
-use crate::jobs::{Job, Lease, Queue, StoreError, Timestamp, random_id};
+use crate::jobs::{Claimant, Lease, Queue, random_id};
 use std::time::Duration;
 
 /// What renewing a lease showed.
@@ -11,7 +15,7 @@ pub(super) enum Renewal {
     Held,
     /// The job is still ours, and its cancellation was requested.
     CancelRequested,
-    /// The lease expired and the job was claimed by another worker, or ended.
+    /// The lease expired and another run of the service took the job.
     Lost,
 }
 
@@ -20,29 +24,19 @@ pub(super) fn renewal_interval(settings: &WorkerSettings) -> Duration {
     settings.lease / 3
 }
 
-/// Claims the next job, if there is one.
-pub(super) async fn claim(
-    queue: &Queue,
-    settings: &WorkerSettings,
-) -> Result<Option<(Job, Lease)>, StoreError> {
-    let token = random_id("");
-    let (now, until) = (queue.clock.now(), expiry(queue, settings));
-    let claimed = queue
-        .jobs
-        .claim(&token, settings.attempt_limit, now, until)
-        .await?;
-    Ok(claimed.map(|job| {
-        let lease = Lease {
-            job: job.id.clone(),
-            token,
-        };
-        (job, lease)
-    }))
+/// A worker of this run that asks for a job, with a new token.
+pub(super) fn claimant(queue: &Queue, settings: &WorkerSettings) -> Claimant {
+    Claimant {
+        token: random_id(""),
+        run: queue.run.clone(),
+        lease: settings.lease,
+    }
 }
 
 /// Extends the lease by its full length from now.
 pub(super) async fn renew(queue: &Queue, settings: &WorkerSettings, lease: &Lease) -> Renewal {
-    match queue.jobs.renew_lease(lease, expiry(queue, settings)).await {
+    let now = queue.clock.now();
+    match queue.jobs.renew_lease(lease, settings.lease, now).await {
         Ok(Some(false)) => Renewal::Held,
         Ok(Some(true)) => Renewal::CancelRequested,
         Ok(None) => Renewal::Lost,
@@ -52,9 +46,4 @@ pub(super) async fn renew(queue: &Queue, settings: &WorkerSettings, lease: &Leas
             Renewal::Held
         }
     }
-}
-
-fn expiry(queue: &Queue, settings: &WorkerSettings) -> Timestamp {
-    let lease = i64::try_from(settings.lease.as_millis()).unwrap_or(i64::MAX / 2);
-    queue.clock.now().saturating_add(lease)
 }

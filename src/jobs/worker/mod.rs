@@ -1,11 +1,13 @@
 //! Workers: each claims a job, computes it, commits the result, and claims the next.
 
+mod isolation;
 mod lease;
 mod priority;
 mod progress;
 mod run;
 mod settings;
 
+pub use isolation::serve_isolated;
 pub use settings::WorkerSettings;
 
 use super::{Queue, Works};
@@ -15,8 +17,8 @@ use std::time::Duration;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 
-/// An idle worker looks for jobs at least this often, because nothing wakes it when the lease of
-/// another process's worker expires.
+/// An idle worker looks for jobs at least this often, because nothing wakes it when another
+/// process files a job.
 const POLL: Duration = Duration::from_secs(1);
 
 /// Stack of the computing threads; recursion over large meshes needs it.
@@ -42,13 +44,7 @@ impl Workers {
         let (drain, halt) = (CancellationToken::new(), CancellationToken::new());
         let mut tasks = JoinSet::new();
         for number in 0..settings.workers {
-            let threads = rayon::ThreadPoolBuilder::new()
-                .num_threads(settings.threads)
-                .thread_name(move |thread| format!("worker-{number}-{thread}"))
-                .stack_size(STACK_BYTES)
-                .start_handler(|_| priority::yield_to_requests())
-                .build()
-                .map_err(std::io::Error::other)?;
+            let threads = thread_pool(&format!("worker-{number}"), settings.threads)?;
             let runner = JobRunner {
                 queue: queue.clone(),
                 works: works.clone(),
@@ -71,6 +67,18 @@ impl Workers {
             while self.tasks.join_next().await.is_some() {}
         }
     }
+}
+
+/// Threads for computing, with enough stack.
+fn thread_pool(name: &str, threads: usize) -> std::io::Result<rayon::ThreadPool> {
+    let name = name.to_owned();
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(move |thread| format!("{name}-{thread}"))
+        .stack_size(STACK_BYTES)
+        .start_handler(|_| priority::yield_to_requests())
+        .build()
+        .map_err(std::io::Error::other)
 }
 
 async fn run_jobs(runner: JobRunner, drain: CancellationToken) {

@@ -1,10 +1,18 @@
 //! Running one job: claim, compute, commit.
+//!
+//! A job is computed on the threads of the service. One that was running when the service died is
+//! computed in a process of its own from then on ([`super::isolation`]).
+//!
+//! The lease is renewed from the claim to the end of the commit. If the storage fails, the worker
+//! keeps the job and what it has computed, and tries again until the storage works or the service
+//! stops: a job of a living run is never without a worker.
 
 use super::WorkerSettings;
 use super::lease::{self, Renewal};
 use super::progress::{ProgressReport, ProgressSender, WriteLimiter};
 use crate::jobs::{
-    Failure, Fault, Job, JobOutcome, Lease, Queue, StoreError, WorkError, WorkOutput, Works,
+    DeathLimit, Failure, Fault, Isolation, Job, JobOutcome, Lease, Queue, StoreError, WorkError,
+    WorkOutput, Works,
 };
 use crate::progress::{CancelToken, Monitor};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -16,6 +24,9 @@ use tokio_util::sync::CancellationToken;
 /// How long a computation that was told to stop may go on before its job is ended anyway.
 const STOP_LIMIT: Duration = Duration::from_secs(5);
 
+/// First and longest pause before the storage is tried again.
+const STORAGE_PAUSES: (Duration, Duration) = (Duration::from_secs(1), Duration::from_secs(30));
+
 /// What one worker needs to run jobs.
 pub(super) struct JobRunner {
     pub queue: Arc<Queue>,
@@ -26,7 +37,30 @@ pub(super) struct JobRunner {
 }
 
 /// What the computation returned; the outer error is a panic.
-type Computed = std::thread::Result<Result<WorkOutput, WorkError>>;
+type Computed = std::thread::Result<Result<WorkOutput, Ended>>;
+
+/// How a computation ended without an output.
+#[derive(Debug)]
+pub(super) enum Ended {
+    /// The work says why.
+    Work(WorkError),
+    /// Its own process died; this is the process's status.
+    Crashed(String),
+    /// Its own process was ended from outside, or could not be started.
+    Interrupted,
+}
+
+impl From<WorkError> for Ended {
+    fn from(error: WorkError) -> Self {
+        Ended::Work(error)
+    }
+}
+
+impl From<Failure> for Ended {
+    fn from(failure: Failure) -> Self {
+        Ended::Work(failure.into())
+    }
+}
 
 /// A computation that was started.
 struct Computation {
@@ -43,18 +77,46 @@ enum Stop {
     LeaseLost,
 }
 
+/// What is written about a job when it leaves its worker.
+enum Resolution {
+    /// Nothing: another run of the service has the job.
+    Nothing,
+    /// The output.
+    Output(WorkOutput),
+    /// The outcome.
+    Outcome(JobOutcome),
+    /// That it waits again.
+    HandBack,
+    /// That its own process died with this status.
+    Crashed(String),
+}
+
 impl JobRunner {
     /// Claims a job and runs it to its end. `false` if there was none.
     pub async fn run_next_job(&self) -> Result<bool, StoreError> {
-        let Some((job, lease)) = lease::claim(&self.queue, &self.settings).await? else {
-            return Ok(false);
+        let by = lease::claimant(&self.queue, &self.settings);
+        let lease = |job: &str| Lease {
+            job: job.to_owned(),
+            token: by.token.clone(),
         };
+        let job = match self.queue.jobs.claim(&by, self.queue.clock.now()).await {
+            Ok(Some(job)) => job,
+            Ok(None) => return Ok(false),
+            Err(error) => {
+                // It may have been written all the same; then nobody else will take the job.
+                let unknown = lease("");
+                self.insist(&unknown, || self.queue.jobs.abandon(&unknown.token))
+                    .await?;
+                return Err(error);
+            }
+        };
+        let lease = lease(&job.id);
         tracing::info!(job = %job.id, kind = %job.kind, attempt = job.attempts, "job started");
         self.queue.announce(&job);
         let cancel = CancelToken::new();
-        self.queue.enter(&job.id, cancel.clone());
+        self.queue.enter(&lease, cancel.clone());
         let ended = self.compute_and_commit(&job, &lease, &cancel).await;
-        self.queue.leave(&job.id);
+        self.queue.leave(&lease);
         if let Some(job) = ended? {
             tracing::info!(job = %job.id, state = job.state.as_str(), "job left its worker");
             self.queue.announce(&job);
@@ -68,11 +130,37 @@ impl JobRunner {
         lease: &Lease,
         cancel: &CancelToken,
     ) -> Result<Option<Job>, StoreError> {
-        let mut computation = self.start(job, cancel).await?;
+        // Whoever cancelled the job after it was claimed may not have found its token yet.
+        if let Ok(Some(now)) = self.queue.jobs.job(&job.id).await
+            && now.cancel_requested
+        {
+            cancel.cancel();
+        }
+        let mut computation = match self.start(job, cancel).await {
+            Ok(computation) => computation,
+            Err(error) => {
+                tracing::error!(job = %job.id, %error, "the job's input could not be read");
+                self.pause(STORAGE_PAUSES.0).await;
+                let limit = self.limit(unreadable);
+                return self
+                    .insist(lease, || {
+                        self.queue
+                            .jobs
+                            .crashed(lease, &limit, self.queue.clock.now())
+                    })
+                    .await;
+            }
+        };
         let (computed, stop) = self.watch(lease, cancel, &mut computation).await;
         let abandoned = computed.is_none();
         self.queue.computed(job);
-        let ended = self.commit(job, lease, computed, stop).await;
+        if matches!(&computed, Some(Ok(Err(Ended::Interrupted)))) && stop.is_none() {
+            self.pause(STORAGE_PAUSES.0).await;
+        }
+        let resolution = self.resolve(computed, stop);
+        let ended = self
+            .insist(lease, || self.commit(job, lease, &resolution))
+            .await;
         if abandoned && !computation.result.is_terminated() {
             // The threads are busy until the computation notices the cancel token.
             tokio::select! {
@@ -81,6 +169,77 @@ impl JobRunner {
             }
         }
         ended
+    }
+
+    /// Writes to the storage until that succeeds or the service stops, and renews the lease
+    /// meanwhile.
+    async fn insist<F>(
+        &self,
+        lease: &Lease,
+        write: impl Fn() -> F,
+    ) -> Result<Option<Job>, StoreError>
+    where
+        F: Future<Output = Result<Option<Job>, StoreError>>,
+    {
+        let writing = async {
+            let mut pause = STORAGE_PAUSES.0;
+            loop {
+                match write().await {
+                    Err(error) if !self.halt.is_cancelled() => {
+                        tracing::error!(
+                            job = %lease.job, %error,
+                            "the end of the job could not be written; trying again"
+                        );
+                        self.pause(pause).await;
+                        pause = (2 * pause).min(STORAGE_PAUSES.1);
+                    }
+                    written => return written,
+                }
+            }
+        };
+        let renewing = async {
+            let mut renewal = self.renewals();
+            loop {
+                renewal.tick().await;
+                // Whether the lease is still held is found out by the write, which names it.
+                lease::renew(&self.queue, &self.settings, lease).await;
+            }
+        };
+        tokio::select! {
+            biased;
+            written = writing => written,
+            () = renewing => Ok(None),
+        }
+    }
+
+    fn renewals(&self) -> tokio::time::Interval {
+        let every = lease::renewal_interval(&self.settings);
+        tokio::time::interval_at(tokio::time::Instant::now() + every, every)
+    }
+
+    async fn pause(&self, pause: Duration) {
+        tokio::select! {
+            () = tokio::time::sleep(pause) => {}
+            () = self.halt.cancelled() => {}
+        }
+    }
+
+    fn limit(&self, reason: impl Fn(u32) -> Failure) -> DeathLimit {
+        DeathLimit {
+            deaths: self.settings.attempt_limit,
+            reason: reason(self.settings.attempt_limit),
+        }
+    }
+
+    /// How to compute the job in a process of its own, if it has to be.
+    fn isolation(&self, job: &Job) -> Option<Isolation> {
+        let suspected = job.interruptions > 0 || job.crashes > 0;
+        let isolation = self.works.isolation().filter(|_| suspected)?;
+        tracing::warn!(
+            job = %job.id, interruptions = job.interruptions, crashes = job.crashes,
+            "the service died while this job was running: it is computed in a process of its own"
+        );
+        Some(isolation.clone())
     }
 
     /// Starts the computation on this worker's threads.
@@ -95,11 +254,17 @@ impl JobRunner {
         let (sender, result) = oneshot::channel();
         let (reports, progress) = mpsc::unbounded_channel();
         let cancel = cancel.clone();
+        let (isolation, kind) = (self.isolation(job), job.kind.clone());
+        let threads = self.settings.threads;
         self.threads.spawn(move || {
-            let computed = catch_unwind(AssertUnwindSafe(|| {
+            let computed = catch_unwind(AssertUnwindSafe(|| -> Result<WorkOutput, Ended> {
                 let (work, input) = prepared?;
                 let observer = ProgressSender::new(work.plan(), reports);
-                work.run(&input, &Monitor::new(&observer, cancel))
+                let monitor = Monitor::new(&observer, cancel);
+                match isolation {
+                    Some(isolation) => isolation.compute(&kind, &input, threads, &monitor),
+                    None => Ok(work.run(&input, &monitor)?),
+                }
             }));
             // The receiver is gone only if the job was ended without the computation.
             let _ = sender.send(computed);
@@ -115,7 +280,7 @@ impl JobRunner {
         computation: &mut Computation,
     ) -> (Option<Computed>, Option<Stop>) {
         let mut stop = None;
-        let mut renewal = tokio::time::interval(lease::renewal_interval(&self.settings));
+        let mut renewal = self.renewals();
         let mut limiter = WriteLimiter::default();
         let deadline = tokio::time::sleep(self.settings.time_limit);
         let stop_limit = tokio::time::sleep(STOP_LIMIT);
@@ -170,24 +335,43 @@ impl JobRunner {
         }
     }
 
+    /// What is to be written about a computation that has ended, or was told to stop.
+    fn resolve(&self, computed: Option<Computed>, stop: Option<Stop>) -> Resolution {
+        match (computed, stop) {
+            (_, Some(Stop::LeaseLost)) => Resolution::Nothing,
+            (Some(Ok(Ok(output))), _) => Resolution::Output(output),
+            (Some(Ok(Err(Ended::Work(WorkError::Failed(failure))))), _) => {
+                Resolution::Outcome(JobOutcome::Failed(failure))
+            }
+            (_, Some(Stop::Shutdown)) => Resolution::HandBack,
+            (_, Some(Stop::TimeLimit)) => Resolution::Outcome(JobOutcome::Failed(self.too_long())),
+            (_, Some(Stop::Requested)) => Resolution::Outcome(JobOutcome::Cancelled),
+            (Some(Ok(Err(Ended::Crashed(status)))), None) => Resolution::Crashed(status),
+            (Some(Ok(Err(Ended::Interrupted))), None) => Resolution::HandBack,
+            (Some(Err(_)), None) => Resolution::Outcome(JobOutcome::Failed(panicked())),
+            (Some(Ok(Err(Ended::Work(WorkError::Cancelled)))) | None, None) => {
+                Resolution::Outcome(JobOutcome::Cancelled)
+            }
+        }
+    }
+
     async fn commit(
         &self,
         job: &Job,
         lease: &Lease,
-        computed: Option<Computed>,
-        stop: Option<Stop>,
+        resolution: &Resolution,
     ) -> Result<Option<Job>, StoreError> {
-        let outcome = match (computed, stop) {
-            (_, Some(Stop::LeaseLost)) => return Ok(None),
-            (Some(Ok(Ok(output))), _) => return self.commit_output(job, lease, output).await,
-            (Some(Ok(Err(WorkError::Failed(failure)))), _) => JobOutcome::Failed(failure),
-            (_, Some(Stop::Shutdown)) => return self.queue.jobs.hand_back(lease).await,
-            (_, Some(Stop::TimeLimit)) => JobOutcome::Failed(self.too_long()),
-            (Some(Err(_)), _) => JobOutcome::Failed(panicked()),
-            (Some(Ok(Err(WorkError::Cancelled))) | None, _) => JobOutcome::Cancelled,
-        };
-        let now = self.queue.clock.now();
-        self.queue.jobs.finish(lease, &outcome, now).await
+        let (jobs, now) = (&self.queue.jobs, self.queue.clock.now());
+        match resolution {
+            Resolution::Nothing => Ok(None),
+            Resolution::Output(output) => self.commit_output(job, lease, output).await,
+            Resolution::Outcome(outcome) => jobs.finish(lease, outcome, now).await,
+            Resolution::HandBack => jobs.hand_back(lease, now).await,
+            Resolution::Crashed(status) => {
+                tracing::error!(job = %job.id, status, "the job has ended its own process");
+                jobs.crashed(lease, &self.limit(crashes), now).await
+            }
+        }
     }
 
     /// Stores the files, then commits the row. If the process ends in between, the next start
@@ -196,7 +380,7 @@ impl JobRunner {
         &self,
         job: &Job,
         lease: &Lease,
-        output: WorkOutput,
+        output: &WorkOutput,
     ) -> Result<Option<Job>, StoreError> {
         let Some(work) = self.works.of_kind(&job.kind) else {
             let outcome = JobOutcome::Failed(unknown_kind());
@@ -204,7 +388,7 @@ impl JobRunner {
             return self.queue.jobs.finish(lease, &outcome, now).await;
         };
         let made = work.makes();
-        self.queue.finish_with(made, job, lease, &output).await
+        self.queue.finish_with(made, job, lease, output).await
     }
 
     fn too_long(&self) -> Failure {
@@ -221,7 +405,7 @@ impl JobRunner {
     }
 }
 
-fn panicked() -> Failure {
+pub(super) fn panicked() -> Failure {
     Failure::new(
         Fault::Service,
         "internal",
@@ -230,10 +414,28 @@ fn panicked() -> Failure {
     .fix("Report it with the job's id.")
 }
 
-fn unknown_kind() -> Failure {
+pub(super) fn unknown_kind() -> Failure {
     Failure::new(
         Fault::Service,
         "unknown-kind",
         "This version of the program cannot compute jobs of this kind.",
     )
+}
+
+fn crashes(times: u32) -> Failure {
+    Failure::new(
+        Fault::Service,
+        "attempt-limit",
+        format!("The computation ended its process {times} times."),
+    )
+    .fix("Report it with the job's id. Other parameters may work, or a machine with more memory.")
+}
+
+fn unreadable(times: u32) -> Failure {
+    Failure::new(
+        Fault::Service,
+        "storage",
+        format!("What the job needs could not be read; that was tried {times} times."),
+    )
+    .fix("Ask the operator to look at the log, then file the job again.")
 }

@@ -9,9 +9,9 @@ pub struct WorkerSettings {
     pub workers: usize,
     /// Threads per job.
     pub threads: usize,
-    /// How long a claim lasts without renewal.
+    /// How long other runs of the service respect a claim that is not renewed.
     pub lease: Duration,
-    /// Number of attempts after which a job is failed.
+    /// Number of times a job may end its own process before it is failed.
     pub attempt_limit: u32,
     /// Longest computation of one job.
     pub time_limit: Duration,
