@@ -218,6 +218,8 @@ async fn steps_of_the_clock_neither_expire_a_lease_nor_keep_a_job_for_ever() {
     let work = fake_engine().work("model").unwrap().clone();
     let parameters = work.parameters_from_json(&serde_json::Map::new()).unwrap();
     let order = NewJob {
+        webhook: None,
+        trace_parent: None,
         tenant: Tenant::default(),
         kind: "model".into(),
         volume: "vol_1".into(),
