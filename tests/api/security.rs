@@ -139,7 +139,9 @@ async fn a_scope_allows_what_it_says_and_no_more() {
         }
         let url = format!("{}{path}", app.url);
         let send = |key: &str| app.client.request(method.clone(), &url).bearer_auth(key);
-        let for_admins = path.starts_with("/v1/keys") || path.starts_with("/v1/audit");
+        let for_admins = ["/v1/keys", "/v1/audit", "/v1/webhooks"]
+            .iter()
+            .any(|admin| path.starts_with(admin));
         let refused = [
             (&read, for_admins || !method.is_safe()),
             (&submit, for_admins),
