@@ -240,7 +240,10 @@ async fn resolve_host(host: &str, port: u16) -> Result<Vec<SocketAddr>, UrlRefus
 
 /// The resolver of the HTTP client: it knows only names that were checked, while they are pinned.
 #[derive(Debug, Clone, Default)]
-pub(super) struct PinnedNames(Arc<Mutex<BTreeMap<String, (usize, Vec<SocketAddr>)>>>);
+pub(super) struct PinnedNames(Arc<Mutex<BTreeMap<String, PinnedAddresses>>>);
+
+/// How often a name is pinned, and the addresses that were checked.
+type PinnedAddresses = (usize, Vec<SocketAddr>);
 
 /// Keeps a name pinned.
 pub(super) struct Pin {

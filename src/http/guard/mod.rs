@@ -60,7 +60,7 @@ fn needed(method: &Method, route: Option<&str>) -> Scope {
         let rest = route.and_then(|route| route.strip_prefix(*path));
         rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
     };
-    if ADMIN_PATHS.iter().any(|path| below(&path)) {
+    if ADMIN_PATHS.iter().any(below) {
         return Scope::Admin;
     }
     match method.is_safe() {
