@@ -292,7 +292,7 @@ settings! {
     /// Names of this machine are always answered on loopback, and any name elsewhere if this is
     /// empty and callers need credentials
     hosts: Words = "";
-    /// Sites whose pages may use the service, such as https://viewer.example, separated by commas;
+    /// Sites whose pages may use the service, such as `https://viewer.example`, separated by commas;
     /// `*` allows any
     cors_origins: Words = "";
     /// Requests per minute of each caller; a key can have a limit of its own; `off` is none

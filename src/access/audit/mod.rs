@@ -2,7 +2,7 @@
 //!
 //! An event is one row of JSON. Its hash covers the hash of the row before it, so a row that is
 //! changed, removed or put in between breaks the chain at that place. Rows hold ids, never names
-//! of patients or contents of files. [`fhir`] shows a row as an AuditEvent of FHIR R4, in the form
+//! of patients or contents of files. [`mod@fhir`] shows a row as an AuditEvent of FHIR R4, in the form
 //! of IHE BALP.
 //!
 //! Not guaranteed: somebody who can write to the database file can write the whole chain anew.

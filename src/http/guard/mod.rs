@@ -278,7 +278,7 @@ mod tests {
         assert_eq!(needs(Method::POST, again), Scope::Submit);
         assert_eq!(needs(Method::GET, "/v1/auditors"), Scope::Read);
         assert_eq!(
-            needed(&Method::from_bytes(b"QUERY").unwrap(), None),
+            needed(&Method::from_bytes(b"PURGE").unwrap(), None),
             Scope::Submit
         );
     }
