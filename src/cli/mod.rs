@@ -4,6 +4,7 @@ mod audit;
 mod bar;
 mod cohort_args;
 mod demo;
+mod doctor;
 mod evaluate;
 mod generate;
 mod keys;
@@ -53,6 +54,8 @@ enum Command {
     Healthcheck(Box<serve::HealthcheckArgs>),
     #[command(name = serve::COMPUTE, hide = true)]
     Compute(serve::ComputeArgs),
+    Doctor(doctor::DoctorArgs),
+    Backup(doctor::BackupArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example: ventriform completions bash > ventriform.bash")]
     Completions {
@@ -77,6 +80,8 @@ pub fn main() -> ExitCode {
         Command::Phantom(args) => phantom::run(&args),
         Command::Compute(args) => serve::compute(&args),
         Command::Healthcheck(args) => serve::check_health(&args),
+        Command::Doctor(args) => doctor::run(&args),
+        Command::Backup(args) => doctor::back_up(&args),
         Command::Completions { shell } => {
             clap_complete::generate(
                 shell,

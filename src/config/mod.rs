@@ -11,8 +11,8 @@
 mod units;
 
 pub use units::{
-    Auto, Count, Keyword, Limit, LogFormat, Networks, NoLimit, Off, OptionalPath, OrKeyword,
-    OtlpEndpoint, Retention, Size, Span, Words,
+    Auto, AutoSize, Count, Keyword, Limit, LogFormat, MinFree, Networks, NoLimit, Off,
+    OptionalPath, OrKeyword, OtlpEndpoint, Retention, Size, Span, Words,
 };
 
 use crate::hooks::AllowList;
@@ -210,6 +210,16 @@ settings! {
     listen: SocketAddr = "127.0.0.1:8080";
     /// Folder for the database and the files; created if missing, used by one process at a time
     data_dir: PathBuf = "ventriform-data";
+    /// Space of the disk to keep free; with less, uploads and jobs are refused with status 507 while
+    /// accepted jobs go on. `auto` is 256 MiB, or 5 % of a smaller disk; `0B` turns this off
+    min_free: MinFree = "auto";
+    /// Longest time that a write waits for the database before it is answered with status 503
+    write_wait: Span = "2s";
+    /// Age at which quarantined items are deleted (files without a record, kept for `ventriform
+    /// doctor`); `off` keeps them
+    quarantine_keep: Retention = "30d";
+    /// Bytes per second that are read to verify every stored file once a day; `0B` turns this off
+    scrub_rate: Size = "1MiB";
 
     ["Jobs"]
     /// Jobs computed at the same time; `auto` is one per core
@@ -520,6 +530,7 @@ shown_by_display!(
     OtlpEndpoint,
     SocketAddr,
     Count,
+    MinFree,
     Span,
     Size,
     Retention,

@@ -41,7 +41,7 @@ impl fmt::Display for Span {
     }
 }
 
-/// A number of bytes: a whole number with `B`, `KiB`, `MiB` or `GiB`.
+/// A number of bytes: a whole number with `B`, `KiB`, `MiB` or `GiB`, or `0`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd)]
 pub struct Size(pub u64);
 
@@ -56,6 +56,9 @@ impl FromStr for Size {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        if text == "0" {
+            return Ok(Self(0));
+        }
         scaled(text, &SIZE_UNITS)
             .map(Self)
             .ok_or("give a whole number with a unit: 4096B, 256KiB, 64MiB or 2GiB".into())
@@ -118,6 +121,18 @@ impl Keyword for Auto {
     const WORD: &'static str = "auto";
     const EXPECTED: &'static str = "a whole number from 1";
 }
+
+/// The keyword `auto` in place of a size.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AutoSize;
+
+impl Keyword for AutoSize {
+    const WORD: &'static str = "auto";
+    const EXPECTED: &'static str = "a size such as 256MiB, or 0B for none";
+}
+
+/// A size from 0, or `auto`: what fits the disk.
+pub type MinFree = OrKeyword<Size, AutoSize>;
 
 /// The keyword `off`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

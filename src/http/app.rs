@@ -2,6 +2,7 @@
 
 use super::decoding::Decoding;
 use super::guard::state::Guard;
+use super::health::Readiness;
 use super::hooks::Hooks;
 use super::metrics::Metrics;
 use super::spans::Spans;
@@ -39,6 +40,8 @@ pub struct Shared {
     pub hooks: Hooks,
     /// Figures for operators.
     pub metrics: Metrics,
+    /// Whether the storage works.
+    pub readiness: Readiness,
     /// Figures that only the database knows.
     pub figures: Arc<dyn FigureStore>,
     /// Traces of requests.
@@ -79,6 +82,7 @@ impl App {
             metrics: watching.metrics,
             figures: watching.figures,
             spans: watching.spans,
+            readiness: Readiness::default(),
         }))
     }
 }

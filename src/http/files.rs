@@ -23,7 +23,11 @@ const PAGE_CACHE_CONTROL: &str = "private, max-age=86400";
 /// Answers with a product's file, or the part of it that `Range` asks for, or 304.
 pub async fn send(app: &App, product: &Product, file: &ProductFile, headers: &HeaderMap) -> Answer {
     let read = async |span| {
-        let content = app.queue.blobs.read(&product.id, &file.name, span).await?;
+        let content = app
+            .queue
+            .blobs
+            .read(&product.id, &file.record(), span)
+            .await?;
         Ok(Body::from_stream(content))
     };
     respond(product, file, headers, CACHE_CONTROL, read).await

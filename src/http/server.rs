@@ -15,10 +15,10 @@ use crate::access::{AccessStore, Gate, Issuer, IssuerError, IssuerSettings, Reco
 use crate::config::Settings;
 use crate::hooks::{Dispatcher, HookSettings, RetrySchedule, UrlGuard};
 use crate::jobs::{
-    Clock, DeathLimit, Failure, Fault, Queue, QueueSettings, SteadyClock, StoreError, SystemClock,
-    Upkeep, WorkerSettings, Workers, recover_after_crash,
+    Clock, Custodian, DeathLimit, Failure, Fault, Queue, QueueSettings, SteadyClock, StoreError,
+    SystemClock, Upkeep, WorkerSettings, Workers, recover_after_crash,
 };
-use crate::store::{OpenError, Store};
+use crate::store::{OpenError, Store, StoreSettings};
 use crate::work::Engine;
 use std::io;
 use std::net::{SocketAddr, TcpListener};
@@ -73,7 +73,7 @@ pub struct Running {
     closing: CancellationToken,
     grace: Duration,
     // Dropping the store unlocks the data folder, so it is kept to the end.
-    _store: Store,
+    store: Store,
 }
 
 /// Serves until `shutdown` completes, then shuts down in order: no new connections are accepted,
@@ -104,7 +104,7 @@ pub async fn start(
     install_cryptography();
     let tls = Tls::of(&settings)?;
     let workers = worker_settings(&settings);
-    let store = Store::open(&settings.data_dir).await?;
+    let store = Store::open_with(&settings.data_dir, store_settings(&settings)).await?;
     let queue = Arc::new(Queue::new(
         store.rows.clone(),
         store.rows.clone(),
@@ -162,6 +162,12 @@ pub async fn start(
     if let Some(age) = settings.audit_retention.0 {
         tokio::spawn(prune_audit(store.rows.clone(), age.0, closing.clone()));
     }
+    let custodian = Custodian {
+        queue: queue.clone(),
+        quarantine_keep: settings.quarantine_keep.0.map(|span| span.0),
+        scrub_rate: settings.scrub_rate.0,
+    };
+    tokio::spawn(custodian.run(closing.clone()));
     let workers = Workers::start(&queue, &engine.works, workers)?;
     tracing::info!(%address, "listening");
     Ok(Running {
@@ -174,7 +180,7 @@ pub async fn start(
         spans,
         closing,
         grace: settings.shutdown_grace.0,
-        _store: store,
+        store,
     })
 }
 
@@ -193,15 +199,23 @@ impl Running {
     ///
     /// # Errors
     /// If the task that serves connections has panicked.
-    pub async fn stop(self) -> Result<(), ServeError> {
+    pub async fn stop(mut self) -> Result<(), ServeError> {
         tracing::info!("shutting down");
         self.closing.cancel();
         let (server, (), dispatcher) =
             tokio::join!(self.server, self.workers.stop(self.grace), self.dispatcher);
         self.app.guard.recorder.flush().await;
         self.spans.flush().await;
+        self.store.close().await;
         server.and(dispatcher).map_err(io::Error::other)?;
         Ok(())
+    }
+}
+
+fn store_settings(settings: &Settings) -> StoreSettings {
+    StoreSettings {
+        min_free: settings.min_free.0.map(|size| size.0),
+        write_wait: settings.write_wait.0,
     }
 }
 

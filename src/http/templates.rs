@@ -210,7 +210,11 @@ async fn stored_mesh(app: &App, id: &str) -> Answer<Bytes> {
     };
     match product.file("mesh.json") {
         Some(file) if file.bytes <= MESH_SIZE.0 => {
-            let pieces = app.queue.blobs.read(id, &file.name, 0..file.bytes).await?;
+            let pieces = app
+                .queue
+                .blobs
+                .read(id, &file.record(), 0..file.bytes)
+                .await?;
             let pieces: Vec<Bytes> = pieces.try_collect().await?;
             Ok(pieces.concat().into())
         }

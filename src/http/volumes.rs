@@ -7,7 +7,9 @@ use super::problem::{Answer, Problem};
 use super::request::{PathSegments, query_pairs, refuse_unknown, unknown};
 use super::upload;
 use super::wire::{path_of, rfc3339};
-use crate::jobs::{Catalogue, ListPage, ListRequest, Resource, StoreError, StoredVolume};
+use crate::jobs::{
+    BlobError, Catalogue, ListPage, ListRequest, Resource, StoreError, StoreFault, StoredVolume,
+};
 use crate::progress::Monitor;
 use crate::work::{UploadFacts, preview_memory};
 use axum::Json;
@@ -203,7 +205,12 @@ pub async fn preview_volume(
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let volume = find::<Volumes>(&app, &id).await?;
     let files = app.queue.volume_files(&id, &volume.files).await?;
-    let files = files.ok_or_else(|| Problem::internal(format!("a file of {id} is missing")))?;
+    let files = files.ok_or_else(|| {
+        BlobError::new(
+            StoreFault::DamagedFile,
+            format!("a file of {id} is missing"),
+        )
+    })?;
     let reader = app.engine.reader.clone();
     let memory = preview_memory(UploadFacts::of(&volume)?.shape);
     let draw = move |monitor: &Monitor<'_>| reader.preview(&files, monitor);

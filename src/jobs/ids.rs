@@ -1,5 +1,6 @@
 //! Ids: derived from the content, or random and ordered by time.
 
+use super::{FileRecord, Resource};
 use sha2::{Digest, Sha256};
 
 /// `prefix` followed by the first 128 bits of the SHA-256 of `parts`, as 32 hexadecimal digits.
@@ -12,6 +13,21 @@ pub fn content_id<'a>(prefix: &str, parts: impl IntoIterator<Item = &'a [u8]>) -
     }
     let digest = hash.finalize();
     format!("{prefix}{}", hex(&digest[..16]))
+}
+
+/// The id of a volume of these files. Of one file: the first 32 digits of its SHA-256. Of several:
+/// the same of the list of their kinds and hashes; the kind is the name from its first dot on.
+pub fn volume_id(files: &[FileRecord]) -> String {
+    let prefix = Resource::Volume.prefix();
+    if let [file] = files {
+        return format!("{prefix}{}", file.sha256.get(..32).unwrap_or_default());
+    }
+    let mut hash = Sha256::new();
+    for file in files {
+        let kind = file.name.split_once('.').map_or("", |(_, kind)| kind);
+        hash.update(format!("{kind}:{}\n", file.sha256));
+    }
+    format!("{prefix}{}", hex(&hash.finalize()[..16]))
 }
 
 /// `prefix` followed by a UUID of version 7 (random, ordered by time).

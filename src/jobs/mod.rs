@@ -61,17 +61,19 @@ mod worker;
 pub use clock::{Clock, SteadyClock, SystemClock, Timestamp, parse_rfc3339, rfc3339};
 pub use failure::{Failure, Fault};
 pub(crate) use ids::hex;
-pub use ids::{content_id, random_id};
+pub use ids::{content_id, random_id, volume_id};
 pub use isolation::Isolation;
 pub use job::{Filed, Idempotency, Job, JobState, JobWebhook, NewJob};
 pub use observer::JobObserver;
-pub use queue::{Hold, Queue, QueuePosition, QueueSettings, Upkeep, recover_after_crash};
+pub use queue::{
+    Custodian, Hold, Queue, QueuePosition, QueueSettings, Swept, Upkeep, recover_after_crash,
+};
 pub use resource::Resource;
 pub use storage::{
-    BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Claimant, DeathLimit, Deleted,
-    FigureStore, Interrupted, JobOutcome, JobStore, Lease, ListPage, ListRequest, LocalFile,
-    Product, ProductFile, QueueFigures, QueueLoad, StagedFiles, StoreError, StoreResult,
-    StoredVolume,
+    BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Claimant, Custody, DeathLimit, Deleted,
+    DiskSpace, FigureStore, FileRecord, Interrupted, ItemRecord, JobOutcome, JobStore, Lease,
+    ListPage, ListRequest, LocalFile, Product, ProductFile, QueueFigures, QueueLoad, StagedFiles,
+    StagedFor, StoreError, StoreFault, StoreResult, StoredVolume,
 };
 pub use tenant::{InvalidTenant, Tenant};
 pub use work::{

@@ -1,155 +1,278 @@
 //! The file store in a folder: one folder per id, made visible by a rename.
 //!
-//! The files of an id are written into a folder under `staging/`, forced to disk, and then moved
-//! to their place by renaming the folder, which succeeds as a whole or not at all. Files are read in
-//! large pieces (`object_store` reads 8 KiB at a time, each on another thread); listing goes through
-//! `object_store`.
+//! The files of an id are written into a folder under `staging/`, together with `record.json`, a
+//! copy of the item's row. Each file and the folder are forced to disk; then the folder is moved to
+//! its place by a rename, which succeeds as a whole or not at all, and that is forced to disk too.
+//! Content is verified when it is read; see [`super::content`].
+//!
+//! Nothing that has no row is deleted: it is set aside under `quarantine/`, in a folder named by
+//! the day.
 
+use super::content::{self, Stamp, Verified};
+use super::space::DiskGauge;
 use crate::jobs::{
-    BlobError, BlobStore, BlobStream, BlobWriter, LocalFile, Resource, StagedFiles, random_id,
+    BlobError, BlobStore, BlobStream, BlobWriter, DiskSpace, FileRecord, ItemRecord, LocalFile,
+    Resource, StagedFiles, StagedFor, StoreFault, Timestamp, random_id,
 };
 use async_trait::async_trait;
 use bytes::Bytes;
-use futures::StreamExt;
-use object_store::local::LocalFileSystem;
-use object_store::path::Path as Key;
-use object_store::{ObjectStore, ObjectStoreExt, PutPayload};
-use std::fs::File;
-use std::io::{ErrorKind, Read, Seek, SeekFrom};
+use futures::{StreamExt, stream};
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::pin::Pin;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::{Context, Poll};
+use time::format_description::StaticFormatDescription;
+use time::macros::format_description;
+use time::{Date, OffsetDateTime};
+use tokio::io::AsyncWrite;
 
-const STAGING: &str = "staging";
+/// The name of the copy of an item's row.
+pub(super) const RECORD: &str = "record.json";
+
+/// Files that are not published yet.
+pub(super) const STAGING: &str = "staging";
+/// What is to be deleted.
+pub(super) const DISCARDED: &str = "discarded";
+/// What was found without a row, by day.
+pub(super) const QUARANTINE: &str = "quarantine";
+
+const DAY: StaticFormatDescription = format_description!("[year]-[month]-[day]");
+
+/// What [`BlobStore::check`] writes: more than the free rest of a block.
+const CHECK: &[u8] = &[b'v'; 8192];
+
+/// Bytes of a file that are read at a time, and held in memory for each slow client.
+const CHUNK: u64 = 256 << 10;
 
 /// Files below one folder.
 pub struct FileBlobs {
     folder: PathBuf,
-    files: LocalFileSystem,
+    gauge: DiskGauge,
+    verified: Arc<Verified>,
 }
 
 impl FileBlobs {
-    /// Makes the folders that do not exist yet, and deletes what an earlier process left in the
-    /// staging folder.
+    /// Makes the folders that do not exist yet, and discards what an earlier process left in the
+    /// staging folder; [`BlobStore::tidy`] deletes it. Uploads are refused if the disk of `gauge`
+    /// is nearly full.
     ///
     /// # Errors
     /// If the folder cannot be written.
-    pub fn open(folder: &Path) -> std::io::Result<Self> {
-        match std::fs::remove_dir_all(folder.join(STAGING)) {
+    pub fn open(folder: &Path, gauge: DiskGauge) -> io::Result<Self> {
+        fs::create_dir_all(folder.join(DISCARDED))?;
+        match fs::rename(
+            folder.join(STAGING),
+            folder.join(DISCARDED).join(random_id("")),
+        ) {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
             _ => {}
         }
         let kinds = Resource::WITH_FILES.map(Resource::plural);
-        for name in kinds.into_iter().chain([STAGING]) {
-            std::fs::create_dir_all(folder.join(name))?;
+        for name in kinds.into_iter().chain([STAGING, QUARANTINE]) {
+            fs::create_dir_all(folder.join(name))?;
         }
         sync(folder)?;
-        let files = LocalFileSystem::new_with_prefix(folder)
-            .map_err(std::io::Error::other)?
-            .with_fsync(true);
         Ok(Self {
             folder: folder.to_owned(),
-            files,
+            gauge,
+            verified: Arc::default(),
         })
-    }
-
-    fn place(&self, id: &str) -> PathBuf {
-        self.folder.join(kind_folder(id)).join(id)
     }
 
     fn new_staging_folder(&self) -> PathBuf {
         self.folder.join(STAGING).join(random_id(""))
     }
+
+    /// Runs `work` on a thread that may block.
+    async fn blocking<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&Path, &Verified) -> Result<T, BlobError> + Send + 'static,
+    ) -> Result<T, BlobError> {
+        let (folder, verified) = (self.folder.clone(), self.verified.clone());
+        tokio::task::spawn_blocking(move || work(&folder, &verified))
+            .await
+            .map_err(|error| BlobError::new(StoreFault::Other, error.to_string()))?
+    }
 }
 
-/// The folder for items of the kind of `id`.
-fn kind_folder(id: &str) -> &'static str {
-    Resource::of(id).unwrap_or(Resource::Volume).plural()
+/// The path of an item below the data folder.
+pub(super) fn shelf_path(id: &str) -> String {
+    let kind = Resource::of(id).unwrap_or(Resource::Volume);
+    format!("{}/{id}", kind.plural())
+}
+
+/// Whether `id` is a name that cannot leave its folder.
+pub(super) fn is_plain(id: &str) -> bool {
+    Resource::of(id).is_some() && id.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
 }
 
 /// Forces a folder's entries, or a file's content, to disk.
-fn sync(path: &Path) -> std::io::Result<()> {
+pub(super) fn sync(path: &Path) -> io::Result<()> {
     File::open(path)?.sync_all()
 }
 
-/// Runs blocking `work` on a thread for it.
-async fn on_a_thread<T: Send + 'static>(
-    work: impl FnOnce() -> std::io::Result<T> + Send + 'static,
-) -> Result<T, BlobError> {
-    let done = tokio::task::spawn_blocking(work).await;
-    Ok(done.map_err(|error| BlobError(error.to_string()))??)
+/// Opens a file of an item and verifies it. `None` if it does not exist.
+fn open_verified(
+    folder: &Path,
+    verified: &Verified,
+    id: &str,
+    record: &FileRecord,
+) -> Result<Option<(File, Stamp)>, BlobError> {
+    let path = format!("{}/{}", shelf_path(id), record.name);
+    let file = match File::open(folder.join(&path)) {
+        Ok(file) => file,
+        Err(error) if is_absent(&error) => return Ok(None),
+        Err(error) => return Err(error.into()),
+    };
+    let stamp = verified.check(&path, &file, record)?;
+    Ok(Some((file, stamp)))
 }
 
-/// Largest piece of a file that is read at a time, bytes. Each piece is handed from a blocking
-/// thread to the connection, which costs as much as reading tens of kibibytes.
-const PIECE: u64 = 256 << 10;
+fn is_absent(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory)
+}
 
-/// The part of a file that is still to be read.
-struct OpenPart {
+/// The rest of a verified file, chunk by chunk.
+struct Reading {
     file: File,
+    stamp: Stamp,
     left: u64,
+    path: String,
 }
 
-impl OpenPart {
-    fn open(path: &Path, range: Range<u64>) -> std::io::Result<Self> {
-        let mut file = File::open(path)?;
-        file.seek(SeekFrom::Start(range.start))?;
-        let left = range.end - range.start;
-        Ok(Self { file, left })
+impl Reading {
+    /// The next chunk. With the last one, checks that the file was not changed meanwhile.
+    fn next(mut self) -> Result<(Bytes, Self), BlobError> {
+        let mut chunk = vec![0; self.left.min(CHUNK) as usize];
+        self.file.read_exact(&mut chunk)?;
+        self.left -= chunk.len() as u64;
+        if self.left == 0 && Stamp::of(&self.file.metadata()?) != self.stamp {
+            return Err(content::damaged(&self.path, "it changed while it was read"));
+        }
+        Ok((chunk.into(), self))
+    }
+}
+
+/// Bytes of an upload between two looks at the free space.
+const ROOM_CHECKED_EVERY: u64 = 4 << 20;
+
+/// A file of an upload, which ends with an error when the disk is nearly full.
+struct UploadFile {
+    file: tokio::fs::File,
+    gauge: DiskGauge,
+    unchecked: u64,
+}
+
+impl AsyncWrite for UploadFile {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        if self.unchecked >= ROOM_CHECKED_EVERY {
+            self.unchecked = 0;
+            let room = self.gauge.space().map(|space| space.require_room(0));
+            if let Some(Err(_)) = room {
+                return Poll::Ready(Err(ErrorKind::StorageFull.into()));
+            }
+        }
+        let written = Pin::new(&mut self.file).poll_write(context, bytes);
+        if let Poll::Ready(Ok(bytes)) = written {
+            self.unchecked += bytes as u64;
+        }
+        written
     }
 
-    /// The next piece and what is left after it.
-    fn next_piece(mut self) -> std::io::Result<(Bytes, Self)> {
-        let mut piece = vec![0; self.left.min(PIECE) as usize];
-        self.file.read_exact(&mut piece)?;
-        self.left -= piece.len() as u64;
-        Ok((piece.into(), self))
+    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.file).poll_flush(context)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.file).poll_shutdown(context)
     }
 }
 
 /// A folder under `staging/`.
 struct StagingFolder {
+    /// For uploads: the disk on which room is to be left.
+    gauge: Option<DiskGauge>,
     /// The folder; deleted on drop.
     folder: PathBuf,
     /// The root of the store.
     root: PathBuf,
+    verified: Arc<Verified>,
     /// Whether everything in the folder has been forced to disk.
     settled: AtomicBool,
 }
 
 impl Drop for StagingFolder {
     fn drop(&mut self) {
-        // Fails after publishing, when the folder has been moved.
-        let _ = std::fs::remove_dir_all(&self.folder);
+        // Fails after publishing, when the folder has been moved. If the folder was exchanged with
+        // that of a damaged item, this deletes the damaged files.
+        let _ = fs::remove_dir_all(&self.folder);
     }
 }
 
 /// Forces the files of a folder, and its entries, to disk.
-fn sync_all(folder: &Path) -> std::io::Result<()> {
-    for entry in std::fs::read_dir(folder)? {
+fn sync_all(folder: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
         sync(&entry?.path())?;
     }
     sync(folder)
 }
 
 impl StagingFolder {
-    fn publish_blocking(&self, place: &Path) -> std::io::Result<()> {
-        if !self.settled.load(Ordering::Acquire) {
+    fn publish_blocking(&self, record: &ItemRecord) -> Result<(), BlobError> {
+        let text = serde_json::to_vec_pretty(record)
+            .map_err(|error| BlobError::new(StoreFault::Other, error.to_string()))?;
+        fs::write(self.folder.join(RECORD), text)?;
+        if self.settled.load(Ordering::Acquire) {
+            sync(&self.folder.join(RECORD))?;
+            sync(&self.folder)?;
+        } else {
             sync_all(&self.folder)?;
         }
-        match std::fs::rename(&self.folder, place) {
-            // The id has its files already.
+        let shelf = shelf_path(record.id());
+        let mut stamps = Vec::new();
+        for file in record.files() {
+            let stamp = Stamp::of(&fs::metadata(self.folder.join(&file.name))?);
+            stamps.push((format!("{shelf}/{}", file.name), stamp, file.sha256));
+        }
+        let place = self.root.join(shelf);
+        self.move_to(&place)?;
+        if let Err(error) = sync(place.parent().unwrap_or(&place)) {
+            // The move may not last, so it is not to be seen either.
+            let _ = fs::rename(&place, &self.folder);
+            return Err(error.into());
+        }
+        for (path, stamp, sha256) in stamps {
+            self.verified.remember(path, stamp, sha256);
+        }
+        Ok(())
+    }
+
+    /// Moves the folder to its place, from which it removes the files that lie there.
+    fn move_to(&self, place: &Path) -> io::Result<()> {
+        match fs::rename(&self.folder, place) {
             Err(error)
                 if matches!(
                     error.kind(),
                     ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists
                 ) =>
             {
-                return Ok(());
+                let discarded = self.root.join(DISCARDED).join(random_id(""));
+                fs::rename(place, &discarded)?;
+                fs::rename(&self.folder, place)?;
+                // What is left of it is deleted by the next `tidy`.
+                let _ = fs::remove_dir_all(&discarded);
+                Ok(())
             }
-            other => other?,
+            other => other,
         }
-        sync(place.parent().unwrap_or(place))
     }
 }
 
@@ -158,7 +281,14 @@ impl StagedFiles for StagingFolder {
     async fn create(&self, name: &str) -> Result<BlobWriter, BlobError> {
         self.settled.store(false, Ordering::Release);
         let file = tokio::fs::File::create(self.folder.join(name)).await?;
-        Ok(Box::pin(file))
+        Ok(match &self.gauge {
+            Some(gauge) => Box::pin(UploadFile {
+                file,
+                gauge: gauge.clone(),
+                unchecked: 0,
+            }),
+            None => Box::pin(file),
+        })
     }
 
     async fn rename(&self, from: &str, to: &str) -> Result<(), BlobError> {
@@ -173,86 +303,211 @@ impl StagedFiles for StagingFolder {
 
     async fn settle(&self) -> Result<(), BlobError> {
         let folder = self.folder.clone();
-        on_a_thread(move || sync_all(&folder)).await?;
+        tokio::task::spawn_blocking(move || sync_all(&folder))
+            .await
+            .map_err(|e| BlobError::new(StoreFault::Other, e.to_string()))??;
         self.settled.store(true, Ordering::Release);
         Ok(())
     }
 
-    async fn publish(self: Box<Self>, id: &str) -> Result<(), BlobError> {
-        let place = self.root.join(kind_folder(id)).join(id);
-        on_a_thread(move || self.publish_blocking(&place)).await
+    async fn publish(self: Box<Self>, record: &ItemRecord) -> Result<(), BlobError> {
+        let record = record.clone();
+        tokio::task::spawn_blocking(move || self.publish_blocking(&record))
+            .await
+            .map_err(|e| BlobError::new(StoreFault::Other, e.to_string()))?
     }
 }
 
 #[async_trait]
 impl BlobStore for FileBlobs {
-    async fn stage(&self) -> Result<Box<dyn StagedFiles>, BlobError> {
+    async fn stage(&self, purpose: StagedFor) -> Result<Box<dyn StagedFiles>, BlobError> {
         let folder = self.new_staging_folder();
         tokio::fs::create_dir(&folder).await?;
         Ok(Box::new(StagingFolder {
+            gauge: (purpose == StagedFor::Upload).then(|| self.gauge.clone()),
             folder,
             root: self.folder.clone(),
+            verified: self.verified.clone(),
             settled: AtomicBool::new(false),
         }))
     }
 
-    async fn read(&self, id: &str, name: &str, range: Range<u64>) -> Result<BlobStream, BlobError> {
-        if range.is_empty() {
-            return Ok(futures::stream::empty().boxed());
-        }
-        let path = self.place(id).join(name);
-        // Reading the first piece here reports a missing file before the stream begins.
-        let (first, rest) = on_a_thread(move || OpenPart::open(&path, range)?.next_piece()).await?;
-        let rest = futures::stream::try_unfold(rest, |part: OpenPart| async move {
-            match part.left {
-                0 => Ok(None),
-                _ => on_a_thread(move || part.next_piece()).await.map(Some),
-            }
+    async fn read(
+        &self,
+        id: &str,
+        file: &FileRecord,
+        range: Range<u64>,
+    ) -> Result<BlobStream, BlobError> {
+        let (id, file) = (id.to_owned(), file.clone());
+        let first = self.blocking(move |folder, verified| {
+            let path = format!("{}/{}", shelf_path(&id), file.name);
+            let Some((mut file, stamp)) = open_verified(folder, verified, &id, &file)? else {
+                return Err(content::damaged(&path, "it is missing"));
+            };
+            file.seek(SeekFrom::Start(range.start))?;
+            let reading = Reading {
+                file,
+                stamp,
+                left: range.end.saturating_sub(range.start),
+                path,
+            };
+            reading.next()
         });
-        Ok(futures::stream::once(async move { Ok(first) })
-            .chain(rest)
-            .boxed())
+        let (chunk, rest) = first.await?;
+        let rest = stream::try_unfold(rest, async |reading: Reading| {
+            if reading.left == 0 {
+                return Ok(None);
+            }
+            tokio::task::spawn_blocking(move || reading.next())
+                .await
+                .map_err(|e| BlobError::new(StoreFault::Other, e.to_string()))?
+                .map(Some)
+        });
+        Ok(stream::iter([Ok(chunk)]).chain(rest).boxed())
     }
 
-    async fn local(&self, id: &str, name: &str) -> Result<Option<LocalFile>, BlobError> {
-        let path = self.place(id).join(name);
-        let exists = tokio::fs::try_exists(&path).await?;
-        Ok(exists.then(|| LocalFile::in_place(path)))
+    async fn local(&self, id: &str, file: &FileRecord) -> Result<Option<LocalFile>, BlobError> {
+        let (owner, record) = (id.to_owned(), file.clone());
+        let found = self.blocking(move |folder, verified| {
+            let found = open_verified(folder, verified, &owner, &record)?;
+            let path = folder.join(shelf_path(&owner)).join(&record.name);
+            Ok(found.map(|_| LocalFile::in_place(path)))
+        });
+        found.await
     }
 
     async fn delete(&self, id: &str) -> Result<(), BlobError> {
-        // Renamed first, so that half the files are never seen as all of them.
-        let doomed = self.new_staging_folder();
-        match tokio::fs::rename(self.place(id), &doomed).await {
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
-            other => other?,
-        }
-        tokio::fs::remove_dir_all(&doomed).await?;
-        Ok(())
+        let id = id.to_owned();
+        let deleted = self.blocking(move |folder, _| {
+            // Renamed first, so that half the files are never seen as all of them.
+            let doomed = folder.join(DISCARDED).join(random_id(""));
+            match fs::rename(folder.join(shelf_path(&id)), &doomed) {
+                Err(error) if is_absent(&error) => return Ok(()),
+                other => other?,
+            }
+            Ok(fs::remove_dir_all(&doomed)?)
+        });
+        deleted.await
     }
 
-    async fn ids(&self) -> Result<Vec<String>, BlobError> {
-        let mut ids = Vec::new();
-        for kind in Resource::WITH_FILES.map(Resource::plural) {
-            let listed = self
-                .files
-                .list_with_delimiter(Some(&Key::from(kind)))
-                .await
-                .map_err(failed)?;
-            let names = listed.common_prefixes.iter();
-            ids.extend(names.filter_map(|key| key.filename()).map(str::to_owned));
-        }
-        Ok(ids)
+    async fn set_aside(&self, id: &str, now: Timestamp) -> Result<(), BlobError> {
+        let id = id.to_owned();
+        let moved = self.blocking(move |folder, _| Ok(set_aside(folder, &id, now)?));
+        moved.await
+    }
+
+    async fn ids(&self, kind: Resource) -> Result<Vec<String>, BlobError> {
+        let listed = self.blocking(move |folder, _| {
+            let mut ids = Vec::new();
+            for entry in fs::read_dir(folder.join(kind.plural()))? {
+                ids.extend(entry?.file_name().into_string());
+            }
+            Ok(ids)
+        });
+        listed.await
+    }
+
+    async fn describe(&self, record: &ItemRecord) -> Result<(), BlobError> {
+        let record = record.clone();
+        let written = self.blocking(move |folder, _| {
+            let place = folder.join(shelf_path(record.id()));
+            if fs::exists(place.join(RECORD))? {
+                return Ok(());
+            }
+            let text = serde_json::to_vec_pretty(&record)
+                .map_err(|error| BlobError::new(StoreFault::Other, error.to_string()))?;
+            let draft = place.join(format!("{RECORD}.new"));
+            fs::write(&draft, text)?;
+            sync(&draft)?;
+            Ok(fs::rename(&draft, place.join(RECORD))?)
+        });
+        written.await
+    }
+
+    async fn hash(&self, id: &str, name: &str) -> Result<FileRecord, BlobError> {
+        let (id, name) = (id.to_owned(), name.to_owned());
+        let hashed = self.blocking(move |folder, _| {
+            let path = format!("{}/{name}", shelf_path(&id));
+            let file = match File::open(folder.join(&path)) {
+                Err(error) if is_absent(&error) => {
+                    return Err(content::damaged(&path, "it is missing"));
+                }
+                other => other?,
+            };
+            Ok(FileRecord {
+                bytes: file.metadata()?.len(),
+                sha256: content::hash(&file)?,
+                name,
+            })
+        });
+        hashed.await
+    }
+
+    async fn tidy(&self, set_aside_before: Option<Timestamp>) -> Result<(), BlobError> {
+        let tidied = self.blocking(move |folder, _| {
+            for entry in fs::read_dir(folder.join(DISCARDED))? {
+                fs::remove_dir_all(entry?.path())?;
+            }
+            let Some(first_kept) = set_aside_before.and_then(day) else {
+                return Ok(());
+            };
+            for entry in fs::read_dir(folder.join(QUARANTINE))? {
+                let entry = entry?;
+                let name = entry.file_name();
+                let of = name.to_str().and_then(|name| Date::parse(name, &DAY).ok());
+                if of.is_some_and(|of| of < first_kept) {
+                    fs::remove_dir_all(entry.path())?;
+                }
+            }
+            Ok(())
+        });
+        tidied.await
     }
 
     async fn check(&self) -> Result<(), BlobError> {
-        let key = Key::from_iter([STAGING, "writable"]);
-        let payload = PutPayload::from(Bytes::from_static(b"yes"));
-        self.files.put(&key, payload).await.map_err(failed)?;
-        self.files.delete(&key).await.map_err(failed)
+        self.require_room(0)?;
+        let path = self.new_staging_folder();
+        let checked = self.blocking(move |_, _| {
+            fs::write(&path, CHECK)?;
+            let read = fs::read(&path);
+            fs::remove_file(&path)?;
+            match read? == CHECK {
+                true => Ok(()),
+                false => Err(BlobError::new(
+                    StoreFault::Disk,
+                    "a file was read back with another content",
+                )),
+            }
+        });
+        checked.await
+    }
+
+    fn space(&self) -> Option<DiskSpace> {
+        self.gauge.space()
     }
 }
 
-fn failed(error: object_store::Error) -> BlobError {
-    BlobError(error.to_string())
+fn day(at: Timestamp) -> Option<Date> {
+    let time = OffsetDateTime::from_unix_timestamp(at.div_euclid(1000)).ok()?;
+    Some(time.date())
+}
+
+/// Moves the folder of an item into the quarantine of the day. Succeeds if there is none.
+pub(super) fn set_aside(folder: &Path, id: &str, now: Timestamp) -> io::Result<()> {
+    let day = day(now).and_then(|day| day.format(&DAY).ok());
+    let shelf = folder
+        .join(QUARANTINE)
+        .join(day.as_deref().unwrap_or("unknown"));
+    fs::create_dir_all(&shelf)?;
+    let mut place = shelf.join(id);
+    if fs::exists(&place)? {
+        place = shelf.join(random_id(&format!("{id}.")));
+    }
+    match fs::rename(folder.join(shelf_path(id)), &place) {
+        Err(error) if is_absent(&error) => Ok(()),
+        other => {
+            other?;
+            sync(&shelf)
+        }
+    }
 }

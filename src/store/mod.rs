@@ -2,32 +2,69 @@
 //!
 //! ```text
 //! DATA_DIR/
-//!   lock              held by the process that uses this folder
+//!   lock              held by the process that uses this folder; says whether it was closed
 //!   ventriform.db     jobs, volumes, products (WAL, synchronous=FULL)
 //!   staging/          files not yet published; emptied at every start
+//!   discarded/        files that are being deleted
+//!   quarantine/DAY/   files that were found without a record
 //!   volumes/vol_.../  files of a volume
 //!   models/mdl_.../   files of a model; likewise segmentations/, templates/
 //! ```
 //!
 //! Files are published before their record is committed, and deleted after it, so the files of a
-//! record are always complete. Files without a record, which a crash can leave behind, are
-//! deleted at the next start.
+//! record are always complete. Beside the files lies a copy of the record, `record.json`. Files
+//! without a record, which a crash can leave behind, are moved into the quarantine.
+//!
+//! A new database is made only in a folder without items: with an empty database, all of them
+//! would seem to be without a record.
 
+mod backup;
 mod blobs;
+mod content;
+mod doctor;
+mod faults;
 mod rows;
+mod space;
 mod sqlite;
 mod sqlite_access;
 mod sqlite_catalogue;
+mod sqlite_custody;
 mod sqlite_figures;
 mod sqlite_hooks;
 mod sqlite_jobs;
+mod sqlite_repair;
+mod writer;
 
+pub use backup::{Backup, backup};
 pub use blobs::FileBlobs;
+pub use doctor::{DoctorError, Examination, Finding, examine};
+pub use space::DiskGauge;
 pub use sqlite::SqliteStore;
 
+use crate::jobs::Resource;
 use std::fs::{File, TryLockError};
+use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
+
+/// Limits of a store.
+#[derive(Debug, Clone, Copy)]
+pub struct StoreSettings {
+    /// Bytes of the disk to keep free; `None` is 256 MiB, or 5 % of a smaller disk.
+    pub min_free: Option<u64>,
+    /// Longest time that a write to the database waits for its turn.
+    pub write_wait: Duration,
+}
+
+impl Default for StoreSettings {
+    fn default() -> Self {
+        Self {
+            min_free: None,
+            write_wait: Duration::from_secs(2),
+        }
+    }
+}
 
 /// The database and the files of one data folder, which is locked while this exists.
 pub struct Store {
@@ -35,7 +72,7 @@ pub struct Store {
     pub rows: Arc<SqliteStore>,
     /// The files.
     pub blobs: Arc<FileBlobs>,
-    _lock: File,
+    lock: FolderLock,
 }
 
 /// Why a data folder cannot be used.
@@ -46,6 +83,24 @@ pub enum OpenError {
         "{0} is in use by another ventriform process; stop that process or choose another data folder"
     )]
     InUse(PathBuf),
+    /// It holds items, but its database is missing or empty.
+    #[error(
+        "{folder} holds stored items, but {database} is missing or empty. Restore it from a backup \
+         together with its -wal file, or make a new one from what lies beside the files: \
+         ventriform doctor --data-dir {folder} --repair",
+        folder = .0.display(),
+        database = .0.join(DATABASE).display(),
+    )]
+    DatabaseMissing(PathBuf),
+    /// The last process did not end in order, and the changes it had not yet moved into the
+    /// database are missing.
+    #[error(
+        "{folder}: the service did not stop in order, and {DATABASE}-wal, which holds the last \
+         changes to the database, is missing. Restore it together with {DATABASE}; if it is \
+         lost, accept that and check the rest: ventriform doctor --data-dir {folder} --repair",
+        folder = .0.display(),
+    )]
+    LogMissing(PathBuf),
     /// It cannot be created, read or written.
     #[error("{path}: {reason}")]
     Unusable {
@@ -57,27 +112,53 @@ pub enum OpenError {
 }
 
 impl Store {
+    /// Opens the data folder, or creates it, with the default settings.
+    ///
+    /// # Errors
+    /// As [`Store::open_with`].
+    pub async fn open(folder: &Path) -> Result<Self, OpenError> {
+        Self::open_with(folder, StoreSettings::default()).await
+    }
+
     /// Opens the data folder, or creates it.
     ///
     /// # Errors
     /// If another process uses the folder, or it cannot be written.
-    pub async fn open(folder: &Path) -> Result<Self, OpenError> {
+    pub async fn open_with(folder: &Path, settings: StoreSettings) -> Result<Self, OpenError> {
         let unusable = |path: &Path, reason: String| OpenError::Unusable {
             path: path.to_owned(),
             reason,
         };
         std::fs::create_dir_all(folder).map_err(|e| unusable(folder, e.to_string()))?;
-        let lock = hold(folder)?;
-        let database = folder.join("ventriform.db");
-        let rows = SqliteStore::open(&database)
+        let mut lock = FolderLock::take(folder)?;
+        let gauge = DiskGauge::new(folder, settings.min_free);
+        let database = folder.join(DATABASE);
+        let empty = !has_items(folder).map_err(|e| unusable(folder, e.to_string()))?;
+        if lock.log_is_missing(folder) {
+            return Err(OpenError::LogMissing(folder.to_owned()));
+        }
+        if !empty && !SqliteStore::has_tables(&database).await {
+            return Err(OpenError::DatabaseMissing(folder.to_owned()));
+        }
+        let rows = SqliteStore::open(&database, settings.write_wait, gauge.clone())
             .await
             .map_err(|e| unusable(&database, e.to_string()))?;
-        let blobs = FileBlobs::open(folder).map_err(|e| unusable(folder, e.to_string()))?;
+        let blobs = FileBlobs::open(folder, gauge).map_err(|e| unusable(folder, e.to_string()))?;
+        if log_of(folder).exists() {
+            lock.mark(OPEN)
+                .map_err(|e| unusable(folder, e.to_string()))?;
+        }
         Ok(Self {
             rows: Arc::new(rows),
             blobs: Arc::new(blobs),
-            _lock: lock,
+            lock,
         })
+    }
+
+    /// Closes the database in order. Every use of it must have ended.
+    pub async fn close(&mut self) {
+        self.lock.release();
+        self.rows.close().await;
     }
 }
 
@@ -103,7 +184,9 @@ pub async fn open_rows(folder: &Path) -> Result<Arc<SqliteStore>, OpenError> {
                     "the service that runs on it has another version than this command".into(),
                 ));
             }
-            let rows = SqliteStore::open(&database).await;
+            let gauge = DiskGauge::new(folder, None);
+            let rows =
+                SqliteStore::open(&database, StoreSettings::default().write_wait, gauge).await;
             rows.map(Arc::new).map_err(|e| unusable(e.to_string()))
         }
         Err(error) => Err(error),
@@ -122,17 +205,95 @@ async fn is_migrated(database: &Path) -> Result<bool, sqlx::Error> {
     Ok(usize::try_from(done) == Ok(sqlx::migrate!("src/store/migrations").iter().count()))
 }
 
-fn hold(folder: &Path) -> Result<File, OpenError> {
-    let path = folder.join("lock");
-    let unusable = |reason: String| OpenError::Unusable {
-        path: path.clone(),
-        reason,
-    };
-    let file = File::create(&path).map_err(|e| unusable(e.to_string()))?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(OpenError::InUse(folder.to_owned())),
-        Err(TryLockError::Error(e)) => Err(unusable(e.to_string())),
+/// Whether a folder for items holds anything.
+fn has_items(folder: &Path) -> std::io::Result<bool> {
+    for shelf in Resource::WITH_FILES.map(Resource::plural) {
+        match std::fs::read_dir(folder.join(shelf)) {
+            Ok(mut entries) => {
+                if entries.next().is_some() {
+                    return Ok(true);
+                }
+            }
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(false)
+}
+
+/// The name of the database.
+const DATABASE: &str = "ventriform.db";
+
+/// The database's write-ahead log.
+fn log_of(folder: &Path) -> PathBuf {
+    folder.join(format!("{DATABASE}-wal"))
+}
+
+/// What the lock file says while a process has the database open. If that process is killed, its
+/// successor finds this, and knows that there must be a write-ahead log.
+const OPEN: &[u8] = b"open\n";
+/// What the lock file says before the database is closed.
+const CLOSED: &[u8] = b"closed\n";
+
+/// The locked file `lock` of a data folder. Dropping it unlocks the folder.
+struct FolderLock {
+    file: File,
+    /// Whether the last process did not close the database in order.
+    was_open: bool,
+    /// Whether this process has marked it as open.
+    marked: bool,
+}
+
+impl FolderLock {
+    fn take(folder: &Path) -> Result<Self, OpenError> {
+        let path = folder.join("lock");
+        let unusable = |error: std::io::Error| OpenError::Unusable {
+            path: path.clone(),
+            reason: error.to_string(),
+        };
+        let mut options = File::options();
+        options.create(true).truncate(false).read(true).write(true);
+        let mut file = options.open(&path).map_err(unusable)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(OpenError::InUse(folder.to_owned())),
+            Err(TryLockError::Error(e)) => return Err(unusable(e)),
+        }
+        let mut said = Vec::new();
+        file.read_to_end(&mut said).map_err(unusable)?;
+        Ok(Self {
+            file,
+            was_open: said == OPEN,
+            marked: false,
+        })
+    }
+
+    /// Whether the write-ahead log is gone without the database having been closed in order.
+    fn log_is_missing(&self, folder: &Path) -> bool {
+        self.was_open && folder.join(DATABASE).exists() && !log_of(folder).exists()
+    }
+
+    fn mark(&mut self, state: &[u8]) -> std::io::Result<()> {
+        self.marked = state == OPEN;
+        self.file.set_len(0)?;
+        self.file.rewind()?;
+        self.file.write_all(state)?;
+        self.file.sync_all()
+    }
+
+    /// To be called before the database is closed, which deletes the write-ahead log.
+    fn release(&mut self) {
+        if self.marked
+            && let Err(error) = self.mark(CLOSED)
+        {
+            tracing::warn!(%error, "the lock file could not be written");
+        }
+    }
+}
+
+impl Drop for FolderLock {
+    fn drop(&mut self) {
+        self.release();
     }
 }
 

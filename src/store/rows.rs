@@ -19,7 +19,7 @@ pub(super) fn job(row: SqliteRow) -> StoreResult<Job> {
         volume: row.try_get("volume")?,
         parameters: json(&row, "parameters")?,
         state: JobState::parse(state)
-            .ok_or_else(|| StoreError::Database(format!("unknown job state `{state}`")))?,
+            .ok_or_else(|| StoreError::database(format!("unknown job state `{state}`")))?,
         stage: row.try_get("stage")?,
         progress: row.try_get("progress")?,
         attempts: count(&row, "attempts")?,
@@ -67,7 +67,7 @@ pub(super) fn product(row: SqliteRow) -> StoreResult<Product> {
 /// The tenant of a row.
 pub(super) fn tenant(row: &SqliteRow) -> StoreResult<Tenant> {
     let name: String = row.try_get("tenant")?;
-    Tenant::try_from(name).map_err(|e| StoreError::Database(format!("damaged row: {e}")))
+    Tenant::try_from(name).map_err(|e| StoreError::database(format!("damaged row: {e}")))
 }
 
 /// Converts the rows of a list by `record`.
@@ -89,7 +89,7 @@ pub(super) fn page<T>(
 }
 
 pub(super) fn to_json(value: &impl Serialize) -> StoreResult<String> {
-    serde_json::to_string(value).map_err(|e| StoreError::Database(e.to_string()))
+    serde_json::to_string(value).map_err(|e| StoreError::database(e.to_string()))
 }
 
 /// The value of a JSON column.
@@ -104,15 +104,9 @@ where
 {
     let text: &str = row.try_get(column)?;
     text.parse()
-        .map_err(|e| StoreError::Database(format!("damaged row: {e}")))
+        .map_err(|e| StoreError::database(format!("damaged row: {e}")))
 }
 
 fn from_json<T: DeserializeOwned>(text: &str) -> StoreResult<T> {
-    serde_json::from_str(text).map_err(|e| StoreError::Database(format!("damaged row: {e}")))
-}
-
-impl From<sqlx::Error> for StoreError {
-    fn from(error: sqlx::Error) -> Self {
-        StoreError::Database(error.to_string())
-    }
+    serde_json::from_str(text).map_err(|e| StoreError::database(format!("damaged row: {e}")))
 }

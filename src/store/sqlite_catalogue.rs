@@ -2,6 +2,7 @@
 
 use super::rows::{self, to_json};
 use super::sqlite::SqliteStore;
+use super::writer::Write;
 use crate::jobs::{
     Catalogue, Deleted, ListPage, ListRequest, Product, Resource, StoreResult, StoredVolume,
     Timestamp,
@@ -34,7 +35,7 @@ impl Catalogue for SqliteStore {
             sqlx::query("UPDATE volumes SET used_at = max(used_at, ?) WHERE id = ? RETURNING *")
                 .bind(now)
                 .bind(id)
-                .fetch_optional(&self.writer)
+                .write_optional(&self.writer)
                 .await?;
         row.map(rows::volume).transpose()
     }

@@ -3,6 +3,7 @@
 
 use super::rows::{self, to_json};
 use super::sqlite::SqliteStore;
+use super::writer::Write;
 use crate::jobs::{
     Claimant, DeathLimit, Deleted, Filed, Interrupted, Job, JobOutcome, JobState, JobStore, Lease,
     ListPage, ListRequest, NewJob, QueueLoad, Resource, StoreResult, Tenant, Timestamp, random_id,
@@ -48,6 +49,7 @@ impl JobStore for SqliteStore {
         if let Some(earlier) = self.earlier(job).await? {
             return Ok(earlier);
         }
+        self.require_room()?;
         let id = random_id(Resource::Job.prefix());
         let key = job.idempotency.as_ref();
         let mut transaction = self.writer.begin().await?;
@@ -194,7 +196,7 @@ impl JobStore for SqliteStore {
         .bind(&by.run)
         .bind(expiry(now, by.lease))
         .bind(now)
-        .fetch_optional(&self.writer)
+        .write_optional(&self.writer)
         .await?;
         row.map(rows::job).transpose()
     }
@@ -213,7 +215,7 @@ impl JobStore for SqliteStore {
         .bind(expiry(now, length))
         .bind(&lease.job)
         .bind(&lease.token)
-        .fetch_optional(&self.writer)
+        .write_optional(&self.writer)
         .await?;
         Ok(row.map(|row| row.get(0)))
     }
@@ -233,7 +235,7 @@ impl JobStore for SqliteStore {
         .bind(progress)
         .bind(&lease.job)
         .bind(&lease.token)
-        .fetch_optional(&self.writer)
+        .write_optional(&self.writer)
         .await?;
         row.map(rows::job).transpose()
     }
@@ -289,7 +291,7 @@ impl JobStore for SqliteStore {
             .bind(None::<String>)
             .bind(&lease.job)
             .bind(&lease.token)
-            .fetch_optional(&self.writer)
+            .write_optional(&self.writer)
             .await?;
         row.map(rows::job).transpose()
     }
@@ -302,7 +304,7 @@ impl JobStore for SqliteStore {
              WHERE state = 'running' AND lease_token = ? RETURNING *",
         )
         .bind(token)
-        .fetch_optional(&self.writer)
+        .write_optional(&self.writer)
         .await?;
         row.map(rows::job).transpose()
     }
@@ -328,7 +330,7 @@ impl JobStore for SqliteStore {
                 .bind(&lease.token)
                 .bind(limit.deaths)
                 .bind(at_limit)
-                .fetch_optional(&self.writer)
+                .write_optional(&self.writer)
                 .await?;
             if let Some(row) = row {
                 return rows::job(row).map(Some);
@@ -359,7 +361,7 @@ impl JobStore for SqliteStore {
                 .bind(deaths)
                 .bind(at_limit)
                 .bind(run)
-                .fetch_all(&self.writer)
+                .write_all(&self.writer)
                 .await?;
             jobs.extend(rows::all(rows, rows::job)?);
         }
@@ -376,7 +378,7 @@ impl JobStore for SqliteStore {
         )
         .bind(now)
         .bind(id)
-        .fetch_optional(&self.writer)
+        .write_optional(&self.writer)
         .await?;
         if let Some(row) = row {
             let job = rows::job(row)?;
@@ -389,6 +391,10 @@ impl JobStore for SqliteStore {
             .job(id)
             .await?
             .map_or(Interrupted::Unknown, Interrupted::Finished))
+    }
+
+    async fn check(&self) -> StoreResult<()> {
+        self.probe().await
     }
 
     async fn delete_job(&self, id: &str, now: Timestamp) -> StoreResult<Deleted> {

@@ -95,7 +95,7 @@ impl UploadFacts {
     /// If the record is damaged.
     pub fn of(volume: &StoredVolume) -> Result<Self, StoreError> {
         Self::deserialize(&volume.facts).map_err(|error| {
-            StoreError::Database(format!("volume {}: damaged facts: {error}", volume.id))
+            StoreError::database(format!("volume {}: damaged facts: {error}", volume.id))
         })
     }
 }

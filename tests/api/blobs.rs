@@ -15,8 +15,9 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 use tokio::io::{AsyncWrite, AsyncWriteExt};
 use ventriform::jobs::{
-    BlobError, BlobStore, BlobStream, BlobWriter, Filed, JobState, LocalFile, NewJob, Queue,
-    QueueSettings, StagedFiles, StoredVolume, SystemClock, Tenant, WorkerSettings, Workers,
+    BlobError, BlobStore, BlobStream, BlobWriter, FileRecord, Filed, ItemRecord, JobState,
+    LocalFile, NewJob, Queue, QueueSettings, Resource, StagedFiles, StagedFor, StoredVolume,
+    SystemClock, Tenant, Timestamp, WorkerSettings, Workers,
 };
 use ventriform::store::Store;
 
@@ -98,34 +99,40 @@ impl StagedFiles for MemoryStaging {
         Ok(())
     }
 
-    async fn publish(self: Box<Self>, id: &str) -> Result<(), BlobError> {
+    async fn publish(self: Box<Self>, record: &ItemRecord) -> Result<(), BlobError> {
         let files = std::mem::take(&mut *self.files.lock().unwrap());
         let mut items = self.store.items.lock().unwrap();
-        items.entry(id.to_owned()).or_insert(files);
+        items.insert(record.id().to_owned(), files);
         Ok(())
     }
 }
 
 #[async_trait]
 impl BlobStore for MemoryBlobs {
-    async fn stage(&self) -> Result<Box<dyn StagedFiles>, BlobError> {
+    async fn stage(&self, _: StagedFor) -> Result<Box<dyn StagedFiles>, BlobError> {
         Ok(Box::new(MemoryStaging {
             store: self.clone(),
             files: Files::default(),
         }))
     }
 
-    async fn read(&self, id: &str, name: &str, range: Range<u64>) -> Result<BlobStream, BlobError> {
+    async fn read(
+        &self,
+        id: &str,
+        file: &FileRecord,
+        range: Range<u64>,
+    ) -> Result<BlobStream, BlobError> {
         let items = self.items.lock().unwrap();
-        let part = &items[id][name][range.start as usize..range.end as usize];
+        let part = &items[id][&file.name][range.start as usize..range.end as usize];
         let chunk = Ok(Bytes::copy_from_slice(part));
         Ok(futures::stream::iter([chunk]).boxed())
     }
 
-    async fn local(&self, id: &str, name: &str) -> Result<Option<LocalFile>, BlobError> {
+    async fn local(&self, id: &str, file: &FileRecord) -> Result<Option<LocalFile>, BlobError> {
         let items = self.items.lock().unwrap();
-        let content = items.get(id).and_then(|files| files.get(name));
-        content.map(|bytes| copy_to_disk(name, bytes)).transpose()
+        let content = items.get(id).and_then(|files| files.get(&file.name));
+        let copy = |bytes: &Vec<u8>| copy_to_disk(&file.name, bytes);
+        content.map(copy).transpose()
     }
 
     async fn delete(&self, id: &str) -> Result<(), BlobError> {
@@ -133,8 +140,26 @@ impl BlobStore for MemoryBlobs {
         Ok(())
     }
 
-    async fn ids(&self) -> Result<Vec<String>, BlobError> {
-        Ok(self.items.lock().unwrap().keys().cloned().collect())
+    async fn ids(&self, kind: Resource) -> Result<Vec<String>, BlobError> {
+        let items = self.items.lock().unwrap();
+        let of_kind = |id: &&String| Resource::of(id) == Some(kind);
+        Ok(items.keys().filter(of_kind).cloned().collect())
+    }
+
+    async fn set_aside(&self, id: &str, _: Timestamp) -> Result<(), BlobError> {
+        self.delete(id).await
+    }
+
+    async fn hash(&self, id: &str, name: &str) -> Result<FileRecord, BlobError> {
+        panic!("nobody verifies {id}/{name}")
+    }
+
+    async fn describe(&self, _: &ItemRecord) -> Result<(), BlobError> {
+        Ok(())
+    }
+
+    async fn tidy(&self, _: Option<Timestamp>) -> Result<(), BlobError> {
+        Ok(())
     }
 
     async fn check(&self) -> Result<(), BlobError> {
@@ -157,7 +182,7 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
             workers: 1,
         },
     ));
-    let staged = blobs.stage().await.unwrap();
+    let staged = blobs.stage(StagedFor::Upload).await.unwrap();
     let mut writer = staged.create("0").await.unwrap();
     writer.write_all(&volume("sphere")).await.unwrap();
     writer.shutdown().await.unwrap();
@@ -167,7 +192,11 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
         sequence: 0,
         created_at: 0,
         bytes: 13,
-        files: vec!["volume.nii".into()],
+        files: vec![FileRecord {
+            name: "volume.nii".into(),
+            bytes: 13,
+            sha256: String::new(),
+        }],
         facts: json!({}),
     };
     let (_, new) = queue.add_volume(record, staged).await.unwrap();
@@ -204,7 +233,7 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
     let model = model.unwrap();
     let report = model.file("report.json").unwrap();
     let content = blobs
-        .read(&model.id, "report.json", 0..report.bytes)
+        .read(&model.id, &report.record(), 0..report.bytes)
         .await
         .unwrap();
     let content: Vec<Bytes> = content.try_collect().await.unwrap();

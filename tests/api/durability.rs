@@ -4,8 +4,8 @@ use crate::helpers::{Service, fake_engine, heart, scan, text};
 use serde_json::{Value, json};
 use std::time::Duration;
 use ventriform::jobs::{
-    Catalogue, Claimant, DeathLimit, Failure, Fault, Filed, JobOutcome, JobState, JobStore, Lease,
-    ListRequest, NewJob, Resource, StoredVolume, Tenant, random_id,
+    Catalogue, Claimant, DeathLimit, Failure, Fault, FileRecord, Filed, JobOutcome, JobState,
+    JobStore, Lease, ListRequest, NewJob, Resource, StoredVolume, Tenant, random_id,
 };
 use ventriform::store::Store;
 
@@ -170,7 +170,11 @@ async fn filed(store: &Store) -> String {
         sequence: 0,
         created_at: 0,
         bytes: 1,
-        files: vec!["volume.nii".into()],
+        files: vec![FileRecord {
+            name: "volume.nii".into(),
+            bytes: 1,
+            sha256: String::new(),
+        }],
         facts: json!({}),
     };
     store.rows.add_volume(&volume).await.unwrap();

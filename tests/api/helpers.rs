@@ -451,10 +451,16 @@ impl Deref for Service {
 impl Service {
     /// Starts the program on a data folder and returns once it listens.
     pub async fn start(data: &Path, arguments: &[&str]) -> Self {
+        Self::start_with(data, arguments, &[]).await
+    }
+
+    /// The same, with environment variables.
+    pub async fn start_with(data: &Path, arguments: &[&str], variables: &[(&str, String)]) -> Self {
         let mut process = Command::new(env!("CARGO_BIN_EXE_ventriform"))
             .args(["serve", "--listen", "127.0.0.1:0", "--data-dir"])
             .arg(data)
             .args(arguments)
+            .envs(variables.iter().map(|(name, value)| (*name, value)))
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()

@@ -63,7 +63,12 @@ impl Bench {
     }
 
     async fn staged(&self) -> Box<dyn StagedFiles> {
-        let staged = self.store.blobs.stage().await.unwrap();
+        let staged = self
+            .store
+            .blobs
+            .stage(ventriform::jobs::StagedFor::Upload)
+            .await
+            .unwrap();
         let mut file = staged.create("volume.nii").await.unwrap();
         file.write_all(b"VOLUME brief").await.unwrap();
         file.shutdown().await.unwrap();
@@ -76,7 +81,11 @@ impl Bench {
             sequence: 0,
             created_at: self.clock.now(),
             bytes: 12,
-            files: vec!["volume.nii".into()],
+            files: vec![ventriform::jobs::FileRecord {
+                name: "volume.nii".into(),
+                bytes: 0,
+                sha256: String::new(),
+            }],
             facts: json!({}),
         }
     }

@@ -1,10 +1,13 @@
 //! Errors of the domain and of the store as problems.
 
 use super::Problem;
-use crate::jobs::{BlobError, Failure, Fault, StoreError};
-use axum::http::StatusCode;
+use crate::jobs::{BlobError, Failure, Fault, StoreError, StoreFault};
+use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use std::any::Any;
+
+/// When to try again after the storage failed for a reason that may pass.
+const RETRY_AFTER_SECONDS: &str = "5";
 
 impl From<Failure> for Problem {
     fn from(failure: Failure) -> Self {
@@ -22,13 +25,58 @@ impl From<Failure> for Problem {
 
 impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
-        Self::internal(error)
+        let problem = |status, code: &str, detail: &str| {
+            tracing::error!(%error, code, "the storage failed while answering a request");
+            Self::new(status, code, detail)
+        };
+        let later = |problem: Self| problem.header(header::RETRY_AFTER, RETRY_AFTER_SECONDS);
+        match error.cause() {
+            StoreFault::Full => later(problem(
+                StatusCode::INSUFFICIENT_STORAGE,
+                "insufficient-storage",
+                "The service has no room left on its disk, so nothing was stored.",
+            ))
+            .fix(
+                "Erase volumes and results that are no longer needed, or ask the operator to free \
+                 disk space; then send the request again.",
+            ),
+            StoreFault::Busy => later(problem(
+                StatusCode::SERVICE_UNAVAILABLE,
+                "storage-busy",
+                "Another program holds the service's database, so nothing was stored.",
+            ))
+            .fix("Send the request again after the number of seconds in Retry-After."),
+            StoreFault::Disk => later(problem(
+                StatusCode::SERVICE_UNAVAILABLE,
+                "storage-failed",
+                "The service's disk failed to read or write, so nothing was stored.",
+            ))
+            .fix(
+                "Send the request again after the number of seconds in Retry-After; if that does \
+                 not help, ask the operator to check the disk.",
+            ),
+            StoreFault::DamagedFile => problem(
+                StatusCode::INTERNAL_SERVER_ERROR,
+                "damaged-file",
+                "A stored file is missing, or no longer holds what was stored.",
+            )
+            .fix(
+                "Upload the volume again, which repairs it; of a result, start the same job again.",
+            ),
+            StoreFault::DamagedDatabase => problem(
+                StatusCode::INTERNAL_SERVER_ERROR,
+                "damaged-database",
+                "The service's database is damaged.",
+            )
+            .fix("Ask the operator to restore a backup or to run `ventriform doctor`."),
+            StoreFault::Other => Self::internal(error),
+        }
     }
 }
 
 impl From<BlobError> for Problem {
     fn from(error: BlobError) -> Self {
-        Self::internal(error)
+        StoreError::from(error).into()
     }
 }
 

@@ -2,7 +2,9 @@
 
 use crate::http::app::App;
 use crate::http::problem::{Answer, Problem};
-use crate::jobs::{BlobError, Hold, Resource, StagedFiles, StoredVolume, hex};
+use crate::jobs::{
+    BlobError, FileRecord, Hold, StagedFiles, StagedFor, StoredVolume, hex, volume_id,
+};
 use crate::progress::Monitor;
 use crate::work::INSPECTION_MEMORY;
 use axum::body::Bytes;
@@ -64,12 +66,12 @@ async fn receive(
         }
         waiting.extend_from_slice(&piece);
         if waiting.len() >= WRITE_BYTES {
-            file.write_all(&waiting).await.map_err(Problem::internal)?;
+            file.write_all(&waiting).await.map_err(BlobError::from)?;
             waiting.clear();
         }
     }
-    file.write_all(&waiting).await.map_err(Problem::internal)?;
-    file.shutdown().await.map_err(Problem::internal)?;
+    file.write_all(&waiting).await.map_err(BlobError::from)?;
+    file.shutdown().await.map_err(BlobError::from)?;
     Ok(Received {
         name: name.to_owned(),
         kind: kind_by_content(&head),
@@ -98,7 +100,7 @@ impl Bundle {
     /// An empty bundle.
     pub async fn new(app: &App) -> Answer<Self> {
         Ok(Self {
-            staged: app.queue.blobs.stage().await?,
+            staged: app.queue.blobs.stage(StagedFor::Upload).await?,
             files: Vec::new(),
         })
     }
@@ -130,18 +132,21 @@ impl Bundle {
     /// 413 or 422 if the files are not a usable volume.
     pub async fn store(mut self, app: &App) -> Answer<Stored> {
         let id = self.volume_id();
+        let records = self.records();
         let hold = app.queue.hold(&id).await;
-        if let Some(volume) = app.queue.renew_volume(&id).await? {
+        if app.queue.intact_volume(&id).await?.is_some()
+            && let Some(volume) = app.queue.renew_volume(&id).await?
+        {
             return Ok(Stored {
                 volume,
                 new: false,
                 hold,
             });
         }
-        let names = self.name_files().await?;
-        let mut files = Vec::with_capacity(names.len());
-        for name in &names {
-            files.push(self.staged.local(name).await?);
+        let mut files = Vec::with_capacity(records.len());
+        for (file, record) in self.files.iter().zip(&records) {
+            self.staged.rename(&file.name, &record.name).await?;
+            files.push(self.staged.local(&record.name).await?);
         }
         let reader = app.engine.reader.clone();
         let inspect = move |monitor: &Monitor<'_>| reader.inspect(&files, monitor);
@@ -153,7 +158,7 @@ impl Bundle {
             sequence: 0,
             created_at: app.queue.clock.now(),
             bytes: self.files.iter().map(|f| f.bytes).sum(),
-            files: names,
+            files: records,
             facts: facts.to_json(),
             id,
         };
@@ -161,38 +166,31 @@ impl Bundle {
         Ok(Stored { volume, new, hold })
     }
 
-    /// The id that the volume has or will have. Of one file: the first 32 digits of its SHA-256. Of several: the same of the list of their
-    /// kinds and hashes.
+    /// The id of the volume of these files.
     pub fn volume_id(&mut self) -> String {
         // The order of the form's parts has no meaning, so it must not change the id.
         self.files
             .sort_by(|a, b| (a.kind, a.digest).cmp(&(b.kind, b.digest)));
-        let prefix = Resource::Volume.prefix();
-        if let [file] = &self.files[..] {
-            return format!("{prefix}{}", hex(&file.digest[..16]));
-        }
-        let mut hash = Sha256::new();
-        for file in &self.files {
-            hash.update(format!("{}:{}\n", file.kind, hex(&file.digest)));
-        }
-        format!("{prefix}{}", hex(&hash.finalize()[..16]))
+        volume_id(&self.records())
     }
 
-    /// Gives the files their final names: `volume` with its extension for one file or a pair, else
+    /// The files under their final names: `volume` with its extension for one file or a pair, else
     /// numbers with extensions.
-    async fn name_files(&self) -> Result<Vec<String>, BlobError> {
+    fn records(&self) -> Vec<FileRecord> {
         let pair = self.files.len() == 2
             && self.files[0].kind.starts_with("hdr")
             && self.files[1].kind.starts_with("img");
-        let mut names = Vec::new();
-        for (number, file) in self.files.iter().enumerate() {
-            let name = match (pair, self.files.len()) {
-                (true, _) | (_, 1) => format!("volume.{}", file.kind),
-                _ => format!("{number:04}.{}", file.kind),
-            };
-            self.staged.rename(&file.name, &name).await?;
-            names.push(name);
-        }
-        Ok(names)
+        let name = |number: usize, kind| match (pair, self.files.len()) {
+            (true, _) | (_, 1) => format!("volume.{kind}"),
+            _ => format!("{number:04}.{kind}"),
+        };
+        let files = self.files.iter().enumerate();
+        files
+            .map(|(number, file)| FileRecord {
+                name: name(number, file.kind),
+                bytes: file.bytes,
+                sha256: hex(&file.digest),
+            })
+            .collect()
     }
 }

@@ -16,6 +16,7 @@ use super::limits::BodyLimits;
 use super::problem::{Answer, body};
 use super::request::{media_type, refuse_content_encoding};
 use axum::extract::Request;
+use axum::http::{HeaderMap, header};
 use futures::TryStreamExt;
 use std::collections::BTreeMap;
 
@@ -41,6 +42,13 @@ pub struct Upload {
     pub fields: Vec<(String, String)>,
 }
 
+/// The length of the body, 0 if it is not announced.
+fn announced_length(headers: &HeaderMap) -> u64 {
+    let length = headers.get(header::CONTENT_LENGTH);
+    let length = length.and_then(|value| value.to_str().ok()?.parse().ok());
+    length.unwrap_or(0)
+}
+
 /// Receives a body. A form's files named in `apart` are kept apart from the volume's.
 ///
 /// # Errors
@@ -48,6 +56,9 @@ pub struct Upload {
 pub async fn receive(app: &App, request: Request, apart: &[&'static str]) -> Answer<Upload> {
     refuse_content_encoding(request.headers())?;
     let limits = BodyLimits::of(&request)?;
+    app.queue
+        .blobs
+        .require_room(announced_length(request.headers()))?;
     let mut upload = Upload {
         volume: Bundle::new(app).await?,
         others: BTreeMap::new(),

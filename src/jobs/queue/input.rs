@@ -2,8 +2,8 @@
 
 use super::Queue;
 use crate::jobs::{
-    BlobError, Failure, Fault, Job, ListRequest, LocalFile, Needs, Product, Resource, StoreError,
-    StoredItem, Work, WorkInput,
+    BlobError, Failure, Fault, FileRecord, Job, ListRequest, LocalFile, Needs, Product, Resource,
+    StoreError, StoreFault, StoredItem, Work, WorkInput,
 };
 use serde_json::Map;
 use std::collections::BTreeMap;
@@ -12,11 +12,25 @@ use std::collections::BTreeMap;
 const LIBRARY_PAGE: u32 = 100;
 
 impl Queue {
-    /// The input of `job`, or why it cannot be computed.
+    /// The input of `job`, or why it cannot be computed. Every file is verified.
     ///
     /// # Errors
     /// If the storage fails.
     pub(in crate::jobs) async fn input(
+        &self,
+        job: &Job,
+        work: &dyn Work,
+    ) -> Result<Result<WorkInput, Failure>, StoreError> {
+        match self.collect(job, work).await {
+            Err(error) if error.cause() == StoreFault::DamagedFile => {
+                tracing::error!(job = %job.id, %error, "the input of a job is damaged");
+                Ok(Err(input_damaged()))
+            }
+            other => other,
+        }
+    }
+
+    async fn collect(
         &self,
         job: &Job,
         work: &dyn Work,
@@ -75,11 +89,11 @@ impl Queue {
     pub async fn volume_files(
         &self,
         id: &str,
-        names: &[String],
+        records: &[FileRecord],
     ) -> Result<Option<Vec<LocalFile>>, BlobError> {
-        let mut files = Vec::with_capacity(names.len());
-        for name in names {
-            match self.blobs.local(id, name).await? {
+        let mut files = Vec::with_capacity(records.len());
+        for record in records {
+            match self.blobs.local(id, record).await? {
                 Some(file) => files.push(file),
                 None => return Ok(None),
             }
@@ -99,7 +113,7 @@ impl Queue {
         let mut files = Vec::new();
         for file in &product.files {
             if wanted.contains(&file.name.as_str()) {
-                files.extend(self.blobs.local(&product.id, &file.name).await?);
+                files.extend(self.blobs.local(&product.id, &file.record()).await?);
             }
         }
         Ok(StoredItem {
@@ -130,6 +144,15 @@ impl Queue {
         library.sort_by(|a, b| a.id.cmp(&b.id));
         Ok(library)
     }
+}
+
+fn input_damaged() -> Failure {
+    Failure::new(
+        Fault::Service,
+        "damaged-file",
+        "A stored file that the job needs no longer holds what was stored.",
+    )
+    .fix("Upload the volume again, which repairs it, then start the job again.")
 }
 
 fn volume_missing(id: &str) -> Failure {

@@ -3,9 +3,11 @@
 mod input;
 mod items;
 mod publish;
+mod sweep;
 mod upkeep;
 
 pub use items::Hold;
+pub use sweep::{Custodian, Swept};
 pub use upkeep::{Upkeep, recover_after_crash};
 
 use super::{

@@ -5,8 +5,9 @@
 
 use super::Queue;
 use crate::jobs::{
-    BlobError, Failure, Fault, Job, JobOutcome, Lease, OutputFile, Product, ProductFile, Resource,
-    StagedFiles, StoreError, StoredVolume, WorkOutput, content_id, hex,
+    BlobError, Failure, Fault, ItemRecord, Job, JobOutcome, Lease, OutputFile, Product,
+    ProductFile, Resource, StagedFiles, StagedFor, StoreError, StoreFault, StoredVolume,
+    WorkOutput, content_id, hex,
 };
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
@@ -28,7 +29,9 @@ impl Queue {
         to_its_end(async move {
             let _lock = queue.items.lock(&volume.id).await;
             queue.items.unsettle(&volume.id);
-            files.publish(&volume.id).await?;
+            queue
+                .publish_unless_intact(&ItemRecord::Volume(volume.clone()), files)
+                .await?;
             let new = queue.catalogue.add_volume(&volume).await?;
             queue.items.settle(&volume.id);
             let stored = queue.catalogue.volume(&volume.id).await?;
@@ -60,6 +63,7 @@ impl Queue {
         organ: &str,
         output: WorkOutput,
     ) -> Result<(Product, bool), StoreError> {
+        self.blobs.require_room(0)?;
         let parameters = [("name", name), ("organ", organ)]
             .map(|(key, value)| (key.to_owned(), Value::from(value)))
             .into_iter()
@@ -69,7 +73,7 @@ impl Queue {
         to_its_end(async move {
             let _lock = queue.items.lock(&template.id).await;
             queue.items.unsettle(&template.id);
-            queue.write_files(&template.id, &output).await?;
+            queue.write_files(&template, &output).await?;
             let new = queue.catalogue.add_product(&template).await?;
             queue.items.settle(&template.id);
             let stored = queue.catalogue.product(&template.id).await?;
@@ -101,8 +105,9 @@ impl Queue {
         let id = product.id.clone();
         let _lock = self.items.lock(&id).await;
         self.items.unsettle(&id);
-        let outcome = match self.write_files(&id, output).await {
+        let outcome = match self.write_files(&product, output).await {
             Ok(()) => JobOutcome::Succeeded(Box::new(product)),
+            Err(error) if error.cause().may_pass() => return Err(error),
             Err(error) => {
                 tracing::error!(job = %job.id, %error, "the result could not be stored");
                 JobOutcome::Failed(
@@ -111,7 +116,7 @@ impl Queue {
                         "storage",
                         "The result was computed but could not be stored.",
                     )
-                    .fix("Ask the operator to free disk space, then start the job again."),
+                    .fix("Ask the operator to look into the log, then start the job again."),
                 )
             }
         };
@@ -122,14 +127,64 @@ impl Queue {
         Ok(ended)
     }
 
-    async fn write_files(&self, id: &str, output: &WorkOutput) -> Result<(), BlobError> {
-        let staged = self.blobs.stage().await?;
+    async fn write_files(&self, product: &Product, output: &WorkOutput) -> Result<(), StoreError> {
+        let staged = self.blobs.stage(StagedFor::Result).await?;
         for file in &output.files {
             let mut writer = staged.create(&file.name).await?;
-            writer.write_all(&file.bytes).await?;
-            writer.shutdown().await?;
+            writer
+                .write_all(&file.bytes)
+                .await
+                .map_err(BlobError::from)?;
+            writer.shutdown().await.map_err(BlobError::from)?;
         }
-        staged.publish(id).await
+        self.publish_unless_intact(&ItemRecord::Product(product.clone()), staged)
+            .await
+    }
+
+    /// Publishes the files of an item, unless it has a row and its files are what the row says.
+    /// If it has a row and damaged files, these are replaced, and the row with them.
+    async fn publish_unless_intact(
+        &self,
+        record: &ItemRecord,
+        files: Box<dyn StagedFiles>,
+    ) -> Result<(), StoreError> {
+        let known = self.catalogue.record(record.id()).await?;
+        if let Some(known) = &known {
+            if self.is_intact(known).await? {
+                return Ok(());
+            }
+            tracing::warn!(id = record.id(), "damaged files are replaced");
+        }
+        files.publish(record).await?;
+        match known {
+            Some(_) => self.catalogue.amend(record).await,
+            None => Ok(()),
+        }
+    }
+
+    /// Whether every file of an item is there and holds what its row says.
+    async fn is_intact(&self, record: &ItemRecord) -> Result<bool, BlobError> {
+        for file in record.files() {
+            match self.blobs.local(record.id(), &file).await {
+                Ok(Some(_)) => {}
+                Ok(None) => return Ok(false),
+                Err(error) if error.cause == StoreFault::DamagedFile => return Ok(false),
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(true)
+    }
+
+    /// The volume of that id, if it is stored and its files are not damaged.
+    ///
+    /// # Errors
+    /// If the storage fails.
+    pub async fn intact_volume(&self, id: &str) -> Result<Option<StoredVolume>, StoreError> {
+        let Some(volume) = self.catalogue.volume(id).await? else {
+            return Ok(None);
+        };
+        let record = ItemRecord::Volume(volume.clone());
+        Ok(self.is_intact(&record).await?.then_some(volume))
     }
 
     /// The record of a product. Its id is a hash of the kind, of `origin` and of the mesh; the
@@ -165,7 +220,7 @@ pub(super) async fn to_its_end<T: Send + 'static>(
 ) -> Result<T, StoreError> {
     tokio::spawn(section.in_current_span())
         .await
-        .unwrap_or_else(|error| Err(BlobError(error.to_string()).into()))
+        .unwrap_or_else(|error| Err(StoreError::database(error.to_string())))
 }
 
 /// The hash of the mesh, which stands for the whole result.

@@ -7,11 +7,11 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio_util::sync::CancellationToken;
 
-/// Makes the table and the files consistent after the previous process ended at any moment:
-/// returns its running jobs to the queue, and deletes files that have no record. To be called
-/// before the first worker starts, by the only process on the store. With a `limit`, jobs that were
-/// running when that many processes died are failed; a program that can compute them in a process
-/// of their own needs none.
+/// Makes the table consistent after the previous process ended at any moment: returns its running
+/// jobs to the queue. To be called before the first worker starts, by the only process on the
+/// store. With a `limit`, jobs that were running when that many processes died are failed; a
+/// program that can compute them in a process of their own needs none. Files without a record are
+/// left to [`Custodian`](super::Custodian).
 ///
 /// # Errors
 /// If the storage fails.
@@ -21,27 +21,13 @@ pub async fn recover_after_crash(
 ) -> Result<(), StoreError> {
     let now = queue.clock.now();
     let released = queue.jobs.release_dead(None, limit, now).await?;
-    let orphans = delete_orphans(queue).await?;
-    if released.len() as u64 + orphans > 0 {
+    if !released.is_empty() {
         tracing::warn!(
             released = released.len(),
-            orphans,
             "recovered after the previous process did not stop in order"
         );
     }
     Ok(())
-}
-
-/// Deletes files whose record was never committed, or was deleted before them.
-async fn delete_orphans(queue: &Queue) -> Result<u64, StoreError> {
-    let mut orphans = 0;
-    for id in queue.blobs.ids().await? {
-        if !has_record(queue, &id).await? {
-            queue.blobs.delete(&id).await?;
-            orphans += 1;
-        }
-    }
-    Ok(orphans)
 }
 
 async fn has_record(queue: &Queue, id: &str) -> Result<bool, StoreError> {

@@ -6,11 +6,14 @@
 //! for a [`LocalFile`]. No method takes or returns the path of a stored file, so that a store
 //! may keep its files elsewhere than on a disk.
 
+use super::{FileRecord, ItemRecord, StoreFault};
+use crate::jobs::{Resource, Timestamp};
 use async_trait::async_trait;
 use bytes::Bytes;
 use futures::stream::BoxStream;
 use std::any::Any;
 use std::fmt;
+use std::io::ErrorKind;
 use std::ops::{Deref, Range};
 use std::path::{Path, PathBuf};
 use std::pin::Pin;
@@ -18,13 +21,73 @@ use std::sync::Arc;
 use tokio::io::AsyncWrite;
 
 /// A file could not be written or read.
-#[derive(Debug, thiserror::Error)]
-#[error("the file store: {0}")]
-pub struct BlobError(pub String);
+#[derive(Debug, Clone, thiserror::Error)]
+#[error("the file store: {message}")]
+pub struct BlobError {
+    /// The kind of failure.
+    pub cause: StoreFault,
+    /// What failed.
+    pub message: String,
+}
+
+impl BlobError {
+    /// A failure of that kind.
+    pub fn new(cause: StoreFault, message: impl Into<String>) -> Self {
+        Self {
+            cause,
+            message: message.into(),
+        }
+    }
+}
 
 impl From<std::io::Error> for BlobError {
     fn from(error: std::io::Error) -> Self {
-        Self(error.to_string())
+        let cause = match error.kind() {
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => StoreFault::Full,
+            _ if error.raw_os_error().is_some() => StoreFault::Disk,
+            _ => StoreFault::Other,
+        };
+        Self::new(cause, error.to_string())
+    }
+}
+
+/// What staged files are for. A file store that keeps a reserve of free space gives it to results
+/// only, so that the jobs it has accepted can end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StagedFor {
+    /// An upload, which is refused if the disk is nearly full.
+    Upload,
+    /// The result of a job.
+    Result,
+}
+
+/// The space of the disk that holds the files, in bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DiskSpace {
+    /// Free for this process.
+    pub free: u64,
+    /// All of it.
+    pub total: u64,
+    /// Kept free: with less than that, uploads and jobs are refused.
+    pub reserve: u64,
+}
+
+impl DiskSpace {
+    /// Checks that `bytes` more can be accepted without using the reserve.
+    ///
+    /// # Errors
+    /// [`StoreFault::Full`].
+    pub fn require_room(&self, bytes: u64) -> Result<(), BlobError> {
+        if self.free >= self.reserve.saturating_add(bytes) {
+            return Ok(());
+        }
+        Err(BlobError::new(
+            StoreFault::Full,
+            format!(
+                "{} bytes are free, {} are to be kept free, and {bytes} more are needed",
+                self.free, self.reserve
+            ),
+        ))
     }
 }
 
@@ -101,9 +164,9 @@ pub trait StagedFiles: Send + Sync {
     /// calling this before allows other work meanwhile.
     async fn settle(&self) -> Result<(), BlobError>;
 
-    /// Makes the files visible under `id`, all at once and durably. If `id` already has files,
-    /// these are kept and the new ones discarded.
-    async fn publish(self: Box<Self>, id: &str) -> Result<(), BlobError>;
+    /// Makes the files visible under the id of `record`, all at once and durably, with a copy of
+    /// `record`. Files that the id had before are deleted.
+    async fn publish(self: Box<Self>, record: &ItemRecord) -> Result<(), BlobError>;
 }
 
 /// Files by item id and file name. The files of an id become visible all at once.
@@ -113,21 +176,57 @@ pub trait BlobStore: Send + Sync + 'static {
     ///
     /// # Errors
     /// [`BlobError`], as of every method here.
-    async fn stage(&self) -> Result<Box<dyn StagedFiles>, BlobError>;
+    async fn stage(&self, purpose: StagedFor) -> Result<Box<dyn StagedFiles>, BlobError>;
 
-    /// A range of bytes of one file.
-    async fn read(&self, id: &str, name: &str, range: Range<u64>) -> Result<BlobStream, BlobError>;
+    /// A range of bytes of one file. Ends with [`StoreFault::DamagedFile`] if the file is missing
+    /// or is not what `file` says.
+    async fn read(
+        &self,
+        id: &str,
+        file: &FileRecord,
+        range: Range<u64>,
+    ) -> Result<BlobStream, BlobError>;
 
     /// One file on the local disk; `None` if it does not exist. A store on the local disk returns
-    /// the file itself; other stores download it.
-    async fn local(&self, id: &str, name: &str) -> Result<Option<LocalFile>, BlobError>;
+    /// the file itself; other stores download it. Fails with [`StoreFault::DamagedFile`] if the
+    /// file is not what `file` says.
+    async fn local(&self, id: &str, file: &FileRecord) -> Result<Option<LocalFile>, BlobError>;
 
     /// Deletes every file of `id`; succeeds if there is none.
     async fn delete(&self, id: &str) -> Result<(), BlobError>;
 
-    /// Every id that has files.
-    async fn ids(&self) -> Result<Vec<String>, BlobError>;
+    /// Every id of that kind that has files.
+    async fn ids(&self, kind: Resource) -> Result<Vec<String>, BlobError>;
 
-    /// Checks, for readiness, that a small file can be written and deleted.
+    /// Moves every file of `id` to where nobody sees it but the operator can restore it; succeeds
+    /// if there is none.
+    async fn set_aside(&self, id: &str, now: Timestamp) -> Result<(), BlobError>;
+
+    /// Reads one file from the disk, whatever is remembered of it. Fails with
+    /// [`StoreFault::DamagedFile`] if it does not exist.
+    async fn hash(&self, id: &str, name: &str) -> Result<FileRecord, BlobError>;
+
+    /// Writes a copy of the item's row beside its files, if there is none.
+    async fn describe(&self, record: &ItemRecord) -> Result<(), BlobError>;
+
+    /// Deletes what was discarded, and what was set aside before `set_aside_before`.
+    async fn tidy(&self, set_aside_before: Option<Timestamp>) -> Result<(), BlobError>;
+
+    /// Checks, for readiness, that there is room and that a small file can be written, read and
+    /// deleted.
     async fn check(&self) -> Result<(), BlobError>;
+
+    /// The space of the disk; `None` where that is unknown or has no meaning.
+    fn space(&self) -> Option<DiskSpace> {
+        None
+    }
+
+    /// Checks that `bytes` more can be accepted without using the reserve.
+    ///
+    /// # Errors
+    /// [`StoreFault::Full`].
+    fn require_room(&self, bytes: u64) -> Result<(), BlobError> {
+        self.space()
+            .map_or(Ok(()), |space| space.require_room(bytes))
+    }
 }

@@ -1,6 +1,6 @@
 //! The interface to the records of volumes and products.
 
-use super::{ListPage, ListRequest, Product, StoreResult, StoredVolume};
+use super::{Custody, ListPage, ListRequest, Product, StoreResult, StoredVolume};
 use crate::jobs::{Resource, Timestamp};
 use async_trait::async_trait;
 
@@ -17,7 +17,7 @@ pub enum Deleted {
 
 /// The tables of volumes and products. Every method fails only if the database does.
 #[async_trait]
-pub trait Catalogue: Send + Sync + 'static {
+pub trait Catalogue: Custody {
     /// Adds a volume. `false` if it exists already.
     async fn add_volume(&self, volume: &StoredVolume) -> StoreResult<bool>;
 

@@ -157,6 +157,10 @@ pub trait JobStore: Send + Sync + 'static {
     /// Cancels a waiting job; marks a running one for cancellation.
     async fn interrupt(&self, id: &str, now: Timestamp) -> StoreResult<Interrupted>;
 
+    /// Checks, for readiness, that the database answers and can be written. Takes no longer than
+    /// a write may wait.
+    async fn check(&self) -> StoreResult<()>;
+
     /// Deletes a job that has ended. [`Deleted::InUse`] if it has not.
     async fn delete_job(&self, id: &str, now: Timestamp) -> StoreResult<Deleted>;
 }

@@ -1,11 +1,12 @@
 //! The record of a product: a model, a segmentation or a template.
 
+use super::FileRecord;
 use crate::jobs::{Resource, Timestamp};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 /// One row of the products table. It never changes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Product {
     /// Derived from the content, with the prefix of its [`Resource`].
     pub id: String,
@@ -36,6 +37,17 @@ pub struct ProductFile {
     pub bytes: u64,
     /// SHA-256 of its content, hexadecimal.
     pub sha256: String,
+}
+
+impl ProductFile {
+    /// Its name in the file store, and what it must contain.
+    pub fn record(&self) -> FileRecord {
+        FileRecord {
+            name: self.name.clone(),
+            bytes: self.bytes,
+            sha256: self.sha256.clone(),
+        }
+    }
 }
 
 impl Product {

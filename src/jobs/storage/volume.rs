@@ -1,10 +1,23 @@
 //! The record of an uploaded volume.
 
 use crate::jobs::Timestamp;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+/// A stored file and what it must contain.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FileRecord {
+    /// Its name in the file store.
+    pub name: String,
+    /// Its length in bytes.
+    pub bytes: u64,
+    /// SHA-256 of its content, hexadecimal. Volumes stored by older versions have the first half
+    /// of it, or (those of several files, until they are first verified) nothing and no length.
+    pub sha256: String,
+}
+
 /// One row of the volumes table.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StoredVolume {
     /// `vol_...`, derived from the content.
     pub id: String,
@@ -14,8 +27,8 @@ pub struct StoredVolume {
     pub created_at: Timestamp,
     /// Total length of its files in bytes.
     pub bytes: u64,
-    /// Names of its files in the file store. These are not the names given by the client.
-    pub files: Vec<String>,
+    /// Its files in the file store. Their names are not those given by the client.
+    pub files: Vec<FileRecord>,
     /// What was found out about the content when it was uploaded; the queue does not read it.
     pub facts: Value,
 }

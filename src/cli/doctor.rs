@@ -1,0 +1,102 @@
+//! `ventriform doctor` and `ventriform backup`: checking, repairing and copying a data folder.
+
+use crate::jobs::Tenant;
+use crate::store::{self, Examination};
+use anyhow::{Result, bail};
+use clap::Args;
+use std::path::PathBuf;
+use tokio::runtime::Runtime;
+
+/// Check a data folder, and repair it from what lies on disk (stop the service first)
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  ventriform doctor --data-dir data
+  ventriform doctor --data-dir data --repair
+  ventriform doctor --data-dir data --json
+
+The status is 0 if nothing is wrong or everything was repaired, else 1. A repair deletes no content:
+what is broken or has no record is moved into the folder `quarantine`.")]
+pub struct DoctorArgs {
+    /// Folder of the service
+    #[arg(long, value_name = "DIR")]
+    data_dir: PathBuf,
+    /// Repair what can be repaired
+    #[arg(long)]
+    repair: bool,
+    /// Tenant that gets the items whose holder is unknown
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    tenant: Tenant,
+    /// Print the findings as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Copy a data folder while the service runs or not
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  ventriform backup --data-dir data /backups/ventriform
+
+The target is empty or holds an earlier backup, of which unchanged files are kept. To restore, stop
+the service, copy the target to the data folder, and start the service.")]
+pub struct BackupArgs {
+    /// Folder of the service
+    #[arg(long, value_name = "DIR")]
+    data_dir: PathBuf,
+    /// Folder to copy to
+    target: PathBuf,
+}
+
+/// Checks a data folder, and repairs it if asked to.
+///
+/// # Errors
+/// If the folder cannot be examined, or something is wrong that was not repaired.
+pub fn run(args: &DoctorArgs) -> Result<()> {
+    let heirs = args.repair.then_some(&args.tenant);
+    let found = Runtime::new()?.block_on(store::examine(&args.data_dir, heirs))?;
+    match args.json {
+        true => println!("{}", serde_json::to_string_pretty(&found)?),
+        false => print(&found),
+    }
+    if found.is_healthy() {
+        return Ok(());
+    }
+    bail!("the folder is not healthy; repair it with --repair, or restore a backup")
+}
+
+fn print(found: &Examination) {
+    for finding in &found.findings {
+        let repair = finding.repair.map(|done| format!(" Repaired: {done}."));
+        println!(
+            "{} {}: {}{}",
+            finding.kind,
+            finding.subject,
+            finding.detail,
+            repair.unwrap_or_default()
+        );
+    }
+    println!(
+        "{} items with a row, {} files read, {} findings",
+        found.items,
+        found.files,
+        found.findings.len()
+    );
+}
+
+/// Copies a data folder.
+///
+/// # Errors
+/// If the folder cannot be copied, or items in it are damaged.
+pub fn back_up(args: &BackupArgs) -> Result<()> {
+    let done = Runtime::new()?.block_on(store::backup(&args.data_dir, &args.target))?;
+    println!(
+        "{} items in the backup, {} of them copied now",
+        done.items, done.copied
+    );
+    if done.damaged.is_empty() {
+        return Ok(());
+    }
+    bail!(
+        "items that are damaged in the data folder are not in the backup:\n{}",
+        done.damaged.join("\n")
+    )
+}

@@ -1,0 +1,224 @@
+//! Looking after what is stored: setting aside files without a row, and verifying all files.
+//!
+//! Both run in the background, in small steps, so that the start does not wait for them however
+//! much is stored.
+//!
+//! **Sweep**, at the start and then every hour: each folder whose item has no row is set aside in
+//! the quarantine. A crash between publishing files and committing their row leaves such folders,
+//! but so does a database that was lost or restored from an older copy, so they are not deleted:
+//! the operator decides, or the time set for the quarantine does. Only the files of an item that
+//! was erased are deleted, which its tombstone tells. No sweep takes place while the database is
+//! damaged.
+//!
+//! **Scrub**, at the set rate and at most once a day: each file is read and compared with the hash
+//! in its row. What is damaged is logged; readers of it are told already.
+
+use super::Queue;
+use crate::jobs::{
+    BlobError, FileRecord, ItemRecord, Resource, StoreError, StoreFault, StoreResult, volume_id,
+};
+use std::sync::Arc;
+use std::time::Duration;
+use tokio_util::sync::CancellationToken;
+
+/// Time between two sweeps.
+const SWEEP_EVERY: Duration = Duration::from_secs(3600);
+/// Items looked up at a time.
+const BATCH: usize = 500;
+/// Pause between two batches, for other users of disk and database.
+const PAUSE: Duration = Duration::from_millis(5);
+/// Shortest time between the starts of two scrubs.
+const SCRUB_EVERY: Duration = Duration::from_secs(86_400);
+/// Hexadecimal digits of a whole SHA-256.
+const HASH_DIGITS: usize = 64;
+
+/// Looks after the files of a running service.
+pub struct Custodian {
+    /// The queue whose items are looked after.
+    pub queue: Arc<Queue>,
+    /// Age at which quarantined items are deleted; `None` keeps them.
+    pub quarantine_keep: Option<Duration>,
+    /// Bytes read per second to verify files; 0 verifies none.
+    pub scrub_rate: u64,
+}
+
+/// What a sweep did.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Swept {
+    /// Items that were set aside.
+    pub set_aside: u64,
+    /// Items whose erasure was completed.
+    pub erased: u64,
+}
+
+impl Custodian {
+    /// Sweeps and scrubs until `end` is cancelled.
+    pub async fn run(self, end: CancellationToken) {
+        tokio::select! {
+            () = end.cancelled() => {}
+            () = async { tokio::join!(self.sweep_for_ever(), self.scrub_for_ever()); } => {}
+        }
+    }
+
+    async fn sweep_for_ever(&self) {
+        let mut round = tokio::time::interval(SWEEP_EVERY);
+        loop {
+            round.tick().await;
+            if let Err(error) = self.sweep().await {
+                tracing::error!(%error, "the sweep of files failed; the next one tries again");
+            }
+        }
+    }
+
+    /// Runs one sweep, and empties the quarantine of what is too old.
+    ///
+    /// # Errors
+    /// If the storage fails, or the database is damaged.
+    pub async fn sweep(&self) -> StoreResult<Swept> {
+        let queue = &self.queue;
+        let defects = queue.catalogue.defects().await?;
+        if let Some(first) = defects.first() {
+            return Err(StoreError::Database {
+                cause: StoreFault::DamagedDatabase,
+                message: format!("it is damaged, run `ventriform doctor`: {first}"),
+            });
+        }
+        let mut swept = Swept::default();
+        for kind in Resource::WITH_FILES {
+            for batch in queue.blobs.ids(kind).await?.chunks(BATCH) {
+                let known = queue.catalogue.known(batch).await?;
+                for id in batch.iter().filter(|id| !known.contains(*id)) {
+                    self.remove(id, &mut swept).await?;
+                }
+                tokio::time::sleep(PAUSE).await;
+            }
+        }
+        let age = self.quarantine_keep.map(|age| age.as_millis());
+        let before = age.map(|age| {
+            let age = i64::try_from(age).unwrap_or(i64::MAX);
+            queue.clock.now().saturating_sub(age)
+        });
+        queue.blobs.tidy(before).await?;
+        if swept.set_aside > 0 {
+            tracing::error!(
+                items = swept.set_aside,
+                "files without a record were moved to the folder `quarantine`; if they are \
+                 missed, stop the service and run `ventriform doctor --repair`"
+            );
+        }
+        Ok(swept)
+    }
+
+    /// Sets the files of an unknown item aside; deletes them if the item was erased.
+    async fn remove(&self, id: &str, swept: &mut Swept) -> StoreResult<()> {
+        let queue = &self.queue;
+        let _lock = queue.items.lock(id).await;
+        if queue.catalogue.record(id).await?.is_some() {
+            return Ok(());
+        }
+        if queue.catalogue.was_erased(id).await? {
+            queue.blobs.delete(id).await?;
+            swept.erased += 1;
+        } else {
+            queue.blobs.set_aside(id, queue.clock.now()).await?;
+            swept.set_aside += 1;
+        }
+        Ok(())
+    }
+
+    async fn scrub_for_ever(&self) {
+        if self.scrub_rate == 0 {
+            return std::future::pending().await;
+        }
+        let mut round = tokio::time::interval(SCRUB_EVERY);
+        loop {
+            round.tick().await;
+            match self.scrub().await {
+                Ok(0) => {}
+                Ok(damaged) => tracing::error!(damaged, "stored items are damaged or incomplete"),
+                Err(error) => tracing::error!(%error, "the check of all files was broken off"),
+            }
+        }
+    }
+
+    /// Verifies every file once, at the set rate. Returns the number of damaged items.
+    ///
+    /// # Errors
+    /// If the storage fails for another reason than a damaged file.
+    pub async fn scrub(&self) -> StoreResult<u64> {
+        let mut damaged = 0;
+        for kind in [Resource::Volume, Resource::Model] {
+            let mut after = 0;
+            loop {
+                let records = self.queue.catalogue.records(kind, after, 1).await?;
+                let Some(record) = records.into_iter().next() else {
+                    break;
+                };
+                after = record.sequence();
+                match self.scrub_item(record).await {
+                    Ok(()) => {}
+                    Err(StoreError::Files(error)) if error.cause == StoreFault::DamagedFile => {
+                        tracing::error!(%error, "a stored file is damaged");
+                        damaged += 1;
+                    }
+                    Err(error) => return Err(error),
+                }
+            }
+        }
+        Ok(damaged)
+    }
+
+    async fn scrub_item(&self, mut record: ItemRecord) -> StoreResult<()> {
+        let queue = &self.queue;
+        let id = record.id().to_owned();
+        let mut found = Vec::new();
+        for expected in record.files() {
+            let file = match queue.blobs.hash(&id, &expected.name).await {
+                Err(error) if error.cause == StoreFault::DamagedFile => {
+                    return self.unless_erased(&id, error).await;
+                }
+                other => other?,
+            };
+            let seconds = file.bytes as f64 / self.scrub_rate as f64;
+            tokio::time::sleep(PAUSE + Duration::from_secs_f64(seconds)).await;
+            if !file.sha256.starts_with(&expected.sha256) {
+                let how = format!("{id}/{}: its SHA-256 is another", file.name);
+                return self
+                    .unless_erased(&id, BlobError::new(StoreFault::DamagedFile, how))
+                    .await;
+            }
+            found.push(file);
+        }
+        if let ItemRecord::Volume(volume) = &mut record
+            && volume.files.iter().any(|f| f.sha256.len() < HASH_DIGITS)
+        {
+            complete(&mut volume.files, found, &id)?;
+            queue.catalogue.amend(&record).await?;
+        }
+        Ok(queue.blobs.describe(&record).await?)
+    }
+
+    /// The error, unless the item has been erased meanwhile.
+    async fn unless_erased(&self, id: &str, error: BlobError) -> StoreResult<()> {
+        match self.queue.catalogue.record(id).await? {
+            Some(_) => Err(error.into()),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Fills in the hashes that older versions did not store, if they give the id.
+fn complete(
+    files: &mut Vec<FileRecord>,
+    found: Vec<FileRecord>,
+    id: &str,
+) -> Result<(), BlobError> {
+    if volume_id(&found) != id {
+        return Err(BlobError::new(
+            StoreFault::DamagedFile,
+            format!("{id}: the content is not what was uploaded"),
+        ));
+    }
+    *files = found;
+    Ok(())
+}

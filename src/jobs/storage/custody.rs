@@ -1,0 +1,30 @@
+//! The interface for looking after what is stored: which items have a row, and what their rows
+//! say of their files.
+
+use super::{ItemRecord, StoreResult};
+use crate::jobs::Resource;
+use async_trait::async_trait;
+use std::collections::BTreeSet;
+
+/// Rows of items of every kind. Every method fails only if the database does.
+#[async_trait]
+pub trait Custody: Send + Sync + 'static {
+    /// The row of that id.
+    async fn record(&self, id: &str) -> StoreResult<Option<ItemRecord>>;
+
+    /// Those of `ids` that have a row.
+    async fn known(&self, ids: &[String]) -> StoreResult<BTreeSet<String>>;
+
+    /// At most `limit` rows of volumes (or of products) after position `after`, oldest first.
+    async fn records(&self, kind: Resource, after: i64, limit: u32)
+    -> StoreResult<Vec<ItemRecord>>;
+
+    /// Replaces what the row says of the item's files and content, after the files were replaced.
+    async fn amend(&self, record: &ItemRecord) -> StoreResult<()>;
+
+    /// Whether anybody erased the item of that id.
+    async fn was_erased(&self, id: &str) -> StoreResult<bool>;
+
+    /// What is wrong with the database's own structure; empty if nothing is.
+    async fn defects(&self) -> StoreResult<Vec<String>>;
+}
