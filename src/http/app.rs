@@ -2,9 +2,9 @@
 
 use super::decoding::Decoding;
 use super::guard::state::Guard;
-use super::health::Readiness;
 use super::hooks::Hooks;
 use super::metrics::Metrics;
+use super::readiness::Readiness;
 use super::spans::Spans;
 use super::streams::EventStreams;
 use crate::access::AccessStore;

@@ -54,6 +54,7 @@ mod openapi;
 mod pagination;
 mod problem;
 mod products;
+mod readiness;
 mod request;
 mod router;
 mod segmentations;

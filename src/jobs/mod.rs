@@ -70,10 +70,10 @@ pub use queue::{
 };
 pub use resource::Resource;
 pub use storage::{
-    BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Claimant, Custody, DeathLimit, Deleted,
-    DiskSpace, FigureStore, FileRecord, Interrupted, ItemRecord, JobOutcome, JobStore, Lease,
-    ListPage, ListRequest, LocalFile, Product, ProductFile, QueueFigures, QueueLoad, StagedFiles,
-    StagedFor, StoreError, StoreFault, StoreResult, StoredVolume,
+    BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Claimant, Custody, DeathLimit,
+    Deleted, DiskSpace, FigureStore, FileRecord, Interrupted, ItemRecord, JobOutcome, JobStore,
+    Lease, ListPage, ListRequest, LocalFile, Product, ProductFile, QueueFigures, QueueLoad,
+    StagedFiles, StagedFor, StoreError, StoreFault, StoreResult, StoredVolume,
 };
 pub use tenant::{InvalidTenant, Tenant};
 pub use work::{
