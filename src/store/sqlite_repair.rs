@@ -92,7 +92,8 @@ impl SqliteStore {
         transaction.commit().await
     }
 
-    /// Copies every row that can be read from the damaged database `old`.
+    /// Copies every row that can be read from the damaged database `old`; none, if it cannot even be
+    /// opened.
     pub(super) async fn salvage(&self, old: &Path) -> StoreResult<()> {
         let tables: Vec<String> = sqlx::query_scalar(
             "SELECT name FROM sqlite_schema
@@ -102,14 +103,19 @@ impl SqliteStore {
         .fetch_all(&self.readers)
         .await?;
         let mut connection = self.writer.connect().await?;
-        sqlx::query("ATTACH ? AS old")
+        let attached = sqlx::query("ATTACH ? AS old")
             .bind(old.to_string_lossy())
             .execute(&mut connection)
-            .await?;
-        for table in tables {
-            if let Err(error) = salvage_table(&mut connection, &table).await {
-                tracing::warn!(table, %error, "no row of this table could be read");
+            .await;
+        match attached {
+            Ok(_) => {
+                for table in tables {
+                    if let Err(error) = salvage_table(&mut connection, &table).await {
+                        tracing::warn!(table, %error, "no row of this table could be read");
+                    }
+                }
             }
+            Err(error) => tracing::warn!(%error, "no row of the damaged database could be read"),
         }
         let _ = connection.close().await;
         sqlx::query(

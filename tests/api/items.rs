@@ -148,11 +148,17 @@ async fn an_upload_is_stored_to_its_end_although_the_client_hangs_up() {
 async fn files_whose_record_could_not_be_written_are_deleted_by_the_upkeep() {
     let bench = Bench::new().await;
     let mut database = database(&bench.folder).await;
-    run(&mut database, "ALTER TABLE volumes RENAME TO hidden").await;
+    run(
+        &mut database,
+        "CREATE TRIGGER full BEFORE INSERT ON volumes BEGIN SELECT RAISE(ABORT, 'full'); END",
+    )
+    .await;
     let files = bench.staged().await;
     let added = bench.queue.add_volume(bench.volume("vol_1"), files).await;
     assert!(added.is_err());
     assert!(bench.has_files("vol_1"));
+    run(&mut database, "DROP TRIGGER full").await;
+    run(&mut database, "ALTER TABLE volumes RENAME TO hidden").await;
     let upkeep = bench.upkeep(None);
     assert!(upkeep.run_once().await.is_err(), "it cannot tell yet");
     assert!(bench.has_files("vol_1"));
