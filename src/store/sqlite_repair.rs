@@ -1,4 +1,4 @@
-//! Repairing and copying the database; for [`super::doctor`] and [`super::backup`].
+//! Repairing and copying the database; for [`super::doctor`] and [`backup()`](super::backup()).
 
 use super::rows::to_json;
 use super::sqlite::SqliteStore;
