@@ -25,7 +25,7 @@ PLATFORM = "x86_64-unknown-linux-gnu"
 BUNDLED = {
     "libsqlite3-sys": ("sqlite", "sqlite3.h", r'#define SQLITE_VERSION\s+"([\d.]+)"'),
     "libdeflate-sys": ("libdeflate", "libdeflate.h", r'#define LIBDEFLATE_VERSION_STRING\s+"([\d.]+)"'),
-    "libmimalloc-sys": ("mimalloc", "v3/include/mimalloc.h", r"#define MI_MALLOC_VERSION\s+(\d+)"),
+    "libmimalloc-sys": ("mimalloc", "mimalloc.h", r"#define MI_MALLOC_VERSION\s+(\d+)"),
 }
 
 
@@ -62,13 +62,6 @@ def judge():
             yield f"{name} comes from {package['source'].split('+')[0]}, which deny.toml does not allow"
 
 
-def dotted(version):
-    """`30302` -> `3.3.2`: mimalloc writes its version as one number."""
-    if "." in version:
-        return version
-    return f"{int(version[:-4])}.{int(version[-4:-2])}.{int(version[-2:])}"
-
-
 def bundled(package):
     """The C library inside of a crate."""
     if package["name"] not in BUNDLED:
@@ -77,7 +70,7 @@ def bundled(package):
     for path in sorted(pathlib.Path(package["manifest_path"]).parent.rglob(header)):
         if found := re.search(pattern, path.read_text(errors="replace")):
             reference = f"{package['name']}/{name}"
-            return [{"type": "library", "bom-ref": reference, "name": name, "version": dotted(found[1])}]
+            return [{"type": "library", "bom-ref": reference, "name": name, "version": found[1]}]
     raise SystemExit(f"{package['name']}: no version of {name} in {header}")
 
 

@@ -4,7 +4,7 @@
 #
 #   scripts/test.sh            everything
 #   scripts/test.sh --quick    without the demo and the external checks (trimesh, vtk, glTF validator,
-#                              pygeodesic, schemathesis)
+#                              pygeodesic, schemathesis, generated clients, licences and SBOM)
 set -uo pipefail
 cd "$(dirname "$0")/.."
 
@@ -73,8 +73,11 @@ install_external_tools() {
       "$tools/python/bin/pip" install -q -r scripts/requirements.txt &&
       cp scripts/requirements.txt "$tools/python.done"
   fi
-  [ -e "$tools/node_modules/gltf-validator" ] ||
-    npm install --silent --no-fund --no-audit --prefix "$tools" gltf-validator@2.0.0-dev.3.10
+  if ! cmp -s scripts/package.json "$tools/node.done"; then
+    cp scripts/package.json "$tools/package.json" &&
+      npm install --silent --no-fund --no-audit --prefix "$tools" &&
+      cp scripts/package.json "$tools/node.done"
+  fi
 }
 
 # The library without the service compiles, and depends on none of the service's crates.
@@ -113,9 +116,15 @@ if wait "${running[install]}"; then
   start formats scripts/check_formats.sh
   start geodesics scripts/check_geodesics.sh
   start api scripts/check_api.sh
+  start contract scripts/with_service.sh "$PYTHON" scripts/check_contract.py
+  start clients scripts/check_clients.sh
+  start dependencies "$PYTHON" scripts/dependencies.py check
   collect formats "formats read by trimesh, vtk and the glTF validator"
   collect geodesics "geodesics against pygeodesic"
   collect api "service tested by schemathesis"
+  collect contract "service answers as its document says"
+  collect clients "generated Python and TypeScript clients"
+  collect dependencies "licences, sources and bill of materials"
 else
   cat "$tools/install.log"
   echo "could not install the tools for the external checks"

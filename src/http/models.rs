@@ -31,6 +31,8 @@ body_of_product!(
     ModelBody,
     Model,
     ModelLinks,
+    openapi::ModelParametersObject,
+    openapi::ModelSummarySchema,
     "Counts and main figures; the report has all figures.",
     "mdl_2c26b46b68ffc68ff99b453c1d304134"
 );

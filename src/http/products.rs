@@ -79,13 +79,17 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
         let path = format!("/v1/{plural}/{{id}}/{path}");
         Documented::new(HttpMethod::Get, path, plural, id.to_owned(), summary).id(noun)
     };
-    let mesh = download("mesh", "get_mesh", format!("Download a {noun}'s mesh"))
-        .description("In the format that `Accept` asks for; GLB if it allows any.")
-        .parameters::<ConditionalHeaders>()
-        .answers::<MeshAnswer>();
+    let mesh = download(
+        "mesh",
+        &format!("get_{noun}_mesh"),
+        format!("Download a {noun}'s mesh"),
+    )
+    .description("In the format that `Accept` asks for; GLB if it allows any.")
+    .parameters::<ConditionalHeaders>()
+    .answers::<MeshAnswer>();
     let mut file = download(
         "{file}",
-        "get_file",
+        &format!("get_{noun}_file"),
         format!("Download one of a {noun}'s files"),
     )
     .description(P::FILE_HELP);
@@ -104,10 +108,14 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
         shared(file).served_by(get(get_file::<P>)),
     ];
     if P::FILES.contains(&REPORT) {
-        let report = download("report", "get_report", format!("Read a {noun}'s report"))
-            .description("JSON, or an HTML page if `Accept` prefers `text/html`.")
-            .parameters::<ConditionalHeaders>()
-            .answers::<ReportAnswer>();
+        let report = download(
+            "report",
+            &format!("get_{noun}_report"),
+            format!("Read a {noun}'s report"),
+        )
+        .description("JSON, or an HTML page if `Accept` prefers `text/html`.")
+        .parameters::<ConditionalHeaders>()
+        .answers::<ReportAnswer>();
         routes.push(shared(report).served_by(get(get_report::<P>)));
     }
     routes
@@ -171,9 +179,10 @@ impl DownloadBody {
 }
 
 /// Declares the JSON of a kind of product that is made of a volume: its doc comments, its name, the
-/// name of its schema, the type of its links, what its summary holds, and an example of an id.
+/// name of its schema, the type of its links, the schemas of its parameters and of its summary,
+/// what its summary holds, and an example of an id.
 macro_rules! body_of_product {
-    ($(#[doc = $doc:tt])+ $name:ident, $schema:ident, $links:ident, $summary:tt, $example:tt) => {
+    ($(#[doc = $doc:tt])+ $name:ident, $schema:ident, $links:ident, $parameters:path, $figures:path, $summary:tt, $example:tt) => {
         $(#[doc = $doc])+
         #[derive(serde::Serialize, utoipa::ToSchema)]
         #[schema(as = $schema)]
@@ -187,10 +196,10 @@ macro_rules! body_of_product {
             /// The volume it was made of.
             volume: String,
             /// The parameters used, including every default.
-            #[schema(value_type = Object)]
+            #[schema(value_type = $parameters)]
             parameters: serde_json::Map<String, serde_json::Value>,
             #[doc = $summary]
-            #[schema(value_type = Object)]
+            #[schema(value_type = $figures)]
             summary: serde_json::Map<String, serde_json::Value>,
             /// The program that made it.
             software: $crate::http::products::SoftwareBody,

@@ -59,7 +59,7 @@ pub struct TemplateBody {
     #[schema(example = "left_ventricle")]
     organ: String,
     /// Counts and main figures.
-    #[schema(value_type = Object)]
+    #[schema(value_type = openapi::TemplateSummarySchema)]
     summary: Map<String, Value>,
     /// The program that added it.
     software: SoftwareBody,

@@ -70,3 +70,64 @@ fn every_reference_resolves() {
         }
     }
 }
+
+/// Path, method and content of every operation.
+fn operations(document: &Value) -> Vec<(&str, &str, &Value)> {
+    let paths = document["paths"].as_object().unwrap().iter();
+    paths
+        .flat_map(|(path, item)| {
+            let methods = item.as_object().unwrap().iter();
+            methods.map(|(method, operation)| (path.as_str(), method.as_str(), operation))
+        })
+        .collect()
+}
+
+#[test]
+fn every_operation_has_an_id_of_its_own_and_examples() {
+    let document: Value = serde_json::from_str(&document_json()).unwrap();
+    let mut ids = std::collections::BTreeSet::new();
+    for (path, method, operation) in operations(&document) {
+        let what = format!("{method} {path}");
+        assert!(ids.insert(text(&operation["operationId"])), "{what}");
+        assert!(text(&operation["x-codeSamples"][0]["source"]).starts_with("curl "));
+        for (status, answer) in operation["responses"].as_object().unwrap() {
+            let contents = answer.get("content").and_then(Value::as_object);
+            for (media_type, content) in contents.into_iter().flatten() {
+                let example = &content["example"];
+                let shared = content["examples"].is_object();
+                let json = ["application/json", "application/problem+json"];
+                assert!(
+                    !json.contains(&media_type.as_str()) || shared || !example.is_null(),
+                    "{what} {status}: record its examples: scripts/check_contract.py --record"
+                );
+            }
+        }
+    }
+    assert!(ids.contains("get_model_mesh_glb") && ids.contains("list_volumes"));
+}
+
+#[test]
+fn bytes_are_binary_and_reports_are_typed() {
+    let document: Value = serde_json::from_str(&document_json()).unwrap();
+    let schema = |path: &str, media_type: &str| {
+        document["paths"][path]["get"]["responses"]["200"]["content"][media_type]["schema"].clone()
+    };
+    for (path, _, operation) in operations(&document) {
+        let uploads = &operation["requestBody"]["content"]["application/octet-stream"];
+        if !uploads.is_null() {
+            assert_eq!(uploads["schema"]["format"], "binary", "{path}");
+        }
+    }
+    let glb = schema("/v1/models/{id}/mesh.glb", "model/gltf-binary");
+    assert_eq!(glb["format"], "binary");
+    for (path, name) in [
+        ("/v1/models/{id}/report", "ModelReport"),
+        ("/v1/models/{id}/report.json", "ModelReport"),
+        ("/v1/models/{id}/distance.json", "Closeness"),
+        ("/v1/segmentations/{id}/report", "SegmentationReport"),
+        ("/v1/segmentations/{id}/polar.json", "PolarMap"),
+    ] {
+        let reference = text(&schema(path, "application/json")["$ref"]);
+        assert_eq!(reference, format!("#/components/schemas/{name}"));
+    }
+}

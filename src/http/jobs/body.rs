@@ -1,6 +1,7 @@
 //! A job as JSON.
 
 use crate::http::app::App;
+use crate::http::openapi::JobParameters;
 use crate::http::problem::{Answer, Problem, ProblemBody};
 use crate::http::wire::{path_of, rfc3339};
 use crate::jobs::{Job, JobState, QueuePosition, Resource, Timestamp};
@@ -22,7 +23,7 @@ pub struct JobBody {
     /// The volume it works on.
     volume: String,
     /// The parameters, including every default.
-    #[schema(value_type = Object)]
+    #[schema(value_type = JobParameters)]
     parameters: Map<String, Value>,
     /// Its state.
     state: JobStateName,

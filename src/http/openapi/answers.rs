@@ -1,5 +1,7 @@
 //! Answers and problems that several handlers share.
 
+use super::bodies::MeshDocument;
+use super::reports::SegmentationReportSchema;
 use crate::export::Format;
 use crate::http::problem::{MEDIA_TYPE, ProblemBody};
 use std::collections::BTreeMap;
@@ -80,9 +82,9 @@ pub struct DownloadAnswers;
 
 impl IntoResponses for DownloadAnswers {
     fn responses() -> Responses {
+        // Without a schema: generators would take the part for a second form of the whole.
         let part = ResponseBuilder::new()
-            .description("The part that `Range` asks for")
-            .content("*/*", Content::new(Some(binary())));
+            .description("The bytes that `Range` asks for, under the file's media type");
         let unchanged = ResponseBuilder::new().description("The client's copy is still current");
         [
             ("206".to_owned(), part.build().into()),
@@ -145,7 +147,7 @@ files! {
     /// 200 with a report.
     ReportAnswer: "The report", [reports()];
     /// 200 with the mask, mesh or report of a segmentation.
-    SegmentationAnswer: "The mask, the mesh or the report", [meshes(), masks()];
+    SegmentationAnswer: "The mask, the mesh or the report", [meshes(), masks(), report_alone()];
     /// 200 with any of a segmentation's files.
     SegmentationFileAnswer: "The file", [meshes(), masks(), pictures(), reports()];
     /// 200 with any of a model's files.
@@ -206,8 +208,9 @@ fn meshes() -> Contents {
         .into_iter()
         .map(|format| {
             let schema = match format {
-                Format::Json | Format::Gltf => object(),
-                _ => binary(),
+                Format::Json => Ref::from_schema_name(MeshDocument::name()).into(),
+                Format::Gltf => RefOr::T(object()),
+                _ => RefOr::T(binary()),
             };
             (format.media_type(), Content::new(Some(schema)))
         })
@@ -238,6 +241,26 @@ fn reports() -> Contents {
         ("application/json", Content::new(Some(object()))),
         ("text/html", Content::new(Some(Schema::from(page)))),
     ]
+}
+
+fn report_alone() -> Contents {
+    let report = Ref::from_schema_name(SegmentationReportSchema::name());
+    vec![("application/json", Content::new(Some(report)))]
+}
+
+/// The media type of a product's file.
+pub fn media_type_of(name: &str) -> &'static str {
+    let extension = name.rsplit('.').next().unwrap_or_default();
+    match extension {
+        "gz" => "application/gzip",
+        "html" => "text/html",
+        "png" => "image/png",
+        "svg" => "image/svg+xml",
+        _ => Format::ALL
+            .into_iter()
+            .find(|format| format.extension() == extension)
+            .map_or("application/octet-stream", Format::media_type),
+    }
 }
 
 fn object() -> Schema {

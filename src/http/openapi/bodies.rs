@@ -24,6 +24,7 @@ impl ToSchema for JobRequest {
             ModelParametersObject::name().into(),
             ModelParametersObject::schema(),
         ));
+        schemas.push((JobParameters::name().into(), JobParameters::schema()));
         schemas.push((
             SegmentationParametersObject::name().into(),
             SegmentationParametersObject::schema(),
@@ -42,14 +43,10 @@ impl PartialSchema for JobRequest {
         let volume = text()
             .description(Some("Id of the volume"))
             .examples(["vol_9f86d081884c7d659a2feaa0c55ad015"]);
-        let parameters = AnyOfBuilder::new()
-            .description(Some("The parameters of that kind of work"))
-            .item(Ref::from_schema_name(ModelParametersObject::name()))
-            .item(Ref::from_schema_name(SegmentationParametersObject::name()));
         let object = ObjectBuilder::new()
             .property("kind", Schema::from(kind))
             .property("volume", Schema::from(volume))
-            .property("parameters", Schema::AnyOf(parameters.build()))
+            .property("parameters", Ref::from_schema_name(JobParameters::name()))
             .property("webhook", Ref::from_schema_name(WebhookRequest::name()))
             .required("volume")
             .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
@@ -96,6 +93,28 @@ impl PartialSchema for WebhookRequest {
             .required("url")
             .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
         Schema::from(object.build()).into()
+    }
+}
+
+/// The parameters of a job of any kind.
+pub struct JobParameters;
+
+impl ToSchema for JobParameters {
+    fn name() -> Cow<'static, str> {
+        "JobParameters".into()
+    }
+
+    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
+        JobRequest::schemas(schemas);
+    }
+}
+
+impl PartialSchema for JobParameters {
+    fn schema() -> RefOr<Schema> {
+        let parameters = AnyOfBuilder::new()
+            .item(Ref::from_schema_name(ModelParametersObject::name()))
+            .item(Ref::from_schema_name(SegmentationParametersObject::name()));
+        Schema::AnyOf(parameters.build()).into()
     }
 }
 
@@ -164,6 +183,11 @@ impl PartialSchema for MeshDocument {
                 .items(RefOr::T(Schema::Array(triple.build())))
                 .description(Some(description))
         };
+        let text = |description: &str| {
+            ObjectBuilder::new()
+                .schema_type(Type::String)
+                .description(Some(description))
+        };
         let word = |only: &'static str| {
             ObjectBuilder::new()
                 .schema_type(Type::String)
@@ -172,7 +196,22 @@ impl PartialSchema for MeshDocument {
         let mesh = ObjectBuilder::new()
             .property("frame", word("LPS"))
             .property("unit", word("mm"))
+            .property("title", text("What the mesh shows"))
+            .property("volume", text("Id of the volume it was made of"))
+            .property(
+                "frame_of_reference_uid",
+                text("The volume's DICOM frame of reference"),
+            )
+            .property("software", text("The program that made it"))
+            .property(
+                "quality",
+                ObjectBuilder::new().description(Some("Its main figures")),
+            )
             .property("vertices", triples(Type::Number, "Points, LPS millimetres"))
+            .property(
+                "normals",
+                triples(Type::Number, "Unit normals of the points, outward"),
+            )
             .property(
                 "triangles",
                 triples(

@@ -9,26 +9,34 @@
 //! | [`answers`] | answers and problems that several handlers share |
 //! | [`access`] | credentials, and how requests are refused before any handler |
 //! | [`operation`] | operations of handlers that serve several kinds of things |
+//! | [`reports`] | JSON files and summaries that jobs write |
+//! | [`finish`] | the last steps on the whole document: one path per file, bytes, examples |
 //!
 //! [`publish`] completes the document that the routes have collected.
 
 mod access;
 mod answers;
 mod bodies;
+mod finish;
 mod inputs;
 mod operation;
+mod reports;
 
 pub use answers::{
     DownloadAnswers, EraseProblems, EventsAnswer, FileProblems, ListProblems, LookupProblems,
     MeshAnswer, ModelFileAnswer, ReportAnswer, SegmentationAnswer, SegmentationFileAnswer,
     UploadProblems, WaitAnswers,
 };
-pub use bodies::{JobRequest, MeshDocument, SegmentationForm, UploadForm, WebhookRequest};
+pub use bodies::{
+    JobParameters, JobRequest, MeshDocument, SegmentationForm, UploadForm, WebhookRequest,
+};
 pub use inputs::{
-    ConditionalHeaders, EventHeader, IdempotencyHeader, ModelQuery, PageParameters, PreferHeader,
-    SegmentationQuery, TemplateQuery, WebhookInputs,
+    ConditionalHeaders, EventHeader, IdempotencyHeader, ModelParametersObject, ModelQuery,
+    PageParameters, PreferHeader, SegmentationParametersObject, SegmentationQuery, TemplateQuery,
+    WebhookInputs,
 };
 pub use operation::Documented;
+pub use reports::{ModelSummarySchema, SegmentationSummarySchema, TemplateSummarySchema};
 
 use utoipa::OpenApi;
 use utoipa::openapi::{RefOr, Required};
@@ -55,12 +63,19 @@ use utoipa::openapi::{RefOr, Required};
         (name = "access", description = "Keys and the audit trail, for the scope `admin`"),
         (name = "operations", description = "For operators"),
     ),
-    components(schemas(super::problem::ProblemBody))
+    components(schemas(
+        super::problem::ProblemBody,
+        bodies::MeshDocument,
+        reports::ModelReportSchema,
+        reports::ClosenessSchema,
+        reports::SegmentationReportSchema,
+        reports::PolarMapSchema,
+    ))
 )]
 pub struct DocumentFrame;
 
 /// The document as it is published, from what the routes have collected.
-pub fn publish(mut collected: utoipa::openapi::OpenApi) -> utoipa::openapi::OpenApi {
+pub fn publish(mut collected: utoipa::openapi::OpenApi) -> serde_json::Value {
     let add = collected.paths.paths.get_mut("/v1/templates");
     let body = add.and_then(|path| path.post.as_mut()?.request_body.as_mut());
     if let Some(RefOr::T(body)) = body {
@@ -68,5 +83,7 @@ pub fn publish(mut collected: utoipa::openapi::OpenApi) -> utoipa::openapi::Open
         body.required = Some(Required::False);
     }
     access::add_access(&mut collected);
-    collected
+    let mut document = serde_json::to_value(collected).expect("the document is plain data");
+    finish::finish(&mut document);
+    document
 }

@@ -1,0 +1,312 @@
+"""Compares the published document with what a running service answers.
+
+    scripts/with_service.sh python scripts/check_contract.py            checks
+    scripts/with_service.sh python scripts/check_contract.py --record   writes the examples anew
+
+1. The document is valid OpenAPI 3.1, and every operationId is unique.
+2. Every example in it satisfies its schema, and every operation has an example of its request and answer.
+3. A walk through the whole API: every JSON answer satisfies its schema, and has no field that the schema
+   does not name.
+
+Needs openapi-spec-validator and jsonschema, and `ventriform phantom` for a scan.
+"""
+import copy, json, os, re, subprocess, sys, time, urllib.error, urllib.parse, urllib.request
+
+from jsonschema import Draft202012Validator
+from openapi_spec_validator import validate
+from referencing import Registry, Resource
+from referencing.jsonschema import DRAFT202012
+
+URL = os.environ["SERVICE_URL"]
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+DOCUMENT = os.path.join(ROOT, "openapi", "ventriform.json")
+EXAMPLES = os.path.join(ROOT, "src", "http", "openapi", "examples.json")
+PROBLEM = "application/problem+json"
+
+# Problems that the walk cannot provoke, in the service's words.
+RARE = {
+    "401": ("unauthenticated", "This service needs an API key or a bearer token.",
+            "Send `Authorization: Bearer KEY`; `ventriform keys create` makes a key."),
+    "403": ("forbidden", "This key does not have the scope that the request needs.",
+            "Ask the operator for a key with that scope."),
+    "408": ("body-too-slow", "The body did not arrive in time.", "Send the request again over a faster connection."),
+    "429": ("queue-full", "1000 jobs are waiting, the most that this service allows.",
+            "Send the request again after `Retry-After` seconds."),
+    "500": ("internal", "The service failed to answer because of an internal error, which has been logged.",
+            "Report it with the x-request-id of this answer."),
+    "503": ("not-ready", "The service is shutting down.", None),
+    "507": ("storage-full", "The disk of the service is full.", "Ask the operator to free or add space."),
+}
+
+
+class Contract:
+    """The document, and validators of its schemas: as they are, and closed against unknown fields."""
+
+    def __init__(self, document):
+        self.document = document
+        absolute = json.loads(json.dumps(document).replace('"#/components/', '"urn:document#/components/'))
+        self.registries = []
+        for exact in (False, True):
+            known = close(copy.deepcopy(absolute)) if exact else absolute
+            resource = Resource(contents=known, specification=DRAFT202012)
+            self.registries.append(Registry().with_resource("urn:document", resource).crawl())
+
+    def errors(self, schema, value, exact):
+        schema = json.loads(json.dumps(schema).replace('"#/components/', '"urn:document#/components/'))
+        validator = Draft202012Validator(close(schema) if exact else schema, registry=self.registries[exact])
+        return [f"{'/'.join(map(str, e.absolute_path))}: {e.message[:200]}" for e in validator.iter_errors(value)]
+
+    def operations(self):
+        for path, item in self.document["paths"].items():
+            for method, operation in item.items():
+                if isinstance(operation, dict) and "operationId" in operation:
+                    yield path, method, operation
+
+
+def close(schema):
+    """The schema with every object closed against fields that it does not name."""
+    if isinstance(schema, dict):
+        if "properties" in schema and "additionalProperties" not in schema:
+            schema["additionalProperties"] = False
+        for value in schema.values():
+            close(value)
+    elif isinstance(schema, list):
+        for value in schema:
+            close(value)
+    return schema
+
+
+def short(value, most=6, keep=4):
+    """The value with long lists cut."""
+    if isinstance(value, dict):
+        return {key: short(v, most, keep) for key, v in value.items()}
+    if isinstance(value, list):
+        return [short(v, most, keep) for v in (value if len(value) <= most else value[:keep])]
+    return value
+
+
+def form(files):
+    """A multipart body and its media type."""
+    mark = "----contract"
+    parts = b""
+    for name, data in files.items():
+        parts += (f'--{mark}\r\nContent-Disposition: form-data; name="{name}"; filename="{name}.nii.gz"\r\n'
+                  "Content-Type: application/gzip\r\n\r\n").encode() + data + b"\r\n"
+    return parts + f"--{mark}--\r\n".encode(), f"multipart/form-data; boundary={mark}"
+
+
+class Walk:
+    """Requests to the service, each checked against the document and recorded as an example."""
+
+    def __init__(self, contract):
+        self.contract, self.failures, self.seen = contract, [], set()
+        self.recorded = {"problems": {}, "operations": {}}
+
+    def call(self, method, template, *, expect, query="", body=None, headers=None, cut=True, **parameters):
+        operation = self.contract.document["paths"][template][method]
+        name = operation["operationId"]
+        path = template
+        for key, value in parameters.items():
+            path = path.replace("{%s}" % key, value)
+        headers = dict(headers or {})
+        own = self.recorded["operations"].setdefault(name, {})
+        if parameters:
+            own["parameters"] = parameters
+        data = body
+        if isinstance(body, (dict, list)):
+            headers["content-type"] = "application/json"
+            data = json.dumps(body).encode()
+            if expect < 300:
+                own["request"] = {"application/json": body}
+        request = urllib.request.Request(URL + path + query, data=data, method=method.upper(), headers=headers)
+        try:
+            answer = urllib.request.urlopen(request, timeout=120)
+        except urllib.error.HTTPError as error:
+            answer = error
+        content, media_type = answer.read(), (answer.headers.get("content-type") or "").split(";")[0]
+        status = str(answer.status)
+        self.seen.add(name)
+        what = f"{method.upper()} {template} {status}"
+        if answer.status != expect:
+            self.failures.append(f"{what}: expected {expect}: {content[:300]!r}")
+            return answer, content
+        documented = operation["responses"].get(status)
+        if documented is None:
+            self.failures.append(f"{what}: the status is not documented")
+            return answer, content
+        media = documented.get("content", {})
+        if content and media_type not in media:
+            self.failures.append(f"{what}: {media_type} is not documented")
+        elif media_type.endswith("json"):
+            value = json.loads(content)
+            for error in self.contract.errors(media[media_type]["schema"], value, exact=True):
+                self.failures.append(f"{what}: {error}")
+            if media_type == PROBLEM:
+                self.recorded["problems"].setdefault(status, value)
+            elif media_type == "application/json":
+                own[status] = {media_type: short(value) if cut else value}
+            return answer, value
+        elif media_type == "text/plain":
+            own[status] = {media_type: "\n".join(content.decode().split("\n")[:6]) + "\n"}
+        return answer, content
+
+
+def wait(walk, job):
+    while job["state"] in ("queued", "running"):
+        time.sleep(0.05)
+        _, job = walk.call("get", "/v1/jobs/{id}", expect=200, id=job["id"])
+    assert job["state"] == "succeeded", job
+    return job
+
+
+def event(walk, job):
+    """The last event of a finished job, as an example."""
+    text = urllib.request.urlopen(f"{URL}/v1/jobs/{job['id']}/events", timeout=30).read().decode()
+    fields = dict(line.split(": ", 1) if ": " in line else line.split(":", 1) for line in text.strip().split("\n"))
+    walk.recorded["operations"]["follow_job"] = {
+        "parameters": {"id": job["id"]}, "200": {"text/event-stream": fields}}
+    walk.seen.add("follow_job")
+
+
+def everything(walk, folder):
+    """Every operation once, and every problem that is easy to provoke."""
+    scan = open(os.path.join(folder, "spect.nii.gz"), "rb").read()
+    truth = open(os.path.join(folder, "lv_truth.nii.gz"), "rb").read()
+    octets = {"content-type": "application/octet-stream"}
+    call = walk.call
+    for template in ("/healthz", "/readyz", "/metrics"):
+        call("get", template, expect=200)
+
+    _, volume = call("post", "/v1/volumes", expect=201, body=scan, headers=octets)
+    call("post", "/v1/volumes", expect=200, body=scan, headers=octets)
+    call("get", "/v1/volumes", expect=200)
+    call("get", "/v1/volumes/{id}", expect=200, id=volume["id"])
+    call("get", "/v1/volumes/{id}/preview.png", expect=200, id=volume["id"])
+
+    order = {"kind": "model", "volume": volume["id"], "parameters": {"points": 24, "iso": "50%"}}
+    _, job = call("post", "/v1/jobs", expect=202, body=order)
+    job = wait(walk, job)
+    event(walk, job)
+    call("get", "/v1/jobs", expect=200)
+    _, job = call("post", "/v1/models", expect=202, query="?points=110", body=scan, headers=octets)
+    template_model = wait(walk, job)["model"]
+    call("post", "/v1/models", expect=200, query="?points=12", body=scan, cut=False,
+         headers={**octets, "prefer": "wait=60", "accept": "application/json"})
+    _, models = call("get", "/v1/models", expect=200)
+    model = models["models"][0]["id"]
+    body, kind = form({"volume": scan, "expert": truth})
+    _, job = call("post", "/v1/segmentations", expect=202, body=body, headers={"content-type": kind})
+    segmentation = wait(walk, job)["segmentation"]
+    call("post", "/v1/segmentations", expect=200, body=body,
+         headers={"content-type": kind, "prefer": "wait=60", "accept": "application/json"})
+    call("get", "/v1/segmentations", expect=200)
+    call("get", "/v1/segmentations/{id}", expect=200, id=segmentation)
+    mesh = urllib.request.urlopen(f"{URL}/v1/models/{template_model}/mesh.json").read()
+    _, added = call("post", "/v1/templates", expect=201, query="?name=healthy", body=json.loads(mesh))
+    walk.recorded["operations"]["create_template"].pop("request")
+    call("post", "/v1/templates", expect=200, query="?name=healthy&model=" + template_model)
+    call("get", "/v1/templates", expect=200)
+
+    of_kind = {"models": model, "segmentations": segmentation, "templates": added["id"], "volumes": volume["id"]}
+    for template, item in walk.contract.document["paths"].items():
+        found = re.match(r"/v1/(models|segmentations|templates|volumes)/\{id\}(/.*)?$", template)
+        if found and "get" in item and item["get"]["operationId"] not in walk.seen:
+            accept = {"accept": "application/json"} if found[2] in ("/mesh", "/report") else {}
+            cut = "mesh" not in template or "models" not in template
+            call("get", template, expect=200, headers=accept, cut=cut, id=of_kind[found[1]])
+    meshes = walk.recorded["operations"]
+    meshes["create_template"]["request"] = meshes["get_model_mesh_json"]["200"]
+
+    # Problems.
+    call("get", "/v1/models/{id}", expect=400, query="?verbose=1", id=model)
+    call("get", "/v1/models/{id}/mesh", expect=406, headers={"accept": "image/gif"}, id=model)
+    call("get", "/v1/models/{id}/mesh.glb", expect=416, headers={"range": "bytes=999999999-"}, id=model)
+    call("post", "/v1/jobs", expect=422, body={"kind": "model", "volume": volume["id"], "parameters": {"points": 3}})
+    call("post", "/v1/jobs", expect=413, body={"volume": "x" * 300_000})
+    call("post", "/v1/volumes", expect=415, body=b"x", headers={"content-type": "image/gif"})
+    call("post", "/v1/volumes", expect=422, body=b"no volume", headers=octets)
+    # More jobs than workers: the first one runs, the last one waits.
+    heavy = [{**order, "parameters": {"points": 3000, "seed": seed}} for seed in range(8)]
+    jobs = [call("post", "/v1/jobs", expect=202, body=body)[1]["id"] for body in heavy]
+    call("delete", "/v1/volumes/{id}", expect=409, id=volume["id"])
+    call("delete", "/v1/jobs/{id}", expect=200, id=jobs[-1])
+    while state_of(jobs[0]) == "queued":
+        time.sleep(0.01)
+    call("delete", "/v1/jobs/{id}", expect=202, id=jobs[0])
+    for name in jobs[1:-1]:
+        urllib.request.urlopen(urllib.request.Request(f"{URL}/v1/jobs/{name}", method="DELETE"))
+    while any(state_of(name) in ("queued", "running") for name in jobs):
+        time.sleep(0.05)
+    for kind, name in of_kind.items():
+        call("delete", f"/v1/{kind}/{{id}}", expect=204, id=name)
+    call("get", "/v1/models/{id}", expect=410, id=model)
+    call("get", "/v1/models/{id}", expect=404, id="mdl_" + "0" * 32)
+    # What the documented examples name was there when it was asked for.
+    for kind, noun in (("models", "model"), ("volumes", "volume")):
+        walk.recorded["operations"][f"get_{noun}"]["parameters"] = {"id": of_kind[kind]}
+    walk.recorded["operations"]["get_job"]["parameters"] = {"id": job["id"]}
+
+
+def state_of(job):
+    return json.load(urllib.request.urlopen(f"{URL}/v1/jobs/{job}"))["state"]
+
+
+def example_failures(contract):
+    """Examples that do not satisfy their schemas, and operations without examples."""
+    failures = []
+    for path, method, operation in contract.operations():
+        what = f"{method.upper()} {path}"
+        if not operation.get("x-codeSamples"):
+            failures.append(f"{what}: no example of a request")
+        for parameter in operation.get("parameters", []):
+            if parameter.get("in") == "path" and "example" not in parameter:
+                failures.append(f"{what}: no example of {parameter['name']}")
+        bodies = [("request", operation.get("requestBody", {})), *operation["responses"].items()]
+        for status, body in bodies:
+            for media_type, content in body.get("content", {}).items():
+                examples = [e for e in [content.get("example")] if e is not None]
+                for reference in content.get("examples", {}).values():
+                    name = reference["$ref"].split("/")[-1]
+                    examples.append(contract.document["components"]["examples"][name]["value"])
+                if media_type.endswith("json") and media_type != "model/gltf+json" and not examples:
+                    failures.append(f"{what} {status} {media_type}: no example")
+                for example in examples:
+                    for error in contract.errors(content["schema"], example, exact=False):
+                        failures.append(f"{what} {status}: example: {error}")
+    return failures
+
+
+def main():
+    record = "--record" in sys.argv[1:]
+    document = json.load(open(DOCUMENT))
+    validate(document)
+    contract = Contract(document)
+    names = [operation["operationId"] for _, _, operation in contract.operations()]
+    failures = [f"operationId {name} is not unique" for name in set(names) if names.count(name) > 1]
+    folder = os.environ["SERVICE_DATA"] + "/phantom"
+    program = os.path.join(ROOT, "target", "debug", "ventriform")
+    subprocess.run([program, "phantom", "-o", folder, "--size", "64", "--spacing", "6.4", "--seed", "1"],
+                   check=True, capture_output=True)
+    walk = Walk(contract)
+    everything(walk, folder)
+    failures += walk.failures
+    failures += [f"operation {name} was not tried" for name in names if name not in walk.seen]
+    if record:
+        for status, (code, detail, fix) in RARE.items():
+            title = code.replace("-", " ").capitalize()
+            problem = {"type": f"urn:ventriform:problem:{code}", "title": title, "status": int(status), "detail": detail}
+            walk.recorded["problems"].setdefault(status, {**problem, **({"fix": fix} if fix else {})})
+        walk.recorded["problems"] = dict(sorted(walk.recorded["problems"].items()))
+        walk.recorded["operations"] = dict(sorted(walk.recorded["operations"].items()))
+        with open(EXAMPLES, "w") as file:
+            json.dump(walk.recorded, file, indent=1, ensure_ascii=False)
+            file.write("\n")
+        print(f"wrote {EXAMPLES}; now write the document: UPDATE_OPENAPI=1 cargo test --test api openapi")
+    else:
+        failures += example_failures(contract)
+    print(*failures, sep="\n")
+    print(f"{len(names)} operations, {len(failures)} failures")
+    sys.exit(bool(failures))
+
+
+main()
