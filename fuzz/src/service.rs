@@ -1,0 +1,76 @@
+//! The target that needs the service: forms, sent to it over loopback.
+
+use std::io::{Read as _, Write as _};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::time::Duration;
+use tempfile::TempDir;
+use tokio::runtime::Runtime;
+use ventriform::config::Settings;
+use ventriform::http::{Running, start};
+use ventriform::volume::ReadLimits;
+use ventriform::work::Engine;
+
+/// A running service.
+pub struct Target {
+    address: SocketAddr,
+    _running: Running,
+    _runtime: Runtime,
+    _data: TempDir,
+}
+
+impl Target {
+    /// Starts a service with a folder of its own.
+    pub fn start() -> Self {
+        let data = tempfile::tempdir().unwrap();
+        let runtime = Runtime::new().unwrap();
+        let settings = Settings {
+            data_dir: data.path().to_owned(),
+            body_limit: "1MiB".parse().unwrap(),
+            body_timeout: "1s".parse().unwrap(),
+            ..Settings::default()
+        };
+        let limits = ReadLimits {
+            voxels: 1 << 16,
+            unpacked_bytes: 1 << 20,
+        };
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let running = runtime
+            .block_on(start(settings, Engine::new(limits), listener))
+            .unwrap();
+        Self {
+            address: running.address(),
+            _running: running,
+            _runtime: runtime,
+            _data: data,
+        }
+    }
+
+    /// Sends the bytes as a form. The service answers 2xx, or a problem of the client's.
+    pub fn multipart(&self, data: &[u8]) {
+        let mut stream = TcpStream::connect(self.address).unwrap();
+        stream
+            .set_read_timeout(Some(Duration::from_secs(30)))
+            .unwrap();
+        let head = format!(
+            "POST /v1/volumes HTTP/1.1\r\nhost: {}\r\nconnection: close\r\ncontent-length: {}\r\n\
+             content-type: multipart/form-data; boundary=X\r\n\r\n",
+            self.address,
+            data.len()
+        );
+        stream.write_all(head.as_bytes()).unwrap();
+        // The service may answer and hang up before it has read everything.
+        let _ = stream.write_all(data);
+        let mut answer = Vec::new();
+        let _ = stream.read_to_end(&mut answer);
+        let answer = String::from_utf8_lossy(&answer);
+        let status = answer
+            .strip_prefix("HTTP/1.1 ")
+            .and_then(|rest| rest.get(..3));
+        let status: u16 = status.unwrap_or_default().parse().unwrap_or(0);
+        let problem = answer.contains("urn:ventriform:problem:");
+        assert!(
+            (200..300).contains(&status) || (400..500).contains(&status) && problem,
+            "{answer}"
+        );
+    }
+}
