@@ -16,13 +16,15 @@ COPY README.md ./
 RUN find src -exec touch {} + \
  && cargo build --profile dist --locked --bin ventriform
 
-# Runtime image: the program, one volume, an unprivileged user.
+# Runtime image: the program, its bill of materials, one volume, an unprivileged user.
 FROM debian:bookworm-slim
 LABEL org.opencontainers.image.title="ventriform" \
       org.opencontainers.image.description="Surface models of the left ventricle from cardiac SPECT" \
       org.opencontainers.image.licenses="MIT OR Apache-2.0"
 RUN install -d -o 10001 -g 10001 -m 0750 /data
 COPY --from=build /build/target/dist/ventriform /usr/local/bin/ventriform
+COPY LICENSE-APACHE LICENSE-MIT ventriform.cdx.json /usr/share/doc/ventriform/
+# The service listens beyond loopback, so it asks callers for keys unless VENTRIFORM_ALLOW_ANONYMOUS=true.
 ENV VENTRIFORM_LISTEN=0.0.0.0:8080 \
     VENTRIFORM_DATA_DIR=/data \
     VENTRIFORM_LOG_FORMAT=json

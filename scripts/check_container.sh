@@ -11,9 +11,13 @@ out=$(mktemp -d)
 trap 'docker compose logs --tail 20 >&2 || true; docker compose down -v >/dev/null 2>&1 || true; rm -rf "$out"' EXIT
 url=http://127.0.0.1:8080
 
-docker compose up -d --build --wait
-cargo build --release --quiet
-target/release/ventriform phantom -o "$out" >/dev/null 2>&1
+started=$SECONDS
+docker compose build
+echo "built in $((SECONDS - started)) s"
+docker compose up -d --wait
+# The image's own program makes the scan.
+chmod 0777 "$out"
+docker run --rm -v "$out:/out" ventriform phantom -o /out >/dev/null 2>&1
 # shellcheck disable=SC2086 # IN_ENGINE is a command with its arguments
 ${IN_ENGINE:-} curl -fsS --data-binary @"$out/spect.nii.gz" -H 'Prefer: wait=60' \
   -H 'Accept: model/gltf-binary' "$url/v1/models?points=150" -o "$out/lv.glb"
@@ -29,5 +33,17 @@ id=$(docker compose ps -q ventriform)
 user=$(docker inspect -f '{{.Config.User}}' "$id")
 readonly_root=$(docker inspect -f '{{.HostConfig.ReadonlyRootfs}}' "$id")
 [ "$user" = 10001:10001 ] && [ "$readonly_root" = true ]
+# Nothing but the volume and /tmp can be written.
+docker compose exec -T ventriform sh -c '! touch /usr/local/bin/x 2>/dev/null && touch /data/x && rm /data/x'
+docker compose exec -T ventriform cat /usr/share/doc/ventriform/ventriform.cdx.json | grep -q CycloneDX
+
+# With keys, callers without one are refused, and the container is still healthy.
+key=$(docker compose exec -T ventriform ventriform keys create --name check --scope read 2>/dev/null)
+VENTRIFORM_ALLOW_ANONYMOUS=false docker compose up -d --wait
+# shellcheck disable=SC2086
+code=$(${IN_ENGINE:-} curl -sS -o /dev/null -w '%{http_code}' "$url/v1/models")
+[ "$code" = 401 ] || { echo "without a key: $code"; exit 1; }
+# shellcheck disable=SC2086
+${IN_ENGINE:-} curl -fsS -H "Authorization: Bearer $key" "$url/v1/models" | grep -q mdl_
 docker image ls ventriform
-echo "ok: image built, model made, restarted, non-root, read-only root"
+echo "ok: image built, model made, restarted, non-root, read-only root, keys"

@@ -15,6 +15,7 @@ mod blobs;
 mod canary;
 mod config;
 mod doctor;
+mod documents;
 mod durability;
 mod end_to_end;
 mod events;

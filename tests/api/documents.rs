@@ -1,0 +1,52 @@
+//! Pages of `docs/` that are written from the code.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use ventriform::config::Settings;
+
+/// If set, the test writes the page instead of comparing it.
+const UPDATE: &str = "UPDATE_DOCS";
+
+const BEGIN: &str = "<!-- settings: written by UPDATE_DOCS=1 cargo test --test api operators -->\n";
+const END: &str = "<!-- end of settings -->\n";
+
+/// Every setting as tables, one for each group.
+fn tables() -> String {
+    let mut text = String::new();
+    let mut group = "";
+    for row in Settings::ROWS {
+        if row.group != group {
+            group = row.group;
+            writeln!(
+                text,
+                "\n**{group}**\n\n| setting | default | what |\n|---|---|---|"
+            )
+            .unwrap();
+        }
+        let default = match row.default {
+            "" => String::new(),
+            value => format!("`{value}`"),
+        };
+        let what = row.summary().replace('|', "\\|");
+        writeln!(text, "| `{}` | {default} | {what} |", row.name).unwrap();
+    }
+    text.push('\n');
+    text
+}
+
+#[test]
+fn the_page_for_operators_lists_every_setting() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/operations.md");
+    let page = std::fs::read_to_string(&path).unwrap();
+    let (before, rest) = page.split_once(BEGIN).unwrap();
+    let (_, after) = rest.split_once(END).unwrap();
+    let expected = format!("{before}{BEGIN}{}{END}{after}", tables());
+    if std::env::var_os(UPDATE).is_some() {
+        std::fs::write(&path, expected).unwrap();
+        return;
+    }
+    assert!(
+        page == expected,
+        "docs/operations.md is out of date; write it anew with {UPDATE}=1 cargo test --test api operators"
+    );
+}
