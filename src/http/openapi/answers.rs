@@ -1,7 +1,6 @@
 //! Answers and problems that several handlers share.
 
 use super::bodies::MeshDocument;
-use super::reports::SegmentationReportSchema;
 use crate::export::Format;
 use crate::http::problem::{MEDIA_TYPE, ProblemBody};
 use std::collections::BTreeMap;
@@ -12,6 +11,8 @@ use utoipa::{IntoResponses, PartialSchema, ToSchema};
 
 /// The schema of a job, which the handlers register.
 const JOB: &str = "Job";
+/// The schema of a segmentation's report, which the document's frame registers.
+const SEGMENTATION_REPORT: &str = "SegmentationReport";
 
 type Responses = BTreeMap<String, RefOr<Response>>;
 
@@ -244,7 +245,7 @@ fn reports() -> Contents {
 }
 
 fn report_alone() -> Contents {
-    let report = Ref::from_schema_name(SegmentationReportSchema::name());
+    let report = Ref::from_schema_name(SEGMENTATION_REPORT);
     vec![("application/json", Content::new(Some(report)))]
 }
 
