@@ -1,5 +1,6 @@
 """Compares the published document with what a running service answers.
 
+    export SERVICE_FLAGS='--webhook-allow 127.0.0.1'
     scripts/with_service.sh python scripts/check_contract.py            checks
     scripts/with_service.sh python scripts/check_contract.py --record   writes the examples anew
 
@@ -37,6 +38,9 @@ RARE = {
     "503": ("not-ready", "The service is shutting down.", None),
     "507": ("storage-full", "The disk of the service is full.", "Ask the operator to free or add space."),
 }
+
+# What stands in the examples for the keys and secrets of the recorded service.
+SECRETS = {"key": "vf_0123456789abcdef_KEEP-IT-SECRET", "secret": "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw"}
 
 
 class Contract:
@@ -101,6 +105,7 @@ class Walk:
     def __init__(self, contract):
         self.contract, self.failures, self.seen = contract, [], set()
         self.recorded = {"problems": {}, "operations": {}}
+        self.credentials = {}
 
     def call(self, method, template, *, expect, query="", body=None, headers=None, cut=True, **parameters):
         operation = self.contract.document["paths"][template][method]
@@ -108,7 +113,7 @@ class Walk:
         path = template
         for key, value in parameters.items():
             path = path.replace("{%s}" % key, value)
-        headers = dict(headers or {})
+        headers = {**self.credentials, **(headers or {})}
         own = self.recorded["operations"].setdefault(name, {})
         if parameters:
             own["parameters"] = parameters
@@ -217,6 +222,8 @@ def everything(walk, folder):
     meshes = walk.recorded["operations"]
     meshes["create_template"]["request"] = meshes["get_model_mesh_json"]["200"]
 
+    webhooks(walk, order)
+
     # Problems.
     call("get", "/v1/models/{id}", expect=400, query="?verbose=1", id=model)
     call("get", "/v1/models/{id}/mesh", expect=406, headers={"accept": "image/gif"}, id=model)
@@ -245,6 +252,54 @@ def everything(walk, folder):
     for kind, noun in (("models", "model"), ("volumes", "volume")):
         walk.recorded["operations"][f"get_{noun}"]["parameters"] = {"id": of_kind[kind]}
     walk.recorded["operations"]["get_job"]["parameters"] = {"id": job["id"]}
+    access(walk)
+
+
+def webhooks(walk, order):
+    """A receiver that nobody listens at is registered, told about a job, told again and removed."""
+    call = walk.call
+    # The service must be started with `--webhook-allow 127.0.0.1`.
+    nobody = {"url": "http://127.0.0.1:9/told", "events": ["succeeded"]}
+    _, webhook = call("post", "/v1/webhooks", expect=201, body=nobody)
+    call("get", "/v1/webhooks", expect=200)
+    call("post", "/v1/webhooks/secret", expect=200)
+    job = wait(walk, call("post", "/v1/jobs", expect=202, body={**order, "parameters": {"points": 20}})[1])
+    _, told = call("get", "/v1/jobs/{id}/deliveries", expect=200, id=job["id"])
+    while told["deliveries"][0]["attempts"] == 0:
+        time.sleep(0.05)
+        _, told = call("get", "/v1/jobs/{id}/deliveries", expect=200, id=job["id"])
+    call("post", "/v1/jobs/{id}/deliveries/{delivery}/redeliver", expect=202,
+         id=job["id"], delivery=told["deliveries"][0]["id"])
+    call("delete", "/v1/webhooks/{id}", expect=204, id=webhook["id"])
+
+
+def access(walk):
+    """Keys and the audit trail. Last, because the first key ends the access without one."""
+    call = walk.call
+    _, first = call("post", "/v1/keys", expect=201, body={"name": "contract", "scope": "admin"})
+    walk.credentials = {"authorization": "Bearer " + first["key"]}
+    _, second = call("post", "/v1/keys", expect=201,
+                     body={"name": "scanner 2", "scope": "submit", "requests_per_minute": 600})
+    call("get", "/v1/keys", expect=200)
+    call("get", "/v1/audit", expect=200, query="?limit=6")
+    call("delete", "/v1/keys/{id}", expect=204, id=second["id"])
+    walk.credentials = {"authorization": "Bearer " + second["key"]}
+    call("get", "/v1/volumes", expect=401)
+    # No key stands in a document that everybody reads.
+    hide(walk.recorded["operations"])
+
+
+def hide(value):
+    """Replaces every secret by one that only looks like it."""
+    if isinstance(value, dict):
+        for name, part in value.items():
+            if name in ("key", "secret") and isinstance(part, str):
+                value[name] = SECRETS[name]
+            else:
+                hide(part)
+    elif isinstance(value, list):
+        for part in value:
+            hide(part)
 
 
 def state_of(job):
