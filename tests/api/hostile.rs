@@ -138,6 +138,30 @@ async fn malformed_requests_are_rejected() {
     }
 }
 
+#[tokio::test]
+async fn clients_that_send_a_few_bytes_and_wait_occupy_no_files() {
+    let app = TestApp::start().await;
+    let mut slow = Vec::new();
+    for _ in 0..8 {
+        let mut stream = connect(&app).await;
+        let head = "POST /v1/volumes HTTP/1.1\r\nhost: x\r\ncontent-length: 90000\r\n\r\n";
+        stream.write_all(head.as_bytes()).await.unwrap();
+        stream.write_all(&[b'.'; 4000]).await.unwrap();
+        slow.push(stream);
+    }
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    assert_eq!(app.stored(), [""; 0]);
+    // The rest arrives, and the body is judged as a whole.
+    let mut last = slow.pop().unwrap();
+    last.write_all(&[b'.'; 86_000]).await.unwrap();
+    let answer = tokio::time::timeout(Duration::from_secs(10), async {
+        let mut said = [0; 12];
+        last.read_exact(&mut said).await.unwrap();
+        String::from_utf8_lossy(&said).into_owned()
+    });
+    assert_eq!(answer.await.unwrap(), "HTTP/1.1 422");
+}
+
 /// Sends requests whose answers are many times as large as what the system buffers.
 async fn ask_for_much(app: &TestApp) -> TcpStream {
     let socket = tokio::net::TcpSocket::new_v4().unwrap();

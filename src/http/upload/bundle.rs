@@ -1,23 +1,28 @@
 //! The received files of one volume, before they are published.
 
 use crate::http::app::App;
-use crate::http::problem::{Answer, Problem};
+use crate::http::problem::{Answer, Problem, body};
 use crate::jobs::{
-    BlobError, FileRecord, Hold, StagedFiles, StagedFor, StoredVolume, hex, volume_id,
+    BlobError, BlobStore, BlobWriter, FileRecord, Hold, StagedFiles, StagedFor, StoredVolume, hex,
+    volume_id,
 };
 use crate::progress::Monitor;
 use crate::work::INSPECTION_MEMORY;
 use axum::body::Bytes;
 use futures::{Stream, StreamExt};
 use sha2::{Digest, Sha256};
+use std::sync::Arc;
 use tokio::io::AsyncWriteExt;
 
-/// Bytes gathered for one write.
+/// Bytes gathered for one write. Up to the first one an upload lies in memory alone: thousands of
+/// clients that send a few bytes and then wait cost neither files nor turns of the disk.
 const WRITE_BYTES: usize = 1 << 20;
 
 /// The files of one volume, which are not published yet.
 pub struct Bundle {
-    staged: Box<dyn StagedFiles>,
+    blobs: Arc<dyn BlobStore>,
+    /// Where the files lie; made for the first of them.
+    staged: Option<Box<dyn StagedFiles>>,
     files: Vec<Received>,
 }
 
@@ -46,38 +51,35 @@ impl Received {
     }
 }
 
-/// Writes a stream to a file and hashes it on the way. Publishing forces the file to the disk.
-async fn receive(
-    mut pieces: impl Stream<Item = Answer<Bytes>> + Unpin,
-    staged: &dyn StagedFiles,
-    name: &str,
-) -> Answer<Received> {
-    let mut file = staged.create(name).await?;
-    let mut hash = Sha256::new();
-    let mut waiting = Vec::with_capacity(64 << 10);
-    let mut head = Vec::new();
-    let mut bytes = 0;
-    while let Some(piece) = pieces.next().await {
-        let piece = piece?;
-        hash.update(&piece);
-        bytes += piece.len() as u64;
-        if head.len() < 132 {
-            head.extend_from_slice(&piece[..piece.len().min(132 - head.len())]);
-        }
-        waiting.extend_from_slice(&piece);
-        if waiting.len() >= WRITE_BYTES {
-            file.write_all(&waiting).await.map_err(BlobError::from)?;
-            waiting.clear();
-        }
+/// A file on its way to the disk.
+struct Arriving<'a> {
+    bundle: &'a mut Bundle,
+    name: String,
+    file: Option<BlobWriter>,
+    waiting: Vec<u8>,
+}
+
+impl Arriving<'_> {
+    /// Writes the bytes that wait.
+    async fn flush(&mut self) -> Answer<()> {
+        let file = match &mut self.file {
+            Some(file) => file,
+            none => none.insert(self.bundle.staged().await?.create(&self.name).await?),
+        };
+        file.write_all(&self.waiting)
+            .await
+            .map_err(BlobError::from)?;
+        self.waiting.clear();
+        Ok(())
     }
-    file.write_all(&waiting).await.map_err(BlobError::from)?;
-    file.shutdown().await.map_err(BlobError::from)?;
-    Ok(Received {
-        name: name.to_owned(),
-        kind: kind_by_content(&head),
-        digest: hash.finalize().into(),
-        bytes,
-    })
+
+    async fn end(mut self) -> Answer<()> {
+        self.flush().await?;
+        if let Some(mut file) = self.file {
+            file.shutdown().await.map_err(BlobError::from)?;
+        }
+        Ok(())
+    }
 }
 
 /// The extension that the first bytes of the content imply.
@@ -98,10 +100,19 @@ fn kind_by_name(name: &str) -> Option<&'static str> {
 
 impl Bundle {
     /// An empty bundle.
-    pub async fn new(app: &App) -> Answer<Self> {
-        Ok(Self {
-            staged: app.queue.blobs.stage(StagedFor::Upload).await?,
+    pub fn new(app: &App) -> Self {
+        Self {
+            blobs: app.queue.blobs.clone(),
+            staged: None,
             files: Vec::new(),
+        }
+    }
+
+    /// Where the files lie.
+    async fn staged(&mut self) -> Answer<&mut Box<dyn StagedFiles>> {
+        Ok(match &mut self.staged {
+            Some(staged) => staged,
+            none => none.insert(self.blobs.stage(StagedFor::Upload).await?),
         })
     }
 
@@ -110,17 +121,44 @@ impl Bundle {
         self.files.iter().all(|file| file.bytes == 0)
     }
 
-    /// Adds a file.
+    /// Adds a file: writes the stream to the disk and hashes it on the way. Publishing forces the
+    /// file to the disk.
     ///
     /// # Errors
     /// The problem in the stream, or 500 if the file cannot be written.
     pub async fn write(
         &mut self,
-        pieces: impl Stream<Item = Answer<Bytes>> + Unpin,
+        mut pieces: impl Stream<Item = Answer<Bytes>> + Unpin,
     ) -> Answer<&mut Received> {
         let name = self.files.len().to_string();
-        let file = receive(pieces, &*self.staged, &name).await?;
-        self.files.push(file);
+        let mut arriving = Arriving {
+            bundle: self,
+            name: name.clone(),
+            file: None,
+            waiting: Vec::new(),
+        };
+        let mut hash = Sha256::new();
+        let mut head = Vec::new();
+        let mut bytes = 0;
+        while let Some(piece) = pieces.next().await {
+            let piece = piece?;
+            hash.update(&piece);
+            bytes += piece.len() as u64;
+            if head.len() < 132 {
+                head.extend_from_slice(&piece[..piece.len().min(132 - head.len())]);
+            }
+            arriving.waiting.extend_from_slice(&piece);
+            if arriving.waiting.len() >= WRITE_BYTES {
+                arriving.flush().await?;
+            }
+        }
+        arriving.end().await?;
+        self.files.push(Received {
+            name,
+            kind: kind_by_content(&head),
+            digest: hash.finalize().into(),
+            bytes,
+        });
         let last = self.files.len() - 1;
         Ok(&mut self.files[last])
     }
@@ -143,26 +181,28 @@ impl Bundle {
                 hold,
             });
         }
+        let received = self.files;
+        let staged = self.staged.ok_or_else(body::empty)?;
         let mut files = Vec::with_capacity(records.len());
-        for (file, record) in self.files.iter().zip(&records) {
-            self.staged.rename(&file.name, &record.name).await?;
-            files.push(self.staged.local(&record.name).await?);
+        for (file, record) in received.iter().zip(&records) {
+            staged.rename(&file.name, &record.name).await?;
+            files.push(staged.local(&record.name).await?);
         }
         let reader = app.engine.reader.clone();
         let inspect = move |monitor: &Monitor<'_>| reader.inspect(&files, monitor);
         // The disk and the processor work at the same time.
         let inspected = async { Ok(app.decoding.run(INSPECTION_MEMORY, inspect).await??) };
-        let settled = async { Ok::<(), Problem>(self.staged.settle().await?) };
+        let settled = async { Ok::<(), Problem>(staged.settle().await?) };
         let (facts, ()) = tokio::try_join!(inspected, settled)?;
         let volume = StoredVolume {
             sequence: 0,
             created_at: app.queue.clock.now(),
-            bytes: self.files.iter().map(|f| f.bytes).sum(),
+            bytes: received.iter().map(|f| f.bytes).sum(),
             files: records,
             facts: facts.to_json(),
             id,
         };
-        let (volume, new) = app.queue.add_volume(volume, self.staged).await?;
+        let (volume, new) = app.queue.add_volume(volume, staged).await?;
         Ok(Stored { volume, new, hold })
     }
 

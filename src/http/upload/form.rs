@@ -11,7 +11,6 @@ use axum::body::{Body, Bytes};
 use axum::extract::multipart::Field;
 use axum::extract::{FromRequest, Multipart, Request};
 use futures::{StreamExt, TryStreamExt};
-use std::collections::btree_map::Entry;
 use std::error::Error;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -80,7 +79,7 @@ pub async fn receive(
         let pieces = field
             .inspect_ok(|_| unparsed.reset())
             .map_err(|error| interrupted(&error));
-        let bundle = bundle_of(upload, app, apart, &name).await?;
+        let bundle = bundle_of(upload, app, apart, &name);
         bundle.write(pieces).await?.known_as(&file_name);
     }
     Ok(())
@@ -92,18 +91,18 @@ fn counted(body: Body, unparsed: Unparsed) -> Body {
 }
 
 /// The bundle to which the files of that name belong.
-async fn bundle_of<'a>(
+fn bundle_of<'a>(
     upload: &'a mut Upload,
     app: &App,
     apart: &[&'static str],
     name: &str,
-) -> Answer<&'a mut Bundle> {
-    let Some(own) = apart.iter().find(|own| **own == name) else {
-        return Ok(&mut upload.volume);
-    };
-    match upload.others.entry(own) {
-        Entry::Occupied(bundle) => Ok(bundle.into_mut()),
-        Entry::Vacant(place) => Ok(place.insert(Bundle::new(app).await?)),
+) -> &'a mut Bundle {
+    match apart.iter().find(|own| **own == name) {
+        None => &mut upload.volume,
+        Some(own) => {
+            let others = &mut upload.others;
+            others.entry(own).or_insert_with(|| Bundle::new(app))
+        }
     }
 }
 

@@ -60,7 +60,7 @@ pub async fn receive(app: &App, request: Request, apart: &[&'static str]) -> Ans
         .blobs
         .require_room(announced_length(request.headers()))?;
     let mut upload = Upload {
-        volume: Bundle::new(app).await?,
+        volume: Bundle::new(app),
         others: BTreeMap::new(),
         fields: Vec::new(),
     };
