@@ -226,6 +226,7 @@ def everything(walk, folder):
 
     # Problems.
     call("get", "/v1/models/{id}", expect=400, query="?verbose=1", id=model)
+    call("get", "/v1/models", expect=421, headers={"host": "elsewhere.example"})
     call("get", "/v1/models/{id}/mesh", expect=406, headers={"accept": "image/gif"}, id=model)
     call("get", "/v1/models/{id}/mesh.glb", expect=416, headers={"range": "bytes=999999999-"}, id=model)
     call("post", "/v1/jobs", expect=422, body={"kind": "model", "volume": volume["id"], "parameters": {"points": 3}})
