@@ -187,7 +187,7 @@ class Rounds:
             if status != 200:
                 self.note("lost", f"{volume}: {status}")
                 continue
-            (name,) = os.listdir(f"{self.data}/volumes/{volume}")
+            (name,) = set(os.listdir(f"{self.data}/volumes/{volume}")) - {"record.json"}
             with open(f"{self.data}/volumes/{volume}/{name}", "rb") as file:
                 if hashlib.sha256(file.read()).hexdigest() != self.volumes[volume]:
                     self.note("corrupt", volume)

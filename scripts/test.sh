@@ -4,7 +4,7 @@
 #
 #   scripts/test.sh            everything
 #   scripts/test.sh --quick    without the demo and the external checks (trimesh, vtk, glTF validator,
-#                              pygeodesic, schemathesis, generated clients, licences and SBOM)
+#                              pygeodesic, schemathesis, generated clients, kills, licences and SBOM)
 set -uo pipefail
 cd "$(dirname "$0")/.."
 
@@ -118,12 +118,14 @@ if wait "${running[install]}"; then
   start api scripts/check_api.sh
   start contract env SERVICE_FLAGS='--webhook-allow 127.0.0.1' scripts/with_service.sh "$PYTHON" scripts/check_contract.py
   start clients scripts/check_clients.sh
+  start crashes "$PYTHON" scripts/crash_rounds.py --program target/debug/ventriform --rounds 10
   start dependencies "$PYTHON" scripts/dependencies.py check
   collect formats "formats read by trimesh, vtk and the glTF validator"
   collect geodesics "geodesics against pygeodesic"
   collect api "service tested by schemathesis"
   collect contract "service answers as its document says"
   collect clients "generated Python and TypeScript clients"
+  collect crashes "ten kills at random moments"
   collect dependencies "licences, sources and bill of materials"
 else
   cat "$tools/install.log"
