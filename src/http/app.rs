@@ -74,7 +74,7 @@ impl App {
             engine,
             access,
             guard,
-            decoding: Decoding::new(&settings),
+            decoding: Decoding::new(&settings, watching.metrics.requests.decoding_waits.clone()),
             streams: EventStreams::new(&settings),
             settings,
             hooks,

@@ -20,6 +20,7 @@ use super::problem::{Answer, Problem};
 use crate::config::Settings;
 use crate::progress::{CancelToken, Monitor, Observer, Stage};
 use axum::http::{StatusCode, header};
+use prometheus::Histogram;
 use std::collections::{BTreeMap, VecDeque};
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -37,11 +38,12 @@ pub const LITTLE_MEMORY: u64 = 8 << 20;
 pub struct Decoding {
     admission: Arc<Admission>,
     turns: Arc<Semaphore>,
+    waits: Histogram,
 }
 
 impl Decoding {
-    /// With the operator's limits.
-    pub fn new(settings: &Settings) -> Self {
+    /// With the operator's limits. `waits` takes the time until each piece of work begins, seconds.
+    pub fn new(settings: &Settings, waits: Histogram) -> Self {
         let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
         Self {
             admission: Arc::new(Admission {
@@ -53,6 +55,7 @@ impl Decoding {
                 }),
             }),
             turns: Arc::new(Semaphore::new(cores)),
+            waits,
         }
     }
 
@@ -66,11 +69,13 @@ impl Decoding {
         memory: u64,
         work: impl FnOnce(&Monitor<'_>) -> T + Send + 'static,
     ) -> Answer<T> {
+        let asked = Instant::now();
         let admitted = self
             .admission
             .enter(ClientAddress::current(), memory)
             .await?;
         let turn = self.turns.clone().acquire_owned().await;
+        self.waits.observe(asked.elapsed().as_secs_f64());
         let turns = TurnTaker {
             turns: self.turns.clone(),
             runtime: Handle::current(),
@@ -244,16 +249,18 @@ fn busy() -> Problem {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::http::metrics::Metrics;
     use std::net::IpAddr;
     use std::sync::atomic::{AtomicUsize, Ordering};
     use std::sync::mpsc;
 
     fn decoding(memory: &str, queue: usize) -> Arc<Decoding> {
-        let mut decoding = Decoding::new(&Settings {
+        let settings = Settings {
             decoding_memory: memory.parse().unwrap(),
             decoding_queue: queue,
             ..Settings::default()
-        });
+        };
+        let mut decoding = Decoding::new(&settings, Metrics::new().requests.decoding_waits);
         decoding.turns = Arc::new(Semaphore::new(2));
         Arc::new(decoding)
     }

@@ -10,8 +10,8 @@ use crate::jobs::{QueueFigures, QueueLoad, Timestamp};
 use crate::store::disk_space;
 use prometheus::core::Collector;
 use prometheus::{
-    Encoder, Gauge, HistogramOpts, HistogramVec, IntCounter, IntCounterVec, IntGauge, IntGaugeVec,
-    Opts, Registry, TextEncoder,
+    Encoder, Gauge, Histogram, HistogramOpts, HistogramVec, IntCounter, IntCounterVec, IntGauge,
+    IntGaugeVec, Opts, Registry, TextEncoder,
 };
 use std::path::Path;
 use std::time::Instant;
@@ -54,6 +54,10 @@ pub struct RequestMetrics {
     pub received: IntCounter,
     /// Bytes of bodies that were sent.
     pub sent: IntCounter,
+    /// Open connections.
+    pub connections: IntGauge,
+    /// Time until the decoding of an upload or a preview begins.
+    pub decoding_waits: Histogram,
 }
 
 /// Figures on jobs.
@@ -124,6 +128,11 @@ impl Maker<'_> {
 
     fn gauge(&self, name: &str, help: &str) -> Made<Gauge> {
         self.keep(Gauge::new(name, help))
+    }
+
+    fn histogram(&self, name: &str, help: &str, bounds: &[f64]) -> Made<Histogram> {
+        let options = HistogramOpts::new(name, help).buckets(bounds.to_vec());
+        self.keep(Histogram::with_opts(options))
     }
 
     fn histograms(
@@ -223,6 +232,12 @@ impl RequestMetrics {
             sent: make.counter(
                 "ventriform_http_sent_bytes_total",
                 "Bytes of the bodies of answers.",
+            )?,
+            connections: make.whole("ventriform_http_connections", "Open connections.")?,
+            decoding_waits: make.histogram(
+                "ventriform_decoding_wait_seconds",
+                "Time until the decoding of an upload or a preview begins.",
+                &ANSWER_SECONDS,
             )?,
         })
     }

@@ -151,7 +151,9 @@ pub async fn start(
     if let Some(tls) = &tls {
         tokio::spawn(tls.clone().follow_changes(closing.clone()));
     }
-    let server = connections::serve(listener, router(app.clone()), tls, limits, closing.clone());
+    let open = app.metrics.requests.connections.clone();
+    let router = router(app.clone());
+    let server = connections::serve(listener, router, tls, limits, open, closing.clone());
     let server = tokio::spawn(server);
     let upkeep = Upkeep {
         queue: queue.clone(),

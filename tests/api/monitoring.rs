@@ -56,6 +56,8 @@ async fn jobs_requests_and_the_process_are_counted() {
             1.0,
         ),
         ("ventriform_job_wait_seconds_count{kind=\"model\"}", 3.0),
+        ("ventriform_http_connections ", 1.0),
+        ("ventriform_decoding_wait_seconds_count ", 3.0),
         (
             "ventriform_job_duration_seconds_count{kind=\"model\",state=\"failed\"}",
             1.0,

@@ -29,6 +29,7 @@ use axum::Router;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::{GracefulShutdown, Watcher};
+use prometheus::IntGauge;
 use registry::{Registry, Ticket};
 use requests::RequestService;
 use socket2::{SockRef, TcpKeepalive};
@@ -82,15 +83,17 @@ struct Server {
     halt: CancellationToken,
 }
 
-/// Serves connections until `shutdown`, and returns when all of them have ended.
+/// Serves connections until `shutdown`, and returns when all of them have ended. `open` is kept at
+/// their number.
 pub async fn serve(
     listener: TcpListener,
     router: Router,
     tls: Option<Arc<Tls>>,
     limits: ConnectionLimits,
+    open: IntGauge,
     shutdown: CancellationToken,
 ) {
-    let registry = Registry::new(&limits);
+    let registry = Registry::new(&limits, open);
     let grace = limits.grace;
     let halt = CancellationToken::new();
     let server = Arc::new(Server {

@@ -9,6 +9,7 @@
 
 use super::ConnectionLimits;
 use crate::http::client::ClientAddress;
+use prometheus::IntGauge;
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::IpAddr;
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
@@ -30,6 +31,7 @@ const DESCRIPTORS_KEPT: usize = 4;
 pub struct Registry {
     connections: usize,
     of_one_client: usize,
+    open: IntGauge,
     table: Mutex<Table>,
 }
 
@@ -53,13 +55,15 @@ pub struct Ticket {
 
 impl Drop for Ticket {
     fn drop(&mut self) {
+        self.registry.open.dec();
         self.registry.table().remove(self.number);
     }
 }
 
 impl Registry {
-    /// With these limits, lowered if the system allows fewer file descriptors.
-    pub fn new(limits: &ConnectionLimits) -> Arc<Self> {
+    /// With these limits, lowered if the system allows fewer file descriptors. `open` is kept at the
+    /// number of connections.
+    pub fn new(limits: &ConnectionLimits, open: IntGauge) -> Arc<Self> {
         let connections = match descriptor_limit() {
             Some(descriptors)
                 if limits.connections > descriptors - descriptors / DESCRIPTORS_KEPT =>
@@ -77,6 +81,7 @@ impl Registry {
         Arc::new(Self {
             connections,
             of_one_client: limits.of_one_client,
+            open,
             table: Mutex::default(),
         })
     }
@@ -112,6 +117,7 @@ impl Registry {
                 oldest.closed.cancel();
             }
         }
+        self.open.inc();
         Ticket {
             connection,
             reserve: !room,
@@ -258,14 +264,15 @@ mod tests {
     use super::*;
 
     fn registry(connections: usize, of_one_client: usize) -> Arc<Registry> {
-        Registry::new(&ConnectionLimits {
+        let limits = ConnectionLimits {
             connections,
             of_one_client,
             trusted_proxies: Default::default(),
             head: PATIENCE,
             write: PATIENCE,
             grace: PATIENCE,
-        })
+        };
+        Registry::new(&limits, IntGauge::new("open", "Open connections.").unwrap())
     }
 
     fn peer(n: u8) -> IpAddr {
