@@ -243,8 +243,9 @@ fn read(object: &Map<String, Value>, caller: &Caller) -> Answer<KeyRequest> {
         None | Some(Value::Null) => Ok(None),
         Some(value) => value
             .as_u64()
+            .filter(|number| i64::try_from(*number).is_ok())
             .map(Some)
-            .ok_or_else(|| wrong(field, "Give a whole number from 0.")),
+            .ok_or_else(|| wrong(field, "Give a whole number from 0 to 9223372036854775807.")),
     };
     let scopes = "Give one of read, submit, admin.";
     let scope = text("scope", scopes)?.and_then(|name| name.parse::<Scope>().ok());

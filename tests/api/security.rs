@@ -210,6 +210,10 @@ async fn keys_are_managed_over_http_within_one_tenant() {
             json!({"name": "x", "scope": "read", "stored_bytes": -1}),
             "stored_bytes",
         ),
+        (
+            json!({"name": "x", "scope": "read", "queued_jobs": 1_u64 << 63}),
+            "queued_jobs",
+        ),
         (expires, "expires_at"),
     ] {
         let answer = make(wrong).send().await.unwrap();
