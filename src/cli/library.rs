@@ -1,7 +1,7 @@
 //! `ventriform templates import`: adds models to the library in a service's data folder.
 
 use crate::config::Settings;
-use crate::jobs::{Queue, QueueSettings, SystemClock};
+use crate::jobs::{Queue, QueueSettings, SystemClock, TemplateSource, Tenant};
 use crate::store::Store;
 use crate::volume::ReadLimits;
 use crate::work::Engine;
@@ -66,8 +66,14 @@ async fn add(queue: &Arc<Queue>, engine: &Engine, path: &Path, organ: &str) -> R
         .reader
         .template(&mesh, organ)
         .map_err(|failure| anyhow!("{failure} {}", failure.fix.clone().unwrap_or_default()))?;
-    let (template, _) = queue.add_template(&name(path), organ, output).await?;
-    Ok(template.id)
+    let name = name(path);
+    let source = TemplateSource {
+        tenant: &Tenant::default(),
+        name: &name,
+        volume: None,
+    };
+    let (template, _) = queue.add_template(source, organ, output).await?;
+    Ok(template.item.id)
 }
 
 fn name(path: &Path) -> String {

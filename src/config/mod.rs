@@ -12,7 +12,7 @@ mod units;
 
 pub use units::{
     Auto, AutoSize, Count, Keyword, Limit, LogFormat, MinFree, Networks, NoLimit, Off,
-    OptionalPath, OrKeyword, OtlpEndpoint, Retention, Size, Span, Words,
+    OptionalPath, OrKeyword, OtlpEndpoint, OwnRetention, Retention, Size, Span, Words,
 };
 
 use crate::hooks::AllowList;
@@ -256,10 +256,22 @@ settings! {
     wait_limit: Span = "60s";
     /// Largest number of templates in the library
     template_limit: u32 = "50";
+    /// Largest number of labels of one volume or job
+    label_limit: usize = "16";
 
     ["Retention"]
-    /// Age at which finished jobs, volumes, models and segmentations are deleted; `off` keeps them
+    /// Age at which volumes, results and finished jobs are erased, unless one of the three settings
+    /// below says otherwise; `off` keeps them until somebody erases them
     retention: Retention = "off";
+    /// Age at which volumes are erased, counted from their last upload or use; `off` keeps them,
+    /// `retention` is the value of that setting
+    volume_retention: OwnRetention = "retention";
+    /// Age at which models and segmentations are erased, counted from their last computation;
+    /// `off` keeps them, `retention` is the value of that setting. Templates are kept
+    result_retention: OwnRetention = "retention";
+    /// Age at which the records of finished jobs are erased (not their results); `off` keeps them,
+    /// `retention` is the value of that setting
+    job_retention: OwnRetention = "retention";
 
     ["Connections"]
     /// Largest number of open connections. At the limit, a new connection takes the place of the one
@@ -534,6 +546,7 @@ shown_by_display!(
     Span,
     Size,
     Retention,
+    OwnRetention,
     LogFormat,
     Networks,
     OptionalPath,

@@ -152,6 +152,28 @@ pub type Retention = OrKeyword<Span, Off>;
 /// The address of a collector; `off` is none.
 pub type OtlpEndpoint = OrKeyword<String, Off>;
 
+/// The keyword `retention`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct General;
+
+impl Keyword for General {
+    const WORD: &'static str = "retention";
+    const EXPECTED: &'static str = "`off` or a time such as 12h or 30d";
+}
+
+/// How long things of one kind are kept, or `retention`: as long as things of the other kinds.
+pub type OwnRetention = OrKeyword<Retention, General>;
+
+impl OwnRetention {
+    /// The time, or the general one.
+    pub fn or(self, general: Option<Duration>) -> Option<Duration> {
+        match self.0 {
+            Some(own) => own.0.map(|span| span.0),
+            None => general,
+        }
+    }
+}
+
 impl Count {
     /// The number; `auto` is replaced by the given one, at least 1.
     pub fn or(self, auto: usize) -> usize {

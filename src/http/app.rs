@@ -7,12 +7,23 @@ use super::metrics::Metrics;
 use super::readiness::Readiness;
 use super::spans::Spans;
 use super::streams::EventStreams;
+use super::wire::rfc3339;
 use crate::access::AccessStore;
 use crate::config::Settings;
-use crate::jobs::{FigureStore, Queue};
+use crate::jobs::{FigureStore, Holding, Queue, Resource, RetentionAges};
 use crate::work::Engine;
 use std::sync::Arc;
 use tokio_util::sync::CancellationToken;
+
+/// The ages at which the operator lets things be erased.
+pub fn retention_ages(settings: &Settings) -> RetentionAges {
+    let general = settings.retention.0.map(|span| span.0);
+    RetentionAges {
+        volumes: settings.volume_retention.or(general),
+        results: settings.result_retention.or(general),
+        jobs: settings.job_retention.or(general),
+    }
+}
 
 /// The service's shared state.
 #[derive(Clone)]
@@ -84,6 +95,15 @@ impl App {
             spans: watching.spans,
             readiness: Readiness::default(),
         }))
+    }
+
+    /// When an item of that kind will be erased (RFC 3339); `None` if it is kept.
+    pub fn expires_at(&self, kind: Resource, holding: &Holding) -> Option<String> {
+        if holding.legal_hold.is_some() || holding.source_on_hold {
+            return None;
+        }
+        let ages = retention_ages(&self.settings);
+        ages.expires_at(kind, holding.renewed_at).map(rfc3339)
     }
 }
 

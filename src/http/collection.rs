@@ -5,15 +5,23 @@
 //! [`routes`] serves it under `/v1/{plural}` and `/v1/{plural}/{id}`.
 
 use super::app::App;
-use super::openapi::{Documented, EraseProblems, ListProblems, LookupProblems, PageParameters};
-use super::pagination::{list_query, next_cursor};
+use super::caller::Caller;
+use super::erasures::{self, ReceiptBody};
+use super::openapi::{
+    CachedHeaders, Documented, EraseProblems, ErasureParameters, ListProblems, LookupProblems,
+    PageParameters, TagParameters, UnchangedAnswer,
+};
+use super::pagination::{next_cursor, page_of};
+use super::problem::Answer;
 use super::problem::not_found::missing;
-use super::problem::{Answer, Problem};
 use super::request::{PathSegments, query_pairs, refuse_unknown};
-use crate::jobs::{Catalogue, Deleted, ListPage, ListRequest, Resource, StoreError};
+use super::{tags, validators};
+use crate::jobs::{
+    Catalogue, Held, ListPage, ListRequest, Resource, StoreError, TagFilter, Tenant,
+};
 use axum::Json;
 use axum::extract::{RawQuery, State};
-use axum::http::StatusCode;
+use axum::http::HeaderMap;
 use axum::routing::{delete, get};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
@@ -29,6 +37,9 @@ pub trait Collection: 'static {
     /// The kind: its ids, its noun, its path.
     const RESOURCE: Resource;
 
+    /// Whether a caller may give it names of its own, and search by them.
+    const TAGGED: bool = false;
+
     /// A row of the catalogue.
     type Row: Send;
 
@@ -39,19 +50,22 @@ pub trait Collection: 'static {
     ///
     /// # Errors
     /// If the row holds something that cannot be read.
-    fn body(row: Self::Row) -> Result<Self::Body, StoreError>;
+    fn body(app: &App, row: Held<Self::Row>) -> Result<Self::Body, StoreError>;
 
-    /// The row of that id.
+    /// The tenant's row of that id.
     fn row(
         catalogue: &dyn Catalogue,
+        tenant: &Tenant,
         id: &str,
-    ) -> impl Future<Output = Result<Option<Self::Row>, StoreError>> + Send;
+    ) -> impl Future<Output = Result<Option<Held<Self::Row>>, StoreError>> + Send;
 
-    /// A page of rows, newest first.
+    /// A page of the tenant's rows, newest first.
     fn rows(
         catalogue: &dyn Catalogue,
+        tenant: &Tenant,
+        filter: &TagFilter,
         page: ListRequest,
-    ) -> impl Future<Output = Result<ListPage<Self::Row>, StoreError>> + Send;
+    ) -> impl Future<Output = Result<ListPage<Held<Self::Row>>, StoreError>> + Send;
 }
 
 /// `GET /v1/{plural}`, `GET /v1/{plural}/{id}` and `DELETE /v1/{plural}/{id}`.
@@ -60,7 +74,7 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
     let operation = |method, path: &str, id, summary| {
         Documented::new(method, format!("/v1/{plural}{path}"), plural, id, summary)
     };
-    let listing = operation(
+    let mut listing = operation(
         HttpMethod::Get,
         "",
         format!("list_{plural}"),
@@ -69,6 +83,9 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
     .parameters::<PageParameters>()
     .json::<ListBody<C>>("A page, newest first")
     .answers::<ListProblems>();
+    if C::TAGGED {
+        listing = listing.parameters::<TagParameters>();
+    }
     let lookup = operation(
         HttpMethod::Get,
         "/{id}",
@@ -76,7 +93,9 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
         format!("Show a {noun}"),
     )
     .id(noun)
+    .parameters::<CachedHeaders>()
     .json::<C::Body>(&format!("The {noun}"))
+    .answers::<UnchangedAnswer>()
     .answers::<LookupProblems>();
     let erasure = operation(
         HttpMethod::Delete,
@@ -84,8 +103,14 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
         format!("delete_{noun}"),
         format!("Erase a {noun}"),
     )
-    .description("Refused while an unfinished job needs it.")
+    .description(
+        "Refused while an unfinished job needs it or a legal hold keeps it. Every erasure leaves a \
+         receipt, at the path in `Location`; `Prefer: return=representation` asks for it in the \
+         answer.",
+    )
     .id(noun)
+    .parameters::<ErasureParameters>()
+    .json::<ReceiptBody>("Erased; the receipt")
     .empty_answer("204", "Erased")
     .answers::<EraseProblems>()
     .answers::<LookupProblems>();
@@ -96,63 +121,68 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
     ]
 }
 
-/// The row of that id, or the 404 or 410 that says why there is none.
-pub async fn find<C: Collection>(app: &App, id: &str) -> Answer<C::Row> {
+/// The tenant's row of that id, or the 404 or 410 that says why there is none.
+pub async fn find<C: Collection>(app: &App, tenant: &Tenant, id: &str) -> Answer<Held<C::Row>> {
     let catalogue = &*app.queue.catalogue;
     let found = match Resource::of(id) == Some(C::RESOURCE) {
-        true => C::row(catalogue, id).await?,
+        true => C::row(catalogue, tenant, id).await?,
         false => None,
     };
     match found {
         Some(row) => Ok(row),
-        None => Err(missing(catalogue, C::RESOURCE, id).await),
+        None => Err(missing(catalogue, tenant, C::RESOURCE, id).await),
     }
 }
 
 async fn list<C: Collection>(
     State(app): State<App>,
+    caller: Caller,
     RawQuery(query): RawQuery,
 ) -> Answer<Json<ListBody<C>>> {
-    let (page, []) = list_query(query.as_deref(), [])?;
-    let page = C::rows(&*app.queue.catalogue, page).await?;
+    let pairs = query_pairs(query.as_deref());
+    let (filter, pairs) = match C::TAGGED {
+        true => tags::take_filter(&app, pairs)?,
+        false => (TagFilter::default(), pairs),
+    };
+    let (page, []) = page_of(pairs, [])?;
+    let page = C::rows(&*app.queue.catalogue, &caller.tenant, &filter, page).await?;
     let next_cursor = next_cursor(&page);
     let items = page
         .items
         .into_iter()
-        .map(C::body)
+        .map(|row| C::body(&app, row))
         .collect::<Result<_, _>>()?;
     Ok(Json(ListBody { items, next_cursor }))
 }
 
 async fn show<C: Collection>(
     State(app): State<App>,
+    caller: Caller,
     PathSegments(id): PathSegments<String>,
     RawQuery(query): RawQuery,
-) -> Answer<Json<C::Body>> {
+    headers: HeaderMap,
+) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    Ok(Json(C::body(find::<C>(&app, &id).await?)?))
+    let row = find::<C>(&app, &caller.tenant, &id).await?;
+    validators::json(&headers, &C::body(&app, row)?)
 }
 
 async fn erase<C: Collection>(
     State(app): State<App>,
+    caller: Caller,
     PathSegments(id): PathSegments<String>,
     RawQuery(query): RawQuery,
-) -> Answer<StatusCode> {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let deleted = match Resource::of(&id) == Some(C::RESOURCE) {
-        true => app.queue.erase(&id).await?,
-        false => Deleted::Unknown,
+    headers: HeaderMap,
+) -> Answer {
+    let pairs = query_pairs(query.as_deref());
+    let cascade = match C::RESOURCE {
+        Resource::Volume => erasures::cascade(&pairs)?,
+        _ => {
+            refuse_unknown(&pairs, &[])?;
+            false
+        }
     };
-    match deleted {
-        Deleted::Done => Ok(StatusCode::NO_CONTENT),
-        Deleted::Unknown => Err(missing(&*app.queue.catalogue, C::RESOURCE, &id).await),
-        Deleted::InUse => Err(Problem::new(
-            StatusCode::CONFLICT,
-            "in-use",
-            format!("An unfinished job needs this {}.", C::RESOURCE.noun()),
-        )
-        .fix("Wait for the job to end, or DELETE it; GET /v1/jobs lists the jobs.")),
-    }
+    erasures::erase(&app, &caller, C::RESOURCE, id, cascade, &headers).await
 }
 
 /// A page of things: `{"models": [...], "next_cursor": "..."}`.

@@ -4,10 +4,10 @@
 use super::app::App;
 use super::problem::{Answer, Problem};
 use super::wire::path_of;
-use crate::jobs::{Product, ProductFile, hex};
+use crate::jobs::{FileRecord, Product, ProductFile, hex};
 use axum::body::{Body, Bytes};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
-use axum::response::IntoResponse;
+use axum::response::{IntoResponse, Response};
 use sha2::{Digest, Sha256};
 use std::ops::Range;
 
@@ -20,17 +20,44 @@ const CACHE_CONTROL: &str = "private, max-age=31536000, immutable";
 /// A later version of the program may draw a page differently.
 const PAGE_CACHE_CONTROL: &str = "private, max-age=86400";
 
+/// A file to be sent.
+pub struct Download<'a> {
+    /// The id of its item.
+    pub id: &'a str,
+    /// Its name, length and SHA-256.
+    pub record: FileRecord,
+    /// Its own path.
+    pub path: String,
+    /// Its media type.
+    pub media_type: &'a str,
+    /// Whether a browser saves it instead of showing it.
+    pub attached: bool,
+}
+
+impl<'a> Download<'a> {
+    fn of(product: &'a Product, file: &'a ProductFile) -> Self {
+        Self {
+            id: &product.id,
+            record: file.record(),
+            path: path(product, file),
+            media_type: &file.media_type,
+            attached: false,
+        }
+    }
+}
+
 /// Answers with a product's file, or the part of it that `Range` asks for, or 304.
 pub async fn send(app: &App, product: &Product, file: &ProductFile, headers: &HeaderMap) -> Answer {
+    send_file(app, &Download::of(product, file), headers).await
+}
+
+/// Answers with a stored file, or the part of it that `Range` asks for, or 304.
+pub async fn send_file(app: &App, file: &Download<'_>, headers: &HeaderMap) -> Answer {
     let read = async |span| {
-        let content = app
-            .queue
-            .blobs
-            .read(&product.id, &file.record(), span)
-            .await?;
+        let content = app.queue.blobs.read(file.id, &file.record, span).await?;
         Ok(Body::from_stream(content))
     };
-    respond(product, file, headers, CACHE_CONTROL, read).await
+    respond(file, headers, CACHE_CONTROL, read).await
 }
 
 /// Answers with the page of a product in the same way.
@@ -45,47 +72,47 @@ pub async fn send_page(product: &Product, page: String, headers: &HeaderMap) -> 
     // The range lies within the page, whose length is a `usize`.
     let read =
         async |span: Range<u64>| Ok(page.slice(span.start as usize..span.end as usize).into());
-    respond(product, &file, headers, PAGE_CACHE_CONTROL, read).await
+    let download = Download::of(product, &file);
+    respond(&download, headers, PAGE_CACHE_CONTROL, read).await
 }
 
 /// Answers with the range of `file` that `read` returns.
 async fn respond(
-    product: &Product,
-    file: &ProductFile,
+    file: &Download<'_>,
     headers: &HeaderMap,
     cache_control: &str,
     read: impl AsyncFnOnce(Range<u64>) -> Answer<Body>,
 ) -> Answer {
-    let etag = format!("\"{}\"", file.sha256);
-    if matches_any(headers, &header::IF_NONE_MATCH, &etag) {
-        return Ok((
-            StatusCode::NOT_MODIFIED,
-            [
-                (header::ETAG, etag),
-                (header::CACHE_CONTROL, cache_control.into()),
-            ],
-        )
-            .into_response());
+    let etag = format!("\"{}\"", file.record.sha256);
+    if let Some(unchanged) = not_modified(headers, &etag, cache_control) {
+        return Ok(unchanged);
     }
-    let range = wanted_range(headers, &etag, file.bytes)?;
+    let range = wanted_range(headers, &etag, file.record.bytes)?;
     let (status, span) = match &range {
         Some(range) => (StatusCode::PARTIAL_CONTENT, range.clone()),
-        None => (StatusCode::OK, 0..file.bytes),
+        None => (StatusCode::OK, 0..file.record.bytes),
     };
     let length = span.end - span.start;
+    let disposition = match file.attached {
+        true => "attachment",
+        false => "inline",
+    };
     let content = read(span.clone()).await?;
     let mut response = (
         status,
         [
-            (header::CONTENT_TYPE, file.media_type.clone()),
+            (header::CONTENT_TYPE, file.media_type.to_owned()),
             (header::CONTENT_LENGTH, length.to_string()),
             (header::ETAG, etag),
             (header::CACHE_CONTROL, cache_control.into()),
             (header::ACCEPT_RANGES, "bytes".into()),
-            (header::CONTENT_LOCATION, path(product, file)),
+            (header::CONTENT_LOCATION, file.path.clone()),
             (
                 header::CONTENT_DISPOSITION,
-                format!("inline; filename=\"{}-{}\"", product.id, file.name),
+                format!(
+                    "{disposition}; filename=\"{}-{}\"",
+                    file.id, file.record.name
+                ),
             ),
         ],
         content,
@@ -96,7 +123,7 @@ async fn respond(
             "bytes {}-{}/{}",
             span.start,
             span.end - 1,
-            file.bytes
+            file.record.bytes
         ))
     {
         response.headers_mut().insert(header::CONTENT_RANGE, value);
@@ -107,6 +134,17 @@ async fn respond(
 /// The path of a product's file.
 pub fn path(product: &Product, file: &ProductFile) -> String {
     format!("{}/{}", path_of(&product.id), file.name)
+}
+
+/// 304 if `If-None-Match` names that validator.
+pub fn not_modified(headers: &HeaderMap, etag: &str, cache_control: &str) -> Option<Response> {
+    matches_any(headers, &header::IF_NONE_MATCH, etag).then(|| {
+        let answer = [
+            (header::ETAG, etag.to_owned()),
+            (header::CACHE_CONTROL, cache_control.to_owned()),
+        ];
+        (StatusCode::NOT_MODIFIED, answer).into_response()
+    })
 }
 
 /// Whether a list of entity tags in the header `name` has `etag`, compared weakly.

@@ -1,7 +1,7 @@
 //! `Idempotency-Key` (draft-ietf-httpapi-idempotency-key-header-07).
 
 use super::problem::{Answer, Problem};
-use crate::jobs::{Idempotency, JobWebhook, content_id};
+use crate::jobs::{Idempotency, JobWebhook, Tags, content_id};
 use axum::http::{HeaderMap, HeaderName};
 use serde_json::{Map, Value, json};
 
@@ -33,12 +33,17 @@ pub fn promise(
     kind: &str,
     volume: &str,
     parameters: &Map<String, Value>,
+    tags: &Tags,
     webhook: Option<&JobWebhook>,
 ) -> Option<Idempotency> {
     let parameters = Value::Object(parameters.clone()).to_string();
+    // What a request does not give is not hashed, so that its fingerprint stays as older versions
+    // stored it. A webhook is a JSON object, names are a JSON array: no request is like another.
     let webhook = webhook.map(|webhook| json!(webhook).to_string());
-    let parts = [kind, volume, &parameters];
-    let parts = parts.into_iter().chain(webhook.as_deref());
+    let names = (*tags != Tags::default()).then(|| json!([tags.external_id, tags.labels]));
+    let names = names.map(|names| names.to_string());
+    let parts = [kind, volume, &parameters].into_iter();
+    let parts = parts.chain(webhook.as_deref()).chain(names.as_deref());
     Some(Idempotency {
         key: key?,
         fingerprint: content_id("", parts.map(str::as_bytes)),

@@ -9,8 +9,9 @@
 //! | the paths, the layers around them | [`router`] |
 //! | uploads, jobs, results | [`volumes`], [`jobs`], [`models`], [`segmentations`], [`templates`] |
 //! | webhooks and what became of their deliveries | [`webhooks`], [`given_webhook`], [`hooks`] |
-//! | what several of them share | [`collection`] (list, show, erase), [`products`] (meshes, reports, files), [`files`] (ranges, validators) |
+//! | what several of them share | [`collection`] (list, show, erase), [`products`] (meshes, reports, files), [`files`] (ranges, validators), [`validators`] (of JSON) |
 //! | who may do what, and the record of it | [`guard`] (before every handler), [`caller`], [`keys`], [`audit`] |
+//! | a tenant's names for its things, legal holds, receipts of erasures | [`tags`], [`legal_hold`], [`erasures`] |
 //! | errors and their wording | [`problem`]; 404 and 410 in [`problem::not_found`] |
 //! | limits on bodies, connections and decoding | [`limits`], [`connections`], [`decoding`] |
 //! | the address that sent a request | [`client`] |
@@ -35,6 +36,7 @@ mod connections;
 mod cryptography;
 mod decoding;
 mod document;
+mod erasures;
 mod files;
 mod front_page;
 mod given_webhook;
@@ -45,12 +47,14 @@ mod idempotency;
 mod job_watch;
 mod jobs;
 mod keys;
+mod legal_hold;
 mod limits;
 mod metrics;
 mod models;
 mod negotiate;
 mod observe;
 mod openapi;
+mod originals;
 mod pagination;
 mod problem;
 mod products;
@@ -61,8 +65,10 @@ mod segmentations;
 mod server;
 mod spans;
 mod streams;
+mod tags;
 mod templates;
 mod upload;
+mod validators;
 mod volumes;
 mod webhooks;
 mod wire;

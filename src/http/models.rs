@@ -1,6 +1,7 @@
 //! `/v1/models`: surface models, and the request that uploads a volume and makes its model.
 
 use super::app::App;
+use super::caller::Caller;
 use super::files;
 use super::jobs::filing::{self, UploadJob};
 use super::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
@@ -79,11 +80,12 @@ impl ModelLinks {
         (Vec<u8> = "application/nifti"),
         (openapi::UploadForm = "multipart/form-data"),
     )),
-    params(openapi::ModelQuery, openapi::IdempotencyHeader, openapi::PreferHeader,
-        openapi::WebhookInputs),
+    params(openapi::ModelQuery, openapi::TagParameters, openapi::IdempotencyHeader,
+        openapi::PreferHeader, openapi::WebhookInputs),
     responses(openapi::MeshAnswer, WaitAnswers, FileProblems, UploadProblems))]
 pub async fn create_model(
     State(app): State<App>,
+    caller: Caller,
     RawQuery(query): RawQuery,
     request: Request,
 ) -> Answer {
@@ -92,5 +94,5 @@ pub async fn create_model(
         apart: &[],
         offers: Offer::meshes(),
     };
-    filing::file_upload(&app, job, query.as_deref(), request).await
+    filing::file_upload(&app, &caller, job, query.as_deref(), request).await
 }

@@ -92,6 +92,20 @@ pub fn preferred_wait(headers: &HeaderMap) -> Option<Duration> {
         })
 }
 
+/// Whether `Prefer: return=representation` asks for a body (RFC 7240, section 4.2).
+pub fn prefers_representation(headers: &HeaderMap) -> bool {
+    headers
+        .get_all("prefer")
+        .iter()
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split([',', ';']))
+        .filter_map(|preference| preference.split_once('='))
+        .any(|(name, value)| {
+            name.trim().eq_ignore_ascii_case("return")
+                && value.trim().trim_matches('"') == "representation"
+        })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

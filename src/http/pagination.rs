@@ -14,7 +14,14 @@ pub fn list_query<const N: usize>(
     query: Option<&str>,
     own: [&'static str; N],
 ) -> Answer<(ListRequest, [Option<String>; N])> {
-    let pairs = query_pairs(query);
+    page_of(query_pairs(query), own)
+}
+
+/// As [`list_query`], of the pairs of the query.
+pub fn page_of<const N: usize>(
+    pairs: Vec<(String, String)>,
+    own: [&'static str; N],
+) -> Answer<(ListRequest, [Option<String>; N])> {
     let known: Vec<&str> = ["limit", "cursor"].into_iter().chain(own).collect();
     refuse_unknown(&pairs, &known)?;
     let value = |name: &str| {

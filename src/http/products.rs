@@ -4,6 +4,7 @@
 //! [`routes`] serves them under `/v1/{plural}/{id}/mesh`, `.../report` and `.../{file}`.
 
 use super::app::App;
+use super::caller::Caller;
 use super::collection::{Collection, find};
 use super::decoding::LITTLE_MEMORY;
 use super::files;
@@ -15,7 +16,9 @@ use super::problem::Answer;
 use super::problem::not_found::{missing, no_such_file};
 use super::request::{PathSegments, query_pairs, refuse_unknown};
 use crate::export::Format;
-use crate::jobs::{Catalogue, ListPage, ListRequest, Product, Resource, StoreError};
+use crate::jobs::{
+    Catalogue, Held, ListPage, ListRequest, Product, Resource, StoreError, TagFilter, Tenant,
+};
 use crate::progress::Monitor;
 use axum::extract::{RawQuery, State};
 use axum::http::{HeaderMap, HeaderValue, header};
@@ -35,7 +38,7 @@ pub trait ProductCollection: 'static {
     const RESOURCE: Resource;
 
     /// The product as JSON.
-    type Body: From<Product> + Serialize + ToSchema + Send;
+    type Body: From<Presented> + Serialize + ToSchema + Send;
 
     /// The names of the files it may have beside the mesh in every format.
     const FILES: &'static [&'static str];
@@ -55,19 +58,43 @@ impl<P: ProductCollection> Collection for P {
     type Row = Product;
     type Body = P::Body;
 
-    async fn row(catalogue: &dyn Catalogue, id: &str) -> Result<Option<Product>, StoreError> {
-        catalogue.product(id).await
+    async fn row(
+        catalogue: &dyn Catalogue,
+        tenant: &Tenant,
+        id: &str,
+    ) -> Result<Option<Held<Product>>, StoreError> {
+        catalogue.product(tenant, id).await
     }
 
-    fn body(product: Product) -> Result<P::Body, StoreError> {
-        Ok(product.into())
+    fn body(app: &App, product: Held<Product>) -> Result<P::Body, StoreError> {
+        Ok(Presented::of(app, product).into())
     }
 
     async fn rows(
         catalogue: &dyn Catalogue,
+        tenant: &Tenant,
+        filter: &TagFilter,
         page: ListRequest,
-    ) -> Result<ListPage<Product>, StoreError> {
-        catalogue.products(P::RESOURCE, page).await
+    ) -> Result<ListPage<Held<Product>>, StoreError> {
+        catalogue.products(tenant, P::RESOURCE, filter, page).await
+    }
+}
+
+/// A product and when it will be erased.
+pub struct Presented {
+    /// The product.
+    pub product: Product,
+    /// When it will be erased (RFC 3339); `None` if it is kept.
+    pub expires_at: Option<String>,
+}
+
+impl Presented {
+    /// A product as its tenant has it.
+    pub fn of(app: &App, held: Held<Product>) -> Self {
+        Self {
+            expires_at: app.expires_at(held.item.resource(), &held.holding),
+            product: held.item,
+        }
     }
 }
 
@@ -193,6 +220,9 @@ macro_rules! body_of_product {
             /// When it was made (RFC 3339).
             #[schema(format = DateTime)]
             created_at: String,
+            /// When it will be erased unless it is computed again (RFC 3339); absent if it is kept.
+            #[schema(format = DateTime)]
+            expires_at: Option<String>,
             /// The volume it was made of.
             volume: String,
             /// The parameters used, including every default.
@@ -209,9 +239,11 @@ macro_rules! body_of_product {
             links: $links,
         }
 
-        impl From<$crate::jobs::Product> for $name {
-            fn from(product: $crate::jobs::Product) -> Self {
+        impl From<$crate::http::products::Presented> for $name {
+            fn from(presented: $crate::http::products::Presented) -> Self {
+                let product = presented.product;
                 Self {
+                    expires_at: presented.expires_at,
                     created_at: $crate::http::wire::rfc3339(product.created_at),
                     volume: product.volume.clone().unwrap_or_default(),
                     software: $crate::http::products::SoftwareBody::of(&product),
@@ -270,14 +302,14 @@ pub fn choose<'a>(headers: &HeaderMap, offers: &'a [Offer]) -> Answer<&'a Offer>
     Ok(&offers[negotiate::require_offer(headers, &types)?])
 }
 
-/// The product of that id, or the 404 or 410 that says why there is none.
-pub async fn find_any(app: &App, id: &str) -> Answer<Product> {
+/// The tenant's product of that id, or the 404 or 410 that says why there is none.
+pub async fn find_any(app: &App, tenant: &Tenant, id: &str) -> Answer<Product> {
     let catalogue = &*app.queue.catalogue;
-    match catalogue.product(id).await? {
-        Some(product) => Ok(product),
+    match catalogue.product(tenant, id).await? {
+        Some(product) => Ok(product.item),
         None => {
             let resource = Resource::of(id).unwrap_or(Resource::Model);
-            Err(missing(catalogue, resource, id).await)
+            Err(missing(catalogue, tenant, resource, id).await)
         }
     }
 }
@@ -295,32 +327,35 @@ pub async fn send(app: &App, product: &Product, offer: &Offer, headers: &HeaderM
 
 async fn get_mesh<P: ProductCollection>(
     state: State<App>,
+    caller: Caller,
     id: PathSegments<String>,
     query: RawQuery,
     headers: HeaderMap,
 ) -> Answer {
-    get_offered::<P>(state, id, query, headers, &Offer::meshes()).await
+    get_offered::<P>(state, caller, id, query, headers, &Offer::meshes()).await
 }
 
 async fn get_report<P: ProductCollection>(
     state: State<App>,
+    caller: Caller,
     id: PathSegments<String>,
     query: RawQuery,
     headers: HeaderMap,
 ) -> Answer {
-    get_offered::<P>(state, id, query, headers, &Offer::reports()).await
+    get_offered::<P>(state, caller, id, query, headers, &Offer::reports()).await
 }
 
 /// The file among `offers` that `Accept` rates highest.
 async fn get_offered<P: ProductCollection>(
     State(app): State<App>,
+    caller: Caller,
     PathSegments(id): PathSegments<String>,
     RawQuery(query): RawQuery,
     headers: HeaderMap,
     offers: &[Offer],
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let product = find::<P>(&app, &id).await?;
+    let product = find::<P>(&app, &caller.tenant, &id).await?.item;
     let mut response = send(&app, &product, choose(&headers, offers)?, &headers).await?;
     response
         .headers_mut()
@@ -330,6 +365,7 @@ async fn get_offered<P: ProductCollection>(
 
 async fn get_file<P: ProductCollection>(
     State(app): State<App>,
+    caller: Caller,
     PathSegments((id, name)): PathSegments<(String, String)>,
     RawQuery(query): RawQuery,
     headers: HeaderMap,
@@ -339,7 +375,7 @@ async fn get_file<P: ProductCollection>(
     if !names.contains(&name) {
         return Err(no_such_file(P::RESOURCE, &name, &names));
     }
-    let product = find::<P>(&app, &id).await?;
+    let product = find::<P>(&app, &caller.tenant, &id).await?.item;
     send_named(&app, &product, &name, &headers).await
 }
 

@@ -94,10 +94,15 @@ pub fn refuse_content_encoding(headers: &HeaderMap) -> Answer<()> {
 /// # Errors
 /// 400 broken off, 408 too slow, 413 too large, 415 of another type or encoding.
 pub async fn json_bytes(request: Request) -> Answer<Bytes> {
+    bytes_of(request, &["application/json"]).await
+}
+
+async fn bytes_of(request: Request, types: &[&str]) -> Answer<Bytes> {
     refuse_content_encoding(request.headers())?;
     match media_type(request.headers()).as_deref() {
-        None | Some("application/json") => {}
-        Some(other) => return Err(body::unsupported_type(other, "application/json")),
+        None => {}
+        Some(known) if types.contains(&known) => {}
+        Some(other) => return Err(body::unsupported_type(other, types[0])),
     }
     let limits = BodyLimits::of(&request)?;
     axum::body::to_bytes(request.into_body(), limits.size.as_usize())
@@ -110,8 +115,20 @@ pub async fn json_bytes(request: Request) -> Answer<Bytes> {
 /// # Errors
 /// As [`json_bytes`], and 400 if the body is not one JSON object.
 pub async fn json_object(request: Request) -> Answer<Map<String, Value>> {
-    let bytes = json_bytes(request).await?;
-    match serde_json::from_slice(&bytes) {
+    object(&json_bytes(request).await?)
+}
+
+/// The JSON merge patch (RFC 7396) in a request's body.
+///
+/// # Errors
+/// As [`json_object`].
+pub async fn merge_patch(request: Request) -> Answer<Map<String, Value>> {
+    let types = ["application/merge-patch+json", "application/json"];
+    object(&bytes_of(request, &types).await?)
+}
+
+fn object(bytes: &[u8]) -> Answer<Map<String, Value>> {
+    match serde_json::from_slice(bytes) {
         Ok(Value::Object(object)) => Ok(object),
         Ok(_) => Err(body::malformed_json("it is another JSON value")),
         Err(error) => Err(body::malformed_json(&error.to_string())),

@@ -13,8 +13,8 @@ use super::segmentations::Segmentations;
 use super::templates::{MESH_SIZE, Templates};
 use super::volumes::Volumes;
 use super::{
-    audit, collection, front_page, given_webhook, health, idempotency, jobs, keys, models,
-    products, segmentations, templates, volumes, webhooks,
+    audit, collection, erasures, front_page, given_webhook, health, idempotency, jobs, keys,
+    legal_hold, models, originals, products, segmentations, templates, volumes, webhooks,
 };
 use crate::config::Settings;
 use axum::Router;
@@ -47,15 +47,23 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         products::routes::<Segmentations>(),
         products::routes::<Templates>(),
     ];
-    let of_one_kind: [UtoipaMethodRouter<App>; 20] = [
+    let of_one_kind: [UtoipaMethodRouter<App>; 28] = [
         routes!(volumes::create_volume).layer(upload()),
         routes!(volumes::preview_volume),
+        routes!(volumes::update_volume).layer(json(settings.json_limit)),
+        routes!(originals::download_volume),
+        routes!(originals::download_volume_file),
+        routes!(legal_hold::hold_volume).layer(json(settings.json_limit)),
+        routes!(legal_hold::release_volume),
+        routes!(erasures::list_erasures),
+        routes!(erasures::get_erasure),
         routes!(models::create_model).layer(upload()),
         routes!(segmentations::create_segmentation).layer(upload()),
         routes!(templates::create_template).layer(json(MESH_SIZE)),
         routes!(jobs::create_job).layer(json(settings.json_limit)),
         routes!(jobs::list_jobs),
         routes!(jobs::get_job, jobs::delete_job),
+        routes!(jobs::update_job).layer(json(settings.json_limit)),
         routes!(jobs::events::follow_job),
         routes!(keys::create_key, keys::list_keys).layer(json(settings.json_limit)),
         routes!(keys::revoke_key),

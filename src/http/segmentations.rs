@@ -2,6 +2,7 @@
 //! a model to it.
 
 use super::app::App;
+use super::caller::Caller;
 use super::files;
 use super::jobs::filing::{self, UploadJob};
 use super::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
@@ -118,11 +119,12 @@ fn offers() -> Vec<Offer> {
         (Vec<u8> = "application/nifti"),
         (openapi::SegmentationForm = "multipart/form-data"),
     )),
-    params(openapi::SegmentationQuery, openapi::IdempotencyHeader, openapi::PreferHeader,
-        openapi::WebhookInputs),
+    params(openapi::SegmentationQuery, openapi::TagParameters, openapi::IdempotencyHeader,
+        openapi::PreferHeader, openapi::WebhookInputs),
     responses(openapi::SegmentationAnswer, WaitAnswers, FileProblems, UploadProblems))]
 pub async fn create_segmentation(
     State(app): State<App>,
+    caller: Caller,
     RawQuery(query): RawQuery,
     request: Request,
 ) -> Answer {
@@ -131,5 +133,5 @@ pub async fn create_segmentation(
         apart: &["expert"],
         offers: offers(),
     };
-    filing::file_upload(&app, job, query.as_deref(), request).await
+    filing::file_upload(&app, &caller, job, query.as_deref(), request).await
 }

@@ -1,6 +1,6 @@
 //! Starting the service from its settings, and shutting it down.
 
-use super::app::{App, Watching};
+use super::app::{App, Watching, retention_ages};
 use super::connections::tls::{Tls, TlsError};
 use super::connections::{self, ConnectionLimits};
 use super::cryptography::install_cryptography;
@@ -157,7 +157,7 @@ pub async fn start(
     let server = tokio::spawn(server);
     let upkeep = Upkeep {
         queue: queue.clone(),
-        retention: settings.retention.0.map(|span| span.0),
+        retention: retention_ages(&settings),
         every: UPKEEP_EVERY,
     };
     tokio::spawn(upkeep.run(closing.clone()));

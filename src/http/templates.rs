@@ -1,15 +1,16 @@
 //! `/v1/templates`: the library of models that `model=auto` chooses from.
 
 use super::app::App;
+use super::caller::Caller;
 use super::decoding::LITTLE_MEMORY;
 use super::openapi::{self, UploadProblems};
 use super::problem::not_found::field_names_nothing;
 use super::problem::{Answer, Problem, ProblemBody};
-use super::products::{DownloadBody, ProductCollection, SoftwareBody};
+use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
 use super::request::{json_bytes, query_pairs, refuse_unknown};
 use super::wire::{path_of, rfc3339};
 use crate::config::Size;
-use crate::jobs::{ListRequest, Product, Resource};
+use crate::jobs::{ListRequest, Resource, TagFilter, TemplateSource, Tenant};
 use crate::progress::Monitor;
 use axum::Json;
 use axum::body::Bytes;
@@ -79,8 +80,9 @@ struct TemplateLinks {
     mesh: String,
 }
 
-impl From<Product> for TemplateBody {
-    fn from(product: Product) -> Self {
+impl From<Presented> for TemplateBody {
+    fn from(presented: Presented) -> Self {
+        let product = presented.product;
         let itself = path_of(&product.id);
         let text = |key: &str| {
             let value = product.parameters.get(key).and_then(Value::as_str);
@@ -121,6 +123,7 @@ impl From<Product> for TemplateBody {
     ))]
 pub async fn create_template(
     State(app): State<App>,
+    caller: Caller,
     RawQuery(query): RawQuery,
     request: Request,
 ) -> Answer {
@@ -133,28 +136,41 @@ pub async fn create_template(
     let organ = value("organ").unwrap_or("left_ventricle").to_owned();
     let name = value("name").or(value("model")).unwrap_or("template");
     check_name(name)?;
-    refuse_when_full(&app).await?;
-    let mesh = given_mesh(&app, value("model"), json_bytes(request).await?).await?;
+    let tenant = &caller.tenant;
+    refuse_when_full(&app, tenant).await?;
+    let body = json_bytes(request).await?;
+    let (mesh, volume) = given_mesh(&app, tenant, value("model"), body).await?;
     let reader = app.engine.reader.clone();
     let shows = organ.clone();
     let memory = LITTLE_MEMORY + MEMORY_PER_BYTE * mesh.len() as u64;
     let make = move |_: &Monitor<'_>| reader.template(&mesh, &shows);
     let output = app.decoding.run(memory, make).await??;
-    let (template, new) = app.queue.add_template(name, &organ, output).await?;
+    let source = TemplateSource {
+        tenant,
+        name,
+        volume: volume.as_deref(),
+    };
+    let (template, new) = app.queue.add_template(source, &organ, output).await?;
     let status = if new {
         StatusCode::CREATED
     } else {
         StatusCode::OK
     };
     let location = [(header::LOCATION, path_of(&template.id))];
-    Ok((status, location, Json(TemplateBody::from(template))).into_response())
+    let body = Json(TemplateBody::from(Presented::of(&app, template)));
+    Ok((status, location, body).into_response())
 }
 
-/// The mesh to be added: the body, or that of the stored `model`.
-async fn given_mesh(app: &App, model: Option<&str>, body: Bytes) -> Answer<Bytes> {
+/// The mesh to be added: the body, or that of the stored `model`, with the id of its volume.
+async fn given_mesh(
+    app: &App,
+    tenant: &Tenant,
+    model: Option<&str>,
+    body: Bytes,
+) -> Answer<(Bytes, Option<String>)> {
     match model {
-        None => Ok(body),
-        Some(id) if body.is_empty() => stored_mesh(app, id).await,
+        None => Ok((body, None)),
+        Some(id) if body.is_empty() => stored_mesh(app, tenant, id).await,
         Some(_) => Err(Problem::bad_request(
             "contradiction",
             "The request has both a body and `model`.",
@@ -176,7 +192,7 @@ fn check_name(name: &str) -> Answer<()> {
     .fix("Give a short name such as t1_150."))
 }
 
-async fn refuse_when_full(app: &App) -> Answer<()> {
+async fn refuse_when_full(app: &App, tenant: &Tenant) -> Answer<()> {
     let limit = app.settings.template_limit;
     let page = ListRequest {
         before: None,
@@ -185,7 +201,7 @@ async fn refuse_when_full(app: &App) -> Answer<()> {
     let page = app
         .queue
         .catalogue
-        .products(Resource::Template, page)
+        .products(tenant, Resource::Template, &TagFilter::default(), page)
         .await?;
     if page.items.len() < limit as usize {
         return Ok(());
@@ -198,15 +214,15 @@ async fn refuse_when_full(app: &App) -> Answer<()> {
     .fix("DELETE a template first, or ask the operator to raise `template_limit`."))
 }
 
-/// The JSON mesh of a stored model or segmentation.
-async fn stored_mesh(app: &App, id: &str) -> Answer<Bytes> {
+/// The JSON mesh of a stored model or segmentation, with the id of its volume.
+async fn stored_mesh(app: &App, tenant: &Tenant, id: &str) -> Answer<(Bytes, Option<String>)> {
     let catalogue = &*app.queue.catalogue;
     let product = match Resource::of(id) {
-        Some(Resource::Model | Resource::Segmentation) => catalogue.product(id).await?,
+        Some(Resource::Model | Resource::Segmentation) => catalogue.product(tenant, id).await?,
         _ => None,
     };
     let Some(product) = product else {
-        return Err(field_names_nothing(catalogue, "model", id).await?);
+        return Err(field_names_nothing(catalogue, tenant, "model", id).await?);
     };
     match product.file("mesh.json") {
         Some(file) if file.bytes <= MESH_SIZE.0 => {
@@ -216,7 +232,7 @@ async fn stored_mesh(app: &App, id: &str) -> Answer<Bytes> {
                 .read(id, &file.record(), 0..file.bytes)
                 .await?;
             let pieces: Vec<Bytes> = pieces.try_collect().await?;
-            Ok(pieces.concat().into())
+            Ok((pieces.concat().into(), product.volume.clone()))
         }
         _ => Err(Problem::invalid_field(
             "model",

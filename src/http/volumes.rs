@@ -1,45 +1,59 @@
 //! `/v1/volumes`: uploaded volumes.
 
 use super::app::App;
+use super::caller::Caller;
 use super::collection::{Collection, find};
+use super::files::not_modified;
 use super::openapi::{self, LookupProblems, UploadProblems};
 use super::problem::{Answer, Problem};
-use super::request::{PathSegments, query_pairs, refuse_unknown, unknown};
-use super::upload;
+use super::request::{PathSegments, merge_patch, query_pairs, refuse_unknown, unknown};
 use super::wire::{path_of, rfc3339};
+use super::{tags, upload};
 use crate::jobs::{
-    BlobError, Catalogue, ListPage, ListRequest, Resource, StoreError, StoreFault, StoredVolume,
+    BlobError, Catalogue, FileRecord, Held, LegalHold, ListPage, ListRequest, Resource, StoreError,
+    StoreFault, StoredVolume, TagFilter, Tenant, content_id,
 };
 use crate::progress::Monitor;
 use crate::work::{UploadFacts, preview_memory};
 use axum::Json;
 use axum::extract::{RawQuery, Request, State};
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use utoipa::ToSchema;
+
+/// A later version of the program may draw a preview differently.
+const PREVIEW_CACHE_CONTROL: &str = "private, max-age=3600";
 
 /// The collection of volumes.
 pub struct Volumes;
 
 impl Collection for Volumes {
     const RESOURCE: Resource = Resource::Volume;
+    const TAGGED: bool = true;
     type Row = StoredVolume;
     type Body = VolumeBody;
 
-    async fn row(catalogue: &dyn Catalogue, id: &str) -> Result<Option<StoredVolume>, StoreError> {
-        catalogue.volume(id).await
+    async fn row(
+        catalogue: &dyn Catalogue,
+        tenant: &Tenant,
+        id: &str,
+    ) -> Result<Option<Held<StoredVolume>>, StoreError> {
+        catalogue.volume(tenant, id).await
     }
 
-    fn body(volume: StoredVolume) -> Result<VolumeBody, StoreError> {
-        VolumeBody::try_from(volume)
+    fn body(app: &App, volume: Held<StoredVolume>) -> Result<VolumeBody, StoreError> {
+        VolumeBody::of(app, volume)
     }
 
     async fn rows(
         catalogue: &dyn Catalogue,
+        tenant: &Tenant,
+        filter: &TagFilter,
         page: ListRequest,
-    ) -> Result<ListPage<StoredVolume>, StoreError> {
-        catalogue.volumes(page).await
+    ) -> Result<ListPage<Held<StoredVolume>>, StoreError> {
+        catalogue.volumes(tenant, filter, page).await
     }
 }
 
@@ -53,10 +67,22 @@ pub struct VolumeBody {
     /// When it was stored (RFC 3339).
     #[schema(format = DateTime)]
     created_at: String,
+    /// The caller's own id for it.
+    #[schema(max_length = 128)]
+    external_id: Option<String>,
+    /// The caller's own names and values for it.
+    labels: BTreeMap<String, String>,
+    /// When it will be erased unless it is uploaded or used again (RFC 3339); absent if it is kept.
+    #[schema(format = DateTime)]
+    expires_at: Option<String>,
+    /// The legal hold that forbids to erase it.
+    legal_hold: Option<LegalHoldBody>,
     /// Size of all its files in bytes.
     bytes: u64,
     /// Number of its files.
     files: usize,
+    /// Its files as they were uploaded.
+    originals: Vec<OriginalBody>,
     /// File format.
     #[schema(example = "NIfTI-1")]
     format: String,
@@ -82,8 +108,8 @@ pub struct VolumeBody {
     dtype: String,
     /// The voxel values after slope and intercept.
     intensity: IntensityBody,
-    /// The labels in rising order if the volume looks like a label map.
-    labels: Option<Vec<i64>>,
+    /// The voxel values in rising order if the volume looks like a label map.
+    label_values: Option<Vec<i64>>,
     /// Oddities of the file that do not prevent its use.
     warnings: Vec<String>,
     /// Related paths.
@@ -104,6 +130,71 @@ struct IntensityBody {
     not_finite: u64,
 }
 
+/// A legal hold.
+#[derive(Serialize, ToSchema)]
+#[schema(as = LegalHold)]
+pub struct LegalHoldBody {
+    /// The reason that was given.
+    reason: String,
+    /// Since when (RFC 3339).
+    #[schema(format = DateTime)]
+    since: String,
+    /// The name of the key that set it.
+    by: String,
+}
+
+impl From<LegalHold> for LegalHoldBody {
+    fn from(hold: LegalHold) -> Self {
+        Self {
+            reason: hold.reason,
+            since: rfc3339(hold.since),
+            by: hold.by,
+        }
+    }
+}
+
+/// An uploaded file.
+#[derive(Serialize, ToSchema)]
+#[schema(as = VolumeFile)]
+pub struct OriginalBody {
+    /// Its name in the store; not that of the upload.
+    #[schema(example = "volume.nii.gz")]
+    name: String,
+    /// Its path.
+    href: String,
+    /// Its media type.
+    media_type: String,
+    /// Its length in bytes.
+    bytes: u64,
+    /// SHA-256 of its content, hexadecimal; also its `ETag`.
+    sha256: String,
+}
+
+impl OriginalBody {
+    /// All files of a volume.
+    pub fn all(volume: &StoredVolume) -> Vec<Self> {
+        let itself = path_of(&volume.id);
+        let describe = |file: &FileRecord| Self {
+            href: format!("{itself}/files/{}", file.name),
+            media_type: media_type(&file.name).to_owned(),
+            name: file.name.clone(),
+            bytes: file.bytes,
+            sha256: file.sha256.clone(),
+        };
+        volume.files.iter().map(describe).collect()
+    }
+}
+
+/// The media type that a file's name in the store stands for.
+pub fn media_type(name: &str) -> &'static str {
+    match name.rsplit('.').next() {
+        Some("gz") => "application/gzip",
+        Some("dcm") => "application/dicom",
+        Some("nii") => "application/nifti",
+        _ => "application/octet-stream",
+    }
+}
+
 /// Paths of one volume.
 #[derive(Serialize, ToSchema)]
 struct VolumeLinks {
@@ -112,16 +203,33 @@ struct VolumeLinks {
     itself: String,
     /// Three middle slices as PNG.
     preview: String,
+    /// The uploaded file; absent if there are several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    content: Option<String>,
+    /// Its legal hold: PUT sets it, DELETE lifts it.
+    hold: String,
 }
 
-impl TryFrom<StoredVolume> for VolumeBody {
-    type Error = StoreError;
-
-    fn try_from(volume: StoredVolume) -> Result<Self, StoreError> {
+impl VolumeBody {
+    /// The JSON of a volume.
+    ///
+    /// # Errors
+    /// If its record is damaged.
+    pub fn of(app: &App, volume: Held<StoredVolume>) -> Result<Self, StoreError> {
+        let expires_at = app.expires_at(Resource::Volume, &volume.holding);
+        let Held {
+            item: volume,
+            holding,
+        } = volume;
         let itself = path_of(&volume.id);
         let facts = UploadFacts::of(&volume)?;
         Ok(Self {
-            created_at: rfc3339(volume.created_at),
+            created_at: rfc3339(holding.created_at),
+            external_id: holding.tags.external_id,
+            labels: holding.tags.labels,
+            expires_at,
+            legal_hold: holding.legal_hold.map(LegalHoldBody::from),
+            originals: OriginalBody::all(&volume),
             bytes: volume.bytes,
             files: volume.files.len(),
             format: facts.format,
@@ -139,10 +247,12 @@ impl TryFrom<StoredVolume> for VolumeBody {
                 mean: facts.intensity.mean,
                 not_finite: facts.intensity.not_finite,
             },
-            labels: facts.labels,
+            label_values: facts.labels,
             warnings: facts.warnings,
             links: VolumeLinks {
                 preview: format!("{itself}/preview.png"),
+                content: (volume.files.len() == 1).then(|| format!("{itself}/content")),
+                hold: format!("{itself}/hold"),
                 itself,
             },
             id: volume.id,
@@ -162,6 +272,7 @@ impl TryFrom<StoredVolume> for VolumeBody {
         (Vec<u8> = "application/nifti"),
         (openapi::UploadForm = "multipart/form-data"),
     )),
+    params(openapi::TagParameters),
     responses(
         (status = 201, description = "Stored", body = VolumeBody,
             headers(("Location" = String, description = "The volume's path"))),
@@ -171,15 +282,20 @@ impl TryFrom<StoredVolume> for VolumeBody {
     ))]
 pub async fn create_volume(
     State(app): State<App>,
+    caller: Caller,
     RawQuery(query): RawQuery,
     request: Request,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let mut pairs = query_pairs(query.as_deref());
+    let (_, others) = tags::take(&app, pairs.clone())?;
+    refuse_unknown(&others, &tags::PARAMETERS)?;
     let upload = upload::receive(&app, request, &[]).await?;
-    if let Some((name, _)) = upload.fields.first() {
-        return Err(unknown("form field", name, &[]));
+    pairs.extend(upload.fields);
+    let (tags, others) = tags::take(&app, pairs)?;
+    if let Some((name, _)) = others.first() {
+        return Err(unknown("form field", name, &tags::PARAMETERS));
     }
-    let stored = upload.volume.store(&app).await?;
+    let stored = upload.volume.store(&app, &caller.tenant, &tags).await?;
     let volume = stored.volume;
     let status = if stored.new {
         StatusCode::CREATED
@@ -187,23 +303,62 @@ pub async fn create_volume(
         StatusCode::OK
     };
     let location = [(header::LOCATION, path_of(&volume.id))];
-    Ok((status, location, Json(VolumeBody::try_from(volume)?)).into_response())
+    Ok((status, location, Json(VolumeBody::of(&app, volume)?)).into_response())
+}
+
+/// Change a volume's names
+///
+/// A JSON merge patch (RFC 7396) of `external_id` and `labels`: what is `null` is removed, what is
+/// absent stays.
+#[utoipa::path(patch, path = "/v1/volumes/{id}", tag = "volumes", operation_id = "update_volume",
+    params(("id" = String, Path, description = "The volume's id")),
+    request_body(content(
+        (openapi::TagsPatch = "application/merge-patch+json"),
+        (openapi::TagsPatch = "application/json"))),
+    responses((status = 200, description = "The volume", body = VolumeBody),
+        openapi::PatchProblems, LookupProblems))]
+pub async fn update_volume(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    request: Request,
+) -> Answer<Json<VolumeBody>> {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
+    let patch = merge_patch(request).await?;
+    let tags = tags::merged(&app, volume.holding.tags, &patch)?;
+    app.queue
+        .catalogue
+        .set_tags(&caller.tenant, &id, &tags)
+        .await?;
+    let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
+    Ok(Json(VolumeBody::of(&app, volume)?))
 }
 
 /// Preview a volume
 ///
 /// The three orthogonal slices through the middle, side by side.
 #[utoipa::path(get, path = "/v1/volumes/{id}/preview.png", tag = "volumes",
-    params(("id" = String, Path, description = "The volume's id")),
+    params(("id" = String, Path, description = "The volume's id"), openapi::CachedHeaders),
     responses((status = 200, description = "The slices", body = Vec<u8>, content_type = "image/png"),
-        LookupProblems))]
+        openapi::UnchangedAnswer, LookupProblems))]
 pub async fn preview_volume(
     State(app): State<App>,
+    caller: Caller,
     PathSegments(id): PathSegments<String>,
     RawQuery(query): RawQuery,
+    headers: HeaderMap,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let volume = find::<Volumes>(&app, &id).await?;
+    let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
+    // The drawing follows from the volume and the program, so it need not be made to be compared.
+    let version = env!("CARGO_PKG_VERSION");
+    let etag = content_id("", ["preview", version, &id].map(str::as_bytes));
+    let etag = format!("\"{etag}\"");
+    if let Some(unchanged) = not_modified(&headers, &etag, PREVIEW_CACHE_CONTROL) {
+        return Ok(unchanged);
+    }
     let files = app.queue.volume_files(&id, &volume.files).await?;
     let files = files.ok_or_else(|| {
         BlobError::new(
@@ -218,7 +373,8 @@ pub async fn preview_volume(
     let png = preview.map_err(Problem::internal)?;
     let headers = [
         (header::CONTENT_TYPE, "image/png"),
-        (header::CACHE_CONTROL, "private, max-age=3600"),
+        (header::ETAG, etag.as_str()),
+        (header::CACHE_CONTROL, PREVIEW_CACHE_CONTROL),
     ];
     Ok((headers, png).into_response())
 }

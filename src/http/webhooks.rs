@@ -282,7 +282,7 @@ pub async fn list_deliveries(
         .deliveries(&caller.tenant, &id, MOST_DELIVERIES)
         .await?;
     if found.is_empty() {
-        jobs::find(&app, &id).await?;
+        jobs::find(&app, &caller.tenant, &id).await?;
     }
     let deliveries = found.into_iter().map(DeliveryBody::from).collect();
     Ok(Json(DeliveryList { deliveries }))

@@ -1,7 +1,7 @@
 //! A job and its states: `queued -> running -> succeeded | failed | cancelled`, and from
 //! `running` back to `queued` when its worker was lost.
 
-use super::{Failure, Tenant, Timestamp};
+use super::{Failure, Tags, Tenant, Timestamp};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -63,6 +63,8 @@ pub struct Job {
     pub tenant: Tenant,
     /// Position in the order of filing.
     pub sequence: i64,
+    /// The tenant's names for it.
+    pub tags: Tags,
     /// The kind of work: `model`, `segmentation`.
     pub kind: String,
     /// Id of the volume to work on.
@@ -105,6 +107,8 @@ pub struct Job {
 pub struct NewJob {
     /// See [`Job::tenant`].
     pub tenant: Tenant,
+    /// See [`Job::tags`].
+    pub tags: Tags,
     /// See [`Job::kind`].
     pub kind: String,
     /// See [`Job::volume`].

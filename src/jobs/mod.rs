@@ -66,14 +66,17 @@ pub use isolation::Isolation;
 pub use job::{Filed, Idempotency, Job, JobState, JobWebhook, NewJob};
 pub use observer::JobObserver;
 pub use queue::{
-    Custodian, Hold, Queue, QueuePosition, QueueSettings, Swept, Upkeep, recover_after_crash,
+    Custodian, Hold, Queue, QueuePosition, QueueSettings, RetentionAges, Swept, TemplateSource,
+    Upkeep, recover_after_crash,
 };
 pub use resource::Resource;
 pub use storage::{
     BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Claimant, Custody, DeathLimit,
-    Deleted, DiskSpace, FigureStore, FileRecord, Interrupted, ItemRecord, JobOutcome, JobStore,
-    Lease, ListPage, ListRequest, LocalFile, Product, ProductFile, QueueFigures, QueueLoad,
-    StagedFiles, StagedFor, StoreError, StoreFault, StoreResult, StoredVolume,
+    Deleted, DiskSpace, Erased, ErasedFile, ErasedItem, ErasureOrder, ErasureReason, Expiry,
+    FigureStore, FileRecord, Held, Holding, Interrupted, ItemRecord, JobFilter, JobOutcome,
+    JobStore, Lease, LegalHold, ListPage, ListRequest, LocalFile, Product, ProductFile,
+    QueueFigures, QueueLoad, Receipt, StagedFiles, StagedFor, StoreError, StoreFault, StoreResult,
+    StoredVolume, TagFilter, Tags,
 };
 pub use tenant::{InvalidTenant, Tenant};
 pub use work::{

@@ -22,6 +22,7 @@ mod backup;
 mod blobs;
 mod content;
 mod doctor;
+mod erasure;
 mod faults;
 mod rows;
 mod space;

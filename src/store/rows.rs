@@ -1,7 +1,8 @@
 //! From rows of SQLite to the records of `jobs`, and JSON columns both ways.
 
 use crate::jobs::{
-    Job, JobState, ListPage, ListRequest, Product, StoreError, StoreResult, StoredVolume, Tenant,
+    Held, Holding, Job, JobState, LegalHold, ListPage, ListRequest, Product, Receipt, StoreError,
+    StoreResult, StoredVolume, Tags, Tenant, Timestamp,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -14,6 +15,7 @@ pub(super) fn job(row: SqliteRow) -> StoreResult<Job> {
     Ok(Job {
         id: row.try_get("id")?,
         tenant: tenant(&row)?,
+        tags: tags(&row)?,
         sequence: row.try_get("sequence")?,
         kind: row.try_get("kind")?,
         volume: row.try_get("volume")?,
@@ -64,6 +66,46 @@ pub(super) fn product(row: SqliteRow) -> StoreResult<Product> {
     })
 }
 
+/// An item as a tenant has it, from a row of the item's columns and its holding's.
+pub(super) fn held<T>(
+    row: SqliteRow,
+    record: fn(SqliteRow) -> StoreResult<T>,
+) -> StoreResult<Held<T>> {
+    let since: Option<Timestamp> = row.try_get("held_at")?;
+    let legal_hold = match since {
+        Some(since) => Some(LegalHold {
+            reason: row.try_get("hold_reason")?,
+            since,
+            by: row.try_get("held_by")?,
+        }),
+        None => None,
+    };
+    let holding = Holding {
+        tenant: tenant(&row)?,
+        created_at: row.try_get("created_at")?,
+        renewed_at: row.try_get("renewed_at")?,
+        tags: tags(&row)?,
+        legal_hold,
+        source_on_hold: row.try_get::<i64, _>("source_holds")? > 0,
+    };
+    Ok(Held {
+        item: record(row)?,
+        holding,
+    })
+}
+
+/// A receipt and its sequence number.
+pub(super) fn receipt(row: SqliteRow) -> StoreResult<(Receipt, i64)> {
+    Ok((json(&row, "receipt")?, row.try_get("sequence")?))
+}
+
+fn tags(row: &SqliteRow) -> StoreResult<Tags> {
+    Ok(Tags {
+        external_id: row.try_get("external_id")?,
+        labels: json(row, "labels")?,
+    })
+}
+
 /// The tenant of a row.
 pub(super) fn tenant(row: &SqliteRow) -> StoreResult<Tenant> {
     let name: String = row.try_get("tenant")?;
@@ -73,7 +115,7 @@ pub(super) fn tenant(row: &SqliteRow) -> StoreResult<Tenant> {
 /// Converts the rows of a list by `record`.
 pub(super) fn all<T>(
     rows: Vec<SqliteRow>,
-    record: fn(SqliteRow) -> StoreResult<T>,
+    record: impl Fn(SqliteRow) -> StoreResult<T>,
 ) -> StoreResult<Vec<T>> {
     rows.into_iter().map(record).collect()
 }
@@ -82,7 +124,7 @@ pub(super) fn all<T>(
 pub(super) fn page<T>(
     rows: Vec<SqliteRow>,
     request: ListRequest,
-    record: fn(SqliteRow) -> StoreResult<T>,
+    record: impl Fn(SqliteRow) -> StoreResult<T>,
     sequence: fn(&T) -> i64,
 ) -> StoreResult<ListPage<T>> {
     Ok(ListPage::cut(all(rows, record)?, request.limit, sequence))

@@ -35,6 +35,8 @@ impl SqliteStore {
             .create_if_missing(true)
             .journal_mode(SqliteJournalMode::Wal)
             .synchronous(SqliteSynchronous::Full)
+            // What is deleted is overwritten.
+            .pragma("secure_delete", "ON")
             .busy_timeout(wait);
         let readers = SqlitePoolOptions::new()
             .max_connections(READERS)

@@ -1,22 +1,43 @@
-//! The tables of volumes and products in SQLite.
+//! The tables of volumes and products in SQLite, and the table of holdings that says which tenant
+//! has which of them.
 
 use super::rows::{self, to_json};
 use super::sqlite::SqliteStore;
 use super::writer::Write;
 use crate::jobs::{
-    Catalogue, Deleted, ListPage, ListRequest, Product, Resource, StoreResult, StoredVolume,
-    Timestamp,
+    Catalogue, Erased, ErasureOrder, Expiry, Held, LegalHold, ListPage, ListRequest, Product,
+    Receipt, Resource, StoreResult, StoredVolume, TagFilter, Tags, Tenant, Timestamp,
 };
 use async_trait::async_trait;
-use sqlx::{Row, SqliteConnection};
+use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
+
+/// A volume with the columns of its holding. `sequence` and `created_at` are the holding's.
+const HELD_VOLUME: &str = "SELECT h.*, v.bytes, v.files, v.facts, (SELECT count(*) FROM sources
+    JOIN holdings AS s ON s.tenant = sources.tenant AND s.id = sources.volume
+    WHERE sources.tenant = h.tenant AND sources.id = h.id AND s.held_at IS NOT NULL)
+        AS source_holds
+    FROM holdings AS h JOIN volumes AS v ON v.id = h.id";
+
+/// A product with the columns of its holding, likewise.
+const HELD_PRODUCT: &str = "SELECT h.*, p.volume, p.parameters, p.summary, p.software, p.files,
+    (SELECT count(*) FROM sources
+    JOIN holdings AS s ON s.tenant = sources.tenant AND s.id = sources.volume
+    WHERE sources.tenant = h.tenant AND sources.id = h.id AND s.held_at IS NOT NULL)
+        AS source_holds
+    FROM holdings AS h JOIN products AS p ON p.id = h.id";
 
 #[async_trait]
 impl Catalogue for SqliteStore {
-    async fn add_volume(&self, volume: &StoredVolume) -> StoreResult<bool> {
+    async fn add_volume(
+        &self,
+        volume: &StoredVolume,
+        tenant: &Tenant,
+        tags: &Tags,
+    ) -> StoreResult<bool> {
         let mut transaction = self.writer.begin().await?;
-        let done = sqlx::query(
-            "INSERT INTO volumes (id, created_at, used_at, bytes, files, facts)
-             VALUES (?1, ?2, ?2, ?3, ?4, ?5) ON CONFLICT (id) DO NOTHING",
+        sqlx::query(
+            "INSERT INTO volumes (id, created_at, bytes, files, facts)
+             VALUES (?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING",
         )
         .bind(&volume.id)
         .bind(volume.created_at)
@@ -25,143 +46,323 @@ impl Catalogue for SqliteStore {
         .bind(to_json(&volume.facts)?)
         .execute(&mut *transaction)
         .await?;
-        forget_deletion(&mut transaction, &volume.id).await?;
-        transaction.commit().await?;
-        Ok(done.rows_affected() == 1)
-    }
-
-    async fn renew_volume(&self, id: &str, now: Timestamp) -> StoreResult<Option<StoredVolume>> {
-        let row =
-            sqlx::query("UPDATE volumes SET used_at = max(used_at, ?) WHERE id = ? RETURNING *")
-                .bind(now)
-                .bind(id)
-                .write_optional(&self.writer)
-                .await?;
-        row.map(rows::volume).transpose()
-    }
-
-    async fn volume(&self, id: &str) -> StoreResult<Option<StoredVolume>> {
-        let row = sqlx::query("SELECT * FROM volumes WHERE id = ?")
-            .bind(id)
-            .fetch_optional(&self.readers)
-            .await?;
-        row.map(rows::volume).transpose()
-    }
-
-    async fn volumes(&self, page: ListRequest) -> StoreResult<ListPage<StoredVolume>> {
-        let rows = sqlx::query(
-            "SELECT * FROM volumes WHERE ?1 IS NULL OR sequence < ?1
-             ORDER BY sequence DESC LIMIT ?2",
-        )
-        .bind(page.before)
-        .bind(i64::from(page.limit) + 1)
-        .fetch_all(&self.readers)
-        .await?;
-        rows::page(rows, page, rows::volume, |v| v.sequence)
-    }
-
-    async fn delete_volume(&self, id: &str, now: Timestamp) -> StoreResult<Deleted> {
-        self.delete_unneeded("volumes", id, now).await
-    }
-
-    async fn add_product(&self, product: &Product) -> StoreResult<bool> {
-        let mut transaction = self.writer.begin().await?;
-        let new = insert_product(&mut transaction, product).await?;
+        let now = volume.created_at;
+        let new = hold(&mut transaction, tenant, &volume.id, tags, now).await?;
         transaction.commit().await?;
         Ok(new)
     }
 
-    async fn product(&self, id: &str) -> StoreResult<Option<Product>> {
-        let row = sqlx::query("SELECT * FROM products WHERE id = ?")
-            .bind(id)
+    async fn renew_volume(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        tags: &Tags,
+        now: Timestamp,
+    ) -> StoreResult<Option<(Held<StoredVolume>, bool)>> {
+        let mut transaction = self.writer.begin().await?;
+        let stored = sqlx::query("SELECT 1 FROM volumes WHERE id = ?").bind(id);
+        if stored.fetch_optional(&mut *transaction).await?.is_none() {
+            transaction.commit().await?;
+            return Ok(None);
+        }
+        let new = hold(&mut transaction, tenant, id, tags, now).await?;
+        transaction.commit().await?;
+        let held = self.volume(tenant, id).await?;
+        Ok(held.map(|held| (held, new)))
+    }
+
+    async fn volume(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Held<StoredVolume>>> {
+        let row = one(HELD_VOLUME, tenant, id)
+            .build()
             .fetch_optional(&self.readers)
             .await?;
-        row.map(rows::product).transpose()
+        row.map(|row| rows::held(row, rows::volume)).transpose()
     }
 
-    async fn products(&self, kind: Resource, page: ListRequest) -> StoreResult<ListPage<Product>> {
-        let rows = sqlx::query(
-            "SELECT * FROM products WHERE kind = ?1 AND (?2 IS NULL OR sequence < ?2)
-             ORDER BY sequence DESC LIMIT ?3",
+    async fn volumes(
+        &self,
+        tenant: &Tenant,
+        filter: &TagFilter,
+        page: ListRequest,
+    ) -> StoreResult<ListPage<Held<StoredVolume>>> {
+        let rows = listed(HELD_VOLUME, tenant, Resource::Volume, filter, page)
+            .build()
+            .fetch_all(&self.readers)
+            .await?;
+        let record = |row| rows::held(row, rows::volume);
+        rows::page(rows, page, record, |held| held.sequence)
+    }
+
+    async fn add_product(
+        &self,
+        product: &Product,
+        tenant: &Tenant,
+        source: Option<&str>,
+    ) -> StoreResult<bool> {
+        let mut transaction = self.writer.begin().await?;
+        let new = insert_product(&mut transaction, product, tenant).await?;
+        if let Some(volume) = source {
+            add_source(&mut transaction, tenant, &product.id, volume).await?;
+        }
+        transaction.commit().await?;
+        Ok(new)
+    }
+
+    async fn product(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Held<Product>>> {
+        let row = one(HELD_PRODUCT, tenant, id)
+            .build()
+            .fetch_optional(&self.readers)
+            .await?;
+        row.map(|row| rows::held(row, rows::product)).transpose()
+    }
+
+    async fn products(
+        &self,
+        tenant: &Tenant,
+        kind: Resource,
+        filter: &TagFilter,
+        page: ListRequest,
+    ) -> StoreResult<ListPage<Held<Product>>> {
+        let rows = listed(HELD_PRODUCT, tenant, kind, filter, page)
+            .build()
+            .fetch_all(&self.readers)
+            .await?;
+        let record = |row| rows::held(row, rows::product);
+        rows::page(rows, page, record, |held| held.sequence)
+    }
+
+    async fn set_tags(&self, tenant: &Tenant, id: &str, tags: &Tags) -> StoreResult<bool> {
+        let statement = match Resource::of(id) {
+            Some(Resource::Job) => {
+                "UPDATE jobs SET external_id = ?, labels = ?, revision = revision + 1
+                 WHERE tenant = ? AND id = ?"
+            }
+            _ => "UPDATE holdings SET external_id = ?, labels = ? WHERE tenant = ? AND id = ?",
+        };
+        let changed = sqlx::query(statement)
+            .bind(&tags.external_id)
+            .bind(to_json(&tags.labels)?)
+            .bind(tenant.as_str())
+            .bind(id)
+            .write(&self.writer)
+            .await?;
+        Ok(changed == 1)
+    }
+
+    async fn set_legal_hold(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        hold: Option<&LegalHold>,
+    ) -> StoreResult<bool> {
+        let changed = sqlx::query(
+            "UPDATE holdings SET hold_reason = ?, held_at = ?, held_by = ?
+             WHERE tenant = ? AND id = ?",
         )
-        .bind(kind.noun())
-        .bind(page.before)
-        .bind(i64::from(page.limit) + 1)
-        .fetch_all(&self.readers)
+        .bind(hold.map(|hold| &hold.reason))
+        .bind(hold.map(|hold| hold.since))
+        .bind(hold.map(|hold| &hold.by))
+        .bind(tenant.as_str())
+        .bind(id)
+        .write(&self.writer)
         .await?;
-        rows::page(rows, page, rows::product, |p| p.sequence)
+        Ok(changed == 1)
     }
 
-    async fn delete_product(&self, id: &str, now: Timestamp) -> StoreResult<Deleted> {
-        self.delete_unneeded("products", id, now).await
+    async fn made_of(&self, tenant: &Tenant, volume: &str) -> StoreResult<Vec<String>> {
+        let mut connection = self.readers.acquire().await?;
+        super::erasure::made_of(&mut connection, tenant, volume).await
     }
 
-    async fn erased_at(&self, id: &str) -> StoreResult<Option<Timestamp>> {
-        let row = sqlx::query("SELECT erased_at FROM erased WHERE tenant = 'default' AND id = ?")
+    async fn erase(
+        &self,
+        order: &ErasureOrder,
+        expected: &[String],
+        now: Timestamp,
+    ) -> StoreResult<Erased> {
+        let mut transaction = self.writer.begin().await?;
+        let erased = super::erasure::erase(&mut transaction, order, expected, now).await?;
+        // Committed also if nothing was erased, which keeps the connection.
+        transaction.commit().await?;
+        Ok(erased)
+    }
+
+    async fn erased_at(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Timestamp>> {
+        let row = sqlx::query("SELECT erased_at FROM erased WHERE tenant = ? AND id = ?")
+            .bind(tenant.as_str())
             .bind(id)
             .fetch_optional(&self.readers)
             .await?;
         Ok(row.map(|row| row.get(0)))
     }
 
-    async fn older_than(&self, before: Timestamp) -> StoreResult<Vec<String>> {
+    async fn receipt(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Receipt>> {
+        let row = sqlx::query("SELECT sequence, receipt FROM erasures WHERE tenant = ? AND id = ?")
+            .bind(tenant.as_str())
+            .bind(id)
+            .fetch_optional(&self.readers)
+            .await?;
+        row.map(|row| Ok(rows::receipt(row)?.0)).transpose()
+    }
+
+    async fn receipts(
+        &self,
+        tenant: &Tenant,
+        item: Option<&str>,
+        page: ListRequest,
+    ) -> StoreResult<ListPage<Receipt>> {
+        let mut query = QueryBuilder::new("SELECT sequence, receipt FROM erasures WHERE tenant = ");
+        query.push_bind(tenant.to_string());
+        if let Some(item) = item {
+            query.push(" AND item = ").push_bind(item.to_owned());
+        }
+        push_page(&mut query, "sequence", page);
+        let rows = query.build().fetch_all(&self.readers).await?;
+        let page = rows::page(rows, page, rows::receipt, |(_, sequence)| *sequence)?;
+        Ok(ListPage {
+            items: page.items.into_iter().map(|(receipt, _)| receipt).collect(),
+            next: page.next,
+        })
+    }
+
+    async fn expired(&self, expiry: &Expiry) -> StoreResult<Vec<(Tenant, String)>> {
+        // A comparison with NULL finds nothing.
         let rows = sqlx::query(
-            "SELECT id FROM jobs WHERE finished_at < ?1
-             UNION ALL SELECT id FROM products WHERE created_at < ?1 AND kind != 'template'
-             UNION ALL SELECT id FROM volumes WHERE used_at < ?1",
+            "SELECT tenant, id FROM jobs AS j WHERE finished_at < ?1 AND NOT EXISTS
+                 (SELECT 1 FROM holdings AS v
+                  WHERE v.tenant = j.tenant AND v.id = j.volume AND v.held_at IS NOT NULL)
+             UNION ALL
+             SELECT tenant, id FROM holdings AS h
+             WHERE ((kind = 'volume' AND renewed_at < ?2)
+                    OR (kind IN ('model', 'segmentation') AND renewed_at < ?3))
+               AND held_at IS NULL AND NOT EXISTS
+                   (SELECT 1 FROM sources JOIN holdings AS s
+                        ON s.tenant = sources.tenant AND s.id = sources.volume
+                    WHERE sources.tenant = h.tenant AND sources.id = h.id
+                      AND s.held_at IS NOT NULL)",
         )
-        .bind(before)
+        .bind(expiry.jobs)
+        .bind(expiry.volumes)
+        .bind(expiry.results)
         .fetch_all(&self.readers)
         .await?;
-        Ok(rows.into_iter().map(|row| row.get(0)).collect())
+        let owned = |row: sqlx::sqlite::SqliteRow| Ok((rows::tenant(&row)?, row.try_get("id")?));
+        rows.into_iter().map(owned).collect()
+    }
+
+    async fn overwrite_erased(&self) -> StoreResult<bool> {
+        self.writer.truncate_log().await
     }
 }
 
-impl SqliteStore {
-    /// Deletes a row of `table`, unless a job that has not ended needs it.
-    async fn delete_unneeded(
-        &self,
-        table: &'static str,
-        id: &str,
-        now: Timestamp,
-    ) -> StoreResult<Deleted> {
-        let mut transaction = self.writer.begin().await?;
-        let delete = format!(
-            "DELETE FROM {table} WHERE id = ?1
-               AND NOT EXISTS (SELECT 1 FROM jobs
-                   WHERE volume = ?1 AND state IN ('queued', 'running'))
-               AND NOT EXISTS (SELECT 1 FROM jobs
-                   WHERE needs != '{{}}' AND state IN ('queued', 'running')
-                     AND EXISTS (SELECT 1 FROM json_each(jobs.needs) WHERE value = ?1))"
-        );
-        let done = sqlx::query(sqlx::AssertSqlSafe(delete))
-            .bind(id)
-            .execute(&mut *transaction)
-            .await?;
-        if done.rows_affected() == 0 {
-            let count = format!("SELECT count(*) FROM {table} WHERE id = ?");
-            let left: i64 = sqlx::query_scalar(sqlx::AssertSqlSafe(count))
-                .bind(id)
-                .fetch_one(&mut *transaction)
-                .await?;
-            return Ok(match left {
-                0 => Deleted::Unknown,
-                _ => Deleted::InUse,
-            });
-        }
-        record_deletion(&mut transaction, id, now).await?;
-        transaction.commit().await?;
-        Ok(Deleted::Done)
+/// The row of one item that a tenant has.
+fn one(select: &str, tenant: &Tenant, id: &str) -> QueryBuilder<Sqlite> {
+    let mut query = QueryBuilder::new(select);
+    query
+        .push(" WHERE h.tenant = ")
+        .push_bind(tenant.to_string());
+    query.push(" AND h.id = ").push_bind(id.to_owned());
+    query
+}
+
+/// A page of the items of one kind that a tenant has.
+fn listed(
+    select: &str,
+    tenant: &Tenant,
+    kind: Resource,
+    filter: &TagFilter,
+    page: ListRequest,
+) -> QueryBuilder<Sqlite> {
+    let mut query = QueryBuilder::new(select);
+    query
+        .push(" WHERE h.tenant = ")
+        .push_bind(tenant.to_string());
+    query.push(" AND h.kind = ").push_bind(kind.noun());
+    push_tags(&mut query, "h.", tenant, kind, filter);
+    push_page(&mut query, "h.sequence", page);
+    query
+}
+
+/// Adds the conditions of a filter to a query whose columns have that prefix.
+pub(super) fn push_tags(
+    query: &mut QueryBuilder<Sqlite>,
+    prefix: &str,
+    tenant: &Tenant,
+    kind: Resource,
+    filter: &TagFilter,
+) {
+    if let Some(external_id) = &filter.external_id {
+        query.push(" AND ").push(prefix).push("external_id = ");
+        query.push_bind(external_id.clone());
+    }
+    for (name, value) in &filter.labels {
+        query.push(" AND ").push(prefix).push("sequence IN ");
+        query.push("(SELECT sequence FROM label_index WHERE tenant = ");
+        query.push_bind(tenant.to_string());
+        query.push(" AND kind = ").push_bind(kind.noun());
+        query.push(" AND name = ").push_bind(name.clone());
+        query
+            .push(" AND value = ")
+            .push_bind(value.clone())
+            .push(")");
     }
 }
 
-/// Adds a product within a transaction, unless its id exists already. Returns whether it was
-/// added.
-pub(super) async fn insert_product(
+/// Adds the end of a query for a page, newest first, by the column of the sequence number.
+pub(super) fn push_page(query: &mut QueryBuilder<Sqlite>, sequence: &str, page: ListRequest) {
+    if let Some(before) = page.before {
+        query.push(" AND ").push(sequence).push(" < ");
+        query.push_bind(before);
+    }
+    query.push(" ORDER BY ").push(sequence).push(" DESC LIMIT ");
+    query.push_bind(i64::from(page.limit) + 1);
+}
+
+/// Gives an item to a tenant, or renews its holding. Returns whether it is new for the tenant.
+async fn hold(
+    to: &mut SqliteConnection,
+    tenant: &Tenant,
+    id: &str,
+    tags: &Tags,
+    now: Timestamp,
+) -> StoreResult<bool> {
+    let kind = Resource::of(id).unwrap_or(Resource::Volume);
+    let known = sqlx::query("SELECT 1 FROM holdings WHERE tenant = ? AND id = ?")
+        .bind(tenant.as_str())
+        .bind(id)
+        .fetch_optional(&mut *to)
+        .await?;
+    sqlx::query(
+        "INSERT INTO holdings (tenant, id, kind, created_at, renewed_at, external_id, labels)
+         VALUES (?1, ?2, ?3, ?4, ?4, ?5, ?6)
+         ON CONFLICT (tenant, id) DO UPDATE SET
+             renewed_at = max(renewed_at, excluded.renewed_at),
+             external_id = coalesce(excluded.external_id, external_id),
+             labels = iif(excluded.labels = '{}', labels, excluded.labels)",
+    )
+    .bind(tenant.as_str())
+    .bind(id)
+    .bind(kind.noun())
+    .bind(now)
+    .bind(&tags.external_id)
+    .bind(to_json(&tags.labels)?)
+    .execute(&mut *to)
+    .await?;
+    // It exists again.
+    sqlx::query("DELETE FROM erased WHERE tenant = ? AND id = ?")
+        .bind(tenant.as_str())
+        .bind(id)
+        .execute(to)
+        .await?;
+    Ok(known.is_none())
+}
+
+/// Adds the record of a product's content, unless it is stored already.
+pub(super) async fn insert_content(
     to: &mut SqliteConnection,
     product: &Product,
-) -> StoreResult<bool> {
-    let done = sqlx::query(
+) -> StoreResult<()> {
+    sqlx::query(
         "INSERT INTO products
              (id, kind, created_at, volume, parameters, summary, software, files)
          VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING",
@@ -174,30 +375,40 @@ pub(super) async fn insert_product(
     .bind(to_json(&product.summary)?)
     .bind(&product.software)
     .bind(to_json(&product.files)?)
-    .execute(&mut *to)
+    .execute(to)
     .await?;
-    forget_deletion(to, &product.id).await?;
-    Ok(done.rows_affected() == 1)
-}
-
-/// Records that the item with that id was deleted.
-pub(super) async fn record_deletion(
-    to: &mut SqliteConnection,
-    id: &str,
-    now: Timestamp,
-) -> StoreResult<()> {
-    sqlx::query("INSERT OR REPLACE INTO erased (tenant, id, erased_at) VALUES ('default', ?, ?)")
-        .bind(id)
-        .bind(now)
-        .execute(to)
-        .await?;
     Ok(())
 }
 
-/// Removes the record of a deletion: the item exists again.
-async fn forget_deletion(to: &mut SqliteConnection, id: &str) -> StoreResult<()> {
-    sqlx::query("DELETE FROM erased WHERE tenant = 'default' AND id = ?")
+/// Adds a product within a transaction, unless it is stored already, and gives it to a tenant.
+/// Returns whether it is new for the tenant.
+pub(super) async fn insert_product(
+    to: &mut SqliteConnection,
+    product: &Product,
+    tenant: &Tenant,
+) -> StoreResult<bool> {
+    insert_content(to, product).await?;
+    let tags = Tags::default();
+    let new = hold(to, tenant, &product.id, &tags, product.created_at).await?;
+    let expert = product.parameters.get("expert").and_then(|id| id.as_str());
+    let expert = expert.filter(|id| Resource::of(id) == Some(Resource::Volume));
+    for volume in product.volume.as_deref().into_iter().chain(expert) {
+        add_source(to, tenant, &product.id, volume).await?;
+    }
+    Ok(new)
+}
+
+/// Notes that an item was made of a volume.
+async fn add_source(
+    to: &mut SqliteConnection,
+    tenant: &Tenant,
+    id: &str,
+    volume: &str,
+) -> StoreResult<()> {
+    sqlx::query("INSERT OR IGNORE INTO sources (tenant, id, volume) VALUES (?, ?, ?)")
+        .bind(tenant.as_str())
         .bind(id)
+        .bind(volume)
         .execute(to)
         .await?;
     Ok(())

@@ -3,7 +3,7 @@
 use super::rows::{self, to_json};
 use super::sqlite::SqliteStore;
 use super::writer::Write;
-use crate::jobs::{Catalogue, Custody, ItemRecord, Resource, StoreResult};
+use crate::jobs::{Custody, ItemRecord, Resource, StoreResult};
 use async_trait::async_trait;
 use sqlx::Row;
 use std::collections::BTreeSet;
@@ -15,10 +15,19 @@ const DEFECTS: &str = "PRAGMA quick_check(20)";
 #[async_trait]
 impl Custody for SqliteStore {
     async fn record(&self, id: &str) -> StoreResult<Option<ItemRecord>> {
-        Ok(match Resource::of(id) {
-            Some(Resource::Volume) => self.volume(id).await?.map(ItemRecord::Volume),
-            _ => self.product(id).await?.map(ItemRecord::Product),
+        let volume = Resource::of(id) == Some(Resource::Volume);
+        let row = sqlx::query(match volume {
+            true => "SELECT * FROM volumes WHERE id = ?",
+            false => "SELECT * FROM products WHERE id = ?",
         })
+        .bind(id)
+        .fetch_optional(&self.readers)
+        .await?;
+        row.map(|row| match volume {
+            true => rows::volume(row).map(ItemRecord::Volume),
+            false => rows::product(row).map(ItemRecord::Product),
+        })
+        .transpose()
     }
 
     async fn known(&self, ids: &[String]) -> StoreResult<BTreeSet<String>> {

@@ -1,15 +1,18 @@
 //! The jobs table in SQLite. Every change is a single statement, or a transaction that begins
 //! with a write: SQLite would not let two transactions that began by reading both write.
 
+use super::erasure::record_deletion;
 use super::rows::{self, to_json};
 use super::sqlite::SqliteStore;
+use super::sqlite_catalogue::{insert_product, push_page, push_tags};
 use super::writer::Write;
 use crate::jobs::{
-    Claimant, DeathLimit, Deleted, Filed, Interrupted, Job, JobOutcome, JobState, JobStore, Lease,
-    ListPage, ListRequest, NewJob, QueueLoad, Resource, StoreResult, Tenant, Timestamp, random_id,
+    Claimant, DeathLimit, Deleted, Filed, Interrupted, Job, JobFilter, JobOutcome, JobState,
+    JobStore, Lease, ListPage, ListRequest, NewJob, QueueLoad, Resource, StoreResult, Tenant,
+    Timestamp, random_id,
 };
 use async_trait::async_trait;
-use sqlx::{Row, SqliteConnection};
+use sqlx::{QueryBuilder, Row, SqliteConnection};
 use std::time::Duration;
 
 /// Number of last succeeded jobs whose durations are averaged.
@@ -29,13 +32,16 @@ fn expiry(now: Timestamp, length: Duration) -> Timestamp {
     now.saturating_add(i64::try_from(length.as_millis()).unwrap_or(i64::MAX / 2))
 }
 
-/// The age of what a job works on counts from now.
+/// The age of the volumes that a job works on counts from now, for the tenant of the job.
 async fn renew_volumes(to: &mut SqliteConnection, job: &Job, now: Timestamp) -> StoreResult<()> {
     sqlx::query(
-        "UPDATE volumes SET used_at = max(used_at, ?1)
-         WHERE id = ?2 OR id IN (SELECT value FROM jobs, json_each(jobs.needs) WHERE jobs.id = ?3)",
+        "UPDATE holdings SET renewed_at = max(renewed_at, ?1)
+         WHERE tenant = ?2 AND kind = 'volume' AND id IN (
+             SELECT ?3 UNION ALL
+             SELECT value FROM jobs, json_each(jobs.needs) WHERE jobs.id = ?4)",
     )
     .bind(now)
+    .bind(job.tenant.as_str())
     .bind(&job.volume)
     .bind(&job.id)
     .execute(to)
@@ -55,14 +61,15 @@ impl JobStore for SqliteStore {
         let mut transaction = self.writer.begin().await?;
         let inserted = sqlx::query(
             "INSERT INTO jobs (id, kind, volume, parameters, created_at, idempotency_key,
-                               fingerprint, needs, tenant, webhook, trace_parent)
-             SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?9, ?10, ?11, ?12
+                               fingerprint, needs, tenant, external_id, labels, webhook,
+                               trace_parent)
+             SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?9, ?10, ?11, ?12, ?13, ?14
              WHERE (SELECT count(*) FROM jobs WHERE state = 'queued') < ?8
-               AND EXISTS (SELECT 1 FROM volumes WHERE id = ?3)
+               AND EXISTS (SELECT 1 FROM holdings
+                           WHERE tenant = ?10 AND id = ?3 AND kind = 'volume')
                AND NOT EXISTS
-                   (SELECT 1 FROM json_each(?9) AS need
-                    WHERE NOT EXISTS (SELECT 1 FROM volumes WHERE id = need.value)
-                      AND NOT EXISTS (SELECT 1 FROM products WHERE id = need.value))
+                   (SELECT 1 FROM json_each(?9) AS need WHERE NOT EXISTS
+                        (SELECT 1 FROM holdings WHERE tenant = ?10 AND id = need.value))
              ON CONFLICT (idempotency_key) DO NOTHING
              RETURNING *",
         )
@@ -76,6 +83,8 @@ impl JobStore for SqliteStore {
         .bind(i64::try_from(queue_limit).unwrap_or(i64::MAX))
         .bind(to_json(&job.needs)?)
         .bind(job.tenant.as_str())
+        .bind(&job.tags.external_id)
+        .bind(to_json(&job.tags.labels)?)
         .bind(job.webhook.as_ref().map(to_json).transpose()?)
         .bind(&job.trace_parent)
         .fetch_optional(&mut *transaction)
@@ -102,24 +111,24 @@ impl JobStore for SqliteStore {
         row.map(rows::job).transpose()
     }
 
-    async fn jobs(&self, state: Option<JobState>, page: ListRequest) -> StoreResult<ListPage<Job>> {
-        // Two statements, because one with `state = ? OR ? IS NULL` would use no index.
-        let query = match state {
-            Some(_) => {
-                "SELECT * FROM jobs WHERE state = ?1 AND sequence < ?2
-                 ORDER BY sequence DESC LIMIT ?3"
+    async fn jobs(&self, filter: &JobFilter, page: ListRequest) -> StoreResult<ListPage<Job>> {
+        let mut query = QueryBuilder::new("SELECT * FROM jobs WHERE tenant = ");
+        query.push_bind(filter.tenant.to_string());
+        if let Some(state) = filter.state {
+            query.push(" AND state = ").push_bind(state.as_str());
+        }
+        for (column, value) in [("volume", &filter.volume), ("kind", &filter.kind)] {
+            if let Some(value) = value {
+                query.push(" AND ").push(column).push(" = ");
+                query.push_bind(value.clone());
             }
-            None => {
-                "SELECT * FROM jobs WHERE ?1 IS NULL AND sequence < ?2
-                 ORDER BY sequence DESC LIMIT ?3"
-            }
-        };
-        let rows = sqlx::query(query)
-            .bind(state.map(JobState::as_str))
-            .bind(page.before.unwrap_or(i64::MAX))
-            .bind(i64::from(page.limit) + 1)
-            .fetch_all(&self.readers)
-            .await?;
+        }
+        if let Some(moment) = filter.created_after {
+            query.push(" AND created_at > ").push_bind(moment);
+        }
+        push_tags(&mut query, "", &filter.tenant, Resource::Job, &filter.tags);
+        push_page(&mut query, "sequence", page);
+        let rows = query.build().fetch_all(&self.readers).await?;
         rows::page(rows, page, rows::job, |job| job.sequence)
     }
 
@@ -157,7 +166,7 @@ impl JobStore for SqliteStore {
             "SELECT max(at) FROM (
                  SELECT (SELECT created_at FROM jobs ORDER BY sequence DESC LIMIT 1) AS at
                  UNION ALL SELECT (SELECT max(finished_at) FROM jobs WHERE finished_at IS NOT NULL)
-                 UNION ALL SELECT (SELECT max(used_at) FROM volumes))",
+                 UNION ALL SELECT (SELECT max(renewed_at) FROM holdings WHERE kind = 'volume'))",
         )
         .fetch_one(&self.readers)
         .await?;
@@ -275,7 +284,7 @@ impl JobStore for SqliteStore {
         let job = rows::job(row)?;
         renew_volumes(&mut transaction, &job, now).await?;
         if let Some(product) = product {
-            super::sqlite_catalogue::insert_product(&mut transaction, product).await?;
+            insert_product(&mut transaction, product, &job.tenant).await?;
         }
         transaction.commit().await?;
         Ok(Some(job))
@@ -399,19 +408,21 @@ impl JobStore for SqliteStore {
 
     async fn delete_job(&self, id: &str, now: Timestamp) -> StoreResult<Deleted> {
         let mut transaction = self.writer.begin().await?;
-        let done =
-            sqlx::query("DELETE FROM jobs WHERE id = ? AND state NOT IN ('queued', 'running')")
-                .bind(id)
-                .execute(&mut *transaction)
-                .await?;
-        if done.rows_affected() == 0 {
+        let row = sqlx::query(
+            "DELETE FROM jobs WHERE id = ? AND state NOT IN ('queued', 'running')
+             RETURNING tenant",
+        )
+        .bind(id)
+        .fetch_optional(&mut *transaction)
+        .await?;
+        let Some(row) = row else {
             drop(transaction);
             return Ok(match self.job(id).await? {
                 Some(_) => Deleted::InUse,
                 None => Deleted::Unknown,
             });
-        }
-        super::sqlite_catalogue::record_deletion(&mut transaction, id, now).await?;
+        };
+        record_deletion(&mut transaction, &rows::tenant(&row)?, id, now).await?;
         transaction.commit().await?;
         Ok(Deleted::Done)
     }
@@ -424,9 +435,10 @@ impl SqliteStore {
         let others = job.needs.iter().map(|(field, id)| (field.as_str(), id));
         for (field, id) in std::iter::once(volume).chain(others) {
             let found = sqlx::query(
-                "SELECT 1 FROM volumes WHERE id = ?1 UNION ALL
-                 SELECT 1 FROM products WHERE id = ?1 AND ?2 != 'volume'",
+                "SELECT 1 FROM holdings WHERE tenant = ?1 AND id = ?2
+                     AND (kind = 'volume' OR ?3 != 'volume')",
             )
+            .bind(job.tenant.as_str())
             .bind(id)
             .bind(field)
             .fetch_optional(&self.readers)

@@ -62,7 +62,7 @@ impl SqliteStore {
                 (&volume.id, "volume", volume.created_at)
             }
             ItemRecord::Product(product) => {
-                super::sqlite_catalogue::insert_product(&mut transaction, product).await?;
+                super::sqlite_catalogue::insert_content(&mut transaction, product).await?;
                 (&product.id, product.resource().noun(), product.created_at)
             }
         };

@@ -20,7 +20,7 @@
 use crate::jobs::{StoreError, StoreFault, StoreResult};
 use sqlx::query::Query;
 use sqlx::sqlite::{SqliteArguments, SqliteConnectOptions, SqliteRow};
-use sqlx::{ConnectOptions, Sqlite, SqliteConnection};
+use sqlx::{ConnectOptions, Row, Sqlite, SqliteConnection};
 use std::ops::{Deref, DerefMut};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -95,6 +95,24 @@ impl Writer {
     /// A connection of its own, beside the one that writes.
     pub async fn connect(&self) -> StoreResult<SqliteConnection> {
         Ok(self.options.connect().await?)
+    }
+
+    /// Moves the write-ahead log into the database and empties it. `false` if a reader was in the
+    /// way.
+    pub async fn truncate_log(&self) -> StoreResult<bool> {
+        let deadline = Instant::now() + self.wait;
+        let mut place = timeout_at(deadline, self.connection.lock())
+            .await
+            .map_err(|_| busy("other writes take too long"))?;
+        let mut connection = match place.take() {
+            Some(connection) => connection,
+            None => self.options.connect().await?,
+        };
+        let row = sqlx::query("PRAGMA wal_checkpoint(TRUNCATE)")
+            .fetch_one(&mut connection)
+            .await?;
+        *place = Some(connection);
+        Ok(row.try_get::<i64, _>(0)? == 0)
     }
 
     /// Whether the last write failed or was abandoned, so that only another write can tell

@@ -17,7 +17,7 @@ use tokio::io::{AsyncWrite, AsyncWriteExt};
 use ventriform::jobs::{
     BlobError, BlobStore, BlobStream, BlobWriter, FileRecord, Filed, ItemRecord, JobState,
     LocalFile, NewJob, Queue, QueueSettings, Resource, StagedFiles, StagedFor, StoredVolume,
-    SystemClock, Tenant, Timestamp, WorkerSettings, Workers,
+    SystemClock, Tags, Tenant, Timestamp, WorkerSettings, Workers,
 };
 use ventriform::store::Store;
 
@@ -199,7 +199,9 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
         }],
         facts: json!({}),
     };
-    let (_, new) = queue.add_volume(record, staged).await.unwrap();
+    let (tenant, tags) = (Tenant::default(), Tags::default());
+    let added = queue.add_volume(record, staged, &tenant, &tags).await;
+    let (_, new) = added.unwrap();
     assert!(new);
 
     let engine = fake_engine();
@@ -213,7 +215,8 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
     let workers = Workers::start(&queue, &engine.works, settings).unwrap();
     let work = engine.work("model").unwrap();
     let job = NewJob {
-        tenant: Tenant::default(),
+        tenant: tenant.clone(),
+        tags,
         kind: "model".into(),
         volume: "vol_1".into(),
         needs: BTreeMap::new(),
@@ -229,8 +232,8 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
     let job = job.unwrap();
     assert_eq!(job.state, JobState::Succeeded, "{:?}", job.failure);
 
-    let model = queue.catalogue.product(&job.result.unwrap()).await.unwrap();
-    let model = model.unwrap();
+    let model = queue.catalogue.product(&tenant, &job.result.unwrap()).await;
+    let model = model.unwrap().unwrap().item;
     let report = model.file("report.json").unwrap();
     let content = blobs
         .read(&model.id, &report.record(), 0..report.bytes)

@@ -5,7 +5,8 @@ use serde_json::{Value, json};
 use std::time::Duration;
 use ventriform::jobs::{
     Catalogue, Claimant, DeathLimit, Failure, Fault, FileRecord, Filed, JobOutcome, JobState,
-    JobStore, Lease, ListRequest, NewJob, Resource, StoredVolume, Tenant, random_id,
+    JobStore, Lease, ListRequest, NewJob, Resource, StoredVolume, TagFilter, Tags, Tenant,
+    random_id,
 };
 use ventriform::store::Store;
 
@@ -177,14 +178,17 @@ async fn filed(store: &Store) -> String {
         }],
         facts: json!({}),
     };
-    store.rows.add_volume(&volume).await.unwrap();
+    let (tenant, tags) = (Tenant::default(), Tags::default());
+    let added = store.rows.add_volume(&volume, &tenant, &tags).await;
+    assert!(added.unwrap());
     let parameters = fake_engine()
         .work("model")
         .unwrap()
         .parameters_from_json(json!({"points": 67}).as_object().unwrap())
         .unwrap();
     let order = NewJob {
-        tenant: Tenant::default(),
+        tenant,
+        tags,
         kind: "model".into(),
         volume: "vol_1".into(),
         needs: Default::default(),
@@ -223,7 +227,8 @@ async fn models_of_an_older_database_are_migrated() {
     pool.close().await;
 
     let store = Store::open(folder.path()).await.unwrap();
-    let model = store.rows.product("mdl_1").await.unwrap().unwrap();
+    let tenant = Tenant::default();
+    let model = store.rows.product(&tenant, "mdl_1").await.unwrap().unwrap();
     assert_eq!(model.volume.as_deref(), Some("vol_1"));
     assert_eq!(model.created_at, 5);
     let page = ListRequest {
@@ -231,7 +236,9 @@ async fn models_of_an_older_database_are_migrated() {
         limit: 9,
     };
     for (kind, count) in [(Resource::Model, 1), (Resource::Segmentation, 0)] {
-        let listed = store.rows.products(kind, page).await.unwrap();
+        let filter = TagFilter::default();
+        let listed = store.rows.products(&tenant, kind, &filter, page).await;
+        let listed = listed.unwrap();
         assert_eq!(listed.items.len(), count);
     }
 }

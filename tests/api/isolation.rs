@@ -173,6 +173,7 @@ async fn file_suspected(data: &Path, volume: &str) {
     let store = Store::open(data).await.unwrap();
     let work = fake_engine().work("model").unwrap().clone();
     let order = NewJob {
+        tags: Default::default(),
         webhook: None,
         trace_parent: None,
         tenant: Tenant::default(),

@@ -9,8 +9,9 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use tokio::io::AsyncWriteExt;
 use ventriform::jobs::{
-    BlobStore, Catalogue, Clock, Deleted, Filed, JobState, JobStore, NewJob, Queue, QueueSettings,
-    StagedFiles, StoredVolume, Tenant, Timestamp, Upkeep, WorkerSettings, Workers,
+    BlobStore, Catalogue, Clock, Erased, ErasureOrder, ErasureReason, FileRecord, Filed, JobState,
+    JobStore, NewJob, Queue, QueueSettings, RetentionAges, StagedFiles, StagedFor, StoredVolume,
+    Tags, Tenant, Timestamp, Upkeep, WorkerSettings, Workers,
 };
 use ventriform::store::Store;
 
@@ -63,12 +64,7 @@ impl Bench {
     }
 
     async fn staged(&self) -> Box<dyn StagedFiles> {
-        let staged = self
-            .store
-            .blobs
-            .stage(ventriform::jobs::StagedFor::Upload)
-            .await
-            .unwrap();
+        let staged = self.store.blobs.stage(StagedFor::Upload).await.unwrap();
         let mut file = staged.create("volume.nii").await.unwrap();
         file.write_all(b"VOLUME brief").await.unwrap();
         file.shutdown().await.unwrap();
@@ -81,9 +77,9 @@ impl Bench {
             sequence: 0,
             created_at: self.clock.now(),
             bytes: 12,
-            files: vec![ventriform::jobs::FileRecord {
+            files: vec![FileRecord {
                 name: "volume.nii".into(),
-                bytes: 0,
+                bytes: 6,
                 sha256: String::new(),
             }],
             facts: json!({}),
@@ -92,7 +88,10 @@ impl Bench {
 
     async fn add(&self, id: &str) {
         let files = self.staged().await;
-        self.queue.add_volume(self.volume(id), files).await.unwrap();
+        let (tenant, tags) = (Tenant::default(), Tags::default());
+        let volume = self.volume(id);
+        let added = self.queue.add_volume(volume, files, &tenant, &tags).await;
+        added.unwrap();
     }
 
     fn has_files(&self, id: &str) -> bool {
@@ -102,7 +101,10 @@ impl Bench {
     fn upkeep(&self, retention: Option<Duration>) -> Upkeep {
         Upkeep {
             queue: self.queue.clone(),
-            retention,
+            retention: RetentionAges {
+                volumes: retention,
+                ..RetentionAges::default()
+            },
             every: Duration::from_secs(60),
         }
     }
@@ -154,8 +156,11 @@ async fn files_whose_record_could_not_be_written_are_deleted_by_the_upkeep() {
     )
     .await;
     let files = bench.staged().await;
-    let added = bench.queue.add_volume(bench.volume("vol_1"), files).await;
-    assert!(added.is_err());
+    let (tenant, tags) = (Tenant::default(), Tags::default());
+    let volume = bench.volume("vol_1");
+    let added = bench.queue.add_volume(volume, files, &tenant, &tags).await;
+    let error = added.err().unwrap();
+    assert!(error.to_string().contains("volumes"), "{error}");
     assert!(bench.has_files("vol_1"));
     run(&mut database, "DROP TRIGGER full").await;
     run(&mut database, "ALTER TABLE volumes RENAME TO hidden").await;
@@ -177,7 +182,14 @@ async fn an_item_on_hold_is_deleted_neither_by_request_nor_by_age() {
     let hold = bench.queue.hold("vol_1").await;
     bench.clock.set(10_000);
     let upkeep = bench.upkeep(Some(Duration::from_secs(1)));
-    assert_eq!(bench.queue.erase("vol_1").await.unwrap(), Deleted::InUse);
+    let order = ErasureOrder {
+        tenant: Tenant::default(),
+        id: "vol_1".into(),
+        cascade: false,
+        by: "test".into(),
+        reason: ErasureReason::Request,
+    };
+    assert_eq!(bench.queue.erase(order).await.unwrap(), Erased::InUse);
     upkeep.run_once().await.unwrap();
     assert!(bench.has_files("vol_1"));
     drop(hold);
@@ -193,10 +205,14 @@ async fn the_age_of_a_volume_counts_from_its_last_upload() {
     for (now, kept) in [(4_000, true), (8_000, true), (14_000, false)] {
         bench.clock.set(now);
         upkeep.run_once().await.unwrap();
-        let found = bench.store.rows.volume("vol_1").await.unwrap().is_some();
+        let tenant = Tenant::default();
+        let volume = bench.store.rows.volume(&tenant, "vol_1").await;
+        let found = volume.unwrap().is_some();
         assert_eq!(found, kept, "at {now}");
         if now == 4_000 {
-            bench.queue.renew_volume("vol_1").await.unwrap();
+            let tags = Tags::default();
+            let renewed = bench.queue.renew_volume(&tenant, "vol_1", &tags).await;
+            assert!(renewed.unwrap().is_some());
         }
     }
 }
@@ -233,6 +249,7 @@ async fn steps_of_the_clock_neither_expire_a_lease_nor_keep_a_job_for_ever() {
     let work = fake_engine().work("model").unwrap().clone();
     let parameters = work.parameters_from_json(&serde_json::Map::new()).unwrap();
     let order = NewJob {
+        tags: Default::default(),
         webhook: None,
         trace_parent: None,
         tenant: Tenant::default(),

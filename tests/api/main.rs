@@ -30,6 +30,7 @@ mod monitoring;
 mod openapi;
 mod operations;
 mod receiver;
+mod records;
 mod security;
 mod segmentations;
 mod shutdown;

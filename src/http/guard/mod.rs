@@ -42,7 +42,12 @@ const RATE_LIMIT: HeaderName = HeaderName::from_static("ratelimit");
 const RATE_LIMIT_POLICY: HeaderName = HeaderName::from_static("ratelimit-policy");
 
 /// The paths under which everything needs the scope `admin`.
-const ADMIN_PATHS: [&str; 3] = ["/v1/keys", "/v1/audit", "/v1/webhooks"];
+const ADMIN_PATHS: [&str; 4] = [
+    "/v1/keys",
+    "/v1/audit",
+    "/v1/webhooks",
+    "/v1/volumes/{id}/hold",
+];
 
 /// Whether everybody may read this path: health, the page for people and the documentation. They
 /// show nothing that is stored.
@@ -276,6 +281,8 @@ mod tests {
         assert_eq!(needs(Method::POST, "/v1/webhooks/secret"), Scope::Admin);
         let again = "/v1/jobs/{id}/deliveries/{delivery}/redeliver";
         assert_eq!(needs(Method::POST, again), Scope::Submit);
+        assert_eq!(needs(Method::PUT, "/v1/volumes/{id}/hold"), Scope::Admin);
+        assert_eq!(needs(Method::DELETE, "/v1/volumes/{id}"), Scope::Submit);
         assert_eq!(needs(Method::GET, "/v1/auditors"), Scope::Read);
         assert_eq!(
             needed(&Method::from_bytes(b"PURGE").unwrap(), None),

@@ -17,6 +17,11 @@ pub struct JobBody {
     /// The job's id.
     #[schema(example = "job_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f")]
     id: String,
+    /// The caller's own id for it.
+    #[schema(max_length = 128)]
+    external_id: Option<String>,
+    /// The caller's own names and values for it.
+    labels: BTreeMap<String, String>,
     /// The kind of work.
     #[schema(example = "model")]
     kind: String,
@@ -164,6 +169,8 @@ fn body(job: Job, positions: &BTreeMap<i64, QueuePosition>, now: Timestamp) -> J
             report: below("report"),
         },
         id: job.id,
+        external_id: job.tags.external_id,
+        labels: job.tags.labels,
         kind: job.kind,
         volume: job.volume,
         parameters: job.parameters,

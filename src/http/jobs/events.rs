@@ -7,6 +7,7 @@
 
 use super::{describe, find};
 use crate::http::app::App;
+use crate::http::caller::Caller;
 use crate::http::openapi::{self, LookupProblems};
 use crate::http::problem::{Answer, Problem, ProblemBody};
 use crate::http::request::{PathSegments, query_pairs, refuse_unknown};
@@ -40,6 +41,7 @@ const KEEP_ALIVE: Duration = Duration::from_secs(15);
         LookupProblems))]
 pub async fn follow_job(
     State(app): State<App>,
+    caller: Caller,
     PathSegments(id): PathSegments<String>,
     RawQuery(query): RawQuery,
     headers: HeaderMap,
@@ -48,7 +50,7 @@ pub async fn follow_job(
     let seen = last_event_id(&headers)?;
     // Subscribing comes before reading, so that no change is missed in between.
     let changes = app.queue.changes();
-    let job = find(&app, &id).await?;
+    let job = find(&app, &caller.tenant, &id).await?;
     if job.state.is_final() && job.revision <= seen {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }

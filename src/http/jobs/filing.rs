@@ -5,6 +5,7 @@
 
 use super::describe;
 use crate::http::app::App;
+use crate::http::caller::Caller;
 use crate::http::given_webhook::GivenWebhook;
 use crate::http::problem::not_found::field_names_nothing;
 use crate::http::problem::{Answer, Problem};
@@ -12,8 +13,8 @@ use crate::http::products::{self, Offer};
 use crate::http::request::query_pairs;
 use crate::http::upload::{self, Upload};
 use crate::http::wire::path_of;
-use crate::http::{idempotency, negotiate, observe};
-use crate::jobs::{Filed, Job, JobState, JobWebhook, NewJob, Resource, Tenant, Work};
+use crate::http::{idempotency, negotiate, observe, tags};
+use crate::jobs::{Filed, Job, JobState, JobWebhook, NewJob, Resource, Tags, Tenant, Work};
 use axum::Json;
 use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
@@ -40,6 +41,7 @@ pub struct UploadJob {
 /// the job to end and answers with the offer that `Accept` rates highest.
 pub async fn file_upload(
     app: &App,
+    caller: &Caller,
     job: UploadJob,
     query: Option<&str>,
     request: Request,
@@ -60,43 +62,51 @@ pub async fn file_upload(
         Some(given) => Some(given.of_job(app).await?),
         None => None,
     };
-    let filing = Filing {
+    let mut given = pairs.clone();
+    let (tags, mut pairs) = tags::take(app, pairs)?;
+    let tenant = &caller.tenant;
+    let mut filing = Filing {
+        tenant: tenant.clone(),
+        tags,
         key,
         webhook,
         trace_parent: observe::trace_parent(&request),
     };
     let mut parameters = work.parameters_from_text(&pairs)?;
     // A repeated request gets its job, whatever has become of the queue and of what it names.
-    if !key_was_used(app, filing.key.as_deref()).await? {
-        require(app, &work.needs(&parameters).items).await?;
+    if !key_was_used(app, tenant, filing.key.as_deref()).await? {
+        require(app, tenant, &work.needs(&parameters).items).await?;
         if app.queue.is_full().await? {
             return Err(queue_full(app).await);
         }
     }
     let mut upload = upload::receive(app, request, job.apart).await?;
-    let given = pairs.len();
-    pairs.append(&mut upload.fields);
-    let earlier = match &filing.key {
-        Some(key) => filed_earlier(app, &**work, &pairs, &mut upload, key.clone(), &filing).await?,
-        None => None,
-    };
-    if let Some(filed) = earlier {
-        let filed = accept(app, filed).await?;
+    let fields = !upload.fields.is_empty();
+    if fields {
+        given.append(&mut upload.fields);
+        (filing.tags, pairs) = tags::take(app, given)?;
+    }
+    if let Some(filed) = filed_earlier(app, &**work, &pairs, &mut upload, &filing).await? {
+        let filed = accept(app, tenant, filed).await?;
         return answer(app, filed, patience, &headers, &job.offers).await;
     }
     // Held until the job is filed: from then on the job keeps them.
     let mut holds = Vec::new();
     for (name, files) in upload.others {
-        let stored = files.store(app).await.map_err(|p| p.at(name))?;
-        pairs.push((name.to_owned(), stored.volume.id));
+        let stored = files
+            .store(app, tenant, &filing.tags)
+            .await
+            .map_err(|p| p.at(name))?;
+        pairs.push((name.to_owned(), stored.volume.id.clone()));
         holds.push(stored.hold);
     }
-    if pairs.len() > given {
+    if fields || !holds.is_empty() {
         parameters = work.parameters_from_text(&pairs)?;
     }
-    let stored = upload.volume.store(app).await?;
+    let stored = upload.volume.store(app, tenant, &filing.tags).await?;
     holds.push(stored.hold);
-    let filed = file(app, &new_job(&**work, stored.volume.id, parameters, filing)).await?;
+    let volume = stored.volume.item.id;
+    let filed = file(app, &new_job(&**work, volume, parameters, filing)).await?;
     drop(holds);
     answer(app, filed, patience, &headers, &job.offers).await
 }
@@ -116,7 +126,12 @@ async fn answer(
 }
 
 /// What a request says about a job besides its work.
+#[derive(Clone)]
 pub struct Filing {
+    /// Whose job it is.
+    pub tenant: Tenant,
+    /// The tenant's names for the job.
+    pub tags: Tags,
     /// Its idempotency key.
     pub key: Option<String>,
     /// Where the job is told about.
@@ -125,13 +140,12 @@ pub struct Filing {
     pub trace_parent: Option<String>,
 }
 
-/// Whether an earlier request was accepted under that key.
-async fn key_was_used(app: &App, key: Option<&str>) -> Answer<bool> {
+/// Whether an earlier request of the tenant was accepted under that key.
+async fn key_was_used(app: &App, tenant: &Tenant, key: Option<&str>) -> Answer<bool> {
     let Some(key) = key else {
         return Ok(false);
     };
-    let tenant = Tenant::default();
-    Ok(app.queue.jobs.filed_under(&tenant, key).await?.is_some())
+    Ok(app.queue.jobs.filed_under(tenant, key).await?.is_some())
 }
 
 /// What became of the key of this upload, if it was used before: ids are hashes, so the request can
@@ -141,20 +155,17 @@ async fn filed_earlier(
     work: &dyn Work,
     pairs: &[(String, String)],
     upload: &mut Upload,
-    key: String,
-    given: &Filing,
+    filing: &Filing,
 ) -> Answer<Option<Filed>> {
+    if filing.key.is_none() {
+        return Ok(None);
+    }
     let mut pairs = pairs.to_vec();
     for (name, files) in &mut upload.others {
         pairs.push(((*name).to_owned(), files.volume_id()));
     }
     let parameters = work.parameters_from_text(&pairs)?;
-    let filing = Filing {
-        key: Some(key),
-        webhook: given.webhook.clone(),
-        trace_parent: None,
-    };
-    let job = new_job(work, upload.volume.volume_id(), parameters, filing);
+    let job = new_job(work, upload.volume.volume_id(), parameters, filing.clone());
     let Some(promise) = job.idempotency else {
         return Ok(None);
     };
@@ -175,15 +186,17 @@ pub fn new_job(
 ) -> NewJob {
     let kind = work.makes().noun();
     NewJob {
-        tenant: Tenant::default(),
+        tenant: filing.tenant,
         kind: kind.into(),
         idempotency: idempotency::promise(
             filing.key,
             kind,
             &volume,
             &parameters,
+            &filing.tags,
             filing.webhook.as_ref(),
         ),
+        tags: filing.tags,
         needs: work.needs(&parameters).items,
         volume,
         parameters,
@@ -209,7 +222,7 @@ async fn wait(
         .unwrap_or(HeaderValue::from_static("wait"));
     let mut response = match (job.state, &job.result) {
         (JobState::Succeeded, Some(id)) => {
-            let product = products::find_any(app, id).await?;
+            let product = products::find_any(app, &job.tenant, id).await?;
             let offer = products::choose(headers, offers)?;
             // The conditional headers of this request concern the upload, not the result.
             let mut response = products::send(app, &product, offer, &HeaderMap::new()).await?;
@@ -226,14 +239,14 @@ async fn wait(
 }
 
 /// Refuses a parameter that names something that does not exist.
-async fn require(app: &App, needs: &BTreeMap<String, String>) -> Answer<()> {
+async fn require(app: &App, tenant: &Tenant, needs: &BTreeMap<String, String>) -> Answer<()> {
     for (field, id) in needs {
         let there = match Resource::of(id) {
-            Some(Resource::Volume) => app.queue.catalogue.volume(id).await?.is_some(),
-            _ => app.queue.catalogue.product(id).await?.is_some(),
+            Some(Resource::Volume) => app.queue.catalogue.volume(tenant, id).await?.is_some(),
+            _ => app.queue.catalogue.product(tenant, id).await?.is_some(),
         };
         if !there {
-            return Err(field_names_nothing(&*app.queue.catalogue, field, id).await?);
+            return Err(field_names_nothing(&*app.queue.catalogue, tenant, field, id).await?);
         }
     }
     Ok(())
@@ -246,10 +259,10 @@ async fn require(app: &App, needs: &BTreeMap<String, String>) -> Answer<()> {
 /// queue is full.
 pub async fn file(app: &App, job: &NewJob) -> Answer<Job> {
     let filed = app.queue.file(job).await?;
-    accept(app, filed).await
+    accept(app, &job.tenant, filed).await
 }
 
-async fn accept(app: &App, filed: Filed) -> Answer<Job> {
+async fn accept(app: &App, tenant: &Tenant, filed: Filed) -> Answer<Job> {
     match filed {
         Filed::New(job) | Filed::Same(job) => Ok(job),
         Filed::QueueFull => Err(queue_full(app).await),
@@ -261,7 +274,7 @@ async fn accept(app: &App, filed: Filed) -> Answer<Job> {
         .at("Idempotency-Key")
         .fix("Use a new key for each new request.")),
         Filed::Missing { field, id } => {
-            Err(field_names_nothing(&*app.queue.catalogue, &field, &id).await?)
+            Err(field_names_nothing(&*app.queue.catalogue, tenant, &field, &id).await?)
         }
     }
 }

@@ -9,15 +9,22 @@ pub use body::{JobBody, describe, describe_all};
 pub use filing::Filing;
 
 use super::app::App;
+use super::caller::Caller;
 use super::given_webhook::webhook_of;
 use super::idempotency;
 use super::observe;
 use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
-use super::pagination::{list_query, next_cursor};
+use super::pagination::{next_cursor, page_of};
 use super::problem::not_found::missing;
 use super::problem::{Answer, Problem, ProblemBody, shorten};
-use super::request::{PathSegments, json_object, query_pairs, refuse_unknown, text, unknown};
-use crate::jobs::{Deleted, Interrupted, Job, JobState, NewJob, Resource};
+use super::request::{
+    PathSegments, json_object, merge_patch, query_pairs, refuse_unknown, text, unknown,
+};
+use super::tags;
+use crate::jobs::{
+    Deleted, Interrupted, Job, JobFilter, JobState, NewJob, Resource, Tenant, Timestamp,
+    parse_rfc3339,
+};
 use axum::Json;
 use axum::extract::{RawQuery, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
@@ -52,6 +59,7 @@ pub struct JobList {
     ))]
 pub async fn create_job(
     State(app): State<App>,
+    caller: Caller,
     RawQuery(query): RawQuery,
     request: Request,
 ) -> Answer {
@@ -60,6 +68,8 @@ pub async fn create_job(
     let trace_parent = observe::trace_parent(&request);
     let object = json_object(request).await?;
     let filing = Filing {
+        tenant: caller.tenant,
+        tags: tags::of_object(&app, &object)?,
         key,
         webhook: webhook_of(&app, &object).await?,
         trace_parent,
@@ -69,7 +79,14 @@ pub async fn create_job(
     filing::accepted(&app, job).await
 }
 
-const FIELDS: [&str; 4] = ["kind", "volume", "parameters", "webhook"];
+const FIELDS: [&str; 6] = [
+    "kind",
+    "volume",
+    "parameters",
+    "external_id",
+    "labels",
+    "webhook",
+];
 
 fn read_job(app: &App, object: &Map<String, Value>, filing: Filing) -> Answer<NewJob> {
     if let Some(name) = object.keys().find(|name| !FIELDS.contains(&name.as_str())) {
@@ -110,16 +127,44 @@ fn read_job(app: &App, object: &Map<String, Value>, filing: Filing) -> Answer<Ne
 
 /// List jobs
 #[utoipa::path(get, path = "/v1/jobs", tag = "jobs",
-    params(openapi::PageParameters,
-        ("state" = Option<JobStateName>, Query, description = "Only jobs in this state")),
+    params(openapi::PageParameters, openapi::TagParameters,
+        ("state" = Option<JobStateName>, Query, description = "Only jobs in this state"),
+        ("kind" = Option<String>, Query, description = "Only jobs of this kind: model, segmentation"),
+        ("volume" = Option<String>, Query, description = "Only jobs on this volume"),
+        ("created_after" = Option<String>, Query, format = DateTime,
+            description = "Only jobs filed after this moment (RFC 3339)")),
     responses((status = 200, description = "A page, newest first", body = JobList), ListProblems))]
-pub async fn list_jobs(State(app): State<App>, RawQuery(query): RawQuery) -> Answer<Json<JobList>> {
-    let (page, [state]) = list_query(query.as_deref(), ["state"])?;
-    let state = state.map(|name| parse_state(&name)).transpose()?;
-    let page = app.queue.jobs.jobs(state, page).await?;
+pub async fn list_jobs(
+    State(app): State<App>,
+    caller: Caller,
+    RawQuery(query): RawQuery,
+) -> Answer<Json<JobList>> {
+    let (tags, pairs) = tags::take_filter(&app, query_pairs(query.as_deref()))?;
+    let own = ["state", "kind", "volume", "created_after"];
+    let (page, [state, kind, volume, created_after]) = page_of(pairs, own)?;
+    let filter = JobFilter {
+        tenant: caller.tenant,
+        state: state.map(|name| parse_state(&name)).transpose()?,
+        kind,
+        volume,
+        tags,
+        created_after: created_after.map(|text| parse_moment(&text)).transpose()?,
+    };
+    let page = app.queue.jobs.jobs(&filter, page).await?;
     let next_cursor = next_cursor(&page);
     let jobs = describe_all(&app, page.items).await?;
     Ok(Json(JobList { jobs, next_cursor }))
+}
+
+fn parse_moment(text: &str) -> Answer<Timestamp> {
+    parse_rfc3339(text).ok_or_else(|| {
+        Problem::bad_request(
+            "invalid-parameter",
+            "`created_after` must be a moment as RFC 3339 writes it.",
+        )
+        .at("created_after")
+        .fix("Give a moment such as 2026-11-22T08:00:00Z.")
+    })
 }
 
 fn parse_state(name: &str) -> Answer<JobState> {
@@ -153,11 +198,12 @@ fn parse_flag(name: &'static str, text: &str) -> Answer<bool> {
     responses((status = 200, description = "The job", body = JobBody), LookupProblems))]
 pub async fn get_job(
     State(app): State<App>,
+    caller: Caller,
     PathSegments(id): PathSegments<String>,
     RawQuery(query): RawQuery,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let job = find(&app, &id).await?;
+    let job = find(&app, &caller.tenant, &id).await?;
     let mut headers = HeaderMap::new();
     headers.insert(
         header::CACHE_CONTROL,
@@ -167,6 +213,36 @@ pub async fn get_job(
         headers.insert(header::RETRY_AFTER, header::HeaderValue::from_static("1"));
     }
     Ok((headers, Json(describe(&app, job).await?)).into_response())
+}
+
+/// Change a job's names
+///
+/// A JSON merge patch (RFC 7396) of `external_id` and `labels`: what is `null` is removed, what is
+/// absent stays.
+#[utoipa::path(patch, path = "/v1/jobs/{id}", tag = "jobs", operation_id = "update_job",
+    params(("id" = String, Path, description = "The job's id")),
+    request_body(content(
+        (openapi::TagsPatch = "application/merge-patch+json"),
+        (openapi::TagsPatch = "application/json"))),
+    responses((status = 200, description = "The job", body = JobBody),
+        openapi::PatchProblems, LookupProblems))]
+pub async fn update_job(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    request: Request,
+) -> Answer<Json<JobBody>> {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let job = find(&app, &caller.tenant, &id).await?;
+    let patch = merge_patch(request).await?;
+    let tags = tags::merged(&app, job.tags, &patch)?;
+    app.queue
+        .catalogue
+        .set_tags(&caller.tenant, &id, &tags)
+        .await?;
+    let job = find(&app, &caller.tenant, &id).await?;
+    Ok(Json(describe(&app, job).await?))
 }
 
 /// Cancel or erase a job
@@ -188,6 +264,7 @@ pub async fn get_job(
         LookupProblems))]
 pub async fn delete_job(
     State(app): State<App>,
+    caller: Caller,
     PathSegments(id): PathSegments<String>,
     RawQuery(query): RawQuery,
 ) -> Answer {
@@ -197,7 +274,9 @@ pub async fn delete_job(
         Some((_, value)) => parse_flag("erase", value)?,
         None => false,
     };
-    if erase && !find(&app, &id).await?.state.is_final() {
+    let tenant = &caller.tenant;
+    let job = find(&app, tenant, &id).await?;
+    if erase && !job.state.is_final() {
         return Err(Problem::new(
             StatusCode::CONFLICT,
             "not-finished",
@@ -209,23 +288,24 @@ pub async fn delete_job(
         Interrupted::Cancelled(job) => (StatusCode::OK, job),
         Interrupted::Asked(job) => (StatusCode::ACCEPTED, job),
         Interrupted::Unknown => {
-            return Err(missing(&*app.queue.catalogue, Resource::Job, &id).await);
+            return Err(missing(&*app.queue.catalogue, tenant, Resource::Job, &id).await);
         }
         Interrupted::Finished(job) if job.cancel_requested && !erase => (StatusCode::OK, job),
         Interrupted::Finished(_) => {
-            return match app.queue.erase(&id).await? {
+            return match app.queue.delete_job(&id).await? {
                 Deleted::Done => Ok(StatusCode::NO_CONTENT.into_response()),
-                _ => Err(missing(&*app.queue.catalogue, Resource::Job, &id).await),
+                _ => Err(missing(&*app.queue.catalogue, tenant, Resource::Job, &id).await),
             };
         }
     };
     Ok((status, Json(describe(&app, job).await?)).into_response())
 }
 
-/// The job of that id, or the 404 or 410 that says why there is none.
-pub async fn find(app: &App, id: &str) -> Answer<Job> {
-    match app.queue.jobs.job(id).await? {
+/// The tenant's job of that id, or the 404 or 410 that says why there is none.
+pub async fn find(app: &App, tenant: &Tenant, id: &str) -> Answer<Job> {
+    let job = app.queue.jobs.job(id).await?;
+    match job.filter(|job| job.tenant == *tenant) {
         Some(job) => Ok(job),
-        None => Err(missing(&*app.queue.catalogue, Resource::Job, id).await),
+        None => Err(missing(&*app.queue.catalogue, tenant, Resource::Job, id).await),
     }
 }

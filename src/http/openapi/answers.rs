@@ -55,7 +55,26 @@ problems! {
     }
     /// Problems of erasing what a job may need.
     EraseProblems {
-        409: "An unfinished job needs it",
+        409: "An unfinished job needs it, or a legal hold keeps it",
+    }
+    /// Problems of changing names.
+    PatchProblems {
+        408: "The body did not arrive in time",
+        413: "The body is larger than the operator allows",
+        415: "The body has a type or encoding that this path does not read",
+        422: "A name or label cannot be used",
+    }
+    /// Problems of what needs a wider scope.
+    ScopeProblems {
+        403: "The caller's scope does not allow it",
+    }
+    /// Problems of setting a legal hold.
+    HoldProblems {
+        403: "The caller's scope does not allow it",
+        408: "The body did not arrive in time",
+        413: "The body is larger than the operator allows",
+        415: "The body has a type or encoding that this path does not read",
+        422: "The reason cannot be used",
     }
     /// Problems of uploads.
     UploadProblems {
@@ -75,6 +94,16 @@ problems! {
         422: "A field or parameter is invalid, or the idempotency key was used for another request",
         429: "The queue is full; the job was not accepted",
         500: "The service met an error of its own",
+    }
+}
+
+/// 304 of what carries a validator.
+pub struct UnchangedAnswer;
+
+impl IntoResponses for UnchangedAnswer {
+    fn responses() -> Responses {
+        let unchanged = ResponseBuilder::new().description("The client's copy is still current");
+        [("304".to_owned(), unchanged.build().into())].into()
     }
 }
 
@@ -145,6 +174,10 @@ macro_rules! files {
 files! {
     /// 200 with a mesh in one of the formats.
     MeshAnswer: "The mesh", [meshes()];
+    /// 200 with an uploaded file.
+    OriginalAnswer: "The file", [files_of([
+        "application/gzip", "application/dicom", "application/nifti", "application/octet-stream",
+    ])];
     /// 200 with a report.
     ReportAnswer: "The report", [reports()];
     /// 200 with the mask, mesh or report of a segmentation.

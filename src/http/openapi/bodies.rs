@@ -2,11 +2,13 @@
 
 use super::inputs::{ModelParametersObject, SegmentationParametersObject};
 use crate::hooks::HookEvent;
+use crate::http::legal_hold::REASON_LENGTH;
+use crate::http::tags;
 use serde_json::json;
 use std::borrow::Cow;
 use utoipa::openapi::schema::{
     AdditionalProperties, AnyOfBuilder, ArrayBuilder, KnownFormat, Object, ObjectBuilder, Schema,
-    SchemaFormat, Type,
+    SchemaFormat, SchemaType, Type,
 };
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
@@ -43,7 +45,10 @@ impl PartialSchema for JobRequest {
         let volume = text()
             .description(Some("Id of the volume"))
             .examples(["vol_9f86d081884c7d659a2feaa0c55ad015"]);
+        let (external_id, labels) = tag_fields(false);
         let object = ObjectBuilder::new()
+            .property("external_id", external_id)
+            .property("labels", labels)
             .property("kind", Schema::from(kind))
             .property("volume", Schema::from(volume))
             .property("parameters", Ref::from_schema_name(JobParameters::name()))
@@ -115,6 +120,77 @@ impl PartialSchema for JobParameters {
             .item(Ref::from_schema_name(ModelParametersObject::name()))
             .item(Ref::from_schema_name(SegmentationParametersObject::name()));
         Schema::AnyOf(parameters.build()).into()
+    }
+}
+
+/// `external_id` and `labels`. In a patch, `null` removes them.
+fn tag_fields(patch: bool) -> (Schema, Schema) {
+    let text = |longest: usize| {
+        let kinds = match patch {
+            true => SchemaType::from_iter([Type::String, Type::Null]),
+            false => Type::String.into(),
+        };
+        ObjectBuilder::new()
+            .schema_type(kinds)
+            .min_length(Some(1))
+            .max_length(Some(longest))
+    };
+    let labels = ObjectBuilder::new()
+        .schema_type(match patch {
+            true => SchemaType::from_iter([Type::Object, Type::Null]),
+            false => Type::Object.into(),
+        })
+        .description(Some("The caller's own names and values"))
+        .additional_properties(Some(Schema::from(text(tags::LABEL_VALUE_LENGTH))))
+        .examples([json!({"study": "42"})]);
+    let external_id = text(tags::EXTERNAL_ID_LENGTH)
+        .description(Some("The id in the caller's own system"))
+        .examples(["A-2026-17"]);
+    (external_id.into(), labels.into())
+}
+
+/// A JSON merge patch of a caller's names.
+pub struct TagsPatch;
+
+impl ToSchema for TagsPatch {
+    fn name() -> Cow<'static, str> {
+        "TagsPatch".into()
+    }
+}
+
+impl PartialSchema for TagsPatch {
+    fn schema() -> RefOr<Schema> {
+        let (external_id, labels) = tag_fields(true);
+        let patch = ObjectBuilder::new()
+            .property("external_id", external_id)
+            .property("labels", labels)
+            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
+        Schema::from(patch).into()
+    }
+}
+
+/// Why a volume is put on legal hold.
+pub struct HoldRequest;
+
+impl ToSchema for HoldRequest {
+    fn name() -> Cow<'static, str> {
+        "HoldRequest".into()
+    }
+}
+
+impl PartialSchema for HoldRequest {
+    fn schema() -> RefOr<Schema> {
+        let reason = ObjectBuilder::new()
+            .schema_type(Type::String)
+            .min_length(Some(1))
+            .max_length(Some(REASON_LENGTH))
+            .description(Some("Why the volume must be kept"))
+            .examples(["Case 17/2026"]);
+        let request = ObjectBuilder::new()
+            .property("reason", Schema::from(reason))
+            .required("reason")
+            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
+        Schema::from(request).into()
     }
 }
 

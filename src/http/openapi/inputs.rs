@@ -176,6 +176,61 @@ impl IntoParams for PageParameters {
     }
 }
 
+/// `external_id` and `label`.
+pub struct TagParameters;
+
+impl IntoParams for TagParameters {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let text = |pattern: &str| {
+            ObjectBuilder::new()
+                .schema_type(Type::String)
+                .pattern(Some(pattern))
+        };
+        let labels = ArrayBuilder::new()
+            .items(RefOr::T(Schema::from(
+                text("^[A-Za-z0-9_./-]{1,64}:[ -~]{1,256}$").examples(["study:42"]),
+            )))
+            .max_items(Some(16));
+        vec![
+            query("external_id", "The id in the caller's own system")
+                .schema(Some(Schema::from(text("^[ -~]{1,128}$"))))
+                .build(),
+            query(
+                "label",
+                "A name and a value with a colon between them; repeat for several",
+            )
+            .schema(Some(Schema::Array(labels.build())))
+            .style(Some(ParameterStyle::Form))
+            .explode(Some(true))
+            .build(),
+        ]
+    }
+}
+
+/// `cascade`, and `Prefer: return=representation`.
+pub struct ErasureParameters;
+
+impl IntoParams for ErasureParameters {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        vec![header(
+            "Prefer",
+            "`return=representation` asks for the receipt in the answer",
+        )]
+    }
+}
+
+/// `If-None-Match`.
+pub struct CachedHeaders;
+
+impl IntoParams for CachedHeaders {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        vec![header(
+            "If-None-Match",
+            "Answer 304 if the `ETag` is among these",
+        )]
+    }
+}
+
 fn query(name: &str, description: &str) -> ParameterBuilder {
     ParameterBuilder::new()
         .name(name)

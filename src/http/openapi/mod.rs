@@ -23,17 +23,19 @@ mod operation;
 mod reports;
 
 pub use answers::{
-    DownloadAnswers, EraseProblems, EventsAnswer, FileProblems, ListProblems, LookupProblems,
-    MeshAnswer, ModelFileAnswer, ReportAnswer, SegmentationAnswer, SegmentationFileAnswer,
-    UploadProblems, WaitAnswers,
+    DownloadAnswers, EraseProblems, EventsAnswer, FileProblems, HoldProblems, ListProblems,
+    LookupProblems, MeshAnswer, ModelFileAnswer, OriginalAnswer, PatchProblems, ReportAnswer,
+    ScopeProblems, SegmentationAnswer, SegmentationFileAnswer, UnchangedAnswer, UploadProblems,
+    WaitAnswers,
 };
 pub use bodies::{
-    JobParameters, JobRequest, MeshDocument, SegmentationForm, UploadForm, WebhookRequest,
+    HoldRequest, JobParameters, JobRequest, MeshDocument, SegmentationForm, TagsPatch, UploadForm,
+    WebhookRequest,
 };
 pub use inputs::{
-    ConditionalHeaders, EventHeader, IdempotencyHeader, ModelParametersObject, ModelQuery,
-    PageParameters, PreferHeader, SegmentationParametersObject, SegmentationQuery, TemplateQuery,
-    WebhookInputs,
+    CachedHeaders, ConditionalHeaders, ErasureParameters, EventHeader, IdempotencyHeader,
+    ModelParametersObject, ModelQuery, PageParameters, PreferHeader, SegmentationParametersObject,
+    SegmentationQuery, TagParameters, TemplateQuery, WebhookInputs,
 };
 pub use operation::Documented;
 pub use reports::{ModelSummarySchema, SegmentationSummarySchema, TemplateSummarySchema};
@@ -61,6 +63,7 @@ use utoipa::openapi::{RefOr, Required};
         (name = "templates", description = "The library of models that `auto` chooses from"),
         (name = "webhooks", description = "Telling other programs about jobs"),
         (name = "access", description = "Keys and the audit trail, for the scope `admin`"),
+        (name = "erasures", description = "Receipts of what was erased"),
         (name = "operations", description = "For operators"),
     ),
     components(schemas(

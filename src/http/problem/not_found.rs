@@ -3,12 +3,17 @@
 
 use super::{Answer, Problem, shorten};
 use crate::http::wire::rfc3339;
-use crate::jobs::{Catalogue, Resource, Timestamp};
+use crate::jobs::{Catalogue, Resource, Tenant, Timestamp};
 use axum::http::StatusCode;
 
-/// 410 if the catalogue remembers that `id` was erased, else 404.
-pub async fn missing(catalogue: &dyn Catalogue, resource: Resource, id: &str) -> Problem {
-    match catalogue.erased_at(id).await {
+/// 410 if the tenant erased `id`, else 404.
+pub async fn missing(
+    catalogue: &dyn Catalogue,
+    tenant: &Tenant,
+    resource: Resource,
+    id: &str,
+) -> Problem {
+    match catalogue.erased_at(tenant, id).await {
         Ok(Some(at)) if Resource::of(id) == Some(resource) => erased(resource, id, at),
         Ok(_) => unknown_id(resource, id),
         Err(error) => error.into(),
@@ -58,6 +63,16 @@ pub fn no_such_file(resource: Resource, name: &str, names: &[String]) -> Problem
     .fix(format!("Ask for one of {}.", names.join(", ")))
 }
 
+/// 404: there is no receipt of an erasure with this id.
+pub fn no_receipt(id: &str) -> Problem {
+    Problem::new(
+        StatusCode::NOT_FOUND,
+        "not-found",
+        format!("There is no receipt `{}`.", shorten(id)),
+    )
+    .fix("Take an id from the list at GET /v1/erasures.")
+}
+
 /// 404: no route has this path.
 pub async fn no_such_path() -> Problem {
     Problem::new(
@@ -74,6 +89,7 @@ pub async fn no_such_path() -> Problem {
 /// A problem with status 500 if the catalogue cannot be read.
 pub async fn field_names_nothing(
     catalogue: &dyn Catalogue,
+    tenant: &Tenant,
     field: &str,
     id: &str,
 ) -> Answer<Problem> {
@@ -82,7 +98,7 @@ pub async fn field_names_nothing(
         _ => Resource::Volume,
     });
     let (noun, short) = (resource.noun(), shorten(id));
-    let detail = match catalogue.erased_at(id).await? {
+    let detail = match catalogue.erased_at(tenant, id).await? {
         Some(at) => format!("The {noun} `{short}` was erased at {}.", rfc3339(at)),
         None => format!("There is no {noun} `{short}`."),
     };

@@ -3,8 +3,8 @@
 use crate::http::app::App;
 use crate::http::problem::{Answer, Problem, body};
 use crate::jobs::{
-    BlobError, BlobStore, BlobWriter, FileRecord, Hold, StagedFiles, StagedFor, StoredVolume, hex,
-    volume_id,
+    BlobError, BlobStore, BlobWriter, FileRecord, Held, Hold, StagedFiles, StagedFor, StoredVolume,
+    Tags, Tenant, hex, volume_id,
 };
 use crate::progress::Monitor;
 use crate::work::INSPECTION_MEMORY;
@@ -29,8 +29,8 @@ pub struct Bundle {
 /// A stored volume, which is not deleted while this exists.
 pub struct Stored {
     /// Its record.
-    pub volume: StoredVolume,
-    /// Whether it was not stored before.
+    pub volume: Held<StoredVolume>,
+    /// Whether the tenant did not have it before.
     pub new: bool,
     /// Keeps it from being deleted.
     pub hold: Hold,
@@ -168,18 +168,14 @@ impl Bundle {
     ///
     /// # Errors
     /// 413 or 422 if the files are not a usable volume.
-    pub async fn store(mut self, app: &App) -> Answer<Stored> {
+    pub async fn store(mut self, app: &App, tenant: &Tenant, tags: &Tags) -> Answer<Stored> {
         let id = self.volume_id();
         let records = self.records();
         let hold = app.queue.hold(&id).await;
-        if app.queue.intact_volume(&id).await?.is_some()
-            && let Some(volume) = app.queue.renew_volume(&id).await?
+        if app.queue.has_intact_volume(&id).await?
+            && let Some((volume, new)) = app.queue.renew_volume(tenant, &id, tags).await?
         {
-            return Ok(Stored {
-                volume,
-                new: false,
-                hold,
-            });
+            return Ok(Stored { volume, new, hold });
         }
         let received = self.files;
         let staged = self.staged.ok_or_else(body::empty)?;
@@ -202,7 +198,7 @@ impl Bundle {
             facts: facts.to_json(),
             id,
         };
-        let (volume, new) = app.queue.add_volume(volume, staged).await?;
+        let (volume, new) = app.queue.add_volume(volume, staged, tenant, tags).await?;
         Ok(Stored { volume, new, hold })
     }
 

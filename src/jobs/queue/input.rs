@@ -3,7 +3,7 @@
 use super::Queue;
 use crate::jobs::{
     BlobError, Failure, Fault, FileRecord, Job, ListRequest, LocalFile, Needs, Product, Resource,
-    StoreError, StoreFault, StoredItem, Work, WorkInput,
+    StoreError, StoreFault, StoredItem, TagFilter, Tenant, Work, WorkInput,
 };
 use serde_json::Map;
 use std::collections::BTreeMap;
@@ -40,12 +40,12 @@ impl Queue {
             library,
             files,
         } = work.needs(&job.parameters);
-        let Some(volume) = self.item(&job.volume, files).await? else {
+        let Some(volume) = self.item(&job.tenant, &job.volume, files).await? else {
             return Ok(Err(volume_missing(&job.volume)));
         };
         let mut found = BTreeMap::new();
         for (field, id) in items {
-            if let Some(item) = self.item(&id, files).await? {
+            if let Some(item) = self.item(&job.tenant, &id, files).await? {
                 found.insert(field, item);
             }
         }
@@ -55,7 +55,7 @@ impl Queue {
             parameters: job.parameters.clone(),
             items: found,
             library: if library {
-                self.library(files).await?
+                self.library(&job.tenant, files).await?
             } else {
                 Vec::new()
             },
@@ -64,19 +64,24 @@ impl Queue {
 
     /// A volume with all its files, or a product with the `wanted` ones. `None` if it does not
     /// exist, or a file of a volume does not.
-    async fn item(&self, id: &str, wanted: &[&str]) -> Result<Option<StoredItem>, StoreError> {
+    async fn item(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        wanted: &[&str],
+    ) -> Result<Option<StoredItem>, StoreError> {
         if Resource::of(id) != Some(Resource::Volume) {
-            return Ok(match self.catalogue.product(id).await? {
-                Some(product) => Some(self.with_files(product, wanted).await?),
+            return Ok(match self.catalogue.product(tenant, id).await? {
+                Some(product) => Some(self.with_files(product.item, wanted).await?),
                 None => None,
             });
         }
-        let Some(volume) = self.catalogue.volume(id).await? else {
+        let Some(volume) = self.catalogue.volume(tenant, id).await? else {
             return Ok(None);
         };
         let files = self.volume_files(id, &volume.files).await?;
         Ok(files.map(|files| StoredItem {
-            id: volume.id,
+            id: volume.item.id,
             parameters: Map::new(),
             files,
         }))
@@ -123,18 +128,25 @@ impl Queue {
         })
     }
 
-    /// Every template in the order of ids, which does not depend on when they were added.
-    async fn library(&self, wanted: &[&str]) -> Result<Vec<StoredItem>, StoreError> {
+    /// Every template of the tenant in the order of ids, which does not depend on when they were added.
+    async fn library(
+        &self,
+        tenant: &Tenant,
+        wanted: &[&str],
+    ) -> Result<Vec<StoredItem>, StoreError> {
         let mut library = Vec::new();
-        let mut before = None;
+        let (filter, mut before) = (TagFilter::default(), None);
         loop {
             let request = ListRequest {
                 before,
                 limit: LIBRARY_PAGE,
             };
-            let page = self.catalogue.products(Resource::Template, request).await?;
+            let page = self
+                .catalogue
+                .products(tenant, Resource::Template, &filter, request)
+                .await?;
             for product in page.items {
-                library.push(self.with_files(product, wanted).await?);
+                library.push(self.with_files(product.item, wanted).await?);
             }
             before = page.next;
             if before.is_none() {

@@ -1,12 +1,15 @@
 //! The queue: filing, watching and cancelling jobs.
 
+mod erase;
 mod input;
 mod items;
 mod publish;
 mod sweep;
 mod upkeep;
 
+pub use erase::RetentionAges;
 pub use items::Hold;
+pub use publish::TemplateSource;
 pub use sweep::{Custodian, Swept};
 pub use upkeep::{Upkeep, recover_after_crash};
 
@@ -17,6 +20,7 @@ use super::{
 use crate::progress::CancelToken;
 use items::Items;
 use std::collections::BTreeMap;
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 use tokio::sync::{Notify, broadcast};
@@ -54,6 +58,8 @@ pub struct Queue {
     /// The time of day.
     pub clock: Arc<dyn Clock>,
     items: Items,
+    /// Whether deleted rows may still be read in the database's files.
+    overwrite_due: AtomicBool,
     settings: QueueSettings,
     filed: Notify,
     changes: broadcast::Sender<Arc<Job>>,
@@ -79,6 +85,7 @@ impl Queue {
             blobs,
             clock,
             items: Items::default(),
+            overwrite_due: AtomicBool::new(false),
             settings,
             filed: Notify::new(),
             changes: broadcast::Sender::new(CHANGES_BUFFERED),

@@ -5,9 +5,9 @@
 
 use super::Queue;
 use crate::jobs::{
-    BlobError, Failure, Fault, ItemRecord, Job, JobOutcome, Lease, OutputFile, Product,
-    ProductFile, Resource, StagedFiles, StagedFor, StoreError, StoreFault, StoredVolume,
-    WorkOutput, content_id, hex,
+    BlobError, Failure, Fault, Held, ItemRecord, Job, JobOutcome, Lease, OutputFile, Product,
+    ProductFile, Resource, StagedFiles, StagedFor, StoreError, StoreFault, StoredVolume, Tags,
+    Tenant, WorkOutput, content_id, hex,
 };
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
@@ -16,7 +16,7 @@ use tokio::io::AsyncWriteExt;
 use tracing::Instrument;
 
 impl Queue {
-    /// Adds an uploaded volume durably. Returns the record, and whether it is new.
+    /// Adds an uploaded volume durably. Returns the record, and whether it is new for the tenant.
     ///
     /// # Errors
     /// If the files or the record cannot be written.
@@ -24,32 +24,37 @@ impl Queue {
         self: &Arc<Self>,
         volume: StoredVolume,
         files: Box<dyn StagedFiles>,
-    ) -> Result<(StoredVolume, bool), StoreError> {
-        let queue = self.clone();
+        tenant: &Tenant,
+        tags: &Tags,
+    ) -> Result<(Held<StoredVolume>, bool), StoreError> {
+        let (queue, tenant, tags) = (self.clone(), tenant.clone(), tags.clone());
         to_its_end(async move {
             let _lock = queue.items.lock(&volume.id).await;
             queue.items.unsettle(&volume.id);
             queue
                 .publish_unless_intact(&ItemRecord::Volume(volume.clone()), files)
                 .await?;
-            let new = queue.catalogue.add_volume(&volume).await?;
+            let new = queue.catalogue.add_volume(&volume, &tenant, &tags).await?;
             queue.items.settle(&volume.id);
-            let stored = queue.catalogue.volume(&volume.id).await?;
-            Ok((stored.unwrap_or(volume), new))
+            let stored = queue.catalogue.volume(&tenant, &volume.id).await?;
+            Ok((stored.ok_or_else(vanished)?, new))
         })
         .await
     }
 
-    /// The volume with that id, whose age counts from now: it was uploaded again.
+    /// The stored volume with that id, which the tenant has from now on, and whether it had it not
+    /// before: it was uploaded again, so its age counts from now.
     ///
     /// # Errors
     /// If the database fails.
-    pub async fn renew_volume(&self, id: &str) -> Result<Option<StoredVolume>, StoreError> {
-        // Most uploads are new: those shall not wait for a write that changes nothing.
-        if self.catalogue.volume(id).await?.is_none() {
-            return Ok(None);
-        }
-        self.catalogue.renew_volume(id, self.clock.now()).await
+    pub async fn renew_volume(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        tags: &Tags,
+    ) -> Result<Option<(Held<StoredVolume>, bool)>, StoreError> {
+        let now = self.clock.now();
+        self.catalogue.renew_volume(tenant, id, tags, now).await
     }
 
     /// Adds a template to the library, durably. Returns the record, and whether it is new: the
@@ -59,25 +64,29 @@ impl Queue {
     /// If the files or the record cannot be written.
     pub async fn add_template(
         self: &Arc<Self>,
-        name: &str,
+        source: TemplateSource<'_>,
         organ: &str,
         output: WorkOutput,
-    ) -> Result<(Product, bool), StoreError> {
+    ) -> Result<(Held<Product>, bool), StoreError> {
         self.blobs.require_room(0)?;
-        let parameters = [("name", name), ("organ", organ)]
+        let parameters = [("name", source.name), ("organ", organ)]
             .map(|(key, value)| (key.to_owned(), Value::from(value)))
             .into_iter()
             .collect();
         let template = self.product(Resource::Template, &[organ], None, parameters, &output);
-        let queue = self.clone();
+        let (queue, tenant) = (self.clone(), source.tenant.clone());
+        let volume = source.volume.map(str::to_owned);
         to_its_end(async move {
             let _lock = queue.items.lock(&template.id).await;
             queue.items.unsettle(&template.id);
             queue.write_files(&template, &output).await?;
-            let new = queue.catalogue.add_product(&template).await?;
+            let new = queue
+                .catalogue
+                .add_product(&template, &tenant, volume.as_deref())
+                .await?;
             queue.items.settle(&template.id);
-            let stored = queue.catalogue.product(&template.id).await?;
-            Ok((stored.unwrap_or(template), new))
+            let stored = queue.catalogue.product(&tenant, &template.id).await?;
+            Ok((stored.ok_or_else(vanished)?, new))
         })
         .await
     }
@@ -175,16 +184,15 @@ impl Queue {
         Ok(true)
     }
 
-    /// The volume of that id, if it is stored and its files are not damaged.
+    /// Whether a volume is stored, whoever has it, and its files are not damaged.
     ///
     /// # Errors
     /// If the storage fails.
-    pub async fn intact_volume(&self, id: &str) -> Result<Option<StoredVolume>, StoreError> {
-        let Some(volume) = self.catalogue.volume(id).await? else {
-            return Ok(None);
-        };
-        let record = ItemRecord::Volume(volume.clone());
-        Ok(self.is_intact(&record).await?.then_some(volume))
+    pub async fn has_intact_volume(&self, id: &str) -> Result<bool, StoreError> {
+        match self.catalogue.record(id).await? {
+            Some(record) => Ok(self.is_intact(&record).await?),
+            None => Ok(false),
+        }
     }
 
     /// The record of a product. Its id is a hash of the kind, of `origin` and of the mesh; the
@@ -212,6 +220,22 @@ impl Queue {
             files,
         }
     }
+}
+
+/// Where a template comes from.
+#[derive(Debug, Clone, Copy)]
+pub struct TemplateSource<'a> {
+    /// The tenant whose library it joins.
+    pub tenant: &'a Tenant,
+    /// The name that reports show.
+    pub name: &'a str,
+    /// The volume from whose model it was copied.
+    pub volume: Option<&'a str>,
+}
+
+/// The record of an item that was just added under its lock is not there.
+fn vanished() -> StoreError {
+    StoreError::database("a record is missing that was just added")
 }
 
 /// Runs a section to its end even if the caller is dropped meanwhile.

@@ -1,8 +1,7 @@
 //! Periodic upkeep: recovery after a crash, failing jobs that never end, deleting old items.
 
-use super::Queue;
-use super::publish::to_its_end;
-use crate::jobs::{DeathLimit, Deleted, Resource, StoreError, Timestamp};
+use super::{Queue, RetentionAges};
+use crate::jobs::{DeathLimit, StoreError, Timestamp};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio_util::sync::CancellationToken;
@@ -31,10 +30,7 @@ pub async fn recover_after_crash(
 }
 
 async fn has_record(queue: &Queue, id: &str) -> Result<bool, StoreError> {
-    Ok(match Resource::of(id) {
-        Some(Resource::Volume) => queue.catalogue.volume(id).await?.is_some(),
-        _ => queue.catalogue.product(id).await?.is_some(),
-    })
+    Ok(queue.catalogue.record(id).await?.is_some())
 }
 
 /// Deletes the files of items that were added or deleted by halves because the storage failed.
@@ -74,9 +70,8 @@ const DOUBT: Duration = Duration::from_secs(3600);
 pub struct Upkeep {
     /// The queue to look after.
     pub queue: Arc<Queue>,
-    /// Age at which finished jobs, volumes, models and segmentations are deleted; `None` keeps
-    /// them.
-    pub retention: Option<Duration>,
+    /// Ages at which things are erased.
+    pub retention: RetentionAges,
     /// Time between two rounds.
     pub every: Duration,
 }
@@ -103,7 +98,7 @@ impl Upkeep {
     /// machine that has started with a wrong clock is likely.
     async fn time_is_doubtful(&self) -> bool {
         let last = match self.queue.jobs.last_change().await {
-            Ok(Some(last)) if self.retention.is_some() => last,
+            Ok(Some(last)) if self.retention != RetentionAges::default() => last,
             _ => return false,
         };
         let age = self.queue.clock.now().saturating_sub(last);
@@ -129,50 +124,10 @@ impl Upkeep {
     async fn run_round(&self, time_is_trusted: bool) -> Result<(), StoreError> {
         release_dead(&self.queue).await?;
         settle_items(&self.queue).await?;
-        let Some(age) = self.retention.filter(|_| time_is_trusted) else {
-            return Ok(());
-        };
-        let age = i64::try_from(age.as_millis()).unwrap_or(i64::MAX);
-        let before = self.queue.clock.now().saturating_sub(age);
-        for id in self.queue.catalogue.older_than(before).await? {
-            self.queue.erase(&id).await?;
+        if time_is_trusted {
+            self.queue.erase_expired(&self.retention).await?;
         }
+        self.queue.overwrite_if_due().await?;
         Ok(())
-    }
-}
-
-impl Queue {
-    /// Deletes a job that has ended, or an item that no unfinished job needs, with its files.
-    ///
-    /// # Errors
-    /// If the database fails. Files that could not be deleted are deleted by the upkeep, or by the
-    /// next start.
-    pub async fn erase(self: &Arc<Self>, id: &str) -> Result<Deleted, StoreError> {
-        let (queue, id) = (self.clone(), id.to_owned());
-        to_its_end(async move { queue.erase_to_the_end(&id).await }).await
-    }
-
-    async fn erase_to_the_end(&self, id: &str) -> Result<Deleted, StoreError> {
-        let now = self.clock.now();
-        let _lock = self.items.lock(id).await;
-        if self.items.is_held(id) {
-            return Ok(Deleted::InUse);
-        }
-        self.items.unsettle(id);
-        let deleted = match Resource::of(id) {
-            Some(Resource::Job) => self.jobs.delete_job(id, now).await?,
-            Some(Resource::Volume) => self.catalogue.delete_volume(id, now).await?,
-            Some(_) => self.catalogue.delete_product(id, now).await?,
-            None => Deleted::Unknown,
-        };
-        if deleted == Deleted::Done
-            && Resource::of(id) != Some(Resource::Job)
-            && let Err(error) = self.blobs.delete(id).await
-        {
-            tracing::warn!(id, %error, "files could not be deleted; the upkeep tries again");
-            return Ok(deleted);
-        }
-        self.items.settle(id);
-        Ok(deleted)
     }
 }

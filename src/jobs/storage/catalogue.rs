@@ -1,55 +1,125 @@
 //! The interface to the records of volumes and products.
+//!
+//! Every method that takes a [`Tenant`] sees what this tenant has and nothing else.
 
-use super::{Custody, ListPage, ListRequest, Product, StoreResult, StoredVolume};
-use crate::jobs::{Resource, Timestamp};
+use super::{
+    Custody, Erased, ErasureOrder, Expiry, Held, LegalHold, ListPage, ListRequest, Product,
+    Receipt, StoreResult, StoredVolume, TagFilter, Tags,
+};
+use crate::jobs::{Resource, Tenant, Timestamp};
 use async_trait::async_trait;
 
-/// The result of a request to delete an item.
+/// The result of a request to delete a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Deleted {
     /// It is deleted.
     Done,
-    /// It is needed by jobs that have not ended.
+    /// It has not ended.
     InUse,
-    /// There is no such item.
+    /// There is no such job.
     Unknown,
 }
 
-/// The tables of volumes and products. Every method fails only if the database does.
+/// The tables of volumes and products. Every method is one transaction and fails only if the
+/// database does.
 #[async_trait]
 pub trait Catalogue: Custody {
-    /// Adds a volume. `false` if it exists already.
-    async fn add_volume(&self, volume: &StoredVolume) -> StoreResult<bool>;
+    /// Adds a volume, unless it is stored already, and gives it to a tenant; see
+    /// [`Catalogue::renew_volume`]. Returns whether it is new for the tenant.
+    async fn add_volume(
+        &self,
+        volume: &StoredVolume,
+        tenant: &Tenant,
+        tags: &Tags,
+    ) -> StoreResult<bool>;
 
-    /// The volume with that id, whose age counts from `now` on; `None` if it does not exist.
-    async fn renew_volume(&self, id: &str, now: Timestamp) -> StoreResult<Option<StoredVolume>>;
+    /// Gives a stored volume to a tenant, or renews it: its age counts from `now` on, and the
+    /// given tags replace those it has. Also returns whether it is new for the tenant. `None` if
+    /// it is not stored.
+    async fn renew_volume(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        tags: &Tags,
+        now: Timestamp,
+    ) -> StoreResult<Option<(Held<StoredVolume>, bool)>>;
 
     /// The volume with that id.
-    async fn volume(&self, id: &str) -> StoreResult<Option<StoredVolume>>;
+    async fn volume(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Held<StoredVolume>>>;
 
     /// Volumes, newest first.
-    async fn volumes(&self, page: ListRequest) -> StoreResult<ListPage<StoredVolume>>;
+    async fn volumes(
+        &self,
+        tenant: &Tenant,
+        filter: &TagFilter,
+        page: ListRequest,
+    ) -> StoreResult<ListPage<Held<StoredVolume>>>;
 
-    /// Deletes a volume that no unfinished job needs.
-    async fn delete_volume(&self, id: &str, now: Timestamp) -> StoreResult<Deleted>;
-
-    /// Adds a product that was not made by a job. `false` if it exists already.
-    async fn add_product(&self, product: &Product) -> StoreResult<bool>;
+    /// Adds a product that was not made by a job, unless it is stored already, and gives it to a
+    /// tenant. `source` is the volume it was made of. Returns whether it is new for the tenant.
+    async fn add_product(
+        &self,
+        product: &Product,
+        tenant: &Tenant,
+        source: Option<&str>,
+    ) -> StoreResult<bool>;
 
     /// The product with that id.
-    async fn product(&self, id: &str) -> StoreResult<Option<Product>>;
+    async fn product(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Held<Product>>>;
 
     /// Products of one kind, newest first.
-    async fn products(&self, kind: Resource, page: ListRequest) -> StoreResult<ListPage<Product>>;
+    async fn products(
+        &self,
+        tenant: &Tenant,
+        kind: Resource,
+        filter: &TagFilter,
+        page: ListRequest,
+    ) -> StoreResult<ListPage<Held<Product>>>;
 
-    /// Deletes a product that no unfinished job needs.
-    async fn delete_product(&self, id: &str, now: Timestamp) -> StoreResult<Deleted>;
+    /// Replaces the tags of an item or a job. `false` if there is none with that id.
+    async fn set_tags(&self, tenant: &Tenant, id: &str, tags: &Tags) -> StoreResult<bool>;
 
-    /// When the item with that id was deleted; `None` if it never existed.
-    async fn erased_at(&self, id: &str) -> StoreResult<Option<Timestamp>>;
+    /// Sets or lifts a tenant's legal hold on an item. `false` if it has no such item.
+    async fn set_legal_hold(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        hold: Option<&LegalHold>,
+    ) -> StoreResult<bool>;
 
-    /// Ids of the finished jobs, volumes, models and segmentations older than `before`. The age of
-    /// a volume counts from its last upload, or from when a job on it was last filed or ended.
-    /// Templates are not listed, as they are kept.
-    async fn older_than(&self, before: Timestamp) -> StoreResult<Vec<String>>;
+    /// What was made of a volume: models, segmentations, templates.
+    async fn made_of(&self, tenant: &Tenant, volume: &str) -> StoreResult<Vec<String>>;
+
+    /// Erases an item that no unfinished job needs and no legal hold keeps. The record of its
+    /// content is deleted with the last tenant's holding. Fails with [`Erased::InUse`] if
+    /// something would go with it that is not among `expected`.
+    async fn erase(
+        &self,
+        order: &ErasureOrder,
+        expected: &[String],
+        now: Timestamp,
+    ) -> StoreResult<Erased>;
+
+    /// When the item or job with that id was erased; `None` if the tenant never had it.
+    async fn erased_at(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Timestamp>>;
+
+    /// The receipt with that id.
+    async fn receipt(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Receipt>>;
+
+    /// Receipts, newest first: all, or those of one item.
+    async fn receipts(
+        &self,
+        tenant: &Tenant,
+        item: Option<&str>,
+        page: ListRequest,
+    ) -> StoreResult<ListPage<Receipt>>;
+
+    /// The finished jobs, volumes, models and segmentations beyond their age that no legal hold
+    /// keeps, with their tenants. The age of an item counts from its last upload or computation,
+    /// that of a volume also from when a job on it was last filed or ended.
+    async fn expired(&self, expiry: &Expiry) -> StoreResult<Vec<(Tenant, String)>>;
+
+    /// Overwrites what was deleted from the database: moves the write-ahead log, which still holds
+    /// it, into the database. `false` if readers were in the way; the next call tries again.
+    async fn overwrite_erased(&self) -> StoreResult<bool>;
 }

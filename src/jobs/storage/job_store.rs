@@ -1,6 +1,6 @@
 //! The interface to the jobs table.
 
-use super::{Deleted, ListPage, ListRequest, Product, StoreResult};
+use super::{Deleted, ListPage, ListRequest, Product, StoreResult, TagFilter};
 use crate::jobs::{Failure, Filed, Job, JobState, NewJob, Tenant, Timestamp};
 use async_trait::async_trait;
 use std::time::Duration;
@@ -70,6 +70,23 @@ pub struct QueueLoad {
     pub mean_duration_ms: Option<f64>,
 }
 
+/// Which jobs to list.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct JobFilter {
+    /// The tenant whose jobs they are.
+    pub tenant: Tenant,
+    /// Only those in this state.
+    pub state: Option<JobState>,
+    /// Only those of this kind of work.
+    pub kind: Option<String>,
+    /// Only those on this volume.
+    pub volume: Option<String>,
+    /// Only those with these tags.
+    pub tags: TagFilter,
+    /// Only those filed after this moment.
+    pub created_after: Option<Timestamp>,
+}
+
 /// The jobs table. Every method is one transaction and fails only if the database does.
 #[async_trait]
 pub trait JobStore: Send + Sync + 'static {
@@ -80,8 +97,8 @@ pub trait JobStore: Send + Sync + 'static {
     /// The job with that id.
     async fn job(&self, id: &str) -> StoreResult<Option<Job>>;
 
-    /// Jobs, newest first: all, or those in `state`.
-    async fn jobs(&self, state: Option<JobState>, page: ListRequest) -> StoreResult<ListPage<Job>>;
+    /// A tenant's jobs, newest first.
+    async fn jobs(&self, filter: &JobFilter, page: ListRequest) -> StoreResult<ListPage<Job>>;
 
     /// The job filed earlier under that idempotency key of a tenant, whatever the request was, with
     /// the fingerprint of that request.

@@ -6,7 +6,9 @@
 mod blobs;
 mod catalogue;
 mod custody;
+mod erasure;
 mod figures;
+mod holding;
 mod job_store;
 mod listing;
 mod product;
@@ -18,8 +20,12 @@ pub use blobs::{
 };
 pub use catalogue::{Catalogue, Deleted};
 pub use custody::Custody;
+pub use erasure::{Erased, ErasedFile, ErasedItem, ErasureOrder, ErasureReason, Expiry, Receipt};
 pub use figures::{FigureStore, QueueFigures};
-pub use job_store::{Claimant, DeathLimit, Interrupted, JobOutcome, JobStore, Lease, QueueLoad};
+pub use holding::{Held, Holding, LegalHold, TagFilter, Tags};
+pub use job_store::{
+    Claimant, DeathLimit, Interrupted, JobFilter, JobOutcome, JobStore, Lease, QueueLoad,
+};
 pub use listing::{ListPage, ListRequest};
 pub use product::{Product, ProductFile};
 pub use record::ItemRecord;

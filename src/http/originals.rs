@@ -1,0 +1,86 @@
+//! `/v1/volumes/{id}/content` and `/v1/volumes/{id}/files`: the uploaded files, byte for byte.
+//!
+//! A volume of one file has `content`; every volume has `files/{name}`. The names are the store's:
+//! those that the client gave may name a patient and are not kept.
+
+use super::app::App;
+use super::caller::Caller;
+use super::collection::find;
+use super::files::{self, Download};
+use super::openapi::{self, ConditionalHeaders, DownloadAnswers, LookupProblems};
+use super::problem::not_found::no_such_file;
+use super::problem::{Answer, Problem};
+use super::request::{PathSegments, query_pairs, refuse_unknown};
+use super::volumes::{Volumes, media_type};
+use super::wire::path_of;
+use crate::jobs::{FileRecord, Resource, StoredVolume};
+use axum::extract::{RawQuery, State};
+use axum::http::{HeaderMap, StatusCode};
+
+/// Download an upload
+///
+/// The uploaded file, byte for byte. A volume of several files has none; its files are listed in
+/// the volume's JSON.
+#[utoipa::path(get, path = "/v1/volumes/{id}/content", tag = "volumes",
+    operation_id = "get_volume_content",
+    params(("id" = String, Path, description = "The volume's id"), ConditionalHeaders),
+    responses(openapi::OriginalAnswer, DownloadAnswers, LookupProblems))]
+pub async fn download_volume(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+) -> Answer {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
+    match &volume.files[..] {
+        [file] => send(&app, &volume, file, &headers).await,
+        _ => Err(Problem::new(
+            StatusCode::NOT_FOUND,
+            "several-files",
+            format!("The volume `{id}` has {} files.", volume.files.len()),
+        )
+        .fix(format!(
+            "Download them one by one; GET {} lists them in `files`.",
+            path_of(&id)
+        ))),
+    }
+}
+
+/// Download one file of an upload
+#[utoipa::path(get, path = "/v1/volumes/{id}/files/{name}", tag = "volumes",
+    operation_id = "get_volume_file",
+    params(("id" = String, Path, description = "The volume's id"),
+        ("name" = String, Path, description = "The file's name, as the volume's JSON lists it"),
+        ConditionalHeaders),
+    responses(openapi::OriginalAnswer, DownloadAnswers, LookupProblems))]
+pub async fn download_volume_file(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments((id, name)): PathSegments<(String, String)>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+) -> Answer {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
+    match volume.files.iter().find(|file| file.name == name) {
+        Some(file) => send(&app, &volume, file, &headers).await,
+        None => {
+            let first = volume.files.iter().take(10).map(|file| file.name.clone());
+            let names: Vec<String> = first.collect();
+            Err(no_such_file(Resource::Volume, &name, &names))
+        }
+    }
+}
+
+async fn send(app: &App, volume: &StoredVolume, file: &FileRecord, headers: &HeaderMap) -> Answer {
+    let download = Download {
+        id: &volume.id,
+        record: file.clone(),
+        path: format!("{}/files/{}", path_of(&volume.id), file.name),
+        media_type: media_type(&file.name),
+        attached: true,
+    };
+    files::send_file(app, &download, headers).await
+}

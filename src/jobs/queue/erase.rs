@@ -1,0 +1,156 @@
+//! Erasing: on request or by age, one item or everything made of a volume.
+//!
+//! The records go first, in one transaction that also writes the receipt; then the files; then the
+//! database's log is moved into the database, whose freed pages are overwritten. A crash in between
+//! leaves files without a record, which the next start deletes. All of it runs in a task of its own,
+//! which goes on if the caller goes away.
+
+use super::Queue;
+use super::publish::to_its_end;
+use crate::jobs::{
+    Deleted, Erased, ErasureOrder, ErasureReason, Expiry, Resource, StoreError, Tenant, Timestamp,
+};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+/// The name under which the upkeep erases.
+const BY_RETENTION: &str = "retention";
+
+/// Ages at which things are erased. `None` keeps them until somebody erases them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct RetentionAges {
+    /// Of volumes, counted from their last upload or use.
+    pub volumes: Option<Duration>,
+    /// Of models and segmentations, counted from when they were last computed.
+    pub results: Option<Duration>,
+    /// Of the records of finished jobs, counted from their end.
+    pub jobs: Option<Duration>,
+}
+
+impl RetentionAges {
+    /// What is too old at the moment `now`.
+    fn expiry(&self, now: Timestamp) -> Expiry {
+        let before = |age: Option<Duration>| age.map(|age| now.saturating_sub(milliseconds(age)));
+        Expiry {
+            volumes: before(self.volumes),
+            results: before(self.results),
+            jobs: before(self.jobs),
+        }
+    }
+
+    /// When an item of that kind will be erased that was renewed at the moment `renewed`; `None`
+    /// if it is kept.
+    pub fn expires_at(&self, kind: Resource, renewed: Timestamp) -> Option<Timestamp> {
+        let age = match kind {
+            Resource::Volume => self.volumes,
+            Resource::Model | Resource::Segmentation => self.results,
+            Resource::Job => self.jobs,
+            Resource::Template => None,
+        };
+        age.map(|age| renewed.saturating_add(milliseconds(age)))
+    }
+}
+
+fn milliseconds(age: Duration) -> i64 {
+    i64::try_from(age.as_millis()).unwrap_or(i64::MAX)
+}
+
+impl Queue {
+    /// Erases an item that no unfinished job needs and no legal hold keeps.
+    ///
+    /// # Errors
+    /// If the database fails. Files that could not be deleted are deleted by the upkeep, or by the
+    /// next start.
+    pub async fn erase(self: &Arc<Self>, order: ErasureOrder) -> Result<Erased, StoreError> {
+        let queue = self.clone();
+        to_its_end(async move {
+            let erased = queue.erase_item(&order).await?;
+            queue.overwrite_if_due().await?;
+            Ok(erased)
+        })
+        .await
+    }
+
+    /// Deletes the record of a job that has ended.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn delete_job(&self, id: &str) -> Result<Deleted, StoreError> {
+        self.overwrite_due.store(true, Ordering::Relaxed);
+        self.jobs.delete_job(id, self.clock.now()).await
+    }
+
+    async fn erase_item(&self, order: &ErasureOrder) -> Result<Erased, StoreError> {
+        let mut ids = vec![order.id.clone()];
+        if order.cascade {
+            ids.extend(self.catalogue.made_of(&order.tenant, &order.id).await?);
+        }
+        // Whoever takes several locks takes them in the order of ids.
+        ids.sort();
+        ids.dedup();
+        let mut locks = Vec::with_capacity(ids.len());
+        for id in &ids {
+            locks.push(self.items.lock(id).await);
+        }
+        if ids.iter().any(|id| self.items.is_held(id)) {
+            return Ok(Erased::InUse);
+        }
+        // Unless erased and settled below, the upkeep looks at them.
+        for id in &ids {
+            self.items.unsettle(id);
+        }
+        let erased = self.catalogue.erase(order, &ids, self.clock.now()).await?;
+        if let Erased::Done(receipt) = &erased {
+            self.overwrite_due.store(true, Ordering::Relaxed);
+            for item in &receipt.items {
+                if item.files_erased
+                    && let Err(error) = self.blobs.delete(&item.id).await
+                {
+                    let id = &item.id;
+                    tracing::warn!(id, %error, "files could not be deleted; the upkeep tries again");
+                    continue;
+                }
+                self.items.settle(&item.id);
+            }
+        }
+        Ok(erased)
+    }
+
+    /// Erases what is too old.
+    pub(super) async fn erase_expired(&self, ages: &RetentionAges) -> Result<(), StoreError> {
+        if *ages == RetentionAges::default() {
+            return Ok(());
+        }
+        let expiry = ages.expiry(self.clock.now());
+        for (tenant, id) in self.catalogue.expired(&expiry).await? {
+            if Resource::of(&id) == Some(Resource::Job) {
+                self.delete_job(&id).await?;
+                continue;
+            }
+            let order = by_retention(tenant, id);
+            self.erase_item(&order).await?;
+        }
+        Ok(())
+    }
+
+    /// Overwrites what was deleted from the database since the last time.
+    pub(super) async fn overwrite_if_due(&self) -> Result<(), StoreError> {
+        if self.overwrite_due.swap(false, Ordering::Relaxed)
+            && !self.catalogue.overwrite_erased().await?
+        {
+            self.overwrite_due.store(true, Ordering::Relaxed);
+        }
+        Ok(())
+    }
+}
+
+fn by_retention(tenant: Tenant, id: String) -> ErasureOrder {
+    ErasureOrder {
+        tenant,
+        id,
+        cascade: false,
+        by: BY_RETENTION.into(),
+        reason: ErasureReason::Retention,
+    }
+}

@@ -1,0 +1,101 @@
+//! Erasing items, and the receipts that stay.
+
+use crate::jobs::{Tenant, Timestamp};
+use serde::{Deserialize, Serialize};
+
+/// An item to be erased.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ErasureOrder {
+    /// Whose item.
+    pub tenant: Tenant,
+    /// The item's id.
+    pub id: String,
+    /// Whether to erase also what was made of it, and the jobs that worked on it.
+    pub cascade: bool,
+    /// The name of the caller.
+    pub by: String,
+    /// Why it is erased.
+    pub reason: ErasureReason,
+}
+
+/// Why an item is erased.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ErasureReason {
+    /// A caller asked for it.
+    Request,
+    /// It reached the age that the operator has set.
+    Retention,
+}
+
+/// What was erased, when and by whom. It holds no name that a tenant gave to an item.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Receipt {
+    /// `ers_...`
+    pub id: String,
+    /// Whose item it was.
+    pub tenant: Tenant,
+    /// The item that was to be erased.
+    pub item: String,
+    /// When it was erased.
+    pub erased_at: Timestamp,
+    /// The name of the caller.
+    pub erased_by: String,
+    /// Why it was erased.
+    pub reason: ErasureReason,
+    /// The item, and what went with it.
+    pub items: Vec<ErasedItem>,
+    /// The jobs whose records went with it.
+    pub jobs: Vec<String>,
+}
+
+/// One item of a [`Receipt`].
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ErasedItem {
+    /// Its id.
+    pub id: String,
+    /// Whether its files were erased; not if another tenant has the same content.
+    pub files_erased: bool,
+    /// Its files.
+    pub files: Vec<ErasedFile>,
+}
+
+/// One file of an [`ErasedItem`].
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ErasedFile {
+    /// Its name in the store.
+    pub name: String,
+    /// Its length in bytes.
+    pub bytes: u64,
+    /// SHA-256 of its content, hexadecimal.
+    pub sha256: String,
+}
+
+/// The result of an order to erase an item.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Erased {
+    /// It is erased. The files of the items of the receipt that no tenant has any more are yet to
+    /// be deleted.
+    Done(Box<Receipt>),
+    /// A job that has not ended needs it.
+    InUse,
+    /// It, or something that would go with it, is on legal hold.
+    OnHold {
+        /// The item with the hold.
+        id: String,
+    },
+    /// The tenant has no such item.
+    Unknown,
+}
+
+/// Ages beyond which things are erased, as moments: what was last used before is too old. `None`
+/// keeps things.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Expiry {
+    /// For volumes.
+    pub volumes: Option<Timestamp>,
+    /// For models and segmentations. Templates are kept.
+    pub results: Option<Timestamp>,
+    /// For the records of finished jobs.
+    pub jobs: Option<Timestamp>,
+}
