@@ -49,8 +49,7 @@ struct CreateArgs {
     /// What it allows: read, submit (also upload, file jobs, erase) or admin (also keys and audit)
     #[arg(long, value_name = "SCOPE")]
     scope: Scope,
-    /// Whose keys, quotas, webhooks and audit trail it belongs to. Volumes, jobs and results are not
-    /// kept apart by tenant yet
+    /// Whose things it opens: what other tenants store does not exist for it
     #[arg(long, value_name = "TENANT", default_value = "default")]
     tenant: Tenant,
     /// How long it is valid, such as 90d; for ever unless given
@@ -116,12 +115,6 @@ async fn create(args: &CreateArgs) -> Result<()> {
         "key {} of tenant {} with scope {}; it is shown only this once",
         key.id, key.tenant, key.scope
     );
-    if key.tenant != Tenant::default() {
-        eprintln!(
-            "note: volumes, jobs and results are not kept apart by tenant yet; run one service for \
-             each tenant"
-        );
-    }
     println!("{text}");
     Ok(())
 }

@@ -7,9 +7,10 @@
 use super::app::App;
 use super::caller::Caller;
 use super::erasures::{self, ReceiptBody};
+use super::guard::Agent;
 use super::openapi::{
-    CachedHeaders, Documented, EraseProblems, ErasureParameters, ListProblems, LookupProblems,
-    PageParameters, TagParameters, UnchangedAnswer,
+    CachedHeaders, CascadeParameter, Documented, EraseProblems, ErasureParameters, ListProblems,
+    LookupProblems, PageParameters, TagParameters, UnchangedAnswer,
 };
 use super::pagination::{next_cursor, page_of};
 use super::problem::Answer;
@@ -19,10 +20,10 @@ use super::{tags, validators};
 use crate::jobs::{
     Catalogue, Held, ListPage, ListRequest, Resource, StoreError, TagFilter, Tenant,
 };
-use axum::Json;
 use axum::extract::{RawQuery, State};
 use axum::http::HeaderMap;
 use axum::routing::{delete, get};
+use axum::{Extension, Json};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 use std::borrow::Cow;
@@ -97,7 +98,7 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
     .json::<C::Body>(&format!("The {noun}"))
     .answers::<UnchangedAnswer>()
     .answers::<LookupProblems>();
-    let erasure = operation(
+    let mut erasure = operation(
         HttpMethod::Delete,
         "/{id}",
         format!("delete_{noun}"),
@@ -114,6 +115,9 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
     .empty_answer("204", "Erased")
     .answers::<EraseProblems>()
     .answers::<LookupProblems>();
+    if C::RESOURCE == Resource::Volume {
+        erasure = erasure.parameters::<CascadeParameter>();
+    }
     [
         listing.served_by(get(list::<C>)),
         lookup.served_by(get(show::<C>)),
@@ -170,6 +174,7 @@ async fn show<C: Collection>(
 async fn erase<C: Collection>(
     State(app): State<App>,
     caller: Caller,
+    Extension(agent): Extension<Agent>,
     PathSegments(id): PathSegments<String>,
     RawQuery(query): RawQuery,
     headers: HeaderMap,
@@ -182,7 +187,7 @@ async fn erase<C: Collection>(
             false
         }
     };
-    erasures::erase(&app, &caller, C::RESOURCE, id, cascade, &headers).await
+    erasures::erase(&app, (&caller, &agent), C::RESOURCE, id, cascade, &headers).await
 }
 
 /// A page of things: `{"models": [...], "next_cursor": "..."}`.

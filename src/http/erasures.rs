@@ -2,6 +2,7 @@
 
 use super::app::App;
 use super::caller::Caller;
+use super::guard::{Agent, AlreadyRecorded};
 use super::openapi::{ListProblems, LookupProblems, PageParameters};
 use super::pagination::{list_query, next_cursor};
 use super::problem::not_found::{missing, no_receipt};
@@ -10,10 +11,10 @@ use super::request::{PathSegments, query_pairs, refuse_unknown};
 use super::wire::{path_of, rfc3339};
 use super::{negotiate, validators};
 use crate::jobs::{Erased, ErasureOrder, ErasureReason, Receipt, Resource};
-use axum::Json;
 use axum::extract::{RawQuery, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
+use axum::{Extension, Json};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -35,12 +36,24 @@ pub struct ReceiptBody {
     erased_by: String,
     /// Why it was erased.
     reason: ReasonName,
+    /// The AuditEvent that records it.
+    audit_event: AuditEventName,
     /// The item, and what went with it.
     items: Vec<ErasedItemBody>,
     /// The jobs whose records went with it.
     jobs: Vec<String>,
     /// Related paths.
     links: ReceiptLinks,
+}
+
+/// Which AuditEvent records an act.
+#[derive(Serialize, ToSchema)]
+struct AuditEventName {
+    /// Its id, as `GET /v1/audit` shows it.
+    #[schema(example = "1234")]
+    id: String,
+    /// Its hash, which the hashes of all later events cover.
+    hash: String,
 }
 
 /// Why something was erased.
@@ -123,6 +136,10 @@ impl From<Receipt> for ReceiptBody {
                 ErasureReason::Request => ReasonName::Request,
                 ErasureReason::Retention => ReasonName::Retention,
             },
+            audit_event: AuditEventName {
+                id: receipt.audit.sequence.to_string(),
+                hash: receipt.audit.hash,
+            },
             items: items.collect(),
             jobs: receipt.jobs,
         }
@@ -158,7 +175,7 @@ pub fn cascade(pairs: &[(String, String)]) -> Answer<bool> {
 /// 404 or 410 if the caller's tenant has no such item, 409 if it must stay.
 pub async fn erase(
     app: &App,
-    caller: &Caller,
+    (caller, agent): (&Caller, &Agent),
     kind: Resource,
     id: String,
     cascade: bool,
@@ -168,7 +185,7 @@ pub async fn erase(
         tenant: caller.tenant.clone(),
         id: id.clone(),
         cascade,
-        by: caller.name.clone(),
+        by: agent.of_erasure(),
         reason: ErasureReason::Request,
     };
     let erased = match Resource::of(&id) == Some(kind) {
@@ -179,11 +196,12 @@ pub async fn erase(
         Erased::Done(receipt) => {
             let location = [(header::LOCATION, path(&receipt.id))];
             if !negotiate::prefers_representation(headers) {
-                return Ok((StatusCode::NO_CONTENT, location).into_response());
+                let answer = (StatusCode::NO_CONTENT, location, Extension(AlreadyRecorded));
+                return Ok(answer.into_response());
             }
             let applied = [("preference-applied", "return=representation")];
             let body = Json(ReceiptBody::from(*receipt));
-            Ok((location, applied, body).into_response())
+            Ok((location, applied, Extension(AlreadyRecorded), body).into_response())
         }
         Erased::Unknown => Err(missing(&*app.queue.catalogue, &caller.tenant, kind, &id).await),
         Erased::InUse => Err(Problem::new(

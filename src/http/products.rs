@@ -214,7 +214,7 @@ macro_rules! body_of_product {
         #[derive(serde::Serialize, utoipa::ToSchema)]
         #[schema(as = $schema)]
         pub struct $name {
-            /// Derived from volume, parameters and mesh, so it is the same on every machine.
+            /// Derived from tenant, volume, parameters and mesh, so it is the same on every machine.
             #[schema(example = $example)]
             id: String,
             /// When it was made (RFC 3339).

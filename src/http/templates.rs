@@ -48,7 +48,7 @@ impl ProductCollection for Templates {
 #[derive(Serialize, ToSchema)]
 #[schema(as = Template)]
 pub struct TemplateBody {
-    /// Derived from organ and mesh, so it is the same on every machine.
+    /// Derived from tenant, organ and mesh, so it is the same on every machine.
     #[schema(example = "tpl_2c26b46b68ffc68ff99b453c1d304134")]
     id: String,
     /// When it was added (RFC 3339).

@@ -71,12 +71,12 @@ pub use queue::{
 };
 pub use resource::Resource;
 pub use storage::{
-    BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Claimant, Custody, DeathLimit,
-    Deleted, DiskSpace, Erased, ErasedFile, ErasedItem, ErasureOrder, ErasureReason, Expiry,
-    FigureStore, FileRecord, Held, Holding, Interrupted, ItemRecord, JobFilter, JobOutcome,
-    JobStore, Lease, LegalHold, ListPage, ListRequest, LocalFile, Product, ProductFile,
-    QueueFigures, QueueLoad, Receipt, StagedFiles, StagedFor, StoreError, StoreFault, StoreResult,
-    StoredVolume, TagFilter, Tags,
+    AuditMark, BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Claimant, Custody,
+    DeathLimit, Deleted, DiskSpace, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder,
+    ErasureReason, Expiry, FigureStore, FileRecord, Held, Holding, Interrupted, ItemRecord,
+    JobFilter, JobOutcome, JobStore, Lease, LegalHold, ListPage, ListRequest, LocalFile, Product,
+    ProductFile, QueueFigures, QueueLoad, Receipt, StagedFiles, StagedFor, StoreError, StoreFault,
+    StoreResult, StoredVolume, TagFilter, Tags,
 };
 pub use tenant::{InvalidTenant, Tenant};
 pub use work::{

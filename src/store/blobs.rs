@@ -379,13 +379,18 @@ impl BlobStore for FileBlobs {
     async fn delete(&self, id: &str) -> Result<(), BlobError> {
         let id = id.to_owned();
         let deleted = self.blocking(move |folder, _| {
-            // Renamed first, so that half the files are never seen as all of them.
-            let doomed = folder.join(DISCARDED).join(random_id(""));
-            match fs::rename(folder.join(shelf_path(&id)), &doomed) {
-                Err(error) if is_absent(&error) => return Ok(()),
-                other => other?,
+            let mut places = set_aside_of(folder, &id)?;
+            places.push(folder.join(shelf_path(&id)));
+            for place in places {
+                // Renamed first, so that half the files are never seen as all of them.
+                let doomed = folder.join(DISCARDED).join(random_id(""));
+                match fs::rename(place, &doomed) {
+                    Err(error) if is_absent(&error) => continue,
+                    other => other?,
+                }
+                fs::remove_dir_all(&doomed)?;
             }
-            Ok(fs::remove_dir_all(&doomed)?)
+            Ok(())
         });
         deleted.await
     }
@@ -490,6 +495,26 @@ impl BlobStore for FileBlobs {
 fn day(at: Timestamp) -> Option<Date> {
     let time = OffsetDateTime::from_unix_timestamp(at.div_euclid(1000)).ok()?;
     Some(time.date())
+}
+
+/// The folders in the quarantine that hold files of an item.
+fn set_aside_of(folder: &Path, id: &str) -> io::Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    for shelf in fs::read_dir(folder.join(QUARANTINE))? {
+        let shelf = shelf?;
+        if !shelf.file_type()?.is_dir() {
+            continue;
+        }
+        for entry in fs::read_dir(shelf.path())? {
+            let entry = entry?;
+            let name = entry.file_name();
+            let rest = name.to_str().and_then(|name| name.strip_prefix(id));
+            if rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.')) {
+                found.push(entry.path());
+            }
+        }
+    }
+    Ok(found)
 }
 
 /// Moves the folder of an item into the quarantine of the day. Succeeds if there is none.

@@ -4,12 +4,15 @@
 //! 2. Refuse if a job that has not ended needs one of them, or a legal hold keeps one.
 //! 3. Delete the tenant's holdings; with the last holding of an item, the record of its content;
 //!    with `cascade`, the jobs on the volume.
-//! 4. Remember each id (410 from then on), and store the receipt.
+//! 4. Remember each id (410 from then on), append a row to the audit trail, and store the receipt,
+//!    which names that row.
 
 use super::rows::{self, to_json};
+use super::sqlite_access::append;
+use crate::access::{Activity, AuditEvent};
 use crate::jobs::{
-    Erased, ErasedFile, ErasedItem, ErasureOrder, Receipt, Resource, StoreResult, Tenant,
-    Timestamp, random_id,
+    AuditMark, Erased, ErasedFile, ErasedItem, ErasureOrder, Receipt, Resource, StoreResult,
+    Tenant, Timestamp, random_id,
 };
 use sqlx::{Row, SqliteConnection};
 
@@ -65,12 +68,24 @@ pub(super) async fn erase(
         true => delete_jobs(to, tenant, &order.id, now).await?,
         false => Vec::new(),
     };
+    let by = order.by.clone();
+    let event = AuditEvent {
+        key: by.key,
+        address: by.address,
+        request: by.request,
+        ..AuditEvent::new(now, Activity::Delete, tenant.clone(), by.name)
+    };
+    let recorded = append(to, &[event.on(&order.id)]).await?;
     let receipt = Receipt {
         id: random_id(PREFIX),
         tenant: tenant.clone(),
         item: order.id.clone(),
         erased_at: now,
-        erased_by: order.by.clone(),
+        erased_by: order.by.name.clone(),
+        audit: AuditMark {
+            sequence: recorded.sequence,
+            hash: recorded.hash,
+        },
         reason: order.reason,
         items,
         jobs,

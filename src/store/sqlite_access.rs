@@ -209,8 +209,12 @@ impl AccessStore for SqliteStore {
     }
 }
 
-/// Appends events to the chain, within a transaction that holds the database's write lock.
-async fn append(to: &mut SqliteConnection, events: &[AuditEvent]) -> StoreResult<()> {
+/// Appends events to the chain, within a transaction that holds the database's write lock. Returns
+/// the end of the chain.
+pub(super) async fn append(
+    to: &mut SqliteConnection,
+    events: &[AuditEvent],
+) -> StoreResult<Anchor> {
     let head = sqlx::query(
         "SELECT sequence, hash FROM (SELECT sequence, hash FROM audit
                                      UNION ALL SELECT sequence, hash FROM audit_anchors)
@@ -233,7 +237,7 @@ async fn append(to: &mut SqliteConnection, events: &[AuditEvent]) -> StoreResult
             .execute(&mut *to)
             .await?;
     }
-    Ok(())
+    Ok(Anchor { sequence, hash })
 }
 
 fn read_key(row: SqliteRow) -> StoreResult<ApiKey> {

@@ -1,5 +1,6 @@
 //! Starts a service for each test, with a fake computation.
 
+use reqwest::header::{AUTHORIZATION, HeaderValue};
 use reqwest::{Client, RequestBuilder, Response, StatusCode};
 use serde_json::{Map, Value, json};
 use std::io::{BufRead, BufReader};
@@ -9,16 +10,18 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
+use ventriform::access::{AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Quota, Scope};
 use ventriform::config::Settings;
 use ventriform::export::{self, Format, Metadata};
 use ventriform::http::{Running, install_cryptography, start};
 use ventriform::jobs::{
-    Failure, Fault, GivenParameters, LocalFile, Needs, OutputFile, Resource, StoredItem, Work,
-    WorkError, WorkInput, WorkOutput,
+    Clock, Failure, Fault, GivenParameters, LocalFile, Needs, OutputFile, Resource, StoredItem,
+    SystemClock, Work, WorkError, WorkInput, WorkOutput,
 };
 use ventriform::mesh::TriMesh;
 use ventriform::mesh::shapes::icosphere;
 use ventriform::progress::{Monitor, Plan, Stage};
+use ventriform::store::open_rows;
 use ventriform::volume::ReadLimits;
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
@@ -37,6 +40,15 @@ impl Api {
     fn new(url: String) -> Self {
         install_cryptography();
         let client = Client::new();
+        Self { client, url }
+    }
+
+    /// A client that sends that API key with every request.
+    fn with_key(url: String, key: &str) -> Self {
+        let mut bearer: HeaderValue = format!("Bearer {key}").parse().unwrap();
+        bearer.set_sensitive(true);
+        let headers = [(AUTHORIZATION, bearer)].into_iter().collect();
+        let client = Client::builder().default_headers(headers).build().unwrap();
         Self { client, url }
     }
 
@@ -100,6 +112,15 @@ impl TestApp {
             api: Api::new(format!("http://{}", running.address())),
             running: Some(running),
             data,
+        }
+    }
+
+    /// The same service as the owner of that API key sees it.
+    pub fn seen_with(&self, key: &str) -> Self {
+        Self {
+            api: Api::with_key(self.url.clone(), key),
+            running: None,
+            data: self.data.clone(),
         }
     }
 
@@ -184,6 +205,33 @@ impl TestApp {
         }
         names.sort();
         names
+    }
+}
+
+/// Makes a key as `ventriform keys create` does: beside the running service. Returns its id and the
+/// key.
+pub async fn key(data: &Path, scope: Scope, tenant: &str, quota: Quota) -> (String, String) {
+    let now = SystemClock.now();
+    let request = KeyRequest {
+        name: format!("{scope} of {tenant}"),
+        tenant: tenant.parse().unwrap(),
+        scope,
+        quota,
+        expires_at: None,
+    };
+    let (key, text) = ApiKey::make(request, now).unwrap();
+    let store = open_rows(data).await.unwrap();
+    let event = AuditEvent::new(now, Activity::KeyCreated, key.tenant.clone(), "test".into());
+    store.add_key(&key, &event.on(&key.id)).await.unwrap();
+    (key.id, text)
+}
+
+/// Waits until the service asks for credentials.
+pub async fn closed(app: &TestApp) {
+    let deadline = Instant::now() + Duration::from_secs(1);
+    while app.get("/v1/volumes").send().await.unwrap().status() != StatusCode::UNAUTHORIZED {
+        assert!(Instant::now() < deadline, "the service is still open");
+        tokio::time::sleep(Duration::from_millis(20)).await;
     }
 }
 

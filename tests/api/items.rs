@@ -9,9 +9,10 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use tokio::io::AsyncWriteExt;
 use ventriform::jobs::{
-    BlobStore, Catalogue, Clock, Erased, ErasureOrder, ErasureReason, FileRecord, Filed, JobState,
-    JobStore, NewJob, Queue, QueueSettings, RetentionAges, StagedFiles, StagedFor, StoredVolume,
-    Tags, Tenant, Timestamp, Upkeep, WorkerSettings, Workers,
+    BlobStore, Catalogue, Clock, Erased, ErasureAgent, ErasureOrder, ErasureReason, FileRecord,
+    Filed, JobState, JobStore, LegalHold, ListRequest, NewJob, Queue, QueueSettings, Resource,
+    RetentionAges, StagedFiles, StagedFor, StoredVolume, Tags, Tenant, Timestamp, Upkeep,
+    WorkerSettings, Workers,
 };
 use ventriform::store::Store;
 
@@ -79,7 +80,7 @@ impl Bench {
             bytes: 12,
             files: vec![FileRecord {
                 name: "volume.nii".into(),
-                bytes: 6,
+                bytes: 12,
                 sha256: String::new(),
             }],
             facts: json!({}),
@@ -103,7 +104,8 @@ impl Bench {
             queue: self.queue.clone(),
             retention: RetentionAges {
                 volumes: retention,
-                ..RetentionAges::default()
+                results: retention,
+                jobs: retention,
             },
             every: Duration::from_secs(60),
         }
@@ -160,7 +162,7 @@ async fn files_whose_record_could_not_be_written_are_deleted_by_the_upkeep() {
     let volume = bench.volume("vol_1");
     let added = bench.queue.add_volume(volume, files, &tenant, &tags).await;
     let error = added.err().unwrap();
-    assert!(error.to_string().contains("volumes"), "{error}");
+    assert!(error.to_string().contains("full"), "{error}");
     assert!(bench.has_files("vol_1"));
     run(&mut database, "DROP TRIGGER full").await;
     run(&mut database, "ALTER TABLE volumes RENAME TO hidden").await;
@@ -186,7 +188,7 @@ async fn an_item_on_hold_is_deleted_neither_by_request_nor_by_age() {
         tenant: Tenant::default(),
         id: "vol_1".into(),
         cascade: false,
-        by: "test".into(),
+        by: ErasureAgent::default(),
         reason: ErasureReason::Request,
     };
     assert_eq!(bench.queue.erase(order).await.unwrap(), Erased::InUse);
@@ -215,6 +217,116 @@ async fn the_age_of_a_volume_counts_from_its_last_upload() {
             assert!(renewed.unwrap().is_some());
         }
     }
+}
+
+/// A job of the tenant on `vol_1`, computed at once.
+async fn use_volume(bench: &Bench, tenant: &Tenant) -> String {
+    let work = fake_engine().work("model").unwrap().clone();
+    let order = NewJob {
+        webhook: None,
+        trace_parent: None,
+        tenant: tenant.clone(),
+        tags: Tags::default(),
+        kind: "model".into(),
+        volume: "vol_1".into(),
+        needs: Default::default(),
+        parameters: work.parameters_from_json(&serde_json::Map::new()).unwrap(),
+        idempotency: None,
+    };
+    let Filed::New(job) = bench.queue.file(&order).await.unwrap() else {
+        panic!("not filed");
+    };
+    job.id
+}
+
+#[tokio::test]
+async fn the_age_of_a_volume_counts_from_the_last_use_by_its_tenant() {
+    let bench = Bench::new().await;
+    let (mine, other) = (Tenant::default(), "other".parse::<Tenant>().unwrap());
+    bench.add("vol_1").await;
+    let tags = Tags::default();
+    let held = bench.queue.renew_volume(&other, "vol_1", &tags).await;
+    assert!(held.unwrap().is_some_and(|(_, new)| new));
+    bench.clock.set(4_000);
+    let job = use_volume(&bench, &mine).await;
+    bench.queue.interrupt(&job).await.unwrap();
+    let upkeep = bench.upkeep(Some(Duration::from_secs(5)));
+    // Uploaded by both at 0, used by one at 4 s.
+    for (now, kept, others) in [
+        (4_900, true, true),
+        (8_900, true, false),
+        (9_100, false, false),
+    ] {
+        bench.clock.set(now);
+        upkeep.run_once().await.unwrap();
+        for (tenant, kept) in [(&mine, kept), (&other, others)] {
+            let volume = bench.store.rows.volume(tenant, "vol_1").await.unwrap();
+            assert_eq!(volume.is_some(), kept, "{tenant} at {now}");
+        }
+        assert_eq!(bench.has_files("vol_1"), kept);
+    }
+}
+
+#[tokio::test]
+async fn a_legal_hold_keeps_a_volume_and_its_jobs_from_retention() {
+    let bench = Bench::new().await;
+    let tenant = Tenant::default();
+    bench.add("vol_1").await;
+    let job = use_volume(&bench, &tenant).await;
+    bench.queue.interrupt(&job).await.unwrap();
+    let hold = LegalHold {
+        reason: "case 17".into(),
+        since: 0,
+        by: "test".into(),
+    };
+    let rows = &bench.store.rows;
+    let set = async |hold: Option<&LegalHold>| {
+        let set = rows.set_legal_hold(&tenant, "vol_1", hold).await;
+        assert!(set.unwrap());
+    };
+    set(Some(&hold)).await;
+    bench.clock.set(1_000_000_000);
+    let upkeep = bench.upkeep(Some(Duration::from_secs(1)));
+    upkeep.run_once().await.unwrap();
+    assert!(bench.has_files("vol_1"));
+    assert!(rows.job(&job).await.unwrap().is_some());
+    set(None).await;
+    upkeep.run_once().await.unwrap();
+    assert!(!bench.has_files("vol_1"));
+    assert!(rows.job(&job).await.unwrap().is_none());
+    let every = ListRequest {
+        before: None,
+        limit: 10,
+    };
+    let receipts = rows.receipts(&tenant, Some("vol_1"), every).await.unwrap();
+    assert_eq!(receipts.items.len(), 1);
+    assert_eq!(receipts.items[0].reason, ErasureReason::Retention);
+    assert_eq!(receipts.items[0].erased_by, "retention");
+}
+
+#[tokio::test]
+async fn nothing_is_erased_by_age_unless_the_operator_says_so() {
+    let ages = RetentionAges::default();
+    for kind in [
+        Resource::Volume,
+        Resource::Model,
+        Resource::Segmentation,
+        Resource::Template,
+        Resource::Job,
+    ] {
+        assert_eq!(ages.expires_at(kind, 0), None);
+    }
+    let app = TestApp::start().await;
+    let job = app.finished("sphere").await;
+    for kind in ["volume", "model"] {
+        let shown = app.json(&text(&job["links"][kind])).await;
+        assert_eq!(shown["expires_at"], serde_json::Value::Null, "{kind}");
+    }
+    let bench = Bench::new().await;
+    bench.add("vol_1").await;
+    bench.clock.set(i64::MAX / 2);
+    bench.upkeep(None).run_once().await.unwrap();
+    assert!(bench.has_files("vol_1"));
 }
 
 #[tokio::test]

@@ -33,14 +33,14 @@ async fn volumes_and_jobs_are_found_by_the_callers_own_names() {
         ids(&list["volumes"])
     };
     let (a, b) = (text(&first["id"]), text(&second["id"]));
-    assert_eq!(found("external_id=A%201").await, [a.clone()]);
+    assert_eq!(found("external_id=A%201").await, [a.as_str()]);
     assert_eq!(found("label=study:42").await, [b.clone(), a.clone()]);
-    assert_eq!(found("label=study:42&label=arm:b").await, [a.clone()]);
+    assert_eq!(found("label=study:42&label=arm:b").await, [a.as_str()]);
     assert!(found("label=study:4").await.is_empty());
     let page = app.json("/v1/volumes?label=study:42&limit=1").await;
     let cursor = text(&page["next_cursor"]);
     let rest = format!("label=study:42&limit=1&cursor={cursor}");
-    assert_eq!(found(&rest).await, [a.clone()]);
+    assert_eq!(found(&rest).await, [a.as_str()]);
 
     let patch = |path: String, body: Value| {
         let request = app.client.patch(format!("{}{path}", app.url));
@@ -53,7 +53,7 @@ async fn volumes_and_jobs_are_found_by_the_callers_own_names() {
     assert_eq!(changed["external_id"], Value::Null);
     assert_eq!(changed["labels"], json!({"site": "x", "study": "42"}));
     assert!(found("label=arm:b").await.is_empty());
-    assert_eq!(found("label=site:x").await, [a.clone()]);
+    assert_eq!(found("label=site:x").await, [a.as_str()]);
     assert!(found("external_id=A%201").await.is_empty());
 
     let order = json!({"volume": a, "external_id": "J1", "labels": {"run": "1"}});
@@ -67,7 +67,7 @@ async fn volumes_and_jobs_are_found_by_the_callers_own_names() {
         format!("volume={a}&kind=model&created_after=2020-01-01T00:00:00Z"),
     ] {
         let list = app.json(&format!("/v1/jobs?{query}")).await;
-        assert_eq!(ids(&list["jobs"]), [id.clone()], "{query}");
+        assert_eq!(ids(&list["jobs"]), [id.as_str()], "{query}");
     }
     for query in ["kind=segmentation", "created_after=2999-01-01T00:00:00Z"] {
         let list = app.json(&format!("/v1/jobs?{query}")).await;
@@ -163,6 +163,12 @@ async fn an_erased_volume_leaves_a_receipt_and_nothing_else() {
     let job: Value = job.json().await.unwrap();
     let job = app.until(&job, &["succeeded"]).await;
     let (id, model) = (text(&job["volume"]), text(&job["model"]));
+    // Copies that were set aside when the files of the volume were damaged.
+    for name in [id.clone(), format!("{id}.019a")] {
+        let aside = app.data.path().join("quarantine/2026-01-02").join(name);
+        std::fs::create_dir_all(&aside).unwrap();
+        std::fs::write(aside.join("volume.nii"), &content[1..]).unwrap();
+    }
     assert!(!files_with(app.data.path(), canary.as_bytes()).is_empty());
     let itself = format!("/v1/volumes/{id}");
     let wrong = app.delete(&format!("{itself}?cascade=yes")).send();
@@ -185,6 +191,14 @@ async fn an_erased_volume_leaves_a_receipt_and_nothing_else() {
     assert_eq!(receipt["items"][0]["files"][0]["sha256"], digest);
     assert_eq!(receipt["items"][0]["files_erased"], true);
     assert_eq!(app.json(&location).await, receipt);
+    let trail = app
+        .json(&format!("/v1/audit?object={id}"))
+        .await
+        .to_string();
+    let row = format!("\"id\":\"{}\"", text(&receipt["audit_event"]["id"]));
+    let hash = text(&receipt["audit_event"]["hash"]);
+    assert!(trail.contains(&row) && trail.contains(&hash), "{trail}");
+    assert_eq!(trail.matches("\"action\":\"D\"").count(), 1, "{trail}");
     let list = app.json(&format!("/v1/erasures?item={id}")).await;
     assert_eq!(list["erasures"], json!([receipt]));
     for path in [

@@ -1,7 +1,7 @@
 //! Credentials, scopes, quotas, the audit trail, and what browsers may do. `docs/security.md` lists
 //! these tests beside the OWASP API Security Top 10 (2023).
 
-use crate::helpers::{TestApp, fake_engine, problem, text, volume};
+use crate::helpers::{TestApp, closed, fake_engine, key, problem, text, volume};
 use axum::Router;
 use axum::routing::get;
 use jsonwebtoken::{Algorithm, EncodingKey, Header, encode};
@@ -13,45 +13,17 @@ use std::net::TcpListener;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
-use ventriform::access::{
-    AccessStore, Activity, ApiKey, AuditEvent, BrokenLink, KeyRequest, Quota, Scope, verify,
-};
+use std::time::Duration;
+use ventriform::access::{AccessStore, Activity, AuditEvent, BrokenLink, Quota, Scope, verify};
 use ventriform::config::Settings;
 use ventriform::http::{ServeError, document_json, start};
 use ventriform::jobs::{Clock, SystemClock, Tenant};
 use ventriform::store::{SqliteStore, open_rows};
 
-/// Makes a key as `ventriform keys create` does: beside the running service.
-async fn key(data: &Path, scope: Scope, tenant: &str, quota: Quota) -> (String, String) {
-    let now = SystemClock.now();
-    let request = KeyRequest {
-        name: format!("{scope} of {tenant}"),
-        tenant: tenant.parse().unwrap(),
-        scope,
-        quota,
-        expires_at: None,
-    };
-    let (key, text) = ApiKey::make(request, now).unwrap();
-    let store = open_rows(data).await.unwrap();
-    let event = AuditEvent::new(now, Activity::KeyCreated, key.tenant.clone(), "test".into());
-    store.add_key(&key, &event.on(&key.id)).await.unwrap();
-    (key.id, text)
-}
-
 async fn plain_key(app: &TestApp, scope: Scope) -> String {
     key(app.data.path(), scope, "default", Quota::default())
         .await
         .1
-}
-
-/// Waits until the service asks for credentials.
-async fn closed(app: &TestApp) {
-    let deadline = Instant::now() + Duration::from_secs(1);
-    while app.get("/v1/volumes").send().await.unwrap().status() != StatusCode::UNAUTHORIZED {
-        assert!(Instant::now() < deadline, "the service is still open");
-        tokio::time::sleep(Duration::from_millis(20)).await;
-    }
 }
 
 async fn status(request: RequestBuilder) -> StatusCode {

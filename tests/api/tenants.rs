@@ -1,13 +1,14 @@
-//! Tenants: what belongs to one does not exist for another.
-//!
-//! The items of another tenant are made by handing those of the tenant `default` over to it in the
-//! database; the caller is always `default`.
+//! Tenants: what belongs to one does not exist for another. Two of them, each with an API key, use
+//! one service.
 
-use crate::helpers::{TestApp, fake_engine, problem, text, volume};
-use reqwest::{Method, StatusCode};
+use crate::helpers::{TestApp, closed, key, problem, text, volume};
+use crate::receiver::Receiver;
+use reqwest::{Method, RequestBuilder, StatusCode};
 use serde_json::{Value, json};
-use sqlx::ConnectOptions;
-use std::path::Path;
+use std::collections::BTreeMap;
+use ventriform::access::{Quota, Scope};
+use ventriform::config::Settings;
+use ventriform::http::document_json;
 use ventriform::jobs::{
     Catalogue, Filed, Idempotency, JobStore, NewJob, StoredVolume, Tags, Tenant,
 };
@@ -63,173 +64,350 @@ async fn an_idempotency_key_is_its_tenants_own() {
     assert_eq!(other.tenant, b);
 }
 
-/// Gives everything that is stored to another tenant.
-async fn hand_over(folder: &Path) {
-    let options = sqlx::sqlite::SqliteConnectOptions::new()
-        .filename(folder.join("ventriform.db"))
-        .foreign_keys(false);
-    let mut database = options.connect().await.unwrap();
-    for statement in [
-        "UPDATE holdings SET tenant = 'other'",
-        "UPDATE sources SET tenant = 'other'",
-        "UPDATE jobs SET tenant = 'other'",
-        "UPDATE erased SET tenant = 'other'",
-        "UPDATE erasures SET tenant = 'other'",
-        "UPDATE label_index SET tenant = 'other'",
-    ] {
-        sqlx::query(statement).execute(&mut database).await.unwrap();
+/// The service as two tenants see it, each by a key of scope `admin`.
+async fn two_tenants(app: &TestApp) -> [TestApp; 2] {
+    let make = async |tenant: &str| {
+        let made = key(app.data.path(), Scope::Admin, tenant, Quota::default());
+        app.seen_with(&made.await.1)
+    };
+    let tenants = [make("a").await, make("b").await];
+    closed(app).await;
+    tenants
+}
+
+/// What a tenant has: for each kind of path, the values that go into it.
+struct Belongings {
+    volume: Value,
+    job: Value,
+    ids: BTreeMap<&'static str, String>,
+    delivery: String,
+}
+
+impl Belongings {
+    /// Stores one thing of each kind, and tells `receiver` about the job.
+    async fn of(a: &TestApp, receiver: &Receiver) -> Self {
+        let sent = async |request: RequestBuilder| -> Value {
+            let answer = request.send().await.unwrap();
+            assert!(answer.status().is_success(), "{}", answer.status());
+            answer.json().await.unwrap()
+        };
+        let erased = a.volume("sphere erased").await;
+        let erase = a.delete(&format!("/v1/volumes/{erased}"));
+        let receipt = sent(erase.header("prefer", "return=representation")).await;
+        let webhook = json!({"url": receiver.url});
+        let webhook = sent(a.post("/v1/webhooks").json(&webhook)).await;
+        let key = json!({"name": "reader", "scope": "read"});
+        let key = sent(a.post("/v1/keys").json(&key)).await;
+        let file = a
+            .post("/v1/models?external_id=A17&label=study:42")
+            .header("idempotency-key", "k");
+        let job = sent(file.body(volume("sphere"))).await;
+        let job = a.until(&job, &["succeeded"]).await;
+        let model = text(&job["model"]);
+        let fit = a.post(&format!("/v1/segmentations?model={model}"));
+        let fit = sent(fit.body(volume("sphere"))).await;
+        let fit = a.until(&fit, &["succeeded"]).await;
+        let template = format!("/v1/templates?model={model}&organ=generic");
+        let template = sent(a.post(&template)).await;
+        receiver.wait_for(2).await;
+        let id = text(&job["id"]);
+        let told = a.json(&format!("/v1/jobs/{id}/deliveries")).await;
+        let id_of = |value: &Value| text(&value["id"]);
+        Self {
+            volume: a.json(&text(&job["links"]["volume"])).await,
+            delivery: id_of(&told["deliveries"][0]),
+            ids: [
+                ("volumes", text(&job["volume"])),
+                ("models", model),
+                ("segmentations", text(&fit["segmentation"])),
+                ("templates", id_of(&template)),
+                ("jobs", id),
+                ("erasures", id_of(&receipt)),
+                ("webhooks", id_of(&webhook)),
+                ("keys", id_of(&key)),
+            ]
+            .into(),
+            job,
+        }
+    }
+
+    /// A path of the document with what the tenant has in it, and that id.
+    fn fill(&self, path: &str) -> (String, &str) {
+        let kind = path.split('/').nth(2).unwrap();
+        let id = self.ids.get(kind).unwrap_or_else(|| {
+            panic!("this test must know an id of another tenant for the new path {path}")
+        });
+        let file = text(&self.volume["originals"][0]["name"]);
+        let filled = path
+            .replace("{id}", id)
+            .replace("{file}", "mesh.stl")
+            .replace("{name}", &file)
+            .replace("{delivery}", &self.delivery);
+        assert!(!filled.contains('{'), "what stands for it in {path}?");
+        (filled, id)
+    }
+
+    /// The ids that must not be seen by others. An idempotency key is no id.
+    fn all(&self) -> impl Iterator<Item = &String> {
+        self.ids.values().chain([&self.delivery])
     }
 }
 
-/// The ids of one thing of each kind.
-struct Ids {
-    volume: String,
-    model: String,
-    segmentation: String,
-    template: String,
-    job: String,
-    receipt: String,
+/// An id of the same form that nobody has.
+fn nobodys(id: &str) -> String {
+    let (prefix, digits) = id.split_at(id.find('_').map_or(0, |at| at + 1));
+    let other = digits.chars().map(|digit| match digit {
+        '0' => '1',
+        _ => '0',
+    });
+    format!("{prefix}{}", other.collect::<String>())
 }
 
-async fn one_of_each(app: &TestApp) -> Ids {
-    let erased = app.volume("sphere erased").await;
-    let receipt = app
-        .delete(&format!("/v1/volumes/{erased}"))
-        .header("prefer", "return=representation")
-        .send()
-        .await
-        .unwrap();
-    assert_eq!(receipt.status(), StatusCode::OK);
-    let receipt: Value = receipt.json().await.unwrap();
-    let job = app.post("/v1/models").body(volume("sphere")).send();
-    let job: Value = job.await.unwrap().json().await.unwrap();
-    let job = app.until(&job, &["succeeded"]).await;
-    let model = text(&job["model"]);
-    let path = format!("/v1/segmentations?model={model}");
-    let fit = app.post(&path).body(volume("sphere")).send();
-    let fit: Value = fit.await.unwrap().json().await.unwrap();
-    let fit = app.until(&fit, &["succeeded"]).await;
-    let template = app
-        .post(&format!("/v1/templates?model={model}&organ=generic"))
-        .send();
-    let template: Value = template.await.unwrap().json().await.unwrap();
-    Ids {
-        volume: text(&job["volume"]),
-        model,
-        segmentation: text(&fit["segmentation"]),
-        template: text(&template["id"]),
-        job: text(&job["id"]),
-        receipt: text(&receipt["id"]),
+/// Every operation of the document: method, path.
+fn operations() -> Vec<(Method, String)> {
+    let document: Value = serde_json::from_str(&document_json()).unwrap();
+    let mut all = Vec::new();
+    for (path, item) in document["paths"].as_object().unwrap() {
+        for method in item.as_object().unwrap().keys() {
+            if let Ok(method) = method.to_uppercase().parse() {
+                all.push((method, path.clone()));
+            }
+        }
     }
+    all
+}
+
+fn local(settings: &mut Settings) {
+    settings.webhook_allow = "127.0.0.0/8".parse().unwrap();
 }
 
 #[tokio::test]
 async fn no_route_shows_or_changes_what_another_tenant_has() {
-    let app = TestApp::start().await;
-    let ids = one_of_each(&app).await;
-    let data = app.stop().await;
-    hand_over(data.path()).await;
-    let app = TestApp::on(data, fake_engine(), |_| {}).await;
-    let document = app.json("/openapi.json").await;
-    let mut tried = 0;
-    for (path, operations) in document["paths"].as_object().unwrap() {
-        let id = match path.split('/').nth(2) {
-            Some("volumes") => &ids.volume,
-            Some("models") => &ids.model,
-            Some("segmentations") => &ids.segmentation,
-            Some("templates") => &ids.template,
-            Some("jobs") => &ids.job,
-            Some("erasures") => &ids.receipt,
-            _ => continue,
-        };
-        let filled = path
-            .replace("{id}", id)
-            .replace("{file}", "mesh.stl")
-            .replace("{name}", "volume.nii");
-        for method in operations.as_object().unwrap().keys() {
-            let verb: Method = method.to_uppercase().parse().unwrap();
-            if filled == *path {
-                if verb == Method::GET {
-                    let list = app.json(&filled).await;
-                    let kind = path.rsplit('/').next().unwrap();
-                    assert_eq!(list[kind], json!([]), "{path}");
-                    tried += 1;
-                }
-                continue;
+    let app = TestApp::with(local).await;
+    let receiver = Receiver::willing().await;
+    let [a, b] = two_tenants(&app).await;
+    let theirs = Belongings::of(&a, &receiver).await;
+    let request = |who: &TestApp, method: &Method, path: &str| {
+        let request = who
+            .client
+            .request(method.clone(), format!("{}{path}", app.url));
+        match *method {
+            Method::PATCH => request.json(&json!({"external_id": "x"})),
+            Method::PUT => request.json(&json!({"reason": "x"})),
+            _ => request,
+        }
+    };
+    let seen = async |who: &TestApp, method: &Method, path: &str| {
+        let answer = request(who, method, path).send().await.unwrap();
+        let status = answer.status();
+        (status, answer.bytes().await.unwrap())
+    };
+    let (mut tried, mut lists) = (0, 0);
+    for (method, path) in operations() {
+        if !path.starts_with("/v1/") {
+            continue;
+        }
+        if path.contains('{') {
+            let (filled, id) = theirs.fill(&path);
+            if method == Method::GET {
+                // The owner is served, so there is something to be refused to others.
+                let (status, _) = seen(&a, &method, &filled).await;
+                assert_eq!(status, StatusCode::OK, "{path} for its owner");
             }
-            let request = app
-                .client
-                .request(verb.clone(), format!("{}{filled}", app.url));
-            let request = match verb {
-                Method::PATCH => request.json(&json!({"external_id": "x"})),
-                Method::PUT => request.json(&json!({"reason": "x"})),
-                _ => request,
-            };
-            let answer = request.send().await.unwrap();
-            let status = answer.status();
-            let body = answer.text().await.unwrap();
+            let (status, body) = seen(&b, &method, &filled).await;
+            let body = String::from_utf8_lossy(&body).into_owned();
             assert_eq!(status, StatusCode::NOT_FOUND, "{method} {path}: {body}");
-            let shown = body.replace(id, "");
-            assert!(!shown.contains("_0"), "{method} {path}: {body}");
+            // It says no more than about an id that never was.
+            let never = nobodys(id);
+            let (status, unknown) = seen(&b, &method, &filled.replace(id, &never)).await;
+            assert_eq!(status, StatusCode::NOT_FOUND, "{method} {path}");
+            let told = |body: &str| {
+                let body: Value = serde_json::from_str(body).unwrap();
+                [&body["type"], &body["title"], &body["detail"], &body["fix"]].map(Value::clone)
+            };
+            let unknown = String::from_utf8_lossy(&unknown).replace(&never, id);
+            assert_eq!(told(&body), told(&unknown), "{method} {path}");
             tried += 1;
+        } else if method == Method::GET {
+            let kind = path.rsplit('/').next().unwrap();
+            let (status, own) = seen(&a, &method, &path).await;
+            assert_eq!(status, StatusCode::OK, "{path}");
+            let own = String::from_utf8_lossy(&own).into_owned();
+            if let Some(id) = theirs.ids.get(kind) {
+                assert!(own.contains(id.as_str()), "{path}: {own}");
+            }
+            let volume = &theirs.ids["volumes"];
+            for query in [
+                String::new(),
+                "?external_id=A17".into(),
+                "?label=study:42".into(),
+                format!("?volume={volume}"),
+                format!("?item={volume}"),
+                format!("?object={volume}"),
+                "?limit=100".into(),
+            ] {
+                let (status, body) = seen(&b, &method, &format!("{path}{query}")).await;
+                if status == StatusCode::BAD_REQUEST && !query.is_empty() {
+                    continue;
+                }
+                let body = String::from_utf8_lossy(&body).into_owned();
+                assert_eq!(status, StatusCode::OK, "{path}{query}: {body}");
+                for id in theirs.all() {
+                    assert!(!body.contains(id.as_str()), "{path}{query}: {body}");
+                }
+                lists += 1;
+            }
+        } else {
+            // What makes something names others' things in its body or query only; see below.
+            let known = ["volumes", "models", "segmentations", "templates", "jobs"];
+            let known = known
+                .into_iter()
+                .chain(["keys", "webhooks", "webhooks/secret"]);
+            let known: Vec<String> = known.map(|kind| format!("/v1/{kind}")).collect();
+            assert!(
+                method == Method::POST && known.contains(&path),
+                "this test must know what {method} {path} can name"
+            );
         }
     }
-    assert!(tried > 25, "only {tried} operations were tried");
+    assert!(tried > 30, "only {tried} operations were tried");
+    assert!(lists > 20, "only {lists} lists were read");
 
     let order = |volume: &str, parameters: Value| {
         let body = json!({"kind": "segmentation", "volume": volume, "parameters": parameters});
-        app.post("/v1/jobs").json(&body).send()
+        b.post("/v1/jobs").json(&body).send()
     };
-    let foreign = order(&ids.volume, json!({})).await.unwrap();
+    let foreign = order(&theirs.ids["volumes"], json!({})).await.unwrap();
     let refused = problem(foreign, 422, "invalid-field").await;
     assert_eq!(refused["field"], "volume");
-    let mine = app.volume("sphere mine").await;
-    for (field, id) in [("model", &ids.model), ("expert", &ids.volume)] {
-        let foreign = order(&mine, json!({field: id})).await.unwrap();
+    let mine = b.volume("sphere mine").await;
+    for (field, kind) in [
+        ("model", "models"),
+        ("model", "segmentations"),
+        ("model", "templates"),
+        ("expert", "volumes"),
+    ] {
+        let foreign = json!({field: theirs.ids[kind]});
+        let foreign = order(&mine, foreign).await.unwrap();
         let refused = problem(foreign, 422, "invalid-field").await;
         assert_eq!(refused["field"], field);
         assert!(!text(&refused["detail"]).contains("erased"), "{refused}");
+        let path = format!("/v1/segmentations?{field}={}", theirs.ids[kind]);
+        let upload = b.post(&path).body(volume("sphere mine")).send();
+        problem(upload.await.unwrap(), 422, "invalid-field").await;
     }
-    let copied = app.post(&format!("/v1/templates?model={}", ids.model));
-    problem(copied.send().await.unwrap(), 422, "invalid-field").await;
-    let listed = app.json(&format!("/v1/jobs?volume={}", ids.volume)).await;
-    assert_eq!(listed["jobs"], json!([]));
+    for kind in ["models", "segmentations"] {
+        let copied = b.post(&format!("/v1/templates?model={}", theirs.ids[kind]));
+        problem(copied.send().await.unwrap(), 422, "invalid-field").await;
+    }
+
+    // Nothing of all that has changed anything for the owner.
+    for (kind, shown) in [("volume", &theirs.volume), ("self", &theirs.job)] {
+        let now = a.json(&text(&theirs.job["links"][kind])).await;
+        assert_eq!(now, *shown, "{kind}");
+    }
+    for kind in ["models", "segmentations", "templates", "erasures"] {
+        a.json(&format!("/v1/{kind}/{}", theirs.ids[kind])).await;
+    }
+    let text_of = async |path: &str| a.get(path).send().await.unwrap().text().await.unwrap();
+    for kind in ["keys", "webhooks"] {
+        let list = text_of(&format!("/v1/{kind}")).await;
+        assert!(list.contains(&theirs.ids[kind]), "{list}");
+    }
+    assert!(!text_of("/v1/keys").await.contains("revoked_at\":\""));
+}
+
+#[tokio::test]
+async fn a_tenant_gets_results_and_answers_of_its_own() {
+    let app = TestApp::start().await;
+    let [a, b] = two_tenants(&app).await;
+    let file = async |who: &TestApp, query: &str| {
+        let request = who.post(&format!("/v1/models{query}"));
+        let request = request.header("idempotency-key", "the same");
+        let job = request.body(volume("sphere")).send().await.unwrap();
+        assert_eq!(job.status(), StatusCode::ACCEPTED);
+        let job: Value = job.json().await.unwrap();
+        who.until(&job, &["succeeded"]).await
+    };
+    let first = file(&a, "?external_id=A17&label=name:doe").await;
+    let shown = a.json(&text(&first["links"]["volume"])).await;
+    assert_eq!(shown["external_id"], "A17");
+    let second = file(&b, "").await;
+    assert_ne!(
+        first["id"], second["id"],
+        "an idempotency key is its tenant's"
+    );
+    assert_eq!(first["volume"], second["volume"], "the same bytes");
+    assert_ne!(
+        first["model"], second["model"],
+        "reports say when they were made"
+    );
+    // Read by one right after the other, who has it too.
+    for _ in 0..3 {
+        let mine = b.json(&text(&second["links"]["volume"])).await;
+        assert_eq!(mine["external_id"], Value::Null, "{mine}");
+        assert_eq!(mine["labels"], json!({}));
+        let theirs = a.json(&text(&first["links"]["volume"])).await;
+        assert_eq!(theirs, shown);
+    }
+    let again = file(&a, "?external_id=A17&label=name:doe").await;
+    assert_eq!(again["id"], first["id"]);
+}
+
+#[tokio::test]
+async fn an_answer_is_never_older_than_the_last_change() {
+    let app = TestApp::start().await;
+    let job = app.finished("sphere").await;
+    let path = text(&job["links"]["volume"]);
+    for round in 0..20 {
+        let name = format!("round {round}");
+        let patch = app.client.patch(format!("{}{path}", app.url));
+        let patched = patch.json(&json!({"external_id": name})).send();
+        assert_eq!(patched.await.unwrap().status(), StatusCode::OK);
+        let reads = (0..4).map(|_| app.json(&path));
+        for shown in futures::future::join_all(reads).await {
+            assert_eq!(shown["external_id"], name);
+        }
+    }
+    let model = text(&job["links"]["model"]);
+    app.json(&model).await;
+    let hold = format!("{}{path}/hold", app.url);
+    let held = app.client.put(&hold).json(&json!({"reason": "x"})).send();
+    assert_eq!(held.await.unwrap().status(), StatusCode::OK);
+    assert!(app.json(&path).await["legal_hold"].is_object());
+    let lifted = app.client.delete(&hold).send().await.unwrap();
+    assert_eq!(lifted.status(), StatusCode::NO_CONTENT);
+    assert!(app.json(&path).await["legal_hold"].is_null());
+    for path in [&model, &path] {
+        app.json(path).await;
+        let erased = app.delete(path).send().await.unwrap();
+        assert_eq!(erased.status(), StatusCode::NO_CONTENT);
+        problem(app.get(path).send().await.unwrap(), 410, "gone").await;
+    }
 }
 
 #[tokio::test]
 async fn content_stays_until_the_last_tenant_has_erased_it() {
     let app = TestApp::start().await;
-    let id = app.volume("sphere").await;
-    let data = app.stop().await;
-    hand_over(data.path()).await;
-    let app = TestApp::on(data, fake_engine(), |_| {}).await;
+    let [a, b] = two_tenants(&app).await;
+    let id = a.volume("sphere").await;
     let path = format!("/v1/volumes/{id}");
-    let upload = || app.post("/v1/volumes").body(volume("sphere")).send();
+    let upload = || b.post("/v1/volumes").body(volume("sphere")).send();
     let first = upload().await.unwrap();
     assert_eq!(first.status(), StatusCode::CREATED, "new for this tenant");
     assert_eq!(upload().await.unwrap().status(), StatusCode::OK);
-    let receipt = app
-        .delete(&path)
-        .header("prefer", "return=representation")
-        .send()
-        .await
-        .unwrap();
-    let receipt: Value = receipt.json().await.unwrap();
-    assert_eq!(receipt["items"][0]["files_erased"], false);
-    problem(app.get(&path).send().await.unwrap(), 410, "gone").await;
+    let erase = async |who: &TestApp| {
+        let request = who.delete(&path).header("prefer", "return=representation");
+        let receipt: Value = request.send().await.unwrap().json().await.unwrap();
+        receipt["items"][0]["files_erased"].clone()
+    };
+    assert_eq!(erase(&b).await, false);
+    problem(b.get(&path).send().await.unwrap(), 410, "gone").await;
     let files = app.data.path().join("volumes").join(&id);
     assert!(files.exists(), "the other tenant still has it");
+    a.json(&path).await;
     assert_eq!(upload().await.unwrap().status(), StatusCode::CREATED);
-    let data = app.stop().await;
-    let options =
-        sqlx::sqlite::SqliteConnectOptions::new().filename(data.path().join("ventriform.db"));
-    let mut database = options.connect().await.unwrap();
-    sqlx::query("DELETE FROM holdings WHERE tenant = 'other'")
-        .execute(&mut database)
-        .await
-        .unwrap();
-    let app = TestApp::on(data, fake_engine(), |_| {}).await;
-    let gone = app.delete(&path).send().await.unwrap();
-    assert_eq!(gone.status(), StatusCode::NO_CONTENT);
+    assert_eq!(erase(&a).await, false);
+    assert_eq!(erase(&b).await, true);
     assert!(!files.exists());
 }

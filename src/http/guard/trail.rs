@@ -9,7 +9,7 @@
 use crate::access::{Activity, AuditEvent, Identity, Outcome, Refusal};
 use crate::http::app::App;
 use crate::http::problem::Problem;
-use crate::jobs::{Resource, Tenant, Timestamp};
+use crate::jobs::{ErasureAgent, Resource, Tenant, Timestamp};
 use axum::extract::MatchedPath;
 use axum::http::request::Parts;
 use axum::http::{Method, StatusCode, header};
@@ -29,6 +29,16 @@ pub struct AlreadyRecorded;
 pub struct Agent(AuditEvent);
 
 impl Agent {
+    /// Who it is, for an erasure, whose event is recorded together with its receipt.
+    pub fn of_erasure(&self) -> ErasureAgent {
+        ErasureAgent {
+            name: self.0.agent.clone(),
+            key: self.0.key.clone(),
+            address: self.0.address.clone(),
+            request: self.0.request.clone(),
+        }
+    }
+
     /// What the agent did at that time.
     pub fn event(&self, activity: Activity, now: Timestamp) -> AuditEvent {
         AuditEvent {

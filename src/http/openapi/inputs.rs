@@ -207,7 +207,21 @@ impl IntoParams for TagParameters {
     }
 }
 
-/// `cascade`, and `Prefer: return=representation`.
+/// `cascade`.
+pub struct CascadeParameter;
+
+impl IntoParams for CascadeParameter {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let flag = ObjectBuilder::new()
+            .schema_type(Type::Boolean)
+            .default(Some(json!(false)));
+        let help = "Whether to erase also the models, segmentations and templates that were made \
+                    of the volume, and the records of its jobs";
+        vec![query("cascade", help).schema(Some(flag)).build()]
+    }
+}
+
+/// `Prefer: return=representation`.
 pub struct ErasureParameters;
 
 impl IntoParams for ErasureParameters {

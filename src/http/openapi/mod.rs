@@ -33,9 +33,9 @@ pub use bodies::{
     WebhookRequest,
 };
 pub use inputs::{
-    CachedHeaders, ConditionalHeaders, ErasureParameters, EventHeader, IdempotencyHeader,
-    ModelParametersObject, ModelQuery, PageParameters, PreferHeader, SegmentationParametersObject,
-    SegmentationQuery, TagParameters, TemplateQuery, WebhookInputs,
+    CachedHeaders, CascadeParameter, ConditionalHeaders, ErasureParameters, EventHeader,
+    IdempotencyHeader, ModelParametersObject, ModelQuery, PageParameters, PreferHeader,
+    SegmentationParametersObject, SegmentationQuery, TagParameters, TemplateQuery, WebhookInputs,
 };
 pub use operation::Documented;
 pub use reports::{ModelSummarySchema, SegmentationSummarySchema, TemplateSummarySchema};

@@ -8,7 +8,8 @@
 use super::Queue;
 use super::publish::to_its_end;
 use crate::jobs::{
-    Deleted, Erased, ErasureOrder, ErasureReason, Expiry, Resource, StoreError, Tenant, Timestamp,
+    Deleted, Erased, ErasureAgent, ErasureOrder, ErasureReason, Expiry, Resource, StoreError,
+    Tenant, Timestamp,
 };
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -150,7 +151,10 @@ fn by_retention(tenant: Tenant, id: String) -> ErasureOrder {
         tenant,
         id,
         cascade: false,
-        by: BY_RETENTION.into(),
+        by: ErasureAgent {
+            name: BY_RETENTION.into(),
+            ..ErasureAgent::default()
+        },
         reason: ErasureReason::Retention,
     }
 }

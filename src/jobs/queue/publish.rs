@@ -73,7 +73,9 @@ impl Queue {
             .map(|(key, value)| (key.to_owned(), Value::from(value)))
             .into_iter()
             .collect();
-        let template = self.product(Resource::Template, &[organ], None, parameters, &output);
+        let origin = [organ];
+        let made = (source.tenant, Resource::Template);
+        let template = self.product(made, &origin, None, parameters, &output);
         let (queue, tenant) = (self.clone(), source.tenant.clone());
         let volume = source.volume.map(str::to_owned);
         to_its_end(async move {
@@ -105,7 +107,7 @@ impl Queue {
     ) -> Result<Option<Job>, StoreError> {
         let parameters = Value::Object(job.parameters.clone()).to_string();
         let product = self.product(
-            made,
+            (&job.tenant, made),
             &[&job.volume, &parameters],
             Some(&job.volume),
             job.parameters.clone(),
@@ -195,19 +197,25 @@ impl Queue {
         }
     }
 
-    /// The record of a product. Its id is a hash of the kind, of `origin` and of the mesh; the
-    /// report contains times and must not change the id.
+    /// The record of a product. Its id is a hash of the kind, of `origin`, of the tenant and of the
+    /// mesh; the report contains times and must not change the id.
+    ///
+    /// The tenant is part of it because reports say when they were made, and which templates of the
+    /// tenant's library were tried: no tenant gets the files of another one. The default tenant is
+    /// not hashed, so that its ids are those of a service without tenants.
     fn product(
         &self,
-        made: Resource,
+        (tenant, made): (&Tenant, Resource),
         origin: &[&str],
         volume: Option<&str>,
         parameters: Map<String, Value>,
         output: &WorkOutput,
     ) -> Product {
         let files: Vec<_> = output.files.iter().map(described).collect();
+        let own = (*tenant != Tenant::default()).then_some(tenant.as_str());
         let parts = std::iter::once(made.noun())
             .chain(origin.iter().copied())
+            .chain(own)
             .chain([mesh_hash(&files)]);
         Product {
             id: content_id(made.prefix(), parts.map(str::as_bytes)),

@@ -192,7 +192,7 @@ pub trait BlobStore: Send + Sync + 'static {
     /// file is not what `file` says.
     async fn local(&self, id: &str, file: &FileRecord) -> Result<Option<LocalFile>, BlobError>;
 
-    /// Deletes every file of `id`; succeeds if there is none.
+    /// Deletes every file of `id`, also what was set aside; succeeds if there is none.
     async fn delete(&self, id: &str) -> Result<(), BlobError>;
 
     /// Every id of that kind that has files.

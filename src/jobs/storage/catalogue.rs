@@ -116,7 +116,7 @@ pub trait Catalogue: Custody {
 
     /// The finished jobs, volumes, models and segmentations beyond their age that no legal hold
     /// keeps, with their tenants. The age of an item counts from its last upload or computation,
-    /// that of a volume also from when a job on it was last filed or ended.
+    /// that of a volume also from when a job on it was last filed or computed.
     async fn expired(&self, expiry: &Expiry) -> StoreResult<Vec<(Tenant, String)>>;
 
     /// Overwrites what was deleted from the database: moves the write-ahead log, which still holds

@@ -12,10 +12,23 @@ pub struct ErasureOrder {
     pub id: String,
     /// Whether to erase also what was made of it, and the jobs that worked on it.
     pub cascade: bool,
-    /// The name of the caller.
-    pub by: String,
+    /// Who asks.
+    pub by: ErasureAgent,
     /// Why it is erased.
     pub reason: ErasureReason,
+}
+
+/// Who erases an item, as the audit trail names it.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ErasureAgent {
+    /// The name.
+    pub name: String,
+    /// Id of the key by which it is done.
+    pub key: Option<String>,
+    /// Network address.
+    pub address: Option<String>,
+    /// Id of the request.
+    pub request: Option<String>,
 }
 
 /// Why an item is erased.
@@ -39,14 +52,25 @@ pub struct Receipt {
     pub item: String,
     /// When it was erased.
     pub erased_at: Timestamp,
-    /// The name of the caller.
+    /// The name of who asked.
     pub erased_by: String,
+    /// The row of the audit trail that records it.
+    pub audit: AuditMark,
     /// Why it was erased.
     pub reason: ErasureReason,
     /// The item, and what went with it.
     pub items: Vec<ErasedItem>,
     /// The jobs whose records went with it.
     pub jobs: Vec<String>,
+}
+
+/// A row of the audit trail.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct AuditMark {
+    /// Its position in the chain.
+    pub sequence: i64,
+    /// Its hash, which the hashes of all later rows cover.
+    pub hash: String,
 }
 
 /// One item of a [`Receipt`].

@@ -20,7 +20,10 @@ pub use blobs::{
 };
 pub use catalogue::{Catalogue, Deleted};
 pub use custody::Custody;
-pub use erasure::{Erased, ErasedFile, ErasedItem, ErasureOrder, ErasureReason, Expiry, Receipt};
+pub use erasure::{
+    AuditMark, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder, ErasureReason, Expiry,
+    Receipt,
+};
 pub use figures::{FigureStore, QueueFigures};
 pub use holding::{Held, Holding, LegalHold, TagFilter, Tags};
 pub use job_store::{
