@@ -3,6 +3,7 @@
 use super::decoding::Decoding;
 use super::guard::state::Guard;
 use super::hooks::Hooks;
+use super::kept_answers::KeptAnswers;
 use super::metrics::Metrics;
 use super::readiness::Readiness;
 use super::spans::Spans;
@@ -45,6 +46,8 @@ pub struct Shared {
     pub closing: CancellationToken,
     /// Reads files outside of jobs.
     pub decoding: Decoding,
+    /// Answers about items that are still current.
+    pub answers: KeptAnswers,
     /// The open streams of events.
     pub streams: EventStreams,
     /// Telling other programs about jobs.
@@ -86,6 +89,9 @@ impl App {
             access,
             guard,
             decoding: Decoding::new(&settings, watching.metrics.requests.decoding_waits.clone()),
+            answers: KeptAnswers::new(
+                usize::try_from(settings.answer_memory.0).unwrap_or(usize::MAX),
+            ),
             streams: EventStreams::new(&settings),
             settings,
             hooks,

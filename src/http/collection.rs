@@ -16,7 +16,8 @@ use super::pagination::{next_cursor, page_of};
 use super::problem::Answer;
 use super::problem::not_found::missing;
 use super::request::{PathSegments, query_pairs, refuse_unknown};
-use super::{tags, validators};
+use super::tags;
+use super::validators::ValidatedJson;
 use crate::jobs::{
     Catalogue, Held, ListPage, ListRequest, Resource, StoreError, TagFilter, Tenant,
 };
@@ -167,8 +168,22 @@ async fn show<C: Collection>(
     headers: HeaderMap,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let row = find::<C>(&app, &caller.tenant, &id).await?;
-    validators::json(&headers, &C::body(&app, row)?)
+    let (catalogue, tenant) = (&app.queue.catalogue, &caller.tenant);
+    let version = catalogue.version();
+    if Resource::of(&id) == Some(C::RESOURCE)
+        && let Some(version) = version
+        && let Some(answer) = app.answers.get(version, tenant, &id)
+    {
+        return Ok(answer.answer(&headers));
+    }
+    let row = find::<C>(&app, tenant, &id).await?;
+    let answer = ValidatedJson::of(&C::body(&app, row)?)?;
+    if let Some(version) = version
+        && catalogue.version() == Some(version)
+    {
+        app.answers.keep(version, tenant, &id, &answer);
+    }
+    Ok(answer.answer(&headers))
 }
 
 async fn erase<C: Collection>(

@@ -1,6 +1,6 @@
 //! `/openapi.json`: serialised and compressed once, with validators.
 
-use super::files::matches_any;
+use super::validators::matches_any;
 use crate::jobs::hex;
 use axum::body::Bytes;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};

@@ -3,11 +3,12 @@
 
 use super::app::App;
 use super::problem::{Answer, Problem};
+use super::validators::not_modified;
 use super::wire::path_of;
 use crate::jobs::{FileRecord, Product, ProductFile, hex};
 use axum::body::{Body, Bytes};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
-use axum::response::{IntoResponse, Response};
+use axum::response::IntoResponse;
 use sha2::{Digest, Sha256};
 use std::ops::Range;
 
@@ -134,28 +135,6 @@ async fn respond(
 /// The path of a product's file.
 pub fn path(product: &Product, file: &ProductFile) -> String {
     format!("{}/{}", path_of(&product.id), file.name)
-}
-
-/// 304 if `If-None-Match` names that validator.
-pub fn not_modified(headers: &HeaderMap, etag: &str, cache_control: &str) -> Option<Response> {
-    matches_any(headers, &header::IF_NONE_MATCH, etag).then(|| {
-        let answer = [
-            (header::ETAG, etag.to_owned()),
-            (header::CACHE_CONTROL, cache_control.to_owned()),
-        ];
-        (StatusCode::NOT_MODIFIED, answer).into_response()
-    })
-}
-
-/// Whether a list of entity tags in the header `name` has `etag`, compared weakly.
-pub fn matches_any(headers: &HeaderMap, name: &HeaderName, etag: &str) -> bool {
-    headers
-        .get_all(name)
-        .iter()
-        .filter_map(|value| value.to_str().ok())
-        .flat_map(|value| value.split(','))
-        .map(|tag| tag.trim())
-        .any(|tag| tag == "*" || tag.strip_prefix("W/").unwrap_or(tag) == etag)
 }
 
 /// The bytes that `Range` asks for, end exclusive. `None` is the whole file: RFC 9110 lets a

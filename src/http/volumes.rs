@@ -3,10 +3,10 @@
 use super::app::App;
 use super::caller::Caller;
 use super::collection::{Collection, find};
-use super::files::not_modified;
 use super::openapi::{self, LookupProblems, UploadProblems};
 use super::problem::{Answer, Problem};
 use super::request::{PathSegments, merge_patch, query_pairs, refuse_unknown, unknown};
+use super::validators::not_modified;
 use super::wire::{path_of, rfc3339};
 use super::{tags, upload};
 use crate::jobs::{

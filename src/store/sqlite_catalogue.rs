@@ -250,6 +250,10 @@ impl Catalogue for SqliteStore {
         rows.into_iter().map(owned).collect()
     }
 
+    fn version(&self) -> Option<u64> {
+        self.writer.version()
+    }
+
     async fn overwrite_erased(&self) -> StoreResult<bool> {
         self.writer.truncate_log().await
     }

@@ -14,6 +14,9 @@
 //! fall into the open transaction of an earlier one, which would report success for changes that
 //! are never committed.
 //!
+//! Readers that keep what they read ask [`Writer::version`] before and after: what was read while the
+//! version stayed the same is current until it changes.
+//!
 //! Single statements are wrapped too: when a statement that returns rows is reset, SQLite commits
 //! it, and the driver ignores errors of that commit.
 
@@ -22,7 +25,7 @@ use sqlx::query::Query;
 use sqlx::sqlite::{SqliteArguments, SqliteConnectOptions, SqliteRow};
 use sqlx::{ConnectOptions, Row, Sqlite, SqliteConnection};
 use std::ops::{Deref, DerefMut};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 use tokio::sync::{Mutex, MutexGuard};
 use tokio::time::{Instant, timeout_at};
@@ -39,6 +42,10 @@ pub(super) struct Writer {
     wait: Duration,
     /// Whether the last write did not end with a commit.
     suspect: AtomicBool,
+    /// Even when nothing is being written. Odd from the beginning of a write to the end of its
+    /// commit; without a commit, to the beginning of the next write, which waits for the lock of the
+    /// one before: until then the changes of that one may still reach the disk.
+    version: AtomicU64,
 }
 
 impl Writer {
@@ -50,7 +57,14 @@ impl Writer {
             connection: Mutex::new(None),
             wait,
             suspect: AtomicBool::new(false),
+            version: AtomicU64::new(0),
         }
+    }
+
+    /// A number that every write changes; `None` while there may be one under way.
+    pub fn version(&self) -> Option<u64> {
+        let version = self.version.load(Ordering::SeqCst);
+        version.is_multiple_of(2).then_some(version)
     }
 
     /// Starts a transaction that holds the database's write lock.
@@ -70,6 +84,10 @@ impl Writer {
             {
                 Ok(_) => {
                     self.suspect.store(true, Ordering::Relaxed);
+                    let odd = |version: u64| Some(version + 1 + version % 2);
+                    let _ = self
+                        .version
+                        .fetch_update(Ordering::SeqCst, Ordering::SeqCst, odd);
                     return Ok(WriteTransaction {
                         writer: self,
                         place,
@@ -155,6 +173,7 @@ impl WriteTransaction<'_> {
     pub async fn commit(mut self) -> StoreResult<()> {
         sqlx::query("COMMIT").execute(&mut self.connection).await?;
         self.writer.suspect.store(false, Ordering::Relaxed);
+        self.writer.version.fetch_add(1, Ordering::SeqCst);
         *self.place = Some(self.connection);
         Ok(())
     }
@@ -262,12 +281,20 @@ mod tests {
             .execute(&mut *transaction)
             .await
             .unwrap();
+        assert_eq!(writer.version(), None, "it is under way");
         drop(transaction);
+        assert_eq!(writer.version(), None, "its end is not known");
         let row = sqlx::query("INSERT INTO t VALUES (2) RETURNING x")
             .write_optional(&writer)
             .await
             .unwrap();
         assert_eq!(row.unwrap().get::<i64, _>(0), 2);
+        let version = writer.version();
+        assert!(version.is_some());
+        let done = sqlx::query("DELETE FROM t WHERE x = 3").write(&writer);
+        assert_eq!(done.await.unwrap(), 0);
+        assert!(writer.version().is_some());
+        assert_ne!(writer.version(), version);
         assert_eq!(seen_by_others(&writer).await, 1);
     }
 

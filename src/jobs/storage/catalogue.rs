@@ -119,6 +119,10 @@ pub trait Catalogue: Custody {
     /// that of a volume also from when a job on it was last filed or computed.
     async fn expired(&self, expiry: &Expiry) -> StoreResult<Vec<(Tenant, String)>>;
 
+    /// A number that every write of this process changes, also of jobs; `None` while there may be a
+    /// write under way. What was read between two equal answers is current until the answer changes.
+    fn version(&self) -> Option<u64>;
+
     /// Overwrites what was deleted from the database: moves the write-ahead log, which still holds
     /// it, into the database. `false` if readers were in the way; the next call tries again.
     async fn overwrite_erased(&self) -> StoreResult<bool>;

@@ -1,0 +1,116 @@
+//! Answers about single items, kept until anything is written.
+//!
+//! The JSON of an item follows from the database and the settings. It is kept under the tenant that
+//! asked and the id, with the version of the database ([`crate::jobs::Catalogue::version`]) under
+//! which it was read. Whatever is written changes the version, and answers of other versions are
+//! never used: neither what was erased, changed or put on hold meanwhile, nor what another tenant
+//! has.
+//!
+//! Memory is limited: when there is no room for one more, all are dropped.
+
+use super::validators::ValidatedJson;
+use crate::jobs::Tenant;
+use std::collections::HashMap;
+use std::sync::{Mutex, PoisonError};
+
+/// Memory for an answer's place in the maps.
+const OVERHEAD: usize = 200;
+
+/// See the module.
+pub struct KeptAnswers {
+    limit: usize,
+    kept: Mutex<Kept>,
+}
+
+#[derive(Default)]
+struct Kept {
+    version: u64,
+    bytes: usize,
+    by_tenant: HashMap<Tenant, HashMap<String, ValidatedJson>>,
+}
+
+impl Kept {
+    fn drop_all(&mut self) {
+        self.bytes = 0;
+        self.by_tenant.clear();
+    }
+}
+
+impl KeptAnswers {
+    /// Keeps answers of at most `limit` bytes together.
+    pub fn new(limit: usize) -> Self {
+        Self {
+            limit,
+            kept: Mutex::default(),
+        }
+    }
+
+    /// The answer about a tenant's item, if it was kept under that version.
+    pub fn get(&self, version: u64, tenant: &Tenant, id: &str) -> Option<ValidatedJson> {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if kept.version != version {
+            return None;
+        }
+        kept.by_tenant.get(tenant)?.get(id).cloned()
+    }
+
+    /// Keeps an answer that was made of what was read under that version.
+    pub fn keep(&self, version: u64, tenant: &Tenant, id: &str, answer: &ValidatedJson) {
+        let bytes = answer.bytes() + id.len() + OVERHEAD;
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if version < kept.version || bytes > self.limit {
+            return;
+        }
+        if version > kept.version || kept.bytes + bytes > self.limit {
+            kept.drop_all();
+            kept.version = version;
+        }
+        let of_tenant = kept.by_tenant.entry(tenant.clone()).or_default();
+        if of_tenant.insert(id.to_owned(), answer.clone()).is_none() {
+            kept.bytes += bytes;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_is_used_for_its_tenant_and_version_only() {
+        let (a, b): (Tenant, Tenant) = ("a".parse().unwrap(), "b".parse().unwrap());
+        let answer = ValidatedJson::of(&"1").unwrap();
+        let kept = KeptAnswers::new(10_000);
+        kept.keep(2, &a, "vol_1", &answer);
+        assert!(kept.get(2, &a, "vol_1").is_some());
+        assert!(kept.get(2, &b, "vol_1").is_none());
+        assert!(kept.get(2, &a, "vol_2").is_none());
+        assert!(kept.get(4, &a, "vol_1").is_none());
+        kept.keep(4, &b, "vol_1", &answer);
+        assert!(kept.get(4, &a, "vol_1").is_none());
+        kept.keep(2, &a, "vol_1", &answer);
+        assert!(kept.get(2, &a, "vol_1").is_none(), "too late");
+        assert!(kept.get(4, &b, "vol_1").is_some());
+    }
+
+    #[test]
+    fn memory_is_limited() {
+        let tenant = Tenant::default();
+        let answer = ValidatedJson::of(&"x".repeat(1000)).unwrap();
+        let kept = KeptAnswers::new(10_000);
+        for number in 0..1000 {
+            kept.keep(0, &tenant, &number.to_string(), &answer);
+            assert!(kept.get(0, &tenant, &number.to_string()).is_some());
+            assert!(kept.kept.lock().unwrap().bytes <= 10_000);
+        }
+        let held = kept.kept.lock().unwrap();
+        let count = held.by_tenant[&tenant].len();
+        assert_eq!(held.bytes, {
+            let bytes = |id: &String| answer.bytes() + id.len() + OVERHEAD;
+            held.by_tenant[&tenant].keys().map(bytes).sum::<usize>()
+        });
+        assert!((2..10).contains(&count), "{count}");
+        drop(held);
+        KeptAnswers::new(100).keep(0, &tenant, "vol_1", &answer);
+    }
+}
