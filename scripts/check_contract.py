@@ -187,11 +187,18 @@ def everything(walk, folder):
     call("get", "/v1/volumes", expect=200)
     call("get", "/v1/volumes/{id}", expect=200, id=volume["id"])
     call("get", "/v1/volumes/{id}/preview.png", expect=200, id=volume["id"])
+    call("get", "/v1/volumes/{id}/content", expect=200, id=volume["id"])
+    call("get", "/v1/volumes/{id}/files/{name}", expect=200, id=volume["id"], name=volume["originals"][0]["name"])
+    names = {"external_id": "A-2026-17", "labels": {"study": "42"}}
+    call("patch", "/v1/volumes/{id}", expect=200, id=volume["id"], body=names)
+    call("put", "/v1/volumes/{id}/hold", expect=200, id=volume["id"], body={"reason": "Case 17/2026"})
+    call("delete", "/v1/volumes/{id}/hold", expect=204, id=volume["id"])
 
     order = {"kind": "model", "volume": volume["id"], "parameters": {"points": 24, "iso": "50%"}}
     _, job = call("post", "/v1/jobs", expect=202, body=order)
     job = wait(walk, job)
     event(walk, job)
+    call("patch", "/v1/jobs/{id}", expect=200, id=job["id"], body=names)
     call("get", "/v1/jobs", expect=200)
     _, job = call("post", "/v1/models", expect=202, query="?points=110", body=scan, headers=octets)
     template_model = wait(walk, job)["model"]
@@ -246,7 +253,9 @@ def everything(walk, folder):
     while any(state_of(name) in ("queued", "running") for name in jobs):
         time.sleep(0.05)
     for kind, name in of_kind.items():
-        call("delete", f"/v1/{kind}/{{id}}", expect=204, id=name)
+        call("delete", f"/v1/{kind}/{{id}}", expect=200, headers={"prefer": "return=representation"}, id=name)
+    _, receipts = call("get", "/v1/erasures", expect=200)
+    call("get", "/v1/erasures/{id}", expect=200, id=receipts["erasures"][0]["id"])
     call("get", "/v1/models/{id}", expect=410, id=model)
     call("get", "/v1/models/{id}", expect=404, id="mdl_" + "0" * 32)
     # What the documented examples name was there when it was asked for.

@@ -14,9 +14,6 @@ use axum::extract::{RawQuery, Request, State};
 use axum::http::StatusCode;
 use serde_json::Value;
 
-/// Longest reason, characters.
-pub const REASON_LENGTH: usize = 1000;
-
 /// Put a volume on legal hold
 ///
 /// Neither the volume nor what was made of it can be erased from then on, by request or by age.
@@ -80,11 +77,15 @@ async fn set(app: &App, caller: &Caller, id: &str, hold: Option<&LegalHold>) -> 
 fn reason(value: Option<&Value>) -> Answer<String> {
     let text = value.and_then(Value::as_str).unwrap_or_default().trim();
     let control = |c: char| c.is_control() && c != '\n';
-    match (1..=REASON_LENGTH).contains(&text.chars().count()) && !text.contains(control) {
+    match (1..=LegalHold::REASON_LENGTH).contains(&text.chars().count()) && !text.contains(control)
+    {
         true => Ok(text.to_owned()),
         false => Err(Problem::invalid_field(
             "reason",
-            format!("`reason` must be a text of 1 to {REASON_LENGTH} printable characters."),
+            format!(
+                "`reason` must be a text of 1 to {} printable characters.",
+                LegalHold::REASON_LENGTH
+            ),
         )
         .fix("Say why the volume must be kept, such as the number of a case.")),
     }

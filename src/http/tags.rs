@@ -1,7 +1,7 @@
 //! A tenant's own names for volumes and jobs: `external_id` and labels, given with a request,
 //! changed by a JSON merge patch (RFC 7396), and searched by.
 //!
-//! In a query string or a form: `external_id=A1` and `label=study:42`, the latter repeated. In
+//! In a query string or a form: `external_id=A1` and `labels=study:42`, the latter repeated. In
 //! JSON: `"external_id": "A1"` and `"labels": {"study": "42"}`.
 
 use super::app::App;
@@ -18,10 +18,8 @@ pub const LABEL_NAME_LENGTH: usize = 64;
 /// Longest value of a label, characters.
 pub const LABEL_VALUE_LENGTH: usize = 256;
 
-/// The parameters of a query string or form that this module reads.
-pub const PARAMETERS: [&str; 2] = ["external_id", "label"];
-
-/// The fields of a JSON object that this module reads.
+/// What this module reads: parameters of a query string or form, fields of a JSON object. (`label`
+/// is a parameter of models: the label of an object in a label map.)
 pub const FIELDS: [&str; 2] = ["external_id", "labels"];
 
 /// Pairs of name and value.
@@ -34,7 +32,7 @@ type Pairs = Vec<(String, String)>;
 pub fn take(app: &App, pairs: Pairs) -> Answer<(Tags, Pairs)> {
     let (own, others): (Pairs, Pairs) = pairs
         .into_iter()
-        .partition(|(name, _)| PARAMETERS.contains(&name.as_str()));
+        .partition(|(name, _)| FIELDS.contains(&name.as_str()));
     let mut tags = Tags::default();
     for (name, value) in own {
         if name == "external_id" {
@@ -45,7 +43,7 @@ pub fn take(app: &App, pairs: Pairs) -> Answer<(Tags, Pairs)> {
         }
         let (name, value) = label(&value)?;
         if tags.labels.insert(name, value).is_some() {
-            return Err(twice("label"));
+            return Err(twice("labels"));
         }
     }
     limit_labels(app, &tags.labels)?;
@@ -143,7 +141,7 @@ fn external_id(text: &str) -> Answer<String> {
 fn label(text: &str) -> Answer<(String, String)> {
     let Some((name, value)) = text.split_once(':') else {
         return Err(Problem::invalid_field(
-            "label",
+            "labels",
             format!("`{}` is not a label.", shorten(text)),
         )
         .fix("Give name and value with a colon between them, such as study:42."));
@@ -156,7 +154,7 @@ fn label_name(text: &str) -> Answer<String> {
     match (1..=LABEL_NAME_LENGTH).contains(&text.len()) && text.chars().all(allowed) {
         true => Ok(text.to_owned()),
         false => Err(Problem::invalid_field(
-            "label",
+            "labels",
             format!("`{}` is not the name of a label.", shorten(text)),
         )
         .fix(format!(
@@ -166,7 +164,7 @@ fn label_name(text: &str) -> Answer<String> {
 }
 
 fn label_value(text: &str) -> Answer<String> {
-    printable("label", "The value of a label", text, LABEL_VALUE_LENGTH)
+    printable("labels", "The value of a label", text, LABEL_VALUE_LENGTH)
 }
 
 fn printable(field: &str, what: &str, text: &str, longest: usize) -> Answer<String> {

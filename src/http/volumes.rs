@@ -288,12 +288,12 @@ pub async fn create_volume(
 ) -> Answer {
     let mut pairs = query_pairs(query.as_deref());
     let (_, others) = tags::take(&app, pairs.clone())?;
-    refuse_unknown(&others, &tags::PARAMETERS)?;
+    refuse_unknown(&others, &tags::FIELDS)?;
     let upload = upload::receive(&app, request, &[]).await?;
     pairs.extend(upload.fields);
     let (tags, others) = tags::take(&app, pairs)?;
     if let Some((name, _)) = others.first() {
-        return Err(unknown("form field", name, &tags::PARAMETERS));
+        return Err(unknown("form field", name, &tags::FIELDS));
     }
     let stored = upload.volume.store(&app, &caller.tenant, &tags).await?;
     let volume = stored.volume;

@@ -107,6 +107,21 @@ fn every_operation_has_an_id_of_its_own_and_examples() {
 }
 
 #[test]
+fn no_name_means_two_parameters_of_an_operation() {
+    let document: Value = serde_json::from_str(&document_json()).unwrap();
+    for (path, method, operation) in operations(&document) {
+        let mut names = std::collections::BTreeSet::new();
+        for parameter in operation["parameters"].as_array().into_iter().flatten() {
+            let name = (parameter["in"].to_string(), parameter["name"].to_string());
+            assert!(
+                parameter["name"].is_null() || names.insert(name),
+                "{method} {path}: {parameter}"
+            );
+        }
+    }
+}
+
+#[test]
 fn bytes_are_binary_and_reports_are_typed() {
     let document: Value = serde_json::from_str(&document_json()).unwrap();
     let schema = |path: &str, media_type: &str| {

@@ -22,8 +22,8 @@ async fn volumes_and_jobs_are_found_by_the_callers_own_names() {
         assert_eq!(answer.status(), StatusCode::CREATED, "{query}");
         answer.json::<Value>().await.unwrap()
     };
-    let first = upload("external_id=A%201&label=study:42&label=arm:b", "sphere 1").await;
-    let second = upload("label=study:42", "sphere 2").await;
+    let first = upload("external_id=A%201&labels=study:42&labels=arm:b", "sphere 1").await;
+    let second = upload("labels=study:42", "sphere 2").await;
     let third = upload("", "sphere 3").await;
     assert_eq!(first["external_id"], "A 1");
     assert_eq!(first["labels"], json!({"arm": "b", "study": "42"}));
@@ -34,12 +34,12 @@ async fn volumes_and_jobs_are_found_by_the_callers_own_names() {
     };
     let (a, b) = (text(&first["id"]), text(&second["id"]));
     assert_eq!(found("external_id=A%201").await, [a.as_str()]);
-    assert_eq!(found("label=study:42").await, [b.clone(), a.clone()]);
-    assert_eq!(found("label=study:42&label=arm:b").await, [a.as_str()]);
-    assert!(found("label=study:4").await.is_empty());
-    let page = app.json("/v1/volumes?label=study:42&limit=1").await;
+    assert_eq!(found("labels=study:42").await, [b.clone(), a.clone()]);
+    assert_eq!(found("labels=study:42&labels=arm:b").await, [a.as_str()]);
+    assert!(found("labels=study:4").await.is_empty());
+    let page = app.json("/v1/volumes?labels=study:42&limit=1").await;
     let cursor = text(&page["next_cursor"]);
-    let rest = format!("label=study:42&limit=1&cursor={cursor}");
+    let rest = format!("labels=study:42&limit=1&cursor={cursor}");
     assert_eq!(found(&rest).await, [a.as_str()]);
 
     let patch = |path: String, body: Value| {
@@ -52,8 +52,8 @@ async fn volumes_and_jobs_are_found_by_the_callers_own_names() {
     let changed: Value = changed.json().await.unwrap();
     assert_eq!(changed["external_id"], Value::Null);
     assert_eq!(changed["labels"], json!({"site": "x", "study": "42"}));
-    assert!(found("label=arm:b").await.is_empty());
-    assert_eq!(found("label=site:x").await, [a.as_str()]);
+    assert!(found("labels=arm:b").await.is_empty());
+    assert_eq!(found("labels=site:x").await, [a.as_str()]);
     assert!(found("external_id=A%201").await.is_empty());
 
     let order = json!({"volume": a, "external_id": "J1", "labels": {"run": "1"}});
@@ -63,7 +63,7 @@ async fn volumes_and_jobs_are_found_by_the_callers_own_names() {
     assert_eq!(job["external_id"], "J1");
     for query in [
         "external_id=J1".to_owned(),
-        "label=run:1".to_owned(),
+        "labels=run:1".to_owned(),
         format!("volume={a}&kind=model&created_after=2020-01-01T00:00:00Z"),
     ] {
         let list = app.json(&format!("/v1/jobs?{query}")).await;
@@ -85,14 +85,14 @@ async fn names_that_cannot_be_used_are_refused() {
     let app = TestApp::with(|settings| settings.label_limit = 2).await;
     let long = "x".repeat(129);
     for (query, status, code) in [
-        ("label=study", 422, "invalid-field"),
-        ("label=a%20b:c", 422, "invalid-field"),
-        ("label=a:", 422, "invalid-field"),
-        ("label=a:%07", 422, "invalid-field"),
+        ("labels=study", 422, "invalid-field"),
+        ("labels=a%20b:c", 422, "invalid-field"),
+        ("labels=a:", 422, "invalid-field"),
+        ("labels=a:%07", 422, "invalid-field"),
         ("external_id=", 422, "invalid-field"),
         (&format!("external_id={long}"), 422, "invalid-field"),
-        ("label=a:1&label=b:1&label=c:1", 422, "invalid-field"),
-        ("label=a:1&label=a:2", 400, "repeated-parameter"),
+        ("labels=a:1&labels=b:1&labels=c:1", 422, "invalid-field"),
+        ("labels=a:1&labels=a:2", 400, "repeated-parameter"),
         ("external_id=a&external_id=b", 400, "repeated-parameter"),
     ] {
         let path = format!("/v1/volumes?{query}");
@@ -156,7 +156,7 @@ fn files_with(folder: &Path, bytes: &[u8]) -> Vec<String> {
 async fn an_erased_volume_leaves_a_receipt_and_nothing_else() {
     let app = TestApp::start().await;
     let canary = "KANARIENVOGEL";
-    let query = format!("external_id={canary}-1&label=name:{canary}-2");
+    let query = format!("external_id={canary}-1&labels=name:{canary}-2");
     let path = format!("/v1/models?{query}");
     let content = volume(&format!("sphere {canary}-3"));
     let job = app.post(&path).body(content.clone()).send().await.unwrap();

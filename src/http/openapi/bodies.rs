@@ -2,8 +2,8 @@
 
 use super::inputs::{ModelParametersObject, SegmentationParametersObject};
 use crate::hooks::HookEvent;
-use crate::http::legal_hold::REASON_LENGTH;
 use crate::http::tags;
+use crate::jobs::LegalHold;
 use serde_json::json;
 use std::borrow::Cow;
 use utoipa::openapi::schema::{
@@ -183,7 +183,7 @@ impl PartialSchema for HoldRequest {
         let reason = ObjectBuilder::new()
             .schema_type(Type::String)
             .min_length(Some(1))
-            .max_length(Some(REASON_LENGTH))
+            .max_length(Some(LegalHold::REASON_LENGTH))
             .description(Some("Why the volume must be kept"))
             .examples(["Case 17/2026"]);
         let request = ObjectBuilder::new()

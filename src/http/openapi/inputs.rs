@@ -196,7 +196,7 @@ impl IntoParams for TagParameters {
                 .schema(Some(Schema::from(text("^[ -~]{1,128}$"))))
                 .build(),
             query(
-                "label",
+                "labels",
                 "A name and a value with a colon between them; repeat for several",
             )
             .schema(Some(Schema::Array(labels.build())))

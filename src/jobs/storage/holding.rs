@@ -28,6 +28,11 @@ pub struct LegalHold {
     pub by: String,
 }
 
+impl LegalHold {
+    /// Longest reason, characters.
+    pub const REASON_LENGTH: usize = 1000;
+}
+
 /// That a tenant has an item.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Holding {
