@@ -122,7 +122,7 @@ class Walk:
             headers["content-type"] = "application/json"
             data = json.dumps(body).encode()
             if expect < 300:
-                own["request"] = {"application/json": body}
+                own["request"] = {kind: body for kind in operation["requestBody"]["content"] if kind.endswith("json")}
         request = urllib.request.Request(URL + path + query, data=data, method=method.upper(), headers=headers)
         try:
             answer = urllib.request.urlopen(request, timeout=120)

@@ -53,9 +53,9 @@ pub fn take(app: &App, pairs: Pairs) -> Answer<(Tags, Pairs)> {
 /// Takes a filter out of the pairs of a query string.
 ///
 /// # Errors
-/// As [`take`].
+/// 400 where [`take`] has 422.
 pub fn take_filter(app: &App, pairs: Pairs) -> Answer<(TagFilter, Pairs)> {
-    let (tags, others) = take(app, pairs)?;
+    let (tags, others) = take(app, pairs).map_err(Problem::of_search)?;
     let filter = TagFilter {
         external_id: tags.external_id,
         labels: tags.labels,

@@ -98,6 +98,9 @@ async fn names_that_cannot_be_used_are_refused() {
         let path = format!("/v1/volumes?{query}");
         let answer = app.post(&path).body(volume("sphere")).send();
         problem(answer.await.unwrap(), status, code).await;
+        // Searches for them are, too.
+        let code = code.replace("field", "parameter");
+        problem(app.get(&path).send().await.unwrap(), 400, &code).await;
     }
     assert_eq!(app.json("/v1/volumes").await["volumes"], json!([]));
 }

@@ -117,6 +117,18 @@ impl Problem {
         self
     }
 
+    /// Makes a 422 about a field a 400 about a parameter of a search.
+    #[must_use]
+    pub fn of_search(mut self) -> Self {
+        if self.body.status == StatusCode::UNPROCESSABLE_ENTITY.as_u16() {
+            let code = "invalid-parameter";
+            self.body.status = StatusCode::BAD_REQUEST.as_u16();
+            self.body.kind = format!("{TYPE_PREFIX}{code}");
+            self.body.title = title(code);
+        }
+        self
+    }
+
     /// Says what to do about it.
     #[must_use]
     pub fn fix(mut self, fix: impl Into<String>) -> Self {
