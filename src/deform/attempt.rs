@@ -30,7 +30,7 @@ pub struct Attempt {
 
 impl Attempt {
     /// Repeats the motion with a stiffer model until nothing is folded; the least folded run
-    /// otherwise. `thicken` moves the inner and the outer edge outward, mm.
+    /// otherwise.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -39,10 +39,9 @@ impl Attempt {
         template: &Template,
         setup: &FitSetup,
         parameters: &DeformParameters,
-        thicken: f64,
         monitor: &Monitor,
     ) -> Result<Self, Cancelled> {
-        let wide = setup.sensors(parameters, parameters.sensor, thicken);
+        let wide = setup.sensors(parameters, parameters.sensor);
         let near = SensorSettings {
             reach: (0.8 * wide.reach).max(parameters.motion.last_reach),
             ..wide
@@ -131,6 +130,7 @@ impl Attempt {
             self_intersections: self.intersections,
             turned_triangles: turned(aligned, &mesh),
             wall_ml: mesh.volume() / 1000.0,
+            surfaces: None,
             patient_orientation: cup.map(|_| setup.patient_orientation),
             wall,
             mesh,

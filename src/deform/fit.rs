@@ -1,20 +1,44 @@
 //! A fitted model with the figures needed to judge it.
 
+use super::anatomical::anatomical_mesh;
 use super::dynamics::StopReason;
 use super::flags::Flag;
+use super::parameters::{DeformParameters, WallEdge};
 use crate::geometry::Vec3;
+use crate::grid::field::Field;
 use crate::locate::cup::Cup;
 use crate::locate::localisation::Localisation;
 use crate::locate::patient_orientation::PatientOrientation;
 use crate::locate::{Hints, LocateError, NotAHeart};
 use crate::mesh::TriMesh;
 use crate::model::wall::VentricleWall;
+use crate::progress::{Cancelled, Monitor};
 use nalgebra::Rotation3;
 
 /// A fitted model is no heart if less than this share of its area sees an edge, and the edges
 /// are farther away than this (weighted rms, mm). Hearts have at least 0.63 or at most 1.15,
 /// also with 100 % defects over seven segments; noise has at most 0.51 and at least 1.6.
 const EDGELESS: (f64, f64) = (0.57, 1.3);
+
+/// A wall of a ventricle.
+#[derive(Debug, Clone)]
+pub struct WallSurface {
+    /// The wall's surface, LPS mm.
+    pub mesh: TriMesh,
+    /// The wall seen from the long axis.
+    pub wall: VentricleWall,
+    /// Volume of the wall, ml.
+    pub wall_ml: f64,
+}
+
+/// Both walls of a ventricle, with the same nodes and triangles.
+#[derive(Debug, Clone)]
+pub struct WallSurfaces {
+    /// The wall as it looks in the blurred image.
+    pub apparent: WallSurface,
+    /// The wall itself ([`super::anatomical`]).
+    pub anatomical: WallSurface,
+}
 
 /// A fitted model.
 #[derive(Debug, Clone)]
@@ -33,6 +57,9 @@ pub struct Fit {
     pub wall: Option<VentricleWall>,
     /// Volume that the model encloses, the wall's of a ventricle, ml.
     pub wall_ml: f64,
+    /// The wall as it looks and the wall itself; ventricles only. `mesh`, `wall` and `wall_ml` are
+    /// those of the one that was asked for.
+    pub surfaces: Option<WallSurfaces>,
     /// Isotropic scale of the pose against the template.
     pub scale: f64,
     /// Rotation of the pose against the template.
@@ -82,6 +109,55 @@ impl Fit {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Adds both walls of a ventricle, and shows the one of `edge`.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub(super) fn with_surfaces(
+        self,
+        image: &Field,
+        parameters: &DeformParameters,
+        monitor: &Monitor,
+    ) -> Result<Self, Cancelled> {
+        let (Some(cup), Some(orientation), Some(wall)) =
+            (self.cup, self.patient_orientation, self.wall.clone())
+        else {
+            return Ok(self);
+        };
+        let thin = anatomical_mesh(&self.mesh, &wall, image, parameters.resolution);
+        let surfaces = WallSurfaces {
+            anatomical: WallSurface {
+                wall: VentricleWall::new(&thin, &cup, &orientation.superior, monitor)?,
+                wall_ml: thin.volume() / 1000.0,
+                mesh: thin,
+            },
+            apparent: WallSurface {
+                mesh: self.mesh,
+                wall,
+                wall_ml: self.wall_ml,
+            },
+        };
+        let shown = match parameters.edge {
+            WallEdge::Apparent => &surfaces.apparent,
+            WallEdge::Anatomical => &surfaces.anatomical,
+        };
+        Ok(Self {
+            mesh: shown.mesh.clone(),
+            wall: Some(shown.wall.clone()),
+            wall_ml: shown.wall_ml,
+            surfaces: Some(surfaces),
+            ..self
+        })
+    }
+
+    /// The wall of a ventricle that a fit with this `edge` does not show.
+    pub fn other_surface(&self, edge: WallEdge) -> Option<&WallSurface> {
+        self.surfaces.as_ref().map(|surfaces| match edge {
+            WallEdge::Apparent => &surfaces.anatomical,
+            WallEdge::Anatomical => &surfaces.apparent,
+        })
     }
 
     /// A figure to rank templates by: the share of area with edges, less strain, misfit and

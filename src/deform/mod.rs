@@ -17,8 +17,8 @@
 //! The edge that is fitted is the half-way point between the wall's ridge and the trough beside
 //! it. It does not depend on uptake: a wall with half the uptake has its edge in the same place.
 //! [`DeformParameters::margin`] moves it for readers who draw wider. Blur makes the wall look
-//! thicker than it is; with [`WallEdge::Anatomical`], [`blur_correction`] estimates by how much,
-//! and step 4 is repeated with the edges moved into the wall by that much.
+//! thicker than it is; [`anatomical`] moves both surfaces of the fitted model to the wall itself,
+//! and the fit keeps both ([`Fit::surfaces`]).
 //!
 //! Where the apex takes up no tracer, the stiffness keeps the model near the length of its pose,
 //! and [`Flag::DarkApex`] says that the length is not seen in the image.
@@ -29,6 +29,7 @@
 //! [`Flag::Folded`] reports them).
 
 pub mod align;
+pub mod anatomical;
 pub mod attempt;
 pub mod blur_correction;
 mod doubts;
@@ -43,7 +44,7 @@ pub mod sensors;
 pub mod setup;
 
 pub use error::DeformError;
-pub use fit::Fit;
+pub use fit::{Fit, WallSurface, WallSurfaces};
 pub use flags::Flag;
 pub use parameters::{DeformParameters, WallEdge};
 pub use place::OrganPlace;
@@ -98,7 +99,7 @@ pub fn fit_at(
             &setup.posed,
             &setup.axis,
             &setup.field,
-            &setup.sensors(parameters, far, 0.0),
+            &setup.sensors(parameters, far),
             parameters.motion.last_reach,
             monitor,
         )?
@@ -106,20 +107,10 @@ pub fn fit_at(
         setup.posed.clone()
     };
     monitor.report(Stage::Deform, 0.0)?;
-    let attempt = Attempt::best(&aligned, template, &setup, parameters, 0.0, monitor)?;
+    let attempt = Attempt::best(&aligned, template, &setup, parameters, monitor)?;
     let fit = attempt.into_fit(volume, template, &setup, &aligned, monitor)?;
     fit.require_wall(&parameters.hints)?;
-    let fit = match (&fit.cup, parameters.edge) {
-        (Some(cup), WallEdge::Anatomical) => {
-            monitor.report(Stage::Deform, 0.5)?;
-            let apparent = blur_correction::thickness(&fit.mesh, cup);
-            let excess = blur_correction::excess(apparent, parameters.resolution);
-            let thin = -0.5 * excess;
-            Attempt::best(&aligned, template, &setup, parameters, thin, monitor)?
-                .into_fit(volume, template, &setup, &aligned, monitor)?
-        }
-        _ => fit,
-    };
+    let fit = fit.with_surfaces(&setup.field, parameters, monitor)?;
     monitor.report(Stage::Deform, 1.0)?;
     Ok(fit)
 }

@@ -32,12 +32,12 @@ pub struct DeformParameters {
     pub blur: f64,
     /// Distance of the reader's edge from the edge found, mm outward, -5..=5. Default 0.
     pub margin: f64,
-    /// Which edge of a ventricle's wall is fitted. Default [`WallEdge::Apparent`].
+    /// Which wall of a ventricle the fit shows; the other one is kept beside it
+    /// ([`Fit::surfaces`](super::Fit::surfaces)). Default [`WallEdge::Apparent`].
     pub edge: WallEdge,
-    /// The image's resolution (full width of a point at half its maximum), mm, 0..=30, for
-    /// [`WallEdge::Anatomical`]. Default 11.5, the mean over the simulated scans, motion and
-    /// filter included.
-    pub resolution: f64,
+    /// The image's resolution (full width of a point at half its maximum, motion and filter
+    /// included), mm, 0..=30, for the anatomical wall. Default `None`: by calibration.
+    pub resolution: Option<f64>,
     /// How the model moves.
     pub motion: Motion,
 }
@@ -55,7 +55,7 @@ impl Default for DeformParameters {
             blur: 3.0,
             margin: 0.0,
             edge: WallEdge::Apparent,
-            resolution: 11.5,
+            resolution: None,
             motion: Motion::default(),
         }
     }
@@ -88,7 +88,7 @@ impl DeformParameters {
             ("reach", self.reach, 2.0, 30.0),
             ("blur", self.blur, 0.0, 10.0),
             ("margin", self.margin, -5.0, 5.0),
-            ("resolution", self.resolution, 0.0, 30.0),
+            ("resolution", self.resolution.unwrap_or(0.0), 0.0, 30.0),
             ("motion.mass", m.mass, 1e-6, 1e6),
             ("motion.damping", m.damping, 0.0, 1e6),
             ("motion.time_step", m.time_step, 1e-3, 1e3),

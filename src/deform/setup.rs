@@ -95,13 +95,8 @@ impl FitSetup {
         })
     }
 
-    /// The settings of sensors of `kind`; `thicken` moves the inner and the outer edge outward, mm.
-    pub fn sensors(
-        &self,
-        parameters: &DeformParameters,
-        kind: SensorKind,
-        thicken: f64,
-    ) -> SensorSettings {
+    /// The settings of sensors of `kind`.
+    pub fn sensors(&self, parameters: &DeformParameters, kind: SensorKind) -> SensorSettings {
         let [inner, outer, rim] = match self.localisation {
             Some(_) => edge_shift(kind),
             None => [0.0; 3],
@@ -113,8 +108,8 @@ impl FitSetup {
             // The values of hotter neighbours are clipped: their slopes would outweigh the wall's.
             ceiling: 1.6 * self.uptake,
             shift: EdgeShift {
-                inner: inner + parameters.margin + thicken,
-                outer: outer + parameters.margin + thicken,
+                inner: inner + parameters.margin,
+                outer: outer + parameters.margin,
                 rim: rim + parameters.margin,
                 axis: self.cavity_axis,
             },

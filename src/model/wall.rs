@@ -3,7 +3,6 @@
 //! In go a closed mesh, its cup and the patient's superior direction; out come [`ROWS`] ×
 //! [`COLUMNS`] rays with their distances to the wall, and thickness, extent and cavity volume.
 //!
-//!
 //! Near the apex the rays start at one point (the focus) and fan out over a half sphere;
 //! basal of it they start on the axis and run across it. Rows follow each other at equal
 //! arc length from apex to base, columns at equal angles from the patient's lateral side
@@ -35,6 +34,19 @@ pub struct WallRay {
     pub wall: Option<[f64; 2]>,
 }
 
+/// A point in the coordinates of the rays.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WallPlace {
+    /// Row, apex first: the rays of row `n` lie at `n`. Beyond the last row basal of the rim.
+    pub row: f64,
+    /// Column, 0..[`COLUMNS`]: the rays of column `n` lie at `n`.
+    pub column: f64,
+    /// Distance from the start of the ray through the point, mm.
+    pub distance: f64,
+    /// Unit direction of that ray.
+    pub direction: Vec3,
+}
+
 /// The wall as [`ROWS`] × [`COLUMNS`] rays, row by row, apex first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VentricleWall {
@@ -48,8 +60,11 @@ pub struct VentricleWall {
     pub cavity_ml: f64,
     /// Mean thickness along the rays, mm.
     pub thickness: f64,
+    /// Standard deviation of the thickness over the rays, mm.
+    pub thickness_spread: f64,
     /// Share of the basal half's rays that find no wall.
     pub gaps: f64,
+    frame: AxisFrame,
 }
 
 /// The direction of the anterior wall: the component of the patient's `superior` direction across
@@ -94,7 +109,7 @@ impl VentricleWall {
         superior: &Vec3,
         monitor: &Monitor,
     ) -> Result<Self, Cancelled> {
-        let frame = Frame::new(mesh, cup, superior);
+        let frame = AxisFrame::new(mesh, cup, superior);
         let tree = Bvh::new(&mesh.vertices, &mesh.triangles);
         let ray = |index: usize| {
             monitor.check()?;
@@ -109,20 +124,31 @@ impl VentricleWall {
             .map(ray)
             .collect::<Result<Vec<_>, _>>()?;
         let met: Vec<[f64; 2]> = rays.iter().filter_map(|r| r.wall).collect();
+        let rays_met = met.len().max(1) as f64;
+        let thickness = met.iter().map(|w| w[1] - w[0]).sum::<f64>() / rays_met;
+        let squares: f64 = met.iter().map(|w| (w[1] - w[0] - thickness).powi(2)).sum();
         let basal = &rays[ROWS / 2 * COLUMNS..];
         Ok(Self {
             cavity_ml: frame.cavity(&rays) / 1000.0,
-            thickness: met.iter().map(|w| w[1] - w[0]).sum::<f64>() / met.len().max(1) as f64,
+            thickness,
+            thickness_spread: (squares / rays_met).sqrt(),
             gaps: basal.iter().filter(|r| r.wall.is_none()).count() as f64 / basal.len() as f64,
             row_spacing: frame.row_spacing(),
             extent: [frame.rim, frame.apex],
             rays,
+            frame,
         })
+    }
+
+    /// `point` in the coordinates of the rays. A point on the axis gets column 0.
+    pub fn place(&self, point: &Vec3) -> WallPlace {
+        self.frame.place(point)
     }
 }
 
 /// The axis with marks on it, as distances from the cup's centre towards the apex, mm.
-struct Frame {
+#[derive(Debug, Clone, PartialEq)]
+struct AxisFrame {
     centre: Vec3,
     axis: Vec3,
     lateral: Vec3,
@@ -132,7 +158,7 @@ struct Frame {
     apex: f64,
 }
 
-impl Frame {
+impl AxisFrame {
     fn new(mesh: &TriMesh, cup: &Cup, superior: &Vec3) -> Self {
         let anterior = anterior(&cup.axis, superior);
         let lateral = anterior.cross(&cup.axis);
@@ -186,6 +212,32 @@ impl Frame {
         }
     }
 
+    /// The inverse of [`AxisFrame::ray`].
+    fn place(&self, point: &Vec3) -> WallPlace {
+        let from_centre = point - self.centre;
+        let along = from_centre.dot(&self.axis);
+        let (x, y) = (
+            from_centre.dot(&self.lateral),
+            from_centre.dot(&self.anterior),
+        );
+        let across = x.hypot(y);
+        let turn = y.atan2(x).rem_euclid(TAU) / TAU;
+        let (from_apex, start) = if along > self.focus {
+            let angle = across.atan2(along - self.focus);
+            (angle * (self.apex - self.focus), self.focus)
+        } else {
+            (self.arc() + self.focus - along, along)
+        };
+        let outward = point - (self.centre + self.axis * start);
+        let distance = outward.norm();
+        WallPlace {
+            row: from_apex / self.row_spacing() - 0.5,
+            column: (turn * COLUMNS as f64 - 0.5).rem_euclid(COLUMNS as f64),
+            distance,
+            direction: outward.try_normalize(1e-9).unwrap_or(self.axis),
+        }
+    }
+
     /// Volume inside the inner surface, mm³. Where a ray misses the wall (a low rim), the nearest
     /// ray of its column towards the apex is used instead.
     fn cavity(&self, rays: &[WallRay]) -> f64 {
@@ -229,4 +281,34 @@ fn crossing(mesh: &TriMesh, tree: &Bvh, start: &Vec3, direction: &Vec3) -> Optio
         (leaves, false) => (0.0, *leaves),
     };
     Some([enters, leaves])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    #[test]
+    fn a_point_on_a_ray_has_the_place_of_that_ray() {
+        let mesh = shapes::cup(70.0, 31.0, 12.0, 24);
+        let cup = Cup {
+            centre: mesh.vertices.iter().sum::<Vec3>() / mesh.vertices.len() as f64,
+            axis: -Vec3::z(),
+            length: 70.0,
+            breadth: 1.0,
+        };
+        let wall = VentricleWall::new(&mesh, &cup, &Vec3::y(), &Monitor::silent()).unwrap();
+        for (index, ray) in wall.rays.iter().enumerate() {
+            let place = wall.place(&(ray.start + ray.direction * 17.0));
+            let expected = [(index / COLUMNS) as f64, (index % COLUMNS) as f64, 17.0];
+            let found = [place.row, place.column, place.distance];
+            for (found, expected) in found.iter().zip(expected) {
+                assert!(
+                    (found - expected).abs() < 1e-6,
+                    "{index}: {found} {expected}"
+                );
+            }
+            assert!((place.direction - ray.direction).norm() < 1e-9);
+        }
+    }
 }

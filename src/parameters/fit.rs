@@ -22,9 +22,7 @@ pub struct FitParameters {
     pub organ: Organ,
     /// Known position of the organ.
     pub place: KnownPlace,
-    /// [`DeformParameters::margin`]; `None` selects the default for the file format.
-    pub margin: Option<f64>,
-    /// Parameters of the deformation. [`FitParameters::on`] sets its hints and margin.
+    /// Parameters of the deformation. [`FitParameters::on`] sets its hints.
     pub deform: DeformParameters,
     /// Parameters of the polar map.
     pub polar: PolarParameters,
@@ -38,7 +36,6 @@ impl Default for FitParameters {
             expert: None,
             organ: Organ::LeftVentricle,
             place: KnownPlace::default(),
-            margin: None,
             deform: DeformParameters::default(),
             polar: PolarParameters::default(),
         }
@@ -77,19 +74,13 @@ impl FitParameters {
         Ok(parameters)
     }
 
-    /// The parameters of the deformation for `volume`: hints in millimetres, and `usual_margin` if
-    /// no margin was given.
+    /// The parameters of the deformation for `volume`, with hints in millimetres.
     ///
     /// # Errors
     /// A [`ParameterError`] for a hint outside the volume.
-    pub fn on(
-        &self,
-        volume: &Volume,
-        usual_margin: f64,
-    ) -> Result<DeformParameters, ParameterError> {
+    pub fn on(&self, volume: &Volume) -> Result<DeformParameters, ParameterError> {
         Ok(DeformParameters {
             hints: self.place.hints(volume)?,
-            margin: self.margin.unwrap_or(usual_margin),
             ..self.deform.clone()
         })
     }
@@ -241,15 +232,15 @@ mod tests {
 
     #[test]
     fn hints_are_millimetres_within_the_volume() {
-        let hinted = |list: &[(&str, &str)]| pairs(list).unwrap().on(&volume(), 2.5);
+        let hinted = |list: &[(&str, &str)]| pairs(list).unwrap().on(&volume());
         let seeded = hinted(&[("seed_point", "0,0,0")]).unwrap();
         assert_eq!(seeded.hints.centre, Some(Vec3::new(-9.0, -19.0, -29.0)));
-        assert_eq!(seeded.margin, 2.5);
-        let boxed = hinted(&[("box", "0,1,2,3,4,5"), ("margin", "0")]).unwrap();
+        assert_eq!(seeded.margin, 0.0);
+        let boxed = hinted(&[("box", "0,1,2,3,4,5"), ("margin", "1.5")]).unwrap();
         let region = boxed.hints.region.unwrap();
         assert_eq!(region.min, Vec3::new(-9.0, -17.0, -25.0));
         assert_eq!(region.max, Vec3::new(-3.0, -11.0, -19.0));
-        assert_eq!(boxed.margin, 0.0);
+        assert_eq!(boxed.margin, 1.5);
         for (name, value) in [
             ("center", "11,0,0"),
             ("seed_point", "10,0,0"),

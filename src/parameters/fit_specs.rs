@@ -186,30 +186,31 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "0.85",
         "Factor by which the search range shrinks from step to step"
     ),
-    optional!(
-        Number f64,
+    number!(
         "margin",
-        margin => margin,
+        deform.margin,
         -5.0..=5.0,
-        "How far outside the detected edge the contour is drawn, millimetres (default 2.5 for DICOM \
-         NM, whose readers draw wide contours, as measured on one expert's mask; otherwise 0)"
+        "0",
+        "How far outside the detected edge the contour is drawn, millimetres"
     ),
     choice!(
         "edge",
         deform.edge,
         "apparent",
-        "Which edge of a ventricle's wall to detect: apparent (the edge in the blurred image) or \
-         anatomical (the edge of the wall itself, with the thickness added by blur removed)",
+        "Which wall of a ventricle mask, mesh and measures show: apparent (as it looks in the blurred \
+         image) or anatomical (the wall itself, without the thickness that blur adds). The report \
+         has the volumes of both",
         "apparent" => WallEdge::Apparent,
         "anatomical" => WallEdge::Anatomical,
     ),
-    number!(
+    optional!(
+        Number f64,
         "resolution",
-        deform.resolution,
+        deform.resolution => deform.resolution,
         0.0..=30.0,
-        "11.5",
-        "Resolution of the image for edge=anatomical: full width at half maximum of a point, \
-         including motion and filters, millimetres"
+        "Resolution of the image, if it is known: full width at half maximum of a point, including \
+         motion and filters, millimetres. The anatomical wall is as much thinner as this blur makes \
+         a wall look thicker. Default: by calibration on simulated hearts"
     ),
     number!(
         "spring_stiffness",

@@ -62,7 +62,7 @@ pub(super) use integer;
 /// field of the parameters, range and summary.
 macro_rules! optional {
     (
-        $kind:ident $getter:ident, $name:literal, $draft:ident => $($field:ident).+,
+        $kind:ident $getter:ident, $name:literal, $($draft:ident).+ => $($field:ident).+,
         $min:literal..=$max:literal, $summary:literal
     ) => {
         ParameterSpec {
@@ -74,7 +74,7 @@ macro_rules! optional {
             default: "",
             summary: $summary,
             read: |draft, value| {
-                draft.$draft = Some(value.$getter());
+                draft.$($draft).+ = Some(value.$getter());
                 Ok(())
             },
             write: |parameters| json!(parameters.$($field).+),

@@ -163,20 +163,9 @@ fn verdict(report: &SegmentationReport) -> Markup {
 
 fn figures(report: &SegmentationReport) -> Markup {
     let measures = report.measures.unwrap_or_default();
-    let wall = match report.is_ventricle() {
-        true => "volume of the wall",
-        false => "volume of the organ",
-    };
     let extent = report.polar.as_ref().and_then(|polar| polar.extent_percent);
-    let rows = [
-        (report.volumes_ml.wall, 1, "ml", wall),
-        (report.volumes_ml.cavity, 1, "ml", "volume of the cavity"),
-        (
-            report.wall_thickness_mm,
-            1,
-            "mm",
-            "mean thickness of the wall",
-        ),
+    let mut rows = size_rows(report);
+    rows.extend([
         (extent, 1, "%", "of the wall below the threshold of uptake"),
         (
             measures.jaccard,
@@ -197,7 +186,7 @@ fn figures(report: &SegmentationReport) -> Markup {
             "mm",
             "95th percentile of the distance between the contours",
         ),
-    ];
+    ]);
     let figures: Vec<HeadlineFigure> = rows
         .into_iter()
         .filter_map(|(value, decimals, unit, label)| {
@@ -209,6 +198,67 @@ fn figures(report: &SegmentationReport) -> Markup {
         })
         .collect();
     document::figures(&figures)
+}
+
+/// Volumes, thickness and mass: of both walls of a ventricle where the report has them.
+fn size_rows(report: &SegmentationReport) -> Vec<(Option<f64>, usize, &'static str, &'static str)> {
+    let volumes = report.volumes_ml;
+    let (Some(apparent), Some(anatomical)) = (volumes.apparent, volumes.anatomical) else {
+        let wall = match report.is_ventricle() {
+            true => "volume of the wall",
+            false => "volume of the organ",
+        };
+        return vec![
+            (volumes.wall, 1, "ml", wall),
+            (volumes.cavity, 1, "ml", "volume of the cavity"),
+            (
+                report.wall_thickness_mm,
+                1,
+                "mm",
+                "mean thickness of the wall",
+            ),
+        ];
+    };
+    let thickness = report.thickness_mm.unwrap_or_default();
+    vec![
+        (
+            anatomical.wall,
+            1,
+            "ml",
+            "anatomical wall: without the blur",
+        ),
+        (
+            anatomical.cavity,
+            1,
+            "ml",
+            "cavity within the anatomical wall",
+        ),
+        (
+            thickness.anatomical.mean,
+            1,
+            "mm",
+            "mean thickness of the anatomical wall",
+        ),
+        (
+            report.mass_g,
+            0,
+            "g",
+            "mass of the anatomical wall (1.05 g/ml)",
+        ),
+        (
+            apparent.wall,
+            1,
+            "ml",
+            "apparent wall: as it looks in the image",
+        ),
+        (apparent.cavity, 1, "ml", "cavity within the apparent wall"),
+        (
+            thickness.apparent.mean,
+            1,
+            "mm",
+            "mean thickness of the apparent wall",
+        ),
+    ]
 }
 
 fn slices(report: &SegmentationReport, png: &[u8]) -> Markup {

@@ -27,6 +27,10 @@ pub struct SegmentationReport {
     pub volumes_ml: FittedVolumes,
     /// Mean thickness of the wall.
     pub wall_thickness_mm: Option<f64>,
+    /// Mean thickness of both walls; ventricles only.
+    pub thickness_mm: Option<BothThicknesses>,
+    /// Mass of the anatomical wall, g; ventricles only.
+    pub mass_g: Option<f64>,
     /// Agreement with an expert's mask.
     pub measures: Option<AgreementFigures>,
     /// Uptake of the wall.
@@ -67,6 +71,36 @@ pub struct RefusedTemplateEntry {
     pub reason: Option<String>,
 }
 
+/// Thickness of both walls of a ventricle.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+#[serde(default)]
+pub struct BothThicknesses {
+    /// As the wall looks.
+    pub apparent: ThicknessFigures,
+    /// Of the wall itself.
+    pub anatomical: ThicknessFigures,
+}
+
+/// Thickness of a wall over its surface.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+#[serde(default)]
+pub struct ThicknessFigures {
+    /// Mean, mm.
+    pub mean: Option<f64>,
+    /// Standard deviation, mm.
+    pub spread: Option<f64>,
+}
+
+/// Volumes of one wall of a ventricle.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+#[serde(default)]
+pub struct WallVolumes {
+    /// Of the wall.
+    pub wall: Option<f64>,
+    /// Of the cavity.
+    pub cavity: Option<f64>,
+}
+
 /// Volumes of a fitted model.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
 #[serde(default)]
@@ -75,6 +109,10 @@ pub struct FittedVolumes {
     pub wall: Option<f64>,
     /// Of the cavity; ventricles only.
     pub cavity: Option<f64>,
+    /// Of the wall as it looks; ventricles only.
+    pub apparent: Option<WallVolumes>,
+    /// Of the wall itself; ventricles only.
+    pub anatomical: Option<WallVolumes>,
 }
 
 /// A segmentation's mask against an expert's.

@@ -2,13 +2,20 @@
 
 use super::from_files::SegmentedVolume;
 use super::report::report_json;
+use crate::deform::WallEdge;
 use crate::export::{self, ExportError, Format, Metadata};
+use crate::grid::voxelise::Mask;
 use crate::parameters::Parameters;
 use crate::polar;
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, SegmentationPage, SegmentationReport};
 use crate::volume::nifti::{self, MaskError};
 use serde_json::{Map, Value, json};
+
+/// The mask of the anatomical wall, where `mask.nii.gz` shows the apparent one.
+const ANATOMICAL_MASK: &str = "mask_anatomical.nii.gz";
+/// The mask of the apparent wall, where `mask.nii.gz` shows the anatomical one.
+const APPARENT_MASK: &str = "mask_apparent.nii.gz";
 
 /// One file of a segmentation.
 #[derive(Debug, Clone)]
@@ -53,20 +60,39 @@ impl SegmentedVolume {
         monitor: &Monitor<'_>,
     ) -> Result<Vec<NamedFile>, SegmentationFilesError> {
         monitor.report(Stage::Export, 0.0)?;
-        let mut files = vec![self.mask(monitor)?];
+        let segmentation = &self.segmentation;
+        let edge = self.parameters.deform.edge;
+        let mut files = vec![self.mask("mask.nii.gz", &segmentation.mask, monitor)?];
+        if let Some(mask) = &segmentation.other_mask {
+            let name = match edge {
+                WallEdge::Apparent => ANATOMICAL_MASK,
+                WallEdge::Anatomical => APPARENT_MASK,
+            };
+            files.push(self.mask(name, mask, monitor)?);
+        }
         monitor.report(Stage::Export, 0.5)?;
         let metadata = Metadata {
             volume_id,
             quality: self.summary(),
             ..Metadata::new("Fitted model")
         };
-        for format in formats {
-            monitor.check()?;
-            files.push(NamedFile {
-                name: format!("mesh.{}", format.extension()),
-                media_type: format.media_type(),
-                bytes: export::encode(*format, &self.segmentation.fit.mesh, &metadata)?,
-            });
+        let mut meshes = vec![("mesh", &segmentation.fit.mesh)];
+        if let Some(other) = segmentation.fit.other_surface(edge) {
+            let name = match edge {
+                WallEdge::Apparent => "mesh_anatomical",
+                WallEdge::Anatomical => "mesh_apparent",
+            };
+            meshes.push((name, &other.mesh));
+        }
+        for (name, mesh) in meshes {
+            for format in formats {
+                monitor.check()?;
+                files.push(NamedFile {
+                    name: format!("{name}.{}", format.extension()),
+                    media_type: format.media_type(),
+                    bytes: export::encode(*format, mesh, &metadata)?,
+                });
+            }
         }
         monitor.report(Stage::Export, 0.9)?;
         files.push(json_file("report.json", &self.report()));
@@ -134,16 +160,20 @@ impl SegmentedVolume {
         .collect()
     }
 
-    fn mask(&self, monitor: &Monitor<'_>) -> Result<NamedFile, SegmentationFilesError> {
-        let mask = &self.segmentation.mask;
+    fn mask(
+        &self,
+        name: &'static str,
+        mask: &Mask,
+        monitor: &Monitor<'_>,
+    ) -> Result<NamedFile, SegmentationFilesError> {
         let frame = &self.reading.volume.frame;
         let bytes = nifti::write_mask(&mask.voxels, mask.shape, frame, monitor);
         Ok(NamedFile {
-            name: "mask.nii.gz".into(),
+            name: name.into(),
             media_type: "application/gzip",
             bytes: bytes.map_err(|error| match error {
                 MaskError::Cancelled(cancelled) => cancelled.into(),
-                MaskError::TooLong(error) => other("mask.nii.gz", &error),
+                MaskError::TooLong(error) => other(name, &error),
             })?,
         })
     }

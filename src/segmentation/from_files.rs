@@ -15,7 +15,7 @@ pub struct SegmentedVolume {
     pub reading: Reading,
     /// The segmentation.
     pub segmentation: Segmentation,
-    /// The parameters used, with the margin filled in.
+    /// The parameters used.
     pub parameters: FitParameters,
 }
 
@@ -37,12 +37,9 @@ pub fn from_files(
         .map(|files| read(files, None, limits, &monitor.part(1, parts)))
         .transpose()
         .map_err(|error| unusable(error, SegmentationError::ExpertVolume))?;
-    let parameters = FitParameters {
-        margin: Some((order.parameters.margin).unwrap_or(usual_margin(reading.facts.format))),
-        ..order.parameters.clone()
-    };
+    let parameters = order.parameters.clone();
     let fit = SegmentationParameters {
-        deform: parameters.on(&reading.volume, 0.0)?,
+        deform: parameters.on(&reading.volume)?,
         polar: parameters.polar,
     };
     let (templates, refused) = prepare(order, monitor)?;
@@ -72,17 +69,5 @@ fn unusable(
     match error {
         VolumeError::Cancelled(cancelled) => cancelled.into(),
         error => which(error),
-    }
-}
-
-/// Default margin for clinical DICOM scans, mm. One expert's mask lies 3 mm outside the steepest
-/// slope; 2.5 mm gave the best agreement with it.
-const DICOM_MARGIN: f64 = 2.5;
-
-/// The default margin for a file of this format, mm.
-fn usual_margin(format: volume::FileFormat) -> f64 {
-    match format {
-        volume::FileFormat::DicomNm => DICOM_MARGIN,
-        _ => 0.0,
     }
 }

@@ -44,5 +44,5 @@ pub use fitting::{OrganSearch, RankedTemplate};
 pub use from_files::{SegmentedVolume, from_files};
 pub use order::{NamedMesh, SegmentationOrder};
 pub use report::{agreement_json, report_json};
-pub use segment::{Segmentation, SegmentationParameters, segment};
+pub use segment::{ImageResolution, Segmentation, SegmentationParameters, segment};
 pub use templates::{NamedTemplate, RefusedTemplate};

@@ -7,6 +7,7 @@ use crate::deform::Fit;
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
 use crate::locate::patient_orientation::Superior;
+use crate::model::wall::VentricleWall;
 use crate::polar;
 
 fn round(x: f64) -> f64 {
@@ -67,16 +68,51 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
             "confidence": round(p.confidence),
         })),
         "fit": fit_json(fit),
-        "volumes_ml": {
-            "wall": round(fit.wall_ml),
-            "cavity": fit.wall.as_ref().map(|w| round(w.cavity_ml)),
-        },
+        "volumes_ml": volumes(fit),
+        "mass_g": fit.surfaces.as_ref().map(|s| round(MYOCARDIUM * s.anatomical.wall_ml)),
         "wall_thickness_mm": fit.wall.as_ref().map(|w| round(w.thickness)),
+        "thickness_mm": fit.surfaces.as_ref().map(|s| json!({
+            "apparent": thickness(&s.apparent.wall),
+            "anatomical": thickness(&s.anatomical.wall),
+        })),
+        "resolution_mm": segmentation.resolution.map(|r| json!({
+            "value": round(r.value),
+            "source": if r.given { "given" } else { "estimated" },
+        })),
         "measures": segmentation.agreement.as_ref().map(agreement_json),
         "polar": segmentation.polar.as_ref().map(summary),
         "flags": flags,
         "mask_rule": "a voxel belongs to the mask if its centre lies inside the surface",
     })
+}
+
+/// Density of the myocardium, g/ml.
+const MYOCARDIUM: f64 = 1.05;
+
+/// The volumes of the wall that is shown and, of a ventricle, those of both walls.
+fn volumes(fit: &Fit) -> Value {
+    let mut volumes = json!({
+        "wall": round(fit.wall_ml),
+        "cavity": fit.wall.as_ref().map(|w| round(w.cavity_ml)),
+    });
+    if let Some(surfaces) = &fit.surfaces {
+        let both = [
+            ("apparent", &surfaces.apparent),
+            ("anatomical", &surfaces.anatomical),
+        ];
+        for (name, surface) in both {
+            volumes[name] = json!({
+                "wall": round(surface.wall_ml),
+                "cavity": round(surface.wall.cavity_ml),
+            });
+        }
+    }
+    volumes
+}
+
+/// Mean thickness of a wall and its standard deviation over the wall, mm.
+fn thickness(wall: &VentricleWall) -> Value {
+    json!({"mean": round(wall.thickness), "spread": round(wall.thickness_spread)})
 }
 
 /// How the motion went, and the fitted model's pose.

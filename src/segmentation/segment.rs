@@ -5,7 +5,7 @@ use super::expert_mask::on_grid;
 use super::fitting::{RankedTemplate, Trials, try_all};
 use super::slices::{self, Cut};
 use super::templates::{NamedTemplate, RefusedTemplate};
-use crate::deform::{DeformParameters, Fit};
+use crate::deform::{DeformParameters, Fit, blur_correction};
 use crate::grid::agreement::{Agreement, compare};
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::polar::{self, PolarMap, PolarParameters};
@@ -28,8 +28,12 @@ pub struct Segmentation {
     pub fit: Fit,
     /// The voxels inside it, on the volume's grid.
     pub mask: Mask,
+    /// Of a ventricle, the voxels inside the wall that [`Segmentation::fit`] does not show.
+    pub other_mask: Option<Mask>,
     /// The polar map of the wall's uptake; ventricles only.
     pub polar: Option<PolarMap>,
+    /// The image's resolution; ventricles only.
+    pub resolution: Option<ImageResolution>,
     /// Agreement with the expert's mask, if one was given.
     pub agreement: Option<Agreement>,
     /// Slices of the volume with the contours of fit and expert, as a PNG file.
@@ -40,6 +44,31 @@ pub struct Segmentation {
     pub candidates: Vec<RankedTemplate>,
     /// Models that were not fitted, or whose fit failed.
     pub refused: Vec<RefusedTemplate>,
+}
+
+/// The width of a point in the image, motion and filters included.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImageResolution {
+    /// Full width at half maximum, mm.
+    pub value: f64,
+    /// Whether the caller stated it. Otherwise it is the blur by which a slab of the anatomical
+    /// thickness looks as thick as the apparent wall.
+    pub given: bool,
+}
+
+impl ImageResolution {
+    fn of(fit: &Fit, given: Option<f64>) -> Option<Self> {
+        let surfaces = fit.surfaces.as_ref()?;
+        let estimated = || {
+            let [thickness, apparent] =
+                [&surfaces.anatomical, &surfaces.apparent].map(|s| s.wall.thickness);
+            blur_correction::resolution_of(thickness, apparent)
+        };
+        Some(Self {
+            value: given.unwrap_or_else(estimated),
+            given: given.is_some(),
+        })
+    }
 }
 
 /// Segments `volume` by the best of `templates` and compares the mask with `expert` if given.
@@ -65,12 +94,16 @@ pub fn segment(
         .ok_or(SegmentationError::NoTemplate)?;
     let fit = fits.swap_remove(chosen);
     monitor.report(Stage::Polar, 0.0)?;
+    // Uptake is sampled through the wall as it looks, whichever wall is shown.
     let polar = fit
-        .wall
+        .surfaces
         .as_ref()
-        .map(|wall| polar::map(volume, wall, &parameters.polar));
+        .map(|surfaces| polar::map(volume, &surfaces.apparent.wall, &parameters.polar));
     monitor.report(Stage::Report, 0.0)?;
     let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
+    let other_mask = fit
+        .other_surface(parameters.deform.edge)
+        .map(|other| voxelise(&other.mesh, volume.shape, &volume.frame));
     monitor.report(Stage::Report, 0.5)?;
     let agreement = match &expert {
         // Both masks are on the volume's grid, so this fails only when cancelled.
@@ -81,8 +114,10 @@ pub fn segment(
     let slices = slices::png(volume, &fit.mesh, &Cut::of(&fit), expert.as_ref(), monitor)?;
     monitor.report(Stage::Report, 1.0)?;
     Ok(Segmentation {
+        resolution: ImageResolution::of(&fit, parameters.deform.resolution),
         fit,
         mask,
+        other_mask,
         polar,
         agreement,
         slices,
