@@ -163,7 +163,7 @@ impl Study {
     fn measure(&self, scan: &Volume) -> Result<Figures> {
         let fit = fit(scan, &self.template, &self.parameters, &Monitor::silent())?;
         let wall = fit.wall.context("the model is not a ventricle")?;
-        let map = polar::map(scan, &wall, &PolarParameters::default());
+        let map = polar::map(scan, &wall, &wall, &PolarParameters::default());
         let means = map.segments.iter().map(|s| s.mean_percent.unwrap_or(0.0));
         Ok(Figures {
             values: [fit.wall_ml, wall.cavity_ml]

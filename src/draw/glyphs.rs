@@ -1,4 +1,4 @@
-//! Digits, a dash and four letters as strokes: enough to label a picture without a font.
+//! Digits, a dash, the sign for per cent and four letters as strokes: enough to label a picture without a font.
 
 /// A point of a stroke: `x` 0..=10 to the right, `y` 0..=14 down from the top of a capital.
 pub type GlyphPoint = (i8, i8);
@@ -41,6 +41,11 @@ pub fn strokes(character: char) -> &'static [&'static [GlyphPoint]] {
             (0, 4), (0, 5), (1, 8), (4, 9), (6, 9), (9, 8), (10, 5),
         ]],
         '-' => &[&[(2, 8), (8, 8)]],
+        '%' => &[
+            &[(9, 0), (1, 14)],
+            &[(1, 0), (3, 0), (4, 2), (3, 4), (1, 4), (0, 2), (1, 0)],
+            &[(7, 10), (9, 10), (10, 12), (9, 14), (7, 14), (6, 12), (7, 10)],
+        ],
         'A' => &[&[(0, 14), (5, 0), (10, 14)], &[(2, 9), (8, 9)]],
         'I' => &[&[(5, 0), (5, 14)]],
         'L' => &[&[(1, 0), (1, 14), (9, 14)]],

@@ -140,6 +140,24 @@ impl VentricleWall {
         })
     }
 
+    /// How far `point` lies from the cup's centre along the axis towards the apex, mm.
+    pub fn along_axis(&self, point: &Vec3) -> f64 {
+        (point - self.frame.centre).dot(&self.frame.axis)
+    }
+
+    /// Where the cavity ends at the apex, mm from the cup's centre: the mean over the rays of the
+    /// apical row that enter the wall.
+    pub fn cavity_end(&self) -> f64 {
+        let ends: Vec<f64> = self.rays[..COLUMNS]
+            .iter()
+            .filter_map(|ray| Some(self.along_axis(&(ray.start + ray.direction * ray.wall?[0]))))
+            .collect();
+        match ends.len() {
+            0 => self.frame.apex,
+            n => ends.iter().sum::<f64>() / n as f64,
+        }
+    }
+
     /// `point` in the coordinates of the rays. A point on the axis gets column 0.
     pub fn place(&self, point: &Vec3) -> WallPlace {
         self.frame.place(point)

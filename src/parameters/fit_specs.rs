@@ -7,6 +7,7 @@ use crate::deform::sensors::SensorKind;
 use crate::geometry::Vec3;
 use crate::locate::patient_orientation::Superior;
 use crate::model::Organ;
+use crate::polar::Projection;
 use serde_json::{Value, json};
 
 impl Parameters for FitParameters {
@@ -295,6 +296,15 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         0.0..=10.0,
         "4.5",
         "Sigma of the Gaussian that smooths the image for the polar map, millimetres"
+    ),
+    choice!(
+        "polar_projection",
+        polar.projection,
+        "standard",
+        "How wide the levels of the polar map are drawn: standard (rings of equal width) or area (each \
+         level has the share of the map that it has of the wall)",
+        "standard" => Projection::Standard,
+        "area" => Projection::Area,
     ),
 ];
 

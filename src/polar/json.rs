@@ -29,6 +29,25 @@ pub fn json(map: &PolarMap) -> Value {
             })
         })
         .collect();
+    let territories: Vec<Value> = map
+        .territories
+        .iter()
+        .map(|t| {
+            json!({
+                "name": t.name,
+                "mean_percent": t.mean_percent.map(round),
+                "extent_percent": round(t.extent_percent),
+                "area_mm2": round(t.area),
+            })
+        })
+        .collect();
+    let numbers: Vec<Vec<usize>> = (0..ROWS)
+        .map(|row| {
+            (0..COLUMNS)
+                .map(|column| map.segment_of(row, column))
+                .collect()
+        })
+        .collect();
     let rows: Vec<Value> = map
         .pixels
         .chunks(COLUMNS)
@@ -40,10 +59,12 @@ pub fn json(map: &PolarMap) -> Value {
         "extent_percent": round(map.extent_percent),
         "note": "per cent of the hottest quarter of this scan's own wall; no normal database, not TPD",
         "segments": segments,
+        "territories": territories,
         "rows": ROWS,
         "columns": COLUMNS,
         "first_column": "lateral",
         "direction": "lateral, anterior, septal, inferior",
         "values_percent": rows,
+        "segment_of": numbers,
     })
 }

@@ -13,9 +13,15 @@
 //!    2002), and the share of wall below [`PolarParameters::threshold`] of the reference. Each ray
 //!    counts by the area of wall it stands for.
 //!
-//! On the map the apex is in the centre, the base at the rim, anterior on top, septum on the left,
-//! as seen from the apex. Segments by share of the way from apex to base: 17 within 0.25; 13 to 16
-//! within 0.5; 7 to 12 within 0.75; 1 to 6 beyond.
+//! Levels ([`Levels`]): the long axis from the mean rim to the end of the cavity is cut into three equal
+//! parts; a place of the wall is basal, mid or apical by the part that the middle of the wall lies in, and
+//! belongs to the apex (segment 17) beyond the cavity's end. Rim and end of the cavity are those of the
+//! anatomical wall: the apparent one ends too far from the apex, by what blur adds.
+//!
+//! On the map the apex is in the centre, the base at the rim, anterior on top, septum on the left, as seen
+//! from the apex. With [`Projection::Standard`] the four levels have rings of equal width, as the
+//! Association draws them; with [`Projection::Area`] every level has the share of the map that it has of
+//! the wall.
 //!
 //! Towards the rim, blur mixes the wall with what lies beyond it, and the model's end is the least
 //! certain part of a fit. The last [`PolarParameters::rim_margin`] millimetres are therefore shown
@@ -27,9 +33,11 @@
 //! 30 % below the apex in a heart of even uptake.
 
 mod json;
+mod levels;
 mod picture;
 
 pub use json::json;
+pub use levels::{Level, Levels};
 pub use picture::{png, svg};
 
 use crate::geometry::Vec3;
@@ -37,6 +45,7 @@ use crate::geometry::bvh::Aabb;
 use crate::grid::Volume;
 use crate::grid::field::Field;
 use crate::model::wall::{COLUMNS, ROWS, VentricleWall, WallRay};
+use levels::MiddleSurface;
 
 /// Parameters of [`map`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,6 +61,18 @@ pub struct PolarParameters {
     pub rim_margin: f64,
     /// Length of wall next to it over which the weight rises to 1, mm, 0..=30. Default 12.
     pub rim_fade: f64,
+    /// How wide the levels are drawn. Default [`Projection::Standard`].
+    pub projection: Projection,
+}
+
+/// How wide the levels are on the map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Projection {
+    /// Rings of equal width.
+    #[default]
+    Standard,
+    /// Each level has the share of the map's area that it has of the wall's.
+    Area,
 }
 
 impl Default for PolarParameters {
@@ -62,6 +83,7 @@ impl Default for PolarParameters {
             blur: 4.5,
             rim_margin: 3.0,
             rim_fade: 12.0,
+            projection: Projection::Standard,
         }
     }
 }
@@ -93,6 +115,19 @@ pub struct Segment {
     pub area: f64,
 }
 
+/// The segments that one coronary artery usually supplies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Territory {
+    /// `LAD`, `LCX` or `RCA`.
+    pub name: &'static str,
+    /// As for a [`Segment`].
+    pub mean_percent: Option<f64>,
+    /// Share of its area below the threshold, per cent.
+    pub extent_percent: f64,
+    /// Wall area, mm², as far as it is counted.
+    pub area: f64,
+}
+
 /// The map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PolarMap {
@@ -105,6 +140,12 @@ pub struct PolarMap {
     pub threshold: f64,
     /// The segments 1 to 17.
     pub segments: [Segment; 17],
+    /// The territories of the three arteries.
+    pub territories: [Territory; 3],
+    /// Where the levels lie.
+    pub levels: Levels,
+    /// How wide the levels are drawn.
+    pub projection: Projection,
     /// Share of the whole wall below the threshold, per cent.
     pub extent_percent: f64,
 }
@@ -139,31 +180,42 @@ pub fn territory(segment: usize) -> &'static str {
     }
 }
 
-/// The segment at `share` of the way from apex to base and `angle` degrees counter-clockwise
-/// from lateral.
-pub fn segment_at(share: f64, angle: f64) -> usize {
+/// The names of the arteries of [`territory`].
+const ARTERIES: [&str; 3] = ["LAD", "LCX", "RCA"];
+
+/// The segment of a `level` at `angle` degrees counter-clockwise from lateral.
+pub fn segment_at(level: Level, angle: f64) -> usize {
     // Sixths are centred on anterior (90°), quarters likewise.
     let sixth = ((angle - 60.0).rem_euclid(360.0) / 60.0) as usize % 6;
     let quarter = ((angle - 45.0).rem_euclid(360.0) / 90.0) as usize % 4;
-    if share < 0.25 {
-        17
-    } else if share < 0.5 {
-        13 + quarter
-    } else if share < 0.75 {
-        7 + sixth
-    } else {
-        1 + sixth
+    match level {
+        Level::Apex => 17,
+        Level::Apical => 13 + quarter,
+        Level::Mid => 7 + sixth,
+        Level::Basal => 1 + sixth,
     }
 }
 
-/// The segment of a pixel.
-pub fn segment_of(row: usize, column: usize) -> usize {
-    let share = (row as f64 + 0.5) / ROWS as f64;
-    segment_at(share, 360.0 * (column as f64 + 0.5) / COLUMNS as f64)
+impl PolarMap {
+    /// The segment of a pixel.
+    pub fn segment_of(&self, row: usize, column: usize) -> usize {
+        segment_of(&self.levels, row, column)
+    }
 }
 
-/// Samples `volume` along the rays of `wall`.
-pub fn map(volume: &Volume, wall: &VentricleWall, parameters: &PolarParameters) -> PolarMap {
+fn segment_of(levels: &Levels, row: usize, column: usize) -> usize {
+    let angle = 360.0 * (column as f64 + 0.5) / COLUMNS as f64;
+    segment_at(levels.of_pixel(row, column), angle)
+}
+
+/// Samples `volume` along the rays of `wall`, the wall as it looks; `anatomical` is the wall itself, of the
+/// same fit.
+pub fn map(
+    volume: &Volume,
+    wall: &VentricleWall,
+    anatomical: &VentricleWall,
+    parameters: &PolarParameters,
+) -> PolarMap {
     let ends = wall.rays.iter().filter_map(|r| {
         let reach = r.wall?[1] + parameters.extension;
         Some(r.start + r.direction * reach)
@@ -175,12 +227,15 @@ pub fn map(volume: &Volume, wall: &VentricleWall, parameters: &PolarParameters) 
     region.max += border;
     let field = Field::new(volume, Some(&region), parameters.blur);
     let rims = rims(wall);
+    let middle = MiddleSurface::of(wall);
+    let levels = Levels::of(&middle, anatomical);
     let pixels: Vec<Option<Pixel>> = wall
         .rays
         .iter()
         .enumerate()
         .map(|(index, ray)| {
-            let pixel = pixel(&field, ray, wall.row_spacing, parameters.extension)?;
+            let area = middle.area(index / COLUMNS, index % COLUMNS);
+            let pixel = pixel(&field, ray, area, parameters.extension)?;
             let rows = rims[index % COLUMNS] as f64 - 0.5 - (index / COLUMNS) as f64;
             let counted = rows * wall.row_spacing - parameters.rim_margin;
             // Without a fade the weight is a step, and NaN (0 / 0) at the step counts as 0.
@@ -194,15 +249,29 @@ pub fn map(volume: &Volume, wall: &VentricleWall, parameters: &PolarParameters) 
     let counts = |p: &Pixel| p.weight > 0.0;
     let indexed = || (0..pixels.len()).filter_map(|i| Some((i, pixels[i].filter(counts)?)));
     let segments = std::array::from_fn(|s| {
-        let own = indexed().filter(|(i, _)| segment_of(i / COLUMNS, i % COLUMNS) == s + 1);
+        let own = indexed().filter(|(i, _)| segment_of(&levels, i / COLUMNS, i % COLUMNS) == s + 1);
         summarise(s + 1, own.map(|(_, p)| p), reference, limit)
+    });
+    let territories = ARTERIES.map(|name| {
+        let own = indexed()
+            .filter(|(i, _)| territory(segment_of(&levels, i / COLUMNS, i % COLUMNS)) == name);
+        let sum = summarise(0, own.map(|(_, p)| p), reference, limit);
+        Territory {
+            name,
+            mean_percent: sum.mean_percent,
+            extent_percent: sum.extent_percent,
+            area: sum.area,
+        }
     });
     let all = summarise(0, indexed().map(|(_, p)| p), reference, limit);
     PolarMap {
         reference,
         threshold: parameters.threshold,
         segments,
+        territories,
         extent_percent: all.extent_percent,
+        levels,
+        projection: parameters.projection,
         pixels,
     }
 }
@@ -233,7 +302,7 @@ fn reference(pixels: &[Option<Pixel>]) -> f64 {
     if area > 0.0 { sum / area } else { 0.0 }
 }
 
-fn pixel(field: &Field, ray: &WallRay, row_spacing: f64, extension: f64) -> Option<Pixel> {
+fn pixel(field: &Field, ray: &WallRay, area: f64, extension: f64) -> Option<Pixel> {
     let [enters, leaves] = ray.wall?;
     let from = (enters - extension).max(0.0);
     let to = leaves + extension;
@@ -245,11 +314,10 @@ fn pixel(field: &Field, ray: &WallRay, row_spacing: f64, extension: f64) -> Opti
         max = max.max(value);
         sum += value;
     }
-    let middle = f64::midpoint(enters, leaves);
     Some(Pixel {
         max,
         mean: sum / (steps + 1) as f64,
-        area: row_spacing * middle * std::f64::consts::TAU / COLUMNS as f64,
+        area,
         weight: 1.0,
     })
 }
@@ -321,13 +389,39 @@ mod tests {
 
     #[test]
     fn segments_are_where_the_heart_association_puts_them() {
-        let at = |share, angle| segment_at(share, angle);
-        assert_eq!([at(0.9, 90.0), at(0.9, 150.0), at(0.9, 210.0)], [1, 2, 3]);
-        assert_eq!([at(0.9, 270.0), at(0.9, 330.0), at(0.9, 30.0)], [4, 5, 6]);
-        assert_eq!([at(0.6, 90.0), at(0.6, 30.0)], [7, 12]);
-        let apical = [90.0, 180.0, 270.0, 0.0].map(|a| at(0.4, a));
+        let at = segment_at;
+        let basal = [90.0, 150.0, 210.0, 270.0, 330.0, 30.0].map(|a| at(Level::Basal, a));
+        assert_eq!(basal, [1, 2, 3, 4, 5, 6]);
+        assert_eq!([at(Level::Mid, 90.0), at(Level::Mid, 30.0)], [7, 12]);
+        let apical = [90.0, 180.0, 270.0, 0.0].map(|a| at(Level::Apical, a));
         assert_eq!(apical, [13, 14, 15, 16]);
-        assert_eq!(at(0.1, 123.0), 17);
+        assert_eq!(at(Level::Apex, 123.0), 17);
+    }
+
+    #[test]
+    fn areas_are_those_of_the_surface_midway_through_the_wall() {
+        let (volume, wall) = scene();
+        let map = map(&volume, &wall, &wall, &PolarParameters::default());
+        // Half a spheroid with semi-axes of 54 and 26 mm, and a ring of 6 mm beyond its middle.
+        let (a, b): (f64, f64) = (26.0, 54.0);
+        let e = (1.0 - a * a / (b * b)).sqrt();
+        let half = std::f64::consts::PI * a * a * (1.0 + b / (a * e) * e.asin());
+        let ring = std::f64::consts::TAU * a * 6.0;
+        let found: f64 = map.pixels.iter().flatten().map(|p| p.area).sum();
+        assert!(
+            (found / (half + ring) - 1.0).abs() < 0.05,
+            "{found} of {}",
+            half + ring
+        );
+        // Segment 17 is the cap beyond the cavity's end, 48 mm from the middle.
+        let z = 48.0 / b;
+        let zone = |z: f64| {
+            let u = e * z;
+            std::f64::consts::PI * a * b / e * (u * (1.0 - u * u).sqrt() + u.asin())
+        };
+        let cap = zone(1.0) - zone(z);
+        let apex = map.segments[16].area;
+        assert!((apex / cap - 1.0).abs() < 0.25, "{apex} of {cap}");
     }
 
     #[test]
@@ -338,7 +432,7 @@ mod tests {
             blur: 2.0,
             ..PolarParameters::default()
         };
-        let map = map(&volume, &wall, &parameters);
+        let map = map(&volume, &wall, &wall, &parameters);
         let mean = |s: usize| map.segments[s - 1].mean_percent.unwrap();
         for lateral in [5, 6, 11, 12, 16] {
             assert!(mean(lateral) < 65.0, "{lateral}: {}", mean(lateral));
@@ -375,9 +469,9 @@ mod tests {
     #[test]
     fn pictures_can_be_read_again() {
         let (volume, wall) = scene();
-        let map = map(&volume, &wall, &PolarParameters::default());
+        let map = map(&volume, &wall, &wall, &PolarParameters::default());
         let (width, height, _) = decoded(&png(&map));
-        assert_eq!((width, height), (640, 640));
+        assert_eq!((width, height), (760, 640));
         let text = svg(&map);
         assert!(text.starts_with("<svg") && text.ends_with("</svg>\n"));
         let value = json(&map);

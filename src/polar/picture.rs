@@ -2,11 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use super::{COLUMNS, PolarMap, ROWS};
+use super::{COLUMNS, Level, PolarMap, Projection, ROWS, territory};
 use crate::draw::vector::{Drawing, Point, Rgb, VectorShape};
 
-/// Edge of the picture, pixels.
+/// Height of the picture, pixels.
 const SIZE: usize = 640;
+/// Its width: the map, and the colour bar on its right.
+const WIDTH: usize = 760;
 /// Radius of the map.
 const RADIUS: f64 = 280.0;
 const CENTRE: f64 = SIZE as f64 / 2.0;
@@ -24,39 +26,75 @@ const COLOURS: [[f64; 3]; 6] = [
 ];
 const NO_WALL: Rgb = [128; 3];
 const BORDER: Rgb = [200; 3];
+/// Borders between the territories of two arteries.
+const TERRITORY_BORDER: Rgb = [255; 3];
+/// The line about the wall below the threshold.
+const THRESHOLD: Rgb = [0, 220, 255];
 const WHITE: Rgb = [255; 3];
 const BLACK: Rgb = [0; 3];
 
 /// The four letters round the map: anterior, septal, inferior, lateral, in turns from lateral.
 const SIDES: [(char, f64); 4] = [('A', 0.25), ('S', 0.5), ('I', 0.75), ('L', 0.0)];
 
-/// The map as SVG: uptake, borders of the segments, their means in per cent.
+/// The map as SVG: uptake, borders of segments and territories, the segments' means in per cent, a line
+/// about the wall below the threshold, a colour bar with the threshold marked. Grey is outside of the wall.
 pub fn svg(map: &PolarMap) -> String {
     drawing(map).svg()
 }
 
-/// The same picture as an RGB PNG of 640 × 640 pixels.
+/// The same picture as an RGB PNG of 760 × 640 pixels.
 pub fn png(map: &PolarMap) -> Vec<u8> {
     drawing(map).image().png()
 }
 
 fn drawing(map: &PolarMap) -> Drawing {
+    let rings = rings(map);
     let places = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column)));
     let tiles = places.map(|(row, column)| VectorShape::Polygon {
-        corners: tile(row, column),
+        corners: tile(map, &rings, row, column),
         fill: shade(map, row, column),
     });
     Drawing {
         title: format!(
-            "Polar map, per cent of {:.4}; extent below {:.0} %: {:.1} % of the wall",
+            "Polar map, per cent of {:.4}; extent below {:.0} %: {:.1} % of the wall; grey: no wall",
             map.reference,
             100.0 * map.threshold,
             map.extent_percent
         ),
-        width: SIZE,
+        width: WIDTH,
         height: SIZE,
-        shapes: tiles.chain(borders()).chain(labels(map)).collect(),
+        shapes: tiles
+            .chain(threshold_line(map, &rings))
+            .chain(borders(&rings))
+            .chain(labels(map, &rings))
+            .chain(colour_bar(map))
+            .collect(),
     }
+}
+
+/// The radii at which the levels end, as shares of the map's.
+fn rings(map: &PolarMap) -> [f64; 4] {
+    let standard = [0.25, 0.5, 0.75, 1.0];
+    if map.projection == Projection::Standard {
+        return standard;
+    }
+    let area = |level: Level| -> f64 {
+        let places = (0..ROWS * COLUMNS)
+            .filter(|index| map.levels.of_pixel(index / COLUMNS, index % COLUMNS) == level);
+        places
+            .filter_map(|index| Some(map.pixels[index]?.area))
+            .sum()
+    };
+    let areas = Level::ALL.map(area);
+    let all: f64 = areas.iter().sum();
+    if !(all > 0.0) {
+        return standard;
+    }
+    let mut inner = 0.0;
+    areas.map(|area| {
+        inner += area / all;
+        inner.sqrt()
+    })
 }
 
 /// The colour of a place of the map.
@@ -78,8 +116,8 @@ fn colour(share: f64) -> Rgb {
 
 /// The outline of one pixel of the map, slightly enlarged so that no gaps show between
 /// neighbours.
-fn tile(row: usize, column: usize) -> Vec<Point> {
-    let shares = [row as f64, row as f64 + 1.03].map(|r| r / ROWS as f64);
+fn tile(map: &PolarMap, rings: &[f64; 4], row: usize, column: usize) -> Vec<Point> {
+    let shares = [row as f64, row as f64 + 1.03].map(|rows| map.levels.share(rows, column, rings));
     let turns = [column as f64, column as f64 + 1.03].map(|c| c / COLUMNS as f64);
     vec![
         screen(shares[0], turns[0]),
@@ -89,62 +127,146 @@ fn tile(row: usize, column: usize) -> Vec<Point> {
     ]
 }
 
-/// The borders of the segments.
-fn borders() -> impl Iterator<Item = VectorShape> {
-    let (stroke, width) = (BORDER, 1.5);
-    let circles = [0.25, 0.5, 0.75, 1.0].map(|share| VectorShape::Circle {
-        centre: [CENTRE; 2],
-        radius: RADIUS * share,
-        stroke,
-        width,
-    });
-    let spokes = [(0.25, 0.5, 4, 0.125), (0.5, 1.0, 6, 1.0 / 6.0)];
-    let lines = spokes
-        .into_iter()
-        .flat_map(move |(from, to, count, first)| {
-            (0..count).map(move |k| {
-                let turns = first + f64::from(k) / f64::from(count);
-                VectorShape::Line {
-                    ends: [screen(from, turns), screen(to, turns)],
-                    stroke,
-                    width,
-                }
-            })
-        });
-    circles.into_iter().chain(lines)
+/// The edges between pixels below the threshold and others.
+fn threshold_line(map: &PolarMap, rings: &[f64; 4]) -> Vec<VectorShape> {
+    let limit = map.threshold * map.reference;
+    let below = |row: usize, column: usize| {
+        let pixel = map.pixels[row * COLUMNS + column % COLUMNS];
+        pixel.map(|pixel| pixel.max < limit)
+    };
+    let place = |rows: usize, column: usize, side: usize| {
+        let share = map.levels.share(rows as f64, column % COLUMNS, rings);
+        screen(share, (column + side) as f64 / COLUMNS as f64)
+    };
+    let line = |ends: [Point; 2]| VectorShape::Line {
+        ends,
+        stroke: THRESHOLD,
+        width: 2.5,
+    };
+    let mut lines = Vec::new();
+    for column in 0..COLUMNS {
+        for row in 0..ROWS {
+            let Some(here) = below(row, column) else {
+                continue;
+            };
+            if row + 1 < ROWS && below(row + 1, column) == Some(!here) {
+                lines.push(line([place(row + 1, column, 0), place(row + 1, column, 1)]));
+            }
+            if below(row, column + 1) == Some(!here) {
+                lines.push(line([place(row, column, 1), place(row + 1, column, 1)]));
+            }
+        }
+    }
+    lines
+}
+
+/// The borders of the segments; those between two territories are thicker.
+fn borders(rings: &[f64; 4]) -> Vec<VectorShape> {
+    let mut shapes: Vec<VectorShape> = rings
+        .iter()
+        .map(|share| VectorShape::Circle {
+            centre: [CENTRE; 2],
+            radius: RADIUS * share,
+            stroke: BORDER,
+            width: 1.5,
+        })
+        .collect();
+    // First segment of a level, number of its segments.
+    for (level, first, count) in [(1, 13, 4), (2, 7, 6), (3, 1, 6)] {
+        for k in 0..count {
+            // Segments follow each other counter-clockwise; the first is centred on anterior.
+            let turns = 0.25 + (k as f64 - 0.5) / count as f64;
+            let pair = [(k + count - 1) % count, k].map(|k| territory(first + k));
+            let (stroke, width) = match pair[0] == pair[1] {
+                true => (BORDER, 1.5),
+                false => (TERRITORY_BORDER, 4.0),
+            };
+            shapes.push(VectorShape::Line {
+                ends: [screen(rings[level - 1], turns), screen(rings[level], turns)],
+                stroke,
+                width,
+            });
+        }
+    }
+    shapes
 }
 
 /// The segments' means and the letters of the four sides.
-fn labels(map: &PolarMap) -> impl Iterator<Item = VectorShape> + '_ {
+fn labels<'a>(map: &'a PolarMap, rings: &'a [f64; 4]) -> impl Iterator<Item = VectorShape> + 'a {
     let means = map.segments.iter().map(|segment| {
         let mean = segment.mean_percent;
-        let (share, turns) = label_place(segment.number);
+        let (share, turns) = label_place(segment.number, rings);
+        // Black on bright tiles, white on dark ones.
+        let bright = mean.is_some_and(|mean| mean > 62.0);
         VectorShape::Label {
             middle: screen(share, turns),
             text: mean.map_or_else(|| "-".to_owned(), |mean| format!("{mean:.0}")),
             size: TEXT,
-            ink: WHITE,
-            rim: Some(BLACK),
+            ink: if bright { BLACK } else { WHITE },
+            rim: Some(if bright { WHITE } else { BLACK }),
         }
     });
-    let letters = SIDES.map(|(letter, turns)| VectorShape::Label {
-        middle: screen(1.07, turns),
-        text: letter.to_string(),
-        size: TEXT,
-        ink: BLACK,
-        rim: None,
-    });
+    let letters = SIDES.map(|(letter, turns)| text(screen(1.07, turns), letter.to_string()));
     means.chain(letters)
 }
 
+fn text(middle: Point, text: String) -> VectorShape {
+    VectorShape::Label {
+        middle,
+        text,
+        size: TEXT,
+        ink: BLACK,
+        rim: None,
+    }
+}
+
 /// Centre of a segment: share of the radius and angle in turns from lateral.
-fn label_place(segment: usize) -> (f64, f64) {
+fn label_place(segment: usize, rings: &[f64; 4]) -> (f64, f64) {
+    let between = |level: usize| f64::midpoint(rings[level - 1], rings[level]);
     match segment {
         17 => (0.0, 0.0),
-        13..=16 => (0.375, 0.25 + (segment - 13) as f64 / 4.0),
-        7..=12 => (0.625, 0.25 + (segment - 7) as f64 / 6.0),
-        _ => (0.875, 0.25 + (segment - 1) as f64 / 6.0),
+        13..=16 => (between(1), 0.25 + (segment - 13) as f64 / 4.0),
+        7..=12 => (between(2), 0.25 + (segment - 7) as f64 / 6.0),
+        _ => (between(3), 0.25 + (segment - 1) as f64 / 6.0),
     }
+}
+
+/// The colours from 0 to 100 per cent, with the threshold.
+fn colour_bar(map: &PolarMap) -> Vec<VectorShape> {
+    const STEPS: usize = 100;
+    let (left, right, top, bottom) = (652.0, 676.0, 140.0, 500.0);
+    let height = |share: f64| bottom - (bottom - top) * share;
+    let mut shapes: Vec<VectorShape> = (0..STEPS)
+        .map(|step| {
+            let ends = [step as f64, step as f64 + 1.03].map(|s| height(s / STEPS as f64));
+            VectorShape::Polygon {
+                corners: vec![
+                    [left, ends[0]],
+                    [right, ends[0]],
+                    [right, ends[1]],
+                    [left, ends[1]],
+                ],
+                fill: colour((step as f64 + 0.5) / STEPS as f64),
+            }
+        })
+        .collect();
+    for percent in [0, 25, 50, 75, 100] {
+        let y = height(f64::from(percent) / 100.0);
+        shapes.push(VectorShape::Line {
+            ends: [[right, y], [right + 6.0, y]],
+            stroke: BLACK,
+            width: 1.5,
+        });
+        shapes.push(text([right + 28.0, y], percent.to_string()));
+    }
+    shapes.push(text([(left + right) / 2.0, top - 24.0], "%".to_owned()));
+    let y = height(map.threshold.clamp(0.0, 1.0));
+    shapes.push(VectorShape::Line {
+        ends: [[left - 6.0, y], [right + 6.0, y]],
+        stroke: THRESHOLD,
+        width: 3.0,
+    });
+    shapes
 }
 
 /// Place in the picture of a share of the radius and an angle in turns from lateral.

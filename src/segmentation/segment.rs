@@ -95,10 +95,10 @@ pub fn segment(
     let fit = fits.swap_remove(chosen);
     monitor.report(Stage::Polar, 0.0)?;
     // Uptake is sampled through the wall as it looks, whichever wall is shown.
-    let polar = fit
-        .surfaces
-        .as_ref()
-        .map(|surfaces| polar::map(volume, &surfaces.apparent.wall, &parameters.polar));
+    let polar = fit.surfaces.as_ref().map(|surfaces| {
+        let [wall, anatomical] = [&surfaces.apparent, &surfaces.anatomical].map(|s| &s.wall);
+        polar::map(volume, wall, anatomical, &parameters.polar)
+    });
     monitor.report(Stage::Report, 0.0)?;
     let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
     let other_mask = fit

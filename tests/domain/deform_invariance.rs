@@ -83,7 +83,7 @@ fn measure(volume: &Volume, template: &Template) -> Vec<f64> {
     let parameters = DeformParameters::default();
     let fit = fit(volume, template, &parameters, &Monitor::silent()).unwrap();
     let wall = fit.wall.unwrap();
-    let map = polar::map(volume, &wall, &PolarParameters::default());
+    let map = polar::map(volume, &wall, &wall, &PolarParameters::default());
     let segments = map.segments.iter().map(|s| s.mean_percent.unwrap());
     [fit.wall_ml, wall.cavity_ml]
         .into_iter()
