@@ -251,7 +251,7 @@ fn the_anatomical_edge_subtracts_what_blur_adds() {
     let agreement = [WallEdge::Apparent, WallEdge::Anatomical].map(|edge| {
         let parameters = DeformParameters {
             edge,
-            resolution: 4.5 * 2.355,
+            resolution: Some(4.5 * 2.355),
             ..DeformParameters::default()
         };
         let fit = fit(&volume, &template, &parameters, &Monitor::silent()).unwrap();

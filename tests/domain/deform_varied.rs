@@ -85,7 +85,7 @@ fn no_varied_patient_is_lost() {
         } = volume::phantom(&patient, &Monitor::silent()).unwrap();
         let parameters = DeformParameters {
             edge: WallEdge::Anatomical,
-            resolution: patient.fwhm_mm,
+            resolution: Some(patient.fwhm_mm),
             ..DeformParameters::default()
         };
         let fit = fit(&volume, &template, &parameters, &Monitor::silent()).unwrap();

@@ -24,6 +24,7 @@ mod deform_invariance;
 mod deform_oracle;
 mod deform_varied;
 
+mod containers;
 mod edges;
 mod pipeline;
 mod segment;

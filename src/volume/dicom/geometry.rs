@@ -4,6 +4,9 @@
 //! Sequence is the position of the *first* slice. Slice k lies at position + (row x column) *
 //! Spacing Between Slices * k. The sign of that spacing matters: GE and Siemens write negative
 //! values. Pixel Spacing holds the distance of rows first, then the distance of columns.
+//!
+//! The numbers are rounded to single precision, in which NIfTI stores them: a scan gives the same
+//! bytes after its conversion.
 
 use super::super::VolumeError;
 use super::super::facts::AffineSource;
@@ -65,6 +68,8 @@ pub(super) fn place(a: &Attributes, shape: [usize; 3]) -> Result<Placement, Volu
         );
         -(linear * Vec3::from_fn(|axis, _| (shape[axis] as f64 - 1.0) / 2.0))
     });
+    let single = |x: f64| f64::from(x as f32);
+    let (linear, origin) = (linear.map(single), origin.map(single));
     let frame = VoxelToPatient::new(linear, origin).map_err(|_| {
         let reason = "directions and spacings must span three dimensions".into();
         a.wrong(
