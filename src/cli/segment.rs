@@ -20,7 +20,9 @@ use std::path::{Path, PathBuf};
   ventriform segment scan.dcm --model a.json --model b.json -o out --expert mask.nii.gz
   ventriform segment scan.nii.gz --model auto -o out --seed-point 60,70,55 --format ply
 Writes mask.nii.gz, mesh.glb, mesh.stl, mesh.json (or the formats given by --format), report.json,
-report.html, slices.png and, for the left ventricle, polar.json, polar.svg and polar.png")]
+report.html, slices.png and, for the left ventricle, polar.json, polar.svg, polar.png, and mask and mesh
+of the anatomical wall: mask_anatomical.nii.gz, mesh_anatomical.glb, ... (with --edge anatomical:
+mask_apparent.nii.gz, mesh_apparent.glb, ...)")]
 pub struct SegmentArgs {
     /// The volume: NIfTI (.nii, .nii.gz, or a .hdr and .img pair) or DICOM NM
     #[arg(value_name = "IN", required = true, num_args = 1..=2)]

@@ -1,4 +1,5 @@
-//! Digits, a dash, the sign for per cent and four letters as strokes: enough to label a picture without a font.
+//! Digits, a dash, the sign for per cent and some capitals as strokes: enough to label a picture without a
+//! font.
 
 /// A point of a stroke: `x` 0..=10 to the right, `y` 0..=14 down from the top of a capital.
 pub type GlyphPoint = (i8, i8);
@@ -47,12 +48,24 @@ pub fn strokes(character: char) -> &'static [&'static [GlyphPoint]] {
             &[(7, 10), (9, 10), (10, 12), (9, 14), (7, 14), (6, 12), (7, 10)],
         ],
         'A' => &[&[(0, 14), (5, 0), (10, 14)], &[(2, 9), (8, 9)]],
+        'C' => &[&[
+            (10, 3), (8, 1), (6, 0), (4, 0), (1, 2), (0, 5), (0, 9), (1, 12), (4, 14), (6, 14),
+            (8, 13), (10, 11),
+        ]],
+        'D' => &[&[
+            (1, 0), (1, 14), (5, 14), (8, 12), (10, 9), (10, 5), (8, 2), (5, 0), (1, 0),
+        ]],
         'I' => &[&[(5, 0), (5, 14)]],
         'L' => &[&[(1, 0), (1, 14), (9, 14)]],
+        'R' => &[
+            &[(1, 14), (1, 0), (6, 0), (9, 1), (10, 3), (10, 5), (9, 7), (6, 8), (1, 8)],
+            &[(5, 8), (10, 14)],
+        ],
         'S' => &[&[
             (10, 3), (8, 1), (6, 0), (4, 0), (1, 1), (0, 3), (1, 6), (3, 7), (7, 7), (9, 8),
             (10, 11), (9, 13), (6, 14), (4, 14), (2, 13), (0, 11),
         ]],
+        'X' => &[&[(0, 0), (10, 14)], &[(10, 0), (0, 14)]],
         _ => &[],
     }
 }

@@ -40,7 +40,10 @@ pub trait ProductCollection: 'static {
     /// The product as JSON.
     type Body: From<Presented> + Serialize + ToSchema + Send;
 
-    /// The names of the files it may have beside the mesh in every format.
+    /// The names, without extension, of the meshes it may have in every format.
+    const MESHES: &'static [&'static str] = &["mesh"];
+
+    /// The names of the files it may have beside its meshes.
     const FILES: &'static [&'static str];
 
     /// The name of the schema that lists all names of files.
@@ -403,12 +406,12 @@ async fn send_named(app: &App, product: &Product, name: &str, headers: &HeaderMa
 
 /// All names of files that a product of that kind may have.
 fn file_names<P: ProductCollection>() -> Vec<String> {
+    let meshes = P::MESHES.iter().flat_map(|name| {
+        let named = |format: Format| format!("{name}.{}", format.extension());
+        Format::ALL.map(named)
+    });
     let others = P::FILES.iter().map(|name| (*name).to_owned());
-    Format::ALL
-        .map(mesh_name)
-        .into_iter()
-        .chain(others)
-        .collect()
+    meshes.chain(others).collect()
 }
 
 /// The schema of [`file_names`].

@@ -22,8 +22,11 @@ pub struct Segmentations;
 impl ProductCollection for Segmentations {
     const RESOURCE: Resource = Resource::Segmentation;
     type Body = SegmentationBody;
+    const MESHES: &'static [&'static str] = &["mesh", "mesh_anatomical", "mesh_apparent"];
     const FILES: &'static [&'static str] = &[
         MASK,
+        "mask_anatomical.nii.gz",
+        "mask_apparent.nii.gz",
         "report.json",
         files::PAGE,
         "slices.png",
@@ -34,7 +37,9 @@ impl ProductCollection for Segmentations {
     const FILE_SCHEMA: &'static str = "SegmentationFileName";
     const FILE_HELP: &'static str = "`mask.nii.gz`, the mesh in each format, `report.json`, \
         `report.html` (made on request) and `slices.png` (three slices with the contour of the \
-        fit); for a left ventricle also `polar.json`, `polar.svg` and `polar.png`.";
+        fit); for a left ventricle also `polar.json`, `polar.svg` and `polar.png`, and mask and \
+        meshes of the wall that `edge` does not ask for: `mask_anatomical.nii.gz` and \
+        `mesh_anatomical.*`, or `mask_apparent.nii.gz` and `mesh_apparent.*`.";
     type FileAnswer = openapi::SegmentationFileAnswer;
 }
 

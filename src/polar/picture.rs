@@ -36,8 +36,8 @@ const BLACK: Rgb = [0; 3];
 /// The four letters round the map: anterior, septal, inferior, lateral, in turns from lateral.
 const SIDES: [(char, f64); 4] = [('A', 0.25), ('S', 0.5), ('I', 0.75), ('L', 0.0)];
 
-/// The map as SVG: uptake, borders of segments and territories, the segments' means in per cent, a line
-/// about the wall below the threshold, a colour bar with the threshold marked. Grey is outside of the wall.
+/// The map as SVG: uptake, borders of segments and territories, the means of both in per cent, a line about
+/// the wall below the threshold, a colour bar with the threshold marked. Grey is outside of the wall.
 pub fn svg(map: &PolarMap) -> String {
     drawing(map).svg()
 }
@@ -68,6 +68,7 @@ fn drawing(map: &PolarMap) -> Drawing {
             .chain(borders(&rings))
             .chain(labels(map, &rings))
             .chain(colour_bar(map))
+            .chain(sums(map))
             .collect(),
     }
 }
@@ -267,6 +268,19 @@ fn colour_bar(map: &PolarMap) -> Vec<VectorShape> {
         width: 3.0,
     });
     shapes
+}
+
+/// The territories' means, below the colour bar.
+fn sums(map: &PolarMap) -> Vec<VectorShape> {
+    let lines = map.territories.iter().enumerate();
+    lines
+        .map(|(line, territory)| {
+            let mean = territory.mean_percent;
+            let mean = mean.map_or_else(|| "-".to_owned(), |mean| format!("{mean:.0}"));
+            let y = 540.0 + 28.0 * line as f64;
+            text([688.0, y], format!("{} {mean}", territory.name))
+        })
+        .collect()
 }
 
 /// Place in the picture of a share of the radius and an angle in turns from lateral.

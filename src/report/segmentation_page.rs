@@ -301,7 +301,9 @@ fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
             p.hint {
                 "Polar map of the 17 segments of the American Heart Association: apex in the "
                 "centre, anterior on top, septum on the left. In per cent of the hottest quarter "
-                "of this scan's own wall; there is no normal database behind it."
+                "of this scan's own wall; there is no normal database behind it. The cyan line "
+                "encloses the wall below the threshold; thick white lines part the territories of "
+                "the arteries; grey is outside of the wall."
             }
             div.row.beside {
                 figure.paper {
@@ -328,6 +330,15 @@ fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
                                     td { (segment.territory) }
                                     td.n { (percent(segment.mean_percent, 1)) }
                                     td.n { (percent(segment.extent_percent, 1)) }
+                                }
+                            }
+                            @for territory in &figures.territories {
+                                tr {
+                                    td.n {}
+                                    th scope="row" { "all of the territory" }
+                                    td { (territory.name) }
+                                    td.n { (percent(territory.mean_percent, 1)) }
+                                    td.n { (percent(territory.extent_percent, 1)) }
                                 }
                             }
                         }

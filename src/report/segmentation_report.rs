@@ -149,6 +149,20 @@ pub struct PolarFigures {
     pub extent_percent: Option<f64>,
     /// The 17 segments.
     pub segments: Vec<SegmentFigures>,
+    /// The territories of the coronary arteries.
+    pub territories: Vec<TerritoryFigures>,
+}
+
+/// The segments that one coronary artery usually supplies, together.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(default)]
+pub struct TerritoryFigures {
+    /// The artery.
+    pub name: String,
+    /// Mean uptake in per cent of the reference.
+    pub mean_percent: Option<f64>,
+    /// Share of its area below the threshold.
+    pub extent_percent: Option<f64>,
 }
 
 /// One segment of a polar map.
