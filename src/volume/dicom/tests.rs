@@ -220,7 +220,8 @@ fn slices_lie_where_the_standard_puts_them() {
         let expected =
             Vec3::new(10.0, -20.5, 30.0) + 4.0 * i * x + 2.5 * j * y - 5.0 * k * x.cross(&y);
         let at = reading.volume.frame.to_patient(&Vec3::new(i, j, k));
-        assert!((at - expected).norm() < 1e-12);
+        // Single precision.
+        assert!((at - expected).norm() < 1e-5);
     }
     assert_eq!(reading.facts.affine_source, AffineSource::ImagePosition);
     assert!(reading.volume.frame.is_left_handed());
@@ -345,7 +346,7 @@ fn what_is_not_known_of_the_place_is_said() {
     assert_eq!(facts.affine_source, AffineSource::UnknownOrigin);
     assert!(facts.warnings[0].contains("supine patient are assumed"));
     let facts = without(&[(0x18, 0x88)]).unwrap().facts;
-    assert_eq!(facts.spacing_mm[2], 6.0);
+    assert!((facts.spacing_mm[2] - 6.0).abs() < 1e-6);
     assert!(facts.warnings[0].contains("Slice Thickness 6 is used"));
     let neither = without(&[(0x18, 0x88), (0x18, 0x50)]);
     assert_eq!(complaint(neither).0, "Spacing Between Slices (0018,0088)");
