@@ -7,6 +7,7 @@
 //! side of the model as in an upright patient.
 
 use crate::geometry::Vec3;
+use crate::geometry::rotation::least_rotation;
 use crate::locate::body::Blob;
 use crate::locate::cup::{Cup, perpendicular};
 use crate::mesh::TriMesh;
@@ -26,7 +27,7 @@ impl TemplatePose {
     /// by `tilt` in the frame, with a further `roll` about the axis, radians.
     pub fn of_ventricle(from: &Cup, to: &Cup, tilt: &Rotation3<f64>, roll: f64) -> Self {
         let tilted = tilt * from.axis;
-        let least = Rotation3::rotation_between(&tilted, &to.axis)
+        let least = least_rotation(&tilted, &to.axis)
             // Opposite axes: half a turn about any direction across.
             .unwrap_or_else(|| {
                 let (across, _) = perpendicular(&tilted);
