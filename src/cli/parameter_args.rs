@@ -105,6 +105,7 @@ fn value_name(kind: &Kind) -> &'static str {
         Kind::Integer { .. } => "N",
         Kind::Number { .. } => "X",
         Kind::Choice(_) => "WORD",
+        Kind::Direction(_) => "WORD|X,Y,Z",
         Kind::Integers { count: 1 } => "N",
         Kind::Integers { count: 3 } => "I,J,K",
         Kind::Integers { .. } => "I0,J0,K0,I1,J1,K1",

@@ -4,6 +4,7 @@ use super::dynamics::Motion;
 use super::elastic::Stiffness;
 use super::error::DeformError;
 use super::sensors::SensorKind;
+use crate::geometry::Vec3;
 use crate::locate::Hints;
 use crate::locate::patient_orientation::Superior;
 
@@ -19,6 +20,9 @@ pub struct DeformParameters {
     /// and segments of the wall are counted from it. Ventricles only. Default
     /// [`Superior::Body`].
     pub superior: Superior,
+    /// Direction from the long axis to the anterior wall, LPS, any length. The wall is counted from
+    /// it unless [`Superior::Stated`] tells more. Default `None`.
+    pub anterior: Option<Vec3>,
     /// Whether the model is aligned as a whole before it is deformed. Default true. If false, as
     /// for models that are placed by hand, the rest state is the posed template.
     pub align: bool,
@@ -48,6 +52,7 @@ impl Default for DeformParameters {
             hints: Hints::default(),
             roll: 0.0,
             superior: Superior::Body,
+            anterior: None,
             align: true,
             stiffness: Stiffness::default(),
             sensor: SensorKind::HalfMaximum,
@@ -112,7 +117,13 @@ impl DeformParameters {
         if !hints.chain(region).all(|p| p.iter().all(|x| x.is_finite())) {
             return Err(DeformError::HintNotFinite);
         }
-        if self.hints.axis.is_some_and(|a| !(a.norm() > 1e-6)) {
+        let superior = match self.superior {
+            Superior::Stated(direction) => Some(direction),
+            Superior::Body | Superior::Frame => None,
+        };
+        let directions = [self.hints.axis, superior, self.anterior];
+        let usable = |d: &Vec3| d.norm() > 1e-6 && d.norm().is_finite();
+        if !directions.iter().flatten().all(usable) {
             return Err(DeformError::HintNotFinite);
         }
         Ok(())

@@ -6,7 +6,7 @@ use crate::grid::Volume;
 use crate::locate;
 use crate::locate::body::{self, Blob};
 use crate::locate::localisation::Localisation;
-use crate::locate::patient_orientation::{PatientOrientation, Superior};
+use crate::locate::patient_orientation::PatientOrientation;
 use crate::model::Template;
 use crate::progress::{Monitor, Stage};
 
@@ -46,11 +46,11 @@ impl OrganPlace {
             Some(_) => {
                 let found =
                     locate::find(volume, &parameters.hints, monitor)?.localisation(monitor)?;
-                let orientation = match parameters.superior {
-                    Superior::Body => {
-                        PatientOrientation::of_body(volume, &found.cup.centre, monitor)?
-                    }
-                    Superior::Frame => PatientOrientation::FRAME,
+                let (superior, cup) = (parameters.superior, &found.cup);
+                let stated = PatientOrientation::stated(superior, parameters.anterior, &cup.axis);
+                let orientation = match stated {
+                    Some(stated) => stated,
+                    None => PatientOrientation::observed(volume, cup, superior, monitor)?,
                 };
                 OrganPlace::Ventricle { found, orientation }
             }

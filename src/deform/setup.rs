@@ -12,8 +12,8 @@ use crate::grid::field::Field;
 use crate::locate::localisation::Localisation;
 use crate::locate::patient_orientation::PatientOrientation;
 use crate::mesh::TriMesh;
-use crate::model::Template;
 use crate::model::pose::TemplatePose;
+use crate::model::{Template, wall};
 use crate::progress::Monitor;
 
 /// Distance of the wall's apparent edge from the edge that the sensors find, mm outward, on the
@@ -64,7 +64,11 @@ impl FitSetup {
             (OrganPlace::Ventricle { found, orientation }, Some(from)) => {
                 let to = found.cup;
                 let roll = parameters.roll.to_radians();
-                let pose = TemplatePose::of_ventricle(from, &to, &orientation.turn(), roll);
+                let turn = match orientation.source.is_stated() {
+                    true => wall::turn_between(&from.axis, &to.axis, &orientation.superior),
+                    false => orientation.turn(),
+                };
+                let pose = TemplatePose::of_ventricle(from, &to, &turn, roll);
                 let inner_end = to.base() + to.axis * (0.6 * to.length);
                 let ends = [to.base(), inner_end];
                 (Some(found.clone()), pose, to.axis, ends, found.wall)

@@ -44,6 +44,7 @@ mod hints;
 pub mod localisation;
 pub mod patient_orientation;
 pub mod rays;
+pub mod short_axis;
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;

@@ -1,4 +1,4 @@
-//! Which way is up in the patient: the body's long axis, read off its outline.
+//! Which way is up in the patient: stated by the caller, or the body's long axis, read off its outline.
 //!
 //! Segments are counted from the patient's superior direction. The volume's frame defines one, but
 //! a patient may lie askew in it, and an image may have been rotated. A torso is nearly a cylinder:
@@ -21,11 +21,17 @@
 //! is no cylinder's ([`DISORDER`]), or if the answer is more than [`CONE`] degrees away. Not
 //! detected: a rotation by more than that, and a patient lying head down in a frame that says
 //! otherwise.
+//!
+//! A frame is not believed where the slices are cut across the heart ([`short_axis`](super::short_axis))
+//! although the frame says that they are cut across the patient: then nothing tells the roll about the
+//! long axis, and the source is [`OrientationSource::Unknown`].
 
 use nalgebra::{Rotation3, SMatrix, Vector6};
 
-use super::cup::perpendicular;
+use super::cup::{Cup, perpendicular};
+use super::short_axis::ShortAxisSlices;
 use crate::geometry::Vec3;
+use crate::geometry::rotation::least_rotation;
 use crate::grid::components::Components;
 use crate::grid::field::Field;
 use crate::grid::labels::Labels;
@@ -53,43 +59,151 @@ pub const CONE: f64 = 45.0;
 /// Pull to the frame's superior, in the measure of the mean of sin²(2φ).
 const PULL: f64 = 0.05;
 
-/// Which superior direction segments are counted from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// What decides the superior direction that segments are counted from.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Superior {
-    /// From the superior end of the body's outline where it is seen, else from the frame's.
+    /// The outline of the body where it is seen, else the volume's frame.
     Body,
-    /// From the superior direction of the volume's frame.
+    /// The volume's frame.
     Frame,
+    /// The caller: a direction in the LPS frame of the volume, of any length.
+    Stated(Vec3),
+}
+
+/// What a patient's orientation was taken from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum OrientationSource {
+    /// A superior direction stated by the caller.
+    StatedSuperior,
+    /// A direction to the anterior wall stated by the caller.
+    StatedAnterior,
+    /// The outline of the body.
+    Body,
+    /// The volume's frame.
+    #[default]
+    Frame,
+    /// Nothing: where segments are counted from is a convention.
+    Unknown,
+}
+
+impl OrientationSource {
+    /// The source's name in reports.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            OrientationSource::StatedSuperior => "superior",
+            OrientationSource::StatedAnterior => "anterior",
+            OrientationSource::Body => "body",
+            OrientationSource::Frame => "frame",
+            OrientationSource::Unknown => "unknown",
+        }
+    }
+
+    /// Whether the caller stated it.
+    pub fn is_stated(self) -> bool {
+        matches!(
+            self,
+            OrientationSource::StatedSuperior | OrientationSource::StatedAnterior
+        )
+    }
 }
 
 /// The patient's superior direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PatientOrientation {
-    /// Unit vector, LPS.
+    /// Unit vector, LPS. If the source is a stated direction to the anterior wall, the part of that
+    /// across the long axis; if it is unknown, a direction across the long axis.
     pub superior: Vec3,
     /// What it was read from.
-    pub source: Superior,
-    /// 0 (taken from the frame) to 1 (the outline is a cylinder's).
+    pub source: OrientationSource,
+    /// 0 (taken from the frame, or unknown) to 1 (stated, or the outline is a cylinder's).
     pub confidence: f64,
 }
+
+/// Least sine of the angle between a stated direction and the long axis that tells the roll about it.
+const LEAST_SINE: f64 = 0.2;
 
 impl PatientOrientation {
     /// The superior direction of the frame.
     pub const FRAME: Self = Self {
         superior: Vec3::new(0.0, 0.0, 1.0),
-        source: Superior::Frame,
+        source: OrientationSource::Frame,
         confidence: 0.0,
     };
+
+    /// What the caller states of a heart with this long `axis` (unit vector), if anything: the superior
+    /// direction, or where that runs along the axis, the direction to the anterior wall. Unknown if
+    /// everything stated runs along the axis.
+    pub fn stated(superior: Superior, anterior: Option<Vec3>, axis: &Vec3) -> Option<Self> {
+        let superior = match superior {
+            Superior::Stated(direction) => Some(direction.normalize()),
+            Superior::Body | Superior::Frame => None,
+        };
+        let anterior = anterior.map(|direction| direction.normalize());
+        let tells = |d: &Vec3| d.cross(axis).norm() > LEAST_SINE;
+        let of = |superior, source| Self {
+            superior,
+            source,
+            confidence: 1.0,
+        };
+        if let Some(direction) = superior.filter(tells) {
+            return Some(of(direction, OrientationSource::StatedSuperior));
+        }
+        if let Some(direction) = anterior.filter(tells) {
+            let across = (direction - axis * axis.dot(&direction)).normalize();
+            return Some(of(across, OrientationSource::StatedAnterior));
+        }
+        (superior.is_some() || anterior.is_some()).then(|| Self::unknown(axis))
+    }
+
+    /// Nothing tells the roll about this long `axis`. The wall is counted from the frame's anterior
+    /// direction, the top of an axial slice, or if that runs along the axis, from its superior one.
+    pub fn unknown(axis: &Vec3) -> Self {
+        let tops = [-Vec3::y(), Vec3::z()];
+        let across = tops.map(|top| top - axis * axis.dot(&top));
+        let top = across.into_iter().find(|top| top.norm() > 0.5);
+        Self {
+            superior: top.map_or(Vec3::z(), |top| top.normalize()),
+            source: OrientationSource::Unknown,
+            confidence: 0.0,
+        }
+    }
+
+    /// The orientation without anything stated: by the body in `volume` about the heart's cavity at
+    /// `heart` if `superior` allows it, else by the frame.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn observed(
+        volume: &Volume,
+        cup: &Cup,
+        superior: Superior,
+        monitor: &Monitor,
+    ) -> Result<Self, Cancelled> {
+        if superior == Superior::Frame {
+            return Ok(Self::FRAME);
+        }
+        let body = Self::of_body(volume, &cup.centre, monitor)?;
+        let across_heart = ShortAxisSlices::of(&volume.frame, &cup.axis);
+        let believed = body.source == OrientationSource::Body
+            || across_heart.is_none_or(|slices| !slices.frame_is_plain);
+        Ok(match believed {
+            true => body,
+            false => Self::unknown(&cup.axis),
+        })
+    }
 
     /// Angle to the frame's superior, degrees.
     pub fn tilt(&self) -> f64 {
         self.superior.z.clamp(-1.0, 1.0).acos().to_degrees()
     }
 
-    /// The least turn from the frame's superior direction to the patient's.
+    /// The least turn from the frame's superior direction to the patient's; none where that is unknown.
     pub fn turn(&self) -> Rotation3<f64> {
+        if self.source == OrientationSource::Unknown {
+            return Rotation3::identity();
+        }
         // None for opposite directions only, which are beyond the cone.
-        Rotation3::rotation_between(&Vec3::z(), &self.superior).unwrap_or_else(Rotation3::identity)
+        least_rotation(&Vec3::z(), &self.superior).unwrap_or_else(Rotation3::identity)
     }
 
     /// Reads the body's outline in `volume`; `heart` is a point in the cavity, LPS mm.
@@ -115,7 +229,7 @@ impl PatientOrientation {
         Ok(match seen {
             true => Self {
                 superior,
-                source: Superior::Body,
+                source: OrientationSource::Body,
                 confidence: 1.0 - disorder,
             },
             false => Self::FRAME,
@@ -303,11 +417,34 @@ mod tests {
         ] {
             let turn = Rotation3::from_scaled_axis(Vec3::from(lean.map(f64::to_radians)));
             let orientation = seen(&torso(&turn, 480.0), &turn);
-            assert_eq!(orientation.source, Superior::Body, "{lean:?}");
+            assert_eq!(orientation.source, OrientationSource::Body, "{lean:?}");
             let up = turn * Vec3::z();
             let off = orientation.superior.angle(&up).to_degrees();
             assert!(off < 3.0, "{lean:?}: off by {off}");
             assert!((orientation.turn() * Vec3::z() - orientation.superior).norm() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn what_is_stated_decides_as_far_as_it_tells_the_roll() {
+        let axis = Vec3::new(0.6, 0.0, -0.8);
+        let stated = |superior: Option<Vec3>, anterior| {
+            let superior = superior.map_or(Superior::Body, Superior::Stated);
+            PatientOrientation::stated(superior, anterior, &axis)
+        };
+        assert_eq!(stated(None, None), None);
+        let up = stated(Some(Vec3::z() * 3.0), Some(Vec3::y())).unwrap();
+        assert_eq!(up.superior, Vec3::z());
+        assert_eq!(up.source, OrientationSource::StatedSuperior);
+        // A superior direction along the axis says nothing about the roll.
+        let front = stated(Some(-axis), Some(Vec3::new(0.6, -5.0, -0.8))).unwrap();
+        assert!((front.superior + Vec3::y()).norm() < 1e-12);
+        assert_eq!(front.source, OrientationSource::StatedAnterior);
+        for nothing in [stated(Some(axis * 9.0), None), stated(None, Some(-axis))] {
+            let nothing = nothing.unwrap();
+            assert_eq!(nothing.source, OrientationSource::Unknown);
+            assert!(nothing.superior.dot(&axis).abs() < 1e-12);
+            assert_eq!(nothing.turn(), Rotation3::identity());
         }
     }
 

@@ -178,6 +178,8 @@ mod tests {
                 ("max_iterations", "7"),
                 ("roll", "90"),
             ],
+            &[("superior", "0,-2,1e-1"), ("anterior", "0,-1,0")],
+            &[("superior", "frame")],
         ]);
     }
 
@@ -210,7 +212,16 @@ mod tests {
             assert_eq!(refusal(&[(name, "NaN")]).field, name);
             assert_eq!(refusal(&[(name, "-inf")]).field, name);
         }
-        assert!(refusal(&[("axis", "0,0,0")]).message.contains("length"));
+        for name in ["axis", "superior", "anterior"] {
+            assert!(refusal(&[(name, "0,0,0")]).message.contains("length"));
+        }
+        for bad in ["up", "1,2", "1,2,inf", ""] {
+            assert!(
+                refusal(&[("superior", bad)])
+                    .fix
+                    .contains("body, frame, or")
+            );
+        }
         let strings = json!({"center": ["1", "2", "3"]});
         assert!(FitParameters::from_json(strings.as_object().unwrap()).is_err());
     }

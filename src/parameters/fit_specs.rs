@@ -105,11 +105,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         summary: "Direction from base to apex, x,y,z in LPS, of any length: the search stays within \
                   35 degrees of it",
         read: |d, v| {
-            let axis = point(v.numbers());
-            if !(axis.norm() > 1e-6 && axis.norm().is_finite()) {
-                return Err("a direction must have a length above 0".into());
-            }
-            d.place.axis = Some(axis);
+            d.place.axis = Some(direction(v.numbers())?);
             Ok(())
         },
         write: |p| json!(p.place.axis.map(|a| [a.x, a.y, a.z])),
@@ -137,16 +133,41 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "Rotation of the model about the long axis, in degrees, in addition to the smallest \
          rotation that aligns the axes"
     ),
-    choice!(
-        "superior",
-        deform.superior,
-        "body",
-        "Which direction is superior in the patient, from which the segments of the polar map are \
-         counted: body (from the outline of the body, if enough of it is in view) or frame (as the \
-         volume's frame states)",
-        "body" => Superior::Body,
-        "frame" => Superior::Frame,
-    ),
+    ParameterSpec {
+        name: "superior",
+        kind: Kind::Direction(&["body", "frame"]),
+        default: "body",
+        summary: "Which direction is superior in the patient, from which the segments of the polar map \
+                  are counted: body (from the outline of the body, if enough of it is in view, else as \
+                  the volume's frame states), frame (as the frame states) or the direction itself, \
+                  x,y,z in the LPS frame of the volume",
+        read: |d, v| {
+            d.deform.superior = match v.direction() {
+                Some(list) => Superior::Stated(direction(list)?),
+                None if v.text() == "frame" => Superior::Frame,
+                None => Superior::Body,
+            };
+            Ok(())
+        },
+        write: |p| match p.deform.superior {
+            Superior::Body => json!("body"),
+            Superior::Frame => json!("frame"),
+            Superior::Stated(up) => json!([up.x, up.y, up.z]),
+        },
+    },
+    ParameterSpec {
+        name: "anterior",
+        kind: Kind::Numbers { count: 3 },
+        default: "",
+        summary: "Direction from the long axis to the anterior wall, x,y,z in the LPS frame of the volume: \
+                  where segments are counted from if no superior direction is stated, as in short-axis \
+                  slices (there, often 0,-1,0: the top of the picture)",
+        read: |d, v| {
+            d.deform.anterior = Some(direction(v.numbers())?);
+            Ok(())
+        },
+        write: |p| json!(p.deform.anterior.map(|a| [a.x, a.y, a.z])),
+    },
     choice!(
         "sensor",
         deform.sensor,
@@ -307,6 +328,14 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "area" => Projection::Area,
     ),
 ];
+
+fn direction(list: &[f64]) -> Result<Vec3, String> {
+    let direction = point(list);
+    match direction.norm() {
+        length if length > 1e-6 && length.is_finite() => Ok(direction),
+        _ => Err("a direction must have a length above 0".into()),
+    }
+}
 
 fn point(list: &[f64]) -> Vec3 {
     Vec3::new(list[0], list[1], list[2])

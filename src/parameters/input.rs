@@ -50,6 +50,14 @@ impl Checked {
         }
     }
 
+    /// Three numbers, unless the value of a direction is a word.
+    pub(super) fn direction(&self) -> Option<&[f64]> {
+        match self {
+            Checked::Numbers(list) => Some(list),
+            _ => None,
+        }
+    }
+
     pub(super) fn text(&self) -> &str {
         match self {
             Checked::Text(t) => t,
@@ -105,6 +113,11 @@ impl RawValue<'_> {
             Kind::Choice(words) => match self.as_text() {
                 Some(word) if words.contains(&word) => Ok(Checked::Text(word.into())),
                 _ => Err(format!("{self} is not one of the choices")),
+            },
+            Kind::Direction(words) => match (self.as_text(), self.as_numbers()) {
+                (Some(word), _) if words.contains(&word) => Ok(Checked::Text(word.into())),
+                (_, Some(list)) if list.len() == 3 => Ok(Checked::Numbers(list)),
+                _ => Err(format!("{self} is not a direction")),
             },
             Kind::Integers { count } => match self.as_integers() {
                 Some(list) if list.len() == count => Ok(Checked::Integers(list)),

@@ -29,6 +29,8 @@ pub enum Kind {
         /// How many.
         count: usize,
     },
+    /// One of the listed words, or three finite numbers separated by commas (in JSON also an array).
+    Direction(&'static [&'static str]),
     /// Text in a form of its own.
     Text {
         /// The form as a regular expression.

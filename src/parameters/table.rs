@@ -196,6 +196,10 @@ impl<P: Parameters> ParameterSpec<P> {
             Kind::Integer { min, max } => format!("a whole number from {min} to {max}"),
             Kind::Number { min, max } => format!("a number from {min} to {max}"),
             Kind::Choice(words) => format!("one of {}", words.join(", ")),
+            Kind::Direction(words) => {
+                let words = words.join(", ");
+                format!("{words}, or a direction as 3 finite numbers separated by commas")
+            }
             Kind::Integers { count } => format!("{count} whole numbers separated by commas"),
             Kind::Numbers { count } => format!("{count} finite numbers separated by commas"),
             Kind::Text { example, .. } => format!("for example {example}"),

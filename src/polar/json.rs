@@ -2,10 +2,10 @@
 
 use serde_json::{Value, json};
 
-use super::{COLUMNS, NAMES, PolarMap, ROWS, territory};
+use super::{COLUMNS, PolarMap, ROWS, territory};
 
 /// Segments, extents, and the pixels in per cent of the reference (`null` where there is no
-/// wall).
+/// wall). Without orientation, no territories, and `null` for what depends on sides.
 pub fn json(map: &PolarMap) -> Value {
     let round = |x: f64| (100.0 * x).round() / 100.0;
     let percent = |x: f64| {
@@ -21,8 +21,8 @@ pub fn json(map: &PolarMap) -> Value {
         .map(|s| {
             json!({
                 "number": s.number,
-                "name": NAMES[s.number - 1],
-                "territory": territory(s.number),
+                "name": map.name_of(s.number),
+                "territory": map.is_oriented().then(|| territory(s.number)),
                 "mean_percent": s.mean_percent.map(round),
                 "extent_percent": round(s.extent_percent),
                 "area_mm2": round(s.area),
@@ -32,6 +32,7 @@ pub fn json(map: &PolarMap) -> Value {
     let territories: Vec<Value> = map
         .territories
         .iter()
+        .filter(|_| map.is_oriented())
         .map(|t| {
             json!({
                 "name": t.name,
@@ -62,8 +63,9 @@ pub fn json(map: &PolarMap) -> Value {
         "territories": territories,
         "rows": ROWS,
         "columns": COLUMNS,
-        "first_column": "lateral",
-        "direction": "lateral, anterior, septal, inferior",
+        "orientation": map.orientation.as_str(),
+        "first_column": map.is_oriented().then_some("lateral"),
+        "direction": map.is_oriented().then_some("lateral, anterior, septal, inferior"),
         "values_percent": rows,
         "segment_of": numbers,
     })

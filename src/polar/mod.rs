@@ -11,7 +11,7 @@
 //!    this patient's wall. A high percentile would follow the noise of a few pixels.
 //! 4. Means over the 17 segments of the American Heart Association (Cerqueira et al., Circulation
 //!    2002), and the share of wall below [`PolarParameters::threshold`] of the reference. Each ray
-//!    counts by the area of wall it stands for.
+//!    counts by the area of wall it stands for, several segments together by their whole areas.
 //!
 //! Levels ([`Levels`]): the long axis from the mean rim to the end of the cavity is cut into three equal
 //! parts; a place of the wall is basal, mid or apical by the part that the middle of the wall lies in, and
@@ -24,9 +24,12 @@
 //! the wall.
 //!
 //! Towards the rim, blur mixes the wall with what lies beyond it, and the model's end is the least
-//! certain part of a fit. The last [`PolarParameters::rim_margin`] millimetres are therefore shown
-//! but not counted, and over the next [`PolarParameters::rim_fade`] millimetres the weight rises
-//! to 1, so that a small change of the fit does not add or remove a whole ray.
+//! certain part of a fit. The uptake of the last [`PolarParameters::rim_margin`] millimetres is therefore
+//! shown but not counted, and over the next [`PolarParameters::rim_fade`] millimetres the weight rises to 1,
+//! so that a small change of the fit does not add or remove a whole ray.
+//!
+//! Where nothing tells which side of the wall is anterior ([`OrientationSource::Unknown`]), the map has its
+//! levels, but neither names of sides nor territories.
 //!
 //! Not guaranteed: there is no normal database; the extent is not a TPD, a summed score or a
 //! diagnosis. Without attenuation correction the base, which lies deeper in the body, is 20 to
@@ -44,6 +47,7 @@ use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::grid::Volume;
 use crate::grid::field::Field;
+use crate::locate::patient_orientation::OrientationSource;
 use crate::model::wall::{COLUMNS, ROWS, VentricleWall, WallRay};
 use levels::MiddleSurface;
 
@@ -111,7 +115,7 @@ pub struct Segment {
     pub mean_percent: Option<f64>,
     /// Share of its area below the threshold, per cent.
     pub extent_percent: f64,
-    /// Wall area, mm², as far as it is counted.
+    /// Wall area, mm².
     pub area: f64,
 }
 
@@ -124,7 +128,7 @@ pub struct Territory {
     pub mean_percent: Option<f64>,
     /// Share of its area below the threshold, per cent.
     pub extent_percent: f64,
-    /// Wall area, mm², as far as it is counted.
+    /// Wall area, mm².
     pub area: f64,
 }
 
@@ -146,6 +150,9 @@ pub struct PolarMap {
     pub levels: Levels,
     /// How wide the levels are drawn.
     pub projection: Projection,
+    /// What the patient's orientation was taken from. If it is unknown, levels hold, but no place of a level
+    /// is known to be anterior: segments of a level are then counted from a convention.
+    pub orientation: OrientationSource,
     /// Share of the whole wall below the threshold, per cent.
     pub extent_percent: f64,
 }
@@ -197,6 +204,31 @@ pub fn segment_at(level: Level, angle: f64) -> usize {
 }
 
 impl PolarMap {
+    /// The map of a wall whose anterior side was taken from `source`.
+    pub fn counted_by(self, source: OrientationSource) -> Self {
+        Self {
+            orientation: source,
+            ..self
+        }
+    }
+
+    /// Whether it is known which side of the map is anterior.
+    pub fn is_oriented(&self) -> bool {
+        self.orientation != OrientationSource::Unknown
+    }
+
+    /// The name of a segment: the Association's, or where no side is known, its level and its place there.
+    pub fn name_of(&self, segment: usize) -> String {
+        let (level, first, count) = match segment {
+            _ if self.is_oriented() => return NAMES[segment - 1].to_owned(),
+            17 => return NAMES[16].to_owned(),
+            13..=16 => ("apical", 13, 4),
+            7..=12 => ("mid", 7, 6),
+            _ => ("basal", 1, 6),
+        };
+        format!("{level}, {} of {count}", segment - first + 1)
+    }
+
     /// The segment of a pixel.
     pub fn segment_of(&self, row: usize, column: usize) -> usize {
         segment_of(&self.levels, row, column)
@@ -246,32 +278,31 @@ pub fn map(
         .collect();
     let reference = reference(&pixels);
     let limit = parameters.threshold * reference;
-    let counts = |p: &Pixel| p.weight > 0.0;
-    let indexed = || (0..pixels.len()).filter_map(|i| Some((i, pixels[i].filter(counts)?)));
-    let segments = std::array::from_fn(|s| {
+    let indexed = || (0..pixels.len()).filter_map(|i| Some((i, pixels[i]?)));
+    let segments: [Segment; 17] = std::array::from_fn(|s| {
         let own = indexed().filter(|(i, _)| segment_of(&levels, i / COLUMNS, i % COLUMNS) == s + 1);
         summarise(s + 1, own.map(|(_, p)| p), reference, limit)
     });
     let territories = ARTERIES.map(|name| {
-        let own = indexed()
-            .filter(|(i, _)| territory(segment_of(&levels, i / COLUMNS, i % COLUMNS)) == name);
-        let sum = summarise(0, own.map(|(_, p)| p), reference, limit);
+        let own = segments.iter().filter(|s| territory(s.number) == name);
+        let (mean_percent, extent_percent, area) = together(own);
         Territory {
             name,
-            mean_percent: sum.mean_percent,
-            extent_percent: sum.extent_percent,
-            area: sum.area,
+            mean_percent,
+            extent_percent,
+            area,
         }
     });
-    let all = summarise(0, indexed().map(|(_, p)| p), reference, limit);
+    let (_, extent_percent, _) = together(segments.iter());
     PolarMap {
         reference,
         threshold: parameters.threshold,
         segments,
         territories,
-        extent_percent: all.extent_percent,
+        extent_percent,
         levels,
         projection: parameters.projection,
+        orientation: OrientationSource::default(),
         pixels,
     }
 }
@@ -328,20 +359,43 @@ fn summarise(
     reference: f64,
     limit: f64,
 ) -> Segment {
-    let (mut sum, mut area, mut low) = (0.0, 0.0, 0.0);
+    let (mut sum, mut counted, mut low, mut area) = (0.0, 0.0, 0.0, 0.0);
     for p in pixels {
-        let counted = p.area * p.weight;
-        sum += counted * p.max;
-        area += counted;
+        let share = p.area * p.weight;
+        sum += share * p.max;
+        counted += share;
+        area += p.area;
         if p.max < limit {
-            low += counted;
+            low += share;
         }
     }
+    let known = counted > 0.0 && reference > 0.0;
     Segment {
         number,
-        mean_percent: (area > 0.0 && reference > 0.0).then(|| 100.0 * sum / area / reference),
-        extent_percent: if area > 0.0 { 100.0 * low / area } else { 0.0 },
+        mean_percent: known.then(|| 100.0 * sum / counted / reference),
+        extent_percent: if counted > 0.0 {
+            100.0 * low / counted
+        } else {
+            0.0
+        },
         area,
+    }
+}
+
+/// Mean, extent and area of several segments together, each by its whole area: the part of the base that is
+/// not counted is as dark or bright as the rest of its segment.
+fn together<'a>(segments: impl Iterator<Item = &'a Segment>) -> (Option<f64>, f64, f64) {
+    let (mut sum, mut low, mut area) = (0.0, 0.0, 0.0);
+    for segment in segments {
+        if let Some(mean) = segment.mean_percent {
+            sum += segment.area * mean;
+            low += segment.area * segment.extent_percent;
+            area += segment.area;
+        }
+    }
+    match area > 0.0 {
+        true => (Some(sum / area), low / area, area),
+        false => (None, 0.0, 0.0),
     }
 }
 
@@ -399,6 +453,29 @@ mod tests {
     }
 
     #[test]
+    fn a_map_without_orientation_names_no_side() {
+        let (volume, wall) = scene();
+        let map = map(&volume, &wall, &wall, &PolarParameters::default());
+        assert_eq!(json(&map)["orientation"], "frame");
+        assert!(svg(&map).contains(">A</text>"));
+        let map = map.counted_by(OrientationSource::Unknown);
+        let value = json(&map);
+        assert_eq!(value["orientation"], "unknown");
+        assert_eq!(value["territories"], serde_json::json!([]));
+        assert_eq!(value["first_column"], serde_json::Value::Null);
+        for segment in value["segments"].as_array().unwrap() {
+            let name = segment["name"].as_str().unwrap();
+            for side in ["anter", "sept", "infer", "lateral"] {
+                assert!(!name.contains(side), "{name}");
+            }
+            assert_eq!(segment["territory"], serde_json::Value::Null);
+        }
+        let picture = svg(&map);
+        assert!(picture.contains("ORIENTATION UNKNOWN"));
+        assert!(!picture.contains(">A</text>") && !picture.contains("LAD"));
+    }
+
+    #[test]
     fn areas_are_those_of_the_surface_midway_through_the_wall() {
         let (volume, wall) = scene();
         let map = map(&volume, &wall, &wall, &PolarParameters::default());
@@ -447,7 +524,7 @@ mod tests {
         );
         let areas: f64 = map.segments.iter().map(|s| s.area).sum();
         let counted = map.pixels.iter().flatten();
-        let all: f64 = counted.map(|p| p.area * p.weight).sum();
+        let all: f64 = counted.map(|p| p.area).sum();
         assert!((areas - all).abs() < 1e-6);
     }
 

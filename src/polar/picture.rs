@@ -38,6 +38,7 @@ const SIDES: [(char, f64); 4] = [('A', 0.25), ('S', 0.5), ('I', 0.75), ('L', 0.0
 
 /// The map as SVG: uptake, borders of segments and territories, the means of both in per cent, a line about
 /// the wall below the threshold, a colour bar with the threshold marked. Grey is outside of the wall.
+/// Without orientation, "ORIENTATION UNKNOWN" instead of sides and territories.
 pub fn svg(map: &PolarMap) -> String {
     drawing(map).svg()
 }
@@ -56,16 +57,21 @@ fn drawing(map: &PolarMap) -> Drawing {
     });
     Drawing {
         title: format!(
-            "Polar map, per cent of {:.4}; extent below {:.0} %: {:.1} % of the wall; grey: no wall",
+            "Polar map, per cent of {:.4}; extent below {:.0} %: {:.1} % of the wall; grey: no wall{}",
             map.reference,
             100.0 * map.threshold,
-            map.extent_percent
+            map.extent_percent,
+            if map.is_oriented() {
+                ""
+            } else {
+                "; orientation unknown"
+            }
         ),
         width: WIDTH,
         height: SIZE,
         shapes: tiles
             .chain(threshold_line(map, &rings))
-            .chain(borders(&rings))
+            .chain(borders(map, &rings))
             .chain(labels(map, &rings))
             .chain(colour_bar(map))
             .chain(sums(map))
@@ -162,7 +168,7 @@ fn threshold_line(map: &PolarMap, rings: &[f64; 4]) -> Vec<VectorShape> {
 }
 
 /// The borders of the segments; those between two territories are thicker.
-fn borders(rings: &[f64; 4]) -> Vec<VectorShape> {
+fn borders(map: &PolarMap, rings: &[f64; 4]) -> Vec<VectorShape> {
     let mut shapes: Vec<VectorShape> = rings
         .iter()
         .map(|share| VectorShape::Circle {
@@ -178,7 +184,7 @@ fn borders(rings: &[f64; 4]) -> Vec<VectorShape> {
             // Segments follow each other counter-clockwise; the first is centred on anterior.
             let turns = 0.25 + (k as f64 - 0.5) / count as f64;
             let pair = [(k + count - 1) % count, k].map(|k| territory(first + k));
-            let (stroke, width) = match pair[0] == pair[1] {
+            let (stroke, width) = match pair[0] == pair[1] || !map.is_oriented() {
                 true => (BORDER, 1.5),
                 false => (TERRITORY_BORDER, 4.0),
             };
@@ -207,8 +213,16 @@ fn labels<'a>(map: &'a PolarMap, rings: &'a [f64; 4]) -> impl Iterator<Item = Ve
             rim: Some(if bright { WHITE } else { BLACK }),
         }
     });
-    let letters = SIDES.map(|(letter, turns)| text(screen(1.07, turns), letter.to_string()));
-    means.chain(letters)
+    let letters = SIDES
+        .map(|(letter, turns)| text(screen(1.07, turns), letter.to_string()))
+        .into_iter()
+        .filter(|_| map.is_oriented());
+    let unknown = text(
+        [CENTRE, SIZE as f64 - 18.0],
+        "ORIENTATION UNKNOWN".to_owned(),
+    );
+    let unknown = (!map.is_oriented()).then_some(unknown);
+    means.chain(letters).chain(unknown)
 }
 
 fn text(middle: Point, text: String) -> VectorShape {
@@ -274,6 +288,7 @@ fn colour_bar(map: &PolarMap) -> Vec<VectorShape> {
 fn sums(map: &PolarMap) -> Vec<VectorShape> {
     let lines = map.territories.iter().enumerate();
     lines
+        .filter(|_| map.is_oriented())
         .map(|(line, territory)| {
             let mean = territory.mean_percent;
             let mean = mean.map_or_else(|| "-".to_owned(), |mean| format!("{mean:.0}"));

@@ -262,7 +262,14 @@ fn size_rows(report: &SegmentationReport) -> Vec<(Option<f64>, usize, &'static s
 }
 
 fn slices(report: &SegmentationReport, png: &[u8]) -> Markup {
+    let polar = report.polar.as_ref();
+    let unknown = polar.is_some_and(|polar| polar.orientation == UNKNOWN);
     let (about, names) = match report.is_ventricle() {
+        true if unknown => (
+            "Planes of the heart through the middle of its cavity, which side is anterior unknown: \
+             apex on top of the second and on the right of the third.",
+            ["Short axis", "Long axis", "Long axis, a quarter turn on"],
+        ),
         true => (
             "Planes of the heart through the middle of its cavity: anterior on top and septum on \
              the left of the first, apex on top of the second and on the right of the third.",
@@ -291,19 +298,32 @@ fn slices(report: &SegmentationReport, png: &[u8]) -> Markup {
     }
 }
 
+/// The orientation of a polar map without sides.
+const UNKNOWN: &str = "unknown";
+
 /// The polar map beside its segments.
 fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
     let figures = report.polar.clone().unwrap_or_default();
     let percent = |value: Option<f64>, decimals| number(value.unwrap_or(f64::NAN), decimals);
+    let sides = match figures.orientation.as_str() {
+        UNKNOWN => {
+            "base outside. Orientation unknown: nothing in the image or its header tells which side \
+             is anterior, so segments have numbers within their level but no sides and no arteries; \
+             `superior` or `anterior` can state a direction"
+        }
+        _ => {
+            "anterior on top, septum on the left; thick white lines part the territories of the \
+             arteries"
+        }
+    };
     html! {
         section {
             h2 { "Uptake of the wall" }
             p.hint {
                 "Polar map of the 17 segments of the American Heart Association: apex in the "
-                "centre, anterior on top, septum on the left. In per cent of the hottest quarter "
-                "of this scan's own wall; there is no normal database behind it. The cyan line "
-                "encloses the wall below the threshold; thick white lines part the territories of "
-                "the arteries; grey is outside of the wall."
+                "centre, " (sides) ". In per cent of the hottest quarter of this scan's own wall; "
+                "there is no normal database behind it. The cyan line encloses the wall below the "
+                "threshold; grey is outside of the wall."
             }
             div.row.beside {
                 figure.paper {
@@ -327,7 +347,7 @@ fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
                                 tr {
                                     td.n { (segment.number.unwrap_or(0)) }
                                     th scope="row" { (segment.name) }
-                                    td { (segment.territory) }
+                                    td { (segment.territory.as_deref().unwrap_or("–")) }
                                     td.n { (percent(segment.mean_percent, 1)) }
                                     td.n { (percent(segment.extent_percent, 1)) }
                                 }

@@ -147,6 +147,8 @@ pub struct PolarFigures {
     pub threshold_percent: Option<f64>,
     /// Share of the wall below it.
     pub extent_percent: Option<f64>,
+    /// What the patient's orientation was taken from; `unknown` if nothing tells it.
+    pub orientation: String,
     /// The 17 segments.
     pub segments: Vec<SegmentFigures>,
     /// The territories of the coronary arteries.
@@ -173,8 +175,8 @@ pub struct SegmentFigures {
     pub number: Option<u64>,
     /// Its name.
     pub name: String,
-    /// The coronary artery that usually feeds it.
-    pub territory: String,
+    /// The coronary artery that usually feeds it; `None` without orientation.
+    pub territory: Option<String>,
     /// Mean uptake in per cent of the reference.
     pub mean_percent: Option<f64>,
     /// Share of its area below the threshold.

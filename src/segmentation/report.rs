@@ -6,7 +6,6 @@ use super::segment::Segmentation;
 use crate::deform::Fit;
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
-use crate::locate::patient_orientation::Superior;
 use crate::model::wall::VentricleWall;
 use crate::polar;
 
@@ -60,10 +59,7 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
         })),
         "posture": fit.patient_orientation.as_ref().map(|p| json!({
             "superior": point(&p.superior),
-            "source": match p.source {
-                Superior::Body => "body",
-                Superior::Frame => "frame",
-            },
+            "source": p.source.as_str(),
             "tilt_degrees": round(p.tilt()),
             "confidence": round(p.confidence),
         })),

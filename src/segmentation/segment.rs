@@ -97,7 +97,9 @@ pub fn segment(
     // Uptake is sampled through the wall as it looks, whichever wall is shown.
     let polar = fit.surfaces.as_ref().map(|surfaces| {
         let [wall, anatomical] = [&surfaces.apparent, &surfaces.anatomical].map(|s| &s.wall);
+        let source = fit.patient_orientation.map(|o| o.source);
         polar::map(volume, wall, anatomical, &parameters.polar)
+            .counted_by(source.unwrap_or_default())
     });
     monitor.report(Stage::Report, 0.0)?;
     let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);

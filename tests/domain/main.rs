@@ -26,6 +26,7 @@ mod deform_varied;
 
 mod containers;
 mod edges;
+mod orientation;
 mod pipeline;
 mod segment;
 

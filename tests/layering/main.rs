@@ -41,7 +41,7 @@ const USES: &[(&str, &[&str])] = &[
             "geometry", "numeric", "mesh", "progress", "grid", "locate", "model",
         ],
     ),
-    ("polar", &["geometry", "grid", "draw", "model"]),
+    ("polar", &["geometry", "grid", "draw", "locate", "model"]),
     (
         "report",
         &[

@@ -108,6 +108,15 @@ fn schema_of<P: Parameters>(spec: &ParameterSpec<P>) -> Schema {
             .schema_type(Type::String)
             .enum_values(Some(words.iter().copied()))
             .into(),
+        Kind::Direction(words) => {
+            let number = r"[+-]?[0-9]{1,9}(\.[0-9]{1,9})?";
+            let words = words.join("|");
+            object
+                .schema_type(Type::String)
+                .pattern(Some(format!("^({words}|{number},{number},{number})$")))
+                .examples([spec.default, "0,0,1"])
+                .into()
+        }
         Kind::Integers { count } => list_of(Type::Integer, count, spec.summary),
         Kind::Numbers { count } => list_of(Type::Number, count, spec.summary),
         Kind::Stored { prefixes, word } => {

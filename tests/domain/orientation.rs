@@ -1,0 +1,126 @@
+//! The polar map of short-axis slices: right where something tells the orientation, and without sides where
+//! nothing does.
+
+// Helpers of a test state their expectations by panicking, as tests do.
+#![allow(clippy::unwrap_used)]
+
+use nalgebra::Matrix3;
+use ventriform::deform::{DeformParameters, Fit, fit};
+use ventriform::geometry::Vec3;
+use ventriform::geometry::frame::VoxelToPatient;
+use ventriform::grid::field::Field;
+use ventriform::locate::patient_orientation::{OrientationSource, Superior};
+use ventriform::mesh::shapes;
+use ventriform::model::{Organ, Template};
+use ventriform::polar::{self, PolarMap, PolarParameters};
+use ventriform::progress::Monitor;
+use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
+use ventriform::volume::{Phantom, Volume};
+
+/// A patient whose inferior wall takes up little.
+fn patient() -> Phantom {
+    let defects = [4, 10, 15].map(|segment| PerfusionDefect {
+        segment,
+        severity: 0.8,
+    });
+    let parameters = PhantomParameters {
+        shape: [64; 3],
+        spacing_mm: [4.4; 3],
+        defects: defects.to_vec(),
+        pose_spread_deg: 0.0,
+        ..PhantomParameters::default()
+    };
+    phantom(&parameters, &Monitor::silent()).unwrap()
+}
+
+/// Short-axis slices: 48 voxels of 4.4 mm along each of the three directions of `rows`, which are unit
+/// vectors at right angles in the patient.
+struct ShortAxis {
+    volume: Volume,
+    /// Patient to the frame that a header without directions states.
+    turn: Matrix3<f64>,
+}
+
+impl ShortAxis {
+    fn of(patient: &Phantom, apex_first: bool) -> Self {
+        let axis = patient.pose.axis;
+        let up = (Vec3::z() - axis * axis.z).normalize();
+        // Anterior on top: rows run down, towards inferior.
+        let third = if apex_first { -axis } else { axis };
+        let sides = Matrix3::from_columns(&[-up.cross(&third), -up, third]);
+        let middle = (patient.pose.apex + patient.pose.base) / 2.0;
+        let (shape, step) = ([48; 3], 4.4);
+        let linear = sides * step;
+        let half = Vec3::repeat((48.0 - 1.0) / 2.0);
+        let frame = VoxelToPatient::new(linear, middle - linear * half).unwrap();
+        let image = Field::new(&patient.volume, None, 0.0);
+        Self {
+            volume: Volume::sampled(shape, frame, |p| image.at(p)),
+            turn: sides.transpose(),
+        }
+    }
+
+    /// The same voxels with a header that states no directions.
+    fn plain(&self) -> Volume {
+        let frame = VoxelToPatient::centred(self.volume.shape, [4.4; 3], Vec3::zeros()).unwrap();
+        Volume {
+            frame,
+            ..self.volume.clone()
+        }
+    }
+}
+
+fn fitted(volume: &Volume, parameters: &DeformParameters) -> (Fit, PolarMap) {
+    let mesh = shapes::cup(75.0, 33.0, 13.0, 14);
+    let template = Template::new(mesh, Organ::LeftVentricle, &Monitor::silent()).unwrap();
+    let fit = fit(volume, &template, parameters, &Monitor::silent()).unwrap();
+    let surfaces = fit.surfaces.as_ref().unwrap();
+    let (apparent, anatomical) = (&surfaces.apparent.wall, &surfaces.anatomical.wall);
+    let source = fit.patient_orientation.unwrap().source;
+    let map = polar::map(volume, apparent, anatomical, &PolarParameters::default());
+    (fit, map.counted_by(source))
+}
+
+/// The inferior wall is the dark one of the mid ring.
+fn is_right(map: &PolarMap) -> bool {
+    let mean = |segment: usize| map.segments[segment - 1].mean_percent.unwrap();
+    (7..=12).all(|segment| segment == 10 || mean(segment) > mean(10) + 15.0)
+}
+
+#[test]
+fn short_axis_slices_are_oriented_by_their_header_or_by_what_is_stated_or_not_at_all() {
+    let patient = patient();
+    for apex_first in [false, true] {
+        let slices = ShortAxis::of(&patient, apex_first);
+        let usual = DeformParameters::default();
+        let (_, map) = fitted(&slices.volume, &usual);
+        assert_eq!(map.orientation, OrientationSource::Frame, "{apex_first}");
+        assert!(is_right(&map), "{apex_first}: {:?}", map.segments);
+
+        let plain = slices.plain();
+        let (guessed, map) = fitted(&plain, &usual);
+        assert_eq!(map.orientation, OrientationSource::Unknown, "{apex_first}");
+
+        let up = slices.turn * Vec3::z();
+        let stated = [
+            (Superior::Stated(up * 2.0), None),
+            (Superior::Body, Some(-Vec3::y())),
+        ];
+        for (superior, anterior) in stated {
+            let parameters = DeformParameters {
+                superior,
+                anterior,
+                ..usual.clone()
+            };
+            let (fit, map) = fitted(&plain, &parameters);
+            assert!(map.orientation.is_stated(), "{apex_first} {superior:?}");
+            assert!(
+                is_right(&map),
+                "{apex_first} {superior:?}: {:?}",
+                map.segments
+            );
+            let change = (fit.wall_ml / guessed.wall_ml - 1.0).abs();
+            assert!(change < 0.1, "{apex_first} {superior:?}: {change}");
+        }
+    }
+}
