@@ -5,9 +5,11 @@ use super::dynamics::{self, Moved};
 use super::elastic::Elastic;
 use super::fit::Fit;
 use super::parameters::DeformParameters;
+use super::rim;
 use super::sensors::{SensorReading, SensorSettings};
 use super::setup::FitSetup;
 use crate::grid::Volume;
+use crate::locate::patient_orientation::OrientationSource;
 use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
 use crate::model::wall::{self, VentricleWall};
@@ -96,11 +98,17 @@ impl Attempt {
         aligned: &TriMesh,
         monitor: &Monitor,
     ) -> Result<Fit, Cancelled> {
-        let mesh = self.moved.mesh;
+        let orientation = setup.patient_orientation;
         let (active, residual) = edges_seen(&self.moved.readings);
         let cup = template
             .cup
-            .map(|cup| wall::carried(&cup, &template.mesh, &mesh));
+            .map(|cup| wall::carried(&cup, &template.mesh, &self.moved.mesh));
+        let mesh = match &cup {
+            Some(cup) if orientation.source != OrientationSource::Unknown => {
+                rim::settled(&self.moved.mesh, cup, &orientation.superior)
+            }
+            _ => self.moved.mesh,
+        };
         let wall = cup
             .map(|cup| {
                 VentricleWall::new(&mesh, &cup, &setup.patient_orientation.superior, monitor)

@@ -12,7 +12,8 @@
 //! 4. [`dynamics`]: deform it under [`elastic`] forces and [`sensors`] until it rests.
 //! 5. [`attempt`]: count folds and self-intersections; if there are any, repeat step 4 with four
 //!    times the stiffness, at most three times.
-//! 6. [`fit`](mod@fit): measure the result; [`flags`]: say what gives reason to doubt it.
+//! 6. [`rim`]: move the rim of a ventricle where anatomy and image together put it.
+//! 7. [`fit`](mod@fit): measure the result; [`flags`]: say what gives reason to doubt it.
 //!
 //! The edge that is fitted is the half-way point between the wall's ridge and the trough beside
 //! it. It does not depend on uptake: a wall with half the uptake has its edge in the same place.
@@ -40,6 +41,7 @@ pub mod fit;
 pub mod flags;
 pub mod parameters;
 pub mod place;
+pub mod rim;
 pub mod sensors;
 pub mod setup;
 

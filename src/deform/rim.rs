@@ -1,0 +1,262 @@
+//! The rim of a ventricle, by anatomy as well as by where the signal ends.
+//!
+//! The sensors end the wall where its uptake ends. An infarct at the base then shortens the wall, and the
+//! segment reads normal; a wall of the right ventricle lengthens it. In go the fitted model, its cup and the
+//! patient's superior direction; out comes the model with its rim moved along the long axis.
+//!
+//! 1. The rim's height in each of [`DIRECTIONS`] directions about the axis.
+//! 2. The shape of the rim that hearts have ([`MEAN`], [`PRECISION`], in three harmonics and shares of
+//!    the heart's length) is fitted to them, robustly: a short stretch far from the rest hardly pulls it.
+//! 3. The distance from that shape is the sum of what is true of this heart and what the signal took away
+//!    or added. A piecewise linear function ([`correction`]) says how much of it to take back.
+//! 4. Nodes within [`REACH`] of the rim move along the axis, those at the rim by the whole, so that the wall
+//!    is stretched or compressed there.
+//!
+//! Shape and function are least-squares fits to simulated hearts whose rims are known. On hearts that were
+//! left out, the rms error of the rim's height falls from 3.8 to 3.2 mm, and the largest error of six
+//! isolated basal infarcts from 13 to 9 mm in the mean (two of them hardly change). Not guaranteed: an
+//! infarct over half of the base moves the shape itself. A model whose orientation is unknown keeps its rim.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::geometry::Vec3;
+use crate::locate::cup::Cup;
+use crate::mesh::TriMesh;
+use crate::mesh::intersections::self_intersections;
+use crate::model::wall::anterior;
+use crate::numeric::order;
+
+/// Directions about the axis: from lateral over anterior, septal and inferior.
+const DIRECTIONS: usize = 30;
+/// Harmonics of the rim's shape: the cosines and sines of one to three times the angle.
+const HARMONICS: usize = 3;
+const TERMS: usize = 2 * HARMONICS;
+
+/// Mean coefficients of the rim's height towards the apex, shares of the heart's length.
+const MEAN: [f64; TERMS] = [-0.0638, 0.0248, 0.0188, -0.0082, -0.0038, 0.0008];
+/// Inverse of their covariance.
+const PRECISION: [[f64; TERMS]; TERMS] = [
+    [2029.0, 51.0, 1485.0, -24.0, -998.0, -454.0],
+    [51.0, 2307.0, -383.0, 1555.0, 172.0, -110.0],
+    [1485.0, -383.0, 6336.0, -677.0, 1556.0, -2108.0],
+    [-24.0, 1555.0, -677.0, 4764.0, -220.0, 1541.0],
+    [-998.0, 172.0, 1556.0, -220.0, 7487.0, -688.0],
+    [-454.0, -110.0, -2108.0, 1541.0, -688.0, 8253.0],
+];
+
+/// Distance from the shape at which a direction counts half, mm.
+const ODD: f64 = 4.0;
+/// Neighbouring directions are not independent: as many of them count as one.
+const TOGETHER: f64 = 3.0;
+/// Rounds of reweighting.
+const ROUNDS: usize = 30;
+
+/// Length of wall next to the rim that is stretched, mm.
+const REACH: f64 = 25.0;
+
+/// How far towards the base the rim is moved where it lies `distance` mm too near to the apex, mm.
+fn correction(distance: f64) -> f64 {
+    let beyond = (distance - 4.0).max(0.0) * 1.136 + (-distance - 4.0).max(0.0) * 0.278;
+    (0.784 + 0.95 * distance + beyond).clamp(-12.0, 16.0)
+}
+
+/// `mesh` with its rim where anatomy and image together put it. Without a rim in every direction, and where
+/// the moved surface would intersect itself, the mesh stays.
+pub fn settled(mesh: &TriMesh, cup: &Cup, superior: &Vec3) -> TriMesh {
+    let frame = RimFrame::of(cup, superior);
+    let Some(rim) = frame.heights(mesh) else {
+        return mesh.clone();
+    };
+    let apex = mesh.vertices.iter().map(|p| frame.along(p));
+    let length = apex.fold(f64::MIN, f64::max) - median(&rim);
+    let Some(shape) = expected(&rim, length) else {
+        return mesh.clone();
+    };
+    let shifts: Vec<f64> = rim
+        .iter()
+        .zip(&shape)
+        .map(|(h, e)| correction(h - e))
+        .collect();
+    let mut moved = mesh.clone();
+    for p in &mut moved.vertices {
+        let direction = frame.direction(p);
+        let above = frame.along(p) - between(&rim, direction);
+        let share = (1.0 - above / REACH).clamp(0.0, 1.0);
+        *p -= frame.axis * (share * between(&shifts, direction));
+    }
+    match self_intersections(&moved).is_empty() {
+        true => moved,
+        false => mesh.clone(),
+    }
+}
+
+/// The shape of a rim with these heights, mm, of a heart of this length.
+fn expected(rim: &[f64], length: f64) -> Option<Vec<f64>> {
+    let basis = DMatrix::from_fn(DIRECTIONS, TERMS + 1, |direction, term| {
+        let angle = TAU * (direction as f64 + 0.5) / DIRECTIONS as f64;
+        let times = term.div_ceil(2) as f64;
+        match term {
+            0 => 1.0,
+            term if term % 2 == 1 => (times * angle).cos(),
+            _ => (times * angle).sin(),
+        }
+    });
+    let mean = DVector::from_fn(TERMS + 1, |term, _| match term {
+        0 => 0.0,
+        term => MEAN[term - 1] * length,
+    });
+    let prior = DMatrix::from_fn(TERMS + 1, TERMS + 1, |a, b| match (a, b) {
+        (0, _) | (_, 0) => 0.0,
+        (a, b) => PRECISION[a - 1][b - 1] / (length * length),
+    });
+    let heights = DVector::from_column_slice(rim);
+    let usual = &basis * &mean;
+    let level: Vec<f64> = (&heights - &usual).iter().copied().collect();
+    let mut shape = usual.add_scalar(median(&level));
+    for _ in 0..ROUNDS {
+        let weights = (&heights - &shape).map(|r| {
+            let odd = r / ODD;
+            1.0 / (1.0 + odd * odd) / (ODD * ODD * TOGETHER)
+        });
+        let weighted = DMatrix::from_fn(TERMS + 1, DIRECTIONS, |t, d| basis[(d, t)] * weights[d]);
+        let system = &weighted * &basis + &prior;
+        let right = &weighted * &heights + &prior * &mean;
+        shape = &basis * system.cholesky()?.solve(&right);
+    }
+    Some(shape.iter().copied().collect())
+}
+
+/// The long axis, and the directions about it.
+struct RimFrame {
+    centre: Vec3,
+    axis: Vec3,
+    lateral: Vec3,
+    anterior: Vec3,
+}
+
+impl RimFrame {
+    fn of(cup: &Cup, superior: &Vec3) -> Self {
+        let anterior = anterior(&cup.axis, superior);
+        Self {
+            centre: cup.centre,
+            axis: cup.axis,
+            lateral: anterior.cross(&cup.axis),
+            anterior,
+        }
+    }
+
+    fn along(&self, p: &Vec3) -> f64 {
+        (p - self.centre).dot(&self.axis)
+    }
+
+    /// 0..[`DIRECTIONS`]; direction n lies at n.
+    fn direction(&self, p: &Vec3) -> f64 {
+        let r = p - self.centre;
+        let angle = r.dot(&self.anterior).atan2(r.dot(&self.lateral));
+        (angle / TAU * DIRECTIONS as f64 - 0.5).rem_euclid(DIRECTIONS as f64)
+    }
+
+    /// How far towards the apex the mesh begins in each direction, mm from the cup's centre: the most basal
+    /// crossing of its edges with the half plane there. `None` if there is a direction without any.
+    fn heights(&self, mesh: &TriMesh) -> Option<Vec<f64>> {
+        (0..DIRECTIONS)
+            .map(|direction| {
+                let (sin, cos) = (TAU * (direction as f64 + 0.5) / DIRECTIONS as f64).sin_cos();
+                let outward = self.lateral * cos + self.anterior * sin;
+                let aside = self.anterior * cos - self.lateral * sin;
+                let mut height = f64::INFINITY;
+                for triangle in 0..mesh.triangles.len() {
+                    let corners = mesh.corners(triangle);
+                    for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+                        let (p, q) = (corners[a] - self.centre, corners[b] - self.centre);
+                        let (from, to) = (p.dot(&aside), q.dot(&aside));
+                        if from * to > 0.0 || from == to {
+                            continue;
+                        }
+                        let crossing = p + (q - p) * (from / (from - to));
+                        if crossing.dot(&outward) > 0.0 {
+                            height = height.min(crossing.dot(&self.axis));
+                        }
+                    }
+                }
+                height.is_finite().then_some(height)
+            })
+            .collect()
+    }
+}
+
+/// The value at a direction, linear between the given ones.
+fn between(values: &[f64], direction: f64) -> f64 {
+    let (low, share) = (direction.floor(), direction.fract());
+    let at = |n: usize| values[n % DIRECTIONS];
+    at(low as usize) * (1.0 - share) + at(low as usize + 1) * share
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    order::quantile(&sorted, 0.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    /// A cup whose axis points down, with the rim of the mean heart, and cut short by `notch` mm where the
+    /// angle from lateral lies within 30 degrees of 90.
+    fn heart(notch: f64) -> (TriMesh, Cup) {
+        let cup = Cup {
+            centre: Vec3::zeros(),
+            axis: -Vec3::z(),
+            length: 70.0,
+            breadth: 1.0,
+        };
+        let frame = RimFrame::of(&cup, &Vec3::y());
+        let mut mesh = shapes::cup(70.0, 31.0, 12.0, 24);
+        let least = mesh.vertices.iter().map(|p| frame.along(p));
+        let base = least.fold(f64::MAX, f64::min);
+        for p in &mut mesh.vertices {
+            let angle = TAU * (frame.direction(p) + 0.5) / DIRECTIONS as f64;
+            let usual: f64 = (0..TERMS)
+                .map(|t| {
+                    let times = (t / 2 + 1) as f64 * angle;
+                    MEAN[t] * 70.0 * if t % 2 == 0 { times.cos() } else { times.sin() }
+                })
+                .sum();
+            let off = (angle.to_degrees() - 90.0).abs();
+            let short = notch * (1.0 - off / 30.0).clamp(0.0, 0.5) * 2.0;
+            let share = (1.0 - (frame.along(p) - base) / 40.0).clamp(0.0, 1.0);
+            *p += cup.axis * ((usual + short) * share);
+        }
+        (mesh, cup)
+    }
+
+    fn rim(mesh: &TriMesh, cup: &Cup) -> Vec<f64> {
+        RimFrame::of(cup, &Vec3::y()).heights(mesh).unwrap()
+    }
+
+    #[test]
+    fn a_stretch_of_rim_that_is_missing_is_put_back() {
+        let (whole, cup) = heart(0.0);
+        let (cut, _) = heart(12.0);
+        let anterior = DIRECTIONS / 4;
+        let heights =
+            [&whole, &cut, &settled(&cut, &cup, &Vec3::y())].map(|m| rim(m, &cup)[anterior]);
+        let [whole, cut, settled] = heights;
+        assert!(cut > whole + 9.0, "{heights:?}");
+        assert!((settled - whole).abs() < 0.5 * (cut - whole), "{heights:?}");
+    }
+
+    #[test]
+    fn a_usual_rim_stays_within_two_millimetres() {
+        let (whole, cup) = heart(0.0);
+        let settled = settled(&whole, &cup, &Vec3::y());
+        for (before, after) in rim(&whole, &cup).iter().zip(rim(&settled, &cup)) {
+            assert!((before - after).abs() < 2.0, "{before} {after}");
+        }
+        assert_eq!(settled.triangles, whole.triangles);
+    }
+}
