@@ -14,6 +14,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   ventriform phantom -o phantom --spacing 2 --seed 7 --defect 8:0.7
+  ventriform phantom -o moved --motion 20
+  ventriform phantom -o infarct --defect 3:1 --defect 9:1 --right-ventricle 1.2
 writes phantom/spect.nii.gz, phantom/lv_truth.nii.gz and phantom/params.json")]
 pub struct PhantomArgs {
     /// Folder to write to (created if missing)
@@ -31,7 +33,19 @@ pub struct PhantomArgs {
     /// Uptake of the liver relative to healthy wall; above 1 it is brighter than the heart
     #[arg(long, value_name = "X", default_value_t = 0.5)]
     liver: f64,
-    /// A perfusion defect: AHA segment 1 to 17 and severity 0 to 1 (repeatable)
+    /// Uptake of the right ventricle's wall relative to healthy wall; 0 leaves it out
+    #[arg(long, value_name = "X", default_value_t = 0.3)]
+    right_ventricle: f64,
+    /// How far the patient moves towards the head half-way through the scan, millimetres; the true
+    /// mask keeps the first place
+    #[arg(
+        long,
+        value_name = "MM",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    motion: f64,
+    /// A perfusion defect: AHA segment 1 to 17 (1 to 6 are basal) and severity 0 to 1 (repeatable)
     #[arg(long, value_name = "SEGMENT:SEVERITY", value_parser = parse_defect)]
     defect: Vec<PerfusionDefect>,
     /// Seed of the random numbers for shape and noise
@@ -61,6 +75,8 @@ pub fn run(args: &PhantomArgs) -> Result<()> {
         spacing_mm: [args.spacing; 3],
         noise: args.noise,
         liver: args.liver,
+        right_ventricle: args.right_ventricle,
+        motion_mm: args.motion,
         defects: args.defect.clone(),
         seed: args.seed,
         ..PhantomParameters::default()

@@ -6,12 +6,15 @@
 //! 1. `anatomy`: the uptake at every voxel. The wall of the LV is a truncated prolate ellipsoid
 //!    shell with a slanted base and optional perfusion defects by AHA segment (Cerqueira et al.,
 //!    Circulation 2002), surrounded by blood, right ventricle, liver, gut, lungs and torso.
-//! 2. A Gaussian blur: the resolution of camera and collimator.
-//! 3. `poisson`: counting noise.
-//! 4. A second Gaussian blur: the reconstruction filter, which correlates the noise.
+//! 2. Motion: the mean of the uptake before and after a displacement along the body, weighted by
+//!    the share of the scan.
+//! 3. A Gaussian blur: the resolution of camera and collimator.
+//! 4. `poisson`: counting noise.
+//! 5. A second Gaussian blur: the reconstruction filter, which correlates the noise.
 //!
-//! Steps 2 to 4 replace projection and reconstruction. Resolution and texture of the noise are
-//! realistic; attenuation, scatter and motion are not modelled.
+//! Steps 2 to 5 replace projection and reconstruction. Resolution and texture of the noise are
+//! realistic; attenuation and scatter are not modelled. Motion doubles walls as in a
+//! reconstruction, but without the streaks of projections that contradict each other.
 //!
 //! Guaranteed: the same parameters give the same voxels on any number of threads.
 
@@ -59,6 +62,10 @@ pub fn phantom(parameters: &PhantomParameters, monitor: &Monitor) -> Result<Phan
     let step = |fraction| monitor.report(Stage::Read, fraction);
     step(0.0)?;
     let (mut voxels, wall) = anatomy.render(p.shape, &frame, monitor)?;
+    if p.motion_mm != 0.0 {
+        let slices = p.motion_mm / p.spacing_mm[2];
+        voxels = moved(&voxels, p.shape, slices, p.motion_share as f32);
+    }
     step(0.3)?;
     let filter = kernels(p.post_filter_mm, p.spacing_mm);
     let system = (p.fwhm_mm.powi(2) - p.post_filter_mm.powi(2)).sqrt();
@@ -96,6 +103,26 @@ pub fn phantom(parameters: &PhantomParameters, monitor: &Monitor) -> Result<Phan
         pose: anatomy.pose(),
         parameters: p.clone(),
     })
+}
+
+/// The mean of `voxels` and the same moved by `slices` along k, the latter weighted by `share`. What
+/// comes in from outside continues the first or last slice.
+fn moved(voxels: &[f32], shape: [usize; 3], slices: f64, share: f32) -> Vec<f32> {
+    let slice = shape[0] * shape[1];
+    let last = shape[2] as f64 - 1.0;
+    (0..shape[2])
+        .into_par_iter()
+        .flat_map_iter(|k| {
+            let from = (k as f64 - slices).clamp(0.0, last);
+            let below = from.floor() as usize;
+            let above = (below + 1).min(shape[2] - 1);
+            let part = (from - from.floor()) as f32;
+            (0..slice).map(move |n| {
+                let [a, b] = [below, above].map(|k| voxels[k * slice + n]);
+                (1.0 - share) * voxels[k * slice + n] + share * (a + (b - a) * part)
+            })
+        })
+        .collect()
 }
 
 /// The kernels along i, j, k of a Gaussian with the full width at half maximum `fwhm_mm`, cut off at

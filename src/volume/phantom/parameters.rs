@@ -39,6 +39,11 @@ pub struct PhantomParameters {
     pub liver: f64,
     /// Uptake of the gut below the heart, 0..=5. Default 0.6.
     pub gut: f64,
+    /// How far the patient moves towards the head during the scan, -60..=60. The true mask keeps the
+    /// first place. Default 0.
+    pub motion_mm: f64,
+    /// Share of the scan after the motion, 0..=1. Default 0.5.
+    pub motion_share: f64,
     /// Resolution of the final volume (full width at half maximum), 0..=40. Default 11.
     pub fwhm_mm: f64,
     /// Full width at half maximum of the reconstruction filter, which is part of `fwhm_mm` and at most
@@ -81,6 +86,8 @@ impl Default for PhantomParameters {
             background: 0.1,
             liver: 0.5,
             gut: 0.6,
+            motion_mm: 0.0,
+            motion_share: 0.5,
             fwhm_mm: 11.0,
             post_filter_mm: 6.0,
             noise: 0.05,
@@ -159,6 +166,8 @@ impl PhantomParameters {
         within("background", self.background, 0.0, 3.0)?;
         within("liver", self.liver, 0.0, 5.0)?;
         within("gut", self.gut, 0.0, 5.0)?;
+        within("motion_mm", self.motion_mm, -60.0, 60.0)?;
+        within("motion_share", self.motion_share, 0.0, 1.0)?;
         within("fwhm_mm", self.fwhm_mm, 0.0, 40.0)?;
         within("post_filter_mm", self.post_filter_mm, 0.0, self.fwhm_mm)?;
         if self.noise != 0.0 {

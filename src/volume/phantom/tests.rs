@@ -200,3 +200,34 @@ fn what_is_out_of_range_is_named() {
         Err(PhantomError::TooSmall { .. })
     ));
 }
+
+#[test]
+fn motion_blends_the_scan_with_itself_displaced_towards_the_head() {
+    let still = PhantomParameters {
+        shape: [48; 3],
+        spacing_mm: [4.0; 3],
+        noise: 0.0,
+        fwhm_mm: 0.0,
+        post_filter_mm: 0.0,
+        ..PhantomParameters::default()
+    };
+    let moved = |share| PhantomParameters {
+        motion_mm: 12.0,
+        motion_share: share,
+        ..still.clone()
+    };
+    let make = |p: &PhantomParameters| phantom(p, &Monitor::silent()).unwrap();
+    let (first, half, last) = (make(&still), make(&moved(0.5)), make(&moved(1.0)));
+    assert_eq!(first.truth.voxels, half.truth.voxels);
+    assert_eq!(first.volume.voxels, make(&moved(0.0)).volume.voxels);
+    let slices = 3 * 48 * 48;
+    let end = first.volume.voxels.len();
+    assert_eq!(
+        last.volume.voxels[slices..],
+        first.volume.voxels[..end - slices]
+    );
+    for n in slices..end {
+        let mean = 0.5 * (first.volume.voxels[n] + last.volume.voxels[n]);
+        assert!((half.volume.voxels[n] - mean).abs() < 1e-3 * mean.max(1.0));
+    }
+}
