@@ -1,10 +1,13 @@
 //! Runs of the motion, repeated with a stiffer model while the result is folded.
 
+use super::confidence;
 use super::doubts;
 use super::dynamics::{self, Moved};
 use super::elastic::Elastic;
+use super::evidence::{Edges, Evidence};
 use super::fit::Fit;
-use super::parameters::DeformParameters;
+use super::flags::Flag;
+use super::parameters::{DeformParameters, WallEdge};
 use super::rim;
 use super::sensors::{SensorReading, SensorSettings};
 use super::setup::FitSetup;
@@ -96,6 +99,7 @@ impl Attempt {
         template: &Template,
         setup: &FitSetup,
         aligned: &TriMesh,
+        edge: WallEdge,
         monitor: &Monitor,
     ) -> Result<Fit, Cancelled> {
         let orientation = setup.patient_orientation;
@@ -103,6 +107,13 @@ impl Attempt {
         let cup = template
             .cup
             .map(|cup| wall::carried(&cup, &template.mesh, &self.moved.mesh));
+        // The confidence is calibrated on the wall as the sensors left it, before its rim moves.
+        let felt = cup
+            .map(|cup| {
+                let mesh = &self.moved.mesh;
+                VentricleWall::new(mesh, &cup, &orientation.superior, monitor)
+            })
+            .transpose()?;
         let mesh = match &cup {
             Some(cup) if orientation.source != OrientationSource::Unknown => {
                 rim::settled(&self.moved.mesh, cup, &orientation.superior)
@@ -125,8 +136,8 @@ impl Attempt {
             cup,
             scale: setup.pose.scale(),
             rotation: *setup.pose.rotation(),
-            confidence: setup.localisation.as_ref().map_or(0.5, |l| l.confidence)
-                * (active / 0.5).min(1.0),
+            confidence: 0.0,
+            evidence: None,
             localisation: setup.localisation.clone(),
             reason: self.moved.reason,
             iterations: self.moved.iterations,
@@ -144,7 +155,23 @@ impl Attempt {
             mesh,
             flags: Vec::new(),
         };
-        fit.flags = doubts::flags(&fit, volume, template.organ == Organ::LeftVentricle);
+        if let (Some(wall), Some(found)) = (&felt, &fit.localisation) {
+            let edges = Edges {
+                active,
+                residual,
+                strain: fit.strain.sqrt(),
+            };
+            fit.evidence = Evidence::of(wall, &edges, found.hollowness);
+        }
+        fit.confidence = match &fit.evidence {
+            Some(evidence) => confidence::of_agreement(evidence, edge),
+            None => fit.place_confidence().min(0.5),
+        };
+        fit.flags = doubts::flags(&fit, volume, template.organ == Organ::LeftVentricle, edge);
+        // The chance is calibrated on images of uptake.
+        if fit.flags.iter().any(|f| matches!(f, Flag::LabelMap { .. })) {
+            fit.confidence = fit.confidence.min(0.5);
+        }
         Ok(fit)
     }
 }

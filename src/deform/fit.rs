@@ -2,6 +2,7 @@
 
 use super::anatomical::anatomical_mesh;
 use super::dynamics::StopReason;
+use super::evidence::Evidence;
 use super::flags::Flag;
 use super::parameters::{DeformParameters, WallEdge};
 use crate::geometry::Vec3;
@@ -19,6 +20,15 @@ use nalgebra::Rotation3;
 /// are farther away than this (weighted rms, mm). Hearts have at least 0.63 or at most 1.15,
 /// also with 100 % defects over seven segments; noise has at most 0.51 and at least 1.6.
 const EDGELESS: (f64, f64) = (0.57, 1.3);
+
+/// A fitted model is no heart if the search's confidence and the chance of a good fit are below one
+/// of these pairs. Hearts that fit badly, for motion or infarcts, are found with 0.32 at least, and
+/// with 0.58 where the chance is below the second limit; what was found in scans without a heart had
+/// 0.38 at most.
+const UNLIKELY: [(f64, f64); 2] = [(0.3, 0.25), (0.5, 0.05)];
+/// In a map of labels, or with a greater share of the model beyond the volume (per cent), the search's
+/// confidence does not count.
+const OUTSIDE: f64 = 50.0;
 
 /// A wall of a ventricle.
 #[derive(Debug, Clone)]
@@ -64,9 +74,14 @@ pub struct Fit {
     pub scale: f64,
     /// Rotation of the pose against the template.
     pub rotation: Rotation3<f64>,
-    /// 0 (a guess) to 1: the confidence of the localisation, lowered where few sensors see an
-    /// edge. 0.5 or less for organs that are no ventricle.
+    /// Of a ventricle, the chance that the mask agrees with an expert's by a Jaccard index of 0.75
+    /// or more ([`confidence::of_agreement`]). Of other organs, half the share of the surface that
+    /// sees an edge, at most 0.5.
+    ///
+    /// [`confidence::of_agreement`]: super::confidence::of_agreement
     pub confidence: f64,
+    /// The figures behind it; ventricles only.
+    pub evidence: Option<Evidence>,
     /// Why the motion ended.
     pub reason: StopReason,
     /// Steps made in the last run.
@@ -91,7 +106,8 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// Refuses a ventricle whose model found no wall, unless a hint says that it is there.
+    /// Refuses a ventricle whose model found no wall, or that neither the search nor the fit believes
+    /// in, unless a hint says that it is there.
     ///
     /// # Errors
     /// [`LocateError::NoHeart`].
@@ -107,8 +123,38 @@ impl Fit {
                     reason: NotAHeart::Edgeless { active, residual },
                 })
             }
+            Some(found) if hints.centre.is_none() && self.is_unlikely(found.confidence) => {
+                Err(LocateError::NoHeart {
+                    centre: found.cup.centre.into(),
+                    correlation: found.correlation,
+                    reason: NotAHeart::Unlikely {
+                        search: found.confidence,
+                        chance: self.confidence,
+                    },
+                })
+            }
             _ => Ok(()),
         }
+    }
+
+    /// Whether neither the search, with this confidence, nor the fit believes in the heart.
+    fn is_unlikely(&self, search: f64) -> bool {
+        let misled = self.flags.iter().any(|flag| match flag {
+            Flag::LabelMap { .. } => true,
+            Flag::TouchesBorder { share } => *share > OUTSIDE,
+            _ => false,
+        });
+        let search = if misled { 0.0 } else { search };
+        UNLIKELY
+            .iter()
+            .any(|(limit, chance)| search < *limit && self.confidence < *chance)
+    }
+
+    /// 0 (a guess) to 1: the confidence of the search for a ventricle, lowered where few sensors see
+    /// an edge. 0.5 or less for other organs.
+    pub fn place_confidence(&self) -> f64 {
+        let search = self.localisation.as_ref().map_or(0.5, |l| l.confidence);
+        search * (self.active / 0.5).min(1.0)
     }
 
     /// Adds both walls of a ventricle, and shows the one of `edge`.

@@ -1,15 +1,70 @@
 //! Reasons to doubt a fit, as codes and sentences for the report.
 
 use super::dynamics::StopReason;
+use super::evidence::Evidence;
 
 /// A reason to doubt a fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Flag {
-    /// The confidence of the fit is below 0.4.
+    /// The confidence of the place is below 0.4.
     #[error("the heart's place is uncertain: confidence {confidence:.2}")]
     UncertainPlace {
-        /// The fit's confidence, 0..=1.
+        /// The place's confidence, 0..=1.
         confidence: f64,
+    },
+    /// The chance of a good fit is below 0.5.
+    #[error(
+        "the chance that an expert's mask agrees with this one (Jaccard index 0.75 or more) is {:.0} %: \
+         edges along {:.0} % of the surface, {residual:.1} mm off in the mean, strain {:.0} %, the \
+         wall's thickness scatters by {thickness_spread:.1} mm, its distance from the axis by {:.0} %, \
+         hollow by {hollowness:.2}",
+        100.0 * chance, 100.0 * evidence.active, 100.0 * evidence.strain,
+        100.0 * evidence.unroundness, residual = evidence.residual,
+        thickness_spread = evidence.thickness_spread, hollowness = evidence.hollowness
+    )]
+    UncertainFit {
+        /// The chance, 0..=1.
+        chance: f64,
+        /// The figures it comes from.
+        evidence: Evidence,
+    },
+    /// The wall looks doubled or displaced.
+    #[error(
+        "the patient may have moved during the scan (chance {:.0} %): the wall looks doubled or \
+         displaced; its thickness scatters by {thickness_spread:.1} mm, its middle lies {:.1} % of the \
+         radius off the axis and scatters by {:.0} %, length over radius is {slenderness:.2}, edges show \
+         along {:.0} % of the surface. The true place of the heart may be some millimetres away",
+        100.0 * chance, 100.0 * evidence.offset, 100.0 * evidence.unroundness,
+        100.0 * evidence.active, thickness_spread = evidence.thickness_spread,
+        slenderness = evidence.slenderness
+    )]
+    Motion {
+        /// The chance of motion, 0..=1.
+        chance: f64,
+        /// The figures it comes from.
+        evidence: Evidence,
+    },
+    /// The model bulges towards the right ventricle.
+    #[error(
+        "the right ventricle's wall may have been taken for the septum: the distance of the wall from \
+         the axis scatters by {:.0} % (round hearts: 9 %), and the septum lies {:.0} % farther out than \
+         the free wall",
+        100.0 * unroundness, 100.0 * (bulge - 1.0)
+    )]
+    RightVentricle {
+        /// Standard deviation of the distance over its mean.
+        unroundness: f64,
+        /// Distance of the septum over that of the free wall.
+        bulge: f64,
+    },
+    /// The volume holds so few different values that it is a label map, not an image of uptake.
+    #[error(
+        "the volume holds {values} different values only: a mask or a map of labels, no image of \
+         uptake; edges, uptake and confidence mean little"
+    )]
+    LabelMap {
+        /// Number of different values.
+        values: usize,
     },
     /// The apical wall is too dark to be seen.
     #[error(
@@ -72,6 +127,10 @@ impl Flag {
     pub fn code(&self) -> &'static str {
         match self {
             Flag::UncertainPlace { .. } => "uncertain_place",
+            Flag::UncertainFit { .. } => "uncertain_fit",
+            Flag::Motion { .. } => "motion",
+            Flag::RightVentricle { .. } => "right_ventricle",
+            Flag::LabelMap { .. } => "label_map",
             Flag::DarkApex { .. } => "dark_apex",
             Flag::NotAtRest { .. } => "not_at_rest",
             Flag::Folded { .. } => "folded",

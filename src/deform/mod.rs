@@ -13,7 +13,8 @@
 //! 5. [`attempt`]: count folds and self-intersections; if there are any, repeat step 4 with four
 //!    times the stiffness, at most three times.
 //! 6. [`rim`]: move the rim of a ventricle where anatomy and image together put it.
-//! 7. [`fit`](mod@fit): measure the result; [`flags`]: say what gives reason to doubt it.
+//! 7. [`fit`](mod@fit): measure the result; [`evidence`], [`confidence`]: how likely it is right;
+//!    [`flags`]: what gives reason to doubt it.
 //!
 //! The edge that is fitted is the half-way point between the wall's ridge and the trough beside
 //! it. It does not depend on uptake: a wall with half the uptake has its edge in the same place.
@@ -33,10 +34,12 @@ pub mod align;
 pub mod anatomical;
 pub mod attempt;
 pub mod blur_correction;
+pub mod confidence;
 mod doubts;
 pub mod dynamics;
 pub mod elastic;
 pub mod error;
+pub mod evidence;
 pub mod fit;
 pub mod flags;
 pub mod parameters;
@@ -46,6 +49,7 @@ pub mod sensors;
 pub mod setup;
 
 pub use error::DeformError;
+pub use evidence::Evidence;
 pub use fit::{Fit, WallSurface, WallSurfaces};
 pub use flags::Flag;
 pub use parameters::{DeformParameters, WallEdge};
@@ -110,7 +114,7 @@ pub fn fit_at(
     };
     monitor.report(Stage::Deform, 0.0)?;
     let attempt = Attempt::best(&aligned, template, &setup, parameters, monitor)?;
-    let fit = attempt.into_fit(volume, template, &setup, &aligned, monitor)?;
+    let fit = attempt.into_fit(volume, template, &setup, &aligned, parameters.edge, monitor)?;
     fit.require_wall(&parameters.hints)?;
     let fit = fit.with_surfaces(&setup.field, parameters, monitor)?;
     monitor.report(Stage::Deform, 1.0)?;

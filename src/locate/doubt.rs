@@ -43,4 +43,16 @@ pub enum NotAHeart {
         /// Weighted rms distance of those edges, mm.
         residual: f64,
     },
+    /// Both the search and the fitted model doubt it.
+    #[error(
+        "is no heart: the search has a confidence of {search:.2}, and the model fitted there a chance \
+         of {:.0} % to be right",
+        100.0 * chance
+    )]
+    Unlikely {
+        /// Confidence of the search, 0..=1.
+        search: f64,
+        /// Chance of a good fit, 0..=1.
+        chance: f64,
+    },
 }

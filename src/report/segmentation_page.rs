@@ -122,8 +122,23 @@ fn checks(report: &SegmentationReport) -> Vec<(bool, String)> {
                 "uncertain_place",
                 format!(
                     "Confidence in the heart's place: {} %",
+                    number(100.0 * report.place_confidence(), 0)
+                ),
+            ),
+            (
+                "uncertain_fit",
+                format!(
+                    "Chance that an expert's mask agrees: {} %",
                     percent("confidence")
                 ),
+            ),
+            (
+                "motion",
+                "The wall is neither doubled nor displaced as by motion".to_owned(),
+            ),
+            (
+                "right_ventricle",
+                "The septum lies where round hearts have it".to_owned(),
             ),
             ("dark_apex", "The apical wall is seen".to_owned()),
             (

@@ -205,6 +205,13 @@ impl SegmentationReport {
         self.organ() == "left_ventricle"
     }
 
+    /// How sure the search for the heart is, 0..=1; NaN without that figure.
+    pub fn place_confidence(&self) -> f64 {
+        let found = self.localisation.as_ref();
+        let number = found.and_then(|found| found.get("confidence")?.as_f64());
+        number.unwrap_or(f64::NAN)
+    }
+
     /// A number of `fit`; NaN where there is none.
     pub fn fit_number(&self, name: &str) -> f64 {
         let number = self.fit.get(name).and_then(Value::as_f64);

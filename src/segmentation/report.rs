@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::segment::Segmentation;
-use crate::deform::Fit;
+use crate::deform::{Evidence, Fit, confidence};
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
 use crate::model::wall::VentricleWall;
@@ -64,6 +64,7 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
             "confidence": round(p.confidence),
         })),
         "fit": fit_json(fit),
+        "evidence": fit.evidence.as_ref().map(evidence),
         "volumes_ml": volumes(fit),
         "mass_g": fit.surfaces.as_ref().map(|s| round(MYOCARDIUM * s.anatomical.wall_ml)),
         "wall_thickness_mm": fit.wall.as_ref().map(|w| round(w.thickness)),
@@ -132,6 +133,23 @@ fn fit_json(fit: &Fit) -> Value {
         "scale": round(fit.scale),
         "rotation": rows(fit),
         "displacement_mm": displacements,
+    })
+}
+
+/// The figures behind confidence and flags.
+fn evidence(e: &Evidence) -> Value {
+    json!({
+        "active_sensors": round(e.active),
+        "residual_mm": round(e.residual),
+        "strain": round(e.strain),
+        "hollowness": round(e.hollowness),
+        "cavity_ml": round(e.cavity_ml),
+        "thickness_spread_mm": round(e.thickness_spread),
+        "unroundness": round(e.unroundness),
+        "offset": round(e.offset),
+        "slenderness": round(e.slenderness),
+        "septal_bulge": round(e.septal_bulge),
+        "chance_of_motion": round(confidence::of_motion(e)),
     })
 }
 

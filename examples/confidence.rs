@@ -1,0 +1,83 @@
+//! Prints the figures that the confidence of a fit is calibrated on.
+//!
+//! `cargo run --release --example confidence -- FOLDER...` segments `CASE/spect.nii.gz` of every case
+//! in the folders with the built-in models. Each case gives one line: its name, the Jaccard index of
+//! the apparent wall with `lv_expert_img.nii.gz` and of the anatomical wall with `lv_truth.nii.gz`
+//! (`-` without a fit), then, as JSON, the report's evidence, both confidences, the flags and the
+//! reason where no heart was found.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use rayon::prelude::*;
+use serde_json::json;
+use ventriform::deform::WallEdge;
+use ventriform::deform::confidence::of_agreement;
+use ventriform::grid::agreement::compare;
+use ventriform::parameters::FitParameters;
+use ventriform::progress::Monitor;
+use ventriform::segmentation::{SegmentationOrder, from_files, on_grid, report_json};
+use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
+
+fn main() -> Result<()> {
+    let mut cases: Vec<PathBuf> = Vec::new();
+    for folder in std::env::args().skip(1) {
+        for entry in std::fs::read_dir(&folder).with_context(|| folder.clone())? {
+            cases.push(entry?.path());
+        }
+    }
+    cases.retain(|case| case.join("spect.nii.gz").exists());
+    cases.sort();
+    let lines: Vec<String> = cases
+        .par_iter()
+        .map(|case| line(case))
+        .collect::<Result<_>>()?;
+    println!("{}", lines.join("\n"));
+    Ok(())
+}
+
+fn line(case: &Path) -> Result<String> {
+    let name = case.file_name().map(|name| name.to_string_lossy());
+    let name = name.unwrap_or_default();
+    let monitor = Monitor::silent();
+    let limits = ReadLimits::default();
+    let parameters = FitParameters::default();
+    let file = |name: &str| [VolumeFile::at(case.join(name))];
+    let order = SegmentationOrder {
+        volume: &file("spect.nii.gz"),
+        expert: None,
+        models: Vec::new(),
+        named: false,
+        parameters: &parameters,
+    };
+    let segmented = match from_files(&order, &limits, &monitor) {
+        Ok(segmented) => segmented,
+        Err(error) => return Ok(format!("{name}\t-\t-\t{}", json!(error.to_string()))),
+    };
+    let (scan, made) = (&segmented.reading.volume, &segmented.segmentation);
+    let jaccard = |mask, gold: &str| -> Result<f64> {
+        let gold = volume::read(&file(gold), &ReadOptions::default(), &limits, &monitor)?.volume;
+        let gold = on_grid(&gold, scan, &monitor)?;
+        Ok(compare(mask, &gold, scan.frame.spacing(), &monitor)?.jaccard)
+    };
+    let apparent = jaccard(&made.mask, "lv_expert_img.nii.gz")?;
+    let anatomical = match &made.other_mask {
+        Some(mask) => jaccard(mask, "lv_truth.nii.gz")?,
+        None => f64::NAN,
+    };
+    let report = report_json(made);
+    let confidences = made.fit.evidence.map(|evidence| {
+        [WallEdge::Apparent, WallEdge::Anatomical].map(|edge| of_agreement(&evidence, edge))
+    });
+    Ok(format!(
+        "{name}\t{apparent:.4}\t{anatomical:.4}\t{}",
+        json!({
+            "evidence": report["evidence"],
+            "confidences": confidences,
+            "candidates": report["candidates"],
+            "place": made.fit.place_confidence(),
+            "thickness_mm": report["wall_thickness_mm"],
+            "flags": report["flags"],
+        })
+    ))
+}

@@ -1,0 +1,133 @@
+//! What a fitted ventricle shows of its own quality, in numbers.
+//!
+//! In go the fitted model and the wall seen from its axis; out comes [`Evidence`], the figures that
+//! [`confidence`](super::confidence) turns into a chance and the flags give as reasons. No other
+//! fit and no mask is needed.
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use crate::model::wall::{COLUMNS, ROWS, VentricleWall};
+
+/// Rows between the apical cap and the rim, where hearts are round.
+const BODY: Range<usize> = 14..28;
+/// Columns about the middle of the septum.
+const SEPTAL: Range<usize> = 22..38;
+/// Columns that are clear of the septum: those before the first and those from the second on.
+const FREE: [usize; 2] = [18, 42];
+
+/// Figures of a fitted ventricle that tell good fits from bad ones.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Evidence {
+    /// Share of the model's area whose sensors see an edge, 0..=1.
+    pub active: f64,
+    /// Weighted rms distance to the edges, mm.
+    pub residual: f64,
+    /// Root mean square of the strain.
+    pub strain: f64,
+    /// How much darker the cavity is than the wall, 0..=1.
+    pub hollowness: f64,
+    /// Volume of the cavity, ml.
+    pub cavity_ml: f64,
+    /// Standard deviation of the wall's thickness over the wall, mm.
+    pub thickness_spread: f64,
+    /// Standard deviation of the distance from the axis to the middle of the wall, between the
+    /// apical cap and the rim, as a share of its mean.
+    pub unroundness: f64,
+    /// How far the middle of the wall lies off the axis there, as a share of that mean.
+    pub offset: f64,
+    /// Length from rim to apex over the outer radius.
+    pub slenderness: f64,
+    /// Distance of the septum from the axis over that of the free wall.
+    pub septal_bulge: f64,
+}
+
+/// How a model met the edges of the image.
+pub(super) struct Edges {
+    /// [`Evidence::active`].
+    pub active: f64,
+    /// [`Evidence::residual`].
+    pub residual: f64,
+    /// [`Evidence::strain`].
+    pub strain: f64,
+}
+
+impl Evidence {
+    /// The figures of a fit whose apparent wall, before its rim was moved, is `wall`, in a heart that is hollow by
+    /// `hollowness`; `None` for models whose wall no ray meets.
+    pub(super) fn of(wall: &VentricleWall, edges: &Edges, hollowness: f64) -> Option<Self> {
+        let middle: Vec<f64> = (0..COLUMNS)
+            .map(|column| mean(&middles(wall, column..column + 1)))
+            .collect::<Option<_>>()?;
+        let radii = middles(wall, 0..COLUMNS);
+        let radius = mean(&radii)?;
+        let squares: f64 = radii.iter().map(|r| (r - radius).powi(2)).sum();
+        let outer: Vec<f64> = of_body(wall, 0..COLUMNS)
+            .map(|[_, leaves]| leaves)
+            .collect();
+        let free: Vec<f64> = [0..FREE[0], FREE[1]..COLUMNS]
+            .into_iter()
+            .flat_map(|columns| middles(wall, columns))
+            .collect();
+        Some(Self {
+            active: edges.active,
+            residual: edges.residual,
+            strain: edges.strain,
+            hollowness,
+            cavity_ml: wall.cavity_ml,
+            thickness_spread: wall.thickness_spread,
+            unroundness: (squares / radii.len() as f64).sqrt() / radius,
+            offset: first_harmonic(&middle) / radius,
+            slenderness: (wall.extent[1] - wall.extent[0]) / mean(&outer)?,
+            septal_bulge: mean(&middles(wall, SEPTAL))? / mean(&free)?,
+        })
+    }
+}
+
+/// Where the rays of these columns, between the apical cap and the rim, enter and leave the wall.
+fn of_body(wall: &VentricleWall, columns: Range<usize>) -> impl Iterator<Item = [f64; 2]> {
+    const { assert!(BODY.end <= ROWS) };
+    let rows = BODY.flat_map(move |row| columns.clone().map(move |c| row * COLUMNS + c));
+    rows.filter_map(|index| wall.rays[index].wall)
+}
+
+/// Distances from the axis to the middle of the wall along those rays, mm.
+fn middles(wall: &VentricleWall, columns: Range<usize>) -> Vec<f64> {
+    of_body(wall, columns)
+        .map(|[enters, leaves]| f64::midpoint(enters, leaves))
+        .collect()
+}
+
+fn mean(values: &[f64]) -> Option<f64> {
+    let sum: f64 = values.iter().sum();
+    (!values.is_empty()).then(|| sum / values.len() as f64)
+}
+
+/// Amplitude of one oscillation per turn: the distance of a circle's centre from the axis.
+fn first_harmonic(around: &[f64]) -> f64 {
+    let (mut x, mut y) = (0.0, 0.0);
+    for (n, value) in around.iter().enumerate() {
+        let (sin, cos) = (TAU * (n as f64 + 0.5) / around.len() as f64).sin_cos();
+        x += value * cos;
+        y += value * sin;
+    }
+    2.0 * x.hypot(y) / around.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_harmonic_is_the_shift_of_a_circle() {
+        let radius = |shift: f64| {
+            let at = |n: usize| {
+                let angle = TAU * (n as f64 + 0.5) / 60.0;
+                shift * angle.cos() + (400.0 - (shift * angle.sin()).powi(2)).sqrt()
+            };
+            first_harmonic(&(0..60).map(at).collect::<Vec<_>>())
+        };
+        assert!(radius(0.0) < 1e-9);
+        assert!((radius(1.5) - 1.5).abs() < 1e-9);
+    }
+}

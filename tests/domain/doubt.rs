@@ -1,0 +1,108 @@
+//! What gives reason to doubt a segmentation: motion, masks, objects that are no hearts.
+
+// Helpers of a test state their expectations by panicking, as tests do.
+#![allow(clippy::unwrap_used)]
+
+use ventriform::deform::Fit;
+use ventriform::geometry::Vec3;
+use ventriform::parameters::FitParameters;
+use ventriform::progress::Monitor;
+use ventriform::segmentation::{SegmentationError, SegmentationOrder, from_files};
+use ventriform::volume::nifti::{self, StoredType};
+use ventriform::volume::phantom::{PhantomParameters, phantom};
+use ventriform::volume::{Phantom, ReadLimits, Volume, VolumeFile};
+
+fn patient() -> PhantomParameters {
+    PhantomParameters {
+        shape: [64; 3],
+        spacing_mm: [4.4; 3],
+        ..PhantomParameters::default()
+    }
+}
+
+fn scan(parameters: &PhantomParameters) -> Phantom {
+    phantom(parameters, &Monitor::silent()).unwrap()
+}
+
+fn segmented(volume: &Volume) -> Result<Fit, SegmentationError> {
+    let bytes = nifti::write(volume, StoredType::Float32, false).unwrap();
+    let order = SegmentationOrder {
+        volume: &[VolumeFile::in_memory("scan.nii", bytes)],
+        expert: None,
+        models: Vec::new(),
+        named: false,
+        parameters: &FitParameters::default(),
+    };
+    let segmented = from_files(&order, &ReadLimits::default(), &Monitor::silent())?;
+    Ok(segmented.segmentation.fit)
+}
+
+fn codes(fit: &Fit) -> Vec<&'static str> {
+    fit.flags.iter().map(|flag| flag.code()).collect()
+}
+
+#[test]
+fn a_usual_scan_is_believed() {
+    for seed in 1..4 {
+        let fit = segmented(&scan(&PhantomParameters { seed, ..patient() }).volume).unwrap();
+        assert_eq!(codes(&fit), Vec::<&str>::new(), "{:?}", fit.evidence);
+        assert!(fit.confidence > 0.9, "{}", fit.confidence);
+    }
+}
+
+#[test]
+fn a_scan_with_motion_is_doubted_the_more_the_farther_the_patient_moved() {
+    let confidence = |motion_mm: f64| {
+        let moved = PhantomParameters {
+            motion_mm,
+            ..patient()
+        };
+        match segmented(&scan(&moved).volume) {
+            Ok(fit) => {
+                let doubted = codes(&fit).contains(&"motion");
+                assert!(doubted || motion_mm < 20.0, "{:?}", fit.evidence);
+                fit.confidence
+            }
+            Err(_) => 0.0,
+        }
+    };
+    let [still, moved] = [0.0, 24.0].map(confidence);
+    assert!(still > 0.9 && moved < 0.5, "{still} {moved}");
+}
+
+#[test]
+fn a_mask_of_a_heart_is_no_image_of_uptake() {
+    if let Ok(fit) = segmented(&scan(&patient()).truth) {
+        assert!(codes(&fit).contains(&"label_map"), "{:?}", codes(&fit));
+        assert!(fit.confidence <= 0.5, "{}", fit.confidence);
+    }
+}
+
+#[test]
+fn balls_shells_and_beans_are_no_hearts() {
+    let mut volume = scan(&patient()).volume;
+    let frame = volume.frame.clone();
+    let [nx, ny, _] = volume.shape;
+    let mut draw = |value: &dyn Fn(Vec3) -> f32| {
+        for n in 0..volume.voxels.len() {
+            let index = [n % nx, n / nx % ny, n / (nx * ny)].map(|i| i as f64);
+            volume.voxels[n] = value(frame.to_patient(&Vec3::from(index)));
+        }
+        segmented(&volume)
+    };
+    let centre = Vec3::new(40.0, -30.0, 5.0);
+    let ball = draw(&|p| (36.0 - (p - centre).norm()).clamp(0.0, 8.0) as f32);
+    assert!(ball.is_err());
+    let shell = draw(&|p| (8.0 - ((p - centre).norm() - 30.0).abs()).clamp(0.0, 5.0) as f32);
+    assert!(shell.is_err());
+    // A ball with a dent, as a kidney's mask has it.
+    let dent = centre + Vec3::new(20.0, 18.0, 0.0);
+    let bean = draw(&|p| {
+        let inside = (p - centre).norm() < 34.0 && (p - dent).norm() > 20.0;
+        f32::from(u8::from(inside))
+    });
+    if let Ok(fit) = bean {
+        assert!(codes(&fit).contains(&"label_map"), "{:?}", codes(&fit));
+        assert!(fit.confidence <= 0.5, "{}", fit.confidence);
+    }
+}
