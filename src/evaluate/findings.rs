@@ -9,7 +9,7 @@ pub enum FindingVerdict {
     Confirmed,
     /// The figures contradict.
     Refuted,
-    /// The run does not include the models or numbers of points that decide it.
+    /// The figures do not decide it: a curve is flat, or models or numbers of points are missing.
     Open,
 }
 
@@ -100,17 +100,27 @@ fn best(curve: &[(usize, f64)]) -> Option<(usize, f64)> {
     })
 }
 
-/// The least number of points whose mean E_J is within [`NOTICEABLE`] of the greatest.
+/// The claim holds where all numbers of points whose mean E_J is within [`NOTICEABLE`] of the greatest
+/// lie between 110 and 200, and fails where none of them does. A curve that is flat across a border of
+/// that range, or ends there, decides nothing.
 fn best_number(rows: &[FitRow]) -> Finding {
     let curve = curve(rows, Variant::Optimised);
     let top = best(&curve);
-    let enough = top.and_then(|top| {
+    let claimed = |c: &&(usize, f64)| (110..=200).contains(&c.0);
+    let good: Vec<&(usize, f64)> = top.map_or_else(Vec::new, |top| {
         let good = |c: &&(usize, f64)| top.1 - c.1 <= NOTICEABLE;
-        curve.iter().find(good).copied()
+        curve.iter().filter(good).collect()
     });
+    let enough = good.first().copied();
+    let within = good.iter().copied().filter(claimed).count();
+    let beyond_both = curve.iter().any(|c| c.0 < 110) && curve.iter().any(|c| c.0 > 200);
+    let holds = match within {
+        0 => curve.iter().any(|c| claimed(&c)).then_some(false),
+        n => (n == good.len() && beyond_both).then_some(true),
+    };
     Finding {
         claim: "The best number of points lies between 110 and 200.",
-        verdict: FindingVerdict::of(enough.map(|b| (110..=200).contains(&b.0))),
+        verdict: FindingVerdict::of(holds),
         figures: enough.zip(top).map_or_else(String::new, |(enough, top)| {
             format!(
                 "{} points are the least that are as good as any (E_J {:.3}, within \
@@ -238,6 +248,21 @@ mod tests {
     fn a_flat_curve_refutes_that_more_points_hurt() {
         let rows = [150, 300].map(|n| row("p1", Variant::Optimised, n, Some(0.8)));
         assert_eq!(verdict(&rows, "hurt"), FindingVerdict::Refuted);
-        assert_eq!(verdict(&rows, "between 110"), FindingVerdict::Confirmed);
+        assert_eq!(verdict(&rows, "between 110"), FindingVerdict::Open);
+    }
+
+    #[test]
+    fn a_flat_curve_decides_nothing_about_the_best_number() {
+        let verdict_of = |curve: &[(usize, f64)]| {
+            let row = |(n, j): &(usize, f64)| row("p1", Variant::Optimised, *n, Some(*j));
+            let rows: Vec<FitRow> = curve.iter().map(row).collect();
+            verdict(&rows, "between 110")
+        };
+        let flat = [(67, 0.84), (110, 0.843), (200, 0.844), (300, 0.844)];
+        assert_eq!(verdict_of(&flat), FindingVerdict::Open);
+        let rising = [(67, 0.7), (110, 0.75), (200, 0.78), (300, 0.8)];
+        assert_eq!(verdict_of(&rising), FindingVerdict::Refuted);
+        let open_ended = [(67, 0.7), (150, 0.8)];
+        assert_eq!(verdict_of(&open_ended), FindingVerdict::Open);
     }
 }
