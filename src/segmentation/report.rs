@@ -187,6 +187,7 @@ fn summary(map: &polar::PolarMap) -> Value {
     let mut value = polar::json(map);
     if let Some(object) = value.as_object_mut() {
         object.remove("values_percent");
+        object.remove("segment_of");
     }
     value
 }

@@ -562,10 +562,18 @@ schemas! {
         posture: Option<PostureReport>,
         /// How the fit went.
         fit: FitReport,
+        /// The figures behind confidence and flags; ventricles only.
+        evidence: Option<EvidenceReport>,
         /// Volumes.
         volumes_ml: FittedVolumesReport,
-        /// Mean thickness of the wall; ventricles only.
+        /// Mass of the myocardium, g, from the anatomical wall; ventricles only.
+        mass_g: Option<f64>,
+        /// Mean thickness of the wall that `edge` asks for; ventricles only.
         wall_thickness_mm: Option<f64>,
+        /// Thickness of both walls; ventricles only.
+        thickness_mm: Option<ThicknessesReport>,
+        /// Full width at half maximum of the image's point response; ventricles only.
+        resolution_mm: Option<ResolutionReport>,
         /// Agreement with the expert's mask.
         measures: Option<AgreementReport>,
         /// Uptake of the wall; ventricles only.
@@ -626,7 +634,7 @@ schemas! {
     PostureReport as Posture {
         /// The direction to the head.
         superior: [f64; 3],
-        /// What showed it: `body` or `frame`.
+        /// What told it: `superior`, `anterior`, `body` or `frame`.
         source: String,
         /// Its angle to the scanner's axis.
         tilt_degrees: f64,
@@ -676,10 +684,72 @@ schemas! {
 
     /// Volumes of a fitted model, millilitres.
     FittedVolumesReport as FittedVolumes {
-        /// Of the wall, or of the whole organ.
+        /// Of the wall that `edge` asks for, or of the whole organ.
         wall: f64,
-        /// Of the cavity; ventricles only.
+        /// Of its cavity; ventricles only.
         cavity: Option<f64>,
+        /// Of the wall as the blurred image shows it; ventricles only.
+        apparent: Option<WallVolumesReport>,
+        /// Of the wall corrected for the blur; ventricles only.
+        anatomical: Option<WallVolumesReport>,
+    }
+
+    /// Volumes of one wall, millilitres.
+    WallVolumesReport as WallVolumes {
+        /// Of the wall.
+        wall: f64,
+        /// Of the cavity.
+        cavity: f64,
+    }
+
+    /// Thickness of both walls, mm.
+    ThicknessesReport as Thicknesses {
+        /// Of the wall as the blurred image shows it.
+        apparent: ThicknessReport,
+        /// Of the wall corrected for the blur.
+        anatomical: ThicknessReport,
+    }
+
+    /// Thickness of a wall, mm.
+    ThicknessReport as Thickness {
+        /// Its mean.
+        mean: f64,
+        /// Its standard deviation over the wall.
+        spread: f64,
+    }
+
+    /// Full width at half maximum of the image's point response.
+    ResolutionReport as Resolution {
+        /// Millimetres.
+        value: f64,
+        /// `given` as a parameter, or `estimated` from the image.
+        source: String,
+    }
+
+    /// The figures behind confidence and flags.
+    EvidenceReport as Evidence {
+        /// Share of sensors that see an edge.
+        active_sensors: f64,
+        /// Distance to the edges, weighted root mean square.
+        residual_mm: f64,
+        /// Root of the mean squared strain.
+        strain: f64,
+        /// How much darker the cavity is than the wall, 0 to 1.
+        hollowness: f64,
+        /// Volume of the cavity.
+        cavity_ml: f64,
+        /// Standard deviation of the wall's thickness.
+        thickness_spread_mm: f64,
+        /// Standard deviation of the distance from the axis to the middle of the wall, as a share of its mean.
+        unroundness: f64,
+        /// How far the middle of the wall lies off the axis, as a share of that mean.
+        offset: f64,
+        /// Length from rim to apex over the outer radius.
+        slenderness: f64,
+        /// Distance of the septum from the axis over that of the free wall.
+        septal_bulge: f64,
+        /// Chance that the patient moved, 0 to 1.
+        chance_of_motion: f64,
     }
 
     /// A mask against an expert's.
@@ -726,14 +796,18 @@ schemas! {
         note: String,
         /// The 17 segments.
         segments: Vec<PolarSegmentReport>,
+        /// The walls of the three arteries; none if the orientation is unknown.
+        territories: Vec<TerritoryReport>,
         /// Rows of pixels, from base to apex.
         rows: u64,
         /// Columns of pixels, around the axis.
         columns: u64,
-        /// Where the first column looks.
-        first_column: String,
-        /// The order of the columns.
-        direction: String,
+        /// What told the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`.
+        orientation: String,
+        /// Where the first column looks; null if the orientation is unknown.
+        first_column: Option<String>,
+        /// The order of the columns; null if the orientation is unknown.
+        direction: Option<String>,
     }
 
     /// A polar map, as in `polar.json`.
@@ -748,16 +822,34 @@ schemas! {
         note: String,
         /// The 17 segments.
         segments: Vec<PolarSegmentReport>,
+        /// The walls of the three arteries; none if the orientation is unknown.
+        territories: Vec<TerritoryReport>,
         /// Rows of pixels, from base to apex.
         rows: u64,
         /// Columns of pixels, around the axis.
         columns: u64,
-        /// Where the first column looks.
-        first_column: String,
-        /// The order of the columns.
-        direction: String,
+        /// What told the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`.
+        orientation: String,
+        /// Where the first column looks; null if the orientation is unknown.
+        first_column: Option<String>,
+        /// The order of the columns; null if the orientation is unknown.
+        direction: Option<String>,
         /// The pixels in per cent of the reference; null where there is no wall.
         values_percent: Vec<Vec<Option<f64>>>,
+        /// The number of the segment to which each pixel belongs.
+        segment_of: Vec<Vec<u64>>,
+    }
+
+    /// The wall that an artery usually feeds.
+    TerritoryReport as Territory {
+        /// LAD, LCX or RCA.
+        name: String,
+        /// Mean uptake in per cent of the reference.
+        mean_percent: Option<f64>,
+        /// Share of its area below the threshold.
+        extent_percent: f64,
+        /// Its area, mm².
+        area_mm2: f64,
     }
 
     /// One segment of a polar map.
@@ -766,8 +858,8 @@ schemas! {
         number: u64,
         /// Its name.
         name: String,
-        /// The coronary artery that usually feeds it.
-        territory: String,
+        /// The coronary artery that usually feeds it; null if the orientation is unknown.
+        territory: Option<String>,
         /// Mean uptake in per cent of the reference.
         mean_percent: Option<f64>,
         /// Share of its area below the threshold.
