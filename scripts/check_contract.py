@@ -211,6 +211,9 @@ def everything(walk, folder):
     segmentation = wait(walk, job)["segmentation"]
     call("post", "/v1/segmentations", expect=200, body=body,
          headers={"content-type": kind, "prefer": "wait=60", "accept": "application/json"})
+    _, job = call("post", "/v1/segmentations", expect=202, query="?edge=anatomical", body=body,
+                  headers={"content-type": kind})
+    anatomical = wait(walk, job)["segmentation"]
     call("get", "/v1/segmentations", expect=200)
     call("get", "/v1/segmentations/{id}", expect=200, id=segmentation)
     mesh = urllib.request.urlopen(f"{URL}/v1/models/{template_model}/mesh.json").read()
@@ -225,7 +228,9 @@ def everything(walk, folder):
         if found and "get" in item and item["get"]["operationId"] not in walk.seen:
             accept = {"accept": "application/json"} if found[2] in ("/mesh", "/report") else {}
             cut = "mesh" not in template or "models" not in template
-            call("get", template, expect=200, headers=accept, cut=cut, id=of_kind[found[1]])
+            # The files of the other wall than the one that `edge` asks for are named by it.
+            made = anatomical if "_apparent" in template else of_kind[found[1]]
+            call("get", template, expect=200, headers=accept, cut=cut, id=made)
     meshes = walk.recorded["operations"]
     meshes["create_template"]["request"] = meshes["get_model_mesh_json"]["200"]
 

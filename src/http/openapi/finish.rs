@@ -125,11 +125,13 @@ fn of_one_file(folder: &str, name: &str, any: &Value) -> Value {
     }
     let media_type = media_type_of(name);
     let schema = match (name, media_type) {
-        ("mesh.json", _) => reference("MeshDocument"),
+        ("mesh.json" | "mesh_apparent.json" | "mesh_anatomical.json", _) => {
+            reference("MeshDocument")
+        }
         ("report.json", _) => report_of(folder),
         ("distance.json", _) => reference("Closeness"),
         ("polar.json", _) => reference("PolarMap"),
-        ("mesh.gltf", _) => json!({"type": "object"}),
+        (_, "model/gltf+json") => json!({"type": "object"}),
         (_, "text/html" | "image/svg+xml") => json!({"type": "string"}),
         _ => binary(),
     };
