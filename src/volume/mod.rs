@@ -40,7 +40,7 @@
 //! ```
 
 mod decode;
-mod dicom;
+pub mod dicom;
 pub mod error;
 pub mod facts;
 mod limits;

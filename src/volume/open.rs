@@ -3,6 +3,7 @@
 //! A format implements [`OpenVolume`]; [`read`] and [`inspect`] do the rest.
 
 use super::decode::DataType;
+use super::dicom::Provenance;
 use super::facts::{
     AffineSource, ByteOrder, FileFormat, IntensitySummary, LengthUnit, VolumeFacts,
 };
@@ -21,12 +22,19 @@ pub struct Reading {
     pub volume: Volume,
     /// Facts about the file.
     pub facts: VolumeFacts,
+    /// Whose scan it is; `None` unless the file is DICOM.
+    pub provenance: Option<Provenance>,
 }
 
 /// A file whose header has been read and checked.
 pub(super) trait OpenVolume {
     /// Everything the header says about the volumes.
     fn header(&self) -> HeaderFacts<'_>;
+
+    /// Whose scan volume number `frame`, from 0, is; `None` where the format does not say.
+    fn provenance(&self, _frame: usize) -> Option<Provenance> {
+        None
+    }
 
     /// Decodes volume number `frame`, from 0.
     fn decode_frame(&mut self, frame: usize, monitor: &Monitor) -> Result<Decoded, VolumeError>;
@@ -112,7 +120,12 @@ pub(super) fn read(
         integral: intensity.integral,
     };
     let facts = facts(header, Some(frame), intensity, decoded.warnings)?;
-    Ok(Reading { volume, facts })
+    let provenance = file.provenance(frame);
+    Ok(Reading {
+        volume,
+        facts,
+        provenance,
+    })
 }
 
 /// Decodes every volume of a file and returns the facts. `open` opens the file; it is called a second

@@ -17,12 +17,14 @@ mod attributes;
 mod frames;
 mod geometry;
 mod pixels;
+mod provenance;
 mod scan;
 mod syntax;
 
 #[cfg(test)]
 mod tests;
 
+pub use provenance::Provenance;
 pub(super) use syntax::is_dicom;
 
 use self::frames::FrameOrder;
@@ -43,6 +45,7 @@ pub(super) struct DicomFile {
     placement: Placement,
     pixels: Pixels,
     source: Source,
+    provenance: Provenance,
     warnings: Vec<String>,
 }
 
@@ -67,6 +70,7 @@ impl DicomFile {
             placement,
             pixels,
             source,
+            provenance: Provenance::of(&scan.attributes),
             warnings,
         })
     }
@@ -92,6 +96,14 @@ impl OpenVolume for DicomFile {
             unit: LengthUnit::Millimetre,
             warnings: &self.warnings,
         }
+    }
+
+    fn provenance(&self, frame: usize) -> Option<Provenance> {
+        let stored = self.order.slices_of(frame).iter();
+        Some(Provenance {
+            slice_frames: stored.map(|&frame| frame as u32 + 1).collect(),
+            ..self.provenance.clone()
+        })
     }
 
     /// Reads the slices of gate `frame` in stored order and then sorts them.
