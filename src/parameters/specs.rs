@@ -54,7 +54,8 @@ pub const SPECS: &[ParameterSpec<ModelParameters>] = &[
         "frame",
         frame => frame,
         0..=1_000_000,
-        "Frame of a 4-D volume, counted from 0"
+        "Frame of a 4-D volume or gate, counted from 0; without it, the gates of a DICOM file are \
+         summed"
     ),
     ParameterSpec {
         name: "iso",

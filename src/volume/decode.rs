@@ -82,6 +82,12 @@ pub(super) struct VoxelReader<'a> {
 /// Decodes portions and keeps running figures over them.
 struct Decoder {
     format: VoxelFormat,
+    figures: Figures,
+}
+
+/// Running figures over decoded voxels.
+#[derive(Debug, Default)]
+pub(super) struct Figures {
     odd: Odd,
     tally: Tally,
 }
@@ -90,21 +96,57 @@ struct Decoder {
 #[derive(Debug, Default)]
 struct Odd {
     infinite: u64,
-    inexact: bool,
+    /// A data type of which values were rounded.
+    inexact: Option<DataType>,
+}
+
+impl Figures {
+    /// Minimum, maximum, sum and counts.
+    pub(super) fn tally(&self) -> Tally {
+        self.tally
+    }
+
+    /// Warnings about values that `f32` cannot represent.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if self.odd.infinite > 0 {
+            let n = self.odd.infinite;
+            warnings.push(format!(
+                "{n} voxels are infinite and are treated as missing (NaN)."
+            ));
+        }
+        if let Some(rounded) = self.odd.inexact {
+            let name = rounded.name();
+            warnings.push(format!(
+                "Some {name} values exceed 2^24 and were rounded to 24 significant bits."
+            ));
+        }
+        warnings
+    }
 }
 
 impl<'a> VoxelReader<'a> {
     /// A reader for the voxels in `source`. The caller has checked that `source` holds them.
     pub(super) fn new(format: VoxelFormat, source: &'a mut Source) -> Self {
+        Self::continuing(Figures::default(), format, source)
+    }
+
+    /// As [`VoxelReader::new`], but the voxels are added to `figures`.
+    pub(super) fn continuing(
+        figures: Figures,
+        format: VoxelFormat,
+        source: &'a mut Source,
+    ) -> Self {
         Self {
-            decoder: Decoder {
-                format,
-                odd: Odd::default(),
-                tally: Tally::default(),
-            },
+            decoder: Decoder { format, figures },
             source,
             buffer: Vec::new(),
         }
+    }
+
+    /// The figures over all voxels so far.
+    pub(super) fn into_figures(self) -> Figures {
+        self.decoder.figures
     }
 
     /// Appends the `count` voxels from byte `begin` on to `voxels`. `begin` must not lie before the
@@ -242,25 +284,12 @@ impl<'a> VoxelReader<'a> {
 
     /// Figures over all voxels read so far.
     pub(super) fn tally(&self) -> Tally {
-        self.decoder.tally
+        self.decoder.figures.tally()
     }
 
     /// Warnings about values that `f32` cannot represent.
     pub(super) fn warnings(&self) -> Vec<String> {
-        let mut warnings = Vec::new();
-        if self.decoder.odd.infinite > 0 {
-            let n = self.decoder.odd.infinite;
-            warnings.push(format!(
-                "{n} voxels are infinite and are treated as missing (NaN)."
-            ));
-        }
-        if self.decoder.odd.inexact {
-            let name = self.decoder.format.data_type.name();
-            warnings.push(format!(
-                "Some {name} values exceed 2^24 and were rounded to 24 significant bits."
-            ));
-        }
-        warnings
+        self.decoder.figures.warnings()
     }
 
     /// Checks the end of the file after the last volume, which verifies the checksum of a gzip
@@ -283,9 +312,10 @@ impl Decoder {
         let start = out.len();
         decode(bytes, &self.format, out);
         let decoded = &mut out[start..];
-        self.odd.settle(bytes, &self.format, decoded, first)?;
+        let figures = &mut self.figures;
+        figures.odd.settle(bytes, &self.format, decoded, first)?;
         // Tallied here because the portion is still in the cache.
-        self.tally.add_portion(decoded);
+        figures.tally.add_portion(decoded);
         Ok(())
     }
 }
@@ -307,7 +337,9 @@ impl Odd {
             infinite |= size == INFINITY;
             large |= size > EXACT && size < INFINITY;
         }
-        self.inexact |= large && format.data_type != DataType::F32;
+        if large && format.data_type != DataType::F32 {
+            self.inexact = Some(format.data_type);
+        }
         match infinite {
             true => self.settle_infinite(bytes, format, voxels, first),
             false => Ok(()),

@@ -24,7 +24,27 @@ pub enum VolumeError {
         /// How to make a readable file of it.
         fix: &'static str,
     },
-    /// A Nuclear Medicine Image that does not contain reconstructed slices.
+    /// A DICOM object that holds no volume.
+    #[error("{file} is {found}: {reason}")]
+    NotVolume {
+        /// The file's name.
+        file: String,
+        /// Name, SOP class and modality of the object.
+        found: String,
+        /// What it holds instead.
+        reason: &'static str,
+        /// What can be sent.
+        fix: &'static str,
+    },
+    /// Files that do not belong to one DICOM series, or of which some are missing.
+    #[error("the {count} DICOM files do not make up one volume: {reason}")]
+    NotOneSeries {
+        /// Number of files.
+        count: usize,
+        /// What contradicts that.
+        reason: String,
+    },
+    /// An image whose Image Type says that it does not contain reconstructed slices.
     #[error("{file} has the Image Type {image_type}: {reason}")]
     NotSlices {
         /// The file's name.

@@ -15,6 +15,12 @@ pub enum FileFormat {
     Nifti2Pair,
     /// DICOM Nuclear Medicine Image, all slices in one file.
     DicomNm,
+    /// DICOM Enhanced PET, CT or MR image: all slices in one file, each with its position.
+    DicomEnhanced,
+    /// PET, CT or MR slices, each in a DICOM file.
+    DicomSeries,
+    /// DICOM Segmentation, read as a volume of labels.
+    DicomSeg,
     /// No file: an array in memory.
     Array,
 }
@@ -28,6 +34,9 @@ impl FileFormat {
             FileFormat::Nifti2 => "NIfTI-2",
             FileFormat::Nifti2Pair => "NIfTI-2 pair",
             FileFormat::DicomNm => "DICOM NM",
+            FileFormat::DicomEnhanced => "DICOM enhanced",
+            FileFormat::DicomSeries => "DICOM series",
+            FileFormat::DicomSeg => "DICOM SEG",
             FileFormat::Array => "array",
         }
     }
@@ -134,7 +143,7 @@ pub struct VolumeFacts {
     pub file_shape: Vec<usize>,
     /// Number of volumes in the file.
     pub frames: usize,
-    /// The volume that was read, from 0; `None` if all were examined.
+    /// The volume that was read, from 0; `None` if all were examined or summed.
     pub frame: Option<usize>,
     /// Voxels along i, j, k of one volume.
     pub shape: [usize; 3],

@@ -7,21 +7,24 @@ use super::VolumeError;
 pub struct ReadOptions {
     /// Number of the volume, from 0, in a file that holds several: for NIfTI the dimensions beyond
     /// the third, the fourth fastest; for DICOM the gates, those of the first R-R interval first.
-    /// Default `None`, which suits files that hold one volume.
+    /// Default `None`: the only volume, or the sum of the gates of a gated DICOM image, which is what
+    /// the camera counted over the whole heart beat.
     pub frame: Option<usize>,
 }
 
 impl ReadOptions {
-    /// The number of the volume to read from a file that holds `frames` volumes.
+    /// The number of the volume to read from a file that holds `frames` volumes; `None` for the sum
+    /// of all, if they are `gated`.
     ///
     /// # Errors
     /// [`VolumeError::FrameNeeded`] if the file holds several and none was asked for,
     /// [`VolumeError::FrameOutOfRange`] if the file has no such volume.
-    pub(super) fn choose(self, frames: usize) -> Result<usize, VolumeError> {
+    pub(super) fn choose(self, frames: usize, gated: bool) -> Result<Option<usize>, VolumeError> {
         match self.frame {
-            None if frames == 1 => Ok(0),
+            None if frames == 1 => Ok(Some(0)),
+            None if gated => Ok(None),
             None => Err(VolumeError::FrameNeeded { frames }),
-            Some(frame) if frame < frames => Ok(frame),
+            Some(frame) if frame < frames => Ok(Some(frame)),
             Some(frame) => Err(VolumeError::FrameOutOfRange { frame, frames }),
         }
     }

@@ -6,7 +6,7 @@
 //!
 //! 1. `source`: opens the file and unpacks gzip (also several members), counting every byte against
 //!    the limits; `unpack` is a faster way for small files.
-//! 2. `recognise`: determines the format by the content, never by the file name.
+//! 2. `archive` and `recognise`: finds the files in a zip archive, and determines the format by the content, never by the file name.
 //! 3. [`nifti`] or `dicom`: checks the header field by field.
 //! 4. `decode`: decodes the voxels in portions directly into the result.
 //! 5. `summary`: figures over the values, and whether they look like labels.
@@ -39,6 +39,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod archive;
 mod decode;
 pub mod dicom;
 pub mod error;
@@ -63,6 +64,6 @@ pub use limits::{ReadLimits, ReadOptions};
 pub use open::{Reading, describe};
 pub use phantom::{Phantom, PhantomParameters, phantom};
 pub use preview::{preview, preview_png};
-pub use read::{inspect, preview_files, read};
+pub use read::{inspect, preview_files, provenance, read};
 pub use source::VolumeFile;
 pub use summary::summarise;

@@ -73,6 +73,8 @@ pub(super) struct HeaderFacts<'a> {
     pub file_shape: Vec<usize>,
     /// Number of volumes.
     pub frames: usize,
+    /// Whether the volumes are gates of one heart beat, which may be summed.
+    pub gated: bool,
     /// Voxels along i, j, k of one volume.
     pub shape: [usize; 3],
     pub placement: &'a Placement,
@@ -108,8 +110,12 @@ pub(super) fn read(
     options: ReadOptions,
     monitor: &Monitor,
 ) -> Result<Reading, VolumeError> {
-    let frame = options.choose(file.header().frames)?;
-    let decoded = file.decode_frame(frame, monitor)?;
+    let header = file.header();
+    let frame = options.choose(header.frames, header.gated)?;
+    let decoded = match frame {
+        Some(frame) => file.decode_frame(frame, monitor)?,
+        None => sum(file, monitor)?,
+    };
     let header = file.header();
     let shape = header.shape;
     let intensity = decoded.tally.with_labels(&decoded.voxels, shape[0]);
@@ -119,13 +125,34 @@ pub(super) fn read(
         frame: header.placement.frame.clone(),
         integral: intensity.integral,
     };
-    let facts = facts(header, Some(frame), intensity, decoded.warnings)?;
-    let provenance = file.provenance(frame);
+    let facts = facts(header, frame, intensity, decoded.warnings)?;
+    let provenance = file.provenance(frame.unwrap_or(0));
     Ok(Reading {
         volume,
         facts,
         provenance,
     })
+}
+
+/// The sum of all volumes of `file`.
+fn sum(file: &mut dyn OpenVolume, monitor: &Monitor) -> Result<Decoded, VolumeError> {
+    let frames = file.header().frames;
+    let mut sum = file.decode_frame(0, monitor)?;
+    for frame in 1..frames {
+        let mut add = |first: usize, part: &[f32]| {
+            let voxels = sum.voxels[first..].iter_mut();
+            voxels.zip(part).for_each(|(sum, voxel)| *sum += voxel);
+        };
+        file.stream_frame(frame, &mut add, monitor)?;
+    }
+    let mut tally = Tally::default();
+    tally.add_portion(&sum.voxels);
+    sum.tally = tally;
+    sum.warnings.push(format!(
+        "The {frames} gates were summed. Set `frame` to a number from 0 to {} for one of them.",
+        frames - 1
+    ));
+    Ok(sum)
 }
 
 /// Decodes every volume of a file and returns the facts. `open` opens the file; it is called a second
@@ -182,6 +209,7 @@ pub fn describe(volume: &Volume) -> Result<VolumeFacts, VolumeError> {
         scaling: None,
         file_shape: volume.shape.to_vec(),
         frames: 1,
+        gated: false,
         shape: volume.shape,
         placement: &placement,
         unit: LengthUnit::Millimetre,

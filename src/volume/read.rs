@@ -1,14 +1,16 @@
 //! The two entry points: a volume to compute with, or only the facts about a file.
 
+use super::dicom::{DicomFile, Provenance};
 use super::limits::{ReadLimits, ReadOptions};
 use super::open::{self, OpenVolume, Reading};
-use super::recognise::{Recognised, recognise};
+use super::recognise::{Recognised, recognise, volumes_among};
 use super::source::VolumeFile;
-use super::{VolumeError, VolumeFacts, dicom, nifti};
+use super::{VolumeError, VolumeFacts, archive, nifti};
 use crate::draw::Image;
 use crate::progress::Monitor;
 
-/// Reads one volume from `files`: a single file, or a `.hdr` file and its `.img` file in any order.
+/// Reads one volume from `files`: a single file, a `.hdr` file and its `.img` file in any order, the
+/// DICOM files of a series, or a zip archive of them.
 ///
 /// # Errors
 /// [`VolumeError`]; in particular [`VolumeError::FrameNeeded`] if the file holds several volumes
@@ -50,8 +52,34 @@ pub fn preview_files(
     open::preview(&mut *open(files, limits, monitor)?, monitor)
 }
 
+/// Whose scan the first volume in `files` is; `None` unless they are DICOM. Only headers are read.
+///
+/// # Errors
+/// [`VolumeError`].
+pub fn provenance(
+    files: &[VolumeFile],
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Option<Provenance>, VolumeError> {
+    Ok(open(files, limits, monitor)?.provenance(0))
+}
+
 /// Recognises the format of `files` and checks the header.
 fn open(
+    files: &[VolumeFile],
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Box<dyn OpenVolume>, VolumeError> {
+    if let [file] = files
+        && let Some(packed) = archive::files_in(file, limits)?
+    {
+        let packed = volumes_among(packed, file.name(), limits)?;
+        return open_unpacked(&packed, limits, monitor);
+    }
+    open_unpacked(files, limits, monitor)
+}
+
+fn open_unpacked(
     files: &[VolumeFile],
     limits: &ReadLimits,
     monitor: &Monitor,
@@ -60,6 +88,6 @@ fn open(
         Recognised::Nifti { header, voxels } => {
             Box::new(nifti::NiftiFile::open(header, voxels, limits)?)
         }
-        Recognised::Dicom(file) => Box::new(dicom::DicomFile::open(file, limits, monitor)?),
+        Recognised::Dicom(files) => Box::new(DicomFile::open(&files, limits, monitor)?),
     })
 }

@@ -17,8 +17,8 @@ pub(super) enum Recognised<'a> {
         header: &'a VolumeFile,
         voxels: &'a VolumeFile,
     },
-    /// A DICOM file.
-    Dicom(&'a VolumeFile),
+    /// DICOM files.
+    Dicom(Vec<&'a VolumeFile>),
 }
 
 /// What a single file is.
@@ -51,11 +51,18 @@ pub(super) fn recognise<'a>(
                     file: file.name().into(),
                 })
             }
-            (FileKind::Dicom, _) => Ok(Recognised::Dicom(file)),
+            (FileKind::Dicom, _) => Ok(Recognised::Dicom(vec![file])),
             (FileKind::Other, start) => Err(refuse(file, &start)),
         },
         [a, b] => pair(a, b, limits),
-        more => Err(VolumeError::NotOneVolume { count: more.len() }),
+        more => {
+            for file in more {
+                if look(file, limits)?.0 != FileKind::Dicom {
+                    return Err(VolumeError::NotOneVolume { count: more.len() });
+                }
+            }
+            Ok(Recognised::Dicom(more.iter().collect()))
+        }
     }
 }
 
@@ -69,6 +76,9 @@ fn pair<'a>(
         // A file of voxels may start with any bytes.
         ((FileKind::NiftiHeader, _), (FileKind::Other | FileKind::Dicom, _)) => (a, b),
         ((FileKind::Other | FileKind::Dicom, _), (FileKind::NiftiHeader, _)) => (b, a),
+        ((FileKind::Dicom, _), (FileKind::Dicom, _)) => {
+            return Ok(Recognised::Dicom(vec![a, b]));
+        }
         ((FileKind::Other, start), (FileKind::Other, _)) if is_analyze(&start) => {
             return Err(refuse(a, &start));
         }
@@ -78,6 +88,35 @@ fn pair<'a>(
         _ => return Err(VolumeError::NotOneVolume { count: 2 }),
     };
     Ok(Recognised::Nifti { header, voxels })
+}
+
+/// The files of an archive that can hold volumes, in the order of their names.
+///
+/// # Errors
+/// [`VolumeError`] if a file cannot be read, or the archive `name` holds no volume.
+pub(super) fn volumes_among(
+    files: Vec<VolumeFile>,
+    name: &str,
+    limits: &ReadLimits,
+) -> Result<Vec<VolumeFile>, VolumeError> {
+    let mut volumes = Vec::new();
+    for file in files {
+        match look(&file, limits) {
+            Ok((FileKind::Other, _)) | Err(VolumeError::Empty { .. }) => {}
+            Ok(_) => volumes.push(file),
+            Err(error) => return Err(error),
+        }
+    }
+    // Archives list their files in any order.
+    volumes.sort_by(|a, b| a.name().cmp(b.name()));
+    match volumes.is_empty() {
+        true => Err(VolumeError::Unsupported {
+            file: name.into(),
+            format: "a zip archive without DICOM or NIfTI files".into(),
+            fix: "Pack the files of one DICOM series into the archive.",
+        }),
+        false => Ok(volumes),
+    }
 }
 
 /// The kind of `file`, and its first bytes.
@@ -129,7 +168,7 @@ fn refuse(file: &VolumeFile, start: &[u8]) -> VolumeError {
         (0, b"II*\0", "a TIFF image"),
         (0, b"MM\0*", "a TIFF image"),
         (0, b"%PDF", "a PDF document"),
-        (0, b"PK\x03\x04", "a ZIP archive"),
+        (0, b"PK\x03\x04", "a ZIP archive in an archive"),
         (0, b"BZh", "a bzip2 file"),
         (0, b"\xfd7zXZ", "an xz file"),
         (0, b"\x28\xb5\x2f\xfd", "a Zstandard file"),

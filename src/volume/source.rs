@@ -6,7 +6,7 @@
 
 use super::VolumeError;
 use super::unpack::{self, Unpacked};
-use flate2::bufread::GzDecoder;
+use flate2::bufread::{DeflateDecoder, GzDecoder};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -30,6 +30,18 @@ pub struct VolumeFile {
 enum Content {
     Path(PathBuf),
     Memory(Arc<[u8]>),
+    /// A file inside an archive.
+    Entry(Arc<Entry>),
+}
+
+/// Place of a file inside an archive.
+#[derive(Debug)]
+struct Entry {
+    archive: VolumeFile,
+    begin: u64,
+    packed: u64,
+    size: u64,
+    deflated: bool,
 }
 
 impl VolumeFile {
@@ -54,6 +66,44 @@ impl VolumeFile {
             name: name.into(),
             content: Content::Memory(bytes.into()),
         }
+    }
+
+    /// The file of `size` bytes in `archive` whose `packed` bytes begin at byte `begin`.
+    pub(super) fn inside(
+        archive: &Self,
+        name: impl Into<String>,
+        begin: u64,
+        [packed, size]: [u64; 2],
+        deflated: bool,
+    ) -> Self {
+        let entry = Entry {
+            archive: archive.clone(),
+            begin,
+            packed,
+            size,
+            deflated,
+        };
+        Self {
+            name: name.into(),
+            content: Content::Entry(Arc::new(entry)),
+        }
+    }
+
+    /// The stored bytes.
+    ///
+    /// # Errors
+    /// If the file cannot be opened.
+    pub(super) fn bytes(&self) -> io::Result<Box<dyn ReadSeek>> {
+        Ok(match &self.content {
+            Content::Path(path) => Box::new(File::open(path)?),
+            Content::Memory(bytes) => Box::new(Cursor::new(Arc::clone(bytes))),
+            Content::Entry(entry) => Box::new(Window {
+                archive: entry.archive.bytes()?,
+                begin: entry.begin,
+                length: entry.packed,
+                position: 0,
+            }),
+        })
     }
 
     /// The file at `path` and, if it is one of a `.hdr`/`.img` pair, the other file of the pair, if
@@ -92,15 +142,20 @@ pub(super) struct Source {
     gzip: bool,
     /// Whether the gzip stream ended before its checksum.
     cut_off: bool,
+    /// Whether unpacking at once was tried.
+    prepared: bool,
 }
 
 enum Body {
     Plain(BufReader<Box<dyn ReadSeek>>),
+    /// Deflated without header or checksum, as in archives and deflated DICOM data sets.
+    Deflated(Box<DeflateDecoder<BufReader<Box<dyn Read>>>>),
     Gzip(Box<Members>),
     /// The whole content, in memory.
     Unpacked(Unpacked),
 }
 
+/// Bytes that can be read from any place on.
 pub(super) trait ReadSeek: Read + Seek {}
 impl<T: Read + Seek> ReadSeek for T {}
 
@@ -114,11 +169,17 @@ impl Source {
             file: file.name.clone(),
             reason: e.to_string(),
         };
-        let mut reader: Box<dyn ReadSeek> = match &file.content {
-            Content::Path(path) => Box::new(File::open(path).map_err(io)?),
-            Content::Memory(bytes) => Box::new(Cursor::new(Arc::clone(bytes))),
-        };
+        let mut reader = file.bytes().map_err(io)?;
         let stored = reader.seek(SeekFrom::End(0)).map_err(io)?;
+        if let Content::Entry(entry) = &file.content
+            && entry.deflated
+        {
+            reader.rewind().map_err(io)?;
+            let mut source = Self::new(file, Self::inflater(reader), stored, limit);
+            // The archive states the size, and no more is taken from it.
+            source.limit = limit.min(entry.size);
+            return Ok(source);
+        }
         reader.rewind().map_err(io)?;
         let mut mark = [0; 2];
         let gzipped = stored >= 2 && reader.read_exact(&mut mark).is_ok() && mark == GZIP;
@@ -127,15 +188,49 @@ impl Source {
             true => Body::Gzip(Box::new(Members::new(reader))),
             false => Body::Plain(BufReader::with_capacity(PORTION, reader)),
         };
-        Ok(Self {
+        let mut source = Self::new(file, body, stored, limit);
+        source.gzip = gzipped;
+        Ok(source)
+    }
+
+    /// Opens `file` to give out the bytes that are deflated from byte `begin` on. They are counted
+    /// from `begin` too.
+    ///
+    /// # Errors
+    /// [`VolumeError`] if the file cannot be read or is shorter.
+    pub(super) fn inflate(file: &VolumeFile, begin: u64, limit: u64) -> Result<Self, VolumeError> {
+        let mut packed = Self::open(file, limit)?;
+        packed.skip_to(begin)?;
+        let stored = packed.capacity();
+        let mut source = Self::new(file, Self::inflater(Box::new(packed)), stored, limit);
+        source.position = begin;
+        Ok(source)
+    }
+
+    /// The `bytes` themselves, whatever they look like.
+    pub(super) fn plain(file: &VolumeFile, bytes: Vec<u8>) -> Self {
+        let stored = bytes.len() as u64;
+        let reader: Box<dyn ReadSeek> = Box::new(Cursor::new(bytes));
+        let body = Body::Plain(BufReader::with_capacity(0, reader));
+        Self::new(file, body, stored, u64::MAX)
+    }
+
+    fn new(file: &VolumeFile, body: Body, stored: u64, limit: u64) -> Self {
+        Self {
             file: file.name.clone(),
             body,
             stored,
             position: 0,
             limit,
-            gzip: gzipped,
+            gzip: false,
             cut_off: false,
-        })
+            prepared: false,
+        }
+    }
+
+    fn inflater(packed: Box<dyn Read>) -> Body {
+        let packed = BufReader::with_capacity(PORTION, packed);
+        Body::Deflated(Box::new(DeflateDecoder::new(packed)))
     }
 
     /// Name of the file.
@@ -155,7 +250,7 @@ impl Source {
 
     /// Upper bound on the number of unpacked bytes in the file.
     pub(super) fn capacity(&self) -> u64 {
-        match self.gzip {
+        match self.gzip || matches!(self.body, Body::Deflated(_)) {
             false => self.stored,
             true => self.stored.saturating_mul(GREATEST_RATIO),
         }
@@ -167,6 +262,10 @@ impl Source {
     /// # Errors
     /// [`VolumeError::Io`].
     pub(super) fn prepare(&mut self, end: u64) -> Result<(), VolumeError> {
+        // A second try would unpack everything before the position again.
+        if std::mem::replace(&mut self.prepared, true) {
+            return Ok(());
+        }
         let Body::Gzip(members) = &mut self.body else {
             return Ok(());
         };
@@ -223,6 +322,7 @@ impl Source {
             let got = match &mut self.body {
                 Body::Plain(reader) => reader.read(part),
                 Body::Gzip(members) => members.read(part),
+                Body::Deflated(inflater) => inflater.read(part),
                 Body::Unpacked(unpacked) => {
                     let begin = self.position as usize + filled;
                     unpacked.bytes().get(begin..).unwrap_or_default().read(part)
@@ -232,8 +332,8 @@ impl Source {
                 Ok(0) => break,
                 Ok(n) => filled += n,
                 Err(e) if e.kind() == ErrorKind::Interrupted => {}
-                // The gzip stream ends in the middle: the file was cut off.
-                Err(e) if e.kind() == ErrorKind::UnexpectedEof && self.is_gzip() => {
+                // The packed stream ends in the middle: the file was cut off.
+                Err(e) if e.kind() == ErrorKind::UnexpectedEof => {
                     self.cut_off = true;
                     break;
                 }
@@ -325,6 +425,40 @@ impl Source {
             },
             _ => VolumeError::Io { file, reason },
         }
+    }
+}
+
+/// A part of a file.
+struct Window {
+    archive: Box<dyn ReadSeek>,
+    begin: u64,
+    length: u64,
+    position: u64,
+}
+
+impl Read for Window {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let left = self.length.saturating_sub(self.position);
+        let most = buffer
+            .len()
+            .min(usize::try_from(left).unwrap_or(usize::MAX));
+        let at = self.begin.saturating_add(self.position);
+        self.archive.seek(SeekFrom::Start(at))?;
+        let got = self.archive.read(&mut buffer[..most])?;
+        self.position += got as u64;
+        Ok(got)
+    }
+}
+
+impl Seek for Window {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let target = match to {
+            SeekFrom::Start(at) => Some(at),
+            SeekFrom::End(by) => self.length.checked_add_signed(by),
+            SeekFrom::Current(by) => self.position.checked_add_signed(by),
+        };
+        self.position = target.ok_or_else(|| io::Error::from(ErrorKind::InvalidInput))?;
+        Ok(self.position)
     }
 }
 

@@ -76,7 +76,9 @@ impl Explain for VolumeError {
             VolumeError::TooLarge { .. } => (Fault::TooLarge, "volume-too-large"),
             VolumeError::FrameNeeded { .. } => (Fault::Request, "frame-needed"),
             VolumeError::FrameOutOfRange { .. } => (Fault::Request, "frame-out-of-range"),
-            VolumeError::Unsupported { .. } => (Fault::Content, "unsupported-format"),
+            VolumeError::Unsupported { .. } | VolumeError::NotVolume { .. } => {
+                (Fault::Content, "unsupported-format")
+            }
             VolumeError::Unrecognised { .. } => (Fault::Content, "unrecognised-format"),
             VolumeError::Truncated { .. } => (Fault::Content, "truncated-volume"),
             VolumeError::Corrupt { .. } => (Fault::Content, "corrupt-volume"),
@@ -338,13 +340,23 @@ fn volume_advice(error: &VolumeError) -> String {
         VolumeError::NoFile | VolumeError::Empty { .. } => {
             "Give a file that contains the volume.".into()
         }
-        VolumeError::Unsupported { fix, .. } => (*fix).into(),
+        VolumeError::Unsupported { fix, .. } | VolumeError::NotVolume { fix, .. } => (*fix).into(),
+        VolumeError::NotOneSeries { .. } => {
+            "Send all files of one series, each once, as several files or as one zip.".into()
+        }
         VolumeError::NotSlices { .. } => {
             "Give the reconstructed slices (Image Type RECON TOMO or RECON GATED TOMO).".into()
         }
         VolumeError::Unrecognised { .. } => {
-            "Give NIfTI (.nii, .nii.gz, or a .hdr/.img pair) or a multi-frame DICOM NM file.".into()
+            "Give NIfTI (.nii, .nii.gz, or a .hdr/.img pair) or DICOM (a multi-frame NM, PET, CT or \
+             MR file, all files of one series, or a zip of them)."
+                .into()
         }
+        // Changing a patient's file by hand is dangerous, so the advice is to export it again.
+        VolumeError::Field { field, .. } if field.ends_with(')') => format!(
+            "Export the series again from the system that made it, so that it states a valid \
+             {field}."
+        ),
         VolumeError::Field { field, .. } => format!("Write the file again with a valid {field}."),
         VolumeError::Truncated { .. } | VolumeError::Corrupt { .. } => {
             "Transfer the file again; if that does not help, export it again from its source."
@@ -362,7 +374,7 @@ fn volume_advice(error: &VolumeError) -> String {
             "Give the .hdr and the .img together, or a single .nii.".into()
         }
         VolumeError::NotOneVolume { .. } => {
-            "Give one file, or a .hdr with its .img; DICOM as one multi-frame file.".into()
+            "Give one file, a .hdr with its .img, or the DICOM files of one series.".into()
         }
         VolumeError::Overflow { .. } => "Scale the values to below 3.4e38.".into(),
         VolumeError::NoFiniteVoxel { .. } => EMPTY_FILE.into(),

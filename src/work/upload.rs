@@ -9,8 +9,9 @@ use crate::volume::{self, ReadLimits};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// Most memory that [`UploadReader::inspect`] takes, bytes: a gzipped file of 16 MiB is unpacked in
-/// memory if it holds at most 16 MiB, and everything else is read in portions.
+/// Most memory that [`UploadReader::inspect`] takes in general, bytes: a gzipped file of 16 MiB is
+/// unpacked in memory if it holds at most 16 MiB, and everything else is read in portions. The largest
+/// JPEG 2000 frame takes 40 MiB, the largest DICOM Segmentation 64 MiB.
 pub const INSPECTION_MEMORY: u64 = 34 << 20;
 
 /// Most memory that [`UploadReader::preview`] takes for volumes of `shape`, bytes: three planes of
@@ -46,7 +47,7 @@ pub trait UploadReader: Send + Sync + 'static {
 /// What is known of a volume after reading it. Stored as JSON in [`StoredVolume::facts`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct UploadFacts {
-    /// `NIfTI-1`, `NIfTI-2` ...
+    /// `NIfTI-1`, `DICOM NM` ...
     pub format: String,
     /// Whether it was gzipped.
     pub compressed: bool,

@@ -3,22 +3,30 @@
 use super::super::VolumeError;
 use super::super::facts::ByteOrder;
 use dicom_core::Tag;
+use dicom_encoding::text::{SpecificCharacterSet, TextCodec};
 use std::collections::BTreeMap;
 
-/// An attribute that the reader needs: its tag, its sequence and its name.
+/// Most values that are kept of one data set. Enough for 20,000 frames with a dozen each.
+const MOST_VALUES: usize = 1 << 18;
+
+/// Most bytes of values that are kept of one data set.
+const MOST_BYTES: usize = 16 << 20;
+
+/// An attribute that the reader needs: its tag, its sequences and its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Attribute {
-    /// The sequence whose first item holds the attribute; `None` at the top level.
-    sequence: Option<Tag>,
+    /// The sequences, from the outermost, whose first items hold the attribute. [`FRAME`] stands for
+    /// the functional groups of a frame or of all frames.
+    path: &'static [Tag],
     tag: Tag,
     /// Name and tag for error messages.
     pub name: &'static str,
 }
 
 macro_rules! attributes {
-    ($($id:ident = $sequence:expr, $group:literal, $element:literal, $name:literal;)*) => {
+    ($($id:ident = $path:expr, $group:literal, $element:literal, $name:literal;)*) => {
         $(pub(super) const $id: Attribute = Attribute {
-            sequence: $sequence,
+            path: $path,
             tag: Tag($group, $element),
             name: $name,
         };)*
@@ -27,57 +35,115 @@ macro_rules! attributes {
     };
 }
 
-const DETECTOR: Option<Tag> = Some(Tag(0x0054, 0x0022));
-const REAL_WORLD: Option<Tag> = Some(Tag(0x0040, 0x9096));
+/// Shared Functional Groups Sequence.
+const SHARED: Tag = Tag(0x5200, 0x9229);
+/// Per-frame Functional Groups Sequence. In a path it stands for the shared groups too.
+const FRAME: Tag = Tag(0x5200, 0x9230);
+
+const DETECTOR: &[Tag] = &[Tag(0x0054, 0x0022)];
+const REAL_WORLD: &[Tag] = &[Tag(0x0040, 0x9096)];
+const PHARMACEUTICAL: &[Tag] = &[Tag(0x0054, 0x0016)];
+const PHARMACEUTICAL_CODE: &[Tag] = &[Tag(0x0054, 0x0016), Tag(0x0054, 0x0304)];
+const NUCLIDE_CODE: &[Tag] = &[Tag(0x0054, 0x0016), Tag(0x0054, 0x0300)];
+const CONTEXT_NAME: &[Tag] = &[Tag(0x0040, 0x0555), Tag(0x0040, 0xa168)];
+const PROTOCOL_CODE: &[Tag] = &[Tag(0x0040, 0x0260)];
+const FRAME_POSITION_PATH: &[Tag] = &[FRAME, Tag(0x0020, 0x9113)];
+const FRAME_ORIENTATION_PATH: &[Tag] = &[FRAME, Tag(0x0020, 0x9116)];
+const FRAME_MEASURES: &[Tag] = &[FRAME, Tag(0x0028, 0x9110)];
+const FRAME_RESCALE: &[Tag] = &[FRAME, Tag(0x0028, 0x9145)];
+const FRAME_REAL_WORLD: &[Tag] = &[FRAME, Tag(0x0040, 0x9096)];
+const FRAME_CONTENT: &[Tag] = &[FRAME, Tag(0x0020, 0x9111)];
+const FRAME_SEGMENT_PATH: &[Tag] = &[FRAME, Tag(0x0062, 0x000a)];
 
 attributes! {
-    IMAGE_TYPE = None, 0x0008, 0x0008, "Image Type (0008,0008)";
-    SOP_CLASS = None, 0x0008, 0x0016, "SOP Class UID (0008,0016)";
-    INSTANCE = None, 0x0008, 0x0018, "SOP Instance UID (0008,0018)";
-    STUDY_DATE = None, 0x0008, 0x0020, "Study Date (0008,0020)";
-    STUDY_TIME = None, 0x0008, 0x0030, "Study Time (0008,0030)";
-    ACCESSION_NUMBER = None, 0x0008, 0x0050, "Accession Number (0008,0050)";
-    MODALITY = None, 0x0008, 0x0060, "Modality (0008,0060)";
-    MANUFACTURER = None, 0x0008, 0x0070, "Manufacturer (0008,0070)";
-    REFERRING_PHYSICIAN = None, 0x0008, 0x0090, "Referring Physician's Name (0008,0090)";
-    SERIES_DESCRIPTION = None, 0x0008, 0x103e, "Series Description (0008,103E)";
-    MODEL_NAME = None, 0x0008, 0x1090, "Manufacturer's Model Name (0008,1090)";
-    PATIENT_NAME = None, 0x0010, 0x0010, "Patient's Name (0010,0010)";
-    PATIENT_ID = None, 0x0010, 0x0020, "Patient ID (0010,0020)";
-    PATIENT_BIRTH_DATE = None, 0x0010, 0x0030, "Patient's Birth Date (0010,0030)";
-    PATIENT_SEX = None, 0x0010, 0x0040, "Patient's Sex (0010,0040)";
-    SLICE_THICKNESS = None, 0x0018, 0x0050, "Slice Thickness (0018,0050)";
-    SPACING_BETWEEN_SLICES = None, 0x0018, 0x0088, "Spacing Between Slices (0018,0088)";
-    STUDY = None, 0x0020, 0x000d, "Study Instance UID (0020,000D)";
-    SERIES = None, 0x0020, 0x000e, "Series Instance UID (0020,000E)";
-    STUDY_ID = None, 0x0020, 0x0010, "Study ID (0020,0010)";
-    SERIES_NUMBER = None, 0x0020, 0x0011, "Series Number (0020,0011)";
-    POSITION = None, 0x0020, 0x0032, "Image Position (Patient) (0020,0032)";
-    ORIENTATION = None, 0x0020, 0x0037, "Image Orientation (Patient) (0020,0037)";
-    FRAME_OF_REFERENCE = None, 0x0020, 0x0052, "Frame of Reference UID (0020,0052)";
-    POSITION_REFERENCE_INDICATOR = None, 0x0020, 0x1040, "Position Reference Indicator (0020,1040)";
-    SAMPLES = None, 0x0028, 0x0002, "Samples per Pixel (0028,0002)";
-    NUMBER_OF_FRAMES = None, 0x0028, 0x0008, "Number of Frames (0028,0008)";
-    FRAME_POINTER = None, 0x0028, 0x0009, "Frame Increment Pointer (0028,0009)";
-    ROWS = None, 0x0028, 0x0010, "Rows (0028,0010)";
-    COLUMNS = None, 0x0028, 0x0011, "Columns (0028,0011)";
-    PIXEL_SPACING = None, 0x0028, 0x0030, "Pixel Spacing (0028,0030)";
-    BITS_ALLOCATED = None, 0x0028, 0x0100, "Bits Allocated (0028,0100)";
-    BITS_STORED = None, 0x0028, 0x0101, "Bits Stored (0028,0101)";
-    HIGH_BIT = None, 0x0028, 0x0102, "High Bit (0028,0102)";
-    PIXEL_REPRESENTATION = None, 0x0028, 0x0103, "Pixel Representation (0028,0103)";
-    RESCALE_INTERCEPT = None, 0x0028, 0x1052, "Rescale Intercept (0028,1052)";
-    RESCALE_SLOPE = None, 0x0028, 0x1053, "Rescale Slope (0028,1053)";
-    RR_INTERVAL_VECTOR = None, 0x0054, 0x0060, "R-R Interval Vector (0054,0060)";
-    TIME_SLOT_VECTOR = None, 0x0054, 0x0070, "Time Slot Vector (0054,0070)";
-    ENERGY_WINDOW_VECTOR = None, 0x0054, 0x0010, "Energy Window Vector (0054,0010)";
-    DETECTOR_VECTOR = None, 0x0054, 0x0020, "Detector Vector (0054,0020)";
-    ROTATION_VECTOR = None, 0x0054, 0x0050, "Rotation Vector (0054,0050)";
-    SLICE_VECTOR = None, 0x0054, 0x0080, "Slice Vector (0054,0080)";
+    CHARACTER_SET = &[], 0x0008, 0x0005, "Specific Character Set (0008,0005)";
+    IMAGE_TYPE = &[], 0x0008, 0x0008, "Image Type (0008,0008)";
+    SOP_CLASS = &[], 0x0008, 0x0016, "SOP Class UID (0008,0016)";
+    SOP_INSTANCE = &[], 0x0008, 0x0018, "SOP Instance UID (0008,0018)";
+    STUDY_DATE = &[], 0x0008, 0x0020, "Study Date (0008,0020)";
+    SERIES_DATE = &[], 0x0008, 0x0021, "Series Date (0008,0021)";
+    ACQUISITION_DATE = &[], 0x0008, 0x0022, "Acquisition Date (0008,0022)";
+    CONTENT_DATE = &[], 0x0008, 0x0023, "Content Date (0008,0023)";
+    ACQUISITION_DATE_TIME = &[], 0x0008, 0x002a, "Acquisition DateTime (0008,002A)";
+    STUDY_TIME = &[], 0x0008, 0x0030, "Study Time (0008,0030)";
+    ACQUISITION_TIME = &[], 0x0008, 0x0032, "Acquisition Time (0008,0032)";
+    ACCESSION_NUMBER = &[], 0x0008, 0x0050, "Accession Number (0008,0050)";
+    MODALITY = &[], 0x0008, 0x0060, "Modality (0008,0060)";
+    MANUFACTURER = &[], 0x0008, 0x0070, "Manufacturer (0008,0070)";
+    REFERRING_PHYSICIAN = &[], 0x0008, 0x0090, "Referring Physician's Name (0008,0090)";
+    STUDY_DESCRIPTION = &[], 0x0008, 0x1030, "Study Description (0008,1030)";
+    SERIES_DESCRIPTION = &[], 0x0008, 0x103e, "Series Description (0008,103E)";
+    MODEL_NAME = &[], 0x0008, 0x1090, "Manufacturer's Model Name (0008,1090)";
+    PATIENT_NAME = &[], 0x0010, 0x0010, "Patient's Name (0010,0010)";
+    PATIENT_ID = &[], 0x0010, 0x0020, "Patient ID (0010,0020)";
+    PATIENT_BIRTH_DATE = &[], 0x0010, 0x0030, "Patient's Birth Date (0010,0030)";
+    PATIENT_SEX = &[], 0x0010, 0x0040, "Patient's Sex (0010,0040)";
+    SLICE_THICKNESS = &[], 0x0018, 0x0050, "Slice Thickness (0018,0050)";
+    SPACING_BETWEEN_SLICES = &[], 0x0018, 0x0088, "Spacing Between Slices (0018,0088)";
+    SOFTWARE_VERSIONS = &[], 0x0018, 0x1020, "Software Versions (0018,1020)";
+    PROTOCOL_NAME = &[], 0x0018, 0x1030, "Protocol Name (0018,1030)";
+    TRIGGER_TIME = &[], 0x0018, 0x1060, "Trigger Time (0018,1060)";
+    CONVOLUTION_KERNEL = &[], 0x0018, 0x1210, "Convolution Kernel (0018,1210)";
+    STUDY_UID = &[], 0x0020, 0x000d, "Study Instance UID (0020,000D)";
+    SERIES_UID = &[], 0x0020, 0x000e, "Series Instance UID (0020,000E)";
+    STUDY_ID = &[], 0x0020, 0x0010, "Study ID (0020,0010)";
+    SERIES_NUMBER = &[], 0x0020, 0x0011, "Series Number (0020,0011)";
+    INSTANCE_NUMBER = &[], 0x0020, 0x0013, "Instance Number (0020,0013)";
+    POSITION = &[], 0x0020, 0x0032, "Image Position (Patient) (0020,0032)";
+    ORIENTATION = &[], 0x0020, 0x0037, "Image Orientation (Patient) (0020,0037)";
+    FRAME_OF_REFERENCE = &[], 0x0020, 0x0052, "Frame of Reference UID (0020,0052)";
+    TEMPORAL_POSITION = &[], 0x0020, 0x0100, "Temporal Position Identifier (0020,0100)";
+    POSITION_REFERENCE = &[], 0x0020, 0x1040, "Position Reference Indicator (0020,1040)";
+    SAMPLES = &[], 0x0028, 0x0002, "Samples per Pixel (0028,0002)";
+    PHOTOMETRIC = &[], 0x0028, 0x0004, "Photometric Interpretation (0028,0004)";
+    NUMBER_OF_FRAMES = &[], 0x0028, 0x0008, "Number of Frames (0028,0008)";
+    FRAME_POINTER = &[], 0x0028, 0x0009, "Frame Increment Pointer (0028,0009)";
+    ROWS = &[], 0x0028, 0x0010, "Rows (0028,0010)";
+    COLUMNS = &[], 0x0028, 0x0011, "Columns (0028,0011)";
+    PIXEL_SPACING = &[], 0x0028, 0x0030, "Pixel Spacing (0028,0030)";
+    BITS_ALLOCATED = &[], 0x0028, 0x0100, "Bits Allocated (0028,0100)";
+    BITS_STORED = &[], 0x0028, 0x0101, "Bits Stored (0028,0101)";
+    HIGH_BIT = &[], 0x0028, 0x0102, "High Bit (0028,0102)";
+    PIXEL_REPRESENTATION = &[], 0x0028, 0x0103, "Pixel Representation (0028,0103)";
+    RESCALE_INTERCEPT = &[], 0x0028, 0x1052, "Rescale Intercept (0028,1052)";
+    RESCALE_SLOPE = &[], 0x0028, 0x1053, "Rescale Slope (0028,1053)";
+    MODALITY_TABLE = &[Tag(0x0028, 0x3000)], 0x0028, 0x3002, "Modality LUT Sequence (0028,3000)";
+    RR_INTERVAL_VECTOR = &[], 0x0054, 0x0060, "R-R Interval Vector (0054,0060)";
+    TIME_SLOT_VECTOR = &[], 0x0054, 0x0070, "Time Slot Vector (0054,0070)";
+    ENERGY_WINDOW_VECTOR = &[], 0x0054, 0x0010, "Energy Window Vector (0054,0010)";
+    DETECTOR_VECTOR = &[], 0x0054, 0x0020, "Detector Vector (0054,0020)";
+    ROTATION_VECTOR = &[], 0x0054, 0x0050, "Rotation Vector (0054,0050)";
+    SLICE_VECTOR = &[], 0x0054, 0x0080, "Slice Vector (0054,0080)";
+    RECONSTRUCTION_METHOD = &[], 0x0054, 0x1103, "Reconstruction Method (0054,1103)";
+    FRAME_REFERENCE_TIME = &[], 0x0054, 0x1300, "Frame Reference Time (0054,1300)";
+    SEGMENTATION_TYPE = &[], 0x0062, 0x0001, "Segmentation Type (0062,0001)";
+    MAXIMUM_FRACTION = &[], 0x0062, 0x000e, "Maximum Fractional Value (0062,000E)";
     DETECTOR_POSITION = DETECTOR, 0x0020, 0x0032, "Image Position (Patient) (0020,0032)";
     DETECTOR_ORIENTATION = DETECTOR, 0x0020, 0x0037, "Image Orientation (Patient) (0020,0037)";
     REAL_WORLD_INTERCEPT = REAL_WORLD, 0x0040, 0x9224, "Real World Value Intercept (0040,9224)";
     REAL_WORLD_SLOPE = REAL_WORLD, 0x0040, 0x9225, "Real World Value Slope (0040,9225)";
+    PHARMACEUTICAL_NAME = PHARMACEUTICAL, 0x0018, 0x0031, "Radiopharmaceutical (0018,0031)";
+    INJECTED_DOSE = PHARMACEUTICAL, 0x0018, 0x1074, "Radionuclide Total Dose (0018,1074)";
+    INJECTION_TIME = PHARMACEUTICAL, 0x0018, 0x1072, "Radiopharmaceutical Start Time (0018,1072)";
+    PHARMACEUTICAL_MEANING = PHARMACEUTICAL_CODE, 0x0008, 0x0104, "Code Meaning (0008,0104)";
+    NUCLIDE_MEANING = NUCLIDE_CODE, 0x0008, 0x0104, "Code Meaning (0008,0104)";
+    CONTEXT_MEANING = CONTEXT_NAME, 0x0008, 0x0104, "Code Meaning (0008,0104)";
+    PROTOCOL_MEANING = PROTOCOL_CODE, 0x0008, 0x0104, "Code Meaning (0008,0104)";
+    FRAME_POSITION = FRAME_POSITION_PATH, 0x0020, 0x0032, "Image Position (Patient) (0020,0032)";
+    FRAME_ORIENTATION = FRAME_ORIENTATION_PATH, 0x0020, 0x0037,
+        "Image Orientation (Patient) (0020,0037)";
+    FRAME_THICKNESS = FRAME_MEASURES, 0x0018, 0x0050, "Slice Thickness (0018,0050)";
+    FRAME_BETWEEN_SLICES = FRAME_MEASURES, 0x0018, 0x0088, "Spacing Between Slices (0018,0088)";
+    FRAME_PIXEL_SPACING = FRAME_MEASURES, 0x0028, 0x0030, "Pixel Spacing (0028,0030)";
+    FRAME_RESCALE_INTERCEPT = FRAME_RESCALE, 0x0028, 0x1052, "Rescale Intercept (0028,1052)";
+    FRAME_RESCALE_SLOPE = FRAME_RESCALE, 0x0028, 0x1053, "Rescale Slope (0028,1053)";
+    FRAME_REAL_WORLD_INTERCEPT = FRAME_REAL_WORLD, 0x0040, 0x9224,
+        "Real World Value Intercept (0040,9224)";
+    FRAME_REAL_WORLD_SLOPE = FRAME_REAL_WORLD, 0x0040, 0x9225,
+        "Real World Value Slope (0040,9225)";
+    FRAME_DATE_TIME = FRAME_CONTENT, 0x0018, 0x9074, "Frame Acquisition DateTime (0018,9074)";
+    FRAME_TEMPORAL_INDEX = FRAME_CONTENT, 0x0020, 0x9128, "Temporal Position Index (0020,9128)";
+    FRAME_SEGMENT = FRAME_SEGMENT_PATH, 0x0062, 0x000b, "Referenced Segment Number (0062,000B)";
 }
 
 impl Attribute {
@@ -86,15 +152,29 @@ impl Attribute {
         [self.tag.0, self.tag.1]
     }
 
-    /// Key of the attribute in [`Attributes`].
-    fn key(self) -> (Option<Tag>, Tag) {
-        (self.sequence, self.tag)
-    }
-
-    /// The needed attribute with `tag` at the top level or in the first item of `sequence`.
-    pub(super) fn find(sequence: Option<Tag>, tag: Tag) -> Option<Self> {
-        let key = (sequence, tag);
-        WANTED.iter().find(|a| a.key() == key).copied()
+    /// The needed attribute with `tag` inside the sequences `open`, each with the number of items
+    /// begun, and the frame to which the value belongs, from 0; `None` for a value that belongs to
+    /// the data set or to all frames.
+    pub(super) fn find(open: &[(Tag, usize)], tag: Tag) -> Option<(Self, Option<usize>)> {
+        let (frame, first) = match open.first() {
+            Some((FRAME, items)) => (Some(items.checked_sub(1)?), 1),
+            Some((SHARED, 1)) => (None, 1),
+            _ => (None, 0),
+        };
+        if open[first..].iter().any(|(_, items)| *items != 1) {
+            return None;
+        }
+        let is_frame = first == 1;
+        let wanted = WANTED.iter().find(|a| {
+            let outer = a.path.first() == Some(&FRAME);
+            a.tag == tag
+                && outer == is_frame
+                && a.path.len() == open.len()
+                && a.path[first..]
+                    .iter()
+                    .eq(open[first..].iter().map(|(t, _)| t))
+        });
+        wanted.map(|attribute| (*attribute, frame))
     }
 }
 
@@ -107,6 +187,9 @@ pub(super) fn clip(text: &str) -> String {
     }
 }
 
+/// Key of a value: sequences, tag, frame.
+type Key = (&'static [Tag], Tag, Option<usize>);
+
 /// Values of the needed attributes that the data set contains, as stored bytes.
 #[derive(Debug)]
 pub(super) struct Attributes {
@@ -114,7 +197,10 @@ pub(super) struct Attributes {
     pub file: String,
     /// Byte order of the values.
     pub byte_order: ByteOrder,
-    values: BTreeMap<(Option<Tag>, Tag), Vec<u8>>,
+    /// Media Storage SOP Class UID (0002,0002), which stands in for a missing SOP Class UID.
+    pub media_class: Option<String>,
+    values: BTreeMap<Key, Vec<u8>>,
+    bytes: usize,
 }
 
 impl Attributes {
@@ -123,13 +209,22 @@ impl Attributes {
         Self {
             file: file.into(),
             byte_order,
+            media_class: None,
             values: BTreeMap::new(),
+            bytes: 0,
         }
     }
 
-    /// Stores the bytes of `attribute`.
-    pub(super) fn insert(&mut self, attribute: Attribute, value: Vec<u8>) {
-        self.values.insert(attribute.key(), value);
+    /// Whether a value of `length` bytes more can be kept.
+    pub(super) fn has_room(&self, length: u64) -> bool {
+        self.values.len() < MOST_VALUES && self.bytes as u64 + length <= MOST_BYTES as u64
+    }
+
+    /// Stores the bytes of `attribute`, which belong to `frame` or to all.
+    pub(super) fn insert(&mut self, attribute: Attribute, frame: Option<usize>, value: Vec<u8>) {
+        self.bytes += value.len();
+        let key = (attribute.path, attribute.tag, frame);
+        self.values.insert(key, value);
     }
 
     /// The error for an invalid value of `field`. Long values are cut.
@@ -152,15 +247,30 @@ impl Attributes {
         )
     }
 
-    fn bytes(&self, attribute: Attribute) -> Option<&[u8]> {
-        let value = self.values.get(&attribute.key())?;
-        (!value.is_empty()).then_some(value)
+    /// Whether the file says what kind of object it is, as far as it was read.
+    pub(super) fn names_a_class(&self) -> bool {
+        self.media_class.is_some() || self.text(SOP_CLASS).is_some()
+    }
+
+    fn bytes_of(&self, attribute: Attribute, frame: Option<usize>) -> Option<&[u8]> {
+        let value = |frame| {
+            let value = self.values.get(&(attribute.path, attribute.tag, frame))?;
+            (!value.is_empty()).then_some(value.as_slice())
+        };
+        match frame {
+            Some(_) => value(frame).or_else(|| value(None)),
+            None => value(None),
+        }
     }
 
     /// The values of a text attribute, which are separated by backslashes; an empty list if the
     /// attribute is absent or empty.
     pub(super) fn texts(&self, attribute: Attribute) -> Vec<String> {
-        let text = String::from_utf8_lossy(self.bytes(attribute).unwrap_or_default());
+        self.texts_of(attribute, None)
+    }
+
+    fn texts_of(&self, attribute: Attribute, frame: Option<usize>) -> Vec<String> {
+        let text = String::from_utf8_lossy(self.bytes_of(attribute, frame).unwrap_or_default());
         let parts = text
             .split('\\')
             .map(|p| p.trim_matches(['\0', ' ']).to_owned());
@@ -171,6 +281,23 @@ impl Attributes {
         }
     }
 
+    /// The first value of a text attribute.
+    pub(super) fn text(&self, attribute: Attribute) -> Option<String> {
+        let first = self.texts(attribute).into_iter().next();
+        first.filter(|text| !text.is_empty())
+    }
+
+    /// The whole text of an attribute in the data set's character set, for people to read.
+    pub(super) fn prose(&self, attribute: Attribute) -> Option<String> {
+        let bytes = self.bytes_of(attribute, None)?;
+        let code = self.text(CHARACTER_SET);
+        let set = code.and_then(|code| SpecificCharacterSet::from_code(&code));
+        let decoded = set.and_then(|set| set.decode(bytes).ok());
+        let text = decoded.unwrap_or_else(|| String::from_utf8_lossy(bytes).into_owned());
+        let text = text.trim_matches(['\0', ' ']);
+        (!text.is_empty()).then(|| text.to_owned())
+    }
+
     /// The `N` decimal numbers (DS, IS) of an attribute, `None` if it is absent or empty.
     ///
     /// # Errors
@@ -179,7 +306,16 @@ impl Attributes {
         &self,
         attribute: Attribute,
     ) -> Result<Option<[f64; N]>, VolumeError> {
-        let texts = self.texts(attribute);
+        self.decimals_of(attribute, None)
+    }
+
+    /// As [`Attributes::decimals`], for stored frame number `frame`, from 0.
+    pub(super) fn decimals_of<const N: usize>(
+        &self,
+        attribute: Attribute,
+        frame: Option<usize>,
+    ) -> Result<Option<[f64; N]>, VolumeError> {
+        let texts = self.texts_of(attribute, frame);
         if texts.is_empty() {
             return Ok(None);
         }
@@ -196,12 +332,27 @@ impl Attributes {
 
     /// The 16-bit numbers (US, AT) of an attribute; an empty list if it is absent.
     pub(super) fn shorts(&self, attribute: Attribute) -> Vec<u16> {
-        let (numbers, _) = self.bytes(attribute).unwrap_or_default().as_chunks::<2>();
+        self.shorts_of(attribute, None)
+    }
+
+    /// As [`Attributes::shorts`], for stored frame number `frame`, from 0.
+    pub(super) fn shorts_of(&self, attribute: Attribute, frame: Option<usize>) -> Vec<u16> {
+        let bytes = self.bytes_of(attribute, frame).unwrap_or_default();
+        let (numbers, _) = bytes.as_chunks::<2>();
         let number = |b: &[u8; 2]| match self.byte_order {
             ByteOrder::Little => u16::from_le_bytes(*b),
             ByteOrder::Big => u16::from_be_bytes(*b),
         };
         numbers.iter().map(number).collect()
+    }
+
+    /// The first 32-bit number (UL) of an attribute of stored frame number `frame`.
+    pub(super) fn long_of(&self, attribute: Attribute, frame: usize) -> Option<u32> {
+        let bytes = self.bytes_of(attribute, Some(frame))?.first_chunk()?;
+        Some(match self.byte_order {
+            ByteOrder::Little => u32::from_le_bytes(*bytes),
+            ByteOrder::Big => u32::from_be_bytes(*bytes),
+        })
     }
 
     /// The first 16-bit number of a required attribute.
@@ -214,8 +365,8 @@ impl Attributes {
     }
 
     /// The 64-bit floating-point number (FD) of an attribute, `None` if it is absent.
-    pub(super) fn double(&self, attribute: Attribute) -> Option<f64> {
-        let bytes = self.bytes(attribute)?.first_chunk()?;
+    pub(super) fn double(&self, attribute: Attribute, frame: Option<usize>) -> Option<f64> {
+        let bytes = self.bytes_of(attribute, frame)?.first_chunk()?;
         Some(match self.byte_order {
             ByteOrder::Little => f64::from_le_bytes(*bytes),
             ByteOrder::Big => f64::from_be_bytes(*bytes),

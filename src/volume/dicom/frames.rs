@@ -6,60 +6,12 @@
 
 use super::super::VolumeError;
 use super::attributes::{
-    Attribute, Attributes, DETECTOR_VECTOR, ENERGY_WINDOW_VECTOR, FRAME_POINTER, IMAGE_TYPE,
-    MODALITY, NUMBER_OF_FRAMES, ROTATION_VECTOR, RR_INTERVAL_VECTOR, SLICE_VECTOR, SOP_CLASS,
-    TIME_SLOT_VECTOR, clip,
+    Attribute, Attributes, DETECTOR_VECTOR, ENERGY_WINDOW_VECTOR, FRAME_POINTER, ROTATION_VECTOR,
+    RR_INTERVAL_VECTOR, SLICE_VECTOR, TIME_SLOT_VECTOR,
 };
-
-/// SOP class of the multi-frame Nuclear Medicine Image.
-const NM_IMAGE: &str = "1.2.840.10008.5.1.4.1.1.20";
 
 /// Vectors that the pointer may name in addition if all of their numbers are 1.
 const IDLE_VECTORS: [Attribute; 3] = [ENERGY_WINDOW_VECTOR, DETECTOR_VECTOR, ROTATION_VECTOR];
-
-/// Checks that the object is a reconstructed NM image, and returns whether it is gated.
-///
-/// # Errors
-/// [`VolumeError::Field`] for another SOP class, [`VolumeError::NotSlices`] for another Image
-/// Type.
-pub(super) fn check_kind(attributes: &Attributes) -> Result<bool, VolumeError> {
-    let sop_class = attributes.texts(SOP_CLASS);
-    let sop_class = sop_class.first().map_or("missing", String::as_str);
-    if sop_class != NM_IMAGE {
-        let modality = attributes.texts(MODALITY).join("\\");
-        return Err(attributes.wrong(
-            SOP_CLASS.name,
-            sop_class,
-            format!(
-                "only the Nuclear Medicine Image ({NM_IMAGE}) is supported (modality: {})",
-                match modality.is_empty() {
-                    true => "none".into(),
-                    false => clip(&modality),
-                }
-            ),
-        ));
-    }
-    let image_type = attributes.texts(IMAGE_TYPE);
-    let shown = image_type.get(2).map_or("", String::as_str);
-    let refuse = |reason| {
-        Err(VolumeError::NotSlices {
-            file: attributes.file.clone(),
-            image_type: clip(shown),
-            reason,
-        })
-    };
-    match shown {
-        "RECON TOMO" => Ok(false),
-        "RECON GATED TOMO" => Ok(true),
-        "TOMO" | "GATED TOMO" => {
-            refuse("its frames are projections acquired around the patient, not slices")
-        }
-        "STATIC" | "DYNAMIC" | "GATED" | "WHOLE BODY" => {
-            refuse("its frames are planar images, not slices")
-        }
-        _ => refuse("only RECON TOMO and RECON GATED TOMO contain reconstructed slices"),
-    }
-}
 
 /// The stored frames of each gate in the order of its slices.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -71,16 +23,16 @@ pub(super) struct FrameOrder {
 }
 
 impl FrameOrder {
-    /// Reads the slice vector, and the vectors of R-R intervals and time slots if `gated`.
+    /// Reads the slice vector of `frames` frames, and the vectors of R-R intervals and time slots if `gated`.
     ///
     /// # Errors
     /// [`VolumeError::Field`] unless every slice of every gate occurs exactly once.
     pub(super) fn of(
         attributes: &Attributes,
+        frames: usize,
         gated: bool,
         warnings: &mut Vec<String>,
     ) -> Result<Self, VolumeError> {
-        let frames = number_of_frames(attributes)?;
         let vectors: &[Attribute] = match gated {
             true => &[RR_INTERVAL_VECTOR, TIME_SLOT_VECTOR, SLICE_VECTOR],
             false => &[SLICE_VECTOR],
@@ -139,21 +91,6 @@ impl FrameOrder {
     /// The stored frames of `gate`, from its first slice to its last.
     pub(super) fn slices_of(&self, gate: usize) -> &[usize] {
         &self.stored[gate * self.slices..(gate + 1) * self.slices]
-    }
-}
-
-fn number_of_frames(attributes: &Attributes) -> Result<usize, VolumeError> {
-    let Some([frames]) = attributes.decimals(NUMBER_OF_FRAMES)? else {
-        return Err(attributes.missing(NUMBER_OF_FRAMES));
-    };
-    // The vectors hold 16 bits per frame in an element of at most one mebibyte.
-    match frames.fract() == 0.0 && (1.0..=524_288.0).contains(&frames) {
-        true => Ok(frames as usize),
-        false => Err(attributes.wrong(
-            NUMBER_OF_FRAMES.name,
-            &frames.to_string(),
-            "expected a whole number from 1 to 524288".into(),
-        )),
     }
 }
 

@@ -1,4 +1,4 @@
-//! Position and orientation of the slices in the patient.
+//! Position and orientation of the slices of a Nuclear Medicine Image in the patient.
 //!
 //! After PS3.3 C.8.4.15: Image Position (Patient) in the first item of the Detector Information
 //! Sequence is the position of the *first* slice. Slice k lies at position + (row x column) *
@@ -12,8 +12,8 @@ use super::super::VolumeError;
 use super::super::facts::AffineSource;
 use super::super::open::Placement;
 use super::attributes::{
-    Attributes, DETECTOR_ORIENTATION, DETECTOR_POSITION, ORIENTATION, PIXEL_SPACING, POSITION,
-    SLICE_THICKNESS, SPACING_BETWEEN_SLICES,
+    Attributes, DETECTOR_ORIENTATION, DETECTOR_POSITION, FRAME_PIXEL_SPACING, ORIENTATION,
+    PIXEL_SPACING, POSITION, SLICE_THICKNESS, SPACING_BETWEEN_SLICES,
 };
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
@@ -28,17 +28,7 @@ const COSINE_SLACK: f64 = 1e-2;
 /// [`VolumeError::Field`] for invalid or missing spacings and directions.
 pub(super) fn place(a: &Attributes, shape: [usize; 3]) -> Result<Placement, VolumeError> {
     let mut warnings = Vec::new();
-    let Some([between_rows, between_columns]) = a.decimals(PIXEL_SPACING)? else {
-        return Err(a.missing(PIXEL_SPACING));
-    };
-    if between_rows <= 0.0 || between_columns <= 0.0 {
-        let value = format!("{between_rows}\\{between_columns}");
-        return Err(a.wrong(
-            PIXEL_SPACING.name,
-            &value,
-            "expected positive numbers".into(),
-        ));
-    }
+    let [between_rows, between_columns] = pixel_spacing(a, None)?;
     let between_slices = slice_spacing(a, &mut warnings)?;
     let orientation = match a.decimals(DETECTOR_ORIENTATION)? {
         Some(orientation) => Some(orientation),
@@ -88,6 +78,25 @@ pub(super) fn place(a: &Attributes, shape: [usize; 3]) -> Result<Placement, Volu
     })
 }
 
+/// Distance of rows and distance of columns, mm, of `frame` or of the whole file.
+pub(super) fn pixel_spacing(a: &Attributes, frame: Option<usize>) -> Result<[f64; 2], VolumeError> {
+    let stated = match a.decimals_of(FRAME_PIXEL_SPACING, frame)? {
+        Some(spacing) => Some(spacing),
+        None => a.decimals(PIXEL_SPACING)?,
+    };
+    let Some([between_rows, between_columns]) = stated else {
+        return Err(a.missing(PIXEL_SPACING));
+    };
+    match between_rows > 0.0 && between_columns > 0.0 {
+        true => Ok([between_rows, between_columns]),
+        false => Err(a.wrong(
+            PIXEL_SPACING.name,
+            &format!("{between_rows}\\{between_columns}"),
+            "expected positive numbers".into(),
+        )),
+    }
+}
+
 /// Signed distance of slices along row x column, mm.
 fn slice_spacing(a: &Attributes, warnings: &mut Vec<String>) -> Result<f64, VolumeError> {
     match a.decimals(SPACING_BETWEEN_SLICES)? {
@@ -111,7 +120,7 @@ fn slice_spacing(a: &Attributes, warnings: &mut Vec<String>) -> Result<f64, Volu
 }
 
 /// Unit vectors along a row (toward higher columns) and along a column (toward higher rows).
-fn directions(a: &Attributes, cosines: [f64; 6]) -> Result<(Vec3, Vec3), VolumeError> {
+pub(super) fn directions(a: &Attributes, cosines: [f64; 6]) -> Result<(Vec3, Vec3), VolumeError> {
     let [x0, x1, x2, y0, y1, y2] = cosines;
     let (x, y) = (Vec3::new(x0, x1, x2), Vec3::new(y0, y1, y2));
     let unit = |v: &Vec3| (v.norm() - 1.0).abs() <= COSINE_SLACK;

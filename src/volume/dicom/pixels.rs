@@ -1,90 +1,354 @@
-//! Storage of the pixels, checked against the length of their element.
+//! Pixels of one file: how they are stored, checked against what the file holds, and read frame by
+//! frame.
 
 use super::super::VolumeError;
-use super::super::decode::{DataType, VoxelFormat};
+use super::super::decode::{DataType, Figures, VoxelFormat, VoxelReader};
 use super::super::facts::ByteOrder;
 use super::super::limits::ReadLimits;
-use super::super::source::Source;
+use super::super::source::{Source, VolumeFile};
 use super::attributes::{
-    Attributes, BITS_ALLOCATED, BITS_STORED, COLUMNS, HIGH_BIT, PIXEL_REPRESENTATION,
-    REAL_WORLD_INTERCEPT, REAL_WORLD_SLOPE, RESCALE_INTERCEPT, RESCALE_SLOPE, ROWS, SAMPLES,
+    Attributes, BITS_ALLOCATED, BITS_STORED, COLUMNS, FRAME_REAL_WORLD_INTERCEPT,
+    FRAME_REAL_WORLD_SLOPE, FRAME_RESCALE_INTERCEPT, FRAME_RESCALE_SLOPE, HIGH_BIT, MODALITY_TABLE,
+    NUMBER_OF_FRAMES, PHOTOMETRIC, PIXEL_REPRESENTATION, REAL_WORLD_INTERCEPT, REAL_WORLD_SLOPE,
+    RESCALE_INTERCEPT, RESCALE_SLOPE, ROWS, SAMPLES,
 };
-use super::scan::{PixelElement, Scan};
+use super::codec::{self, FrameLayout};
+use super::fragments::frames_of;
+use super::kind::Kind;
+use super::scan::{Fragment, PixelElement, PixelPlace, Scan};
+use super::syntax::Syntax;
+use crate::progress::Cancelled;
 
-/// Layout of the pixels of all frames.
-#[derive(Debug)]
+/// Slope and intercept; `None` if the values are stored as they are.
+pub(super) type Scaling = Option<(f64, f64)>;
+
+/// The pixels of one file.
 pub(super) struct Pixels {
-    /// Columns, rows, slices: voxels along i, j, k.
-    pub shape: [usize; 3],
-    /// How a pixel is stored.
-    pub format: VoxelFormat,
-    /// Offset of the first frame in the unpacked file, bytes.
-    begin: u64,
+    file: VolumeFile,
+    syntax: Syntax,
+    /// Most unpacked bytes of the file to read.
+    limit: u64,
+    /// Columns and rows.
+    pub extent: [usize; 2],
+    /// Stored frames.
+    pub frames: usize,
+    /// Type of a stored number.
+    pub data_type: DataType,
+    /// Byte order of the stored numbers.
+    pub byte_order: ByteOrder,
+    unused_bits: u32,
+    /// One for each frame, or one for all.
+    scaling: Vec<Scaling>,
+    storage: Storage,
+}
+
+/// Where the frames are.
+enum Storage {
+    /// One after the other from this byte on.
+    Whole { begin: u64 },
+    /// As `Whole`, one bit per pixel without padding between the frames.
+    Bits { begin: u64 },
+    /// Compressed, each in one or several fragments.
+    Frames(Vec<Vec<Fragment>>),
 }
 
 impl Pixels {
-    /// Checks the layout of the pixels found by `scan`: `gates` volumes of `slices` frames.
+    /// Checks the layout of the pixels in `scan`.
     ///
     /// # Errors
-    /// [`VolumeError`] for unsupported pixel formats, more voxels than `limits` allows, and
+    /// [`VolumeError`] for unsupported pixel formats, more voxels than `limits` allow, and
     /// elements too short for the stated frames.
     pub(super) fn of(
         scan: &Scan,
-        slices: usize,
-        gates: usize,
+        file: &VolumeFile,
+        syntax: Syntax,
         limits: &ReadLimits,
-        source: &Source,
     ) -> Result<Self, VolumeError> {
         let a = &scan.attributes;
-        let samples = a.shorts(SAMPLES).first().copied().unwrap_or(1);
-        if samples != 1 {
-            let reason = "expected 1: colour images are not supported".into();
-            return Err(a.wrong(SAMPLES.name, &samples.to_string(), reason));
-        }
-        let extent = |attribute| match a.short(attribute)? {
+        check_colours(a)?;
+        let size = |attribute| match a.short(attribute)? {
             0 => Err(a.wrong(attribute.name, "0", "expected at least 1".into())),
             n => Ok(usize::from(n)),
         };
-        let shape = [extent(COLUMNS)?, extent(ROWS)?, slices];
+        let extent = [size(COLUMNS)?, size(ROWS)?];
+        let frames = number_of_frames(a, scan.kind)?;
         let (data_type, unused_bits) = data_type(scan)?;
-        let pixels = Self {
-            shape,
-            format: VoxelFormat {
-                file: a.file.clone(),
-                shape,
-                data_type,
-                byte_order: a.byte_order,
-                unused_bits,
-                scaling: scaling(a)?,
-            },
-            begin: scan.begin,
-        };
+        let bits = a.short(BITS_ALLOCATED).is_ok_and(|n| n == 1);
         // Cannot overflow: two factors of 16 bits and one of 20 bits.
-        let voxels = (pixels.frame_voxels() * slices) as u64;
-        if voxels > limits.voxels {
-            return Err(VolumeError::TooLarge {
-                file: a.file.clone(),
-                what: "voxels",
-                asked: voxels,
-                limit: limits.voxels,
-            });
+        let voxels = (extent[0] * extent[1] * frames) as u64;
+        let most = limits.voxels;
+        // One gate is read at a time, but every frame of a segmentation.
+        let one = match scan.kind {
+            Kind::Segmentation => voxels,
+            _ => (extent[0] * extent[1]) as u64,
+        };
+        if one > most {
+            return Err(too_many_voxels(a, one, most));
         }
-        let bytes = voxels * gates as u64 * data_type.size() as u64;
-        match bytes > scan.length {
-            true => Err(source.truncated(scan.begin + bytes, scan.begin + scan.length)),
-            false => Ok(pixels),
-        }
+        let storage =
+            match &scan.pixels {
+                PixelPlace::Whole { begin, length } => {
+                    let bytes = match bits {
+                        true => voxels.div_ceil(8),
+                        false => voxels * data_type.size() as u64,
+                    };
+                    if bytes > *length {
+                        return Err(VolumeError::Truncated {
+                            file: a.file.clone(),
+                            needed: begin + bytes,
+                            found: begin + length,
+                        });
+                    }
+                    match bits {
+                        true => Storage::Bits { begin: *begin },
+                        false => Storage::Whole { begin: *begin },
+                    }
+                }
+                PixelPlace::Fragments { offsets, fragments } => {
+                    if bits {
+                        let reason = "bits are not compressed in this transfer syntax".into();
+                        return Err(a.wrong(BITS_ALLOCATED.name, "1", reason));
+                    }
+                    let pixels = extent[0] * extent[1];
+                    if pixels > codec::MOST_PIXELS {
+                        return Err(VolumeError::TooLarge {
+                            file: a.file.clone(),
+                            what: "pixels in a compressed frame",
+                            asked: pixels as u64,
+                            limit: codec::MOST_PIXELS as u64,
+                        });
+                    }
+                    let frames = frames_of(offsets, fragments, frames);
+                    Storage::Frames(frames.map_err(|reason| {
+                        a.wrong("Pixel Data (7FE0,0010)", "in fragments", reason)
+                    })?)
+                }
+            };
+        let scaling = match scan.kind {
+            Kind::Segmentation => vec![None],
+            Kind::Enhanced => {
+                let each = (0..frames).map(|frame| scaling(a, Some(frame)));
+                each.collect::<Result<_, _>>()?
+            }
+            _ => vec![scaling(a, None)?],
+        };
+        Ok(Self {
+            file: file.clone(),
+            byte_order: match storage {
+                // Decoded frames are little endian.
+                Storage::Frames(_) | Storage::Bits { .. } => ByteOrder::Little,
+                Storage::Whole { .. } => a.byte_order,
+            },
+            limit: limits.unpacked_bytes,
+            extent,
+            frames,
+            data_type,
+            unused_bits,
+            scaling,
+            storage,
+            syntax,
+        })
     }
 
     /// Voxels of one frame.
     pub(super) fn frame_voxels(&self) -> usize {
-        self.shape[0] * self.shape[1]
+        self.extent[0] * self.extent[1]
     }
 
-    /// Offset of stored frame number `frame`, from 0, bytes.
-    pub(super) fn frame_begin(&self, frame: usize) -> u64 {
-        let bytes = self.frame_voxels() * self.format.data_type.size();
-        self.begin + frame as u64 * bytes as u64
+    /// Whether the file is gzipped.
+    pub(super) fn is_gzip(&self) -> bool {
+        self.syntax.gzip
+    }
+
+    /// Slope and intercept of stored frame number `frame`.
+    pub(super) fn scaling(&self, frame: usize) -> Scaling {
+        let only = self.scaling.first().copied().flatten();
+        self.scaling.get(frame).copied().unwrap_or(only)
+    }
+
+    /// Opens the file to read its frames from the first to the last.
+    pub(super) fn open(&self) -> Result<FrameReader<'_>, VolumeError> {
+        Ok(FrameReader {
+            pixels: self,
+            source: self.syntax.open(&self.file, self.limit)?,
+            bits: BitRow::default(),
+        })
+    }
+}
+
+/// The error for a volume of too many voxels.
+pub(super) fn too_many_voxels(a: &Attributes, asked: u64, limit: u64) -> VolumeError {
+    VolumeError::TooLarge {
+        file: a.file.clone(),
+        what: "voxels",
+        asked,
+        limit,
+    }
+}
+
+/// Reads the frames of a file in rising order.
+pub(super) struct FrameReader<'a> {
+    pixels: &'a Pixels,
+    source: Source,
+    bits: BitRow,
+}
+
+impl FrameReader<'_> {
+    /// Decodes stored frame number `frame` in portions, gives each to `take` with the number of voxels
+    /// before it in the frame, and adds them to `figures`.
+    ///
+    /// # Errors
+    /// [`VolumeError`] if the file is damaged or cut off.
+    pub(super) fn read(
+        &mut self,
+        frame: usize,
+        slice: usize,
+        figures: Figures,
+        take: &mut dyn FnMut(usize, &[f32]),
+        report: &mut dyn FnMut(f64) -> Result<(), Cancelled>,
+    ) -> Result<Figures, VolumeError> {
+        let pixels = self.pixels;
+        let count = pixels.frame_voxels();
+        let [columns, rows] = pixels.extent;
+        let format = VoxelFormat {
+            file: pixels.file.name().into(),
+            shape: [columns, rows, slice + 1],
+            data_type: pixels.data_type,
+            byte_order: pixels.byte_order,
+            unused_bits: pixels.unused_bits,
+            scaling: pixels.scaling(frame),
+        };
+        let mut unpacked;
+        let (source, begin) = match &pixels.storage {
+            Storage::Whole { begin } => {
+                let bytes = (count * pixels.data_type.size()) as u64;
+                (&mut self.source, begin + frame as u64 * bytes)
+            }
+            Storage::Bits { begin } => {
+                let bytes = self.bits.read(&mut self.source, *begin, frame, count)?;
+                unpacked = Source::plain(&pixels.file, bytes);
+                (&mut unpacked, 0)
+            }
+            Storage::Frames(frames) => {
+                let bytes = self.decompress(&frames[frame])?;
+                unpacked = Source::plain(&pixels.file, bytes);
+                (&mut unpacked, 0)
+            }
+        };
+        let mut reader = VoxelReader::continuing(figures, format, source);
+        reader.stream(begin, count, take, report)?;
+        Ok(reader.into_figures())
+    }
+
+    /// Reads and decodes a compressed frame.
+    fn decompress(&mut self, fragments: &[Fragment]) -> Result<Vec<u8>, VolumeError> {
+        let pixels = self.pixels;
+        let [columns, rows] = pixels.extent;
+        let layout = FrameLayout {
+            columns,
+            rows,
+            size: pixels.data_type.size(),
+        };
+        // No encoder makes more of the numbers than twice their size.
+        let most = 2 * columns * rows * layout.size + (64 << 10);
+        let length: u64 = fragments.iter().map(|f| u64::from(f.length)).sum();
+        let corrupt = |byte, reason| VolumeError::Corrupt {
+            file: pixels.file.name().into(),
+            byte,
+            reason,
+        };
+        let begin = fragments.first().map_or(0, |f| f.begin);
+        if length > most as u64 {
+            let reason = format!("a frame of {most} bytes at most is stored in {length} bytes");
+            return Err(corrupt(begin, reason));
+        }
+        let mut packed = vec![0; length as usize];
+        let mut filled = 0;
+        for fragment in fragments {
+            self.source.skip_to(fragment.begin)?;
+            let end = filled + fragment.length as usize;
+            let needed = fragment.begin + u64::from(fragment.length);
+            self.source.fill_all(&mut packed[filled..end], needed)?;
+            filled = end;
+        }
+        codec::decode(pixels.syntax.compression, &packed, layout)
+            .map_err(|reason| corrupt(begin, reason))
+    }
+}
+
+/// The place in pixels of one bit.
+#[derive(Default)]
+struct BitRow {
+    /// The next frame.
+    next: usize,
+    held: u8,
+    /// Bits of `held` that belong to the next frame.
+    left: u32,
+}
+
+impl BitRow {
+    /// The bits of `frame`, the least significant of each byte first, as bytes 0 and 1.
+    fn read(
+        &mut self,
+        source: &mut Source,
+        begin: u64,
+        frame: usize,
+        count: usize,
+    ) -> Result<Vec<u8>, VolumeError> {
+        debug_assert!(frame == self.next, "bits are read from front to back");
+        if frame == 0 {
+            source.skip_to(begin)?;
+        }
+        let mut bits = Vec::with_capacity(count);
+        let mut byte = [0];
+        while bits.len() < count {
+            if self.left == 0 {
+                let needed = source.position() + 1;
+                source.fill_all(&mut byte, needed)?;
+                (self.held, self.left) = (byte[0], 8);
+            }
+            let taken = (self.left as usize).min(count - bits.len());
+            for _ in 0..taken {
+                bits.push(self.held & 1);
+                self.held >>= 1;
+            }
+            self.left -= taken as u32;
+        }
+        self.next = frame + 1;
+        Ok(bits)
+    }
+}
+
+/// Refuses pictures in colour.
+fn check_colours(a: &Attributes) -> Result<(), VolumeError> {
+    let samples = a.shorts(SAMPLES).first().copied().unwrap_or(1);
+    if samples != 1 {
+        let reason = "expected 1: colour images are not supported".into();
+        return Err(a.wrong(SAMPLES.name, &samples.to_string(), reason));
+    }
+    match a.text(PHOTOMETRIC) {
+        Some(meaning) if !meaning.starts_with("MONOCHROME") => {
+            let reason = "expected MONOCHROME1 or MONOCHROME2".into();
+            Err(a.wrong(PHOTOMETRIC.name, &meaning, reason))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn number_of_frames(a: &Attributes, kind: Kind) -> Result<usize, VolumeError> {
+    let frames = match a.decimals(NUMBER_OF_FRAMES)? {
+        Some([frames]) => frames,
+        None if matches!(kind, Kind::Nuclear { .. }) => return Err(a.missing(NUMBER_OF_FRAMES)),
+        None => 1.0,
+    };
+    let (most, reason) = match kind.is_single_slice() {
+        true => (1.0, "expected 1 for this SOP class"),
+        // The vectors hold 16 bits per frame in an element of at most one mebibyte.
+        false => (524_288.0, "expected a whole number from 1 to 524288"),
+    };
+    match frames.fract() == 0.0 && (1.0..=most).contains(&frames) {
+        true => Ok(frames as usize),
+        false => Err(a.wrong(NUMBER_OF_FRAMES.name, &frames.to_string(), reason.into())),
     }
 }
 
@@ -97,6 +361,9 @@ fn data_type(scan: &Scan) -> Result<(DataType, u32), VolumeError> {
         PixelElement::Double => return Ok((DataType::F64, 0)),
     }
     let allocated = a.short(BITS_ALLOCATED)?;
+    if allocated == 1 && scan.kind == Kind::Segmentation && a.byte_order == ByteOrder::Little {
+        return Ok((DataType::U8, 0));
+    }
     let signed = match a.short(PIXEL_REPRESENTATION)? {
         0 => false,
         1 => true,
@@ -106,9 +373,9 @@ fn data_type(scan: &Scan) -> Result<(DataType, u32), VolumeError> {
         }
     };
     let data_type = match (allocated, signed) {
-        // In big endian files two 8-bit pixels share a word in swapped order.
-        (8, _) if a.byte_order == ByteOrder::Big => {
-            let reason = "8-bit pixels in big endian byte order are not supported".into();
+        // Two 8-bit pixels share a word in swapped order.
+        (8, _) if a.byte_order == ByteOrder::Big && scan.words => {
+            let reason = "8-bit pixels in big endian words are not supported".into();
             return Err(a.wrong(BITS_ALLOCATED.name, "8", reason));
         }
         (8, false) => DataType::U8,
@@ -135,21 +402,36 @@ fn data_type(scan: &Scan) -> Result<(DataType, u32), VolumeError> {
     Ok((data_type, u32::from(allocated - stored)))
 }
 
-/// Slope and intercept: Rescale Slope and Intercept, otherwise the first item of the Real World
-/// Value Mapping; `None` if there is neither or they change nothing.
-fn scaling(a: &Attributes) -> Result<Option<(f64, f64)>, VolumeError> {
-    let (field, slope, inter) = match a.decimals(RESCALE_SLOPE)? {
-        Some([slope]) => {
-            let [inter] = a.decimals(RESCALE_INTERCEPT)?.unwrap_or([0.0]);
-            (RESCALE_SLOPE.name, slope, inter)
+/// Slope and intercept of `frame` or of the whole file: Rescale Slope and Intercept, otherwise the
+/// first item of the Real World Value Mapping; `None` if there is neither or they change nothing.
+fn scaling(a: &Attributes, frame: Option<usize>) -> Result<Scaling, VolumeError> {
+    let rescale = [
+        (FRAME_RESCALE_SLOPE, FRAME_RESCALE_INTERCEPT),
+        (RESCALE_SLOPE, RESCALE_INTERCEPT),
+    ];
+    let real_world = [
+        (FRAME_REAL_WORLD_SLOPE, FRAME_REAL_WORLD_INTERCEPT),
+        (REAL_WORLD_SLOPE, REAL_WORLD_INTERCEPT),
+    ];
+    let mut found = None;
+    for (slope, inter) in rescale {
+        if let (None, Some([value])) = (&found, a.decimals_of(slope, frame)?) {
+            let [inter] = a.decimals_of(inter, frame)?.unwrap_or([0.0]);
+            found = Some((slope.name, value, inter));
         }
-        None => match a.double(REAL_WORLD_SLOPE) {
-            Some(slope) => {
-                let inter = a.double(REAL_WORLD_INTERCEPT).unwrap_or(0.0);
-                (REAL_WORLD_SLOPE.name, slope, inter)
-            }
-            None => return Ok(None),
-        },
+    }
+    if found.is_none() && !a.shorts(MODALITY_TABLE).is_empty() {
+        let reason = "values by a table are not supported; expected Rescale Slope".into();
+        return Err(a.wrong(MODALITY_TABLE.name, "present", reason));
+    }
+    for (slope, inter) in real_world {
+        if let (None, Some(value)) = (&found, a.double(slope, frame)) {
+            let inter = a.double(inter, frame).unwrap_or(0.0);
+            found = Some((slope.name, value, inter));
+        }
+    }
+    let Some((field, slope, inter)) = found else {
+        return Ok(None);
     };
     if !slope.is_finite() || slope == 0.0 || !inter.is_finite() {
         let value = format!("{slope} (intercept {inter})");

@@ -1,98 +1,173 @@
-//! Whose scan a volume is and which DICOM objects it came from.
+//! Whose scan a volume is, how it was made and which DICOM objects it came from.
 
 use super::attributes::{
-    ACCESSION_NUMBER, Attribute, Attributes, FRAME_OF_REFERENCE, INSTANCE, MANUFACTURER, MODALITY,
-    MODEL_NAME, PATIENT_BIRTH_DATE, PATIENT_ID, PATIENT_NAME, PATIENT_SEX,
-    POSITION_REFERENCE_INDICATOR, REFERRING_PHYSICIAN, SERIES, SERIES_DESCRIPTION, SERIES_NUMBER,
-    SOP_CLASS, STUDY, STUDY_DATE, STUDY_ID, STUDY_TIME,
+    ACCESSION_NUMBER, ACQUISITION_DATE, ACQUISITION_DATE_TIME, ACQUISITION_TIME, Attributes,
+    CONTENT_DATE, CONTEXT_MEANING, CONVOLUTION_KERNEL, FRAME_OF_REFERENCE, IMAGE_TYPE,
+    INJECTED_DOSE, INJECTION_TIME, MANUFACTURER, MODALITY, MODEL_NAME, NUCLIDE_MEANING,
+    PATIENT_BIRTH_DATE, PATIENT_ID, PATIENT_NAME, PATIENT_SEX, PHARMACEUTICAL_MEANING,
+    PHARMACEUTICAL_NAME, POSITION_REFERENCE, PROTOCOL_MEANING, PROTOCOL_NAME,
+    RECONSTRUCTION_METHOD, REFERRING_PHYSICIAN, SERIES_DATE, SERIES_DESCRIPTION, SERIES_NUMBER,
+    SERIES_UID, SOFTWARE_VERSIONS, SOP_CLASS, SOP_INSTANCE, STUDY_DATE, STUDY_DESCRIPTION,
+    STUDY_ID, STUDY_TIME, STUDY_UID,
 };
 use std::fmt;
 
-/// Patient, study, series and instances of a volume, as its DICOM header states them (PS3.3 C.7).
-/// An attribute that is absent or empty is `None`.
-///
-/// This is personal data. `Debug` shows no value of it, so that it cannot get into a log.
-#[derive(Clone, Default, PartialEq, Eq)]
-pub struct Provenance {
+macro_rules! provenance {
+    ($($(#[$doc:meta])* $field:ident = $attribute:expr;)*) => {
+        /// Patient, study, series, instances and acquisition of a volume, as its DICOM header states
+        /// them (PS3.3 C.7, C.8.4). An attribute that is absent or empty is `None`.
+        ///
+        /// This is personal data. `Debug` shows no value of it, so that it cannot get into a log.
+        #[derive(Clone, Default, PartialEq, Eq)]
+        pub struct Provenance {
+            $($(#[$doc])* pub $field: Option<String>,)*
+            /// `rest` or `stress`, from the acquisition context, the protocol, or the descriptions of
+            /// series and study.
+            pub rest_or_stress: Option<&'static str>,
+            /// SOP Instance UIDs of a series of several instances, in the order of the volume's
+            /// slices; empty for a single one.
+            pub instance_uids: Vec<String>,
+            /// For every slice of the volume, the number of its stored frame in the instance, from 1;
+            /// empty for a series of single-frame instances, and for a segmentation.
+            pub slice_frames: Vec<u32>,
+        }
+
+        impl Provenance {
+            /// What the data set says, without the frames of the slices.
+            pub(super) fn of(a: &Attributes) -> Self {
+                Self {
+                    $($field: a.prose($attribute),)*
+                    rest_or_stress: rest_or_stress(a),
+                    instance_uids: Vec::new(),
+                    slice_frames: Vec::new(),
+                }
+                .settled(a)
+            }
+
+            /// The stated values, each with its name, without the numbers of slices.
+            pub fn stated(&self) -> Vec<(&'static str, &str)> {
+                let fields = [$((stringify!($field), self.$field.as_deref()),)*];
+                let state = ("rest_or_stress", self.rest_or_stress);
+                fields
+                    .into_iter()
+                    .chain([state])
+                    .filter_map(|(name, value)| Some((name, value?)))
+                    .collect()
+            }
+        }
+    };
+}
+
+provenance! {
     /// Patient's Name (0010,0010), components separated by `^`.
-    pub patient_name: Option<String>,
+    patient_name = PATIENT_NAME;
     /// Patient ID (0010,0020).
-    pub patient_id: Option<String>,
+    patient_id = PATIENT_ID;
     /// Patient's Birth Date (0010,0030), `YYYYMMDD`.
-    pub patient_birth_date: Option<String>,
+    patient_birth_date = PATIENT_BIRTH_DATE;
     /// Patient's Sex (0010,0040): `M`, `F` or `O`.
-    pub patient_sex: Option<String>,
+    patient_sex = PATIENT_SEX;
     /// Study Instance UID (0020,000D).
-    pub study_uid: Option<String>,
+    study_uid = STUDY_UID;
     /// Study Date (0008,0020), `YYYYMMDD`.
-    pub study_date: Option<String>,
+    study_date = STUDY_DATE;
     /// Study Time (0008,0030), `HHMMSS.FFFFFF`.
-    pub study_time: Option<String>,
+    study_time = STUDY_TIME;
     /// Study ID (0020,0010).
-    pub study_id: Option<String>,
+    study_id = STUDY_ID;
+    /// Study Description (0008,1030).
+    study_description = STUDY_DESCRIPTION;
     /// Accession Number (0008,0050).
-    pub accession_number: Option<String>,
+    accession_number = ACCESSION_NUMBER;
     /// Referring Physician's Name (0008,0090).
-    pub referring_physician: Option<String>,
+    referring_physician = REFERRING_PHYSICIAN;
     /// Series Instance UID (0020,000E).
-    pub series_uid: Option<String>,
+    series_uid = SERIES_UID;
     /// Series Number (0020,0011).
-    pub series_number: Option<String>,
+    series_number = SERIES_NUMBER;
     /// Series Description (0008,103E).
-    pub series_description: Option<String>,
+    series_description = SERIES_DESCRIPTION;
     /// Modality (0008,0060).
-    pub modality: Option<String>,
+    modality = MODALITY;
+    /// Image Type (0008,0008), values separated by backslashes.
+    image_type = IMAGE_TYPE;
     /// Frame of Reference UID (0020,0052).
-    pub frame_of_reference_uid: Option<String>,
+    frame_of_reference_uid = FRAME_OF_REFERENCE;
     /// Position Reference Indicator (0020,1040).
-    pub position_reference_indicator: Option<String>,
+    position_reference_indicator = POSITION_REFERENCE;
     /// SOP Class UID (0008,0016) of the instances.
-    pub sop_class_uid: Option<String>,
+    sop_class_uid = SOP_CLASS;
     /// SOP Instance UID (0008,0018); of a series of several instances, the first one's.
-    pub sop_instance_uid: Option<String>,
-    /// SOP Instance UIDs of a series of several instances, in the order of the volume's slices;
-    /// empty for a single one.
-    pub instance_uids: Vec<String>,
-    /// For every slice of the volume, the number of its stored frame in the instance, from 1; empty
-    /// for a series of single-frame instances.
-    pub slice_frames: Vec<u32>,
+    sop_instance_uid = SOP_INSTANCE;
+    /// Acquisition Date (0008,0022), or the date in Acquisition `DateTime` (0008,002A), or the
+    /// Series Date, `YYYYMMDD`.
+    acquisition_date = ACQUISITION_DATE;
+    /// Acquisition Time (0008,0032), or the time in Acquisition `DateTime` (0008,002A).
+    acquisition_time = ACQUISITION_TIME;
+    /// Meaning of the Radiopharmaceutical Code (0054,0304), or the Radiopharmaceutical (0018,0031).
+    radiopharmaceutical = PHARMACEUTICAL_MEANING;
+    /// Meaning of the Radionuclide Code (0054,0300).
+    radionuclide = NUCLIDE_MEANING;
+    /// Radionuclide Total Dose (0018,1074) as stored: MBq in NM images, Bq in PET images.
+    injected_dose = INJECTED_DOSE;
+    /// Radiopharmaceutical Start Time (0018,1072).
+    injection_time = INJECTION_TIME;
     /// Manufacturer (0008,0070) of the equipment.
-    pub manufacturer: Option<String>,
+    manufacturer = MANUFACTURER;
     /// Manufacturer's Model Name (0008,1090).
-    pub model_name: Option<String>,
+    model_name = MODEL_NAME;
+    /// Software Versions (0018,1020).
+    software_versions = SOFTWARE_VERSIONS;
+    /// Protocol Name (0018,1030).
+    protocol_name = PROTOCOL_NAME;
+    /// Reconstruction Method (0054,1103).
+    reconstruction_method = RECONSTRUCTION_METHOD;
+    /// Convolution Kernel (0018,1210).
+    convolution_kernel = CONVOLUTION_KERNEL;
 }
 
 impl Provenance {
-    /// What the data set says, without the frames of the slices.
-    pub(super) fn of(attributes: &Attributes) -> Self {
-        let text = |attribute: Attribute| {
-            let text = attributes.texts(attribute).join("\\");
-            (!text.is_empty()).then_some(text)
+    /// Takes values from attributes that say the same where the first choice is empty.
+    fn settled(mut self, a: &Attributes) -> Self {
+        let moment = a.prose(ACQUISITION_DATE_TIME);
+        let date = moment.as_ref().and_then(|moment| moment.get(..8));
+        let time = moment.as_ref().and_then(|moment| moment.get(8..));
+        let or = |value: Option<String>, other: Option<&str>| {
+            value.or_else(|| other.filter(|o| !o.is_empty()).map(str::to_owned))
         };
-        Self {
-            patient_name: text(PATIENT_NAME),
-            patient_id: text(PATIENT_ID),
-            patient_birth_date: text(PATIENT_BIRTH_DATE),
-            patient_sex: text(PATIENT_SEX),
-            study_uid: text(STUDY),
-            study_date: text(STUDY_DATE),
-            study_time: text(STUDY_TIME),
-            study_id: text(STUDY_ID),
-            accession_number: text(ACCESSION_NUMBER),
-            referring_physician: text(REFERRING_PHYSICIAN),
-            series_uid: text(SERIES),
-            series_number: text(SERIES_NUMBER),
-            series_description: text(SERIES_DESCRIPTION),
-            modality: text(MODALITY),
-            frame_of_reference_uid: text(FRAME_OF_REFERENCE),
-            position_reference_indicator: text(POSITION_REFERENCE_INDICATOR),
-            sop_class_uid: text(SOP_CLASS),
-            sop_instance_uid: text(INSTANCE),
-            manufacturer: text(MANUFACTURER),
-            model_name: text(MODEL_NAME),
-            ..Self::default()
-        }
+        self.acquisition_date = or(self.acquisition_date, date)
+            .or_else(|| a.prose(SERIES_DATE))
+            .or_else(|| a.prose(CONTENT_DATE));
+        self.acquisition_time = or(self.acquisition_time, time);
+        self.radiopharmaceutical = self
+            .radiopharmaceutical
+            .or_else(|| a.prose(PHARMACEUTICAL_NAME));
+        self
     }
+}
+
+/// `rest` or `stress` if exactly one of them is named, by the most telling attribute that names one.
+fn rest_or_stress(a: &Attributes) -> Option<&'static str> {
+    [
+        CONTEXT_MEANING,
+        PROTOCOL_MEANING,
+        PROTOCOL_NAME,
+        SERIES_DESCRIPTION,
+        STUDY_DESCRIPTION,
+    ]
+    .into_iter()
+    .find_map(|attribute| {
+        let text = a.prose(attribute)?.to_lowercase();
+        let words: Vec<&str> = text.split(|c: char| !c.is_alphabetic()).collect();
+        let any = |names: &[&str]| words.iter().any(|word| names.contains(word));
+        let rest = any(&["rest", "resting", "rst", "ruhe", "repos"]);
+        let stress = any(&["stress", "str", "strs", "exercise", "belastung", "effort"]);
+        match (rest, stress) {
+            (true, false) => Some("rest"),
+            (false, true) => Some("stress"),
+            _ => None,
+        }
+    })
 }
 
 impl fmt::Debug for Provenance {

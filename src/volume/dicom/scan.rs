@@ -9,11 +9,11 @@ use super::super::VolumeError;
 use super::super::facts::ByteOrder;
 use super::super::source::Source;
 use super::attributes::{Attribute, Attributes};
-use super::frames::check_kind;
-use super::syntax::Syntax;
+use super::kind::Kind;
+use super::syntax::{Compression, Syntax};
 use crate::progress::Monitor;
-use dicom_core::Tag;
 use dicom_core::header::DataElementHeader;
+use dicom_core::{Tag, VR};
 use dicom_encoding::transfer_syntax::Endianness;
 use dicom_parser::dataset::LazyDataToken;
 use dicom_parser::dataset::lazy_read::LazyDataSetReader;
@@ -24,6 +24,9 @@ const DEEPEST: usize = 32;
 
 /// Longest value of a needed attribute, bytes.
 const LONGEST: u64 = 1 << 20;
+
+/// Most pieces of compressed pixels in one file.
+const MOST_FRAGMENTS: usize = 1 << 18;
 
 /// Tokens between two checks for cancellation.
 const TOKENS_PER_CHECK: usize = 4096;
@@ -44,12 +47,35 @@ pub(super) enum PixelElement {
 pub(super) struct Scan {
     /// Values of the needed attributes.
     pub attributes: Attributes,
+    /// What the object is.
+    pub kind: Kind,
     /// The element that holds the pixels.
     pub element: PixelElement,
-    /// Offset of the first pixel in the unpacked file, bytes.
+    /// Whether the value representation of the pixels is OW.
+    pub words: bool,
+    /// Where the pixels are.
+    pub pixels: PixelPlace,
+}
+
+/// Where the pixels of a file are. Offsets are those of the unpacked file.
+#[derive(Debug)]
+pub(super) enum PixelPlace {
+    /// In one piece of `length` bytes from byte `begin` on.
+    Whole { begin: u64, length: u64 },
+    /// In fragments, of which the first item, the Basic Offset Table, is kept apart.
+    Fragments {
+        offsets: Vec<u32>,
+        fragments: Vec<Fragment>,
+    },
+}
+
+/// A piece of compressed pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Fragment {
+    /// Offset of its first byte.
     pub begin: u64,
-    /// Length of the pixel element, bytes.
-    pub length: u64,
+    /// Its length, bytes.
+    pub length: u32,
 }
 
 /// Scans the data set that begins at the position of `source`, up to its pixels.
@@ -62,13 +88,52 @@ pub(super) fn scan(
     syntax: &Syntax,
     monitor: &Monitor,
 ) -> Result<Scan, VolumeError> {
-    let file = source.file().to_owned();
-    let capacity = source.capacity();
-    let ts = syntax.transfer_syntax;
-    let byte_order = match ts.endianness() {
+    let byte_order = match syntax.transfer_syntax.endianness() {
         Endianness::Little => ByteOrder::Little,
         Endianness::Big => ByteOrder::Big,
     };
+    let mut walk = Walk::new(Attributes::new(source.file(), byte_order));
+    walk.attributes.media_class.clone_from(&syntax.media_class);
+    let found = find_pixels(source, syntax, &mut walk, monitor);
+    // For another kind of object, the kind is the more useful error.
+    let kind = match &found {
+        Err(VolumeError::Cancelled(_)) => None,
+        Err(_) if !walk.attributes.names_a_class() => None,
+        _ => Some(Kind::of(&walk.attributes)?),
+    };
+    let (Some(found), Some(kind)) = (found?, kind) else {
+        return Err(walk.attributes.wrong(
+            "Pixel Data (7FE0,0010)",
+            "missing",
+            "the file contains no image".into(),
+        ));
+    };
+    Ok(Scan {
+        attributes: walk.attributes,
+        kind,
+        element: found.element,
+        words: found.words,
+        pixels: found.pixels,
+    })
+}
+
+/// The pixel element.
+struct Found {
+    element: PixelElement,
+    words: bool,
+    pixels: PixelPlace,
+}
+
+/// Walks through the data set up to its pixels; `None` if there are none.
+fn find_pixels(
+    source: &mut Source,
+    syntax: &Syntax,
+    walk: &mut Walk,
+    monitor: &Monitor,
+) -> Result<Option<Found>, VolumeError> {
+    let file = source.file().to_owned();
+    let capacity = source.capacity();
+    let ts = syntax.transfer_syntax;
     let damaged = |byte: u64, e: &dyn std::fmt::Display| VolumeError::Corrupt {
         file: file.clone(),
         byte,
@@ -77,7 +142,7 @@ pub(super) fn scan(
     let start = source.position();
     let decoder = DynStatefulDecoder::new_with(source, ts, Default::default(), start);
     let mut reader = LazyDataSetReader::new(decoder.map_err(|e| damaged(start, &e))?);
-    let mut walk = Walk::new(Attributes::new(&file, byte_order));
+    let mut pixels: Option<Pieces> = None;
     let mut tokens = 0_usize;
     let mut byte = start;
     while let Some(token) = reader.advance() {
@@ -89,7 +154,10 @@ pub(super) fn scan(
             LazyDataToken::ElementHeader(_) => {}
             LazyDataToken::LazyValue { header, decoder } => {
                 byte = decoder.position();
-                let length = header.len.get().map_or(u64::MAX, u64::from);
+                let Some(length) = header.len.get().map(u64::from) else {
+                    let element = format!("the length of {} is undefined", header.tag);
+                    return Err(damaged(byte, &element));
+                };
                 if length > capacity.saturating_sub(byte) {
                     return Err(VolumeError::Truncated {
                         file,
@@ -98,28 +166,72 @@ pub(super) fn scan(
                     });
                 }
                 if let Some(element) = walk.pixels(&header) {
-                    return Ok(Scan {
-                        attributes: walk.attributes,
+                    if syntax.compression != Compression::None {
+                        return Err(walk.attributes.wrong(
+                            "Pixel Data (7FE0,0010)",
+                            "in one piece",
+                            format!(
+                                "the transfer syntax {} stores pixels in fragments",
+                                ts.name()
+                            ),
+                        ));
+                    }
+                    return Ok(Some(Found {
                         element,
-                        begin: byte,
-                        length,
-                    });
+                        words: header.vr == VR::OW,
+                        pixels: PixelPlace::Whole {
+                            begin: byte,
+                            length,
+                        },
+                    }));
                 }
                 let kept = walk.take(&header, length, decoder)?;
                 kept.map_err(|e| damaged(byte, &e))?;
             }
             LazyDataToken::LazyItemValue { len, decoder } => {
-                decoder.skip_bytes(len).map_err(|e| damaged(byte, &e))?;
+                byte = decoder.position();
+                let end = byte.saturating_add(u64::from(len));
+                if end > capacity {
+                    return Err(VolumeError::Truncated {
+                        file,
+                        needed: end,
+                        found: capacity,
+                    });
+                }
+                let done = match &mut pixels {
+                    Some(pieces) => pieces.take(byte, len, decoder),
+                    None => decoder.skip_bytes(len),
+                };
+                done.map_err(|e| damaged(byte, &e))?;
+                if pixels.as_ref().is_some_and(Pieces::are_too_many) {
+                    return Err(walk.attributes.wrong(
+                        "Pixel Data (7FE0,0010)",
+                        "in more fragments",
+                        format!("at most {MOST_FRAGMENTS} fragments are read"),
+                    ));
+                }
             }
             LazyDataToken::PixelSequenceStart => {
-                return Err(walk.attributes.wrong(
-                    "Pixel Data (7FE0,0010)",
-                    "in fragments",
-                    format!(
-                        "the transfer syntax {} stores pixels in one piece",
-                        ts.name()
-                    ),
-                ));
+                if syntax.compression == Compression::None {
+                    return Err(walk.attributes.wrong(
+                        "Pixel Data (7FE0,0010)",
+                        "in fragments",
+                        format!(
+                            "the transfer syntax {} stores pixels in one piece",
+                            ts.name()
+                        ),
+                    ));
+                }
+                pixels = Some(Pieces::default());
+            }
+            LazyDataToken::SequenceEnd if pixels.is_some() => break,
+            // Each item is either the offset table or a fragment.
+            LazyDataToken::ItemStart { len } if pixels.is_some() => {
+                if let Some(pieces) = &mut pixels
+                    && len.get() == Some(0)
+                {
+                    pieces.empty();
+                }
             }
             LazyDataToken::SequenceStart { tag, .. } => walk.enter(tag)?,
             LazyDataToken::ItemStart { .. } => walk.next_item(),
@@ -127,13 +239,58 @@ pub(super) fn scan(
             _ => {}
         }
     }
-    // For another kind of object, the kind is the more useful error.
-    check_kind(&walk.attributes)?;
-    Err(walk.attributes.wrong(
-        "Pixel Data (7FE0,0010)",
-        "missing",
-        "the file contains no image".into(),
-    ))
+    let pieces = pixels.filter(|pieces| !pieces.fragments.is_empty());
+    Ok(pieces.map(|pieces| Found {
+        element: PixelElement::Integer,
+        words: false,
+        pixels: PixelPlace::Fragments {
+            offsets: pieces.offsets,
+            fragments: pieces.fragments,
+        },
+    }))
+}
+
+/// The fragments of the pixels found so far.
+#[derive(Default)]
+struct Pieces {
+    /// Whether the first item, the Basic Offset Table, has been seen.
+    begun: bool,
+    offsets: Vec<u32>,
+    fragments: Vec<Fragment>,
+}
+
+impl Pieces {
+    /// Adds an item without content.
+    fn empty(&mut self) {
+        self.begun = true;
+    }
+
+    /// Adds the item of `length` bytes at `begin`, which `decoder` is about to read.
+    fn take<D: StatefulDecode>(
+        &mut self,
+        begin: u64,
+        length: u32,
+        decoder: &mut D,
+    ) -> dicom_parser::stateful::decode::Result<()> {
+        let table = !std::mem::replace(&mut self.begun, true);
+        if !table {
+            self.fragments.push(Fragment { begin, length });
+            return decoder.skip_bytes(length);
+        }
+        // A longer table belongs to more frames than are read, and is not needed.
+        if u64::from(length) > LONGEST {
+            return decoder.skip_bytes(length);
+        }
+        let mut bytes = Vec::new();
+        decoder.read_to_vec(length, &mut bytes)?;
+        let (offsets, _) = bytes.as_chunks::<4>();
+        self.offsets = offsets.iter().map(|b| u32::from_le_bytes(*b)).collect();
+        Ok(())
+    }
+
+    fn are_too_many(&self) -> bool {
+        self.fragments.len() > MOST_FRAGMENTS
+    }
 }
 
 /// State of the pass: the open sequences and the values collected so far.
@@ -190,16 +347,17 @@ impl Walk {
         length: u64,
         decoder: &mut D,
     ) -> Result<dicom_parser::stateful::decode::Result<()>, VolumeError> {
-        let wanted = match self.path.as_slice() {
-            [] => Attribute::find(None, header.tag),
-            [(sequence, 1)] => Attribute::find(Some(*sequence), header.tag),
-            _ => None,
-        };
         // The caller has checked that the length comes from a 32-bit field.
         let bytes = length as u32;
-        let Some(attribute) = wanted else {
+        let Some((attribute, frame)) = Attribute::find(&self.path, header.tag) else {
             return Ok(decoder.skip_bytes(bytes));
         };
+        if !self.attributes.has_room(length) {
+            let reason = "the file describes more frames than are read".into();
+            return Err(self
+                .attributes
+                .wrong(attribute.name, "given too often", reason));
+        }
         if length > LONGEST {
             let reason = format!("a value may be at most {LONGEST} bytes long");
             let value = format!("{length} bytes long");
@@ -207,7 +365,7 @@ impl Walk {
         }
         let mut value = Vec::new();
         let read = decoder.read_to_vec(bytes, &mut value);
-        self.attributes.insert(attribute, value);
+        self.attributes.insert(attribute, frame, value);
         Ok(read)
     }
 }

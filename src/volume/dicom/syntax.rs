@@ -1,4 +1,4 @@
-//! Finds the start of the data set and its encoding.
+//! Finds the start of the data set, its encoding and the compression of its pixels.
 //!
 //! After PS3.10, a file begins with 128 bytes of preamble, `DICM`, and group 0002 in Explicit VR
 //! Little Endian, which names the transfer syntax. Old files lack the preamble or all three. They
@@ -21,12 +21,62 @@ const EXPLICIT_BIG: &str = "1.2.840.10008.1.2.2";
 /// Deflated Explicit VR Little Endian, the only transfer syntax that compresses whole data sets.
 const DEFLATED: &str = "1.2.840.10008.1.2.1.99";
 
+/// How the pixels are compressed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Compression {
+    /// Not at all.
+    None,
+    /// Run lengths, PS3.5 annex G.
+    Rle,
+    /// JPEG (ISO 10918-1): baseline, or lossless with any predictor.
+    Jpeg,
+    /// JPEG-LS (ISO 14495-1).
+    JpegLs,
+    /// JPEG 2000 (ISO 15444-1).
+    Jpeg2000,
+}
+
+/// The transfer syntaxes with compressed pixels that are read.
+const COMPRESSED: [(&str, Compression); 8] = [
+    ("1.2.840.10008.1.2.5", Compression::Rle),
+    ("1.2.840.10008.1.2.4.50", Compression::Jpeg),
+    ("1.2.840.10008.1.2.4.57", Compression::Jpeg),
+    ("1.2.840.10008.1.2.4.70", Compression::Jpeg),
+    ("1.2.840.10008.1.2.4.80", Compression::JpegLs),
+    ("1.2.840.10008.1.2.4.81", Compression::JpegLs),
+    ("1.2.840.10008.1.2.4.90", Compression::Jpeg2000),
+    ("1.2.840.10008.1.2.4.91", Compression::Jpeg2000),
+];
+
 /// Start and encoding of a data set.
 pub(super) struct Syntax {
     /// Offset of the data set's first byte in the unpacked file.
     pub data_set: u64,
-    /// The encoding.
+    /// The encoding of the data set.
     pub transfer_syntax: &'static TransferSyntax,
+    /// Whether the data set is deflated. Its offsets count inflated bytes.
+    pub deflated: bool,
+    /// How the pixels are compressed.
+    pub compression: Compression,
+    /// Whether the file is gzipped.
+    pub gzip: bool,
+    /// Media Storage SOP Class UID (0002,0002).
+    pub media_class: Option<String>,
+}
+
+impl Syntax {
+    /// Opens `file` at the start of its data set.
+    ///
+    /// # Errors
+    /// [`VolumeError`] if the file cannot be read.
+    pub(super) fn open(&self, file: &VolumeFile, limit: u64) -> Result<Source, VolumeError> {
+        if self.deflated {
+            return Source::inflate(file, self.data_set, limit);
+        }
+        let mut source = Source::open(file, limit)?;
+        source.skip_to(self.data_set)?;
+        Ok(source)
+    }
 }
 
 /// Whether a file that begins with `start` is a DICOM file.
@@ -54,12 +104,13 @@ fn guess(start: &[u8]) -> Option<&'static TransferSyntax> {
 /// Finds the data set of `file`.
 ///
 /// # Errors
-/// [`VolumeError::Unsupported`] for compressed or unknown transfer syntaxes, and
+/// [`VolumeError::Unsupported`] for transfer syntaxes that are not read, and
 /// [`VolumeError::Field`] if group 0002 is damaged or the encoding cannot be determined.
 pub(super) fn find(file: &VolumeFile, limits: &ReadLimits) -> Result<Syntax, VolumeError> {
     let reach = META_REACH.min(usize::try_from(limits.unpacked_bytes).unwrap_or(META_REACH));
     let mut start = vec![0; reach];
-    let there = Source::open(file, limits.unpacked_bytes)?.fill(&mut start)?;
+    let mut source = Source::open(file, limits.unpacked_bytes)?;
+    let there = source.fill(&mut start)?;
     start.truncate(there);
     let begin = match start.get(128..132) {
         Some(b"DICM") => 132,
@@ -72,38 +123,44 @@ pub(super) fn find(file: &VolumeFile, limits: &ReadLimits) -> Result<Syntax, Vol
         reason: format!("the group must end within {META_REACH} bytes"),
         byte: Some(begin as u64),
     })?;
-    let transfer_syntax = match &meta.transfer_syntax {
-        Some(uid) => known(uid, file)?,
-        None => guess(&start[meta.end..]).ok_or_else(|| VolumeError::Field {
-            file: file.name().into(),
-            field: "Transfer Syntax UID (0002,0010)",
-            value: "missing".into(),
-            reason: "the encoding cannot be determined from the first element either".into(),
-            byte: Some(meta.end as u64),
-        })?,
+    let unknown = || VolumeError::Field {
+        file: file.name().into(),
+        field: "Transfer Syntax UID (0002,0010)",
+        value: "missing".into(),
+        reason: "the encoding cannot be determined from the first element either".into(),
+        byte: Some(meta.end as u64),
     };
-    Ok(Syntax {
-        data_set: meta.end as u64,
-        transfer_syntax,
-    })
+    let uid = match &meta.transfer_syntax {
+        Some(uid) => uid.as_str(),
+        None => guess(&start[meta.end..]).ok_or_else(unknown)?.uid(),
+    };
+    let transfer_syntax = TransferSyntaxRegistry.get(uid);
+    let deflated = uid == DEFLATED;
+    let listed = COMPRESSED.iter().find(|(known, _)| *known == uid);
+    let compression = match (transfer_syntax, listed) {
+        (Some(_), Some((_, compression))) => Some(*compression),
+        (Some(syntax), None) if deflated || syntax.is_codec_free() => Some(Compression::None),
+        _ => None,
+    };
+    match (transfer_syntax, compression) {
+        (Some(transfer_syntax), Some(compression)) => Ok(Syntax {
+            data_set: meta.end as u64,
+            transfer_syntax,
+            deflated,
+            compression,
+            gzip: source.is_gzip(),
+            media_class: meta.media_class,
+        }),
+        _ => Err(refuse(file, transfer_syntax, uid)),
+    }
 }
 
-/// The transfer syntax with `uid`, if it is uncompressed.
-fn known(uid: &str, file: &VolumeFile) -> Result<&'static TransferSyntax, VolumeError> {
-    let refuse = |format: String| VolumeError::Unsupported {
+fn refuse(file: &VolumeFile, syntax: Option<&TransferSyntax>, uid: &str) -> VolumeError {
+    let name = syntax.map_or("an unknown transfer syntax", TransferSyntax::name);
+    VolumeError::Unsupported {
         file: file.name().into(),
-        format,
-        fix: "Store it uncompressed, in Explicit VR Little Endian (1.2.840.10008.1.2.1).",
-    };
-    match TransferSyntaxRegistry.get(uid) {
-        Some(syntax) if syntax.is_codec_free() && uid != DEFLATED => Ok(syntax),
-        Some(syntax) => Err(refuse(format!("a DICOM file in {} ({uid})", syntax.name()))),
-        None => {
-            let uid = clip(uid);
-            Err(refuse(format!(
-                "a DICOM file in an unknown transfer syntax ({uid})"
-            )))
-        }
+        format: format!("a DICOM file in {name} ({})", clip(uid)),
+        fix: "Send it uncompressed, or in RLE, JPEG Lossless, JPEG-LS or JPEG 2000.",
     }
 }
 
@@ -111,6 +168,7 @@ fn known(uid: &str, file: &VolumeFile) -> Result<&'static TransferSyntax, Volume
 struct Meta {
     end: usize,
     transfer_syntax: Option<String>,
+    media_class: Option<String>,
 }
 
 impl Meta {
@@ -119,6 +177,7 @@ impl Meta {
         let mut meta = Self {
             end: begin,
             transfer_syntax: None,
+            media_class: None,
         };
         while let Some([2, 0, element @ ..]) = start[meta.end..].first_chunk::<8>() {
             let long = matches!(
@@ -137,9 +196,14 @@ impl Meta {
             };
             let end = value.checked_add(length)?;
             let bytes = start.get(value..end)?;
-            if element[..2] == [0x10, 0] {
+            let text = || {
                 let text = String::from_utf8_lossy(bytes);
-                meta.transfer_syntax = Some(text.trim_matches(['\0', ' ']).to_owned());
+                Some(text.trim_matches(['\0', ' ']).to_owned())
+            };
+            match element[..2] {
+                [0x10, 0] => meta.transfer_syntax = text(),
+                [0x02, 0] => meta.media_class = text().filter(|class| !class.is_empty()),
+                _ => {}
             }
             meta.end = end;
         }

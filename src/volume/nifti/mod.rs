@@ -75,6 +75,7 @@ impl OpenVolume for NiftiFile {
             scaling: self.header.scaling,
             file_shape: self.header.dim.clone(),
             frames: self.header.frames,
+            gated: false,
             shape: self.header.shape,
             placement: &self.placement,
             unit: self.header.unit,

@@ -1,0 +1,181 @@
+//! What a DICOM object is, and what to send instead of one that holds no volume.
+
+use super::super::VolumeError;
+use super::attributes::{Attributes, IMAGE_TYPE, MODALITY, SOP_CLASS, clip};
+use dicom_core::dictionary::{UidDictionary, UidDictionaryEntry};
+use dicom_dictionary_std::StandardSopClassDictionary;
+
+/// What the caller can send.
+const READABLE: &str = "Send reconstructed slices: a multi-frame NM image with the Image Type \
+    RECON TOMO or RECON GATED TOMO, an Enhanced PET, CT or MR image, all files of one PET, CT or MR \
+    series (as several files or as one zip), or a Segmentation.";
+
+/// The objects that hold slices.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Nuclear Medicine Image with the Image Type RECON TOMO or RECON GATED TOMO: the frames are
+    /// ordered by vectors.
+    Nuclear {
+        /// Whether it holds several gates.
+        gated: bool,
+    },
+    /// One slice of a PET, CT or MR series.
+    Slice,
+    /// Enhanced or Legacy Converted Enhanced PET, CT or MR image: every frame has its own position.
+    Enhanced,
+    /// Segmentation or Label Map Segmentation.
+    Segmentation,
+}
+
+/// SOP classes of the objects that hold slices, after their common prefix.
+const READ: [(&str, Kind); 12] = [
+    ("20", Kind::Nuclear { gated: false }),
+    ("2", Kind::Slice),
+    ("4", Kind::Slice),
+    ("128", Kind::Slice),
+    ("2.1", Kind::Enhanced),
+    ("2.2", Kind::Enhanced),
+    ("4.1", Kind::Enhanced),
+    ("4.4", Kind::Enhanced),
+    ("130", Kind::Enhanced),
+    ("128.1", Kind::Enhanced),
+    ("66.4", Kind::Segmentation),
+    ("66.7", Kind::Segmentation),
+];
+
+/// Beginning of the SOP classes of stored objects.
+const STORAGE: &str = "1.2.840.10008.5.1.4.1.1.";
+
+/// Why an object holds no volume, by the beginning of its SOP class after [`STORAGE`]; the first entry
+/// that fits counts.
+const OTHERS: [(&str, &str); 17] = [
+    ("7", "a picture without a position in the patient"),
+    ("66.5", "surfaces, not voxels"),
+    ("66", "a registration or measurement, not an image"),
+    ("481.1", "a projection, not slices"),
+    ("481.2", "radiation dose, not an image of the patient"),
+    (
+        "481.3",
+        "contours, not voxels; send the image series that it refers to",
+    ),
+    ("481", "a treatment plan or record, not an image"),
+    (
+        "88",
+        "a report, not an image; send the image series that it refers to",
+    ),
+    ("104", "a document or a surface model, not voxels"),
+    ("9", "a waveform, not an image"),
+    (
+        "11",
+        "how to present images; send the images that it refers to",
+    ),
+    ("30", "a map of figures, which is not read"),
+    (
+        "77",
+        "a photograph or microscopy, not slices of the patient",
+    ),
+    ("6", "ultrasound pictures, not slices"),
+    ("3", "ultrasound pictures, not slices"),
+    ("12", "projections, not slices"),
+    ("1", "projections, not slices"),
+];
+
+/// The directory of a medium.
+const DIRECTORY: &str = "1.2.840.10008.1.3.10";
+
+impl Kind {
+    /// The kind of the object with `attributes`.
+    ///
+    /// # Errors
+    /// [`VolumeError::NotVolume`] for objects that hold no slices, [`VolumeError::NotSlices`] for
+    /// images whose Image Type says so.
+    pub(super) fn of(attributes: &Attributes) -> Result<Self, VolumeError> {
+        let class = attributes.text(SOP_CLASS);
+        let class = class.or_else(|| attributes.media_class.clone());
+        let image_type = attributes.texts(IMAGE_TYPE);
+        let refuse = |found: String, reason: &'static str| {
+            Err(VolumeError::NotVolume {
+                file: attributes.file.clone(),
+                found,
+                reason,
+                fix: READABLE,
+            })
+        };
+        let Some(class) = class else {
+            let found = "a DICOM data set without a SOP Class UID (0008,0016)".into();
+            return refuse(found, "it does not say what it holds");
+        };
+        if class == DIRECTORY {
+            let found = "a DICOMDIR (Media Storage Directory)".into();
+            return refuse(found, "a list of files; send the image files that it lists");
+        }
+        let suffix = class.strip_prefix(STORAGE).unwrap_or_default();
+        if let Some((_, kind)) = READ.iter().find(|(read, _)| *read == suffix) {
+            return match kind {
+                Self::Nuclear { .. } => nuclear(attributes, &image_type),
+                Self::Slice if image_type.iter().any(|value| value == "LOCALIZER") => {
+                    Err(VolumeError::NotSlices {
+                        file: attributes.file.clone(),
+                        image_type: "LOCALIZER".into(),
+                        reason: "it is a projection for planning, not a slice",
+                    })
+                }
+                kind => Ok(*kind),
+            };
+        }
+        let name = StandardSopClassDictionary.by_uid(&class);
+        let name = name.map_or("object of an unknown SOP class", |entry| entry.name());
+        let name = name.trim_end_matches(" Storage");
+        let modality = attributes.texts(MODALITY).join("\\");
+        let modality = match modality.is_empty() {
+            true => String::new(),
+            false => format!(", modality {}", clip(&modality)),
+        };
+        let begins = |begin: &str| {
+            let rest = suffix.strip_prefix(begin);
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        };
+        let other = OTHERS.iter().find(|(begin, _)| begins(begin));
+        let reason = other.map_or("an object of a kind that is not read", |(_, reason)| reason);
+        // RT, MR and NM are spoken letter by letter.
+        let spelled = ["RT ", "MR ", "NM "]
+            .iter()
+            .any(|letters| name.starts_with(letters));
+        let article = match spelled || name.starts_with(['A', 'E', 'I', 'O', 'o']) {
+            true => "an",
+            false => "a",
+        };
+        refuse(
+            format!("{article} {name} ({}{modality})", clip(&class)),
+            reason,
+        )
+    }
+
+    /// Whether each file holds one slice.
+    pub(super) fn is_single_slice(self) -> bool {
+        self == Self::Slice
+    }
+}
+
+/// The kind of a Nuclear Medicine Image by value 3 of its Image Type.
+fn nuclear(attributes: &Attributes, image_type: &[String]) -> Result<Kind, VolumeError> {
+    let shown = image_type.get(2).map_or("", String::as_str);
+    let refuse = |reason| {
+        Err(VolumeError::NotSlices {
+            file: attributes.file.clone(),
+            image_type: clip(shown),
+            reason,
+        })
+    };
+    match shown {
+        "RECON TOMO" => Ok(Kind::Nuclear { gated: false }),
+        "RECON GATED TOMO" => Ok(Kind::Nuclear { gated: true }),
+        "TOMO" | "GATED TOMO" => {
+            refuse("its frames are projections acquired around the patient, not slices")
+        }
+        "STATIC" | "DYNAMIC" | "GATED" | "WHOLE BODY" => {
+            refuse("its frames are planar images, not slices")
+        }
+        _ => refuse("only RECON TOMO and RECON GATED TOMO contain reconstructed slices"),
+    }
+}

@@ -1,0 +1,458 @@
+//! Series, Enhanced images, Segmentations, archives, and objects that hold no slices.
+
+use super::super::super::{FileFormat, ReadLimits, VolumeFile, provenance};
+use super::*;
+use std::io::Write as _;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
+
+/// A CT slice of 3 x 2 pixels at `height` mm, with the numbers from `first` on.
+fn ct(height: &'static str, first: u16) -> Elements {
+    BTreeMap::from([
+        ((0x08, 0x05), ("CS", Text("ISO_IR 192"))),
+        ((0x08, 0x08), ("CS", Text("ORIGINAL\\PRIMARY\\AXIAL"))),
+        ((0x08, 0x16), ("UI", Text("1.2.840.10008.5.1.4.1.1.2"))),
+        ((0x08, 0x18), ("UI", Text(height))),
+        ((0x08, 0x60), ("CS", Text("CT"))),
+        ((0x10, 0x10), ("PN", Text("Müller^Ä"))),
+        ((0x18, 0x50), ("DS", Text("2"))),
+        ((0x20, 0x0d), ("UI", Text("1.2.3"))),
+        ((0x20, 0x0e), ("UI", Text("1.2.3.4"))),
+        ((0x20, 0x11), ("IS", Text("7"))),
+        ((0x20, 0x32), ("DS", Text(position(height)))),
+        ((0x20, 0x37), ("DS", Text("1\\0\\0\\0\\1\\0"))),
+        ((0x28, 0x02), ("US", Shorts(vec![1]))),
+        ((0x28, 0x04), ("CS", Text("MONOCHROME2"))),
+        ((0x28, 0x10), ("US", Shorts(vec![2]))),
+        ((0x28, 0x11), ("US", Shorts(vec![3]))),
+        ((0x28, 0x30), ("DS", Text("2.5\\4"))),
+        ((0x28, 0x100), ("US", Shorts(vec![16]))),
+        ((0x28, 0x101), ("US", Shorts(vec![16]))),
+        ((0x28, 0x102), ("US", Shorts(vec![15]))),
+        ((0x28, 0x103), ("US", Shorts(vec![1]))),
+        ((0x28, 0x1052), ("DS", Text("-5"))),
+        ((0x28, 0x1053), ("DS", Text("1"))),
+        ((0x7fe0, 0x10), ("OW", Shorts((first..first + 6).collect()))),
+    ])
+}
+
+fn position(height: &str) -> &'static str {
+    match height {
+        "0" => "1\\2\\0",
+        "3" => "1\\2\\3",
+        "6" => "1\\2\\6",
+        "9" => "1\\2\\9",
+        other => panic!("no position {other}"),
+    }
+}
+
+fn files(slices: &[Elements]) -> Vec<VolumeFile> {
+    let named = slices.iter().enumerate();
+    named
+        .map(|(n, e)| VolumeFile::in_memory(format!("{n}"), Encoding::Explicit.file(e)))
+        .collect()
+}
+
+fn read_files(files: &[VolumeFile]) -> Result<Reading, VolumeError> {
+    let (options, limits) = (ReadOptions::default(), ReadLimits::default());
+    read_volume(files, &options, &limits, &Monitor::silent())
+}
+
+fn archive(files: &[(&str, Vec<u8>)], method: CompressionMethod) -> VolumeFile {
+    let mut zip = ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    let options = SimpleFileOptions::default().compression_method(method);
+    for (name, bytes) in files {
+        zip.start_file(*name, options).unwrap();
+        zip.write_all(bytes).unwrap();
+    }
+    VolumeFile::in_memory("series.zip", zip.finish().unwrap().into_inner())
+}
+
+#[test]
+fn slices_of_a_series_are_ordered_by_their_positions() {
+    let mut scaled = ct("3", 100);
+    scaled.insert((0x28, 0x1053), ("DS", Text("0.5")));
+    let slices = [ct("6", 200), ct("0", 0), scaled];
+    let expected: Vec<f32> = (0..18)
+        .map(|n| match n / 6 {
+            0 => n as f32 - 5.0,
+            1 => (100 + n - 6) as f32 * 0.5 - 5.0,
+            _ => (200 + n - 12) as f32 - 5.0,
+        })
+        .collect();
+    let mut with_company: Vec<(&str, Vec<u8>)> = vec![
+        ("study/DICOMDIR", vec![0; 200]),
+        ("study/read me.txt", b"a series".to_vec()),
+    ];
+    let bytes: Vec<_> = slices.iter().map(|s| Encoding::Explicit.file(s)).collect();
+    for (name, bytes) in ["study/a", "study/b.dcm", "study/c"]
+        .into_iter()
+        .zip(&bytes)
+    {
+        with_company.push((name, bytes.clone()));
+    }
+    for given in [
+        files(&slices),
+        vec![archive(&with_company, CompressionMethod::Stored)],
+        vec![archive(&with_company, CompressionMethod::Deflated)],
+    ] {
+        let reading = read_files(&given).unwrap();
+        assert_eq!(reading.volume.shape, [3, 2, 3]);
+        assert_eq!(reading.volume.voxels, expected);
+        let facts = &reading.facts;
+        assert_eq!(facts.format, FileFormat::DicomSeries);
+        assert_eq!(facts.spacing_mm, [4.0, 2.5, 3.0]);
+        assert_eq!((facts.scaling, facts.warnings.len()), (None, 0));
+        let corner = reading.volume.frame.to_patient(&Vec3::new(2.0, 1.0, 2.0));
+        assert!((corner - Vec3::new(9.0, 4.5, 6.0)).norm() < 1e-12);
+        let from = reading.provenance.unwrap();
+        assert_eq!(from.instance_uids, ["0", "3", "6"]);
+        assert_eq!(from.patient_name.as_deref(), Some("Müller^Ä"));
+        assert_eq!(from.study_uid.as_deref(), Some("1.2.3"));
+        assert!(!format!("{from:?}").contains("ller"));
+    }
+}
+
+#[test]
+fn files_that_are_not_one_series_are_named() {
+    let complain = |slices: &[Elements]| match read_files(&files(slices)) {
+        Err(VolumeError::NotOneSeries { reason, .. }) => reason,
+        other => panic!("{other:?}"),
+    };
+    let gap = complain(&[ct("0", 0), ct("3", 0), ct("9", 0)]);
+    assert!(gap.contains("slices are missing"), "{gap}");
+    let mut other = ct("3", 0);
+    other.insert((0x20, 0x0e), ("UI", Text("9")));
+    other.insert((0x20, 0x11), ("IS", Text("8")));
+    let two = complain(&[ct("0", 0), other]);
+    assert!(two.contains("2 series, numbers 7 (1 files), 8"), "{two}");
+    let mut wide = ct("3", 0);
+    wide.insert((0x28, 0x10), ("US", Shorts(vec![1])));
+    assert!(complain(&[ct("0", 0), wide]).contains("3 x 1"));
+    let volume = complain(&[ct("0", 0), slices()]);
+    assert!(volume.contains("a volume of its own"), "{volume}");
+    let twice = read_files(&files(&[ct("0", 0), ct("3", 0), ct("3", 0)])).unwrap();
+    assert_eq!(twice.volume.shape, [3, 2, 2]);
+    assert!(twice.facts.warnings[0].starts_with("1 files repeat"));
+    let one = read_files(&files(&[ct("3", 0)])).unwrap();
+    assert_eq!(one.facts.spacing_mm, [4.0, 2.5, 2.0]);
+    assert!(one.facts.warnings[0].contains("single slice"));
+}
+
+#[test]
+fn several_slices_at_one_place_are_several_volumes() {
+    let late = |height, first, instance| {
+        let mut slice = ct(height, first);
+        slice.insert((0x08, 0x18), ("UI", Text(instance)));
+        slice.insert((0x18, 0x1060), ("DS", Text("400")));
+        slice
+    };
+    let four = [
+        late("0", 60, "a"),
+        ct("3", 6),
+        late("3", 70, "b"),
+        ct("0", 0),
+    ];
+    let needed = read_files(&files(&four)).unwrap_err();
+    assert_eq!(needed, VolumeError::FrameNeeded { frames: 2 });
+    let options = ReadOptions { frame: Some(1) };
+    let limits = ReadLimits::default();
+    let second = read_volume(&files(&four), &options, &limits, &Monitor::silent()).unwrap();
+    assert_eq!(
+        second.volume.voxels[..7],
+        [55.0, 56.0, 57.0, 58.0, 59.0, 60.0, 65.0]
+    );
+    assert_eq!(second.provenance.unwrap().instance_uids, ["a", "b"]);
+}
+
+fn item(tag: (u16, u16), vr: &'static str, value: Value) -> Elements {
+    BTreeMap::from([(tag, (vr, value))])
+}
+
+fn group(tag: (u16, u16), content: Elements) -> ((u16, u16), (&'static str, Value)) {
+    (tag, ("SQ", Items(vec![content])))
+}
+
+/// An Enhanced PET image of four frames, stored from above, with a scaling of its own each.
+fn enhanced() -> Elements {
+    let mut elements = ct("0", 0);
+    let heights = ["1\\2\\9", "1\\2\\3", "1\\2\\0", "1\\2\\6"];
+    let slopes = ["4", "2", "1", "3"];
+    let frames = heights.into_iter().zip(slopes).map(|(height, slope)| {
+        BTreeMap::from([
+            group((0x20, 0x9113), item((0x20, 0x32), "DS", Text(height))),
+            group((0x28, 0x9145), item((0x28, 0x1053), "DS", Text(slope))),
+        ])
+    });
+    let shared = BTreeMap::from([
+        group(
+            (0x20, 0x9116),
+            item((0x20, 0x37), "DS", Text("1\\0\\0\\0\\1\\0")),
+        ),
+        group((0x28, 0x9110), item((0x28, 0x30), "DS", Text("2.5\\4"))),
+    ]);
+    for tag in [
+        (0x20, 0x32),
+        (0x20, 0x37),
+        (0x28, 0x30),
+        (0x28, 0x1052),
+        (0x28, 0x1053),
+    ] {
+        elements.remove(&tag);
+    }
+    elements.extend([
+        ((0x08, 0x16), ("UI", Text("1.2.840.10008.5.1.4.1.1.130"))),
+        ((0x28, 0x08), ("IS", Text("4"))),
+        ((0x5200, 0x9229), ("SQ", Items(vec![shared]))),
+        ((0x5200, 0x9230), ("SQ", Items(frames.collect()))),
+        ((0x7fe0, 0x10), ("OW", Shorts((0..24).collect()))),
+    ]);
+    elements
+}
+
+#[test]
+fn frames_of_an_enhanced_image_lie_where_they_say() {
+    for encoding in [Encoding::Implicit, Encoding::Explicit, Encoding::BigEndian] {
+        let reading = read_frame(encoding.file(&enhanced()), None).unwrap();
+        assert_eq!(reading.facts.format, FileFormat::DicomEnhanced);
+        assert_eq!(reading.facts.spacing_mm, [4.0, 2.5, 3.0]);
+        // Slices from below: stored frames 2, 1, 3, 0, each with its slope.
+        let of = |frame: usize, slope: f32| (0..6).map(move |n| (6 * frame + n) as f32 * slope);
+        let expected = of(2, 1.0)
+            .chain(of(1, 2.0))
+            .chain(of(3, 3.0))
+            .chain(of(0, 4.0));
+        assert_eq!(reading.volume.voxels, expected.collect::<Vec<_>>());
+        assert_eq!(reading.provenance.unwrap().slice_frames, [3, 2, 4, 1]);
+        let corner = reading.volume.frame.to_patient(&Vec3::new(0.0, 1.0, 3.0));
+        assert!((corner - Vec3::new(1.0, 4.5, 9.0)).norm() < 1e-12);
+    }
+}
+
+/// Nine bits for each of three frames without padding, the first pixel in the lowest bit: pixels 0 and 1
+/// of the first frame, 1 and 3 of the second, 2 and 3 of the third.
+const SEGMENT_BITS: u32 = 1 | 1 << 1 | 1 << (9 + 1) | 1 << (9 + 3) | 1 << (18 + 2) | 1 << (18 + 3);
+
+/// A segmentation of 3 x 3 pixels: segment 1 in slices 0 and 3, segment 2 in slice 0.
+fn segmentation() -> Elements {
+    let mut elements = enhanced();
+    let frames = [("1\\2\\9", 1_u16), ("1\\2\\0", 1), ("1\\2\\0", 2)];
+    let frames = frames.map(|(height, segment)| {
+        BTreeMap::from([
+            group((0x20, 0x9113), item((0x20, 0x32), "DS", Text(height))),
+            group(
+                (0x62, 0x0a),
+                item((0x62, 0x0b), "US", Shorts(vec![segment])),
+            ),
+        ])
+    });
+    let measures = BTreeMap::from([
+        ((0x18, 0x88), ("DS", Text("3"))),
+        ((0x28, 0x30), ("DS", Text("2.5\\4"))),
+    ]);
+    let shared = BTreeMap::from([
+        group(
+            (0x20, 0x9116),
+            item((0x20, 0x37), "DS", Text("1\\0\\0\\0\\1\\0")),
+        ),
+        group((0x28, 0x9110), measures),
+    ]);
+    let (low, high) = (SEGMENT_BITS as u16, (SEGMENT_BITS >> 16) as u16);
+    elements.extend([
+        ((0x08, 0x16), ("UI", Text("1.2.840.10008.5.1.4.1.1.66.4"))),
+        ((0x28, 0x08), ("IS", Text("3"))),
+        ((0x28, 0x10), ("US", Shorts(vec![3]))),
+        ((0x28, 0x100), ("US", Shorts(vec![1]))),
+        ((0x28, 0x101), ("US", Shorts(vec![1]))),
+        ((0x28, 0x102), ("US", Shorts(vec![0]))),
+        ((0x28, 0x103), ("US", Shorts(vec![0]))),
+        ((0x62, 0x01), ("CS", Text("BINARY"))),
+        ((0x5200, 0x9229), ("SQ", Items(vec![shared]))),
+        ((0x5200, 0x9230), ("SQ", Items(frames.to_vec()))),
+        ((0x7fe0, 0x10), ("OB", Shorts(vec![low, high]))),
+    ]);
+    elements
+}
+
+#[test]
+fn segments_become_labels() {
+    let reading = read_elements(&segmentation()).unwrap();
+    assert_eq!(reading.facts.format, FileFormat::DicomSeg);
+    assert_eq!(reading.volume.shape, [3, 3, 4]);
+    let mut expected = vec![0.0; 36];
+    // Pixel 3 of the lowest slice belongs to both segments.
+    for (slice, pixel, label) in [(3, 0, 1), (3, 1, 1), (0, 1, 1), (0, 2, 2), (0, 3, 2)] {
+        expected[9 * slice + pixel] = label as f32;
+    }
+    assert!(reading.facts.warnings[0].starts_with("1 voxels belong to several"));
+    assert_eq!(reading.volume.voxels, expected);
+    assert_eq!(reading.facts.spacing_mm, [4.0, 2.5, 3.0]);
+    let labels = reading.facts.intensity.labels.unwrap();
+    assert!(labels.iter().all(|label| [1, 2].contains(&label.label)));
+    // Far apart frames of a thin grid: refused before memory is taken.
+    let mut far = segmentation();
+    if let Some((_, Items(shared))) = far.get_mut(&(0x5200, 0x9229))
+        && let Some((_, Items(measures))) = shared[0].get_mut(&(0x28, 0x9110))
+    {
+        measures[0].insert((0x18, 0x88), ("DS", Text("0.0001")));
+    }
+    let (field, _) = complaint(read_elements(&far));
+    assert_eq!(field, "Per-frame Functional Groups Sequence (5200,9230)");
+}
+
+#[test]
+fn gates_are_summed_unless_one_is_chosen() {
+    let reading = read_elements(&gated()).unwrap();
+    // Stored frames 2 0 6 5 hold the first slices of the gates, 3 1 7 4 the second.
+    let first = |frames: [usize; 4]| frames.map(|f| 6.0 * f as f32).iter().sum::<f32>();
+    assert_eq!(reading.volume.voxels[0], first([2, 0, 6, 5]));
+    assert_eq!(reading.volume.voxels[7], first([3, 1, 7, 4]) + 4.0);
+    assert_eq!((reading.facts.frames, reading.facts.frame), (4, None));
+    assert!(reading.facts.warnings[0].contains("4 gates were summed"));
+    assert_eq!(reading.facts.intensity.sum, 47.0 * 24.0);
+    assert_eq!(reading.provenance.unwrap().slice_frames, [3, 4]);
+}
+
+#[test]
+fn objects_without_slices_are_refused_by_name() {
+    for (class, named, instead) in [
+        (
+            "1.2.840.10008.5.1.4.1.1.481.3",
+            "an RT Structure Set",
+            "image series",
+        ),
+        (
+            "1.2.840.10008.5.1.4.1.1.88.33",
+            "a Comprehensive SR",
+            "image series",
+        ),
+        ("1.2.840.10008.5.1.4.1.1.481.2", "an RT Dose", "RECON TOMO"),
+        (
+            "1.2.840.10008.5.1.4.1.1.7",
+            "a Secondary Capture Image",
+            "RECON TOMO",
+        ),
+        ("1.2.840.10008.1.3.10", "a DICOMDIR", "files that it lists"),
+        ("1.2.3", "unknown SOP class (1.2.3", "RECON TOMO"),
+    ] {
+        let result = changed(|e| {
+            e.insert((0x08, 0x16), ("UI", Text(class)));
+        });
+        let Err(VolumeError::NotVolume {
+            found, reason, fix, ..
+        }) = result
+        else {
+            panic!("{class}: {result:?}");
+        };
+        assert!(found.contains(named), "{found}");
+        assert!(
+            format!("{reason} {fix}").contains(instead),
+            "{reason} {fix}"
+        );
+    }
+    let nameless = changed(|e| {
+        e.remove(&(0x08, 0x16));
+    });
+    assert!(
+        nameless
+            .unwrap_err()
+            .to_string()
+            .contains("without a SOP Class UID")
+    );
+    let mut localizer = ct("0", 0);
+    localizer.insert((0x08, 0x08), ("CS", Text("ORIGINAL\\PRIMARY\\LOCALIZER")));
+    let refused = read_elements(&localizer);
+    assert!(matches!(refused, Err(VolumeError::NotSlices { .. })));
+    let mut table = ct("0", 0);
+    table.remove(&(0x28, 0x1053));
+    let descriptor = item((0x28, 0x3002), "US", Shorts(vec![1, 0, 16]));
+    table.extend([group((0x28, 0x3000), descriptor)]);
+    assert_eq!(
+        complaint(read_elements(&table)).0,
+        "Modality LUT Sequence (0028,3000)"
+    );
+}
+
+#[test]
+fn provenance_tells_how_the_scan_was_made() {
+    let mut elements = slices();
+    let drug = BTreeMap::from([
+        ((0x18, 0x1074), ("DS", Text("740"))),
+        group(
+            (0x54, 0x304),
+            item((0x08, 0x104), "LO", Text("Tc-99m tetrofosmin")),
+        ),
+        group(
+            (0x54, 0x300),
+            item((0x08, 0x104), "LO", Text("^99m^Technetium")),
+        ),
+    ]);
+    elements.extend([
+        ((0x08, 0x2a), ("DT", Text("20260102030405.5"))),
+        ((0x08, 0x70), ("LO", Text("Maker"))),
+        ((0x08, 0x103e), ("LO", Text("MYOCARDIUM STRESS [Recon]"))),
+        ((0x20, 0x52), ("UI", Text("1.2.9"))),
+        ((0x54, 0x16), ("SQ", Items(vec![drug]))),
+    ]);
+    let given = [VolumeFile::in_memory(
+        "nm",
+        Encoding::Implicit.file(&elements),
+    )];
+    let from = provenance(&given, &ReadLimits::default(), &Monitor::silent());
+    let from = from.unwrap().unwrap();
+    let stated = from.stated();
+    for pair in [
+        ("acquisition_date", "20260102"),
+        ("acquisition_time", "030405.5"),
+        ("frame_of_reference_uid", "1.2.9"),
+        ("injected_dose", "740"),
+        ("manufacturer", "Maker"),
+        ("modality", "NM"),
+        ("radionuclide", "^99m^Technetium"),
+        ("radiopharmaceutical", "Tc-99m tetrofosmin"),
+        ("rest_or_stress", "stress"),
+    ] {
+        assert!(stated.contains(&pair), "{pair:?} {stated:?}");
+    }
+    assert_eq!(from.patient_id, None);
+    assert_eq!(from.slice_frames, [1, 2, 3, 4]);
+    elements.insert((0x08, 0x103e), ("LO", Text("rest/stress")));
+    let given = [VolumeFile::in_memory(
+        "nm",
+        Encoding::Implicit.file(&elements),
+    )];
+    let both = provenance(&given, &ReadLimits::default(), &Monitor::silent());
+    assert_eq!(both.unwrap().unwrap().rest_or_stress, None);
+}
+
+#[test]
+fn archives_cost_no_more_than_they_hold() {
+    let zeros = vec![0; 8 << 20];
+    let bomb = archive(&[("a.dcm", zeros)], CompressionMethod::Deflated);
+    let limits = ReadLimits {
+        unpacked_bytes: 1 << 20,
+        ..ReadLimits::default()
+    };
+    let refused = inspect_volume(&[bomb.clone()], &limits, &Monitor::silent());
+    assert!(matches!(refused, Err(VolumeError::TooLarge { .. })));
+    let nothing = read_files(&[bomb]).unwrap_err();
+    assert!(nothing.to_string().contains("without DICOM or NIfTI"));
+    let slice = Encoding::Explicit.file(&ct("0", 0));
+    for method in [CompressionMethod::Stored, CompressionMethod::Deflated] {
+        let whole = archive(&[("a.dcm", slice.clone())], method);
+        assert!(read_files(std::slice::from_ref(&whole)).is_ok());
+        let mut bytes = Vec::new();
+        std::io::Read::read_to_end(&mut whole.bytes().unwrap(), &mut bytes).unwrap();
+        for cut in (4..bytes.len()).step_by(7) {
+            let files = [VolumeFile::in_memory("cut.zip", bytes[..cut].to_vec())];
+            assert!(read_files(&files).is_err(), "{cut}");
+        }
+        // The directory says that the file is smaller than it is.
+        let at = bytes.windows(4).position(|w| w == b"PK\x01\x02").unwrap();
+        bytes[at + 24..at + 28].copy_from_slice(&100_u32.to_le_bytes());
+        let files = [VolumeFile::in_memory("lie.zip", bytes)];
+        if method == CompressionMethod::Deflated {
+            assert!(read_files(&files).is_err());
+        }
+    }
+}
