@@ -18,10 +18,12 @@ use std::path::{Path, PathBuf};
   ventriform generate spect.nii.gz -o lv.glb
   ventriform generate spect.nii.gz -o lv.stl -o lv.json --points 200 --report report.html
   ventriform generate organs.nii.gz -o liver.ply --label 1 --adaptive 0.25
-  ventriform generate pair.hdr pair.img -o lv.vtp --iso 50%")]
+  ventriform generate pair.hdr pair.img -o lv.vtp --iso 50%
+  ventriform generate series/*.dcm -o lv.glb")]
 pub struct GenerateArgs {
-    /// The volume: NIfTI (.nii, .nii.gz, or a .hdr and .img pair) or DICOM NM
-    #[arg(value_name = "IN", required = true, num_args = 1..=2)]
+    /// The volume: NIfTI (.nii, .nii.gz, or a .hdr and .img pair) or DICOM (a multi-frame NM, PET, CT or
+    /// MR file, all files of one series, or a zip of them)
+    #[arg(value_name = "IN", required = true, num_args = 1..)]
     input: Vec<PathBuf>,
     /// File to write the model to; the extension chooses the format: glb, gltf, stl, ply, obj, vtp
     /// or json (repeatable)

@@ -7,6 +7,7 @@ mod demo;
 mod doctor;
 mod evaluate;
 mod generate;
+mod inspect;
 mod keys;
 mod library;
 mod measure;
@@ -43,6 +44,7 @@ enum Command {
     Demo(demo::DemoArgs),
     Generate(Box<generate::GenerateArgs>),
     Segment(Box<segment::SegmentArgs>),
+    Inspect(inspect::InspectArgs),
     Measure(measure::MeasureArgs),
     Evaluate(Box<evaluate::EvaluateArgs>),
     Templates(templates::TemplatesArgs),
@@ -69,6 +71,7 @@ pub fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Generate(args) => generate::run(&args),
         Command::Segment(args) => segment::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
         Command::Measure(args) => measure::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Templates(args) => templates::run(&args),

@@ -24,8 +24,9 @@ report.html, slices.png and, for the left ventricle, polar.json, polar.svg, pola
 of the anatomical wall: mask_anatomical.nii.gz, mesh_anatomical.glb, ... (with --edge anatomical:
 mask_apparent.nii.gz, mesh_apparent.glb, ...)")]
 pub struct SegmentArgs {
-    /// The volume: NIfTI (.nii, .nii.gz, or a .hdr and .img pair) or DICOM NM
-    #[arg(value_name = "IN", required = true, num_args = 1..=2)]
+    /// The volume: NIfTI (.nii, .nii.gz, or a .hdr and .img pair) or DICOM (a multi-frame NM, PET, CT or
+    /// MR file, all files of one series, or a zip of them)
+    #[arg(value_name = "IN", required = true, num_args = 1..)]
     input: Vec<PathBuf>,
     /// Model to fit: a JSON mesh written by `generate`, or auto for the built-in ventricle
     /// (repeatable: the best fit is kept)

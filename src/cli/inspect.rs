@@ -1,0 +1,59 @@
+//! `ventriform inspect`: what a file says about itself.
+
+use crate::progress::Monitor;
+use crate::report;
+use crate::volume::dicom::Provenance;
+use crate::volume::{self, ReadLimits, VolumeFile};
+use crate::work::problems::Explain;
+use anyhow::Result;
+use clap::Args;
+use serde_json::{Map, Value};
+use std::path::PathBuf;
+
+/// Print what is read of a volume: size, place, values and, of DICOM, whose scan it is
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  ventriform inspect scan.dcm
+  ventriform inspect series.zip | jq .dicom.series_uid
+Prints JSON. The values under `dicom` are personal data.")]
+pub struct InspectArgs {
+    /// The volume: NIfTI (.nii, .nii.gz, or a .hdr and .img pair) or DICOM (one file, all files of one
+    /// series, or a zip of them)
+    #[arg(value_name = "IN", required = true, num_args = 1..)]
+    input: Vec<PathBuf>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// If the volume cannot be read.
+pub fn run(args: &InspectArgs) -> Result<()> {
+    let files: Vec<VolumeFile> = match args.input.as_slice() {
+        [one] => VolumeFile::with_other_half(one),
+        several => several.iter().map(VolumeFile::at).collect(),
+    };
+    let (limits, monitor) = (ReadLimits::default(), Monitor::silent());
+    let facts = volume::inspect(&files, &limits, &monitor);
+    let facts = facts.map_err(|error| anyhow::anyhow!(error.with_advice()))?;
+    let from = volume::provenance(&files, &limits, &monitor)?;
+    let mut shown = report::input(&facts);
+    if let (Value::Object(shown), Some(from)) = (&mut shown, from) {
+        shown.insert("dicom".into(), dicom(&from));
+    }
+    println!("{}", serde_json::to_string_pretty(&shown)?);
+    Ok(())
+}
+
+fn dicom(from: &Provenance) -> Value {
+    let stated = from.stated().into_iter();
+    let mut shown: Map<String, Value> = stated
+        .map(|(name, value)| (name.to_owned(), value.into()))
+        .collect();
+    if !from.instance_uids.is_empty() {
+        shown.insert("instance_uids".into(), from.instance_uids.clone().into());
+    }
+    if !from.slice_frames.is_empty() {
+        shown.insert("slice_frames".into(), from.slice_frames.clone().into());
+    }
+    Value::Object(shown)
+}
