@@ -76,7 +76,7 @@ fn kept<P: Parameters, E>(given: Result<P, E>) {
 pub fn corpus(target: &str) -> Vec<Vec<u8>> {
     match target {
         "nifti" => nifti_corpus(),
-        "dicom" => vec![dicom_file(false), dicom_file(true)],
+        "dicom" => dicom_corpus(),
         "parameters" => [
             r#"{"points": 24, "iso": "50%", "box": [0, 0, 0, 9, 9, 9], "method": "paper"}"#,
             r#"{"model": "auto", "organ": "liver", "center": [1.5, 2, 3], "margin": 0.5}"#,
@@ -105,6 +105,162 @@ fn nifti_corpus() -> Vec<Vec<u8>> {
     // A header in the other byte order: the reader must notice by its first number.
     swapped[..4].reverse();
     [plain.to_vec(), vec![packed, swapped]].concat()
+}
+
+fn dicom_corpus() -> Vec<Vec<u8>> {
+    let mut corpus = vec![dicom_file(false), dicom_file(true)];
+    for (uid, frame) in [
+        ("1.2.840.10008.1.2.5\0", run_lengths()),
+        ("1.2.840.10008.1.2.4.70", hex(JPEG_LOSSLESS)),
+        ("1.2.840.10008.1.2.4.80", hex(JPEG_LS)),
+        ("1.2.840.10008.1.2.4.90", hex(JPEG_2000)),
+    ] {
+        corpus.push(compressed_slice(uid, &frame));
+    }
+    corpus.push(segmentation());
+    corpus.push(stored_zip(&corpus[2]));
+    corpus
+}
+
+/// A 9 x 7 image of 12 bits in JPEG-LS, by CharLS.
+const JPEG_LS: &str = "\
+    ffd8ffe800205350494646000200000100000007000000090a1006010000012c0000012cffe8000800000001\
+    ffd8fff7000b100007000901011100fff8000d01ffff0012004301140040ffda0008010100000000f127f4cf\
+    2bf7a89fb342c34189a161b2825ba89d412dc13a735ef7da34e2f7515a6df54b4da310d6bd9b10d6bd910e5c\
+    dcb653ad7ca651ad3c924ec63c4507b3f84a0765f01400ffd9";
+
+/// The same in JPEG 2000, by OpenJPEG.
+const JPEG_2000: &str = "\
+    ff4fff5100290000000000090000000700000000000000000000000900000007000000000000000000010b01\
+    01ff52000c00000001000004040001ff5c00044060ff640025000143726561746564206279204f70656e4a50\
+    45472076657273696f6e20322e352e34ff90000a00000000006a0001ff93dfe164111df62479fd1b32775125\
+    b50b562195515f88f2d362bc588be51732ce2b6a0286c0c3712d678334be10852cbaaa2a9fde568f0e5df2c5\
+    823a9c9ea09749ceff0cc6c571b21e92674e776eb56158ed6297956d67093f31582dffd9";
+
+/// The same in lossless JPEG, by liblj92.
+const JPEG_LOSSLESS: &str = "\
+    ffd8ffc4001b000101000203010000000000000000000008000706090a050cffc3000b0c0007000901001100\
+    ffda0008010000060000f9ff00eaeca1ca6f32fcf0f62baacd08fc579891f54824e638cde9ccebcb8f656db7\
+    1d2a745cf8a9cb6895b6a4895b6a4895b6754b30f5f4b30f5f4b30d1ea368798a368798a3680ffd9";
+
+fn hex(digits: &str) -> Vec<u8> {
+    let digits: Vec<u32> = digits.chars().filter_map(|c| c.to_digit(16)).collect();
+    let (pairs, _) = digits.as_chunks::<2>();
+    pairs.iter().map(|[a, b]| (16 * a + b) as u8).collect()
+}
+
+/// 9 x 7 numbers of 16 bits in literal runs and runs of one byte.
+fn run_lengths() -> Vec<u8> {
+    let mut frame = vec![0; 64];
+    (frame[0], frame[4], frame[8]) = (2, 64, 66);
+    frame.extend([194, 3]);
+    frame.push(62);
+    frame.extend(0..63);
+    frame
+}
+
+/// The elements of an image of 9 columns and 7 rows of a SOP class.
+fn image_elements(class: &[u8], bits: u16) -> Vec<((u16, u16), &'static str, Vec<u8>)> {
+    let short = |n: u16| n.to_le_bytes().to_vec();
+    vec![
+        ((0x08, 0x16), "UI", class.to_vec()),
+        ((0x08, 0x18), "UI", b"1.2.3.4\0".to_vec()),
+        ((0x18, 0x50), "DS", b"6 ".to_vec()),
+        ((0x20, 0x32), "DS", b"10\\-20.5\\30 ".to_vec()),
+        ((0x20, 0x37), "DS", b"1\\0\\0\\0\\1\\0 ".to_vec()),
+        ((0x28, 0x10), "US", short(7)),
+        ((0x28, 0x11), "US", short(9)),
+        ((0x28, 0x30), "DS", b"2.5\\4 ".to_vec()),
+        ((0x28, 0x100), "US", short(bits)),
+        ((0x28, 0x101), "US", short(bits)),
+        ((0x28, 0x102), "US", short(bits - 1)),
+        ((0x28, 0x103), "US", short(0)),
+    ]
+}
+
+fn dicom_start(uid: &str) -> Vec<u8> {
+    let mut bytes = vec![0; 128];
+    bytes.extend(b"DICM");
+    element(&mut bytes, (2, 0x10), "UI", uid.as_bytes(), false);
+    bytes
+}
+
+/// A PET slice with compressed pixels.
+fn compressed_slice(uid: &str, frame: &[u8]) -> Vec<u8> {
+    let mut bytes = dicom_start(uid);
+    for (tag, vr, value) in &image_elements(b"1.2.840.10008.5.1.4.1.1.128\0", 16) {
+        element(&mut bytes, *tag, vr, value, false);
+    }
+    bytes.extend([0xe0, 0x7f, 0x10, 0x00]);
+    bytes.extend(b"OB\0\0\xff\xff\xff\xff");
+    bytes.extend([0xfe, 0xff, 0x00, 0xe0, 0, 0, 0, 0]);
+    bytes.extend([0xfe, 0xff, 0x00, 0xe0]);
+    let padded = frame.len().next_multiple_of(2);
+    bytes.extend((padded as u32).to_le_bytes());
+    bytes.extend(frame);
+    bytes.resize(bytes.len() + padded - frame.len(), 0);
+    bytes.extend([0xfe, 0xff, 0xdd, 0xe0, 0, 0, 0, 0]);
+    bytes
+}
+
+/// A binary segmentation of two frames, each with a position of its own.
+fn segmentation() -> Vec<u8> {
+    let mut bytes = dicom_start("1.2.840.10008.1.2.1\0");
+    let mut elements = image_elements(b"1.2.840.10008.5.1.4.1.1.66.4", 1);
+    elements.push(((0x28, 0x08), "IS", b"2 ".to_vec()));
+    elements.push(((0x62, 0x01), "CS", b"BINARY".to_vec()));
+    elements.sort_by_key(|(tag, ..)| *tag);
+    for (tag, vr, value) in &elements {
+        element(&mut bytes, *tag, vr, value, false);
+    }
+    let item = |content: Vec<u8>| {
+        let mut item = vec![0xfe, 0xff, 0x00, 0xe0];
+        item.extend((content.len() as u32).to_le_bytes());
+        item.extend(content);
+        item
+    };
+    let mut frames = Vec::new();
+    for (position, segment) in [("10\\-20.5\\30 ", 1_u16), ("10\\-20.5\\48 ", 2)] {
+        let (mut place, mut number, mut frame) = (Vec::new(), Vec::new(), Vec::new());
+        element(&mut place, (0x20, 0x32), "DS", position.as_bytes(), false);
+        element(
+            &mut number,
+            (0x62, 0x0b),
+            "US",
+            &segment.to_le_bytes(),
+            false,
+        );
+        element(&mut frame, (0x20, 0x9113), "SQ", &item(place), false);
+        element(&mut frame, (0x62, 0x0a), "SQ", &item(number), false);
+        frames.extend(item(frame));
+    }
+    element(&mut bytes, (0x5200, 0x9230), "SQ", &frames, false);
+    element(&mut bytes, (0x7fe0, 0x10), "OW", &[0x55; 16], false);
+    bytes
+}
+
+/// A zip archive with `content` as its only file, not packed.
+fn stored_zip(content: &[u8]) -> Vec<u8> {
+    let size = (content.len() as u32).to_le_bytes();
+    // Version, flags, method, time, date, checksum (not read), sizes, lengths of name and extra field.
+    let mut common = vec![20, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+    common.extend([size, size].concat());
+    common.extend([1, 0, 0, 0]);
+    let mut bytes = b"PK\x03\x04".to_vec();
+    bytes.extend(&common);
+    bytes.push(b'a');
+    bytes.extend(content);
+    let begin = (bytes.len() as u32).to_le_bytes();
+    let mut directory = b"PK\x01\x02\x14\0".to_vec();
+    directory.extend(&common);
+    directory.extend([0; 14]);
+    directory.push(b'a');
+    bytes.extend(&directory);
+    bytes.extend(b"PK\x05\x06\0\0\0\0\x01\0\x01\0");
+    bytes.extend((directory.len() as u32).to_le_bytes());
+    bytes.extend(begin);
+    bytes.extend([0, 0]);
+    bytes
 }
 
 /// A multi-frame NM file of 2 × 3 × 4 voxels, with explicit or implicit value representations.
@@ -166,7 +322,7 @@ fn element(bytes: &mut Vec<u8>, tag: (u16, u16), vr: &str, value: &[u8], implici
     let length = value.len() as u32;
     match (implicit, vr) {
         (true, _) => bytes.extend(length.to_le_bytes()),
-        (false, "SQ" | "OW") => {
+        (false, "SQ" | "OW" | "OB") => {
             bytes.extend(vr.as_bytes());
             bytes.extend([0, 0]);
             bytes.extend(length.to_le_bytes());
