@@ -86,6 +86,7 @@ impl Arriving<'_> {
 fn kind_by_content(head: &[u8]) -> &'static str {
     match head {
         [0x1f, 0x8b, ..] => "nii.gz",
+        [b'P', b'K', 3, 4, ..] => "zip",
         _ if head.get(128..132) == Some(b"DICM") => "dcm",
         _ => "nii",
     }
