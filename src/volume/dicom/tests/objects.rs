@@ -433,7 +433,7 @@ fn archives_cost_no_more_than_they_hold() {
         unpacked_bytes: 1 << 20,
         ..ReadLimits::default()
     };
-    let refused = inspect_volume(&[bomb.clone()], &limits, &Monitor::silent());
+    let refused = inspect_volume(std::slice::from_ref(&bomb), &limits, &Monitor::silent());
     assert!(matches!(refused, Err(VolumeError::TooLarge { .. })));
     let nothing = read_files(&[bomb]).unwrap_err();
     assert!(nothing.to_string().contains("without DICOM or NIfTI"));
