@@ -19,6 +19,7 @@
 //! precision (see `single.rs`). Not checked: whether the mesh is a manifold; see
 //! [`crate::mesh::topology`].
 
+pub mod dicom;
 mod glb;
 mod gltf;
 mod json;

@@ -33,7 +33,7 @@ const USES: &[(&str, &[&str])] = &[
         ],
     ),
     ("decimate", &["geometry", "mesh", "progress"]),
-    ("export", &["geometry", "mesh"]),
+    ("export", &["geometry", "mesh", "grid", "volume"]),
     ("model", &["geometry", "mesh", "progress", "grid", "locate"]),
     (
         "deform",

@@ -1,0 +1,173 @@
+//! A data set under construction, over `dicom-object`.
+
+use super::DicomError;
+use super::codes::Code;
+use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
+use dicom_core::value::DataSetSequence;
+use dicom_core::{DataElement, PrimitiveValue, Tag, VR};
+use dicom_dictionary_std::{StandardDataDictionary, tags, uids};
+use dicom_object::{FileMetaTableBuilder, InMemDicomObject};
+
+/// Implementation Class UID (0002,0012) of this software: derived from a UUID that was drawn once.
+const IMPLEMENTATION: &str = "2.25.212046303391268093411418305311126403873";
+
+/// Elements by tag. The value representation of an attribute is the dictionary's.
+#[derive(Debug, Clone)]
+pub(super) struct DataSet(InMemDicomObject);
+
+impl DataSet {
+    pub(super) fn new() -> Self {
+        Self(InMemDicomObject::new_empty())
+    }
+
+    /// Puts a value whose representation the dictionary does not decide.
+    pub(super) fn put(&mut self, tag: Tag, vr: VR, value: PrimitiveValue) {
+        self.0.put(DataElement::new(tag, vr, value));
+    }
+
+    /// Puts text; backslashes separate several values. Empty text gives an empty element.
+    pub(super) fn text(&mut self, tag: Tag, text: impl Into<String>) {
+        let text = text.into();
+        let value = match text.is_empty() {
+            true => PrimitiveValue::Empty,
+            false => PrimitiveValue::Str(text),
+        };
+        self.put(tag, representation(tag), value);
+    }
+
+    /// Puts text, or an empty element for `None`.
+    pub(super) fn stated(&mut self, tag: Tag, text: Option<&str>) {
+        self.text(tag, text.unwrap_or_default());
+    }
+
+    /// Puts text unless there is none.
+    pub(super) fn known(&mut self, tag: Tag, text: Option<&str>) {
+        if let Some(text) = text.filter(|text| !text.is_empty()) {
+            self.text(tag, text);
+        }
+    }
+
+    /// Puts an empty element.
+    pub(super) fn empty(&mut self, tag: Tag) {
+        self.put(tag, representation(tag), PrimitiveValue::Empty);
+    }
+
+    /// Puts a 16-bit number.
+    pub(super) fn short(&mut self, tag: Tag, number: u16) {
+        self.put(tag, VR::US, PrimitiveValue::from(number));
+    }
+
+    /// Puts 16-bit numbers.
+    pub(super) fn shorts(&mut self, tag: Tag, numbers: &[u16]) {
+        self.put(tag, VR::US, PrimitiveValue::U16(numbers.into()));
+    }
+
+    /// Puts 32-bit numbers.
+    pub(super) fn longs(&mut self, tag: Tag, numbers: Vec<u32>) {
+        self.put(
+            tag,
+            representation(tag),
+            PrimitiveValue::U32(numbers.into()),
+        );
+    }
+
+    /// Puts numbers of single precision.
+    pub(super) fn floats(&mut self, tag: Tag, numbers: Vec<f32>) {
+        self.put(
+            tag,
+            representation(tag),
+            PrimitiveValue::F32(numbers.into()),
+        );
+    }
+
+    /// Puts the tag of another attribute.
+    pub(super) fn tag(&mut self, tag: Tag, named: Tag) {
+        self.put(tag, VR::AT, PrimitiveValue::from(named));
+    }
+
+    /// Puts bytes, padded to an even number.
+    pub(super) fn bytes(&mut self, tag: Tag, mut bytes: Vec<u8>) {
+        if bytes.len() % 2 == 1 {
+            bytes.push(0);
+        }
+        self.put(tag, VR::OB, PrimitiveValue::U8(bytes.into()));
+    }
+
+    /// Puts decimal numbers.
+    pub(super) fn decimals(&mut self, tag: Tag, numbers: &[f64]) {
+        let texts: Vec<String> = numbers.iter().map(|x| decimal(*x)).collect();
+        self.text(tag, texts.join("\\"));
+    }
+
+    /// Puts a sequence.
+    pub(super) fn items(&mut self, tag: Tag, items: Vec<DataSet>) {
+        let items: Vec<InMemDicomObject> = items.into_iter().map(|item| item.0).collect();
+        let sequence = DataSetSequence::from(items);
+        self.0.put(DataElement::new(tag, VR::SQ, sequence));
+    }
+
+    /// Puts a sequence with one item.
+    pub(super) fn item(&mut self, tag: Tag, item: DataSet) {
+        self.items(tag, vec![item]);
+    }
+
+    /// Puts a sequence with one coded concept.
+    pub(super) fn code(&mut self, tag: Tag, code: Code) {
+        let mut item = DataSet::new();
+        item.text(tags::CODE_VALUE, code.value);
+        item.text(tags::CODING_SCHEME_DESIGNATOR, code.scheme);
+        item.text(tags::CODE_MEANING, code.meaning);
+        self.item(tag, item);
+    }
+
+    /// The data set as a file, Explicit VR Little Endian.
+    ///
+    /// # Errors
+    /// [`DicomError::Encoding`].
+    pub(super) fn file(self) -> Result<Vec<u8>, DicomError> {
+        let meta = FileMetaTableBuilder::new()
+            .transfer_syntax(uids::EXPLICIT_VR_LITTLE_ENDIAN)
+            .implementation_class_uid(IMPLEMENTATION)
+            .implementation_version_name("VENTRIFORM");
+        let object = self.0.with_meta(meta).map_err(encoding)?;
+        let mut bytes = Vec::new();
+        object.write_all(&mut bytes).map_err(encoding)?;
+        Ok(bytes)
+    }
+}
+
+fn encoding(error: impl std::error::Error) -> DicomError {
+    DicomError::Encoding(error.to_string())
+}
+
+/// The value representation of a standard attribute.
+fn representation(tag: Tag) -> VR {
+    let entry = StandardDataDictionary.by_tag(tag);
+    entry.map_or(VR::UN, |entry| entry.vr().relaxed())
+}
+
+/// A decimal string (DS): at most 16 characters, as many digits as they hold.
+pub(super) fn decimal(number: f64) -> String {
+    const LONGEST: usize = 16;
+    let number = number + 0.0;
+    let shortest = format!("{number}");
+    if shortest.len() <= LONGEST {
+        return shortest;
+    }
+    let fixed = (0..=14).rev().map(|digits| format!("{number:.digits$}"));
+    let scientific = (0..=10).rev().map(|digits| format!("{number:.digits$e}"));
+    let fits = |text: &String| text.len() <= LONGEST;
+    let best = match number.abs() < 1e-4 {
+        true => scientific.chain(fixed).find(fits),
+        false => fixed.chain(scientific).find(fits),
+    };
+    best.unwrap_or_else(|| "0".into())
+}
+
+/// The item that refers to an instance, in the form of the SOP Instance Reference Macro.
+pub(super) fn reference(class: &str, instance: &str) -> DataSet {
+    let mut item = DataSet::new();
+    item.text(tags::REFERENCED_SOP_CLASS_UID, class);
+    item.text(tags::REFERENCED_SOP_INSTANCE_UID, instance);
+    item
+}

@@ -1,0 +1,390 @@
+//! Results as DICOM objects, for an archive (PACS).
+//!
+//! In: a scan's identity and grid ([`SourceScan`]), and what was made of it ([`DicomResults`]).
+//! Out: the bytes of one file for each [`DicomObject`], Explicit VR Little Endian.
+//!
+//! 1. [`identity`] completes what the file says about patient and study by what a person states.
+//! 2. [`SourceScan::deidentified`] takes the identity away, on request.
+//! 3. [`DicomResults::write`] builds the object: the modules that all have in common here, the
+//!    rest in the module of its kind (`segmentation`, `structure_set`, `stl`, `surface`,
+//!    `measurements`, `capture`).
+//!
+//! Guaranteed: the same patient, study and Frame of Reference as the source, which is referenced
+//! (of a multi-frame image, the frames); millimetres in LPS; standard attributes only; the same
+//! input gives the same bytes, UIDs included, and other input gives other UIDs. A scan whose
+//! position in the patient is assumed gives objects with a Frame of Reference of their own, so that
+//! no viewer lays them over other images.
+//!
+//! Not guaranteed: that the values which a source states about the patient are valid DICOM; they
+//! are copied, so that the archive finds the same patient.
+
+mod capture;
+mod codes;
+mod data_set;
+mod measurements;
+mod segmentation;
+mod source;
+mod stl;
+mod structure_set;
+mod surface;
+mod uid;
+
+#[cfg(test)]
+mod tests;
+
+pub use codes::Structure;
+pub use source::{Deidentification, Moment, SourceScan, StatedIdentity, identity};
+
+use self::codes::{ANATOMICAL_STRUCTURE, Code, DEFORMABLE_MODELS};
+use self::data_set::{DataSet, reference};
+use self::uid::Uids;
+use super::ExportError;
+use crate::grid::voxelise::Mask;
+use crate::mesh::TriMesh;
+use dicom_dictionary_std::{tags, uids};
+use serde_json::Value;
+
+/// Why a result cannot be written as DICOM.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DicomError {
+    /// Patient or study is unknown.
+    #[error("the volume's file does not say whose scan it is: `{field}` is needed")]
+    NoIdentity {
+        /// What is needed.
+        field: &'static str,
+    },
+    /// A person states another value than the file.
+    #[error("`{field}` differs from what the volume's file says")]
+    Contradiction {
+        /// What differs.
+        field: &'static str,
+    },
+    /// A stated value is not valid DICOM.
+    #[error("`{field}` is not {expected}")]
+    Identity {
+        /// The value at fault.
+        field: &'static str,
+        /// What is valid.
+        expected: &'static str,
+    },
+    /// Rows and columns of the volume are not at right angles.
+    #[error("the rows and columns of the volume are not at right angles, which DICOM images are")]
+    Oblique,
+    /// The volume has more rows or columns than an image may have.
+    #[error("the volume has more than 65535 rows or columns")]
+    TooLarge,
+    /// A contour has more points than its element can hold.
+    #[error("the contour in slice {slice} has more points than DICOM can hold")]
+    LongContour {
+        /// Number of the slice, from 0.
+        slice: usize,
+    },
+    /// The mesh cannot be written.
+    #[error(transparent)]
+    Mesh(#[from] ExportError),
+    /// A picture cannot be read.
+    #[error("{name}: {reason}")]
+    Picture {
+        /// The object.
+        name: &'static str,
+        /// Why.
+        reason: String,
+    },
+    /// The data set cannot be encoded.
+    #[error("the data set cannot be encoded: {0}")]
+    Encoding(String),
+}
+
+/// An object for the archive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DicomObject {
+    /// The mask: Segmentation, binary.
+    Mask,
+    /// The mask's outlines in every slice: RT Structure Set.
+    Contours,
+    /// The mesh: Encapsulated STL.
+    Mesh,
+    /// The mesh: Surface Segmentation.
+    Surface,
+    /// The figures: Comprehensive 3D SR, TID 1500.
+    Measurements,
+    /// The polar map: Secondary Capture.
+    Polar,
+    /// The slices with contours: Secondary Capture.
+    Page,
+}
+
+impl DicomObject {
+    /// All objects.
+    pub const ALL: [DicomObject; 7] = [
+        DicomObject::Mask,
+        DicomObject::Contours,
+        DicomObject::Mesh,
+        DicomObject::Surface,
+        DicomObject::Measurements,
+        DicomObject::Polar,
+        DicomObject::Page,
+    ];
+
+    /// The media type of all of them.
+    pub const MEDIA_TYPE: &str = "application/dicom";
+
+    /// The name of the file.
+    pub fn file_name(self) -> &'static str {
+        self.facts().name
+    }
+
+    fn facts(self) -> ObjectFacts {
+        let facts = |name, class, modality, series, description| ObjectFacts {
+            name,
+            class,
+            modality,
+            series,
+            description,
+        };
+        match self {
+            DicomObject::Mask => facts(
+                "mask.dcm",
+                uids::SEGMENTATION_STORAGE,
+                "SEG",
+                9101,
+                "segmentation",
+            ),
+            DicomObject::Contours => facts(
+                "contours.dcm",
+                uids::RT_STRUCTURE_SET_STORAGE,
+                "RTSTRUCT",
+                9102,
+                "contours",
+            ),
+            DicomObject::Mesh => facts(
+                "mesh.dcm",
+                uids::ENCAPSULATED_STL_STORAGE,
+                "M3D",
+                9103,
+                "model (STL)",
+            ),
+            DicomObject::Surface => facts(
+                "surface.dcm",
+                uids::SURFACE_SEGMENTATION_STORAGE,
+                "SEG",
+                9104,
+                "surface",
+            ),
+            DicomObject::Measurements => facts(
+                "measurements.dcm",
+                uids::COMPREHENSIVE3_DSR_STORAGE,
+                "SR",
+                9105,
+                "measurements",
+            ),
+            DicomObject::Polar => facts(
+                "polar.dcm",
+                uids::SECONDARY_CAPTURE_IMAGE_STORAGE,
+                "OT",
+                9106,
+                "polar map",
+            ),
+            DicomObject::Page => facts(
+                "page.dcm",
+                uids::SECONDARY_CAPTURE_IMAGE_STORAGE,
+                "OT",
+                9107,
+                "slices with contours",
+            ),
+        }
+    }
+}
+
+/// What distinguishes an object from the others.
+struct ObjectFacts {
+    name: &'static str,
+    class: &'static str,
+    modality: &'static str,
+    /// Series Number.
+    series: u16,
+    description: &'static str,
+}
+
+/// Results of one scan.
+#[derive(Clone)]
+pub struct DicomResults<'a> {
+    scan: &'a SourceScan,
+    structure: Structure,
+    mask: &'a Mask,
+    mesh: &'a TriMesh,
+    report: &'a Value,
+    slices: Option<&'a [u8]>,
+    polar: Option<&'a [u8]>,
+    uids: Uids,
+}
+
+impl<'a> DicomResults<'a> {
+    /// Results of `scan`, which show `structure`: the mask on the scan's grid, the mesh (LPS mm) and
+    /// the report (`report.json`).
+    pub fn new(
+        scan: &'a SourceScan,
+        structure: Structure,
+        mask: &'a Mask,
+        mesh: &'a TriMesh,
+        report: &'a Value,
+    ) -> Self {
+        Self {
+            scan,
+            structure,
+            mask,
+            mesh,
+            report,
+            slices: None,
+            polar: None,
+            uids: Uids::over_all(|add| {
+                add(env!("CARGO_PKG_VERSION").as_bytes());
+                scan.add_to(add);
+                add(structure.label.as_bytes());
+                add(&mask.voxels.iter().map(|v| u8::from(*v)).collect::<Vec<_>>());
+                let numbers = mesh.vertices.iter().flat_map(|v| [v.x, v.y, v.z]);
+                add(&numbers.flat_map(f64::to_le_bytes).collect::<Vec<_>>());
+                let corners = mesh.triangles.iter().flatten();
+                add(&corners.flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>());
+                add(report.to_string().as_bytes());
+            }),
+        }
+    }
+
+    /// Adds pictures, as PNG files: the slices with contours and the polar map.
+    #[must_use]
+    pub fn with_pictures(self, slices: Option<&'a [u8]>, polar: Option<&'a [u8]>) -> Self {
+        Self {
+            slices,
+            polar,
+            ..self
+        }
+    }
+
+    /// The bytes of `object`; `None` for a picture that is not there.
+    ///
+    /// # Errors
+    /// See [`DicomError`].
+    pub fn write(&self, object: DicomObject) -> Result<Option<Vec<u8>>, DicomError> {
+        let mut set = DataSet::new();
+        match object {
+            DicomObject::Mask => segmentation::put(self, &mut set)?,
+            DicomObject::Contours => structure_set::put(self, &mut set)?,
+            DicomObject::Mesh => stl::put(self, &mut set)?,
+            DicomObject::Surface => surface::put(self, &mut set)?,
+            DicomObject::Measurements => measurements::put(self, &mut set),
+            DicomObject::Polar | DicomObject::Page => {
+                let picture = match object {
+                    DicomObject::Polar => self.polar,
+                    _ => self.slices,
+                };
+                let Some(png) = picture else { return Ok(None) };
+                capture::put(self, object.file_name(), png, &mut set)?;
+            }
+        }
+        self.put_common(object, &mut set);
+        set.file().map(Some)
+    }
+
+    /// The modules that all objects have: patient, study, series, equipment, SOP Common, and the
+    /// references to the source.
+    fn put_common(&self, object: DicomObject, set: &mut DataSet) {
+        let facts = object.facts();
+        self.scan.put_identity(set);
+        set.text(tags::SOP_CLASS_UID, facts.class);
+        set.text(tags::SOP_INSTANCE_UID, self.instance(object));
+        set.text(tags::MODALITY, facts.modality);
+        set.text(tags::SERIES_INSTANCE_UID, self.series(object));
+        set.text(tags::SERIES_NUMBER, facts.series.to_string());
+        set.text(tags::INSTANCE_NUMBER, "1");
+        let description = format!("{}: {}", self.structure.label, facts.description);
+        set.text(tags::SERIES_DESCRIPTION, description);
+        let made = self.scan.made();
+        set.text(tags::SERIES_DATE, made.date.as_str());
+        set.text(tags::SERIES_TIME, made.time.as_str());
+        set.text(tags::MANUFACTURER, "ventriform");
+        set.text(tags::MANUFACTURER_MODEL_NAME, "ventriform");
+        set.text(tags::DEVICE_SERIAL_NUMBER, "none");
+        set.text(tags::SOFTWARE_VERSIONS, env!("CARGO_PKG_VERSION"));
+    }
+
+    /// Date and time of the content.
+    fn put_made(&self, set: &mut DataSet) {
+        let made = self.scan.made();
+        set.text(tags::CONTENT_DATE, made.date.as_str());
+        set.text(tags::CONTENT_TIME, made.time.as_str());
+    }
+
+    /// Label, description and creator of a segmentation.
+    fn put_content(&self, set: &mut DataSet) {
+        self.put_made(set);
+        set.text(tags::CONTENT_LABEL, "VENTRIFORM");
+        set.text(tags::CONTENT_DESCRIPTION, self.structure.label);
+        set.empty(tags::CONTENT_CREATOR_NAME);
+    }
+
+    /// What a segment shows, for its item in the Segment Sequence.
+    fn put_segment(&self, segment: &mut DataSet) {
+        segment.short(tags::SEGMENT_NUMBER, 1);
+        segment.text(tags::SEGMENT_LABEL, self.structure.label);
+        segment.text(tags::SEGMENT_ALGORITHM_TYPE, "AUTOMATIC");
+        segment.code(
+            tags::SEGMENTED_PROPERTY_CATEGORY_CODE_SEQUENCE,
+            ANATOMICAL_STRUCTURE,
+        );
+        segment.code(
+            tags::SEGMENTED_PROPERTY_TYPE_CODE_SEQUENCE,
+            self.structure.kind,
+        );
+        segment.text(tags::TRACKING_ID, self.structure.label);
+        segment.text(tags::TRACKING_UID, self.tracking());
+    }
+
+    /// The Referenced Series Sequence of the Common Instance Reference module.
+    fn put_referenced_series(&self, set: &mut DataSet) {
+        let Some(images) = self.scan.images() else {
+            return;
+        };
+        let instances = images.instances.iter();
+        let instances = instances.map(|(uid, _)| reference(images.class, uid));
+        let mut series = DataSet::new();
+        series.text(tags::SERIES_INSTANCE_UID, images.series);
+        series.items(tags::REFERENCED_INSTANCE_SEQUENCE, instances.collect());
+        set.item(tags::REFERENCED_SERIES_SEQUENCE, series);
+    }
+
+    fn instance(&self, object: DicomObject) -> String {
+        let picture = match object {
+            DicomObject::Polar => self.polar,
+            DicomObject::Page => self.slices,
+            _ => None,
+        };
+        let name = object.file_name();
+        self.uids.over(name, picture.unwrap_or_default())
+    }
+
+    fn series(&self, object: DicomObject) -> String {
+        self.uids.uid(&format!("series of {}", object.file_name()))
+    }
+
+    /// Tracking UID of the structure.
+    fn tracking(&self) -> String {
+        self.uids.uid("tracking")
+    }
+}
+
+/// An item of the Algorithm Identification Macro.
+fn algorithm() -> DataSet {
+    let mut item = DataSet::new();
+    let family: Code = DEFORMABLE_MODELS;
+    item.code(tags::ALGORITHM_FAMILY_CODE_SEQUENCE, family);
+    item.text(tags::ALGORITHM_NAME, "ventriform");
+    item.text(tags::ALGORITHM_VERSION, env!("CARGO_PKG_VERSION"));
+    item
+}
+
+/// Red, green and blue of the structure in viewers.
+const COLOUR: [u8; 3] = [255, 150, 0];
+
+/// [`COLOUR`] as CIELab values (PS3.3 C.10.7.1.1).
+const CIELAB: [u16; 3] = [46928, 41046, 52636];

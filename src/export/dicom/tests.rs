@@ -1,0 +1,597 @@
+//! The objects, read back with `dicom-object`.
+
+use super::uid::is_uid;
+use super::*;
+use crate::draw::Image;
+use crate::geometry::Vec3;
+use crate::geometry::frame::VoxelToPatient;
+use crate::grid::voxelise::voxelise;
+use crate::mesh::shapes;
+use crate::volume::dicom::Provenance;
+use dicom_core::Tag;
+use dicom_object::{DefaultDicomObject, InMemDicomObject, from_reader};
+use nalgebra::Matrix3;
+use serde_json::json;
+use std::collections::{BTreeMap, BTreeSet};
+
+const SHAPE: [usize; 3] = [30, 26, 22];
+
+fn moment() -> Moment {
+    Moment {
+        date: "20261123".into(),
+        time: "013000".into(),
+    }
+}
+
+fn provenance() -> Provenance {
+    let some = |text: &str| Some(text.to_owned());
+    Provenance {
+        patient_name: some("Müller^Jürgen"),
+        patient_id: some("P-17"),
+        patient_birth_date: some("19500203"),
+        patient_sex: some("M"),
+        study_uid: some("1.2.3.4"),
+        study_date: some("20250115"),
+        study_time: some("103000"),
+        study_id: some("S1"),
+        accession_number: some("ACC1"),
+        referring_physician: some("House^Gregory"),
+        series_uid: some("1.2.3.4.5"),
+        series_number: some("2"),
+        series_description: some("SA rest"),
+        modality: some("NM"),
+        frame_of_reference_uid: some("1.2.3.4.9"),
+        sop_class_uid: some(uids::NUCLEAR_MEDICINE_IMAGE_STORAGE),
+        sop_instance_uid: some("1.2.3.4.5.6"),
+        slice_frames: (1..=SHAPE[2] as u32).rev().collect(),
+        ..Provenance::default()
+    }
+}
+
+/// Everything that results are made of.
+struct Scene {
+    scan: SourceScan,
+    mask: Mask,
+    mesh: TriMesh,
+    report: Value,
+    png: Vec<u8>,
+}
+
+impl Scene {
+    /// A cup in a volume whose axes are the columns of `axes`, 3 x 3.5 x 4 mm apart.
+    fn new(axes: Matrix3<f64>, provenance: Provenance, placed: bool) -> Self {
+        let linear = axes * Matrix3::from_diagonal(&Vec3::new(3.0, 3.5, 4.0));
+        let middle = Vec3::new(14.5, 12.5, 10.5);
+        let frame = VoxelToPatient::new(linear, Vec3::new(7.0, -30.0, 45.0) - linear * middle);
+        let frame = frame.unwrap();
+        let mut mesh = shapes::cup(60.0, 30.0, 10.0, 24);
+        let centre = mesh.vertices.iter().sum::<Vec3>() / mesh.vertices.len() as f64;
+        for vertex in &mut mesh.vertices {
+            *vertex += frame.to_patient(&middle) - centre + Vec3::new(1.0, -2.0, 3.0);
+        }
+        let mask = voxelise(&mesh, SHAPE, &frame);
+        assert!(mask.count() > 500);
+        let segments: Vec<Value> = (1..=17)
+            .map(|n| json!({"number": n, "mean_percent": 60 + n, "extent_percent": n}))
+            .collect();
+        let report = json!({
+            "volumes_ml": {"wall": 101.25, "cavity": 55.5},
+            "wall_thickness_mm": 9.5,
+            "polar": {"extent_percent": 12.5, "segments": segments},
+            "flags": [{"code": "x", "reason": "The wall is thin; größer als üblich."}],
+        });
+        Self {
+            scan: SourceScan::new(provenance, frame, SHAPE, placed, moment()),
+            mask,
+            mesh,
+            report,
+            png: Image::filled(5, 3, [10, 20, 30]).png(),
+        }
+    }
+
+    fn results(&self) -> DicomResults<'_> {
+        let structure = Structure::of("left_ventricle");
+        DicomResults::new(&self.scan, structure, &self.mask, &self.mesh, &self.report)
+            .with_pictures(Some(&self.png), Some(&self.png))
+    }
+
+    fn write(&self, object: DicomObject) -> Vec<u8> {
+        self.results().write(object).unwrap().unwrap()
+    }
+
+    fn read(&self, object: DicomObject) -> DefaultDicomObject {
+        from_reader(&self.write(object)[..]).unwrap()
+    }
+}
+
+fn straight() -> Scene {
+    Scene::new(Matrix3::identity(), provenance(), true)
+}
+
+fn text(set: &InMemDicomObject, tag: Tag) -> String {
+    set.element(tag)
+        .unwrap()
+        .to_str()
+        .unwrap()
+        .trim_end_matches('\0')
+        .trim_end()
+        .to_owned()
+}
+
+fn numbers(set: &InMemDicomObject, tag: Tag) -> Vec<f64> {
+    set.element(tag).unwrap().to_multi_float64().unwrap()
+}
+
+fn items(set: &InMemDicomObject, tag: Tag) -> &[InMemDicomObject] {
+    set.element(tag).unwrap().items().unwrap()
+}
+
+fn only(set: &InMemDicomObject, tag: Tag) -> &InMemDicomObject {
+    let items = items(set, tag);
+    assert_eq!(items.len(), 1);
+    &items[0]
+}
+
+/// The 24 ways to turn a volume by right angles and their 24 mirror images, and two oblique ones.
+fn orientations() -> Vec<Matrix3<f64>> {
+    let mut all = Vec::new();
+    for order in [
+        [0, 1, 2],
+        [0, 2, 1],
+        [1, 0, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [2, 1, 0],
+    ] {
+        for signs in 0..8 {
+            let mut axes = Matrix3::zeros();
+            for (column, row) in order.into_iter().enumerate() {
+                axes[(row, column)] = if signs >> column & 1 == 1 { -1.0 } else { 1.0 };
+            }
+            all.push(axes);
+        }
+    }
+    let turn = *nalgebra::Rotation3::from_euler_angles(0.3, -0.5, 1.1).matrix();
+    all.extend([
+        turn,
+        turn * Matrix3::from_diagonal(&Vec3::new(1.0, 1.0, -1.0)),
+    ]);
+    all
+}
+
+/// Every voxel of the mask is where the volume has it, and its frame refers to the source's frame.
+#[test]
+fn the_mask_lies_where_it_was_made() {
+    for axes in orientations() {
+        let scene = Scene::new(axes, provenance(), true);
+        let set = scene.read(DicomObject::Mask);
+        let shared = only(&set, tags::SHARED_FUNCTIONAL_GROUPS_SEQUENCE);
+        let measures = only(shared, tags::PIXEL_MEASURES_SEQUENCE);
+        let spacing = numbers(measures, tags::PIXEL_SPACING);
+        assert_eq!(numbers(measures, tags::SPACING_BETWEEN_SLICES), [4.0]);
+        let plane = only(shared, tags::PLANE_ORIENTATION_SEQUENCE);
+        let cosines = numbers(plane, tags::IMAGE_ORIENTATION_PATIENT);
+        let along_row = Vec3::from_column_slice(&cosines[..3]);
+        let along_column = Vec3::from_column_slice(&cosines[3..]);
+        let bytes = set.element(tags::PIXEL_DATA).unwrap().to_bytes().unwrap();
+        let frames = items(&set, tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE);
+        assert_eq!(frames.len(), SHAPE[2]);
+        let mut last = f64::NEG_INFINITY;
+        let mut found = BTreeSet::new();
+        let (mut bit, mut expected) = (0, 0);
+        for frame in frames {
+            let corner = only(frame, tags::PLANE_POSITION_SEQUENCE);
+            let corner = numbers(corner, tags::IMAGE_POSITION_PATIENT);
+            let corner = Vec3::from_column_slice(&corner);
+            let height = corner.dot(&along_row.cross(&along_column));
+            assert!(height > last, "frames follow each other along the normal");
+            last = height;
+            for row in 0..SHAPE[1] {
+                for column in 0..SHAPE[0] {
+                    let at = corner
+                        + along_row * (spacing[1] * column as f64)
+                        + along_column * (spacing[0] * row as f64);
+                    let index = scene.scan.frame.to_voxel(&at);
+                    let voxel = [0, 1, 2].map(|axis| index[axis].round() as usize);
+                    assert!((index - Vec3::from(voxel.map(|x| x as f64))).norm() < 1e-6);
+                    let place = voxel[0] + SHAPE[0] * (voxel[1] + SHAPE[1] * voxel[2]);
+                    let set = bytes[bit / 8] >> (bit % 8) & 1 == 1;
+                    assert_eq!(set, scene.mask.voxels[place]);
+                    expected += usize::from(set);
+                    found.insert(place);
+                    bit += 1;
+                    if (row, column) == (0, 0) {
+                        let derivation = only(frame, tags::DERIVATION_IMAGE_SEQUENCE);
+                        let source = only(derivation, tags::SOURCE_IMAGE_SEQUENCE);
+                        let stored = text(source, tags::REFERENCED_FRAME_NUMBER);
+                        assert_eq!(stored, (SHAPE[2] - voxel[2]).to_string());
+                        assert_eq!(
+                            text(source, tags::REFERENCED_SOP_INSTANCE_UID),
+                            "1.2.3.4.5.6"
+                        );
+                    }
+                }
+            }
+        }
+        assert_eq!(found.len(), SHAPE.iter().product::<usize>());
+        assert_eq!(expected, scene.mask.count());
+    }
+}
+
+/// Slices of a volume are filled by its contours exactly where voxel centres lie inside the mesh.
+#[test]
+fn the_contours_enclose_the_mask() {
+    for axes in [orientations()[0], orientations()[11], orientations()[49]] {
+        let scene = Scene::new(axes, provenance(), true);
+        let set = scene.read(DicomObject::Contours);
+        let region = only(&set, tags::ROI_CONTOUR_SEQUENCE);
+        let mut filled = Mask::empty(SHAPE);
+        for contour in items(region, tags::CONTOUR_SEQUENCE) {
+            let points = numbers(contour, tags::CONTOUR_DATA);
+            let count: usize = text(contour, tags::NUMBER_OF_CONTOUR_POINTS)
+                .parse()
+                .unwrap();
+            assert_eq!(points.len(), 3 * count);
+            let points: Vec<Vec3> = points
+                .chunks(3)
+                .map(|p| scene.scan.frame.to_voxel(&Vec3::from_column_slice(p)))
+                .collect();
+            let slice = points[0].z.round() as usize;
+            assert!(points.iter().all(|p| (p.z - slice as f64).abs() < 1e-3));
+            let source = only(contour, tags::CONTOUR_IMAGE_SEQUENCE);
+            let stored = text(source, tags::REFERENCED_FRAME_NUMBER);
+            assert_eq!(stored, (SHAPE[2] - slice).to_string());
+            for row in 0..SHAPE[1] {
+                for column in 0..SHAPE[0] {
+                    let (x, y) = (column as f64, row as f64);
+                    let crossings = (0..points.len()).filter(|i| {
+                        let (a, b) = (points[*i], points[(i + 1) % points.len()]);
+                        (a.y > y) != (b.y > y) && x < a.x + (b.x - a.x) * (y - a.y) / (b.y - a.y)
+                    });
+                    let place = column + SHAPE[0] * (row + SHAPE[1] * slice);
+                    filled.voxels[place] ^= crossings.count() % 2 == 1;
+                }
+            }
+        }
+        let differing = (filled.voxels.iter().zip(&scene.mask.voxels)).filter(|(a, b)| a != b);
+        // Contours are rounded to the thousandth of a millimetre.
+        assert!(differing.count() <= 2);
+    }
+}
+
+#[test]
+fn both_meshes_have_the_vertices_of_the_model() {
+    let scene = straight();
+    let set = scene.read(DicomObject::Mesh);
+    let document = set
+        .element(tags::ENCAPSULATED_DOCUMENT)
+        .unwrap()
+        .to_bytes()
+        .unwrap();
+    let length: usize = text(&set, tags::ENCAPSULATED_DOCUMENT_LENGTH)
+        .parse()
+        .unwrap();
+    let triangles = scene.mesh.triangles.len();
+    assert_eq!(length, 84 + 50 * triangles);
+    for (facet, triangle) in document[84..length].chunks(50).zip(&scene.mesh.triangles) {
+        for corner in 0..3 {
+            let at: Vec<f32> = facet[12 + 12 * corner..24 + 12 * corner]
+                .chunks(4)
+                .map(|b| f32::from_le_bytes(b.try_into().unwrap()))
+                .collect();
+            let vertex = scene.mesh.vertices[triangle[corner] as usize];
+            assert!((0..3).all(|axis| (f64::from(at[axis]) - vertex[axis]).abs() < 0.01));
+        }
+    }
+    assert_eq!(text(&set, tags::MODEL_MIRRORING), "NO");
+    let unit = only(&set, tags::MEASUREMENT_UNITS_CODE_SEQUENCE);
+    assert_eq!(text(unit, tags::CODE_VALUE), "mm");
+
+    let set = scene.read(DicomObject::Surface);
+    let surface = only(&set, tags::SURFACE_SEQUENCE);
+    let points = only(surface, tags::SURFACE_POINTS_SEQUENCE);
+    let coordinates = numbers(points, tags::POINT_COORDINATES_DATA);
+    assert_eq!(coordinates.len(), 3 * scene.mesh.vertices.len());
+    for (point, vertex) in coordinates.chunks(3).zip(&scene.mesh.vertices) {
+        assert!((Vec3::from_column_slice(point) - vertex).norm() < 1e-4);
+    }
+    let primitives = only(surface, tags::SURFACE_MESH_PRIMITIVES_SEQUENCE);
+    let list = primitives
+        .element(tags::LONG_TRIANGLE_POINT_INDEX_LIST)
+        .unwrap();
+    let corners: Vec<u32> = list.to_multi_int().unwrap();
+    let expected: Vec<u32> = scene
+        .mesh
+        .triangles
+        .iter()
+        .flatten()
+        .map(|v| v + 1)
+        .collect();
+    assert_eq!(corners, expected);
+}
+
+/// Meaning of the concept name and the value of every NUM below `set`, with its depth first path.
+fn figures(set: &InMemDicomObject, into: &mut Vec<(String, String, f64)>, site: &str) {
+    let mut site = site.to_owned();
+    let Some(Ok(children)) = set.get(tags::CONTENT_SEQUENCE).map(|e| e.items().ok_or(())) else {
+        return;
+    };
+    let name = |item: &InMemDicomObject, tag| text(only(item, tag), tags::CODE_MEANING);
+    for child in children {
+        let named = child.get(tags::CONCEPT_NAME_CODE_SEQUENCE).is_some();
+        if named && name(child, tags::CONCEPT_NAME_CODE_SEQUENCE) == "Finding Site" {
+            site = name(child, tags::CONCEPT_CODE_SEQUENCE);
+        }
+    }
+    for child in children {
+        if text(child, tags::VALUE_TYPE) == "NUM" {
+            let value = only(child, tags::MEASURED_VALUE_SEQUENCE);
+            let number = numbers(value, tags::NUMERIC_VALUE)[0];
+            let concept = name(child, tags::CONCEPT_NAME_CODE_SEQUENCE);
+            let mut own = site.clone();
+            for modifier in child
+                .get(tags::CONTENT_SEQUENCE)
+                .iter()
+                .flat_map(|e| e.items().unwrap())
+            {
+                if name(modifier, tags::CONCEPT_NAME_CODE_SEQUENCE) == "Finding Site" {
+                    own = name(modifier, tags::CONCEPT_CODE_SEQUENCE);
+                }
+            }
+            into.push((concept, own, number));
+        } else {
+            figures(child, into, &site);
+        }
+    }
+}
+
+#[test]
+fn the_report_repeats_the_figures() {
+    let scene = straight();
+    let set = scene.read(DicomObject::Measurements);
+    let mut found = Vec::new();
+    figures(&set, &mut found, "");
+    let has = |concept: &str, site: &str, number: f64| {
+        let entry = (concept.to_owned(), site.to_owned(), number);
+        assert!(found.contains(&entry), "{entry:?} in {found:?}");
+    };
+    has("Volume", "Left ventricle", 101.25);
+    has("Volume", "Cavity of left ventricle", 55.5);
+    has("Wall Thickness", "Left ventricle", 9.5);
+    has(
+        "Extent of cardiac perfusion defect (observable entity)",
+        "Left ventricle",
+        12.5,
+    );
+    has(
+        "Myocardial perfusion (observable entity)",
+        "left ventricle mid inferior segment",
+        70.0,
+    );
+    assert_eq!(found.len(), 4 + 2 * 17);
+    // The evidence names the source and the mask that the content refers to.
+    let study = only(&set, tags::CURRENT_REQUESTED_PROCEDURE_EVIDENCE_SEQUENCE);
+    let named: Vec<String> = items(study, tags::REFERENCED_SERIES_SEQUENCE)
+        .iter()
+        .map(|s| {
+            text(
+                only(s, tags::REFERENCED_SOP_SEQUENCE),
+                tags::REFERENCED_SOP_INSTANCE_UID,
+            )
+        })
+        .collect();
+    let mask = text(&scene.read(DicomObject::Mask), tags::SOP_INSTANCE_UID);
+    assert_eq!(named, ["1.2.3.4.5.6", &mask]);
+}
+
+/// Calls `visit` with every element of `set` and of its sequences.
+fn walk(set: &InMemDicomObject, visit: &mut dyn FnMut(Tag, &str)) {
+    for element in set.iter() {
+        match element.items() {
+            Some(items) => items.iter().for_each(|item| walk(item, visit)),
+            None => {
+                let shown = element.to_str().unwrap_or_default();
+                visit(element.header().tag, &shown);
+            }
+        }
+    }
+}
+
+#[test]
+fn all_belong_to_the_patient_and_have_no_private_attribute() {
+    let scene = straight();
+    let mut instances = BTreeSet::new();
+    for object in DicomObject::ALL {
+        let set = scene.read(object);
+        assert_eq!(text(&set, tags::PATIENT_NAME), "Müller^Jürgen");
+        assert_eq!(text(&set, tags::PATIENT_ID), "P-17");
+        assert_eq!(text(&set, tags::STUDY_INSTANCE_UID), "1.2.3.4");
+        assert_eq!(text(&set, tags::ACCESSION_NUMBER), "ACC1");
+        if let Some(frame) = set.get(tags::FRAME_OF_REFERENCE_UID) {
+            assert_eq!(frame.to_str().unwrap().trim_end_matches('\0'), "1.2.3.4.9");
+        }
+        let mut uids = Vec::new();
+        walk(&set, &mut |tag, value| {
+            assert_eq!(tag.group() % 2, 0, "{tag} of {object:?} is private");
+            if value.starts_with("2.25.") {
+                uids.push(value.trim_end_matches('\0').to_owned());
+            }
+        });
+        assert!(uids.iter().all(|uid| is_uid(uid)));
+        assert!(instances.insert(text(&set, tags::SOP_INSTANCE_UID)));
+        assert_eq!(
+            set.meta()
+                .media_storage_sop_instance_uid()
+                .trim_end_matches('\0'),
+            text(&set, tags::SOP_INSTANCE_UID)
+        );
+    }
+}
+
+#[test]
+fn equal_input_gives_equal_bytes_and_other_input_other_uids() {
+    let (scene, again) = (straight(), straight());
+    for object in DicomObject::ALL {
+        assert_eq!(scene.write(object), again.write(object), "{object:?}");
+    }
+    let uid = |scene: &Scene| text(&scene.read(DicomObject::Mask), tags::SOP_INSTANCE_UID);
+    let mut other = straight();
+    other.report = json!({});
+    assert_ne!(uid(&scene), uid(&other));
+    let mut other = straight();
+    other.mask.voxels[0] ^= true;
+    assert_ne!(uid(&scene), uid(&other));
+    let later = Provenance {
+        patient_id: Some("P-18".into()),
+        ..provenance()
+    };
+    assert_ne!(
+        uid(&scene),
+        uid(&Scene::new(Matrix3::identity(), later, true))
+    );
+}
+
+#[test]
+fn without_a_position_no_frame_of_reference_is_claimed() {
+    let scene = Scene::new(Matrix3::identity(), provenance(), false);
+    let own = text(&scene.read(DicomObject::Mask), tags::FRAME_OF_REFERENCE_UID);
+    assert!(own != "1.2.3.4.9" && is_uid(&own));
+    for object in [
+        DicomObject::Mesh,
+        DicomObject::Surface,
+        DicomObject::Contours,
+    ] {
+        let set = scene.read(object);
+        assert_eq!(text(&set, tags::FRAME_OF_REFERENCE_UID), own);
+    }
+}
+
+#[test]
+fn deidentified_objects_hold_nothing_of_the_patient() {
+    let how = Deidentification {
+        secret: b"secret".to_vec(),
+    };
+    let stated = StatedIdentity {
+        patient_id: Some("TRIAL-1".into()),
+        ..StatedIdentity::default()
+    };
+    let mut scene = straight();
+    scene.scan = scene.scan.deidentified(&how, &stated);
+    let mut studies = BTreeMap::new();
+    for object in DicomObject::ALL {
+        let bytes = scene.write(object);
+        let set = from_reader(&bytes[..]).unwrap();
+        walk(&set, &mut |tag, value| {
+            let secret = [
+                "ller", "P-17", "195002", "ACC1", "House", "20250115", "20261123", "1.2.3.4",
+            ];
+            for part in secret {
+                assert!(!value.contains(part), "{part} in {tag} of {object:?}");
+            }
+        });
+        assert_eq!(text(&set, tags::PATIENT_ID), "TRIAL-1");
+        assert_eq!(text(&set, tags::PATIENT_IDENTITY_REMOVED), "YES");
+        *studies
+            .entry(text(&set, tags::STUDY_INSTANCE_UID))
+            .or_insert(0) += 1;
+    }
+    assert_eq!(studies.len(), 1, "one study stays one study");
+}
+
+#[test]
+fn identity_comes_from_the_file_or_from_a_person() {
+    let stated = |id: Option<&str>, study: Option<&str>| StatedIdentity {
+        patient_id: id.map(str::to_owned),
+        study_uid: study.map(str::to_owned),
+        ..StatedIdentity::default()
+    };
+    let missing = |field| Err(DicomError::NoIdentity { field });
+    assert!(identity(Some(&provenance()), &stated(None, None)).is_ok());
+    assert!(identity(Some(&provenance()), &stated(Some("P-17"), None)).is_ok());
+    let other = identity(Some(&provenance()), &stated(Some("P-18"), None));
+    let field = "patient_id";
+    assert_eq!(other, Err(DicomError::Contradiction { field }));
+    assert_eq!(
+        identity(None, &stated(None, Some("1.2"))),
+        missing("patient_id")
+    );
+    assert_eq!(
+        identity(None, &stated(Some("A"), None)),
+        missing("study_uid")
+    );
+    assert!(identity(None, &stated(Some("A"), Some("1.2"))).is_ok());
+    for (id, study) in [("A\\B", "1.2"), ("", "1.2"), ("A", "1.02"), ("A", "one")] {
+        let refused = identity(None, &stated(Some(id), Some(study)));
+        assert!(
+            matches!(refused, Err(DicomError::Identity { .. })),
+            "{id} {study}"
+        );
+    }
+}
+
+#[test]
+fn a_volume_without_dicom_images_names_no_source() {
+    let caller = Provenance {
+        patient_id: Some("A".into()),
+        study_uid: Some("1.2.3".into()),
+        ..Provenance::default()
+    };
+    let scene = Scene::new(Matrix3::identity(), caller, true);
+    for object in DicomObject::ALL {
+        let set = scene.read(object);
+        let mut referenced = 0;
+        let mask = text(&scene.read(DicomObject::Mask), tags::SOP_INSTANCE_UID);
+        walk(&set, &mut |tag, value| {
+            if tag == tags::REFERENCED_SOP_INSTANCE_UID && value.trim_end_matches('\0') != mask {
+                referenced += 1;
+            }
+        });
+        assert_eq!(referenced, 0, "{object:?}");
+    }
+}
+
+#[test]
+fn pictures_keep_their_pixels_and_oblique_rows_are_refused() {
+    let scene = straight();
+    let set = scene.read(DicomObject::Page);
+    assert_eq!(
+        (text(&set, tags::ROWS), text(&set, tags::COLUMNS)),
+        ("3".into(), "5".into())
+    );
+    let pixels = set.element(tags::PIXEL_DATA).unwrap().to_bytes().unwrap();
+    assert_eq!(pixels[..45], [10, 20, 30].repeat(15));
+    assert_eq!(pixels.len(), 46);
+    let bare = DicomResults {
+        polar: None,
+        ..scene.results()
+    };
+    assert_eq!(bare.write(DicomObject::Polar), Ok(None));
+
+    let mut sheared = Matrix3::identity();
+    sheared[(0, 1)] = 0.1;
+    let scene = Scene::new(sheared, provenance(), true);
+    assert_eq!(
+        scene.results().write(DicomObject::Mask),
+        Err(DicomError::Oblique)
+    );
+}
+
+#[test]
+fn decimals_have_sixteen_characters_at_most() {
+    for (number, text) in [
+        (0.0, "0"),
+        (-0.0, "0"),
+        (3.5, "3.5"),
+        (-123.456_789_012_345_67, "-123.45678901235"),
+        (1.0 / 3.0, "0.33333333333333"),
+        (-1.234_567_890_123e-9, "-1.23456789012e-9"),
+    ] {
+        let shown = data_set::decimal(number);
+        assert!(shown.len() <= 16);
+        let read: f64 = shown.parse().unwrap();
+        assert!(
+            (read - number).abs() <= 1e-9 * number.abs().max(1e-3),
+            "{text}: {shown}"
+        );
+    }
+}
