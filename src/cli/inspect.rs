@@ -3,7 +3,7 @@
 use crate::progress::Monitor;
 use crate::report;
 use crate::volume::dicom::Provenance;
-use crate::volume::{self, ReadLimits, VolumeFile};
+use crate::volume::{self, ReadLimits, ReadOptions, VolumeFile};
 use crate::work::problems::Explain;
 use anyhow::Result;
 use clap::Args;
@@ -35,7 +35,8 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     let (limits, monitor) = (ReadLimits::default(), Monitor::silent());
     let facts = volume::inspect(&files, &limits, &monitor);
     let facts = facts.map_err(|error| anyhow::anyhow!(error.with_advice()))?;
-    let from = volume::provenance(&files, &limits, &monitor)?;
+    let first = ReadOptions { frame: Some(0) };
+    let from = volume::provenance(&files, &first, &limits, &monitor)?;
     let mut shown = report::input(&facts);
     if let (Value::Object(shown), Some(from)) = (&mut shown, from) {
         shown.insert("dicom".into(), dicom(&from));

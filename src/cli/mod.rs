@@ -4,6 +4,7 @@ mod audit;
 mod bar;
 mod cohort_args;
 mod demo;
+mod dicom_args;
 mod doctor;
 mod evaluate;
 mod generate;

@@ -1,5 +1,6 @@
 //! `ventriform segment`: fits a model to a patient's volume.
 
+use super::dicom_args::DicomArgs;
 use super::output::{create_folder, write_file};
 use super::{Bar, FitArgs};
 use crate::export::{self, Format};
@@ -22,7 +23,8 @@ use std::path::{Path, PathBuf};
 Writes mask.nii.gz, mesh.glb, mesh.stl, mesh.json (or the formats given by --format), report.json,
 report.html, slices.png and, for the left ventricle, polar.json, polar.svg, polar.png, and mask and mesh
 of the anatomical wall: mask_anatomical.nii.gz, mesh_anatomical.glb, ... (with --edge anatomical:
-mask_apparent.nii.gz, mesh_apparent.glb, ...)")]
+mask_apparent.nii.gz, mesh_apparent.glb, ...); with --dicom also mask.dcm, contours.dcm, mesh.dcm,
+surface.dcm, measurements.dcm, polar.dcm and page.dcm")]
 pub struct SegmentArgs {
     /// The volume: NIfTI (.nii, .nii.gz, or a .hdr and .img pair) or DICOM (a multi-frame NM, PET, CT or
     /// MR file, all files of one series, or a zip of them)
@@ -46,6 +48,8 @@ pub struct SegmentArgs {
         default_values = ["glb", "stl", "json"]
     )]
     formats: Vec<Format>,
+    #[command(flatten)]
+    dicom: DicomArgs,
     #[command(flatten)]
     fit: FitArgs,
 }
@@ -79,6 +83,7 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
         bail!("--model {AUTO} stands for the built-in model; give {AUTO} or files, not both");
     }
     let volume: Vec<VolumeFile> = args.input.iter().map(VolumeFile::at).collect();
+    let dicom = args.dicom.order(&volume, parameters.frame)?;
     let expert = args.expert.as_ref().map(|path| [VolumeFile::at(path)]);
     let order = SegmentationOrder {
         volume: &volume,
@@ -95,6 +100,11 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
     bar.finish();
     let (mut files, made) = made?;
     files.push(made.page(&files));
+    if let Some(order) = dicom {
+        let scan = order.of(&made);
+        let objects = made.dicom_files(&scan);
+        files.extend(objects.map_err(|error| anyhow!(error.with_advice()))?);
+    }
     write_all(&args.output, &files)?;
     eprintln!("{}", headline(&made.segmentation));
     for flag in &made.segmentation.fit.flags {

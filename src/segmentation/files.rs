@@ -3,13 +3,16 @@
 use super::from_files::SegmentedVolume;
 use super::report::report_json;
 use crate::deform::WallEdge;
+use crate::export::dicom::{DicomError, DicomObject, DicomResults, Moment, SourceScan, Structure};
 use crate::export::{self, ExportError, Format, Metadata};
 use crate::grid::voxelise::Mask;
 use crate::parameters::Parameters;
 use crate::polar;
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, SegmentationPage, SegmentationReport};
+use crate::volume::dicom::Provenance;
 use crate::volume::nifti::{self, MaskError};
+use crate::volume::{AffineSource, Reading};
 use serde_json::{Map, Value, json};
 
 /// The mask of the anatomical wall, where `mask.nii.gz` shows the apparent one.
@@ -158,6 +161,38 @@ impl SegmentedVolume {
         .into_iter()
         .map(|(key, value)| (key.to_owned(), value))
         .collect()
+    }
+
+    /// The scan that the results belong to, with the given identity.
+    pub fn scan(&self, identity: Provenance, made: Moment) -> SourceScan {
+        let Reading { volume, facts, .. } = &self.reading;
+        let assumed = [AffineSource::Pixdim, AffineSource::UnknownOrigin];
+        let placed = !assumed.contains(&facts.affine_source);
+        SourceScan::new(identity, volume.frame.clone(), volume.shape, placed, made)
+    }
+
+    /// The results as DICOM objects of `scan` (see [`SegmentedVolume::scan`]).
+    ///
+    /// # Errors
+    /// See [`DicomError`].
+    pub fn dicom_files(&self, scan: &SourceScan) -> Result<Vec<NamedFile>, DicomError> {
+        let made = &self.segmentation;
+        let structure = Structure::of(self.parameters.organ.as_str());
+        let report = self.report();
+        let polar = made.polar.as_ref().map(polar::png);
+        let results = DicomResults::new(scan, structure, &made.mask, &made.fit.mesh, &report)
+            .with_pictures(Some(&made.slices), polar.as_deref());
+        let mut files = Vec::new();
+        for object in DicomObject::ALL {
+            if let Some(bytes) = results.write(object)? {
+                files.push(NamedFile {
+                    name: object.file_name().into(),
+                    media_type: DicomObject::MEDIA_TYPE,
+                    bytes,
+                });
+            }
+        }
+        Ok(files)
     }
 
     fn mask(

@@ -24,6 +24,23 @@ pub fn read(
     open::read(&mut *open(files, limits, monitor)?, *options, monitor)
 }
 
+/// Whose scan the volume in `files` is; `None` unless they are DICOM. Only headers are read.
+/// Where gates are summed, frames and instances are those of the first gate.
+///
+/// # Errors
+/// [`VolumeError`], as for [`read()`].
+pub fn provenance(
+    files: &[VolumeFile],
+    options: &ReadOptions,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Option<Provenance>, VolumeError> {
+    let file = open(files, limits, monitor)?;
+    let header = file.header();
+    let frame = options.choose(header.frames, header.gated)?;
+    Ok(file.provenance(frame.unwrap_or(0)))
+}
+
 /// Returns the facts about `files`. For several volumes the intensities are taken over all of them.
 ///
 /// Every voxel is decoded, so that a file that passes here can also be read. The voxels are not kept,
@@ -50,18 +67,6 @@ pub fn preview_files(
     monitor: &Monitor,
 ) -> Result<Image<1>, VolumeError> {
     open::preview(&mut *open(files, limits, monitor)?, monitor)
-}
-
-/// Whose scan the first volume in `files` is; `None` unless they are DICOM. Only headers are read.
-///
-/// # Errors
-/// [`VolumeError`].
-pub fn provenance(
-    files: &[VolumeFile],
-    limits: &ReadLimits,
-    monitor: &Monitor,
-) -> Result<Option<Provenance>, VolumeError> {
-    Ok(open(files, limits, monitor)?.provenance(0))
 }
 
 /// Recognises the format of `files` and checks the header.

@@ -7,6 +7,7 @@
 
 use super::page::PageError;
 use crate::deform::DeformError;
+use crate::export::dicom::DicomError;
 use crate::export::read_json::ReadMeshError;
 use crate::jobs::{Failure, Fault, WorkError};
 use crate::locate::LocateError;
@@ -266,6 +267,46 @@ impl Explain for TemplateError {
 
     fn is_cancelled(&self) -> bool {
         matches!(self, TemplateError::Cancelled(_))
+    }
+}
+
+impl Explain for DicomError {
+    fn explain(&self) -> Failure {
+        let (kind, field, advice) = match self {
+            DicomError::NoIdentity { field } => (
+                (Fault::Request, "identity-needed"),
+                Some(*field),
+                "DICOM objects belong to a patient and a study: give `patient_id` and \
+                 `study_uid`, or the scan as the DICOM file that it came from."
+                    .into(),
+            ),
+            DicomError::Contradiction { field } => (
+                (Fault::Request, "identity-differs"),
+                Some(*field),
+                format!("Check that this is the right scan; leave `{field}` out if it is."),
+            ),
+            DicomError::Identity { field, expected } => (
+                (Fault::Request, "invalid-parameter"),
+                Some(*field),
+                format!("Give {expected} as `{field}`."),
+            ),
+            DicomError::Oblique => (
+                (Fault::Content, "not-exportable"),
+                None,
+                "Resample the volume to a grid with right angles.".into(),
+            ),
+            DicomError::LongContour { .. } | DicomError::Mesh(_) => (
+                (Fault::Content, "not-exportable"),
+                Some("model"),
+                "Use a model with fewer points.".into(),
+            ),
+            DicomError::TooLarge | DicomError::Picture { .. } | DicomError::Encoding(_) => (
+                (Fault::Content, "not-exportable"),
+                None,
+                "Use the other files of the result, which hold the same.".into(),
+            ),
+        };
+        failure(kind, self, field, advice)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Series, Enhanced images, Segmentations, archives, and objects that hold no slices.
 
 use super::super::super::{FileFormat, ReadLimits, VolumeFile, provenance};
+use super::super::Provenance;
 use super::*;
 use std::io::Write as _;
 use zip::write::SimpleFileOptions;
@@ -51,6 +52,13 @@ fn files(slices: &[Elements]) -> Vec<VolumeFile> {
     named
         .map(|(n, e)| VolumeFile::in_memory(format!("{n}"), Encoding::Explicit.file(e)))
         .collect()
+}
+
+/// Whose scan the volume `frame` of `files` is, by the headers alone.
+fn headers(files: &[VolumeFile], frame: Option<usize>) -> Provenance {
+    let (options, limits) = (ReadOptions { frame }, ReadLimits::default());
+    let found = provenance(files, &options, &limits, &Monitor::silent());
+    found.unwrap().unwrap()
 }
 
 fn read_files(files: &[VolumeFile]) -> Result<Reading, VolumeError> {
@@ -311,6 +319,11 @@ fn gates_are_summed_unless_one_is_chosen() {
     assert!(reading.facts.warnings[0].contains("4 gates were summed"));
     assert_eq!(reading.facts.intensity.sum, 47.0 * 24.0);
     assert_eq!(reading.provenance.unwrap().slice_frames, [3, 4]);
+    let file = VolumeFile::in_memory("gated", Encoding::Explicit.file(&gated()));
+    for (frame, frames) in [(None, [3, 4]), (Some(1), [1, 2]), (Some(3), [6, 5])] {
+        let from = headers(std::slice::from_ref(&file), frame);
+        assert_eq!(from.slice_frames, frames, "{frame:?}");
+    }
 }
 
 #[test]
@@ -398,8 +411,7 @@ fn provenance_tells_how_the_scan_was_made() {
         "nm",
         Encoding::Implicit.file(&elements),
     )];
-    let from = provenance(&given, &ReadLimits::default(), &Monitor::silent());
-    let from = from.unwrap().unwrap();
+    let from = headers(&given, None);
     let stated = from.stated();
     for pair in [
         ("acquisition_date", "20260102"),
@@ -421,8 +433,8 @@ fn provenance_tells_how_the_scan_was_made() {
         "nm",
         Encoding::Implicit.file(&elements),
     )];
-    let both = provenance(&given, &ReadLimits::default(), &Monitor::silent());
-    assert_eq!(both.unwrap().unwrap().rest_or_stress, None);
+    let both = headers(&given, None);
+    assert_eq!(both.rest_or_stress, None);
 }
 
 #[test]

@@ -1,0 +1,154 @@
+//! The flags of DICOM output.
+
+use crate::export::dicom::{Deidentification, Moment, SourceScan, StatedIdentity, identity};
+use crate::progress::Monitor;
+use crate::segmentation::SegmentedVolume;
+use crate::volume::dicom::Provenance;
+use crate::volume::{self, ReadLimits, ReadOptions, VolumeFile};
+use crate::work::problems::Explain;
+use anyhow::{Result, anyhow};
+use clap::Args;
+use time::format_description::well_known::Rfc3339;
+use time::{OffsetDateTime, UtcOffset};
+
+/// Whether to write DICOM objects, and for whom.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "DICOM output")]
+pub struct DicomArgs {
+    /// Also write the results as DICOM objects of the scan's patient and study
+    #[arg(long)]
+    dicom: bool,
+    /// Patient ID; needed for a volume that is not DICOM. With --deidentify, the new Patient ID
+    #[arg(long, value_name = "ID", requires = "dicom")]
+    patient_id: Option<String>,
+    /// Patient's name, as FAMILY^GIVEN. With --deidentify, the new name
+    #[arg(long, value_name = "NAME", requires = "dicom")]
+    patient_name: Option<String>,
+    /// Patient's birth date
+    #[arg(long, value_name = "YYYYMMDD", requires = "dicom")]
+    patient_birth_date: Option<String>,
+    /// Patient's sex
+    #[arg(long, value_name = "M|F|O", requires = "dicom")]
+    patient_sex: Option<String>,
+    /// Study Instance UID; needed for a volume that is not DICOM
+    #[arg(long, value_name = "UID", requires = "dicom")]
+    study_uid: Option<String>,
+    /// Date of the study
+    #[arg(long, value_name = "YYYYMMDD", requires = "dicom")]
+    study_date: Option<String>,
+    /// Study ID
+    #[arg(long, value_name = "ID", requires = "dicom")]
+    study_id: Option<String>,
+    /// Accession number
+    #[arg(long, value_name = "NUMBER", requires = "dicom")]
+    accession_number: Option<String>,
+    /// Frame of Reference UID of the scan
+    #[arg(long, value_name = "UID", requires = "dicom")]
+    frame_of_reference_uid: Option<String>,
+    /// Remove the patient's identity from the DICOM objects (PS3.15, basic profile)
+    #[arg(long, requires = "dicom")]
+    deidentify: bool,
+    /// Secret from which --deidentify derives new UIDs: with the same secret, objects of one study
+    /// stay together [default: VENTRIFORM_DEIDENTIFY_SECRET, or a random one]
+    #[arg(long, value_name = "TEXT", requires = "deidentify")]
+    deidentify_secret: Option<String>,
+    /// Date and time of the DICOM objects; with the same time, the same input gives the same bytes
+    /// [default: now]
+    #[arg(long, value_name = "RFC3339", requires = "dicom")]
+    made_at: Option<String>,
+}
+
+/// DICOM output whose identity is known.
+pub(super) struct DicomOrder {
+    identity: Provenance,
+    made: Moment,
+    deidentify: Option<(Deidentification, StatedIdentity)>,
+}
+
+impl DicomArgs {
+    /// What is to be written of `files`; `None` without `--dicom`.
+    ///
+    /// # Errors
+    /// If patient or study are unknown, or a flag has a value that DICOM does not allow.
+    pub(super) fn order(
+        &self,
+        files: &[VolumeFile],
+        frame: Option<usize>,
+    ) -> Result<Option<DicomOrder>> {
+        if !self.dicom {
+            return Ok(None);
+        }
+        let stated = self.stated();
+        let limits = ReadLimits::default();
+        let found = volume::provenance(files, &ReadOptions { frame }, &limits, &Monitor::silent())
+            .map_err(|error| anyhow!(error.with_advice()))?;
+        // The new identity of a DICOM scan is not meant to be the one in its file.
+        let known = match self.deidentify && found.is_some() {
+            true => (stated.check()).and_then(|()| identity(found.as_ref(), &Default::default())),
+            false => identity(found.as_ref(), &stated),
+        };
+        let identity = known.map_err(|error| anyhow!(error.with_advice()))?;
+        let secret = || {
+            let given = self.deidentify_secret.clone();
+            let given = given.or_else(|| std::env::var("VENTRIFORM_DEIDENTIFY_SECRET").ok());
+            match given {
+                Some(text) => text.into_bytes(),
+                None => uuid::Uuid::new_v4().as_bytes().to_vec(),
+            }
+        };
+        Ok(Some(DicomOrder {
+            identity,
+            made: self.moment()?,
+            deidentify: self.deidentify.then(|| {
+                let how = Deidentification { secret: secret() };
+                (how, stated)
+            }),
+        }))
+    }
+
+    fn stated(&self) -> StatedIdentity {
+        StatedIdentity {
+            patient_id: self.patient_id.clone(),
+            patient_name: self.patient_name.clone(),
+            patient_birth_date: self.patient_birth_date.clone(),
+            patient_sex: self.patient_sex.clone(),
+            study_uid: self.study_uid.clone(),
+            study_date: self.study_date.clone(),
+            study_id: self.study_id.clone(),
+            accession_number: self.accession_number.clone(),
+            frame_of_reference_uid: self.frame_of_reference_uid.clone(),
+        }
+    }
+
+    /// The time of the objects, in UTC.
+    fn moment(&self) -> Result<Moment> {
+        let time = match &self.made_at {
+            None => OffsetDateTime::now_utc(),
+            Some(text) => OffsetDateTime::parse(text, &Rfc3339).map_err(|_| {
+                anyhow!("--made-at {text:?} is no time; give one such as 2026-11-23T13:45:00Z")
+            })?,
+        };
+        let time = time.to_offset(UtcOffset::UTC);
+        let (hour, minute, second) = time.to_hms();
+        Ok(Moment {
+            date: format!(
+                "{:04}{:02}{:02}",
+                time.year(),
+                u8::from(time.month()),
+                time.day()
+            ),
+            time: format!("{hour:02}{minute:02}{second:02}"),
+        })
+    }
+}
+
+impl DicomOrder {
+    /// The scan that the objects of `made` belong to.
+    pub(super) fn of(self, made: &SegmentedVolume) -> SourceScan {
+        let scan = made.scan(self.identity, self.made);
+        match self.deidentify {
+            Some((how, stated)) => scan.deidentified(&how, &stated),
+            None => scan,
+        }
+    }
+}
