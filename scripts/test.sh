@@ -4,7 +4,7 @@
 #
 #   scripts/test.sh            everything
 #   scripts/test.sh --quick    without the demo and the external checks (trimesh, vtk, glTF validator,
-#                              pygeodesic, schemathesis, generated clients, kills, licences and SBOM)
+#                              pygeodesic, schemathesis, generated clients, kills, DICOM, licences and SBOM)
 set -uo pipefail
 cd "$(dirname "$0")/.."
 
@@ -67,6 +67,7 @@ need() { # need COMMAND PACKAGE...: installs the packages if the command is miss
 install_external_tools() {
   need node nodejs npm
   need npm npm
+  need dciodvfy dicom3tools dcmtk
   python3 -c 'import ensurepip, venv' 2>/dev/null || need no-such-command python3 python3-venv python3-pip
   if ! cmp -s scripts/requirements.txt "$tools/python.done"; then
     python3 -m venv "$tools/python" &&
@@ -119,6 +120,7 @@ if wait "${running[install]}"; then
   start contract env SERVICE_FLAGS='--webhook-allow 127.0.0.1' scripts/with_service.sh "$PYTHON" scripts/check_contract.py
   start clients scripts/check_clients.sh
   start crashes "$PYTHON" scripts/crash_rounds.py --program target/debug/ventriform --rounds 10
+  start dicom scripts/check_dicom.sh
   start dependencies "$PYTHON" scripts/dependencies.py check
   collect formats "formats read by trimesh, vtk and the glTF validator"
   collect geodesics "geodesics against pygeodesic"
@@ -126,6 +128,7 @@ if wait "${running[install]}"; then
   collect contract "service answers as its document says"
   collect clients "generated Python and TypeScript clients"
   collect crashes "ten kills at random moments"
+  collect dicom "DICOM objects read by dciodvfy, highdicom and dcmqi"
   collect dependencies "licences, sources and bill of materials"
 else
   cat "$tools/install.log"

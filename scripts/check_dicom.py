@@ -1,0 +1,208 @@
+"""Writes NM files of one scan, segments them with ventriform and reads the DICOM objects back.
+
+usage: check_dicom.py VENTRIFORM DIR
+
+DIR/phantom/spect.nii.gz is the scan. For every case below the file's geometry is computed here, after PS3.3
+C.8.4.15, and the objects are compared with mask.nii.gz and mesh.json of the same run:
+
+- mask.dcm, read by highdicom and by dcmqi: every voxel, by its place in the patient;
+- contours.dcm: voxel centres inside the polygons of every slice;
+- mesh.dcm: every vertex of the STL within 0.01 mm; surface.dcm: points and triangles;
+- measurements.dcm, read by highdicom: the volumes of report.json;
+- all: patient, study, Frame of Reference, source, no private attribute.
+"""
+import glob
+import json
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import highdicom
+import nibabel
+import numpy as np
+import pydicom
+from pydicom.dataset import Dataset, FileMetaDataset
+from pydicom.uid import ExplicitVRLittleEndian
+
+NM = "1.2.840.10008.5.1.4.1.1.20"
+LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
+NAMES = ["mask", "contours", "mesh", "surface", "measurements", "polar", "page"]
+
+
+def nm(path, voxels, affine, number, gates=1):
+    """A reconstructed NM image of voxels[i, j, k]; `affine` maps indices to LPS mm and has right angles."""
+    steps = affine[:3, :3]
+    spacing = np.linalg.norm(steps, axis=0)
+    rows, columns = steps[:, 0] / spacing[0], steps[:, 1] / spacing[1]
+    sign = np.sign(np.dot(np.cross(rows, columns), steps[:, 2]))
+    data = Dataset()
+    data.SOPClassUID = NM
+    data.SOPInstanceUID = f"1.2.826.0.1.3680043.10.999.{number}.3"
+    data.StudyInstanceUID = f"1.2.826.0.1.3680043.10.999.{number}.1"
+    data.SeriesInstanceUID = f"1.2.826.0.1.3680043.10.999.{number}.2"
+    data.FrameOfReferenceUID = f"1.2.826.0.1.3680043.10.999.{number}.4"
+    data.SpecificCharacterSet = "ISO_IR 192"
+    data.PatientName, data.PatientID = "Phantom^Fritz", f"PH{number}"
+    data.PatientBirthDate, data.PatientSex = "19600102", "O"
+    data.StudyDate, data.StudyTime, data.StudyID = "20250115", "103000", "1"
+    data.AccessionNumber, data.ReferringPhysicianName = "ACC", ""
+    data.Modality, data.SeriesNumber, data.InstanceNumber = "NM", 2, 1
+    data.Manufacturer = "none"
+    kind = "RECON GATED TOMO" if gates > 1 else "RECON TOMO"
+    data.ImageType = ["DERIVED", "PRIMARY", kind, "EMISSION"]
+    data.Rows, data.Columns = voxels.shape[1], voxels.shape[0]
+    data.SamplesPerPixel, data.PhotometricInterpretation = 1, "MONOCHROME2"
+    data.BitsAllocated, data.BitsStored, data.HighBit, data.PixelRepresentation = 16, 16, 15, 0
+    data.PixelSpacing = [float(f"{spacing[1]:.9g}"), float(f"{spacing[0]:.9g}")]
+    data.SpacingBetweenSlices = float(f"{sign * spacing[2]:.9g}")
+    data.SliceThickness = float(f"{spacing[2]:.9g}")
+    slices = voxels.shape[2]
+    order = np.arange(gates * slices)[::-1]  # the file's frames in another order than the slices
+    data.NumberOfFrames = len(order)
+    data.SliceVector = [int(f) % slices + 1 for f in order]
+    if gates > 1:
+        data.FrameIncrementPointer = [0x00540060, 0x00540070, 0x00540080]
+        data.RRIntervalVector = [1] * len(order)
+        data.TimeSlotVector = [int(f) // slices + 1 for f in order]
+    else:
+        data.FrameIncrementPointer = 0x00540080
+    detector = Dataset()
+    detector.ImageOrientationPatient = [float(f"{x:.10f}") for x in (*rows, *columns)]
+    detector.ImagePositionPatient = [float(f"{x:.6f}") for x in affine[:3, 3]]
+    data.DetectorInformationSequence = [detector]
+    frames = np.concatenate([voxels.transpose(2, 1, 0)] * gates)[order]
+    data.PixelData = frames.astype("<u2").tobytes()
+    data["PixelData"].VR = "OW"
+    meta = FileMetaDataset()
+    meta.MediaStorageSOPClassUID, meta.MediaStorageSOPInstanceUID = NM, data.SOPInstanceUID
+    meta.TransferSyntaxUID = ExplicitVRLittleEndian
+    data.file_meta = meta
+    data.save_as(path, enforce_file_format=True)
+
+
+def cases(voxels, affine):
+    """Name, voxels, affine and number of gates: the same patient, stored in different ways."""
+    yield "plain", voxels, affine, 1
+    last = np.eye(4)
+    last[2, 2], last[2, 3] = -1, voxels.shape[2] - 1
+    yield "negative", voxels[:, :, ::-1], affine @ last, 1
+    # Sagittal slices, turned a little.
+    turn = np.eye(4)
+    a, b = np.radians([8, -11])
+    turn[:3, :3] = (np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]])
+                    @ np.array([[1, 0, 0], [0, np.cos(b), -np.sin(b)], [0, np.sin(b), np.cos(b)]]))
+    swap = np.eye(4)[:, [1, 2, 0, 3]]
+    yield "oblique", voxels.transpose(1, 2, 0), turn @ affine @ swap, 1
+    yield "gated", voxels, affine, 2
+
+
+def same_voxels(found, found_affine, mask, affine):
+    """Whether the voxels of two masks lie at the same places; the affines map indices to LPS mm."""
+    points = np.argwhere(found) @ found_affine[:3, :3].T + found_affine[:3, 3]
+    indices = (points - affine[:3, 3]) @ np.linalg.inv(affine[:3, :3]).T
+    nearest = np.rint(indices).astype(int)
+    truth = np.argwhere(mask)
+    return (len(nearest) == len(truth) and np.abs(indices - nearest).max() < 0.01
+            and {*map(tuple, nearest)} == {*map(tuple, truth)})
+
+
+def check_mask(out, mask, affine):
+    seg = highdicom.seg.segread(out / "mask.dcm")
+    volume = seg.get_volume(combine_segments=True)
+    assert same_voxels(volume.array > 0, volume.affine, mask, affine), "highdicom: other voxels"
+    folder = out / "dcmqi"
+    folder.mkdir()
+    program = Path(sys.executable).parent / "segimage2itkimage"
+    subprocess.run([program, "--inputDICOM", out / "mask.dcm", "--outputDirectory", folder,
+                    "--outputType", "nii"], check=True, capture_output=True)
+    image = nibabel.load(glob.glob(str(folder / "*.nii*"))[0])
+    found = np.asarray(image.dataobj) > 0
+    assert same_voxels(found, LPS @ image.affine, mask, affine), "dcmqi: other voxels"
+    return seg
+
+
+def inside(polygon, points):
+    """Which points (n, 2) lie inside the polygon, by parity."""
+    result = np.zeros(len(points), bool)
+    for a, b in zip(polygon, np.roll(polygon, -1, axis=0)):
+        crosses = (a[1] > points[:, 1]) != (b[1] > points[:, 1])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x = a[0] + (b[0] - a[0]) * (points[:, 1] - a[1]) / (b[1] - a[1])
+        result ^= crosses & (points[:, 0] < x)
+    return result
+
+
+def check_contours(out, mask, affine):
+    data = pydicom.dcmread(out / "contours.dcm")
+    back = np.linalg.inv(affine)
+    found = np.zeros(mask.shape, bool)
+    grid = np.argwhere(np.ones(mask.shape[:2], bool))
+    for contour in data.ROIContourSequence[0].ContourSequence:
+        points = np.array(contour.ContourData, float).reshape(-1, 3) @ back[:3, :3].T + back[:3, 3]
+        k = round(points[0, 2])
+        assert np.abs(points[:, 2] - k).max() < 1e-3, "a contour leaves its slice"
+        found[:, :, k] ^= inside(points[:, :2], grid).reshape(mask.shape[:2])
+    # Polygons are rounded to the thousandth of a millimetre.
+    assert (found != mask).sum() <= 2, "contours: other voxels"
+
+
+def check_meshes(out, mesh):
+    vertices, triangles = np.array(mesh["vertices"]), np.array(mesh["triangles"])
+    data = pydicom.dcmread(out / "mesh.dcm")
+    stl = data.EncapsulatedDocument[:data.EncapsulatedDocumentLength]
+    count = struct.unpack("<I", stl[80:84])[0]
+    facets = np.frombuffer(stl[84:], dtype=[("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
+    assert count == len(triangles) == len(facets)
+    assert np.abs(facets["v"] - vertices[triangles]).max() < 0.01, "STL: other vertices"
+    surface = pydicom.dcmread(out / "surface.dcm").SurfaceSequence[0]
+    points = np.frombuffer(surface.SurfacePointsSequence[0].PointCoordinatesData, "<f4").reshape(-1, 3)
+    assert np.abs(points - vertices).max() < 0.01, "surface: other points"
+    lists = surface.SurfaceMeshPrimitivesSequence[0].LongTrianglePointIndexList
+    assert (np.frombuffer(lists, "<u4").reshape(-1, 3) == triangles + 1).all(), "surface: other triangles"
+
+
+def check_measurements(out, report, seg):
+    sr = highdicom.sr.srread(out / "measurements.dcm")
+    (group,) = sr.content.get_volumetric_roi_measurement_groups()
+    assert group.referenced_segment is not None
+    assert group.tracking_uid == seg.SegmentSequence[0].TrackingUID
+    volumes = [m.value for m in group.get_measurements() if m.name.meaning == "Volume"]
+    assert report["volumes_ml"]["wall"] in volumes and report["volumes_ml"]["cavity"] in volumes
+    segments = sr.content.get_image_measurement_groups()
+    assert len(segments) == 17, len(segments)
+
+
+def main():
+    program, folder = sys.argv[1], Path(sys.argv[2])
+    image = nibabel.load(folder / "phantom/spect.nii.gz")
+    voxels = np.asarray(image.dataobj).clip(0)
+    for number, (name, stored, affine, gates) in enumerate(cases(voxels, LPS @ image.affine)):
+        here = folder / name
+        here.mkdir()
+        nm(here / "nm.dcm", stored, affine, number, gates)
+        out = here / "out"
+        command = [program, "segment", here / "nm.dcm", "--model", "auto", "-o", out, "--dicom"]
+        command += ["--frame", "1"] if gates > 1 else []
+        subprocess.run(command, check=True, capture_output=True)
+        image = nibabel.load(out / "mask.nii.gz")
+        mask = np.asarray(image.dataobj) > 0
+        assert mask.shape == stored.shape and mask.sum() > 100
+        source = pydicom.dcmread(here / "nm.dcm")
+        for kind in NAMES:
+            data = pydicom.dcmread(out / f"{kind}.dcm")
+            for attribute in ("PatientName", "PatientID", "StudyInstanceUID", "AccessionNumber"):
+                assert data[attribute].value == source[attribute].value, (kind, attribute)
+            frame = data.get("FrameOfReferenceUID", source.FrameOfReferenceUID)
+            assert frame == source.FrameOfReferenceUID, kind
+            text = str(data)
+            assert source.SOPInstanceUID in text, f"{kind} does not name its source"
+            assert not any(e.tag.is_private for e in data.iterall()), kind
+        seg = check_mask(out, mask, affine)
+        check_contours(out, mask, affine)
+        check_meshes(out, json.loads((out / "mesh.json").read_text()))
+        check_measurements(out, json.loads((out / "report.json").read_text()), seg)
+        print(f"{name}: {mask.sum()} voxels, 7 objects as they must be")
+
+
+main()
