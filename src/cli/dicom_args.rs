@@ -36,7 +36,7 @@ pub struct DicomArgs {
     /// Date of the study
     #[arg(long, value_name = "YYYYMMDD", requires = "dicom")]
     study_date: Option<String>,
-    /// Study ID
+    /// Study ID: the number of the study in the department
     #[arg(long, value_name = "ID", requires = "dicom")]
     study_id: Option<String>,
     /// Accession number

@@ -197,12 +197,12 @@ impl IntoParams for TagParameters {
         };
         let labels = ArrayBuilder::new()
             .items(RefOr::T(Schema::from(
-                text("^[A-Za-z0-9_./-]{1,64}:[ -~]{1,256}$").examples(["study:42"]),
+                text("^[A-Za-z0-9_./-]{1,64}:.{1,256}$").examples(["study:42"]),
             )))
             .max_items(Some(16));
         vec![
             query("external_id", "The id in the caller's own system")
-                .schema(Some(Schema::from(text("^[ -~]{1,128}$"))))
+                .schema(Some(Schema::from(text("^.{1,128}$"))))
                 .build(),
             query(
                 "labels",
