@@ -1,7 +1,6 @@
 //! A picture as Secondary Capture Image Storage (PS3.3 A.8.1), in colour.
 
-use super::codes::SOURCE_FOR_PROCESSING;
-use super::data_set::{DataSet, reference};
+use super::data_set::DataSet;
 use super::{DicomError, DicomResults};
 use dicom_dictionary_std::tags;
 use std::io::Cursor;
@@ -24,16 +23,7 @@ pub(super) fn put(
     set.text(tags::BURNED_IN_ANNOTATION, "NO");
     set.text(tags::LOSSY_IMAGE_COMPRESSION, "00");
     if let Some(images) = results.scan.images() {
-        let source = |(uid, _): &(&str, Vec<u32>)| {
-            let mut item = reference(images.class, uid);
-            item.code(
-                tags::PURPOSE_OF_REFERENCE_CODE_SEQUENCE,
-                SOURCE_FOR_PROCESSING,
-            );
-            item
-        };
-        let sources = images.instances.iter().map(source).collect();
-        set.items(tags::SOURCE_IMAGE_SEQUENCE, sources);
+        set.items(tags::SOURCE_IMAGE_SEQUENCE, images.processed());
     }
     set.short(tags::SAMPLES_PER_PIXEL, 3);
     set.text(tags::PHOTOMETRIC_INTERPRETATION, "RGB");

@@ -227,8 +227,8 @@ fn context(results: &DicomResults<'_>) -> Vec<DataSet> {
 /// The source images, as TID 1600 lists them; nothing without DICOM images.
 fn image_library(results: &DicomResults<'_>) -> Option<DataSet> {
     let images = results.scan.images()?;
-    let all = images.instances.iter();
-    let all = all.map(|(uid, _)| image("CONTAINS", None, reference(images.class, uid)));
+    let all = images.references().into_iter();
+    let all = all.map(|reference| image("CONTAINS", None, reference));
     let group = container(dcm("126200", "Image Library Group"), all.collect());
     Some(container(dcm("111028", "Image Library"), vec![group]))
 }
@@ -274,11 +274,11 @@ fn whole(results: &DicomResults<'_>) -> DataSet {
             Some(dcm("121191", "Referenced Segment")),
             segment_reference(results),
         ));
-        for (uid, _) in &images.instances {
+        for reference in images.references() {
             content.push(image(
                 "CONTAINS",
                 Some(dcm("121233", "Source image for segmentation")),
-                reference(images.class, uid),
+                reference,
             ));
         }
     }
@@ -408,9 +408,7 @@ fn evidence(results: &DicomResults<'_>) -> DataSet {
         all.push(series);
     };
     if let Some(images) = results.scan.images() {
-        let instances = images.instances.iter();
-        let instances = instances.map(|(uid, _)| reference(images.class, uid));
-        add(images.series, instances.collect());
+        add(images.series, images.references());
     }
     let mask = results.instance(DicomObject::Mask);
     add(

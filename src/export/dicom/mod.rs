@@ -36,7 +36,7 @@ pub use codes::Structure;
 pub use source::{Deidentification, Moment, SourceScan, StatedIdentity, identity};
 
 use self::codes::{ANATOMICAL_STRUCTURE, Code, DEFORMABLE_MODELS};
-use self::data_set::{DataSet, reference};
+use self::data_set::DataSet;
 use self::uid::Uids;
 use super::ExportError;
 use crate::grid::voxelise::Mask;
@@ -345,11 +345,9 @@ impl<'a> DicomResults<'a> {
         let Some(images) = self.scan.images() else {
             return;
         };
-        let instances = images.instances.iter();
-        let instances = instances.map(|(uid, _)| reference(images.class, uid));
         let mut series = DataSet::new();
         series.text(tags::SERIES_INSTANCE_UID, images.series);
-        series.items(tags::REFERENCED_INSTANCE_SEQUENCE, instances.collect());
+        series.items(tags::REFERENCED_INSTANCE_SEQUENCE, images.references());
         set.item(tags::REFERENCED_SERIES_SEQUENCE, series);
     }
 

@@ -4,8 +4,9 @@
 //! the mask. Frames follow each other along row × column, against the order of the slices if the
 //! volume is left-handed (negative Spacing Between Slices), and each has its own Image Position.
 
-use super::codes::{SEGMENTATION, SOURCE_FOR_PROCESSING};
+use super::codes::SEGMENTATION;
 use super::data_set::DataSet;
+use super::source::for_processing;
 use super::{CIELAB, DicomError, DicomResults, algorithm};
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
@@ -154,13 +155,9 @@ fn frame_groups(results: &DicomResults<'_>, place: usize, k: usize) -> DataSet {
     let mut segment = DataSet::new();
     segment.short(tags::REFERENCED_SEGMENT_NUMBER, 1);
     group.item(tags::SEGMENT_IDENTIFICATION_SEQUENCE, segment);
-    if let Some(mut source) = results.scan.slice_reference(k) {
-        source.code(
-            tags::PURPOSE_OF_REFERENCE_CODE_SEQUENCE,
-            SOURCE_FOR_PROCESSING,
-        );
+    if let Some(source) = results.scan.slice_reference(k) {
         let mut derivation = DataSet::new();
-        derivation.item(tags::SOURCE_IMAGE_SEQUENCE, source);
+        derivation.item(tags::SOURCE_IMAGE_SEQUENCE, for_processing(source));
         derivation.code(tags::DERIVATION_CODE_SEQUENCE, SEGMENTATION);
         group.item(tags::DERIVATION_IMAGE_SEQUENCE, derivation);
     }

@@ -1,6 +1,7 @@
 //! The scan that the objects belong to: its identity, its grid and its images.
 
 use super::DicomError;
+use super::codes::SOURCE_FOR_PROCESSING;
 use super::data_set::{DataSet, reference};
 use super::uid::{derived, is_uid};
 use crate::geometry::frame::VoxelToPatient;
@@ -66,9 +67,31 @@ pub struct SourceScan {
 /// The DICOM images that a volume was read from.
 pub(super) struct SourceImages<'a> {
     pub series: &'a str,
-    pub class: &'a str,
-    /// Every instance once, with the frames used of it (none: the whole instance).
-    pub instances: Vec<(&'a str, Vec<u32>)>,
+    class: &'a str,
+    instances: Vec<&'a str>,
+}
+
+impl SourceImages<'_> {
+    /// A reference to every instance.
+    pub fn references(&self) -> Vec<DataSet> {
+        let all = self.instances.iter();
+        all.map(|uid| reference(self.class, uid)).collect()
+    }
+
+    /// The same, naming them as what the result was computed from.
+    pub fn processed(&self) -> Vec<DataSet> {
+        let all = self.references().into_iter();
+        all.map(for_processing).collect()
+    }
+}
+
+/// Adds to a reference that the result was computed from what it names.
+pub(super) fn for_processing(mut reference: DataSet) -> DataSet {
+    reference.code(
+        tags::PURPOSE_OF_REFERENCE_CODE_SEQUENCE,
+        SOURCE_FOR_PROCESSING,
+    );
+    reference
 }
 
 impl StatedIdentity {
@@ -253,11 +276,8 @@ impl SourceScan {
     pub(super) fn images(&self) -> Option<SourceImages<'_>> {
         let p = &self.provenance;
         let instances = match p.instance_uids.is_empty() {
-            false => {
-                let all = p.instance_uids.iter();
-                all.map(|uid| (uid.as_str(), Vec::new())).collect()
-            }
-            true => vec![(p.sop_instance_uid.as_deref()?, p.slice_frames.clone())],
+            false => p.instance_uids.iter().map(String::as_str).collect(),
+            true => vec![p.sop_instance_uid.as_deref()?],
         };
         Some(SourceImages {
             series: p.series_uid.as_deref()?,

@@ -1,7 +1,7 @@
 //! The mesh as Encapsulated STL Storage (PS3.3 A.85.1).
 
-use super::codes::{MILLIMETRE, SOURCE_FOR_PROCESSING};
-use super::data_set::{DataSet, reference};
+use super::codes::MILLIMETRE;
+use super::data_set::DataSet;
 use super::{DicomError, DicomResults};
 use crate::export::{Format, Metadata, encode};
 use dicom_core::PrimitiveValue;
@@ -24,16 +24,7 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), D
     set.text(tags::DOCUMENT_TITLE, results.structure.label);
     set.items(tags::CONCEPT_NAME_CODE_SEQUENCE, Vec::new());
     if let Some(images) = scan.images() {
-        let source = |(uid, _): &(&str, Vec<u32>)| {
-            let mut item = reference(images.class, uid);
-            item.code(
-                tags::PURPOSE_OF_REFERENCE_CODE_SEQUENCE,
-                SOURCE_FOR_PROCESSING,
-            );
-            item
-        };
-        let sources = images.instances.iter().map(source).collect();
-        set.items(tags::SOURCE_INSTANCE_SEQUENCE, sources);
+        set.items(tags::SOURCE_INSTANCE_SEQUENCE, images.processed());
     }
     set.text(tags::MIME_TYPE_OF_ENCAPSULATED_DOCUMENT, "model/stl");
     set.put(

@@ -30,11 +30,9 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), D
     let mut referenced = DataSet::new();
     referenced.text(tags::FRAME_OF_REFERENCE_UID, frame_of_reference.as_str());
     if let Some(images) = scan.images() {
-        let all = images.instances.iter();
-        let all = all.map(|(uid, _)| reference(images.class, uid)).collect();
         let mut series = DataSet::new();
         series.text(tags::SERIES_INSTANCE_UID, images.series);
-        series.items(tags::CONTOUR_IMAGE_SEQUENCE, all);
+        series.items(tags::CONTOUR_IMAGE_SEQUENCE, images.references());
         let mut study = reference(STUDY_CLASS, scan.study());
         study.item(tags::RT_REFERENCED_SERIES_SEQUENCE, series);
         referenced.item(tags::RT_REFERENCED_STUDY_SEQUENCE, study);

@@ -22,11 +22,7 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), D
         tags::SEGMENT_SURFACE_GENERATION_ALGORITHM_IDENTIFICATION_SEQUENCE,
         algorithm(),
     );
-    let sources = results.scan.images().map(|images| {
-        let all = images.instances.into_iter();
-        all.map(|(uid, _)| super::data_set::reference(images.class, uid))
-            .collect()
-    });
+    let sources = results.scan.images().map(|images| images.references());
     made.items(
         tags::SEGMENT_SURFACE_SOURCE_INSTANCE_SEQUENCE,
         sources.unwrap_or_default(),
