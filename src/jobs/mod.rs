@@ -75,8 +75,8 @@ pub use storage::{
     DeathLimit, Deleted, DiskSpace, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder,
     ErasureReason, Expiry, FigureStore, FileRecord, Held, Holding, Interrupted, ItemRecord,
     JobFilter, JobOutcome, JobStore, Lease, LegalHold, ListPage, ListRequest, LocalFile, Product,
-    ProductFile, QueueFigures, QueueLoad, Receipt, StagedFiles, StagedFor, StoreError, StoreFault,
-    StoreResult, StoredVolume, TagFilter, Tags,
+    ProductFile, QueueFigures, QueueLoad, Receipt, RecordPages, StagedFiles, StagedFor, StoreError,
+    StoreFault, StoreResult, StoredVolume, TagFilter, Tags,
 };
 pub use tenant::{InvalidTenant, Tenant};
 pub use work::{

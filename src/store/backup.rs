@@ -14,7 +14,7 @@ use super::content;
 use super::doctor::{DoctorError, names};
 use super::sqlite::SqliteStore;
 use super::{CLOSED, DATABASE, DiskGauge, FolderLock, OpenError, StoreSettings};
-use crate::jobs::{Custody, ItemRecord, Resource, StoreError};
+use crate::jobs::{ItemRecord, RecordPages, Resource, StoreError};
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io;
@@ -97,28 +97,23 @@ async fn copy_items(
     rows: &SqliteStore,
 ) -> Result<(Backup, BTreeSet<String>), DoctorError> {
     let (mut done, mut kept) = (Backup::default(), BTreeSet::new());
-    for kind in [Resource::Volume, Resource::Model] {
-        let mut after = 0;
-        loop {
-            let page = rows.records(kind, after, PAGE).await?;
-            let Some(last) = page.last() else { break };
-            after = last.sequence();
-            for record in page {
-                let id = record.id();
-                match copy_item(folder, target, &record)? {
-                    Copied::Now => done.copied += 1,
-                    Copied::Before => {}
-                    Copied::Not(defect) => {
-                        rows.forget(id).await?;
-                        if folder.join(blobs::shelf_path(id)).exists() {
-                            done.damaged.push(format!("{id}: {defect}"));
-                        }
-                        continue;
+    let mut pages = RecordPages::new(rows, PAGE);
+    while let Some(page) = pages.next().await? {
+        for record in page {
+            let id = record.id();
+            match copy_item(folder, target, &record)? {
+                Copied::Now => done.copied += 1,
+                Copied::Before => {}
+                Copied::Not(defect) => {
+                    rows.forget(id).await?;
+                    if folder.join(blobs::shelf_path(id)).exists() {
+                        done.damaged.push(format!("{id}: {defect}"));
                     }
+                    continue;
                 }
-                done.items += 1;
-                kept.insert(id.to_owned());
             }
+            done.items += 1;
+            kept.insert(id.to_owned());
         }
     }
     for shelf in Resource::WITH_FILES.map(Resource::plural) {

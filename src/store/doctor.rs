@@ -22,8 +22,8 @@ use super::content;
 use super::sqlite::SqliteStore;
 use super::{CLOSED, DATABASE, DiskGauge, FolderLock, OpenError, StoreSettings};
 use crate::jobs::{
-    Clock, Custody, FileRecord, ItemRecord, Resource, StoreError, SystemClock, Tenant, random_id,
-    volume_id,
+    Clock, Custody, FileRecord, ItemRecord, RecordPages, Resource, StoreError, SystemClock, Tenant,
+    random_id, volume_id,
 };
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -262,16 +262,11 @@ impl Doctor<'_> {
     /// Checks the files of every row. Returns the ids that have a row.
     async fn rows(&mut self, rows: &SqliteStore) -> Result<BTreeSet<String>, DoctorError> {
         let mut known = BTreeSet::new();
-        for kind in [Resource::Volume, Resource::Model] {
-            let mut after = 0;
-            loop {
-                let page = rows.records(kind, after, PAGE).await?;
-                let Some(last) = page.last() else { break };
-                after = last.sequence();
-                for record in page {
-                    self.row(rows, &record).await?;
-                    known.insert(record.id().to_owned());
-                }
+        let mut pages = RecordPages::new(rows, PAGE);
+        while let Some(page) = pages.next().await? {
+            for record in page {
+                self.row(rows, &record).await?;
+                known.insert(record.id().to_owned());
             }
         }
         Ok(known)

@@ -15,7 +15,8 @@
 
 use super::Queue;
 use crate::jobs::{
-    BlobError, FileRecord, ItemRecord, Resource, StoreError, StoreFault, StoreResult, volume_id,
+    BlobError, FileRecord, ItemRecord, RecordPages, Resource, StoreError, StoreFault, StoreResult,
+    volume_id,
 };
 use std::sync::Arc;
 use std::time::Duration;
@@ -147,14 +148,10 @@ impl Custodian {
     /// If the storage fails for another reason than a damaged file.
     pub async fn scrub(&self) -> StoreResult<u64> {
         let mut damaged = 0;
-        for kind in [Resource::Volume, Resource::Model] {
-            let mut after = 0;
-            loop {
-                let records = self.queue.catalogue.records(kind, after, 1).await?;
-                let Some(record) = records.into_iter().next() else {
-                    break;
-                };
-                after = record.sequence();
+        // One by one: an item may be erased while those before it are read.
+        let mut pages = RecordPages::new(&*self.queue.catalogue, 1);
+        while let Some(page) = pages.next().await? {
+            for record in page {
                 match self.scrub_item(record).await {
                     Ok(()) => {}
                     Err(StoreError::Files(error)) if error.cause == StoreFault::DamagedFile => {

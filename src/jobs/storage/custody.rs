@@ -6,6 +6,44 @@ use crate::jobs::Resource;
 use async_trait::async_trait;
 use std::collections::BTreeSet;
 
+/// The rows of all items with files, page by page: volumes first, each kind from the oldest on. Rows
+/// may be removed meanwhile.
+pub struct RecordPages<'a, C: ?Sized> {
+    rows: &'a C,
+    limit: u32,
+    /// The kinds that are not at their end; [`Resource::Model`] stands for all products.
+    kinds: &'static [Resource],
+    after: i64,
+}
+
+impl<'a, C: Custody + ?Sized> RecordPages<'a, C> {
+    /// Pages of at most `limit` rows.
+    pub fn new(rows: &'a C, limit: u32) -> Self {
+        Self {
+            rows,
+            limit,
+            kinds: &[Resource::Volume, Resource::Model],
+            after: 0,
+        }
+    }
+
+    /// The next page; `None` after the last.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn next(&mut self) -> StoreResult<Option<Vec<ItemRecord>>> {
+        while let [kind, rest @ ..] = self.kinds {
+            let page = self.rows.records(*kind, self.after, self.limit).await?;
+            if let Some(last) = page.last() {
+                self.after = last.sequence();
+                return Ok(Some(page));
+            }
+            (self.kinds, self.after) = (rest, 0);
+        }
+        Ok(None)
+    }
+}
+
 /// Rows of items of every kind. Every method fails only if the database does.
 #[async_trait]
 pub trait Custody: Send + Sync + 'static {

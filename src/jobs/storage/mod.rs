@@ -19,7 +19,7 @@ pub use blobs::{
     BlobError, BlobStore, BlobStream, BlobWriter, DiskSpace, LocalFile, StagedFiles, StagedFor,
 };
 pub use catalogue::{Catalogue, Deleted};
-pub use custody::Custody;
+pub use custody::{Custody, RecordPages};
 pub use erasure::{
     AuditMark, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder, ErasureReason, Expiry,
     Receipt,
