@@ -68,6 +68,7 @@ pub async fn metrics(State(app): State<App>, RawQuery(query): RawQuery) -> Answe
         backlog: app.hooks.store.backlog().await?,
         sent: app.hooks.dispatcher.counts(),
         ready: app.readiness.check(&app.queue).await.is_ok(),
+        space: app.queue.blobs.space(),
         settings: &app.settings,
         now: app.queue.clock.now(),
     };

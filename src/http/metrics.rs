@@ -6,8 +6,7 @@
 
 use crate::config::Settings;
 use crate::hooks::{Backlog, DeliveryCounts};
-use crate::jobs::{QueueFigures, QueueLoad, Timestamp};
-use crate::store::disk_space;
+use crate::jobs::{DiskSpace, QueueFigures, QueueLoad, Timestamp};
 use prometheus::core::Collector;
 use prometheus::{
     Encoder, Gauge, Histogram, HistogramOpts, HistogramVec, IntCounter, IntCounterVec, IntGauge,
@@ -197,6 +196,8 @@ pub struct MetricReadings<'a> {
     pub sent: &'a DeliveryCounts,
     /// Whether the storage works.
     pub ready: bool,
+    /// The space of the disk, where it is known.
+    pub space: Option<DiskSpace>,
     /// The operator's settings.
     pub settings: &'a Settings,
     /// The time of day.
@@ -363,9 +364,9 @@ impl Gauges {
                 .set(signed(*count));
         }
         let folder = &settings.data_dir;
-        if let Some(space) = disk_space(folder) {
-            self.disk_size.set(signed(space.1));
-            self.disk_free.set(signed(space.0));
+        if let Some(space) = &reading.space {
+            self.disk_size.set(signed(space.total));
+            self.disk_free.set(signed(space.free));
         }
         self.database.set(size_of(&folder.join("ventriform.db")));
         self.write_ahead_log

@@ -297,17 +297,3 @@ impl Drop for FolderLock {
         self.release();
     }
 }
-
-/// Free and total bytes of the disk that holds `folder`; `None` if the system does not tell.
-#[cfg(unix)]
-pub fn disk_space(folder: &Path) -> Option<(u64, u64)> {
-    let found = rustix::fs::statvfs(folder).ok()?;
-    let bytes = |blocks: u64| blocks.saturating_mul(found.f_frsize);
-    Some((bytes(found.f_bavail), bytes(found.f_blocks)))
-}
-
-/// Free and total bytes of the disk that holds `folder`; `None` if the system does not tell.
-#[cfg(not(unix))]
-pub fn disk_space(_folder: &Path) -> Option<(u64, u64)> {
-    None
-}
