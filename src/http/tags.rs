@@ -6,8 +6,9 @@
 
 use super::app::App;
 use super::problem::{Answer, Problem, shorten};
-use super::request::unknown;
-use crate::jobs::{TagFilter, Tags};
+use super::request::{merge_patch, unknown};
+use crate::jobs::{TagFilter, Tags, Tenant};
+use axum::extract::Request;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
@@ -79,11 +80,27 @@ pub fn of_object(app: &App, object: &Map<String, Value>) -> Answer<Tags> {
     Ok(tags)
 }
 
+/// Applies the JSON merge patch of a request to the tags of a tenant's item or job.
+///
+/// # Errors
+/// Those of [`merge_patch`] and [`merged`], 503 or 507 if the storage fails.
+pub async fn change(
+    app: &App,
+    tenant: &Tenant,
+    id: &str,
+    tags: Tags,
+    request: Request,
+) -> Answer<()> {
+    let tags = merged(app, tags, &merge_patch(request).await?)?;
+    app.queue.catalogue.set_tags(tenant, id, &tags).await?;
+    Ok(())
+}
+
 /// The tags after a JSON merge patch: what is `null` goes, what is absent stays.
 ///
 /// # Errors
 /// 400 for a field that is not a tag, 422 for one that is malformed.
-pub fn merged(app: &App, mut tags: Tags, patch: &Map<String, Value>) -> Answer<Tags> {
+fn merged(app: &App, mut tags: Tags, patch: &Map<String, Value>) -> Answer<Tags> {
     for (name, value) in patch {
         if !FIELDS.contains(&name.as_str()) {
             return Err(unknown("field", name, &FIELDS));

@@ -5,7 +5,7 @@ use super::caller::Caller;
 use super::collection::{Collection, find};
 use super::openapi::{self, LookupProblems, UploadProblems};
 use super::problem::{Answer, Problem};
-use super::request::{PathSegments, merge_patch, query_pairs, refuse_unknown, unknown};
+use super::request::{PathSegments, query_pairs, refuse_unknown, unknown};
 use super::validators::not_modified;
 use super::wire::{path_of, rfc3339};
 use super::{tags, upload};
@@ -326,12 +326,7 @@ pub async fn update_volume(
 ) -> Answer<Json<VolumeBody>> {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
-    let patch = merge_patch(request).await?;
-    let tags = tags::merged(&app, volume.holding.tags, &patch)?;
-    app.queue
-        .catalogue
-        .set_tags(&caller.tenant, &id, &tags)
-        .await?;
+    tags::change(&app, &caller.tenant, &id, volume.holding.tags, request).await?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     Ok(Json(VolumeBody::of(&app, volume)?))
 }

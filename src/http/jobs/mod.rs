@@ -17,9 +17,7 @@ use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
 use super::pagination::{next_cursor, page_of};
 use super::problem::not_found::missing;
 use super::problem::{Answer, Problem, ProblemBody, shorten};
-use super::request::{
-    PathSegments, json_object, merge_patch, query_pairs, refuse_unknown, text, unknown,
-};
+use super::request::{PathSegments, json_object, query_pairs, refuse_unknown, text, unknown};
 use super::tags;
 use crate::jobs::{
     Deleted, Interrupted, Job, JobFilter, JobState, NewJob, Resource, Tenant, Timestamp,
@@ -235,12 +233,7 @@ pub async fn update_job(
 ) -> Answer<Json<JobBody>> {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let job = find(&app, &caller.tenant, &id).await?;
-    let patch = merge_patch(request).await?;
-    let tags = tags::merged(&app, job.tags, &patch)?;
-    app.queue
-        .catalogue
-        .set_tags(&caller.tenant, &id, &tags)
-        .await?;
+    tags::change(&app, &caller.tenant, &id, job.tags, request).await?;
     let job = find(&app, &caller.tenant, &id).await?;
     Ok(Json(describe(&app, job).await?))
 }
