@@ -42,7 +42,7 @@ pub async fn download_volume(
             format!("The volume `{id}` has {} files.", volume.files.len()),
         )
         .fix(format!(
-            "Download them one by one; GET {} lists them in `files`.",
+            "Download them one by one; GET {} lists them in `originals`.",
             path_of(&id)
         ))),
     }
