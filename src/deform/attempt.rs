@@ -107,24 +107,22 @@ impl Attempt {
         let cup = template
             .cup
             .map(|cup| wall::carried(&cup, &template.mesh, &self.moved.mesh));
-        // The confidence is calibrated on the wall as the sensors left it, before its rim moves.
-        let felt = cup
-            .map(|cup| {
-                let mesh = &self.moved.mesh;
-                VentricleWall::new(mesh, &cup, &orientation.superior, monitor)
-            })
-            .transpose()?;
-        let mesh = match &cup {
-            Some(cup) if orientation.source != OrientationSource::Unknown => {
-                rim::settled(&self.moved.mesh, cup, &orientation.superior)
-            }
-            _ => self.moved.mesh,
+        let wall_of = |mesh: &TriMesh| {
+            cup.map(|cup| VentricleWall::new(mesh, &cup, &orientation.superior, monitor))
+                .transpose()
         };
-        let wall = cup
-            .map(|cup| {
-                VentricleWall::new(&mesh, &cup, &setup.patient_orientation.superior, monitor)
-            })
-            .transpose()?;
+        // The confidence is calibrated on the wall as the sensors left it, before its rim moves.
+        let felt = wall_of(&self.moved.mesh)?;
+        let settled = cup
+            .filter(|_| orientation.source != OrientationSource::Unknown)
+            .and_then(|cup| rim::settled(&self.moved.mesh, &cup, &orientation.superior));
+        let (mesh, wall) = match settled {
+            Some(mesh) => {
+                let wall = wall_of(&mesh)?;
+                (mesh, wall)
+            }
+            None => (self.moved.mesh, felt.clone()),
+        };
         let posed = &setup.posed.vertices;
         let mut fit = Fit {
             displacements: mesh

@@ -62,18 +62,14 @@ fn correction(distance: f64) -> f64 {
     (0.784 + 0.95 * distance + beyond).clamp(-12.0, 16.0)
 }
 
-/// `mesh` with its rim where anatomy and image together put it. Without a rim in every direction, and where
-/// the moved surface would intersect itself, the mesh stays.
-pub fn settled(mesh: &TriMesh, cup: &Cup, superior: &Vec3) -> TriMesh {
+/// `mesh` with its rim where anatomy and image together put it. `None` without a rim in every direction, and
+/// where the moved surface would intersect itself: then the mesh stays.
+pub fn settled(mesh: &TriMesh, cup: &Cup, superior: &Vec3) -> Option<TriMesh> {
     let frame = RimFrame::of(cup, superior);
-    let Some(rim) = frame.heights(mesh) else {
-        return mesh.clone();
-    };
+    let rim = frame.heights(mesh)?;
     let apex = mesh.vertices.iter().map(|p| frame.along(p));
     let length = apex.fold(f64::MIN, f64::max) - median(&rim);
-    let Some(shape) = expected(&rim, length) else {
-        return mesh.clone();
-    };
+    let shape = expected(&rim, length)?;
     let shifts: Vec<f64> = rim
         .iter()
         .zip(&shape)
@@ -86,10 +82,7 @@ pub fn settled(mesh: &TriMesh, cup: &Cup, superior: &Vec3) -> TriMesh {
         let share = (1.0 - above / REACH).clamp(0.0, 1.0);
         *p -= frame.axis * (share * between(&shifts, direction));
     }
-    match self_intersections(&moved).is_empty() {
-        true => moved,
-        false => mesh.clone(),
-    }
+    self_intersections(&moved).is_empty().then_some(moved)
 }
 
 /// The shape of a rim with these heights, mm, of a heart of this length.
@@ -243,8 +236,8 @@ mod tests {
         let (whole, cup) = heart(0.0);
         let (cut, _) = heart(12.0);
         let anterior = DIRECTIONS / 4;
-        let heights =
-            [&whole, &cut, &settled(&cut, &cup, &Vec3::y())].map(|m| rim(m, &cup)[anterior]);
+        let settled = settled(&cut, &cup, &Vec3::y()).unwrap();
+        let heights = [&whole, &cut, &settled].map(|m| rim(m, &cup)[anterior]);
         let [whole, cut, settled] = heights;
         assert!(cut > whole + 9.0, "{heights:?}");
         assert!((settled - whole).abs() < 0.5 * (cut - whole), "{heights:?}");
@@ -253,7 +246,7 @@ mod tests {
     #[test]
     fn a_usual_rim_stays_within_two_millimetres() {
         let (whole, cup) = heart(0.0);
-        let settled = settled(&whole, &cup, &Vec3::y());
+        let settled = settled(&whole, &cup, &Vec3::y()).unwrap();
         for (before, after) in rim(&whole, &cup).iter().zip(rim(&settled, &cup)) {
             assert!((before - after).abs() < 2.0, "{before} {after}");
         }
