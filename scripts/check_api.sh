@@ -12,24 +12,12 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 python=${PYTHON:-python3}
-data=$(mktemp -d)
-# Naming a test gives the libraries the same features as `cargo test` does. Without it cargo would
-# compile them and the program a second time.
-cargo build --quiet --bins --test layering
+[ -n "${SERVICE_URL:-}" ] || SERVICE_FLAGS='--auth-failure-limit 1000000' exec scripts/with_service.sh scripts/check_api.sh
 # The service asks for credentials as soon as there is a key; schemathesis checks that it does.
 key=$(target/debug/ventriform keys create --name schemathesis --scope admin \
-  --requests-per-minute 1000000 --data-dir "$data" 2>/dev/null)
-target/debug/ventriform serve --auth-failure-limit 1000000 --listen 127.0.0.1:0 --data-dir "$data" >"$data/log" 2>&1 &
-service=$!
-trap 'kill $service 2>/dev/null; wait $service 2>/dev/null; rm -rf "$data"' EXIT
-for _ in $(seq 100); do
-  url=$(grep -o 'http://127[0-9.:]*' "$data/log" | head -n 1 || true)
-  [ -n "$url" ] && break
-  sleep 0.1
-done
-[ -n "$url" ] || { cat "$data/log"; exit 1; }
+  --requests-per-minute 1000000 --data-dir "$SERVICE_DATA/data" 2>/dev/null)
 try() {
-  "$(dirname "$python")/schemathesis" run "$url/openapi.json" \
+  "$(dirname "$python")/schemathesis" run "$SERVICE_URL/openapi.json" \
     --header "Authorization: Bearer $key" --max-examples "${EXAMPLES:-15}" \
     --workers 1 --seed 1 --suppress-health-check all \
     --exclude-checks positive_data_acceptance --no-color "$@"
@@ -37,4 +25,3 @@ try() {
 # Revoking keys comes last: it takes ids from answers, among them that of the key of the requests.
 try --exclude-operation-id revoke_key
 try --include-operation-id revoke_key
-kill -0 "$service"
