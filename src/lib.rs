@@ -149,6 +149,9 @@ pub mod access;
 pub mod hooks;
 
 #[cfg(feature = "service")]
+pub mod archive;
+
+#[cfg(feature = "service")]
 pub mod store;
 
 #[cfg(feature = "service")]

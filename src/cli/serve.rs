@@ -46,11 +46,12 @@ pub struct HealthcheckArgs {
 /// # Errors
 /// If a setting is invalid, the address is in use, or the data folder cannot be used.
 pub fn run(args: &ServeArgs) -> Result<()> {
-    let (settings, origins) = Settings::load(&args.flags, variable)?;
+    let (mut settings, origins) = Settings::load(&args.flags, variable)?;
     if args.print_config {
         print!("{}", settings.print(&origins));
         return Ok(());
     }
+    settings.read_credentials(variable)?;
     start_log(&settings)?;
     let listener = bind(settings.listen)?;
     let address = listener.local_addr()?;

@@ -4,10 +4,12 @@
 //! environment variable, the TOML file given by `--config`, the default. The table below lists
 //! every setting with its description, type and default; flags, variables, file keys, `--help`
 //! and `--print-config` are generated from it. Nothing else in the program reads the environment.
+//! Lists (`[[archives]]`) are in the file only.
 //!
 //! The crate `config` is not used: it does not combine with flags of `clap`, does not say in an
 //! error which setting came from where, and cannot print the origins.
 
+mod archives;
 mod units;
 
 pub use units::{
@@ -15,6 +17,7 @@ pub use units::{
     OptionalPath, OrKeyword, OtlpEndpoint, OwnRetention, Retention, Size, Span, Words,
 };
 
+use crate::archive::Archives;
 use crate::hooks::AllowList;
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -48,6 +51,24 @@ pub enum ConfigError {
         key: String,
         /// The setting with the most similar name.
         nearest: Option<String>,
+    },
+    /// A field of a list in the file is not valid.
+    #[error("{path}: {field}: {reason}")]
+    BadField {
+        /// The file.
+        path: PathBuf,
+        /// The field: `archives[0].dicomweb`.
+        field: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A variable that a field of a list in the file names is not set.
+    #[error("{field}: {reason}")]
+    NoCredentials {
+        /// The field: `archives[0].password_env`.
+        field: String,
+        /// Which variable is missing.
+        reason: String,
     },
     /// A value is not valid for its setting.
     #[error("{setting} = `{value}` ({origin}): {reason}")]
@@ -155,6 +176,8 @@ macro_rules! settings {
         #[derive(Debug, Clone, PartialEq)]
         pub struct Settings {
             $($($(#[doc = $doc])+ pub $name: $kind,)+)+
+            /// The archives that jobs may name; in the file only.
+            pub archives: Archives,
         }
 
         /// The settings as flags of `ventriform serve`, all optional.
@@ -193,6 +216,7 @@ macro_rules! settings {
                         origins.push(origin);
                         value
                     },)+)+
+                    archives: layers.archives.clone(),
                 };
                 Ok((settings, origins))
             }
@@ -369,6 +393,23 @@ settings! {
     /// Largest number of registered webhooks of one tenant
     webhook_endpoint_limit: u32 = "20";
 
+    ["Archives"]
+    /// Hosts, addresses and networks that a job may name in `source.dicomweb` although no archive is
+    /// configured for them, separated by commas; empty allows none
+    dicomweb_allow: AllowList = "";
+    /// Longest pause of an archive in an answer
+    archive_timeout: Span = "30s";
+    /// Longest time for one fetch of a series or one delivery
+    archive_time_limit: Span = "10m";
+    /// Largest number of attempts of one fetch or delivery
+    archive_attempts: u32 = "20";
+    /// Longest time for which a fetch or a delivery is tried
+    archive_age: Span = "3d";
+    /// Pause after the first failed attempt; each is four times the one before, at most 6h
+    archive_backoff: Span = "5s";
+    /// Largest number of fetches, and of deliveries, at the same time
+    archive_concurrency: usize = "4";
+
     ["Traces"]
     /// Address of an OpenTelemetry collector (OTLP over HTTP), such as http://127.0.0.1:4318; the
     /// variable OTEL_EXPORTER_OTLP_ENDPOINT is read too. `off` sends no traces
@@ -409,6 +450,10 @@ impl Settings {
             .config
             .clone()
             .or_else(|| variable("VENTRIFORM_CONFIG").map(PathBuf::from));
+        let file = match path {
+            Some(path) => read_file(&path)?,
+            None => FileContent::default(),
+        };
         let layers = Layers {
             variables: Settings::NAMES
                 .iter()
@@ -421,23 +466,41 @@ impl Settings {
                     Some((*name, value?))
                 })
                 .collect(),
-            file: match path {
-                Some(path) => read_file(&path)?,
-                None => BTreeMap::new(),
-            },
+            file: file.values,
+            archives: file.archives,
         };
         let (settings, origins) = Self::resolve(flags, &layers)?;
         Ok((settings, Origins(origins)))
     }
 
+    /// Takes the credentials of the archives from the environment. Not part of
+    /// [`Settings::load`]: commands beside the service need none.
+    ///
+    /// # Errors
+    /// The field whose variable is not set.
+    pub fn read_credentials(
+        &mut self,
+        variable: impl Fn(&str) -> Option<String>,
+    ) -> Result<(), ConfigError> {
+        for (number, archive) in self.archives.0.iter_mut().enumerate() {
+            archive
+                .read_credentials(&variable)
+                .map_err(|fault| ConfigError::NoCredentials {
+                    field: format!("{}[{number}].{}", archives::KEY, fault.field),
+                    reason: fault.reason,
+                })?;
+        }
+        Ok(())
+    }
+
     /// The settings as TOML that reads back, with the origin of each as a comment.
     pub fn print(&self, origins: &Origins) -> String {
-        Self::NAMES
+        let lines = Self::NAMES
             .iter()
             .zip(self.values())
             .zip(&origins.0)
-            .map(|((name, value), origin)| format!("{name} = {value:?} # {origin}\n"))
-            .collect()
+            .map(|((name, value), origin)| format!("{name} = {value:?} # {origin}\n"));
+        lines.chain([archives::print(&self.archives)]).collect()
     }
 }
 
@@ -449,6 +512,15 @@ pub fn variable_name(setting: &str) -> String {
 struct Layers {
     variables: BTreeMap<&'static str, String>,
     file: BTreeMap<String, String>,
+    archives: Archives,
+}
+
+/// What the file of `--config` says.
+#[derive(Default)]
+struct FileContent {
+    /// The settings as text, so that values of every origin go through one parser.
+    values: BTreeMap<String, String>,
+    archives: Archives,
 }
 
 impl Layers {
@@ -481,8 +553,7 @@ impl Layers {
     }
 }
 
-/// The settings of the file as text, so that values of every origin go through one parser.
-fn read_file(path: &Path) -> Result<BTreeMap<String, String>, ConfigError> {
+fn read_file(path: &Path) -> Result<FileContent, ConfigError> {
     let unreadable = |reason: String| ConfigError::Unreadable {
         path: path.to_owned(),
         reason,
@@ -491,28 +562,31 @@ fn read_file(path: &Path) -> Result<BTreeMap<String, String>, ConfigError> {
     let table: toml::Table = text
         .parse()
         .map_err(|e: toml::de::Error| unreadable(e.to_string()))?;
-    table
-        .into_iter()
-        .map(|(key, value)| {
-            if !Settings::NAMES.contains(&key.as_str()) {
-                return Err(ConfigError::UnknownKey {
-                    path: path.to_owned(),
-                    nearest: nearest(&key),
-                    key,
-                });
-            }
-            let text = match value {
-                toml::Value::String(text) => text,
-                other => other.to_string(),
-            };
-            Ok((key, text))
-        })
-        .collect()
+    let mut content = FileContent::default();
+    for (key, value) in table {
+        if key == archives::KEY {
+            content.archives = archives::read(path, value)?;
+            continue;
+        }
+        if !Settings::NAMES.contains(&key.as_str()) {
+            return Err(ConfigError::UnknownKey {
+                path: path.to_owned(),
+                nearest: nearest(&key),
+                key,
+            });
+        }
+        let text = match value {
+            toml::Value::String(text) => text,
+            other => other.to_string(),
+        };
+        content.values.insert(key, text);
+    }
+    Ok(content)
 }
 
 fn nearest(key: &str) -> Option<String> {
-    Settings::NAMES
-        .iter()
+    let names = Settings::NAMES.iter().chain(&[archives::KEY]);
+    names
         .map(|name| (strsim::jaro_winkler(key, name), *name))
         .filter(|(likeness, _)| *likeness > 0.75)
         .max_by(|a, b| a.0.total_cmp(&b.0))
@@ -612,6 +686,50 @@ mod tests {
         assert_eq!(endpoint(&[standard, own]).otlp_endpoint.0, None);
     }
 
+    const PACS: &str = "[[archives]]
+name = \"pacs\"
+dicomweb = \"https://10.0.0.5/dicom-web\"
+username_env = \"PACS_USER\"
+password_env = \"PACS_PASSWORD\"
+tenants = [\"default\"]
+";
+
+    #[test]
+    fn archives_are_read_and_their_credentials_are_not_in_the_file() {
+        let (mut settings, _) = load(Flags::default(), &[], Some(PACS)).unwrap();
+        let [pacs] = &settings.archives.0[..] else {
+            panic!("{:?}", settings.archives);
+        };
+        assert_eq!(pacs.name, "pacs");
+        let error = settings.read_credentials(|_| None).unwrap_err().to_string();
+        assert!(error.contains("archives[0].username_env"), "{error}");
+        assert!(error.contains("PACS_USER"), "{error}");
+        settings.read_credentials(|name| Some(name.into())).unwrap();
+    }
+
+    #[test]
+    fn every_fault_of_an_archive_names_its_field() {
+        for (text, field) in [
+            ("archives = 1".to_owned(), "archives"),
+            ("archives = [1]".to_owned(), "archives[0].name"),
+            (format!("{PACS}dicomwebb = \"a\""), "archives[0].dicomwebb"),
+            (format!("{PACS}ca_file = 1"), "archives[0].ca_file"),
+            (format!("{PACS}{PACS}"), "archives[1].name"),
+            (PACS.replace("https", "gopher"), "archives[0].dicomweb"),
+            (PACS.replace("[\"default\"]", "[]"), "archives[0].tenants"),
+            (
+                PACS.replace("[\"default\"]", "[\"a/b\"]"),
+                "archives[0].tenants",
+            ),
+            (PACS.replace("[\"default\"]", "1"), "archives[0].tenants"),
+        ] {
+            let error = load(Flags::default(), &[], Some(&text)).unwrap_err();
+            assert!(error.to_string().contains(&format!("{field}:")), "{error}");
+        }
+        let error = load(Flags::default(), &[], Some("archivs = 1")).unwrap_err();
+        assert!(error.to_string().contains("`archives`?"));
+    }
+
     #[test]
     fn an_unknown_key_of_the_file_is_rejected_with_the_nearest_name() {
         let error = load(Flags::default(), &[], Some("queue_limits = 1")).unwrap_err();
@@ -646,7 +764,8 @@ mod tests {
             body_limit: Some("3MiB".parse().unwrap()),
             ..Flags::default()
         };
-        let (settings, origins) = load(flags, &[("VENTRIFORM_WORKERS", "4")], None).unwrap();
+        let variables = [("VENTRIFORM_WORKERS", "4")];
+        let (settings, origins) = load(flags, &variables, Some(PACS)).unwrap();
         let printed = settings.print(&origins);
         assert!(printed.contains("workers = \"4\" # variable"));
         assert!(printed.contains("retention = \"30d\" # flag"));

@@ -145,6 +145,8 @@ impl CheckedUrl {
 #[derive(Debug, Clone)]
 pub struct UrlGuard {
     allow: AllowList,
+    /// Whether public addresses pass beside the allowed ones.
+    public: bool,
     closed: Vec<IpNet>,
     open_v6: Option<IpNet>,
 }
@@ -155,8 +157,17 @@ impl UrlGuard {
         let ranges = CLOSED_V4.iter().chain(&CLOSED_V6);
         Self {
             allow,
+            public: true,
             closed: ranges.filter_map(|range| range.parse().ok()).collect(),
             open_v6: OPEN_V6.parse().ok(),
+        }
+    }
+
+    /// A guard that lets pass only what is in the list.
+    pub fn of_listed(allow: AllowList) -> Self {
+        Self {
+            public: false,
+            ..Self::new(allow)
         }
     }
 
@@ -188,6 +199,9 @@ impl UrlGuard {
         let named = self.allow.has_name(&host);
         let allowed = |a: &SocketAddr| named || self.allow.has_address(a.ip().to_canonical());
         let addresses_allowed = addresses.iter().all(allowed);
+        if !addresses_allowed && !self.public {
+            return Err(UrlRefusal("The operator has not allowed that host."));
+        }
         if !addresses_allowed {
             if url.scheme() == "http" {
                 return Err(UrlRefusal(
@@ -371,6 +385,16 @@ mod tests {
             "ff02::1",
         ] {
             assert!(!guard.is_public(closed.parse().unwrap()), "{closed}");
+        }
+    }
+
+    #[tokio::test]
+    async fn a_guard_of_listed_hosts_lets_nothing_else_pass() {
+        let guard = UrlGuard::of_listed("10.1.0.0/16".parse().unwrap());
+        assert_eq!(refusal(&guard, "http://10.1.2.3/dicom-web").await, None);
+        for other in ["https://8.8.8.8/", "https://10.2.0.1/", "http://127.0.0.1/"] {
+            let refused = refusal(&guard, other).await;
+            assert_eq!(refused, Some("The operator has not allowed that host."));
         }
     }
 

@@ -1,6 +1,7 @@
 //! The state that all handlers share.
 
 use super::decoding::Decoding;
+use super::exchange::Exchange;
 use super::guard::state::Guard;
 use super::hooks::Hooks;
 use super::kept_answers::KeptAnswers;
@@ -52,6 +53,8 @@ pub struct Shared {
     pub streams: EventStreams,
     /// Telling other programs about jobs.
     pub hooks: Hooks,
+    /// Archives.
+    pub exchange: Exchange,
     /// Figures for operators.
     pub metrics: Metrics,
     /// Whether the storage works.
@@ -79,7 +82,7 @@ impl App {
         engine: Engine,
         (access, guard): (Arc<dyn AccessStore>, Guard),
         settings: Settings,
-        hooks: Hooks,
+        (hooks, exchange): (Hooks, Exchange),
         watching: Watching,
         closing: CancellationToken,
     ) -> Self {
@@ -95,6 +98,7 @@ impl App {
             streams: EventStreams::new(&settings),
             settings,
             hooks,
+            exchange,
             closing,
             metrics: watching.metrics,
             figures: watching.figures,

@@ -37,6 +37,7 @@ mod cryptography;
 mod decoding;
 mod document;
 mod erasures;
+mod exchange;
 mod files;
 mod front_page;
 mod given_webhook;

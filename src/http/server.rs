@@ -4,6 +4,7 @@ use super::app::{App, Watching, retention_ages};
 use super::connections::tls::{Tls, TlsError};
 use super::connections::{self, ConnectionLimits};
 use super::cryptography::install_cryptography;
+use super::exchange::Exchange;
 use super::guard::hosts::HostPolicy;
 use super::guard::state::Guard;
 use super::hooks::Hooks;
@@ -135,7 +136,7 @@ pub async fn start(
         engine.clone(),
         (store.rows.clone(), guard),
         settings.clone(),
-        hooks,
+        (hooks, exchange(&settings)),
         watching,
         closing.clone(),
     );
@@ -322,6 +323,12 @@ fn hooks(settings: &Settings, store: &Store, queue: &Queue) -> Hooks {
         store: store.rows.clone(),
         guard,
         dispatcher: Arc::new(dispatcher),
+    }
+}
+
+fn exchange(settings: &Settings) -> Exchange {
+    Exchange {
+        guard: UrlGuard::of_listed(settings.dicomweb_allow.clone()),
     }
 }
 

@@ -2,7 +2,7 @@
 //! `running` back to `queued` when its worker was lost.
 
 use super::{Failure, Tags, Tenant, Timestamp};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -67,8 +67,12 @@ pub struct Job {
     pub tags: Tags,
     /// The kind of work: `model`, `segmentation`.
     pub kind: String,
-    /// Id of the volume to work on.
-    pub volume: String,
+    /// Id of the volume to work on; `None` until it has come from [`Job::source`].
+    pub volume: Option<String>,
+    /// The series in an archive that the volume comes from.
+    pub source: Option<SeriesSource>,
+    /// What of the result is sent to an archive.
+    pub send: Option<SendOrder>,
     /// The validated parameters, with every default written out.
     pub parameters: Map<String, Value>,
     /// The state.
@@ -102,8 +106,38 @@ pub struct Job {
     pub trace_parent: Option<String>,
 }
 
+/// A series in an archive. `Debug` does not show which.
+#[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SeriesSource {
+    /// Name of the configured archive.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub archive: Option<String>,
+    /// Base URL of a DICOMweb service for which no archive is configured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dicomweb: Option<String>,
+    /// Study Instance UID.
+    pub study: String,
+    /// Series Instance UID.
+    pub series: String,
+}
+
+impl fmt::Debug for SeriesSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("SeriesSource(..)")
+    }
+}
+
+/// What of a job's result is sent to an archive.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SendOrder {
+    /// Names of the DICOM objects, such as `mask.dcm`; not empty, each once.
+    pub names: Vec<String>,
+    /// Name of the archive.
+    pub to: String,
+}
+
 /// A job to be filed.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct NewJob {
     /// See [`Job::tenant`].
     pub tenant: Tenant,
@@ -111,8 +145,12 @@ pub struct NewJob {
     pub tags: Tags,
     /// See [`Job::kind`].
     pub kind: String,
-    /// See [`Job::volume`].
-    pub volume: String,
+    /// See [`Job::volume`]; `None` if there is a source.
+    pub volume: Option<String>,
+    /// See [`Job::source`].
+    pub source: Option<SeriesSource>,
+    /// See [`Job::send`].
+    pub send: Option<SendOrder>,
     /// Other stored items the work needs: parameter name to id.
     pub needs: BTreeMap<String, String>,
     /// See [`Job::parameters`].

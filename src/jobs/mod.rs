@@ -63,7 +63,7 @@ pub use failure::{Failure, Fault};
 pub(crate) use ids::hex;
 pub use ids::{content_id, random_id, volume_id};
 pub use isolation::Isolation;
-pub use job::{Filed, Idempotency, Job, JobState, JobWebhook, NewJob};
+pub use job::{Filed, Idempotency, Job, JobState, JobWebhook, NewJob, SendOrder, SeriesSource};
 pub use observer::JobObserver;
 pub use queue::{
     Custodian, Hold, Queue, QueuePosition, QueueSettings, RetentionAges, Swept, TemplateSource,

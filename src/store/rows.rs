@@ -18,7 +18,9 @@ pub(super) fn job(row: SqliteRow) -> StoreResult<Job> {
         tags: tags(&row)?,
         sequence: row.try_get("sequence")?,
         kind: row.try_get("kind")?,
-        volume: row.try_get("volume")?,
+        volume: Some(row.try_get("volume")?).filter(|volume: &String| !volume.is_empty()),
+        source: optional_json(&row, "source")?,
+        send: optional_json(&row, "send")?,
         parameters: json(&row, "parameters")?,
         state: JobState::parse(state)
             .ok_or_else(|| StoreError::database(format!("unknown job state `{state}`")))?,
@@ -137,6 +139,12 @@ pub(super) fn to_json(value: &impl Serialize) -> StoreResult<String> {
 /// The value of a JSON column.
 pub(super) fn json<T: DeserializeOwned>(row: &SqliteRow, column: &str) -> StoreResult<T> {
     from_json(row.try_get(column)?)
+}
+
+/// The value of a JSON column that may be null.
+fn optional_json<T: DeserializeOwned>(row: &SqliteRow, column: &str) -> StoreResult<Option<T>> {
+    let text: Option<&str> = row.try_get(column)?;
+    text.map(from_json).transpose()
 }
 
 /// The value of a text column that has a parser of its own.

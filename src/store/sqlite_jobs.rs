@@ -62,11 +62,12 @@ impl JobStore for SqliteStore {
         let inserted = sqlx::query(
             "INSERT INTO jobs (id, kind, volume, parameters, created_at, idempotency_key,
                                fingerprint, needs, tenant, external_id, labels, webhook,
-                               trace_parent)
-             SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?9, ?10, ?11, ?12, ?13, ?14
+                               trace_parent, source, send)
+             SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16
              WHERE (SELECT count(*) FROM jobs WHERE state = 'queued') < ?8
-               AND EXISTS (SELECT 1 FROM holdings
-                           WHERE tenant = ?10 AND id = ?3 AND kind = 'volume')
+               AND (?15 IS NOT NULL
+                    OR EXISTS (SELECT 1 FROM holdings
+                               WHERE tenant = ?10 AND id = ?3 AND kind = 'volume'))
                AND NOT EXISTS
                    (SELECT 1 FROM json_each(?9) AS need WHERE NOT EXISTS
                         (SELECT 1 FROM holdings WHERE tenant = ?10 AND id = need.value))
@@ -75,7 +76,7 @@ impl JobStore for SqliteStore {
         )
         .bind(&id)
         .bind(&job.kind)
-        .bind(&job.volume)
+        .bind(job.volume.as_deref().unwrap_or_default())
         .bind(to_json(&job.parameters)?)
         .bind(now)
         .bind(key.map(|k| stored_key(&job.tenant, &k.key)))
@@ -87,6 +88,8 @@ impl JobStore for SqliteStore {
         .bind(to_json(&job.tags.labels)?)
         .bind(job.webhook.as_ref().map(to_json).transpose()?)
         .bind(&job.trace_parent)
+        .bind(job.source.as_ref().map(to_json).transpose()?)
+        .bind(job.send.as_ref().map(to_json).transpose()?)
         .fetch_optional(&mut *transaction)
         .await?;
         if let Some(row) = inserted {
@@ -198,7 +201,8 @@ impl JobStore for SqliteStore {
                     lease_run = ?2, lease_expires_at = ?3, started_at = ?4, stage = NULL,
                     progress = 0, revision = revision + 1
              WHERE sequence = (
-                 SELECT sequence FROM jobs WHERE state = 'queued' ORDER BY sequence LIMIT 1)
+                 SELECT sequence FROM jobs WHERE state = 'queued' AND volume != ''
+                 ORDER BY sequence LIMIT 1)
              RETURNING *",
         )
         .bind(&by.token)
@@ -431,9 +435,9 @@ impl JobStore for SqliteStore {
 impl SqliteStore {
     /// The first item the job needs that does not exist.
     async fn missing(&self, job: &NewJob) -> StoreResult<Option<Filed>> {
-        let volume = ("volume", &job.volume);
+        let volume = job.volume.iter().map(|id| ("volume", id));
         let others = job.needs.iter().map(|(field, id)| (field.as_str(), id));
-        for (field, id) in std::iter::once(volume).chain(others) {
+        for (field, id) in volume.chain(others) {
             let found = sqlx::query(
                 "SELECT 1 FROM holdings WHERE tenant = ?1 AND id = ?2
                      AND (kind = 'volume' OR ?3 != 'volume')",

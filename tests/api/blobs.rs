@@ -218,12 +218,11 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
         tenant: tenant.clone(),
         tags,
         kind: "model".into(),
-        volume: "vol_1".into(),
+        volume: Some("vol_1".into()),
         needs: BTreeMap::new(),
         parameters: work.parameters_from_text(&[]).unwrap(),
         idempotency: None,
-        webhook: None,
-        trace_parent: None,
+        ..NewJob::default()
     };
     let Filed::New(job) = queue.file(&job).await.unwrap() else {
         panic!("the job was rejected");

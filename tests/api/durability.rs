@@ -190,12 +190,11 @@ async fn filed(store: &Store) -> String {
         tenant,
         tags,
         kind: "model".into(),
-        volume: "vol_1".into(),
+        volume: Some("vol_1".into()),
         needs: Default::default(),
         parameters,
         idempotency: None,
-        webhook: None,
-        trace_parent: None,
+        ..NewJob::default()
     };
     match store.rows.file(&order, 10, 0).await.unwrap() {
         Filed::New(job) => job.id,

@@ -174,14 +174,13 @@ async fn file_suspected(data: &Path, volume: &str) {
     let work = fake_engine().work("model").unwrap().clone();
     let order = NewJob {
         tags: Default::default(),
-        webhook: None,
-        trace_parent: None,
         tenant: Tenant::default(),
         kind: "model".into(),
-        volume: volume.into(),
+        volume: Some(volume.into()),
         needs: Default::default(),
         parameters: work.parameters_from_json(&Map::new()).unwrap(),
         idempotency: None,
+        ..NewJob::default()
     };
     let filed = store.rows.file(&order, 10, 0).await.unwrap();
     assert!(matches!(filed, Filed::New(_)), "{filed:?}");

@@ -223,15 +223,14 @@ async fn the_age_of_a_volume_counts_from_its_last_upload() {
 async fn use_volume(bench: &Bench, tenant: &Tenant) -> String {
     let work = fake_engine().work("model").unwrap().clone();
     let order = NewJob {
-        webhook: None,
-        trace_parent: None,
         tenant: tenant.clone(),
         tags: Tags::default(),
         kind: "model".into(),
-        volume: "vol_1".into(),
+        volume: Some("vol_1".into()),
         needs: Default::default(),
         parameters: work.parameters_from_json(&serde_json::Map::new()).unwrap(),
         idempotency: None,
+        ..NewJob::default()
     };
     let Filed::New(job) = bench.queue.file(&order).await.unwrap() else {
         panic!("not filed");
@@ -362,14 +361,13 @@ async fn steps_of_the_clock_neither_expire_a_lease_nor_keep_a_job_for_ever() {
     let parameters = work.parameters_from_json(&serde_json::Map::new()).unwrap();
     let order = NewJob {
         tags: Default::default(),
-        webhook: None,
-        trace_parent: None,
         tenant: Tenant::default(),
         kind: "model".into(),
-        volume: "vol_1".into(),
+        volume: Some("vol_1".into()),
         needs: Default::default(),
         parameters,
         idempotency: None,
+        ..NewJob::default()
     };
     let Filed::New(job) = bench.queue.file(&order).await.unwrap() else {
         panic!("the queue is empty");

@@ -11,6 +11,7 @@
 
 mod helpers;
 
+mod archives;
 mod blobs;
 mod canary;
 mod config;

@@ -30,15 +30,14 @@ async fn an_idempotency_key_is_its_tenants_own() {
         tenant: tenant.parse().unwrap(),
         tags: Tags::default(),
         kind: "model".into(),
-        volume: "vol_1".into(),
+        volume: Some("vol_1".into()),
         needs: Default::default(),
         parameters: Default::default(),
         idempotency: Some(Idempotency {
             key: "k".into(),
             fingerprint: "f".into(),
         }),
-        webhook: None,
-        trace_parent: None,
+        ..NewJob::default()
     };
     let file = async |tenant: &str| store.rows.file(&order(tenant), 10, 0).await.unwrap();
     let a: Tenant = "a".parse().unwrap();

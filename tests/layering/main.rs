@@ -114,6 +114,7 @@ const USES: &[(&str, &[&str])] = &[
     ("jobs", &["progress"]),
     ("access", &["jobs"]),
     ("hooks", &["jobs"]),
+    ("archive", &["jobs"]),
     ("store", &["jobs", "access", "hooks"]),
     (
         "work",
@@ -134,7 +135,7 @@ const USES: &[(&str, &[&str])] = &[
             "jobs",
         ],
     ),
-    ("config", &["hooks"]),
+    ("config", &["jobs", "hooks", "archive"]),
     (
         "http",
         &[
@@ -206,7 +207,7 @@ const SERVICE_CRATES: &[&str] = &[
 
 /// The service: what stands here may name [`SERVICE_CRATES`].
 const SERVICE: &[&str] = &[
-    "jobs", "access", "hooks", "work", "store", "config", "http", "cli",
+    "jobs", "access", "hooks", "archive", "work", "store", "config", "http", "cli",
 ];
 
 /// Standard-library facilities that would make a result depend on more than its input.

@@ -34,6 +34,7 @@ mod tests;
 
 pub use codes::Structure;
 pub use source::{Deidentification, Moment, SourceScan, StatedIdentity, identity};
+pub use uid::is_uid;
 
 use self::codes::{ANATOMICAL_STRUCTURE, Code, DEFORMABLE_MODELS};
 use self::data_set::DataSet;
@@ -125,6 +126,13 @@ impl DicomObject {
         DicomObject::Polar,
         DicomObject::Page,
     ];
+
+    /// The object with that file name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|object| object.file_name() == name)
+    }
 
     /// The media type of all of them.
     pub const MEDIA_TYPE: &str = "application/dicom";

@@ -50,7 +50,7 @@ pub(super) fn derived(parts: &[&[u8]]) -> String {
 }
 
 /// Whether `text` is a unique identifier (PS3.5 section 9.1).
-pub(super) fn is_uid(text: &str) -> bool {
+pub fn is_uid(text: &str) -> bool {
     let number = |part: &str| {
         let digits = !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
         digits && (part == "0" || !part.starts_with('0'))

@@ -4,7 +4,7 @@ use crate::http::app::App;
 use crate::http::openapi::JobParameters;
 use crate::http::problem::{Answer, Problem, ProblemBody};
 use crate::http::wire::{path_of, rfc3339};
-use crate::jobs::{Job, JobState, QueuePosition, Resource, Timestamp};
+use crate::jobs::{Job, JobState, QueuePosition, Resource, SeriesSource, Timestamp};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -25,8 +25,11 @@ pub struct JobBody {
     /// The kind of work.
     #[schema(example = "model")]
     kind: String,
-    /// The volume it works on.
-    volume: String,
+    /// The volume it works on; `null` until it has been fetched from `source`.
+    volume: Option<String>,
+    /// The series in an archive that the volume comes from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    source: Option<SourceBody>,
     /// The parameters, including every default.
     #[schema(value_type = JobParameters)]
     parameters: Map<String, Value>,
@@ -85,6 +88,33 @@ pub enum JobStateName {
     Cancelled,
 }
 
+/// A series in an archive.
+#[derive(Serialize, ToSchema)]
+#[schema(as = JobSource)]
+struct SourceBody {
+    /// The archive's name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    archive: Option<String>,
+    /// Base URL of its DICOMweb service, if no archive is configured for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dicomweb: Option<String>,
+    /// Study Instance UID.
+    study: String,
+    /// Series Instance UID.
+    series: String,
+}
+
+impl From<SeriesSource> for SourceBody {
+    fn from(source: SeriesSource) -> Self {
+        Self {
+            archive: source.archive,
+            dicomweb: source.dicomweb,
+            study: source.study,
+            series: source.series,
+        }
+    }
+}
+
 /// Paths of one job and of its results.
 #[derive(Serialize, ToSchema)]
 struct JobLinks {
@@ -93,8 +123,9 @@ struct JobLinks {
     itself: String,
     /// Its changes as server-sent events.
     events: String,
-    /// Its volume.
-    volume: String,
+    /// Its volume, once it is stored.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    volume: Option<String>,
     /// The model it made.
     #[serde(skip_serializing_if = "Option::is_none")]
     model: Option<String>,
@@ -161,7 +192,7 @@ fn body(job: Job, positions: &BTreeMap<i64, QueuePosition>, now: Timestamp) -> J
         links: JobLinks {
             events: format!("{itself}/events"),
             itself,
-            volume: format!("/v1/volumes/{}", job.volume),
+            volume: job.volume.as_deref().map(path_of),
             model: model.as_deref().map(path_of),
             segmentation: segmentation.as_deref().map(path_of),
             mask: segmentation.as_ref().and_then(|_| below("mask.nii.gz")),
@@ -173,6 +204,7 @@ fn body(job: Job, positions: &BTreeMap<i64, QueuePosition>, now: Timestamp) -> J
         labels: job.tags.labels,
         kind: job.kind,
         volume: job.volume,
+        source: job.source.map(SourceBody::from),
         parameters: job.parameters,
         stage: job.stage,
         progress: job.progress,

@@ -14,12 +14,14 @@ use crate::http::request::query_pairs;
 use crate::http::upload::{self, Upload};
 use crate::http::wire::path_of;
 use crate::http::{idempotency, negotiate, observe, tags};
-use crate::jobs::{Filed, Job, JobState, JobWebhook, NewJob, Resource, Tags, Tenant, Work};
+use crate::jobs::{
+    Filed, Job, JobState, JobWebhook, NewJob, Resource, SendOrder, SeriesSource, Tags, Tenant, Work,
+};
 use axum::Json;
 use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -70,6 +72,8 @@ pub async fn file_upload(
         tags,
         key,
         webhook,
+        source: None,
+        send: None,
         trace_parent: observe::trace_parent(&request),
     };
     let mut parameters = work.parameters_from_text(&pairs)?;
@@ -105,7 +109,7 @@ pub async fn file_upload(
     }
     let stored = upload.volume.store(app, tenant, &filing.tags).await?;
     holds.push(stored.hold);
-    let volume = stored.volume.item.id;
+    let volume = Some(stored.volume.item.id);
     let filed = file(app, &new_job(&**work, volume, parameters, filing)).await?;
     drop(holds);
     answer(app, filed, patience, &headers, &job.offers).await
@@ -136,6 +140,10 @@ pub struct Filing {
     pub key: Option<String>,
     /// Where the job is told about.
     pub webhook: Option<JobWebhook>,
+    /// Where its volume comes from, unless it is stored.
+    pub source: Option<SeriesSource>,
+    /// What of its result is sent to an archive.
+    pub send: Option<SendOrder>,
     /// The request's trace context.
     pub trace_parent: Option<String>,
 }
@@ -165,7 +173,8 @@ async fn filed_earlier(
         pairs.push(((*name).to_owned(), files.volume_id()));
     }
     let parameters = work.parameters_from_text(&pairs)?;
-    let job = new_job(work, upload.volume.volume_id(), parameters, filing.clone());
+    let volume = Some(upload.volume.volume_id());
+    let job = new_job(work, volume, parameters, filing.clone());
     let Some(promise) = job.idempotency else {
         return Ok(None);
     };
@@ -177,30 +186,38 @@ async fn filed_earlier(
     Ok(earlier.map(|(job, fingerprint)| promise.judge(job, &fingerprint)))
 }
 
-/// A job on a stored volume, for [`file()`].
+/// A job on a stored volume or on the series of its source, for [`file()`].
 pub fn new_job(
     work: &dyn Work,
-    volume: String,
+    volume: Option<String>,
     parameters: Map<String, Value>,
     filing: Filing,
 ) -> NewJob {
     let kind = work.makes().noun();
+    let others = [
+        filing.webhook.as_ref().map(|webhook| json!(webhook)),
+        filing.source.as_ref().map(|source| json!(source)),
+        filing.send.as_ref().map(|send| json!(send)),
+    ];
+    let others: Vec<Value> = others.into_iter().flatten().collect();
     NewJob {
         tenant: filing.tenant,
         kind: kind.into(),
         idempotency: idempotency::promise(
             filing.key,
             kind,
-            &volume,
+            volume.as_deref(),
             &parameters,
             &filing.tags,
-            filing.webhook.as_ref(),
+            &others,
         ),
         tags: filing.tags,
         needs: work.needs(&parameters).items,
         volume,
         parameters,
         webhook: filing.webhook,
+        source: filing.source,
+        send: filing.send,
         trace_parent: filing.trace_parent,
     }
 }

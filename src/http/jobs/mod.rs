@@ -3,6 +3,7 @@
 pub mod events;
 pub mod filing;
 
+mod archives;
 mod body;
 
 pub use body::{JobBody, describe, describe_all};
@@ -70,23 +71,28 @@ pub async fn create_job(
         tags: tags::of_object(&app, &object)?,
         key,
         webhook: webhook_of(&app, &object).await?,
+        source: None,
+        send: None,
         trace_parent,
     };
-    let job = read_job(&app, &object, filing)?;
+    let job = read_job(&app, &object, filing).await?;
     let job = filing::file(&app, &job).await?;
     filing::accepted(&app, job).await
 }
 
-const FIELDS: [&str; 6] = [
+const FIELDS: [&str; 9] = [
     "kind",
     "volume",
+    "source",
     "parameters",
     "external_id",
     "labels",
     "webhook",
+    "send",
+    "to",
 ];
 
-fn read_job(app: &App, object: &Map<String, Value>, filing: Filing) -> Answer<NewJob> {
+async fn read_job(app: &App, object: &Map<String, Value>, mut filing: Filing) -> Answer<NewJob> {
     if let Some(name) = object.keys().find(|name| !FIELDS.contains(&name.as_str())) {
         return Err(unknown("field", name, &FIELDS));
     }
@@ -99,9 +105,19 @@ fn read_job(app: &App, object: &Map<String, Value>, filing: Filing) -> Answer<Ne
         )
         .fix(format!("Known kinds: {}.", kinds.join(", "))));
     };
-    let volume = text(object, "volume")?
-        .ok_or_else(|| Problem::invalid_field("volume", "`volume` is missing."))
-        .map_err(|problem| problem.fix("Give the id of a stored volume."))?;
+    filing.source = archives::source_of(app, &filing.tenant, object).await?;
+    filing.send = archives::send_of(app, &filing.tenant, object, kind, filing.source.as_ref())?;
+    let volume = match (text(object, "volume")?, &filing.source) {
+        (None, None) => {
+            return Err(Problem::invalid_field("volume", "`volume` is missing.")
+                .fix("Give the id of a stored volume, or in `source` a series of an archive."));
+        }
+        (Some(_), Some(_)) => {
+            let both = "A job has a `volume` or a `source`, not both.";
+            return Err(Problem::invalid_field("source", both).fix("Leave one of them out."));
+        }
+        (volume, _) => volume.map(str::to_owned),
+    };
     let empty = Map::new();
     let parameters = match object.get("parameters") {
         None => &empty,
@@ -115,12 +131,7 @@ fn read_job(app: &App, object: &Map<String, Value>, filing: Filing) -> Answer<Ne
         }
     };
     let parameters = work.parameters_from_json(parameters)?;
-    Ok(filing::new_job(
-        &**work,
-        volume.to_owned(),
-        parameters,
-        filing,
-    ))
+    Ok(filing::new_job(&**work, volume, parameters, filing))
 }
 
 /// List jobs

@@ -1,14 +1,15 @@
 //! Request bodies that the handlers read piece by piece, so that no Rust type describes them.
 
 use super::inputs::{ModelParametersObject, SegmentationParametersObject};
+use crate::export::dicom::DicomObject;
 use crate::hooks::HookEvent;
 use crate::http::tags;
 use crate::jobs::LegalHold;
 use serde_json::json;
 use std::borrow::Cow;
 use utoipa::openapi::schema::{
-    AdditionalProperties, AnyOfBuilder, ArrayBuilder, KnownFormat, Object, ObjectBuilder, Schema,
-    SchemaFormat, SchemaType, Type,
+    AdditionalProperties, AnyOfBuilder, ArrayBuilder, KnownFormat, Object, ObjectBuilder,
+    OneOfBuilder, Schema, SchemaFormat, SchemaType, Type,
 };
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
@@ -32,28 +33,129 @@ impl ToSchema for JobRequest {
             SegmentationParametersObject::schema(),
         ));
         schemas.push((WebhookRequest::name().into(), WebhookRequest::schema()));
+        let own = [
+            (VolumeJobRequest::name(), VolumeJobRequest::schema()),
+            (SourceJobRequest::name(), SourceJobRequest::schema()),
+            (SourceRequest::name(), SourceRequest::schema()),
+        ];
+        schemas.extend(own.map(|(name, schema)| (name.into(), schema)));
     }
 }
 
 impl PartialSchema for JobRequest {
     fn schema() -> RefOr<Schema> {
-        let text = || ObjectBuilder::new().schema_type(Type::String);
-        let kind = text()
-            .description(Some("The kind of work"))
-            .enum_values(Some(["model", "segmentation"]))
-            .default(Some(json!("model")));
-        let volume = text()
+        let requests = OneOfBuilder::new()
+            .item(Ref::from_schema_name(VolumeJobRequest::name()))
+            .item(Ref::from_schema_name(SourceJobRequest::name()));
+        Schema::OneOf(requests.build()).into()
+    }
+}
+
+/// What both kinds of job requests have, before and after what they work on.
+fn job_request(input: &str, schema: RefOr<Schema>) -> RefOr<Schema> {
+    let text = || ObjectBuilder::new().schema_type(Type::String);
+    let kind = text()
+        .description(Some("The kind of work"))
+        .enum_values(Some(["model", "segmentation"]))
+        .default(Some(json!("model")));
+    let (external_id, labels) = tag_fields(false);
+    let names = text().enum_values(Some(DicomObject::ALL.map(DicomObject::file_name)));
+    let send = ArrayBuilder::new()
+        .description(Some(
+            "DICOM objects of the result that are sent to an archive",
+        ))
+        .items(RefOr::T(Schema::from(names)))
+        .min_items(Some(1))
+        .max_items(Some(DicomObject::ALL.len()));
+    let to = text()
+        .description(Some(
+            "The archive that they are sent to; that of `source` unless given",
+        ))
+        .pattern(Some("^[A-Za-z0-9._-]{1,64}$"));
+    let object = ObjectBuilder::new()
+        .property("external_id", external_id)
+        .property("labels", labels)
+        .property("kind", Schema::from(kind))
+        .property(input, schema)
+        .property("parameters", Ref::from_schema_name(JobParameters::name()))
+        .property("webhook", Ref::from_schema_name(WebhookRequest::name()))
+        .property("send", Schema::Array(send.build()))
+        .property("to", Schema::from(to))
+        .required(input)
+        .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
+    Schema::from(object.build()).into()
+}
+
+/// A job on a stored volume.
+pub struct VolumeJobRequest;
+
+impl ToSchema for VolumeJobRequest {
+    fn name() -> Cow<'static, str> {
+        "VolumeJobRequest".into()
+    }
+}
+
+impl PartialSchema for VolumeJobRequest {
+    fn schema() -> RefOr<Schema> {
+        let volume = ObjectBuilder::new()
+            .schema_type(Type::String)
             .description(Some("Id of the volume"))
             .examples(["vol_9f86d081884c7d659a2feaa0c55ad015"]);
-        let (external_id, labels) = tag_fields(false);
+        job_request("volume", Schema::from(volume).into())
+    }
+}
+
+/// A job on a series in an archive.
+pub struct SourceJobRequest;
+
+impl ToSchema for SourceJobRequest {
+    fn name() -> Cow<'static, str> {
+        "SourceJobRequest".into()
+    }
+}
+
+impl PartialSchema for SourceJobRequest {
+    fn schema() -> RefOr<Schema> {
+        let source = Ref::from_schema_name(SourceRequest::name());
+        job_request("source", source.into())
+    }
+}
+
+/// A series in an archive; `source_of` reads it field by field.
+pub struct SourceRequest;
+
+impl ToSchema for SourceRequest {
+    fn name() -> Cow<'static, str> {
+        "SourceRequest".into()
+    }
+}
+
+impl PartialSchema for SourceRequest {
+    fn schema() -> RefOr<Schema> {
+        let text = || ObjectBuilder::new().schema_type(Type::String);
+        let uid = |what: &str| {
+            let uid = text()
+                .description(Some(what))
+                .pattern(Some(r"^(0|[1-9][0-9]*)(\.(0|[1-9][0-9]*))+$"))
+                .max_length(Some(64));
+            Schema::from(uid)
+        };
+        let archive = text()
+            .description(Some("Name of a configured archive"))
+            .examples(["pacs"]);
+        let dicomweb = text()
+            .description(Some(
+                "Base URL of a DICOMweb service, instead of `archive`: of a configured archive, or \
+                 of a host that the operator has allowed",
+            ))
+            .max_length(Some(2048));
         let object = ObjectBuilder::new()
-            .property("external_id", external_id)
-            .property("labels", labels)
-            .property("kind", Schema::from(kind))
-            .property("volume", Schema::from(volume))
-            .property("parameters", Ref::from_schema_name(JobParameters::name()))
-            .property("webhook", Ref::from_schema_name(WebhookRequest::name()))
-            .required("volume")
+            .property("archive", Schema::from(archive))
+            .property("dicomweb", Schema::from(dicomweb))
+            .property("study", uid("Study Instance UID"))
+            .property("series", uid("Series Instance UID"))
+            .required("study")
+            .required("series")
             .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
         Schema::from(object.build()).into()
     }

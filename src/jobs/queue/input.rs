@@ -40,8 +40,9 @@ impl Queue {
             library,
             files,
         } = work.needs(&job.parameters);
-        let Some(volume) = self.item(&job.tenant, &job.volume, files).await? else {
-            return Ok(Err(volume_missing(&job.volume)));
+        let id = job.volume.as_deref().unwrap_or_default();
+        let Some(volume) = self.item(&job.tenant, id, files).await? else {
+            return Ok(Err(volume_missing(id)));
         };
         let mut found = BTreeMap::new();
         for (field, id) in items {

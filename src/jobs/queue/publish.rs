@@ -106,10 +106,11 @@ impl Queue {
         output: &WorkOutput,
     ) -> Result<Option<Job>, StoreError> {
         let parameters = Value::Object(job.parameters.clone()).to_string();
+        let volume = job.volume.as_deref();
         let product = self.product(
             (&job.tenant, made),
-            &[&job.volume, &parameters],
-            Some(&job.volume),
+            &[volume.unwrap_or_default(), &parameters],
+            volume,
             job.parameters.clone(),
             output,
         );
