@@ -21,6 +21,37 @@ async fn rest_of(stream: &mut TcpStream) -> String {
 }
 
 #[tokio::test]
+async fn a_request_names_its_host_once() {
+    let app = TestApp::start().await;
+    for (head, status) in [
+        ("GET /healthz HTTP/1.1\r\n", 400),
+        (
+            "GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nHost: 127.0.0.1\r\n",
+            400,
+        ),
+        (
+            "GET http://evil.example/healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n",
+            421,
+        ),
+        (
+            "GET http://127.0.0.1/healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n",
+            200,
+        ),
+        ("GET /healthz HTTP/1.0\r\n", 200),
+    ] {
+        let mut stream = connect(&app).await;
+        let request = format!("{head}Connection: close\r\n\r\n");
+        stream.write_all(request.as_bytes()).await.unwrap();
+        let answer = rest_of(&mut stream).await;
+        assert_eq!(
+            answer.split(' ').nth(1),
+            Some(&*status.to_string()),
+            "{head}"
+        );
+    }
+}
+
+#[tokio::test]
 async fn idle_connections_and_partial_headers_are_closed() {
     let app = TestApp::with(|s| s.header_timeout = "300ms".parse().unwrap()).await;
     let mut silent = connect(&app).await;

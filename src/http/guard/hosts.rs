@@ -14,7 +14,7 @@ use crate::config::Words;
 use crate::http::problem::{Answer, Problem};
 use axum::extract::{Request, State};
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, HeaderName, StatusCode, header, uri::Authority};
+use axum::http::{HeaderMap, HeaderName, StatusCode, Version, header, uri::Authority};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use std::net::IpAddr;
@@ -116,13 +116,22 @@ pub async fn check_host(
     request: Request,
     next: Next,
 ) -> Response {
-    let host = request.headers().get(header::HOST);
-    let answered = match (host, request.uri().host()) {
-        (Some(host), _) => host.to_str().is_ok_and(|host| policy.answers(host)),
-        (None, Some(host)) => policy.answers(host),
-        // Browsers always send one; HTTP/1.0 clients need not.
-        (None, None) => true,
-    };
+    let mut hosts = request.headers().get_all(header::HOST).iter();
+    let (given, target) = (hosts.next(), request.uri().host());
+    let missing = given.is_none() && target.is_none() && request.version() == Version::HTTP_11;
+    if missing || hosts.next().is_some() {
+        return Problem::bad_request(
+            "invalid-host",
+            "A request has exactly one Host header (RFC 9112, section 3.2).",
+        )
+        .at("Host")
+        .fix("Send one Host header with the service's address.")
+        .into_response();
+    }
+    let answers = |host: &str| policy.answers(host);
+    // HTTP/1.0 clients need not send one; browsers always do.
+    let answered =
+        given.is_none_or(|host| host.to_str().is_ok_and(answers)) && target.is_none_or(answers);
     if answered {
         return next.run(request).await;
     }
