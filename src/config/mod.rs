@@ -276,8 +276,8 @@ settings! {
     /// Largest number of uploads and previews that wait to be decoded; more are answered with
     /// status 503
     decoding_queue: usize = "256";
-    /// Memory for answers about volumes, models, segmentations and templates, which are kept until
-    /// something is written; `0B` keeps none
+    /// Memory for answers about volumes, models, segmentations, templates and ended jobs, which are
+    /// kept until something is written; `0B` keeps none
     answer_memory: Size = "8MiB";
     /// Longest time a request with `Prefer: wait` waits
     wait_limit: Span = "60s";

@@ -28,6 +28,7 @@ use axum::{Extension, Json};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 use std::borrow::Cow;
+use std::ops::ControlFlow;
 use utoipa::openapi::path::HttpMethod;
 use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, Schema, SchemaType, Type};
 use utoipa::openapi::{Ref, RefOr};
@@ -168,22 +169,16 @@ async fn show<C: Collection>(
     headers: HeaderMap,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let (catalogue, tenant) = (&app.queue.catalogue, &caller.tenant);
-    let version = catalogue.version();
-    if Resource::of(&id) == Some(C::RESOURCE)
-        && let Some(version) = version
-        && let Some(answer) = app.answers.get(version, tenant, &id)
-    {
-        return Ok(answer.answer(&headers));
-    }
-    let row = find::<C>(&app, tenant, &id).await?;
-    let answer = ValidatedJson::of(&C::body(&app, row)?)?;
-    if let Some(version) = version
-        && catalogue.version() == Some(version)
-    {
-        app.answers.keep(version, tenant, &id, &answer);
-    }
-    Ok(answer.answer(&headers))
+    let read = async || {
+        let row = find::<C>(&app, &caller.tenant, &id).await?;
+        Ok(ControlFlow::Continue(ValidatedJson::of(&C::body(
+            &app, row,
+        )?)?))
+    };
+    let catalogue = &*app.queue.catalogue;
+    app.answers
+        .answer(catalogue, &caller.tenant, C::RESOURCE, &id, &headers, read)
+        .await
 }
 
 async fn erase<C: Collection>(

@@ -8,9 +8,13 @@
 //!
 //! Memory is limited: when there is no room for one more, all are dropped.
 
+use super::problem::Answer;
 use super::validators::ValidatedJson;
-use crate::jobs::Tenant;
+use crate::jobs::{Catalogue, Resource, Tenant};
+use axum::http::HeaderMap;
+use axum::response::Response;
 use std::collections::HashMap;
+use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};
 
 /// Memory for an answer's place in the maps.
@@ -45,8 +49,41 @@ impl KeptAnswers {
         }
     }
 
+    /// The answer about a tenant's item: the kept one, or what `read` makes. `read` gives JSON that
+    /// follows from the database alone, which is kept, or breaks off with an answer that is not.
+    ///
+    /// # Errors
+    /// Those of `read`.
+    pub async fn answer(
+        &self,
+        catalogue: &dyn Catalogue,
+        tenant: &Tenant,
+        resource: Resource,
+        id: &str,
+        headers: &HeaderMap,
+        read: impl AsyncFnOnce() -> Answer<ControlFlow<Response, ValidatedJson>>,
+    ) -> Answer {
+        let version = catalogue.version();
+        if Resource::of(id) == Some(resource)
+            && let Some(version) = version
+            && let Some(answer) = self.get(version, tenant, id)
+        {
+            return Ok(answer.answer(headers));
+        }
+        let answer = match read().await? {
+            ControlFlow::Continue(answer) => answer,
+            ControlFlow::Break(answer) => return Ok(answer),
+        };
+        if let Some(version) = version
+            && catalogue.version() == Some(version)
+        {
+            self.keep(version, tenant, id, &answer);
+        }
+        Ok(answer.answer(headers))
+    }
+
     /// The answer about a tenant's item, if it was kept under that version.
-    pub fn get(&self, version: u64, tenant: &Tenant, id: &str) -> Option<ValidatedJson> {
+    fn get(&self, version: u64, tenant: &Tenant, id: &str) -> Option<ValidatedJson> {
         let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         if kept.version != version {
             return None;
@@ -55,7 +92,7 @@ impl KeptAnswers {
     }
 
     /// Keeps an answer that was made of what was read under that version.
-    pub fn keep(&self, version: u64, tenant: &Tenant, id: &str, answer: &ValidatedJson) {
+    fn keep(&self, version: u64, tenant: &Tenant, id: &str, answer: &ValidatedJson) {
         let bytes = answer.bytes() + id.len() + OVERHEAD;
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         if version < kept.version || bytes > self.limit {

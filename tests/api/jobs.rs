@@ -229,6 +229,37 @@ async fn deleting_cancels_a_waiting_job_and_erases_an_ended_one() {
 }
 
 #[tokio::test]
+async fn an_ended_job_has_a_validator_that_follows_its_changes() {
+    let app = TestApp::start().await;
+    let slow = app.file("slow").await;
+    app.until(&slow, &["running"]).await;
+    let path = text(&slow["links"]["self"]);
+    let running = app.get(&path).send().await.unwrap();
+    assert!(!running.headers().contains_key("etag"));
+    assert_eq!(running.headers()["cache-control"], "no-store");
+    assert_eq!(running.headers()["retry-after"], "1");
+    app.delete(&path).send().await.unwrap();
+    app.until(&slow, &["cancelled"]).await;
+
+    let asked = async |etag: &str| app.get(&path).header("if-none-match", etag).send().await;
+    let ended = asked("").await.unwrap();
+    assert_eq!(ended.status(), StatusCode::OK);
+    let first = text(&ended.headers()["etag"].to_str().unwrap().into());
+    let unchanged = asked(&first).await.unwrap();
+    assert_eq!(unchanged.status(), StatusCode::NOT_MODIFIED);
+    let change = app.client.patch(format!("{}{path}", app.url));
+    let change = change.json(&json!({"external_id": "mine"}));
+    assert_eq!(change.send().await.unwrap().status(), StatusCode::OK);
+    let changed = asked(&first).await.unwrap();
+    assert_eq!(changed.status(), StatusCode::OK);
+    assert_ne!(changed.headers()["etag"], first.as_str());
+    assert_eq!(
+        changed.json::<Value>().await.unwrap()["external_id"],
+        "mine"
+    );
+}
+
+#[tokio::test]
 async fn a_panic_fails_only_its_job() {
     let app = TestApp::with(|s| s.workers = "1".parse().unwrap()).await;
     let job = app.finished("panic").await;

@@ -20,6 +20,7 @@ use super::problem::not_found::missing;
 use super::problem::{Answer, Problem, ProblemBody, shorten};
 use super::request::{PathSegments, json_object, query_pairs, refuse_unknown, text, unknown};
 use super::tags;
+use super::validators::ValidatedJson;
 use crate::jobs::{
     Deleted, Interrupted, Job, JobFilter, JobState, NewJob, Resource, Tenant, Timestamp,
     parse_rfc3339,
@@ -31,6 +32,7 @@ use axum::response::IntoResponse;
 use body::JobStateName;
 use serde::Serialize;
 use serde_json::{Map, Value};
+use std::ops::ControlFlow;
 use utoipa::ToSchema;
 
 /// A page of jobs.
@@ -202,26 +204,47 @@ fn parse_flag(name: &'static str, text: &str) -> Answer<bool> {
 }
 
 /// Show a job
+///
+/// A job that has ended has a validator in `ETag`. For one that has not, `Retry-After` says when to
+/// ask again.
 #[utoipa::path(get, path = "/v1/jobs/{id}", tag = "jobs",
-    params(("id" = String, Path, description = "The job's id")),
-    responses((status = 200, description = "The job", body = JobBody), LookupProblems))]
+    params(("id" = String, Path, description = "The job's id"), openapi::CachedHeaders),
+    responses((status = 200, description = "The job", body = JobBody),
+        openapi::UnchangedAnswer, LookupProblems))]
 pub async fn get_job(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
     RawQuery(query): RawQuery,
+    headers: HeaderMap,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let job = find(&app, &caller.tenant, &id).await?;
-    let mut headers = HeaderMap::new();
-    headers.insert(
-        header::CACHE_CONTROL,
-        header::HeaderValue::from_static("no-store"),
-    );
-    if !job.state.is_final() {
-        headers.insert(header::RETRY_AFTER, header::HeaderValue::from_static("1"));
-    }
-    Ok((headers, Json(describe(&app, job).await?)).into_response())
+    let read = async || {
+        let job = find(&app, &caller.tenant, &id).await?;
+        let ended = job.state.is_final();
+        let body = describe(&app, job).await?;
+        Ok(match ended {
+            true => ControlFlow::Continue(ValidatedJson::of(&body)?),
+            false => {
+                let ask_again = [
+                    (header::CACHE_CONTROL, "no-store"),
+                    (header::RETRY_AFTER, "1"),
+                ];
+                ControlFlow::Break((ask_again, Json(body)).into_response())
+            }
+        })
+    };
+    let catalogue = &*app.queue.catalogue;
+    app.answers
+        .answer(
+            catalogue,
+            &caller.tenant,
+            Resource::Job,
+            &id,
+            &headers,
+            read,
+        )
+        .await
 }
 
 /// Change a job's names
