@@ -9,10 +9,10 @@ use crate::volume::{self, ReadLimits};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// Most memory that [`UploadReader::inspect`] takes in general, bytes: a gzipped file of 16 MiB is
-/// unpacked in memory if it holds at most 16 MiB, and everything else is read in portions. The largest
-/// JPEG 2000 frame takes 40 MiB, the largest DICOM Segmentation 64 MiB.
-pub const INSPECTION_MEMORY: u64 = 34 << 20;
+/// Most memory that [`UploadReader::inspect`] takes, bytes: that of the largest DICOM Segmentation. The
+/// largest JPEG 2000 frame takes 40 MiB. A gzipped file of 16 MiB is unpacked in memory if it holds at
+/// most 16 MiB, and everything else is read in portions.
+pub const INSPECTION_MEMORY: u64 = 64 << 20;
 
 /// Most memory that [`UploadReader::preview`] takes for volumes of `shape`, bytes: three planes of
 /// voxels beside what an inspection takes.
