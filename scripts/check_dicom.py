@@ -205,4 +205,5 @@ def main():
         print(f"{name}: {mask.sum()} voxels, 7 objects as they must be")
 
 
-main()
+if __name__ == "__main__":
+    main()

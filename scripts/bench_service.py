@@ -1,0 +1,184 @@
+#!/usr/bin/env python3
+"""Uploads and small requests per second, beside Orthanc in the same run.
+
+    target/test-tools/python/bin/python scripts/bench_service.py [--program target/release/ventriform] [--rounds 4]
+
+Both listen on loopback, keep their files under the same temporary folder, sync them (Orthanc:
+SyncStorageArea) and check credentials. They get the same DICOM NM files of 8 MiB and take turns, round by
+round, so that what else the machine does meets both. Prints the median of each and of the ratios.
+
+Needs the Debian packages orthanc and wrk, and the Python packages of scripts/requirements.txt.
+"""
+import argparse
+import base64
+import http.client
+import json
+import queue
+import re
+import socket
+import statistics
+import subprocess
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+from check_dicom import nm
+
+USER, PASSWORD = "bench", "bench"
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+class Server:
+    """A program that listens, and what its requests need."""
+
+    def __init__(self, name, command, port, authorization, probe, upload):
+        self.name, self.port, self.headers, self.upload_path = name, port, {"Authorization": authorization}, upload
+        self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        for _ in range(500):
+            try:
+                if self.ask("GET", probe)[0] == 200:
+                    return
+            except OSError:
+                time.sleep(0.02)
+        raise SystemExit(f"{name} does not answer")
+
+    def ask(self, method, path, body=None):
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=120)
+        try:
+            connection.request(method, path, body, self.headers)
+            answer = connection.getresponse()
+            return answer.status, answer.read()
+        finally:
+            connection.close()
+
+    def json(self, method, path, body=None):
+        status, text = self.ask(method, path, body)
+        if status >= 300:
+            raise SystemExit(f"{self.name}: {method} {path}: {status} {text[:300]}")
+        return json.loads(text)
+
+    def upload(self, files, clients):
+        """MiB per second."""
+        waiting = queue.Queue()
+        for file in files:
+            waiting.put(file)
+        failures = []
+
+        def run():
+            connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=120)
+            while True:
+                try:
+                    body = waiting.get_nowait().read_bytes()
+                except queue.Empty:
+                    return
+                connection.request("POST", self.upload_path, body, self.headers | {"Content-Type": "application/dicom"})
+                answer = connection.getresponse()
+                answer.read()
+                if answer.status not in (200, 201):
+                    failures.append(answer.status)
+
+        threads = [threading.Thread(target=run) for _ in range(clients)]
+        started = time.perf_counter()
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        if failures:
+            raise SystemExit(f"{self.name}: uploads were answered {failures}")
+        return len(files) * 8 / (time.perf_counter() - started)
+
+    def requests(self, path):
+        """Requests per second over 8 connections."""
+        header = f"Authorization: {self.headers['Authorization']}"
+        command = ["wrk", "-t1", "-c8", "-d2s", "-H", header, f"http://127.0.0.1:{self.port}{path}"]
+        printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        if "Non-2xx" in printed:
+            raise SystemExit(f"{self.name}: {path}: {printed}")
+        return float(re.search(r"Requests/sec:\s+([\d.]+)", printed).group(1))
+
+
+def compare(what, unit, rounds, ours, theirs):
+    pairs = [(ours(i), theirs(i)) for i in range(rounds)]
+    ratio = statistics.median(a / b for a, b in pairs)
+    a, b = (statistics.median(side) for side in zip(*pairs))
+    print(f"{what}: {a:.0f} {unit}, Orthanc {b:.0f}, ratio {ratio:.2f}", flush=True)
+
+
+def ventriform(program, folder):
+    data, port = folder / "ventriform", free_port()
+    made = [program, "keys", "create", "--name", "bench", "--scope", "submit", "--requests-per-minute", "1000000000",
+            "--data-dir", str(data)]
+    key = subprocess.run(made, capture_output=True, text=True, check=True).stdout.split()[-1]
+    command = [program, "serve", "--listen", f"127.0.0.1:{port}", "--data-dir", str(data)]
+    return Server("ventriform", command, port, f"Bearer {key}", "/readyz", "/v1/volumes")
+
+
+def orthanc(folder):
+    port = free_port()
+    settings = {
+        "StorageDirectory": str(folder / "orthanc"), "IndexDirectory": str(folder / "orthanc"), "HttpPort": port,
+        "DicomServerEnabled": False, "RemoteAccessAllowed": False, "AuthenticationEnabled": True,
+        "RegisteredUsers": {USER: PASSWORD}, "SyncStorageArea": True, "KeepAlive": True, "TcpNoDelay": True,
+    }
+    (folder / "orthanc.json").write_text(json.dumps(settings))
+    basic = base64.b64encode(f"{USER}:{PASSWORD}".encode()).decode()
+    return Server("Orthanc", ["Orthanc", str(folder / "orthanc.json")], port, f"Basic {basic}", "/system", "/instances")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--program", default="target/release/ventriform")
+    parser.add_argument("--rounds", type=int, default=4)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        folder = Path(folder)
+        subprocess.run([options.program, "phantom", "-o", str(folder)], check=True, stdout=subprocess.DEVNULL)
+        scan = (folder / "spect.nii.gz").read_bytes()
+        files = []
+        for number in range(2 * 10 * options.rounds):
+            voxels = np.full((256, 256, 64), number, np.uint16)
+            files.append(folder / f"{number}.dcm")
+            nm(files[-1], voxels, np.diag([2.0, 2.0, 2.0, 1.0]), number)
+        ours, theirs = ventriform(options.program, folder), orthanc(folder)
+        try:
+            bench(ours, theirs, files, scan, options.rounds)
+        finally:
+            for server in (ours, theirs):
+                server.process.kill()
+                server.process.wait()
+
+
+def bench(ours, theirs, files, scan, rounds):
+    for turn, clients in enumerate((1, 4)):
+        part = lambda i: files[10 * (turn * rounds + i):][:10]
+        compare(f"uploads of 8 MiB, {clients} at a time", "MiB/s", rounds,
+                lambda i: ours.upload(part(i), clients), lambda i: theirs.upload(part(i), clients))
+    volume = ours.json("GET", "/v1/volumes?limit=1")["volumes"][0]["id"]
+    job = ours.json("POST", "/v1/models?points=150", scan)["id"]
+    while (shown := ours.json("GET", f"/v1/jobs/{job}"))["state"] != "succeeded":
+        time.sleep(0.1)
+    instance = theirs.json("GET", "/instances")[0]
+    paths = [("/healthz", "/system"), (f"/v1/volumes/{volume}", f"/instances/{instance}"),
+             (f"/v1/jobs/{job}", f"/instances/{instance}"), (f"/v1/models/{shown['model']}", f"/instances/{instance}"),
+             (f"/v1/models/{shown['model']}/mesh.stl", f"/instances/{instance}/simplified-tags")]
+    for state in ("idle", "all workers busy"):
+        for own, other in paths:
+            if state != "idle":
+                for seed in range(40):
+                    ours.ask("POST", f"/v1/models?points=300&seed={time.time_ns() + seed}", scan)
+            name = re.sub(r"/[a-z]{3}_\w+", "/ID", own)
+            compare(f"GET {name}, {state}", "1/s", rounds,
+                    lambda i: ours.requests(own), lambda i: theirs.requests(other))
+            for waiting in ours.json("GET", "/v1/jobs?state=queued&limit=100")["jobs"]:
+                ours.ask("DELETE", f"/v1/jobs/{waiting['id']}")
+
+
+if __name__ == "__main__":
+    main()
