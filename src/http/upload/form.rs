@@ -1,4 +1,4 @@
-//! Receiving `multipart/form-data`, with the limits that a form needs beside those on its body:
+//! Receiving `multipart/form-data` and `multipart/related`, with the limits that a form needs beside those on its body:
 //! the number of files and of text fields, the length of a text field, and the length of headers
 //! and boundaries, which the parser gathers in memory.
 
@@ -10,7 +10,9 @@ use crate::http::problem::{Answer, shorten};
 use axum::body::{Body, Bytes};
 use axum::extract::multipart::Field;
 use axum::extract::{FromRequest, Multipart, Request};
+use axum::http::{HeaderMap, HeaderValue, header};
 use futures::{StreamExt, TryStreamExt};
+use mediatype::{MediaType, Name, ReadParams};
 use std::error::Error;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -52,6 +54,53 @@ pub async fn receive(
     apart: &[&'static str],
     upload: &mut Upload,
 ) -> Answer<()> {
+    receive_parts(app, request, limit, Some(apart), upload).await
+}
+
+/// Receives `multipart/related` of DICOM files; every part is one.
+pub async fn receive_related(
+    app: &App,
+    mut request: Request,
+    limit: Size,
+    upload: &mut Upload,
+) -> Answer<()> {
+    let boundary = related_boundary(request.headers())?;
+    // The parts are written alike; the parser asks for the name of a form.
+    let form = HeaderValue::from_str(&format!("multipart/form-data; boundary=\"{boundary}\""));
+    let form = form.map_err(|_| body::malformed_form("its boundary cannot be read"))?;
+    request.headers_mut().insert(header::CONTENT_TYPE, form);
+    receive_parts(app, request, limit, None, upload).await
+}
+
+/// The boundary of `multipart/related` of the type `application/dicom`.
+fn related_boundary(headers: &HeaderMap) -> Answer<String> {
+    let text = headers.get(header::CONTENT_TYPE);
+    let text = text.and_then(|value| value.to_str().ok()).unwrap_or("?");
+    let unreadable = || body::malformed_form("its Content-Type cannot be read");
+    let media_type = MediaType::parse(text).map_err(|_| unreadable())?;
+    let parameter = |name: &str| {
+        let value = media_type.get_param(Name::new_unchecked(name))?;
+        Some(value.unquoted_str().into_owned())
+    };
+    match parameter("type") {
+        Some(inner) if !inner.eq_ignore_ascii_case("application/dicom") => {
+            let found = format!("multipart/related; type={inner}");
+            let wanted = "multipart/related; type=\"application/dicom\"";
+            return Err(body::unsupported_type(&found, wanted));
+        }
+        _ => {}
+    }
+    parameter("boundary").ok_or_else(|| body::malformed_form("it has no boundary"))
+}
+
+/// Receives the parts of a body; without `apart`, every part is a file.
+async fn receive_parts(
+    app: &App,
+    request: Request,
+    limit: Size,
+    apart: Option<&[&'static str]>,
+    upload: &mut Upload,
+) -> Answer<()> {
     let unparsed = Unparsed::default();
     let request = request.map(|body| counted(body, unparsed.clone()));
     let mut form = Multipart::from_request(request, app)
@@ -62,7 +111,8 @@ pub async fn receive(
     while let Some(field) = form.next_field().await.map_err(|e| interrupted(&e))? {
         unparsed.reset();
         let name = field.name().unwrap_or_default().to_owned();
-        if field.file_name().is_none() && field.content_type().is_none() {
+        let is_text = field.file_name().is_none() && field.content_type().is_none();
+        if is_text && apart.is_some() {
             let text = text_field(field, &name, &unparsed, interrupted).await?;
             upload.fields.push((name, text));
             if upload.fields.len() > FIELDS {
@@ -79,7 +129,7 @@ pub async fn receive(
         let pieces = field
             .inspect_ok(|_| unparsed.reset())
             .map_err(|error| interrupted(&error));
-        let bundle = bundle_of(upload, app, apart, &name);
+        let bundle = bundle_of(upload, app, apart.unwrap_or_default(), &name);
         bundle.write(pieces).await?.known_as(&file_name);
     }
     Ok(())

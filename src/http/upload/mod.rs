@@ -1,8 +1,9 @@
 //! From a request's body to files: streamed to the disk and hashed on the way, never held in
 //! memory.
 //!
-//! The body is one file, or a form. A form's text fields are parameters; its files make up the
-//! volume, except those whose name asks to be kept apart (an expert's mask). The limits on size
+//! The body is one file, a form, or the parts of `multipart/related` that DICOMweb clients send
+//! (PS3.18 section 8.6.1.2). A form's text fields are parameters; its files make up the volume,
+//! except those whose name asks to be kept apart (an expert's mask). The limits on size
 //! and time are layers of the route ([`crate::http::limits`]); [`form`] adds those that only a
 //! form needs.
 
@@ -68,8 +69,14 @@ pub async fn receive(app: &App, request: Request, apart: &[&'static str]) -> Ans
         Some("multipart/form-data") => {
             form::receive(app, request, limits.size, apart, &mut upload).await?;
         }
+        Some("multipart/related") => {
+            form::receive_related(app, request, limits.size, &mut upload).await?;
+        }
         Some(other) if !RAW_TYPES.contains(&other) => {
-            let wanted = format!("{} or multipart/form-data", RAW_TYPES[0]);
+            let wanted = format!(
+                "{}, multipart/form-data, or multipart/related of application/dicom",
+                RAW_TYPES[0]
+            );
             return Err(body::unsupported_type(other, &wanted));
         }
         _ => {
