@@ -191,6 +191,9 @@ def everything(walk, folder):
     call("get", "/v1/volumes/{id}/files/{name}", expect=200, id=volume["id"], name=volume["originals"][0]["name"])
     names = {"external_id": "A-2026-17", "labels": {"study": "42"}}
     call("patch", "/v1/volumes/{id}", expect=200, id=volume["id"], body=names)
+    stated = {"patient_id": "4711", "patient_name": "Doe^Jane", "study_uid": "1.2.840.99999.1.1", "accession_number": "A17"}
+    call("put", "/v1/volumes/{id}/identity", expect=200, id=volume["id"], body=stated)
+    call("get", "/v1/volumes/{id}/identity", expect=200, id=volume["id"])
     call("put", "/v1/volumes/{id}/hold", expect=200, id=volume["id"], body={"reason": "Case 17/2026"})
     call("delete", "/v1/volumes/{id}/hold", expect=204, id=volume["id"])
 
@@ -257,6 +260,8 @@ def everything(walk, folder):
         urllib.request.urlopen(urllib.request.Request(f"{URL}/v1/jobs/{name}", method="DELETE"))
     while any(state_of(name) in ("queued", "running") for name in jobs):
         time.sleep(0.05)
+    call("delete", "/v1/volumes/{id}/identity", expect=204, id=volume["id"])
+    call("get", "/v1/models/{id}/mesh.dcm", expect=409, id=model)
     for kind, name in of_kind.items():
         call("delete", f"/v1/{kind}/{{id}}", expect=200, headers={"prefer": "return=representation"}, id=name)
     _, receipts = call("get", "/v1/erasures", expect=200)

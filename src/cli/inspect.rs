@@ -2,12 +2,11 @@
 
 use crate::progress::Monitor;
 use crate::report;
-use crate::volume::dicom::Provenance;
 use crate::volume::{self, ReadLimits, ReadOptions, VolumeFile};
 use crate::work::problems::Explain;
 use anyhow::Result;
 use clap::Args;
-use serde_json::{Map, Value};
+use serde_json::Value;
 use std::path::PathBuf;
 
 /// Print what is read of a volume: size, place, values and, of DICOM, whose scan it is
@@ -39,22 +38,8 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     let from = volume::provenance(&files, &first, &limits, &monitor)?;
     let mut shown = report::input(&facts);
     if let (Value::Object(shown), Some(from)) = (&mut shown, from) {
-        shown.insert("dicom".into(), dicom(&from));
+        shown.insert("dicom".into(), serde_json::to_value(from)?);
     }
     println!("{}", serde_json::to_string_pretty(&shown)?);
     Ok(())
-}
-
-fn dicom(from: &Provenance) -> Value {
-    let stated = from.stated().into_iter();
-    let mut shown: Map<String, Value> = stated
-        .map(|(name, value)| (name.to_owned(), value.into()))
-        .collect();
-    if !from.instance_uids.is_empty() {
-        shown.insert("instance_uids".into(), from.instance_uids.clone().into());
-    }
-    if !from.slice_frames.is_empty() {
-        shown.insert("slice_frames".into(), from.slice_frames.clone().into());
-    }
-    Value::Object(shown)
 }

@@ -10,16 +10,18 @@ use super::erasures::{self, ReceiptBody};
 use super::guard::Agent;
 use super::openapi::{
     CachedHeaders, CascadeParameter, Documented, EraseProblems, ErasureParameters, ListProblems,
-    LookupProblems, PageParameters, TagParameters, UnchangedAnswer,
+    LookupProblems, PageParameters, ScanParameters, TagParameters, UnchangedAnswer,
 };
 use super::pagination::{next_cursor, page_of};
 use super::problem::Answer;
 use super::problem::not_found::missing;
 use super::request::{PathSegments, query_pairs, refuse_unknown};
-use super::tags;
 use super::validators::ValidatedJson;
+use super::{scans, tags};
+use crate::access::Scope;
 use crate::jobs::{
-    Catalogue, Held, ListPage, ListRequest, Resource, StoreError, TagFilter, Tenant,
+    Catalogue, Held, ItemFilter, ListPage, ListRequest, Resource, ScanFilter, StoreError,
+    TagFilter, Tenant,
 };
 use axum::extract::{RawQuery, State};
 use axum::http::HeaderMap;
@@ -43,17 +45,20 @@ pub trait Collection: 'static {
     /// Whether a caller may give it names of its own, and search by them.
     const TAGGED: bool = false;
 
+    /// Whether it is of a scan, by which it is searched.
+    const SCANNED: bool = true;
+
     /// A row of the catalogue.
     type Row: Send;
 
     /// The row as JSON.
     type Body: Serialize + ToSchema + Send;
 
-    /// The JSON of a row.
+    /// The JSON of a row for a caller of that scope.
     ///
     /// # Errors
     /// If the row holds something that cannot be read.
-    fn body(app: &App, row: Held<Self::Row>) -> Result<Self::Body, StoreError>;
+    fn body(app: &App, scope: Scope, row: Held<Self::Row>) -> Result<Self::Body, StoreError>;
 
     /// The tenant's row of that id.
     fn row(
@@ -66,7 +71,7 @@ pub trait Collection: 'static {
     fn rows(
         catalogue: &dyn Catalogue,
         tenant: &Tenant,
-        filter: &TagFilter,
+        filter: &ItemFilter,
         page: ListRequest,
     ) -> impl Future<Output = Result<ListPage<Held<Self::Row>>, StoreError>> + Send;
 }
@@ -88,6 +93,9 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
     .answers::<ListProblems>();
     if C::TAGGED {
         listing = listing.parameters::<TagParameters>();
+    }
+    if C::SCANNED {
+        listing = listing.parameters::<ScanParameters>();
     }
     let lookup = operation(
         HttpMethod::Get,
@@ -146,17 +154,22 @@ async fn list<C: Collection>(
     RawQuery(query): RawQuery,
 ) -> Answer<Json<ListBody<C>>> {
     let pairs = query_pairs(query.as_deref());
-    let (filter, pairs) = match C::TAGGED {
+    let (tags, pairs) = match C::TAGGED {
         true => tags::take_filter(&app, pairs)?,
         false => (TagFilter::default(), pairs),
     };
+    let (scan, pairs) = match C::SCANNED {
+        true => scans::take_filter(pairs)?,
+        false => (ScanFilter::default(), pairs),
+    };
+    let filter = ItemFilter { tags, scan };
     let (page, []) = page_of(pairs, [])?;
     let page = C::rows(&*app.queue.catalogue, &caller.tenant, &filter, page).await?;
     let next_cursor = next_cursor(&page);
     let items = page
         .items
         .into_iter()
-        .map(|row| C::body(&app, row))
+        .map(|row| C::body(&app, caller.scope, row))
         .collect::<Result<_, _>>()?;
     Ok(Json(ListBody { items, next_cursor }))
 }
@@ -172,12 +185,15 @@ async fn show<C: Collection>(
     let read = async || {
         let row = find::<C>(&app, &caller.tenant, &id).await?;
         Ok(ControlFlow::Continue(ValidatedJson::of(&C::body(
-            &app, row,
+            &app,
+            caller.scope,
+            row,
         )?)?))
     };
     let catalogue = &*app.queue.catalogue;
+    let asker = (&caller.tenant, scans::sees_patients(caller.scope));
     app.answers
-        .answer(catalogue, &caller.tenant, C::RESOURCE, &id, &headers, read)
+        .answer(catalogue, asker, C::RESOURCE, &id, &headers, read)
         .await
 }
 

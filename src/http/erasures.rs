@@ -210,19 +210,21 @@ pub async fn erase(
             format!("An unfinished job needs this {}.", kind.noun()),
         )
         .fix("Wait for the job to end, or DELETE it; GET /v1/jobs lists the jobs.")),
-        Erased::OnHold { id } => Err(Problem::new(
-            StatusCode::CONFLICT,
-            "legal-hold",
-            format!(
-                "A legal hold on `{id}` forbids to erase this {}.",
-                kind.noun()
-            ),
-        )
-        .fix(format!(
-            "DELETE {}/hold with a key of scope `admin` when the hold has ended.",
-            path_of(&id)
-        ))),
+        Erased::OnHold { id } => Err(on_hold(&id, kind.noun())),
     }
+}
+
+/// 409: a legal hold on the item `id` keeps what was to be erased.
+pub fn on_hold(id: &str, what: &str) -> Problem {
+    Problem::new(
+        StatusCode::CONFLICT,
+        "legal-hold",
+        format!("A legal hold on `{id}` forbids to erase this {what}."),
+    )
+    .fix(format!(
+        "DELETE {}/hold with a key of scope `admin` when the hold has ended.",
+        path_of(id)
+    ))
 }
 
 /// List receipts of erasures

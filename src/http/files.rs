@@ -5,7 +5,7 @@ use super::app::App;
 use super::problem::{Answer, Problem};
 use super::validators::not_modified;
 use super::wire::path_of;
-use crate::jobs::{FileRecord, Product, ProductFile, hex};
+use crate::jobs::{FileRecord, OutputFile, Product, ProductFile, hex};
 use axum::body::{Body, Bytes};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::IntoResponse;
@@ -20,6 +20,9 @@ const CACHE_CONTROL: &str = "private, max-age=31536000, immutable";
 
 /// A later version of the program may draw a page differently.
 const PAGE_CACHE_CONTROL: &str = "private, max-age=86400";
+
+/// Whose scan it is may be stated otherwise, or erased.
+const OBJECT_CACHE_CONTROL: &str = "private, no-cache";
 
 /// A file to be sent.
 pub struct Download<'a> {
@@ -63,18 +66,41 @@ pub async fn send_file(app: &App, file: &Download<'_>, headers: &HeaderMap) -> A
 
 /// Answers with the page of a product in the same way.
 pub async fn send_page(product: &Product, page: String, headers: &HeaderMap) -> Answer {
-    let page = Bytes::from(page);
-    let file = ProductFile {
+    let file = OutputFile {
         name: PAGE.into(),
         media_type: "text/html; charset=utf-8".into(),
-        bytes: page.len() as u64,
-        sha256: hex(&Sha256::digest(&page)),
+        bytes: page.into_bytes(),
     };
-    // The range lies within the page, whose length is a `usize`.
+    send_made(product, file, PAGE_CACHE_CONTROL, false, headers).await
+}
+
+/// Answers with a DICOM object of a product in the same way.
+pub async fn send_object(product: &Product, object: OutputFile, headers: &HeaderMap) -> Answer {
+    send_made(product, object, OBJECT_CACHE_CONTROL, true, headers).await
+}
+
+async fn send_made(
+    product: &Product,
+    made: OutputFile,
+    cache_control: &str,
+    attached: bool,
+    headers: &HeaderMap,
+) -> Answer {
+    let content = Bytes::from(made.bytes);
+    let file = ProductFile {
+        name: made.name,
+        media_type: made.media_type.into_owned(),
+        bytes: content.len() as u64,
+        sha256: hex(&Sha256::digest(&content)),
+    };
+    // The range lies within the content, whose length is a `usize`.
     let read =
-        async |span: Range<u64>| Ok(page.slice(span.start as usize..span.end as usize).into());
-    let download = Download::of(product, &file);
-    respond(&download, headers, PAGE_CACHE_CONTROL, read).await
+        async |span: Range<u64>| Ok(content.slice(span.start as usize..span.end as usize).into());
+    let download = Download {
+        attached,
+        ..Download::of(product, &file)
+    };
+    respond(&download, headers, cache_control, read).await
 }
 
 /// Answers with the range of `file` that `read` returns.

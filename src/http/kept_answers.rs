@@ -4,7 +4,7 @@
 //! asked and the id, with the version of the database ([`crate::jobs::Catalogue::version`]) under
 //! which it was read. Whatever is written changes the version, and answers of other versions are
 //! never used: neither what was erased, changed or put on hold meanwhile, nor what another tenant
-//! has.
+//! has. Callers who see whose scan a volume is have answers of their own.
 //!
 //! Memory is limited: when there is no room for one more, all are dropped.
 
@@ -20,6 +20,9 @@ use std::sync::{Mutex, PoisonError};
 /// Memory for an answer's place in the maps.
 const OVERHEAD: usize = 200;
 
+/// The tenant of a caller, and whether the caller sees whose scan a volume is.
+pub type Asker<'a> = (&'a Tenant, bool);
+
 /// See the module.
 pub struct KeptAnswers {
     limit: usize,
@@ -30,13 +33,14 @@ pub struct KeptAnswers {
 struct Kept {
     version: u64,
     bytes: usize,
-    by_tenant: HashMap<Tenant, HashMap<String, ValidatedJson>>,
+    /// For callers who do not see whose scan it is, and for those who do.
+    by_tenant: [HashMap<Tenant, HashMap<String, ValidatedJson>>; 2],
 }
 
 impl Kept {
     fn drop_all(&mut self) {
         self.bytes = 0;
-        self.by_tenant.clear();
+        self.by_tenant.iter_mut().for_each(HashMap::clear);
     }
 }
 
@@ -57,7 +61,7 @@ impl KeptAnswers {
     pub async fn answer(
         &self,
         catalogue: &dyn Catalogue,
-        tenant: &Tenant,
+        asker: Asker<'_>,
         resource: Resource,
         id: &str,
         headers: &HeaderMap,
@@ -66,7 +70,7 @@ impl KeptAnswers {
         let version = catalogue.version();
         if Resource::of(id) == Some(resource)
             && let Some(version) = version
-            && let Some(answer) = self.get(version, tenant, id)
+            && let Some(answer) = self.get(version, asker, id)
         {
             return Ok(answer.answer(headers));
         }
@@ -77,22 +81,24 @@ impl KeptAnswers {
         if let Some(version) = version
             && catalogue.version() == Some(version)
         {
-            self.keep(version, tenant, id, &answer);
+            self.keep(version, asker, id, &answer);
         }
         Ok(answer.answer(headers))
     }
 
-    /// The answer about a tenant's item, if it was kept under that version.
-    fn get(&self, version: u64, tenant: &Tenant, id: &str) -> Option<ValidatedJson> {
+    /// The answer about an item for a caller of that tenant who sees patients or not, if it was kept
+    /// under that version.
+    fn get(&self, version: u64, (tenant, patients): Asker<'_>, id: &str) -> Option<ValidatedJson> {
         let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         if kept.version != version {
             return None;
         }
-        kept.by_tenant.get(tenant)?.get(id).cloned()
+        let by_tenant = &kept.by_tenant[usize::from(patients)];
+        by_tenant.get(tenant)?.get(id).cloned()
     }
 
     /// Keeps an answer that was made of what was read under that version.
-    fn keep(&self, version: u64, tenant: &Tenant, id: &str, answer: &ValidatedJson) {
+    fn keep(&self, version: u64, (tenant, patients): Asker<'_>, id: &str, answer: &ValidatedJson) {
         let bytes = answer.bytes() + id.len() + OVERHEAD;
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         if version < kept.version || bytes > self.limit {
@@ -102,7 +108,8 @@ impl KeptAnswers {
             kept.drop_all();
             kept.version = version;
         }
-        let of_tenant = kept.by_tenant.entry(tenant.clone()).or_default();
+        let by_tenant = &mut kept.by_tenant[usize::from(patients)];
+        let of_tenant = by_tenant.entry(tenant.clone()).or_default();
         if of_tenant.insert(id.to_owned(), answer.clone()).is_none() {
             kept.bytes += bytes;
         }
@@ -118,16 +125,17 @@ mod tests {
         let (a, b): (Tenant, Tenant) = ("a".parse().unwrap(), "b".parse().unwrap());
         let answer = ValidatedJson::of(&"1").unwrap();
         let kept = KeptAnswers::new(10_000);
-        kept.keep(2, &a, "vol_1", &answer);
-        assert!(kept.get(2, &a, "vol_1").is_some());
-        assert!(kept.get(2, &b, "vol_1").is_none());
-        assert!(kept.get(2, &a, "vol_2").is_none());
-        assert!(kept.get(4, &a, "vol_1").is_none());
-        kept.keep(4, &b, "vol_1", &answer);
-        assert!(kept.get(4, &a, "vol_1").is_none());
-        kept.keep(2, &a, "vol_1", &answer);
-        assert!(kept.get(2, &a, "vol_1").is_none(), "too late");
-        assert!(kept.get(4, &b, "vol_1").is_some());
+        kept.keep(2, (&a, true), "vol_1", &answer);
+        assert!(kept.get(2, (&a, true), "vol_1").is_some());
+        assert!(kept.get(2, (&b, true), "vol_1").is_none());
+        assert!(kept.get(2, (&a, false), "vol_1").is_none());
+        assert!(kept.get(2, (&a, true), "vol_2").is_none());
+        assert!(kept.get(4, (&a, true), "vol_1").is_none());
+        kept.keep(4, (&b, true), "vol_1", &answer);
+        assert!(kept.get(4, (&a, true), "vol_1").is_none());
+        kept.keep(2, (&a, true), "vol_1", &answer);
+        assert!(kept.get(2, (&a, true), "vol_1").is_none(), "too late");
+        assert!(kept.get(4, (&b, true), "vol_1").is_some());
     }
 
     #[test]
@@ -136,18 +144,18 @@ mod tests {
         let answer = ValidatedJson::of(&"x".repeat(1000)).unwrap();
         let kept = KeptAnswers::new(10_000);
         for number in 0..1000 {
-            kept.keep(0, &tenant, &number.to_string(), &answer);
-            assert!(kept.get(0, &tenant, &number.to_string()).is_some());
+            kept.keep(0, (&tenant, true), &number.to_string(), &answer);
+            assert!(kept.get(0, (&tenant, true), &number.to_string()).is_some());
             assert!(kept.kept.lock().unwrap().bytes <= 10_000);
         }
         let held = kept.kept.lock().unwrap();
-        let count = held.by_tenant[&tenant].len();
+        let count = held.by_tenant[1][&tenant].len();
         assert_eq!(held.bytes, {
             let bytes = |id: &String| answer.bytes() + id.len() + OVERHEAD;
-            held.by_tenant[&tenant].keys().map(bytes).sum::<usize>()
+            held.by_tenant[1][&tenant].keys().map(bytes).sum::<usize>()
         });
         assert!((2..10).contains(&count), "{count}");
         drop(held);
-        KeptAnswers::new(100).keep(0, &tenant, "vol_1", &answer);
+        KeptAnswers::new(100).keep(0, (&tenant, true), "vol_1", &answer);
     }
 }

@@ -12,6 +12,7 @@
 //! | what several of them share | [`collection`] (list, show, erase), [`products`] (meshes, reports, files), [`files`] (ranges, validators), [`validators`] (of JSON), [`kept_answers`] |
 //! | who may do what, and the record of it | [`guard`] (before every handler), [`caller`], [`keys`], [`audit`] |
 //! | a tenant's names for its things, legal holds, receipts of erasures | [`tags`], [`legal_hold`], [`erasures`] |
+//! | whose scan a volume is | [`scans`] (in answers and searches), [`identities`] (stated, erased) |
 //! | errors and their wording | [`problem`]; 404 and 410 in [`problem::not_found`] |
 //! | limits on bodies, connections and decoding | [`limits`], [`connections`], [`decoding`] |
 //! | the address that sent a request | [`client`] |
@@ -45,6 +46,7 @@ mod guard;
 mod health;
 mod hooks;
 mod idempotency;
+mod identities;
 mod job_watch;
 mod jobs;
 mod kept_answers;
@@ -63,6 +65,7 @@ mod products;
 mod readiness;
 mod request;
 mod router;
+mod scans;
 mod segmentations;
 mod server;
 mod spans;

@@ -6,7 +6,7 @@ use super::files;
 use super::jobs::filing::{self, UploadJob};
 use super::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
 use super::problem::Answer;
-use super::products::{Offer, ProductCollection, body_of_product};
+use super::products::{Offer, ProductCollection, body_of_product, object_paths};
 use super::wire::path_of;
 use crate::jobs::{Product, Resource};
 use axum::extract::{RawQuery, Request, State};
@@ -23,7 +23,8 @@ impl ProductCollection for Models {
     const FILE_SCHEMA: &'static str = "FileName";
     const FILE_HELP: &'static str = "The mesh in each format, `report.json`, `distance.json` \
         (signed distances of the model's vertices and triangles to the surface) and \
-        `report.html`, which is made on request.";
+        `report.html`, which is made on request. The `.dcm` files are DICOM objects of the scan's \
+        patient and study, made on request; they need the scope `submit`, or `deidentify=true`.";
     type FileAnswer = openapi::ModelFileAnswer;
 }
 
@@ -50,6 +51,8 @@ struct ModelLinks {
     report: String,
     /// The report as an HTML page.
     page: String,
+    /// DICOM objects of the scan's patient and study, for the archive.
+    dicom: Vec<String>,
     /// Its volume.
     volume: String,
 }
@@ -61,6 +64,7 @@ impl ModelLinks {
             mesh: format!("{itself}/mesh"),
             report: format!("{itself}/report"),
             page: format!("{itself}/{}", files::PAGE),
+            dicom: object_paths(model),
             volume: path_of(model.volume.as_deref().unwrap_or_default()),
             itself,
         }
@@ -79,6 +83,7 @@ impl ModelLinks {
         (Vec<u8> = "application/dicom"),
         (Vec<u8> = "application/nifti"),
         (openapi::UploadForm = "multipart/form-data"),
+        (Vec<u8> = "multipart/related"),
     )),
     params(openapi::ModelQuery, openapi::TagParameters, openapi::IdempotencyHeader,
         openapi::PreferHeader, openapi::WebhookInputs),

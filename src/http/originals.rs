@@ -1,7 +1,8 @@
 //! `/v1/volumes/{id}/content` and `/v1/volumes/{id}/files`: the uploaded files, byte for byte.
 //!
 //! A volume of one file has `content`; every volume has `files/{name}`. The names are the store's:
-//! those that the client gave may name a patient and are not kept.
+//! those that the client gave may name a patient and are not kept. A DICOM file names the patient
+//! itself, so it needs the scope `submit`.
 
 use super::app::App;
 use super::caller::Caller;
@@ -13,7 +14,9 @@ use super::problem::{Answer, Problem};
 use super::request::{PathSegments, query_pairs, refuse_unknown};
 use super::volumes::{Volumes, media_type};
 use super::wire::path_of;
+use crate::access::Scope;
 use crate::jobs::{FileRecord, Resource, StoredVolume};
+use crate::work::UploadFacts;
 use axum::extract::{RawQuery, State};
 use axum::http::{HeaderMap, StatusCode};
 
@@ -24,7 +27,7 @@ use axum::http::{HeaderMap, StatusCode};
 #[utoipa::path(get, path = "/v1/volumes/{id}/content", tag = "volumes",
     operation_id = "get_volume_content",
     params(("id" = String, Path, description = "The volume's id"), ConditionalHeaders),
-    responses(openapi::OriginalAnswer, DownloadAnswers, LookupProblems))]
+    responses(openapi::OriginalAnswer, DownloadAnswers, openapi::ScopeProblems, LookupProblems))]
 pub async fn download_volume(
     State(app): State<App>,
     caller: Caller,
@@ -35,7 +38,7 @@ pub async fn download_volume(
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     match &volume.files[..] {
-        [file] => send(&app, &volume, file, &headers).await,
+        [file] => send(&app, &caller, &volume, file, &headers).await,
         _ => Err(Problem::new(
             StatusCode::NOT_FOUND,
             "several-files",
@@ -54,7 +57,7 @@ pub async fn download_volume(
     params(("id" = String, Path, description = "The volume's id"),
         ("name" = String, Path, description = "The file's name, as the volume's JSON lists it"),
         ConditionalHeaders),
-    responses(openapi::OriginalAnswer, DownloadAnswers, LookupProblems))]
+    responses(openapi::OriginalAnswer, DownloadAnswers, openapi::ScopeProblems, LookupProblems))]
 pub async fn download_volume_file(
     State(app): State<App>,
     caller: Caller,
@@ -65,7 +68,7 @@ pub async fn download_volume_file(
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     match volume.files.iter().find(|file| file.name == name) {
-        Some(file) => send(&app, &volume, file, &headers).await,
+        Some(file) => send(&app, &caller, &volume, file, &headers).await,
         None => {
             let first = volume.files.iter().take(10).map(|file| file.name.clone());
             let names: Vec<String> = first.collect();
@@ -74,7 +77,17 @@ pub async fn download_volume_file(
     }
 }
 
-async fn send(app: &App, volume: &StoredVolume, file: &FileRecord, headers: &HeaderMap) -> Answer {
+async fn send(
+    app: &App,
+    caller: &Caller,
+    volume: &StoredVolume,
+    file: &FileRecord,
+    headers: &HeaderMap,
+) -> Answer {
+    if UploadFacts::of(volume)?.format.starts_with("DICOM") {
+        // Its header names the patient.
+        caller.require(Scope::Submit)?;
+    }
     let download = Download {
         id: &volume.id,
         record: file.clone(),

@@ -10,18 +10,24 @@ use super::decoding::LITTLE_MEMORY;
 use super::files;
 use super::negotiate;
 use super::openapi::{
-    ConditionalHeaders, Documented, DownloadAnswers, LookupProblems, MeshAnswer, ReportAnswer,
+    ConditionalHeaders, DeidentifyParameter, DicomProblems, Documented, DownloadAnswers,
+    LookupProblems, MeshAnswer, ReportAnswer,
 };
-use super::problem::Answer;
 use super::problem::not_found::{missing, no_such_file};
-use super::request::{PathSegments, query_pairs, refuse_unknown};
+use super::problem::{Answer, Problem};
+use super::request::{PathSegments, flag, query_pairs, refuse_unknown};
+use super::scans::ScanUidsBody;
+use super::wire::path_of;
+use crate::access::Scope;
 use crate::export::Format;
+use crate::export::dicom::DicomObject;
 use crate::jobs::{
-    Catalogue, Held, ListPage, ListRequest, Product, Resource, StoreError, TagFilter, Tenant,
+    Catalogue, Held, ItemFilter, ListPage, ListRequest, Product, Resource, StoreError, Tenant,
 };
 use crate::progress::Monitor;
+use crate::work::{UploadFacts, dicom};
 use axum::extract::{RawQuery, State};
-use axum::http::{HeaderMap, HeaderValue, header};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::routing::get;
 use serde::Serialize;
 use std::borrow::Cow;
@@ -36,6 +42,9 @@ use utoipa_axum::router::UtoipaMethodRouter;
 pub trait ProductCollection: 'static {
     /// The kind: its ids, its noun, its path.
     const RESOURCE: Resource;
+
+    /// Whether it is made of a scan, by which it is searched.
+    const SCANNED: bool = true;
 
     /// The product as JSON.
     type Body: From<Presented> + Serialize + ToSchema + Send;
@@ -58,6 +67,7 @@ pub trait ProductCollection: 'static {
 
 impl<P: ProductCollection> Collection for P {
     const RESOURCE: Resource = P::RESOURCE;
+    const SCANNED: bool = P::SCANNED;
     type Row = Product;
     type Body = P::Body;
 
@@ -69,14 +79,14 @@ impl<P: ProductCollection> Collection for P {
         catalogue.product(tenant, id).await
     }
 
-    fn body(app: &App, product: Held<Product>) -> Result<P::Body, StoreError> {
+    fn body(app: &App, _: Scope, product: Held<Product>) -> Result<P::Body, StoreError> {
         Ok(Presented::of(app, product).into())
     }
 
     async fn rows(
         catalogue: &dyn Catalogue,
         tenant: &Tenant,
-        filter: &TagFilter,
+        filter: &ItemFilter,
         page: ListRequest,
     ) -> Result<ListPage<Held<Product>>, StoreError> {
         catalogue.products(tenant, P::RESOURCE, filter, page).await
@@ -89,6 +99,8 @@ pub struct Presented {
     pub product: Product,
     /// When it will be erased (RFC 3339); `None` if it is kept.
     pub expires_at: Option<String>,
+    /// The scan of its volume.
+    pub scan: Option<ScanUidsBody>,
 }
 
 impl Presented {
@@ -96,6 +108,7 @@ impl Presented {
     pub fn of(app: &App, held: Held<Product>) -> Self {
         Self {
             expires_at: app.expires_at(held.item.resource(), &held.holding),
+            scan: ScanUidsBody::of(&held.holding.scan),
             product: held.item,
         }
     }
@@ -124,10 +137,15 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
     )
     .description(P::FILE_HELP);
     let names = file.refer::<FileNames<P>>();
-    let file = file
+    let mut file = file
         .segment("file", "The file's name".into(), names)
         .parameters::<ConditionalHeaders>()
         .answers::<P::FileAnswer>();
+    if !dicom::objects(P::RESOURCE).is_empty() {
+        file = file
+            .parameters::<DeidentifyParameter>()
+            .answers::<DicomProblems>();
+    }
     let shared = |operation: Documented| {
         operation
             .answers::<DownloadAnswers>()
@@ -228,6 +246,8 @@ macro_rules! body_of_product {
             expires_at: Option<String>,
             /// The volume it was made of.
             volume: String,
+            /// The scan of that volume; absent if it is not known.
+            dicom: Option<$crate::http::scans::ScanUidsBody>,
             /// The parameters used, including every default.
             #[schema(value_type = $parameters)]
             parameters: serde_json::Map<String, serde_json::Value>,
@@ -247,6 +267,7 @@ macro_rules! body_of_product {
                 let product = presented.product;
                 Self {
                     expires_at: presented.expires_at,
+                    dicom: presented.scan,
                     created_at: $crate::http::wire::rfc3339(product.created_at),
                     volume: product.volume.clone().unwrap_or_default(),
                     software: $crate::http::products::SoftwareBody::of(&product),
@@ -373,13 +394,85 @@ async fn get_file<P: ProductCollection>(
     RawQuery(query): RawQuery,
     headers: HeaderMap,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let pairs = query_pairs(query.as_deref());
+    let object = dicom::object_named(P::RESOURCE, &name);
+    let known: &[&str] = match object {
+        Some(_) => &["deidentify"],
+        None => &[],
+    };
+    refuse_unknown(&pairs, known)?;
     let names = file_names::<P>();
     if !names.contains(&name) {
         return Err(no_such_file(P::RESOURCE, &name, &names));
     }
     let product = find::<P>(&app, &caller.tenant, &id).await?.item;
-    send_named(&app, &product, &name, &headers).await
+    let Some(object) = object else {
+        return send_named(&app, &product, &name, &headers).await;
+    };
+    let deidentify = match pairs.first() {
+        Some((_, value)) => flag("deidentify", value)?,
+        None => false,
+    };
+    if !deidentify {
+        caller.require(Scope::Submit)?;
+    }
+    send_object(&app, &caller.tenant, product, object, deidentify, &headers).await
+}
+
+/// Answers with a DICOM object, which is made of the product's files and the scan of its volume.
+async fn send_object(
+    app: &App,
+    tenant: &Tenant,
+    product: Product,
+    object: DicomObject,
+    deidentify: bool,
+    headers: &HeaderMap,
+) -> Answer {
+    let id = &product.id;
+    let result = app.queue.result(tenant, id, dicom::FILES).await?;
+    let result = result.ok_or_else(|| volume_erased(id))?;
+    let secret = match deidentify {
+        true => Some(app.queue.catalogue.deidentification_secret(tenant).await?),
+        false => None,
+    };
+    let memory = dicom::object_memory(UploadFacts::of(&result.volume)?.shape);
+    let limits = app.engine.limits;
+    let make = move |_: &Monitor<'_>| dicom::object(&result, object, secret.as_deref(), &limits);
+    let made = app.decoding.run(memory, make).await?.map_err(|failure| {
+        let unknown = failure.code == "identity-needed" || failure.code == "identity-differs";
+        let problem = Problem::from(failure);
+        match unknown {
+            true => problem.conflict(),
+            false => problem,
+        }
+    })?;
+    match made {
+        Some(file) => files::send_object(&product, file, headers).await,
+        None => {
+            let names: Vec<_> = product.files.iter().map(|file| file.name.clone()).collect();
+            Err(no_such_file(product.resource(), object.file_name(), &names))
+        }
+    }
+}
+
+/// The paths of the DICOM objects that can be made of a product.
+pub fn object_paths(product: &Product) -> Vec<String> {
+    let itself = path_of(&product.id);
+    let objects = dicom::objects(product.resource()).iter();
+    objects
+        .filter(|object| product.file("polar.png").is_some() || **object != DicomObject::Polar)
+        .map(|object| format!("{itself}/{}", object.file_name()))
+        .collect()
+}
+
+/// 409: whose scan a result is of went with its volume.
+fn volume_erased(id: &str) -> Problem {
+    Problem::new(
+        StatusCode::CONFLICT,
+        "volume-erased",
+        format!("The volume of `{id}` was erased, and with it whose scan it is."),
+    )
+    .fix("Upload the same file again; DICOM objects of the result can then be had.")
 }
 
 async fn send_named(app: &App, product: &Product, name: &str, headers: &HeaderMap) -> Answer {
@@ -411,7 +504,9 @@ fn file_names<P: ProductCollection>() -> Vec<String> {
         Format::ALL.map(named)
     });
     let others = P::FILES.iter().map(|name| (*name).to_owned());
-    meshes.chain(others).collect()
+    let objects = dicom::objects(P::RESOURCE).iter();
+    let objects = objects.map(|object| object.file_name().to_owned());
+    meshes.chain(others).chain(objects).collect()
 }
 
 /// The schema of [`file_names`].

@@ -58,6 +58,21 @@ pub fn refuse_unknown(pairs: &[(String, String)], known: &[&str]) -> Answer<()> 
     Ok(())
 }
 
+/// The value of the parameter `name`: `true` or `false`.
+///
+/// # Errors
+/// 400 for another text.
+pub fn flag(name: &str, text: &str) -> Answer<bool> {
+    text.parse().map_err(|_| {
+        Problem::bad_request(
+            "invalid-parameter",
+            format!("`{name}` must be `true` or `false`."),
+        )
+        .at(name)
+        .fix("Give `true` or `false`, or leave it out for `false`.")
+    })
+}
+
 /// 400 for an unknown name, with the most similar known one.
 pub fn unknown(what: &str, name: &str, known: &[&str]) -> Problem {
     let fix = match nearest(name, known.iter().copied()) {

@@ -13,8 +13,8 @@ use super::segmentations::Segmentations;
 use super::templates::{MESH_SIZE, Templates};
 use super::volumes::Volumes;
 use super::{
-    audit, collection, erasures, front_page, given_webhook, health, idempotency, jobs, keys,
-    legal_hold, models, originals, products, segmentations, templates, volumes, webhooks,
+    audit, collection, erasures, front_page, given_webhook, health, idempotency, identities, jobs,
+    keys, legal_hold, models, originals, products, segmentations, templates, volumes, webhooks,
 };
 use crate::config::Settings;
 use axum::Router;
@@ -47,7 +47,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         products::routes::<Segmentations>(),
         products::routes::<Templates>(),
     ];
-    let of_one_kind: [UtoipaMethodRouter<App>; 28] = [
+    let of_one_kind: [UtoipaMethodRouter<App>; 30] = [
         routes!(volumes::create_volume).layer(upload()),
         routes!(volumes::preview_volume),
         routes!(volumes::update_volume).layer(json(settings.json_limit)),
@@ -55,6 +55,8 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(originals::download_volume_file),
         routes!(legal_hold::hold_volume).layer(json(settings.json_limit)),
         routes!(legal_hold::release_volume),
+        routes!(identities::get_identity, identities::erase_identity),
+        routes!(identities::state_identity).layer(json(settings.json_limit)),
         routes!(erasures::list_erasures),
         routes!(erasures::get_erasure),
         routes!(models::create_model).layer(upload()),

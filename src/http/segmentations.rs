@@ -7,7 +7,7 @@ use super::files;
 use super::jobs::filing::{self, UploadJob};
 use super::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
 use super::problem::Answer;
-use super::products::{Offer, ProductCollection, body_of_product};
+use super::products::{Offer, ProductCollection, body_of_product, object_paths};
 use super::wire::path_of;
 use crate::jobs::{Product, Resource};
 use axum::extract::{RawQuery, Request, State};
@@ -39,7 +39,9 @@ impl ProductCollection for Segmentations {
         `report.html` (made on request) and `slices.png` (three slices with the contour of the \
         fit); for a left ventricle also `polar.json`, `polar.svg` and `polar.png`, and mask and \
         meshes of the wall that `edge` does not ask for: `mask_anatomical.nii.gz` and \
-        `mesh_anatomical.*`, or `mask_apparent.nii.gz` and `mesh_apparent.*`.";
+        `mesh_anatomical.*`, or `mask_apparent.nii.gz` and `mesh_apparent.*`. The `.dcm` files are \
+        DICOM objects of the scan's patient and study, made on request; they need the scope \
+        `submit`, or `deidentify=true`.";
     type FileAnswer = openapi::SegmentationFileAnswer;
 }
 
@@ -72,6 +74,8 @@ struct SegmentationLinks {
     /// The polar map; left ventricles only.
     #[serde(skip_serializing_if = "Option::is_none")]
     polar: Option<String>,
+    /// DICOM objects of the scan's patient and study, for the archive.
+    dicom: Vec<String>,
     /// The volume.
     volume: String,
 }
@@ -86,6 +90,7 @@ impl SegmentationLinks {
             report: format!("{itself}/report"),
             page: format!("{itself}/{}", files::PAGE),
             polar: polar.map(|file| format!("{itself}/{}", file.name)),
+            dicom: object_paths(segmentation),
             volume: path_of(segmentation.volume.as_deref().unwrap_or_default()),
             itself,
         }
@@ -123,6 +128,7 @@ fn offers() -> Vec<Offer> {
         (Vec<u8> = "application/dicom"),
         (Vec<u8> = "application/nifti"),
         (openapi::SegmentationForm = "multipart/form-data"),
+        (Vec<u8> = "multipart/related"),
     )),
     params(openapi::SegmentationQuery, openapi::TagParameters, openapi::IdempotencyHeader,
         openapi::PreferHeader, openapi::WebhookInputs),

@@ -11,6 +11,7 @@ use super::hooks::Hooks;
 use super::job_watch::JobWatch;
 use super::metrics::Metrics;
 use super::router::router;
+use super::scans;
 use super::spans::{OtlpError, Spans};
 use crate::access::{AccessStore, Gate, Issuer, IssuerError, IssuerSettings, Recorder, Scope};
 use crate::config::Settings;
@@ -162,6 +163,7 @@ pub async fn start(
         every: UPKEEP_EVERY,
     };
     tokio::spawn(upkeep.run(closing.clone()));
+    tokio::spawn(scans::read_old(app.clone(), closing.clone()));
     if let Some(age) = settings.audit_retention.0 {
         tokio::spawn(prune_audit(store.rows.clone(), age.0, closing.clone()));
     }

@@ -10,7 +10,7 @@ use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
 use super::request::{json_bytes, query_pairs, refuse_unknown};
 use super::wire::{path_of, rfc3339};
 use crate::config::Size;
-use crate::jobs::{ListRequest, Resource, TagFilter, TemplateSource, Tenant};
+use crate::jobs::{ItemFilter, ListRequest, Resource, TemplateSource, Tenant};
 use crate::progress::Monitor;
 use axum::Json;
 use axum::body::Bytes;
@@ -37,6 +37,7 @@ pub struct Templates;
 
 impl ProductCollection for Templates {
     const RESOURCE: Resource = Resource::Template;
+    const SCANNED: bool = false;
     type Body = TemplateBody;
     const FILES: &'static [&'static str] = &[];
     const FILE_SCHEMA: &'static str = "TemplateFileName";
@@ -201,7 +202,7 @@ async fn refuse_when_full(app: &App, tenant: &Tenant) -> Answer<()> {
     let page = app
         .queue
         .catalogue
-        .products(tenant, Resource::Template, &TagFilter::default(), page)
+        .products(tenant, Resource::Template, &ItemFilter::default(), page)
         .await?;
     if page.items.len() < limit as usize {
         return Ok(());

@@ -8,10 +8,11 @@ use super::problem::{Answer, Problem};
 use super::request::{PathSegments, query_pairs, refuse_unknown, unknown};
 use super::validators::not_modified;
 use super::wire::{path_of, rfc3339};
-use super::{tags, upload};
+use super::{scans, tags, upload};
+use crate::access::Scope;
 use crate::jobs::{
-    BlobError, Catalogue, FileRecord, Held, LegalHold, ListPage, ListRequest, Resource, StoreError,
-    StoreFault, StoredVolume, TagFilter, Tenant, content_id,
+    BlobError, Catalogue, FileRecord, Held, ItemFilter, LegalHold, ListPage, ListRequest, Resource,
+    StoreError, StoreFault, StoredVolume, Tenant, content_id,
 };
 use crate::progress::Monitor;
 use crate::work::{UploadFacts, preview_memory};
@@ -20,6 +21,7 @@ use axum::extract::{RawQuery, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
 use serde::Serialize;
+use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
@@ -43,14 +45,14 @@ impl Collection for Volumes {
         catalogue.volume(tenant, id).await
     }
 
-    fn body(app: &App, volume: Held<StoredVolume>) -> Result<VolumeBody, StoreError> {
-        VolumeBody::of(app, volume)
+    fn body(app: &App, scope: Scope, volume: Held<StoredVolume>) -> Result<VolumeBody, StoreError> {
+        VolumeBody::of(app, scope, volume)
     }
 
     async fn rows(
         catalogue: &dyn Catalogue,
         tenant: &Tenant,
-        filter: &TagFilter,
+        filter: &ItemFilter,
         page: ListRequest,
     ) -> Result<ListPage<Held<StoredVolume>>, StoreError> {
         catalogue.volumes(tenant, filter, page).await
@@ -112,6 +114,9 @@ pub struct VolumeBody {
     label_values: Option<Vec<i64>>,
     /// Oddities of the file that do not prevent its use.
     warnings: Vec<String>,
+    /// Whose scan it is, as far as the caller's scope allows to see it; absent if nothing is known.
+    #[schema(value_type = Option<openapi::ScanSchema>)]
+    dicom: Option<Map<String, Value>>,
     /// Related paths.
     links: VolumeLinks,
 }
@@ -208,14 +213,16 @@ struct VolumeLinks {
     content: Option<String>,
     /// Its legal hold: PUT sets it, DELETE lifts it.
     hold: String,
+    /// Whose scan it is: PUT states it, DELETE erases it.
+    identity: String,
 }
 
 impl VolumeBody {
-    /// The JSON of a volume.
+    /// The JSON of a volume for a caller of that scope.
     ///
     /// # Errors
     /// If its record is damaged.
-    pub fn of(app: &App, volume: Held<StoredVolume>) -> Result<Self, StoreError> {
+    pub fn of(app: &App, scope: Scope, volume: Held<StoredVolume>) -> Result<Self, StoreError> {
         let expires_at = app.expires_at(Resource::Volume, &volume.holding);
         let Held {
             item: volume,
@@ -249,10 +256,12 @@ impl VolumeBody {
             },
             label_values: facts.labels,
             warnings: facts.warnings,
+            dicom: scans::shown(&holding.scan, scope),
             links: VolumeLinks {
                 preview: format!("{itself}/preview.png"),
                 content: (volume.files.len() == 1).then(|| format!("{itself}/content")),
                 hold: format!("{itself}/hold"),
+                identity: format!("{itself}/identity"),
                 itself,
             },
             id: volume.id,
@@ -263,7 +272,8 @@ impl VolumeBody {
 /// Upload a volume
 ///
 /// The body is the file itself, or a form whose files make up one volume (a `.hdr`/`.img` pair, a
-/// DICOM series). The same bytes always get the same id.
+/// DICOM series), or their parts as DICOMweb clients send them. The same bytes always get the same
+/// id.
 #[utoipa::path(post, path = "/v1/volumes", tag = "volumes",
     request_body(content(
         (Vec<u8> = "application/octet-stream"),
@@ -271,6 +281,7 @@ impl VolumeBody {
         (Vec<u8> = "application/dicom"),
         (Vec<u8> = "application/nifti"),
         (openapi::UploadForm = "multipart/form-data"),
+        (Vec<u8> = "multipart/related"),
     )),
     params(openapi::TagParameters),
     responses(
@@ -303,7 +314,12 @@ pub async fn create_volume(
         StatusCode::OK
     };
     let location = [(header::LOCATION, path_of(&volume.id))];
-    Ok((status, location, Json(VolumeBody::of(&app, volume)?)).into_response())
+    Ok((
+        status,
+        location,
+        Json(VolumeBody::of(&app, caller.scope, volume)?),
+    )
+        .into_response())
 }
 
 /// Change a volume's names
@@ -328,7 +344,7 @@ pub async fn update_volume(
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     tags::change(&app, &caller.tenant, &id, volume.holding.tags, request).await?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
-    Ok(Json(VolumeBody::of(&app, volume)?))
+    Ok(Json(VolumeBody::of(&app, caller.scope, volume)?))
 }
 
 /// Preview a volume

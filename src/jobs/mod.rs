@@ -73,13 +73,15 @@ pub use resource::Resource;
 pub use storage::{
     AuditMark, BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Claimant, Custody,
     DeathLimit, Deleted, DiskSpace, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder,
-    ErasureReason, Expiry, FigureStore, FileRecord, Held, Holding, Interrupted, ItemRecord,
-    JobFilter, JobOutcome, JobStore, Lease, LegalHold, ListPage, ListRequest, LocalFile, Product,
-    ProductFile, QueueFigures, QueueLoad, Receipt, RecordPages, StagedFiles, StagedFor, StoreError,
-    StoreFault, StoreResult, StoredVolume, TagFilter, Tags,
+    ErasureReason, Expiry, FigureStore, FileRecord, Held, Holding, Interrupted, ItemFilter,
+    ItemRecord, JobFilter, JobOutcome, JobStore, Lease, LegalHold, ListPage, ListRequest,
+    LocalFile, Product, ProductFile, QueueFigures, QueueLoad, Receipt, RecordPages, ScanFields,
+    ScanFilter, ScanIdentity, Scans, StagedFiles, StagedFor, StoreError, StoreFault, StoreResult,
+    StoredVolume, TagFilter, Tags, UnreadScan,
 };
 pub use tenant::{InvalidTenant, Tenant};
 pub use work::{
-    GivenParameters, Needs, OutputFile, StoredItem, Work, WorkError, WorkInput, WorkOutput, Works,
+    GivenParameters, Needs, OutputFile, StoredItem, StoredResult, Work, WorkError, WorkInput,
+    WorkOutput, Works,
 };
 pub use worker::{WorkerSettings, Workers, serve_isolated};

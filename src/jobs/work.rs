@@ -1,7 +1,7 @@
 //! What a kind of job provides: its parameters, its computation, its input and output.
 
 use super::isolation::Isolation;
-use super::{Failure, LocalFile, Resource};
+use super::{Failure, LocalFile, Resource, ScanIdentity, StoredVolume, Timestamp};
 use crate::progress::{Cancelled, Monitor, Plan};
 use serde_json::{Map, Value};
 use std::borrow::Cow;
@@ -113,6 +113,21 @@ impl StoredItem {
             Err(error) => Err(error),
         }
     }
+}
+
+/// A stored result beside the volume that it was made of.
+#[derive(Debug, Clone)]
+pub struct StoredResult {
+    /// When the tenant first had it.
+    pub made_at: Timestamp,
+    /// The result, with the requested files.
+    pub files: StoredItem,
+    /// The volume.
+    pub volume: StoredVolume,
+    /// The volume's files.
+    pub volume_files: Vec<LocalFile>,
+    /// Whose scan the volume is.
+    pub scan: ScanIdentity,
 }
 
 /// What a job works on.

@@ -34,12 +34,15 @@ pub struct Model {
     pub reference: TriMesh,
     /// Figures about the model and how it was made.
     pub report: ModelReport,
+    /// DICOM Frame of Reference UID of the volume, if it lies in one.
+    pub frame_of_reference_uid: Option<String>,
 }
 
 impl Model {
     /// The metadata that mesh files store with the model.
     pub fn metadata(&self) -> Metadata {
         Metadata {
+            frame_of_reference_uid: self.frame_of_reference_uid.clone(),
             quality: self.report.quality_summary(),
             ..Metadata::new("Left ventricle")
         }
@@ -153,13 +156,11 @@ pub fn from_reading(
     read_ms: f64,
     monitor: &Monitor,
 ) -> Result<Model, PipelineError> {
-    from_volume(
-        &reading.volume,
-        &reading.facts,
-        parameters,
-        read_ms,
-        monitor,
-    )
+    let (volume, facts) = (&reading.volume, &reading.facts);
+    Ok(Model {
+        frame_of_reference_uid: reading.frame_of_reference().map(str::to_owned),
+        ..from_volume(volume, facts, parameters, read_ms, monitor)?
+    })
 }
 
 fn from_volume(
@@ -205,6 +206,7 @@ fn from_volume(
         mesh: made.optimised.mesh,
         reference: surface.mesh,
         report,
+        frame_of_reference_uid: None,
     })
 }
 

@@ -76,6 +76,7 @@ impl SegmentedVolume {
         monitor.report(Stage::Export, 0.5)?;
         let metadata = Metadata {
             volume_id,
+            frame_of_reference_uid: self.reading.frame_of_reference().map(str::to_owned),
             quality: self.summary(),
             ..Metadata::new("Fitted model")
         };

@@ -34,6 +34,7 @@ mod sqlite_figures;
 mod sqlite_hooks;
 mod sqlite_jobs;
 mod sqlite_repair;
+mod sqlite_scans;
 mod writer;
 
 pub use backup::{Backup, backup};

@@ -1,8 +1,8 @@
 //! From rows of SQLite to the records of `jobs`, and JSON columns both ways.
 
 use crate::jobs::{
-    Held, Holding, Job, JobState, LegalHold, ListPage, ListRequest, Product, Receipt, StoreError,
-    StoreResult, StoredVolume, Tags, Tenant, Timestamp,
+    Held, Holding, Job, JobState, LegalHold, ListPage, ListRequest, Product, Receipt, ScanFields,
+    ScanIdentity, StoreError, StoreResult, StoredVolume, Tags, Tenant, Timestamp,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -89,10 +89,31 @@ pub(super) fn held<T>(
         tags: tags(&row)?,
         legal_hold,
         source_on_hold: row.try_get::<i64, _>("source_holds")? > 0,
+        scan: scan(&row)?,
     };
     Ok(Held {
         item: record(row)?,
         holding,
+    })
+}
+
+/// The columns that [`scan`] reads, of the table `scans` joined as `c`.
+pub(super) const SCAN_COLUMNS: &str =
+    "c.found AS scan_found, c.stated AS scan_stated, c.erased_at AS scan_erased_at";
+
+/// The identity in a row with [`SCAN_COLUMNS`].
+pub(super) fn scan(row: &SqliteRow) -> StoreResult<ScanIdentity> {
+    let fields = |column: &str| -> StoreResult<Option<ScanFields>> {
+        let text: Option<&str> = row.try_get(column)?;
+        match text {
+            Some(_) => Ok(Some(ScanFields(json(row, column)?))),
+            None => Ok(None),
+        }
+    };
+    Ok(ScanIdentity {
+        found: fields("scan_found")?,
+        stated: fields("scan_stated")?,
+        erased_at: row.try_get("scan_erased_at")?,
     })
 }
 

@@ -1,30 +1,59 @@
 //! The tables of volumes and products in SQLite, and the table of holdings that says which tenant
 //! has which of them.
 
-use super::rows::{self, to_json};
+use super::rows::{self, SCAN_COLUMNS, to_json};
 use super::sqlite::SqliteStore;
+use super::sqlite_scans::{note_upload, push_scan};
 use super::writer::Write;
 use crate::jobs::{
-    Catalogue, Erased, ErasureOrder, Expiry, Held, LegalHold, ListPage, ListRequest, Product,
-    Receipt, Resource, StoreResult, StoredVolume, TagFilter, Tags, Tenant, Timestamp,
+    Catalogue, Erased, ErasureOrder, Expiry, Held, ItemFilter, LegalHold, ListPage, ListRequest,
+    Product, Receipt, Resource, ScanFields, StoreResult, StoredVolume, TagFilter, Tags, Tenant,
+    Timestamp,
 };
 use async_trait::async_trait;
 use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
 
 /// A volume with the columns of its holding. `sequence` and `created_at` are the holding's.
-const HELD_VOLUME: &str = "SELECT h.*, v.bytes, v.files, v.facts, (SELECT count(*) FROM sources
-    JOIN holdings AS s ON s.tenant = sources.tenant AND s.id = sources.volume
-    WHERE sources.tenant = h.tenant AND sources.id = h.id AND s.held_at IS NOT NULL)
-        AS source_holds
-    FROM holdings AS h JOIN volumes AS v ON v.id = h.id";
+const HELD_VOLUME: Select = Select {
+    columns: "v.bytes, v.files, v.facts",
+    table: "volumes AS v ON v.id = h.id",
+    volume: "h.id",
+};
 
 /// A product with the columns of its holding, likewise.
-const HELD_PRODUCT: &str = "SELECT h.*, p.volume, p.parameters, p.summary, p.software, p.files,
-    (SELECT count(*) FROM sources
-    JOIN holdings AS s ON s.tenant = sources.tenant AND s.id = sources.volume
-    WHERE sources.tenant = h.tenant AND sources.id = h.id AND s.held_at IS NOT NULL)
-        AS source_holds
-    FROM holdings AS h JOIN products AS p ON p.id = h.id";
+const HELD_PRODUCT: Select = Select {
+    columns: "p.volume, p.parameters, p.summary, p.software, p.files",
+    table: "products AS p ON p.id = h.id",
+    volume: "p.volume",
+};
+
+/// What is read of an item that a tenant has.
+struct Select {
+    /// The columns of its content.
+    columns: &'static str,
+    /// The table of its content.
+    table: &'static str,
+    /// The column with the volume whose scan it is of.
+    volume: &'static str,
+}
+
+impl Select {
+    fn query(&self) -> QueryBuilder<Sqlite> {
+        let Self {
+            columns,
+            table,
+            volume,
+        } = self;
+        QueryBuilder::new(format!(
+            "SELECT h.*, {columns}, {SCAN_COLUMNS}, (SELECT count(*) FROM sources
+             JOIN holdings AS s ON s.tenant = sources.tenant AND s.id = sources.volume
+             WHERE sources.tenant = h.tenant AND sources.id = h.id AND s.held_at IS NOT NULL)
+                 AS source_holds
+             FROM holdings AS h JOIN {table}
+             LEFT JOIN scans AS c ON c.tenant = h.tenant AND c.volume = {volume}"
+        ))
+    }
+}
 
 #[async_trait]
 impl Catalogue for SqliteStore {
@@ -33,6 +62,7 @@ impl Catalogue for SqliteStore {
         volume: &StoredVolume,
         tenant: &Tenant,
         tags: &Tags,
+        scan: Option<&ScanFields>,
     ) -> StoreResult<bool> {
         let mut transaction = self.writer.begin().await?;
         sqlx::query(
@@ -48,6 +78,7 @@ impl Catalogue for SqliteStore {
         .await?;
         let now = volume.created_at;
         let new = hold(&mut transaction, tenant, &volume.id, tags, now).await?;
+        note_upload(&mut transaction, tenant, &volume.id, scan).await?;
         transaction.commit().await?;
         Ok(new)
     }
@@ -57,6 +88,7 @@ impl Catalogue for SqliteStore {
         tenant: &Tenant,
         id: &str,
         tags: &Tags,
+        scan: Option<&ScanFields>,
         now: Timestamp,
     ) -> StoreResult<Option<(Held<StoredVolume>, bool)>> {
         let mut transaction = self.writer.begin().await?;
@@ -66,13 +98,14 @@ impl Catalogue for SqliteStore {
             return Ok(None);
         }
         let new = hold(&mut transaction, tenant, id, tags, now).await?;
+        note_upload(&mut transaction, tenant, id, scan).await?;
         transaction.commit().await?;
         let held = self.volume(tenant, id).await?;
         Ok(held.map(|held| (held, new)))
     }
 
     async fn volume(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Held<StoredVolume>>> {
-        let row = one(HELD_VOLUME, tenant, id)
+        let row = one(&HELD_VOLUME, tenant, id)
             .build()
             .fetch_optional(&self.readers)
             .await?;
@@ -82,10 +115,10 @@ impl Catalogue for SqliteStore {
     async fn volumes(
         &self,
         tenant: &Tenant,
-        filter: &TagFilter,
+        filter: &ItemFilter,
         page: ListRequest,
     ) -> StoreResult<ListPage<Held<StoredVolume>>> {
-        let rows = listed(HELD_VOLUME, tenant, Resource::Volume, filter, page)
+        let rows = listed(&HELD_VOLUME, tenant, Resource::Volume, filter, page)
             .build()
             .fetch_all(&self.readers)
             .await?;
@@ -109,7 +142,7 @@ impl Catalogue for SqliteStore {
     }
 
     async fn product(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Held<Product>>> {
-        let row = one(HELD_PRODUCT, tenant, id)
+        let row = one(&HELD_PRODUCT, tenant, id)
             .build()
             .fetch_optional(&self.readers)
             .await?;
@@ -120,10 +153,10 @@ impl Catalogue for SqliteStore {
         &self,
         tenant: &Tenant,
         kind: Resource,
-        filter: &TagFilter,
+        filter: &ItemFilter,
         page: ListRequest,
     ) -> StoreResult<ListPage<Held<Product>>> {
-        let rows = listed(HELD_PRODUCT, tenant, kind, filter, page)
+        let rows = listed(&HELD_PRODUCT, tenant, kind, filter, page)
             .build()
             .fetch_all(&self.readers)
             .await?;
@@ -260,8 +293,8 @@ impl Catalogue for SqliteStore {
 }
 
 /// The row of one item that a tenant has.
-fn one(select: &str, tenant: &Tenant, id: &str) -> QueryBuilder<Sqlite> {
-    let mut query = QueryBuilder::new(select);
+fn one(select: &Select, tenant: &Tenant, id: &str) -> QueryBuilder<Sqlite> {
+    let mut query = select.query();
     query
         .push(" WHERE h.tenant = ")
         .push_bind(tenant.to_string());
@@ -271,18 +304,26 @@ fn one(select: &str, tenant: &Tenant, id: &str) -> QueryBuilder<Sqlite> {
 
 /// A page of the items of one kind that a tenant has.
 fn listed(
-    select: &str,
+    select: &Select,
     tenant: &Tenant,
     kind: Resource,
-    filter: &TagFilter,
+    filter: &ItemFilter,
     page: ListRequest,
 ) -> QueryBuilder<Sqlite> {
-    let mut query = QueryBuilder::new(select);
+    let mut query = select.query();
     query
         .push(" WHERE h.tenant = ")
         .push_bind(tenant.to_string());
     query.push(" AND h.kind = ").push_bind(kind.noun());
-    push_tags(&mut query, "h.", tenant, kind, filter);
+    push_tags(&mut query, "h.", tenant, kind, &filter.tags);
+    let of_scan = match kind {
+        Resource::Volume => "JOIN holdings AS x ON x.tenant = c.tenant AND x.id = c.volume",
+        _ => {
+            "JOIN sources AS s ON s.tenant = c.tenant AND s.volume = c.volume
+             JOIN holdings AS x ON x.tenant = s.tenant AND x.id = s.id"
+        }
+    };
+    push_scan(&mut query, ("h.", of_scan), tenant, &filter.scan);
     push_page(&mut query, "h.sequence", page);
     query
 }

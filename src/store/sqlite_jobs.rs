@@ -5,6 +5,7 @@ use super::erasure::record_deletion;
 use super::rows::{self, to_json};
 use super::sqlite::SqliteStore;
 use super::sqlite_catalogue::{insert_product, push_page, push_tags};
+use super::sqlite_scans::push_scan;
 use super::writer::Write;
 use crate::jobs::{
     Claimant, DeathLimit, Deleted, Filed, Interrupted, Job, JobFilter, JobOutcome, JobState,
@@ -130,6 +131,8 @@ impl JobStore for SqliteStore {
             query.push(" AND created_at > ").push_bind(moment);
         }
         push_tags(&mut query, "", &filter.tenant, Resource::Job, &filter.tags);
+        let of_scan = "JOIN jobs AS x ON x.tenant = c.tenant AND x.volume = c.volume";
+        push_scan(&mut query, ("", of_scan), &filter.tenant, &filter.scan);
         push_page(&mut query, "sequence", page);
         let rows = query.build().fetch_all(&self.readers).await?;
         rows::page(rows, page, rows::job, |job| job.sequence)

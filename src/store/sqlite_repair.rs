@@ -33,6 +33,7 @@ impl SqliteStore {
             "DELETE FROM volumes WHERE id = ?",
             "DELETE FROM products WHERE id = ?",
             "DELETE FROM sources WHERE id = ?",
+            "DELETE FROM scans WHERE volume = ?",
             "DELETE FROM holdings WHERE id = ?",
         ] {
             sqlx::query(statement)
@@ -118,12 +119,14 @@ impl SqliteStore {
             Err(error) => tracing::warn!(%error, "no row of the damaged database could be read"),
         }
         let _ = connection.close().await;
-        sqlx::query(
+        for orphans in [
             "DELETE FROM sources WHERE NOT EXISTS
-            (SELECT 1 FROM holdings h WHERE h.tenant = sources.tenant AND h.id = sources.id)",
-        )
-        .write(&self.writer)
-        .await?;
+             (SELECT 1 FROM holdings h WHERE h.tenant = sources.tenant AND h.id = sources.id)",
+            "DELETE FROM scans WHERE NOT EXISTS
+             (SELECT 1 FROM holdings h WHERE h.tenant = scans.tenant AND h.id = scans.volume)",
+        ] {
+            sqlx::query(orphans).write(&self.writer).await?;
+        }
         Ok(())
     }
 

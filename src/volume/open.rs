@@ -26,6 +26,15 @@ pub struct Reading {
     pub provenance: Option<Provenance>,
 }
 
+impl Reading {
+    /// The DICOM Frame of Reference UID of the volume; `None` unless its position there is known.
+    pub fn frame_of_reference(&self) -> Option<&str> {
+        let placed = self.facts.affine_source == AffineSource::ImagePosition;
+        let from = self.provenance.as_ref().filter(|_| placed)?;
+        from.frame_of_reference_uid.as_deref()
+    }
+}
+
 /// A file whose header has been read and checked.
 pub(super) trait OpenVolume {
     /// Everything the header says about the volumes.

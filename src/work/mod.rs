@@ -6,12 +6,14 @@
 //! | `segmentation` | jobs of kind `segmentation`: a stored model fitted to a volume |
 //! | `template` | a mesh to a template of the library |
 //! | `upload` | validating and previewing an uploaded volume |
+//! | [`dicom`] | DICOM objects of a stored result |
 //! | `page` | the HTML page of a stored model or segmentation |
 //! | `problems` | errors of the domain to failures with status class, code, field and advice |
 //!
 //! Everything here is synchronous and runs on the threads of a worker or of a blocking pool. It
 //! reads local files and returns bytes; it neither stores anything nor sees the queue.
 
+pub mod dicom;
 mod files;
 mod model;
 mod page;
@@ -39,6 +41,8 @@ pub struct Engine {
     pub reader: Arc<dyn UploadReader>,
     /// Computes jobs, by kind.
     pub works: Works,
+    /// Limits on the volumes that are read.
+    pub limits: ReadLimits,
 }
 
 impl Engine {
@@ -51,6 +55,7 @@ impl Engine {
         Self {
             reader: Arc::new(DomainReader { limits }),
             works: works.into_iter().collect(),
+            limits,
         }
     }
 

@@ -7,7 +7,7 @@
 
 use super::page::PageError;
 use crate::deform::DeformError;
-use crate::export::dicom::DicomError;
+use crate::export::dicom::{DicomError, StatedIdentity};
 use crate::export::read_json::ReadMeshError;
 use crate::jobs::{Failure, Fault, WorkError};
 use crate::locate::LocateError;
@@ -19,6 +19,7 @@ use crate::segmentation::{ExpertMaskError, SegmentationError};
 use crate::surface::SurfaceError;
 use crate::volume::VolumeError;
 use std::error::Error;
+use std::fmt::Display;
 
 /// Advice for work that was cancelled.
 const START_AGAIN: &str = "Start again if the result is still needed.";
@@ -332,6 +333,46 @@ const GIVE_MESH_JSON: &str = "Give a JSON mesh as `generate` writes it (mesh.jso
 /// A mesh that no file format can represent, or not one of them.
 pub(super) fn not_exportable(error: &dyn Error) -> Failure {
     Failure::new(Fault::Content, "not-exportable", sentence(error))
+}
+
+/// A stored result whose files do not fit together, or cannot be read.
+pub(super) fn broken_result(error: &dyn Display) -> Failure {
+    Failure::new(
+        Fault::Service,
+        "unreadable",
+        format!("The stored result cannot be used: {error}."),
+    )
+    .fix("Start the same job again, which stores the result anew.")
+}
+
+/// Nobody knows of which patient and study the volume with that id is.
+pub(super) fn identity_needed(error: &DicomError, volume: &str) -> Failure {
+    let path = format!("/v1/volumes/{volume}/identity");
+    error.explain().fix(format!(
+        "DICOM objects belong to a patient and a study: state both by PUT {path} with \
+         `patient_id` and `study_uid`, or upload the scan as the DICOM file that it came from."
+    ))
+}
+
+/// A statement about a scan has a field that is not known.
+pub(super) fn unknown_identity(name: &str) -> Failure {
+    let name: String = name.chars().take(80).collect();
+    let known = StatedIdentity::FIELDS.join(", ");
+    Failure::new(
+        Fault::Request,
+        "invalid-field",
+        format!("There is no field `{name}`."),
+    )
+    .at(&name)
+    .fix(format!("Give one of {known}."))
+}
+
+/// A statement about a scan has a field that is no text.
+pub(super) fn malformed_identity(name: &str) -> Failure {
+    let detail = format!("`{name}` must be a string.");
+    Failure::new(Fault::Request, "invalid-field", detail)
+        .at(name)
+        .fix("Give a JSON string.")
 }
 
 /// A template that cannot be written in every format.

@@ -3,9 +3,9 @@
 use super::files::volume_files;
 use super::problems::Explain;
 use super::template;
-use crate::jobs::{Failure, LocalFile, StoreError, StoredVolume, WorkOutput};
+use crate::jobs::{Failure, LocalFile, ScanFields, StoreError, StoredVolume, WorkOutput};
 use crate::progress::Monitor;
-use crate::volume::{self, ReadLimits};
+use crate::volume::{self, ReadLimits, ReadOptions};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -29,6 +29,18 @@ pub trait UploadReader: Send + Sync + 'static {
     /// # Errors
     /// Why the files do not make up a usable volume.
     fn inspect(&self, files: &[LocalFile], monitor: &Monitor<'_>) -> Result<UploadFacts, Failure>;
+
+    /// What the files of one volume say about patient, study and acquisition: the fields of
+    /// [`Provenance`](crate::volume::dicom::Provenance), without the frames of slices, which differ
+    /// between gates. `None` unless they are DICOM.
+    ///
+    /// # Errors
+    /// As [`UploadReader::inspect`].
+    fn scan(
+        &self,
+        files: &[LocalFile],
+        monitor: &Monitor<'_>,
+    ) -> Result<Option<ScanFields>, Failure>;
 
     /// The three orthogonal middle slices as a PNG.
     ///
@@ -134,6 +146,23 @@ impl UploadReader for DomainReader {
                 .map(|labels| labels.iter().map(|l| l.label).collect()),
             warnings: facts.warnings,
         })
+    }
+
+    fn scan(
+        &self,
+        files: &[LocalFile],
+        monitor: &Monitor<'_>,
+    ) -> Result<Option<ScanFields>, Failure> {
+        let options = ReadOptions { frame: Some(0) };
+        let found = volume::provenance(&volume_files(files), &options, &self.limits, monitor);
+        let Some(mut found) = found.map_err(|error| error.explain())? else {
+            return Ok(None);
+        };
+        found.slice_frames.clear();
+        match serde_json::to_value(found) {
+            Ok(Value::Object(fields)) => Ok(Some(ScanFields(fields))),
+            _ => Ok(None),
+        }
     }
 
     fn preview(&self, files: &[LocalFile], monitor: &Monitor<'_>) -> Result<Vec<u8>, Failure> {

@@ -145,7 +145,7 @@ async fn what_a_job_says_of_archives_is_checked() {
         (json!({"volume": volume, "send": ["mesh.dcm"]}), "to"),
         (json!({"volume": volume, "to": "pacs"}), "send"),
         (
-            json!({"volume": volume, "send": ["mask.dcm"], "to": "pacs"}),
+            json!({"volume": volume, "send": ["polar.dcm"], "to": "pacs"}),
             "send",
         ),
     ] {

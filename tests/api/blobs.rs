@@ -200,7 +200,7 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
         facts: json!({}),
     };
     let (tenant, tags) = (Tenant::default(), Tags::default());
-    let added = queue.add_volume(record, staged, &tenant, &tags).await;
+    let added = queue.add_volume(record, staged, &tenant, &tags, None).await;
     let (_, new) = added.unwrap();
     assert!(new);
 

@@ -1,6 +1,7 @@
 //! Nothing that a file or a client says about a patient leaves the service by its log, metrics,
 //! traces, webhooks or headers.
 
+use crate::dicom::{Patient, contains, element, file, nm};
 use crate::receiver::Receiver;
 use axum::http::StatusCode;
 use axum::response::IntoResponse;
@@ -26,41 +27,26 @@ impl Drop for Killed {
     }
 }
 
-/// A small DICOM file (explicit VR, little endian) that names the patient and has no picture.
-fn dicom() -> Vec<u8> {
-    fn element(group: u16, number: u16, vr: &str, value: &str) -> Vec<u8> {
-        let mut value = value.as_bytes().to_vec();
-        if value.len() % 2 == 1 {
-            value.push(if vr == "UI" { 0 } else { b' ' });
-        }
-        let length = u16::try_from(value.len()).unwrap();
-        let tag = [group.to_le_bytes(), number.to_le_bytes()].concat();
-        [
-            tag,
-            vr.as_bytes().to_vec(),
-            length.to_le_bytes().to_vec(),
-            value,
-        ]
-        .concat()
-    }
-    let syntax = element(2, 0x10, "UI", "1.2.840.10008.1.2.1");
-    let length = u32::try_from(syntax.len()).unwrap().to_le_bytes();
-    let group_length = [&[2, 0, 0, 0][..], b"UL", &[4, 0], &length].concat();
-    let set = [
-        element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.20"),
-        element(8, 0x60, "CS", "NM"),
-        element(0x10, 0x10, "PN", CANARY),
-        element(0x10, 0x20, "LO", CANARY),
-        element(0x10, 0x4000, "LT", CANARY),
-    ];
-    [
-        vec![0; 128],
-        b"DICM".to_vec(),
-        group_length,
-        syntax,
-        set.concat(),
-    ]
-    .concat()
+/// A DICOM file that names the patient and has no picture.
+fn unusable() -> Vec<u8> {
+    file(&[
+        element(8, 0x16, "UI", b"1.2.840.10008.5.1.4.1.1.20"),
+        element(8, 0x60, "CS", b"NM"),
+        element(0x10, 0x10, "PN", CANARY.as_bytes()),
+        element(0x10, 0x20, "LO", CANARY.as_bytes()),
+        element(0x10, 0x4000, "LT", CANARY.as_bytes()),
+    ])
+}
+
+/// A DICOM scan of the patient.
+fn scan() -> Vec<u8> {
+    let patient = Patient {
+        name: CANARY,
+        id: CANARY,
+        study: "1.2.840.99999.5",
+        accession: "Kanarienvogel",
+    };
+    nm(&patient, 1)
 }
 
 /// A scan whose header's description names the patient.
@@ -139,7 +125,8 @@ async fn no_patient_is_named_in_logs_metrics_traces_or_webhooks() {
     let mut volumes = Vec::new();
     for (bytes, status) in [
         (nifti(), 201),
-        (dicom(), 422),
+        (scan(), 201),
+        (unusable(), 422),
         (CANARY.as_bytes().to_vec(), 422),
     ] {
         let answer = client
@@ -167,6 +154,40 @@ async fn no_patient_is_named_in_logs_metrics_traces_or_webhooks() {
             ended(&client, url, &job).await;
         }
     }
+    // Whose scan it is: shown, stated, searched, written into DICOM objects, erased.
+    let of_nifti = format!("{url}/v1/volumes/{}/identity", volumes[0].as_str().unwrap());
+    let stated = json!({"patient_id": CANARY, "patient_name": CANARY, "study_uid": "1.2.3"});
+    for body in [
+        stated,
+        json!({"patient_id": CANARY, "study_uid": CANARY}),
+        json!({CANARY: 1}),
+    ] {
+        let answer = client.put(&of_nifti).json(&body).send().await.unwrap();
+        heads += &format!("{:?}", answer.headers());
+    }
+    let models = client.get(format!("{url}/v1/models?accession={CANARY}"));
+    assert_eq!(models.send().await.unwrap().status(), 200);
+    let models = client
+        .get(format!("{url}/v1/models?study=1.2.3"))
+        .send()
+        .await
+        .unwrap();
+    let models: Value = models.json().await.unwrap();
+    let model = models["models"][0]["id"].as_str().unwrap();
+    let object = client.get(format!("{url}/v1/models/{model}/mesh.dcm"));
+    let object = object.send().await.unwrap();
+    heads += &format!("{:?}", object.headers());
+    assert!(contains(&object.bytes().await.unwrap(), CANARY));
+    let of_dicom = format!("{url}/v1/volumes/{}", volumes[1].as_str().unwrap());
+    let shown = client.get(&of_dicom).send().await.unwrap();
+    heads += &format!("{:?}", shown.headers());
+    assert!(shown.text().await.unwrap().contains(CANARY));
+    let erased = client
+        .delete(format!("{of_dicom}/identity"))
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(erased.status(), 204);
     for path in [
         format!("/v1/volumes/{CANARY}"),
         format!("/v1/jobs?state={CANARY}"),

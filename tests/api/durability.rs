@@ -4,8 +4,8 @@ use crate::helpers::{Service, fake_engine, heart, scan, text};
 use serde_json::{Value, json};
 use std::time::Duration;
 use ventriform::jobs::{
-    Catalogue, Claimant, DeathLimit, Failure, Fault, FileRecord, Filed, JobOutcome, JobState,
-    JobStore, Lease, ListRequest, NewJob, Resource, StoredVolume, TagFilter, Tags, Tenant,
+    Catalogue, Claimant, DeathLimit, Failure, Fault, FileRecord, Filed, ItemFilter, JobOutcome,
+    JobState, JobStore, Lease, ListRequest, NewJob, Resource, StoredVolume, Tags, Tenant,
     random_id,
 };
 use ventriform::store::Store;
@@ -179,7 +179,7 @@ async fn filed(store: &Store) -> String {
         facts: json!({}),
     };
     let (tenant, tags) = (Tenant::default(), Tags::default());
-    let added = store.rows.add_volume(&volume, &tenant, &tags).await;
+    let added = store.rows.add_volume(&volume, &tenant, &tags, None).await;
     assert!(added.unwrap());
     let parameters = fake_engine()
         .work("model")
@@ -235,7 +235,7 @@ async fn models_of_an_older_database_are_migrated() {
         limit: 9,
     };
     for (kind, count) in [(Resource::Model, 1), (Resource::Segmentation, 0)] {
-        let filter = TagFilter::default();
+        let filter = ItemFilter::default();
         let listed = store.rows.products(&tenant, kind, &filter, page).await;
         let listed = listed.unwrap();
         assert_eq!(listed.items.len(), count);

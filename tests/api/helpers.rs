@@ -15,8 +15,8 @@ use ventriform::config::Settings;
 use ventriform::export::{self, Format, Metadata};
 use ventriform::http::{Running, install_cryptography, start};
 use ventriform::jobs::{
-    Clock, Failure, Fault, GivenParameters, LocalFile, Needs, OutputFile, Resource, StoredItem,
-    SystemClock, Work, WorkError, WorkInput, WorkOutput,
+    Clock, Failure, Fault, GivenParameters, LocalFile, Needs, OutputFile, Resource, ScanFields,
+    StoredItem, SystemClock, Work, WorkError, WorkInput, WorkOutput,
 };
 use ventriform::mesh::TriMesh;
 use ventriform::mesh::shapes::icosphere;
@@ -273,6 +273,7 @@ pub fn fake_engine() -> Engine {
     let stand_in = |work: &Arc<dyn Work>| -> Arc<dyn Work> { Arc::new(FakeWork(work.clone())) };
     Engine {
         works: real.works.iter().map(stand_in).collect(),
+        limits: real.limits,
         reader: Arc::new(FakeReader(real.reader)),
     }
 }
@@ -316,6 +317,11 @@ impl UploadReader for FakeReader {
             labels: None,
             warnings: files.iter().map(|path| name(path)).collect(),
         })
+    }
+
+    fn scan(&self, files: &[LocalFile], _: &Monitor<'_>) -> Result<Option<ScanFields>, Failure> {
+        words(files)?;
+        Ok(None)
     }
 
     fn preview(&self, files: &[LocalFile], _: &Monitor<'_>) -> Result<Vec<u8>, Failure> {

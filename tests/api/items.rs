@@ -91,7 +91,10 @@ impl Bench {
         let files = self.staged().await;
         let (tenant, tags) = (Tenant::default(), Tags::default());
         let volume = self.volume(id);
-        let added = self.queue.add_volume(volume, files, &tenant, &tags).await;
+        let added = self
+            .queue
+            .add_volume(volume, files, &tenant, &tags, None)
+            .await;
         added.unwrap();
     }
 
@@ -160,7 +163,10 @@ async fn files_whose_record_could_not_be_written_are_deleted_by_the_upkeep() {
     let files = bench.staged().await;
     let (tenant, tags) = (Tenant::default(), Tags::default());
     let volume = bench.volume("vol_1");
-    let added = bench.queue.add_volume(volume, files, &tenant, &tags).await;
+    let added = bench
+        .queue
+        .add_volume(volume, files, &tenant, &tags, None)
+        .await;
     let error = added.err().unwrap();
     assert!(error.to_string().contains("full"), "{error}");
     assert!(bench.has_files("vol_1"));
@@ -213,7 +219,10 @@ async fn the_age_of_a_volume_counts_from_its_last_upload() {
         assert_eq!(found, kept, "at {now}");
         if now == 4_000 {
             let tags = Tags::default();
-            let renewed = bench.queue.renew_volume(&tenant, "vol_1", &tags).await;
+            let renewed = bench
+                .queue
+                .renew_volume(&tenant, "vol_1", &tags, None)
+                .await;
             assert!(renewed.unwrap().is_some());
         }
     }
@@ -244,7 +253,7 @@ async fn the_age_of_a_volume_counts_from_the_last_use_by_its_tenant() {
     let (mine, other) = (Tenant::default(), "other".parse::<Tenant>().unwrap());
     bench.add("vol_1").await;
     let tags = Tags::default();
-    let held = bench.queue.renew_volume(&other, "vol_1", &tags).await;
+    let held = bench.queue.renew_volume(&other, "vol_1", &tags, None).await;
     assert!(held.unwrap().is_some_and(|(_, new)| new));
     bench.clock.set(4_000);
     let job = use_volume(&bench, &mine).await;

@@ -43,7 +43,13 @@ async fn an_idempotency_key_is_its_tenants_own() {
     let a: Tenant = "a".parse().unwrap();
     let b: Tenant = "b".parse().unwrap();
     let tags = Tags::default();
-    assert!(store.rows.add_volume(&volume, &a, &tags).await.unwrap());
+    assert!(
+        store
+            .rows
+            .add_volume(&volume, &a, &tags, None)
+            .await
+            .unwrap()
+    );
     let Filed::New(first) = file("a").await else {
         panic!("not filed");
     };
@@ -55,7 +61,13 @@ async fn an_idempotency_key_is_its_tenants_own() {
         matches!(file("b").await, Filed::Missing { .. }),
         "b does not have the volume"
     );
-    assert!(store.rows.add_volume(&volume, &b, &tags).await.unwrap());
+    assert!(
+        store
+            .rows
+            .add_volume(&volume, &b, &tags, None)
+            .await
+            .unwrap()
+    );
     let Filed::New(other) = file("b").await else {
         panic!("another tenant's key was met");
     };

@@ -119,8 +119,10 @@ const USES: &[(&str, &[&str])] = &[
     (
         "work",
         &[
+            "geometry",
             "mesh",
             "progress",
+            "grid",
             "volume",
             "locate",
             "surface",

@@ -7,6 +7,7 @@ use super::uid::{derived, is_uid};
 use crate::geometry::frame::VoxelToPatient;
 use crate::volume::dicom::Provenance;
 use dicom_dictionary_std::tags;
+use serde::{Deserialize, Serialize};
 
 /// A date and a time as DICOM writes them.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,25 +19,35 @@ pub struct Moment {
 }
 
 /// Identity that a person gives for a scan whose file has none, or in place of one.
-#[derive(Clone, Default, PartialEq, Eq)]
+#[derive(Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct StatedIdentity {
     /// Patient ID.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub patient_id: Option<String>,
     /// Patient's Name, components separated by `^`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub patient_name: Option<String>,
     /// Patient's Birth Date, `YYYYMMDD`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub patient_birth_date: Option<String>,
     /// Patient's Sex: `M`, `F` or `O`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub patient_sex: Option<String>,
     /// Study Instance UID.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub study_uid: Option<String>,
     /// Study Date, `YYYYMMDD`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub study_date: Option<String>,
     /// Study ID.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub study_id: Option<String>,
     /// Accession Number.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub accession_number: Option<String>,
     /// Frame of Reference UID.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub frame_of_reference_uid: Option<String>,
 }
 
@@ -95,6 +106,19 @@ pub(super) fn for_processing(mut reference: DataSet) -> DataSet {
 }
 
 impl StatedIdentity {
+    /// The names of all fields.
+    pub const FIELDS: [&str; 9] = [
+        "patient_id",
+        "patient_name",
+        "patient_birth_date",
+        "patient_sex",
+        "study_uid",
+        "study_date",
+        "study_id",
+        "accession_number",
+        "frame_of_reference_uid",
+    ];
+
     /// Checks every value that is given.
     ///
     /// # Errors

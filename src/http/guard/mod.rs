@@ -49,6 +49,10 @@ const ADMIN_PATHS: [&str; 4] = [
     "/v1/volumes/{id}/hold",
 ];
 
+/// The paths under which everything needs at least the scope `submit`: they tell whose scans are
+/// stored.
+const PATIENT_PATHS: [&str; 1] = ["/v1/volumes/{id}/identity"];
+
 /// Whether everybody may read this path: health, the page for people and the documentation. They
 /// show nothing that is stored.
 fn is_open_path(path: &str, settings: &Settings) -> bool {
@@ -68,7 +72,7 @@ fn needed(method: &Method, route: Option<&str>) -> Scope {
     if ADMIN_PATHS.iter().any(below) {
         return Scope::Admin;
     }
-    match method.is_safe() {
+    match method.is_safe() && !PATIENT_PATHS.iter().any(below) {
         true => Scope::Read,
         false => Scope::Submit,
     }
@@ -283,6 +287,8 @@ mod tests {
         assert_eq!(needs(Method::POST, again), Scope::Submit);
         assert_eq!(needs(Method::PUT, "/v1/volumes/{id}/hold"), Scope::Admin);
         assert_eq!(needs(Method::DELETE, "/v1/volumes/{id}"), Scope::Submit);
+        let identity = "/v1/volumes/{id}/identity";
+        assert_eq!(needs(Method::GET, identity), Scope::Submit);
         assert_eq!(needs(Method::GET, "/v1/auditors"), Scope::Read);
         assert_eq!(
             needed(&Method::from_bytes(b"PURGE").unwrap(), None),

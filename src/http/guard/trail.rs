@@ -78,6 +78,13 @@ impl Act {
     /// something could not be recorded.
     pub async fn record(mut self, app: &App, response: Response) -> Response {
         let status = response.status();
+        if status == StatusCode::FORBIDDEN {
+            // A handler found that the caller's scope does not suffice.
+            self.event.activity = Activity::AccessRefused;
+            self.event.object = self.object;
+            note_refusal(app, self.event).await;
+            return response;
+        }
         let done = status.is_success() || status == StatusCode::NOT_MODIFIED;
         if !done || response.extensions().get::<AlreadyRecorded>().is_some() {
             return response;

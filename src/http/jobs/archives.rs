@@ -1,11 +1,12 @@
 //! What a job says of archives: the series that its volume comes from, and what of its result is
 //! sent where.
 
-use crate::export::dicom::{DicomObject, is_uid};
+use crate::export::dicom::is_uid;
 use crate::http::app::App;
 use crate::http::problem::{Answer, Problem, shorten};
 use crate::http::request::{text, unknown};
 use crate::jobs::{Resource, SendOrder, SeriesSource, Tenant};
+use crate::work::dicom;
 use serde_json::{Map, Value};
 
 /// The fields of `source`.
@@ -160,10 +161,8 @@ pub fn send_of(
 
 /// The names of the DICOM objects that a result of that kind has.
 fn sendable(kind: &str) -> Vec<&'static str> {
-    let all = match kind == Resource::Segmentation.noun() {
-        true => &DicomObject::ALL[..],
-        false => &[DicomObject::Mesh, DicomObject::Surface],
-    };
+    let kind = Resource::ALL.into_iter().find(|known| known.noun() == kind);
+    let all = kind.map(dicom::objects).unwrap_or_default();
     all.iter().map(|object| object.file_name()).collect()
 }
 

@@ -18,9 +18,9 @@ use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
 use super::pagination::{next_cursor, page_of};
 use super::problem::not_found::missing;
 use super::problem::{Answer, Problem, ProblemBody, shorten};
-use super::request::{PathSegments, json_object, query_pairs, refuse_unknown, text, unknown};
-use super::tags;
+use super::request::{PathSegments, flag, json_object, query_pairs, refuse_unknown, text, unknown};
 use super::validators::ValidatedJson;
+use super::{scans, tags};
 use crate::jobs::{
     Deleted, Interrupted, Job, JobFilter, JobState, NewJob, Resource, Tenant, Timestamp,
     parse_rfc3339,
@@ -138,7 +138,7 @@ async fn read_job(app: &App, object: &Map<String, Value>, mut filing: Filing) ->
 
 /// List jobs
 #[utoipa::path(get, path = "/v1/jobs", tag = "jobs",
-    params(openapi::PageParameters, openapi::TagParameters,
+    params(openapi::PageParameters, openapi::TagParameters, openapi::ScanParameters,
         ("state" = Option<JobStateName>, Query, description = "Only jobs in this state"),
         ("kind" = Option<String>, Query, description = "Only jobs of this kind: model, segmentation"),
         ("volume" = Option<String>, Query, description = "Only jobs on this volume"),
@@ -151,6 +151,7 @@ pub async fn list_jobs(
     RawQuery(query): RawQuery,
 ) -> Answer<Json<JobList>> {
     let (tags, pairs) = tags::take_filter(&app, query_pairs(query.as_deref()))?;
+    let (scan, pairs) = scans::take_filter(pairs)?;
     let own = ["state", "kind", "volume", "created_after"];
     let (page, [state, kind, volume, created_after]) = page_of(pairs, own)?;
     let filter = JobFilter {
@@ -159,6 +160,7 @@ pub async fn list_jobs(
         kind,
         volume,
         tags,
+        scan,
         created_after: created_after.map(|text| parse_moment(&text)).transpose()?,
     };
     let page = app.queue.jobs.jobs(&filter, page).await?;
@@ -189,17 +191,6 @@ fn parse_state(name: &str) -> Answer<JobState> {
             "Give one of {}.",
             JobState::ALL.map(JobState::as_str).join(", ")
         ))
-    })
-}
-
-fn parse_flag(name: &'static str, text: &str) -> Answer<bool> {
-    text.parse().map_err(|_| {
-        Problem::bad_request(
-            "invalid-parameter",
-            format!("`{name}` must be `true` or `false`."),
-        )
-        .at(name)
-        .fix("Give `true` or `false`, or leave it out for `false`.")
     })
 }
 
@@ -238,7 +229,8 @@ pub async fn get_job(
     app.answers
         .answer(
             catalogue,
-            &caller.tenant,
+            // A job says the same to all callers of its tenant.
+            (&caller.tenant, false),
             Resource::Job,
             &id,
             &headers,
@@ -298,7 +290,7 @@ pub async fn delete_job(
     let pairs = query_pairs(query.as_deref());
     refuse_unknown(&pairs, &["erase"])?;
     let erase = match pairs.first() {
-        Some((_, value)) => parse_flag("erase", value)?,
+        Some((_, value)) => flag("erase", value)?,
         None => false,
     };
     let tenant = &caller.tenant;

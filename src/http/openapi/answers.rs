@@ -2,6 +2,7 @@
 
 use super::bodies::MeshDocument;
 use crate::export::Format;
+use crate::export::dicom::DicomObject;
 use crate::http::problem::{MEDIA_TYPE, ProblemBody};
 use std::collections::BTreeMap;
 use utoipa::openapi::header::HeaderBuilder;
@@ -75,6 +76,21 @@ problems! {
         413: "The body is larger than the operator allows",
         415: "The body has a type or encoding that this path does not read",
         422: "The reason cannot be used",
+    }
+    /// Problems of stating whose scan a volume is.
+    IdentityProblems {
+        403: "The caller's scope does not allow it",
+        408: "The body did not arrive in time",
+        409: "The volume's file says something else",
+        413: "The body is larger than the operator allows",
+        415: "The body has a type or encoding that this path does not read",
+        422: "A field is unknown, or its value is not valid DICOM",
+    }
+    /// Problems of making a DICOM object of a result.
+    DicomProblems {
+        403: "Whose scan it is needs the scope `submit`",
+        409: "Nobody said whose scan the volume is, or the volume was erased",
+        422: "DICOM cannot express the result",
     }
     /// Problems of uploads.
     UploadProblems {
@@ -183,9 +199,9 @@ files! {
     /// 200 with the mask, mesh or report of a segmentation.
     SegmentationAnswer: "The mask, the mesh or the report", [meshes(), masks(), report_alone()];
     /// 200 with any of a segmentation's files.
-    SegmentationFileAnswer: "The file", [meshes(), masks(), pictures(), reports()];
+    SegmentationFileAnswer: "The file", [meshes(), masks(), pictures(), reports(), objects()];
     /// 200 with any of a model's files.
-    ModelFileAnswer: "The file", [meshes(), reports()];
+    ModelFileAnswer: "The file", [meshes(), reports(), objects()];
 }
 
 /// 200 with a job's changes; the schema is that of one event.
@@ -263,6 +279,10 @@ fn pictures() -> Contents {
     files_of(["image/svg+xml", "image/png"])
 }
 
+fn objects() -> Contents {
+    files_of([DicomObject::MEDIA_TYPE])
+}
+
 fn files_of<const N: usize>(media_types: [&'static str; N]) -> Contents {
     media_types
         .map(|media_type| (media_type, Content::new(Some(binary()))))
@@ -286,6 +306,7 @@ fn report_alone() -> Contents {
 pub fn media_type_of(name: &str) -> &'static str {
     let extension = name.rsplit('.').next().unwrap_or_default();
     match extension {
+        "dcm" => DicomObject::MEDIA_TYPE,
         "gz" => "application/gzip",
         "html" => "text/html",
         "png" => "image/png",

@@ -203,6 +203,40 @@ impl PartialSchema for WebhookRequest {
     }
 }
 
+/// Whose scan a volume is, as a caller states it.
+#[derive(ToSchema)]
+#[schema(as = StatedScan)]
+#[expect(dead_code, reason = "it describes a body that is read field by field")]
+pub struct StatedScanSchema {
+    /// Patient ID; needed for a file that is not DICOM.
+    #[schema(max_length = 64, example = "4711")]
+    patient_id: Option<String>,
+    /// Patient's Name, components separated by `^`.
+    #[schema(max_length = 64, example = "Doe^Jane")]
+    patient_name: Option<String>,
+    /// Patient's Birth Date, `YYYYMMDD`.
+    #[schema(pattern = "^[0-9]{8}$")]
+    patient_birth_date: Option<String>,
+    /// Patient's Sex: M, F or O.
+    #[schema(pattern = "^[MFO]$")]
+    patient_sex: Option<String>,
+    /// Study Instance UID; needed for a file that is not DICOM.
+    #[schema(max_length = 64, pattern = "^[0-9.]+$", example = "1.2.840.99999.1.1")]
+    study_uid: Option<String>,
+    /// Study Date, `YYYYMMDD`.
+    #[schema(pattern = "^[0-9]{8}$")]
+    study_date: Option<String>,
+    /// Study ID.
+    #[schema(max_length = 16)]
+    study_id: Option<String>,
+    /// Accession Number.
+    #[schema(max_length = 16)]
+    accession_number: Option<String>,
+    /// Frame of Reference UID.
+    #[schema(max_length = 64, pattern = "^[0-9.]+$")]
+    frame_of_reference_uid: Option<String>,
+}
+
 /// The parameters of a job of any kind.
 pub struct JobParameters;
 

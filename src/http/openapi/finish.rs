@@ -10,6 +10,7 @@
 //! 4. Every operation takes `X-Request-Id`.
 
 use super::answers::media_type_of;
+use crate::export::dicom::DicomObject;
 use crate::http::problem::MEDIA_TYPE;
 use serde_json::{Map, Value, json};
 
@@ -119,11 +120,20 @@ fn of_one_file(folder: &str, name: &str, any: &Value) -> Value {
     if let Some(parameters) = one["parameters"].as_array_mut() {
         parameters.retain(|parameter| parameter["name"] != "file");
     }
+    let media_type = media_type_of(name);
+    let is_object = media_type == DicomObject::MEDIA_TYPE;
     if let Some(answers) = one["responses"].as_object_mut() {
         // The name says the format; `Accept` is not looked at.
         answers.shift_remove("406");
+        if !is_object {
+            for status in ["403", "409", "422"] {
+                answers.shift_remove(status);
+            }
+        }
     }
-    let media_type = media_type_of(name);
+    if !is_object && let Some(parameters) = one["parameters"].as_array_mut() {
+        parameters.retain(|parameter| parameter["name"] != "deidentify");
+    }
     let schema = match (name, media_type) {
         ("mesh.json" | "mesh_apparent.json" | "mesh_anatomical.json", _) => {
             reference("MeshDocument")

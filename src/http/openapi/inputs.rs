@@ -216,6 +216,40 @@ impl IntoParams for TagParameters {
     }
 }
 
+/// `study`, `series` and `accession`.
+pub struct ScanParameters;
+
+impl IntoParams for ScanParameters {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        [
+            ("study", "Only of the study with this Study Instance UID"),
+            ("series", "Only of the series with this Series Instance UID"),
+            ("accession", "Only of scans with this Accession Number"),
+        ]
+        .map(|(name, help)| {
+            let text = ObjectBuilder::new()
+                .schema_type(Type::String)
+                .pattern(Some("^.{1,64}$"));
+            query(name, help).schema(Some(Schema::from(text))).build()
+        })
+        .into()
+    }
+}
+
+/// `deidentify`.
+pub struct DeidentifyParameter;
+
+impl IntoParams for DeidentifyParameter {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let flag = ObjectBuilder::new()
+            .schema_type(Type::Boolean)
+            .default(Some(json!(false)));
+        let help = "Of DICOM objects: whether to remove the patient's identity (PS3.15, basic \
+                    profile)";
+        vec![query("deidentify", help).schema(Some(flag)).build()]
+    }
+}
+
 /// `cascade`.
 pub struct CascadeParameter;
 

@@ -23,22 +23,25 @@ mod operation;
 mod reports;
 
 pub use answers::{
-    DownloadAnswers, EraseProblems, EventsAnswer, FileProblems, HoldProblems, ListProblems,
-    LookupProblems, MeshAnswer, ModelFileAnswer, OriginalAnswer, PatchProblems, ReportAnswer,
-    ScopeProblems, SegmentationAnswer, SegmentationFileAnswer, UnchangedAnswer, UploadProblems,
-    WaitAnswers,
+    DicomProblems, DownloadAnswers, EraseProblems, EventsAnswer, FileProblems, HoldProblems,
+    IdentityProblems, ListProblems, LookupProblems, MeshAnswer, ModelFileAnswer, OriginalAnswer,
+    PatchProblems, ReportAnswer, ScopeProblems, SegmentationAnswer, SegmentationFileAnswer,
+    UnchangedAnswer, UploadProblems, WaitAnswers,
 };
 pub use bodies::{
-    HoldRequest, JobParameters, JobRequest, MeshDocument, SegmentationForm, TagsPatch, UploadForm,
-    WebhookRequest,
+    HoldRequest, JobParameters, JobRequest, MeshDocument, SegmentationForm, StatedScanSchema,
+    TagsPatch, UploadForm, WebhookRequest,
 };
 pub use inputs::{
-    CachedHeaders, CascadeParameter, ConditionalHeaders, ErasureParameters, EventHeader,
-    IdempotencyHeader, ModelParametersObject, ModelQuery, PageParameters, PreferHeader,
-    SegmentationParametersObject, SegmentationQuery, TagParameters, TemplateQuery, WebhookInputs,
+    CachedHeaders, CascadeParameter, ConditionalHeaders, DeidentifyParameter, ErasureParameters,
+    EventHeader, IdempotencyHeader, ModelParametersObject, ModelQuery, PageParameters,
+    PreferHeader, ScanParameters, SegmentationParametersObject, SegmentationQuery, TagParameters,
+    TemplateQuery, WebhookInputs,
 };
 pub use operation::Documented;
-pub use reports::{ModelSummarySchema, SegmentationSummarySchema, TemplateSummarySchema};
+pub use reports::{
+    ModelSummarySchema, ScanSchema, SegmentationSummarySchema, TemplateSummarySchema,
+};
 
 use utoipa::OpenApi;
 use utoipa::openapi::{RefOr, Required};

@@ -28,6 +28,79 @@ macro_rules! schemas {
 }
 
 schemas! {
+    /// Whose scan a volume is: what its DICOM header says, or was stated.
+    ScanSchema as Scan {
+        /// Patient's Name (0010,0010), components separated by `^`.
+        patient_name: Option<String>,
+        /// Patient ID (0010,0020).
+        patient_id: Option<String>,
+        /// Patient's Birth Date (0010,0030), `YYYYMMDD`.
+        patient_birth_date: Option<String>,
+        /// Patient's Sex (0010,0040): `M`, `F` or `O`.
+        patient_sex: Option<String>,
+        /// Study Instance UID (0020,000D).
+        study_uid: Option<String>,
+        /// Study Date (0008,0020), `YYYYMMDD`.
+        study_date: Option<String>,
+        /// Study Time (0008,0030), `HHMMSS.FFFFFF`.
+        study_time: Option<String>,
+        /// Study ID (0020,0010).
+        study_id: Option<String>,
+        /// Study Description (0008,1030).
+        study_description: Option<String>,
+        /// Accession Number (0008,0050).
+        accession_number: Option<String>,
+        /// Referring Physician's Name (0008,0090).
+        referring_physician: Option<String>,
+        /// Series Instance UID (0020,000E).
+        series_uid: Option<String>,
+        /// Series Number (0020,0011).
+        series_number: Option<String>,
+        /// Series Description (0008,103E).
+        series_description: Option<String>,
+        /// Modality (0008,0060).
+        modality: Option<String>,
+        /// Image Type (0008,0008), values separated by backslashes.
+        image_type: Option<String>,
+        /// Frame of Reference UID (0020,0052).
+        frame_of_reference_uid: Option<String>,
+        /// Position Reference Indicator (0020,1040).
+        position_reference_indicator: Option<String>,
+        /// SOP Class UID (0008,0016) of the instances.
+        sop_class_uid: Option<String>,
+        /// SOP Instance UID (0008,0018); of a series of several instances, the first one's.
+        sop_instance_uid: Option<String>,
+        /// Acquisition Date (0008,0022), or the date in Acquisition `DateTime` (0008,002A), or
+        /// the Series Date, `YYYYMMDD`.
+        acquisition_date: Option<String>,
+        /// Acquisition Time (0008,0032), or the time in Acquisition `DateTime` (0008,002A).
+        acquisition_time: Option<String>,
+        /// Meaning of the Radiopharmaceutical Code (0054,0304), or the Radiopharmaceutical
+        /// (0018,0031).
+        radiopharmaceutical: Option<String>,
+        /// Meaning of the Radionuclide Code (0054,0300).
+        radionuclide: Option<String>,
+        /// Radionuclide Total Dose (0018,1074) as stored: MBq in NM images, Bq in PET images.
+        injected_dose: Option<String>,
+        /// Radiopharmaceutical Start Time (0018,1072).
+        injection_time: Option<String>,
+        /// Manufacturer (0008,0070) of the equipment.
+        manufacturer: Option<String>,
+        /// Manufacturer's Model Name (0008,1090).
+        model_name: Option<String>,
+        /// Software Versions (0018,1020).
+        software_versions: Option<String>,
+        /// Protocol Name (0018,1030).
+        protocol_name: Option<String>,
+        /// Reconstruction Method (0054,1103).
+        reconstruction_method: Option<String>,
+        /// Convolution Kernel (0018,1210).
+        convolution_kernel: Option<String>,
+        /// `rest` or `stress`.
+        rest_or_stress: Option<String>,
+        /// SOP Instance UIDs of a series of several instances; in `/identity` only.
+        instance_uids: Option<Vec<String>>,
+    }
     /// The report of a model. Lengths are millimetres in the patient frame LPS.
     ModelReportSchema as ModelReport {
         /// The program that made the model.

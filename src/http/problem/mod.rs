@@ -129,6 +129,13 @@ impl Problem {
         self
     }
 
+    /// Makes a 422 about what is stored, not about the request, a 409.
+    #[must_use]
+    pub fn conflict(mut self) -> Self {
+        self.body.status = StatusCode::CONFLICT.as_u16();
+        self
+    }
+
     /// Says what to do about it.
     #[must_use]
     pub fn fix(mut self, fix: impl Into<String>) -> Self {

@@ -2,9 +2,10 @@
 
 use crate::http::app::App;
 use crate::http::problem::{Answer, Problem, body};
+use crate::http::scans;
 use crate::jobs::{
-    BlobError, BlobStore, BlobWriter, FileRecord, Held, Hold, StagedFiles, StagedFor, StoredVolume,
-    Tags, Tenant, hex, volume_id,
+    BlobError, BlobStore, BlobWriter, Failure, FileRecord, Held, Hold, StagedFiles, StagedFor,
+    StoredVolume, Tags, Tenant, hex, volume_id,
 };
 use crate::progress::Monitor;
 use crate::work::INSPECTION_MEMORY;
@@ -173,10 +174,12 @@ impl Bundle {
         let id = self.volume_id();
         let records = self.records();
         let hold = app.queue.hold(&id).await;
-        if app.queue.has_intact_volume(&id).await?
-            && let Some((volume, new)) = app.queue.renew_volume(tenant, &id, tags).await?
-        {
-            return Ok(Stored { volume, new, hold });
+        if app.queue.has_intact_volume(&id).await? {
+            let scan = scans::to_note(app, tenant, &id, &records).await?;
+            let renewed = app.queue.renew_volume(tenant, &id, tags, scan.as_ref());
+            if let Some((volume, new)) = renewed.await? {
+                return Ok(Stored { volume, new, hold });
+            }
         }
         let received = self.files;
         let staged = self.staged.ok_or_else(body::empty)?;
@@ -186,11 +189,14 @@ impl Bundle {
             files.push(staged.local(&record.name).await?);
         }
         let reader = app.engine.reader.clone();
-        let inspect = move |monitor: &Monitor<'_>| reader.inspect(&files, monitor);
+        let inspect = move |monitor: &Monitor<'_>| {
+            let facts = reader.inspect(&files, monitor)?;
+            Ok::<_, Failure>((facts, reader.scan(&files, monitor)?))
+        };
         // The disk and the processor work at the same time.
         let inspected = async { Ok(app.decoding.run(INSPECTION_MEMORY, inspect).await??) };
         let settled = async { Ok::<(), Problem>(staged.settle().await?) };
-        let (facts, ()) = tokio::try_join!(inspected, settled)?;
+        let ((facts, scan), ()) = tokio::try_join!(inspected, settled)?;
         let volume = StoredVolume {
             sequence: 0,
             created_at: app.queue.clock.now(),
@@ -199,7 +205,8 @@ impl Bundle {
             facts: facts.to_json(),
             id,
         };
-        let (volume, new) = app.queue.add_volume(volume, staged, tenant, tags).await?;
+        let added = app.queue.add_volume(volume, staged, tenant, tags, scan);
+        let (volume, new) = added.await?;
         Ok(Stored { volume, new, hold })
     }
 

@@ -82,6 +82,27 @@ impl Queue {
         self.jobs.delete_job(id, self.clock.now()).await
     }
 
+    /// Erases whose scan a volume is; the volume stays. `false` if there is no such volume, or it is
+    /// on legal hold.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn erase_scan(
+        self: &Arc<Self>,
+        tenant: &Tenant,
+        volume: &str,
+    ) -> Result<bool, StoreError> {
+        let (queue, tenant, volume) = (self.clone(), tenant.clone(), volume.to_owned());
+        to_its_end(async move {
+            let now = queue.clock.now();
+            let erased = queue.catalogue.erase_scan(&tenant, &volume, now).await?;
+            queue.overwrite_due.store(true, Ordering::Relaxed);
+            queue.overwrite_if_due().await?;
+            Ok(erased)
+        })
+        .await
+    }
+
     async fn erase_item(&self, order: &ErasureOrder) -> Result<Erased, StoreError> {
         let mut ids = vec![order.id.clone()];
         if order.cascade {

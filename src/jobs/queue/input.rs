@@ -2,8 +2,8 @@
 
 use super::Queue;
 use crate::jobs::{
-    BlobError, Failure, Fault, FileRecord, Job, ListRequest, LocalFile, Needs, Product, Resource,
-    StoreError, StoreFault, StoredItem, TagFilter, Tenant, Work, WorkInput,
+    BlobError, Failure, Fault, FileRecord, ItemFilter, Job, ListRequest, LocalFile, Needs, Product,
+    Resource, StoreError, StoreFault, StoredItem, StoredResult, Tenant, Work, WorkInput,
 };
 use serde_json::Map;
 use std::collections::BTreeMap;
@@ -129,6 +129,39 @@ impl Queue {
         })
     }
 
+    /// A tenant's product with those of its files that are `wanted`, and the volume that it was made
+    /// of with its files. `None` if the tenant has one of the two no more, or the product was made of
+    /// no volume.
+    ///
+    /// # Errors
+    /// If the storage fails.
+    pub async fn result(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        wanted: &[&str],
+    ) -> Result<Option<StoredResult>, StoreError> {
+        let Some(product) = self.catalogue.product(tenant, id).await? else {
+            return Ok(None);
+        };
+        let Some(source) = product.volume.clone() else {
+            return Ok(None);
+        };
+        let Some(volume) = self.catalogue.volume(tenant, &source).await? else {
+            return Ok(None);
+        };
+        let Some(volume_files) = self.volume_files(&source, &volume.files).await? else {
+            return Ok(None);
+        };
+        Ok(Some(StoredResult {
+            made_at: product.holding.created_at,
+            files: self.with_files(product.item, wanted).await?,
+            scan: volume.holding.scan,
+            volume: volume.item,
+            volume_files,
+        }))
+    }
+
     /// Every template of the tenant in the order of ids, which does not depend on when they were added.
     async fn library(
         &self,
@@ -136,7 +169,7 @@ impl Queue {
         wanted: &[&str],
     ) -> Result<Vec<StoredItem>, StoreError> {
         let mut library = Vec::new();
-        let (filter, mut before) = (TagFilter::default(), None);
+        let (filter, mut before) = (ItemFilter::default(), None);
         loop {
             let request = ListRequest {
                 before,

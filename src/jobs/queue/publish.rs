@@ -6,8 +6,8 @@
 use super::Queue;
 use crate::jobs::{
     BlobError, Failure, Fault, Held, ItemRecord, Job, JobOutcome, Lease, OutputFile, Product,
-    ProductFile, Resource, StagedFiles, StagedFor, StoreError, StoreFault, StoredVolume, Tags,
-    Tenant, WorkOutput, content_id, hex,
+    ProductFile, Resource, ScanFields, StagedFiles, StagedFor, StoreError, StoreFault,
+    StoredVolume, Tags, Tenant, WorkOutput, content_id, hex,
 };
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
@@ -16,7 +16,8 @@ use tokio::io::AsyncWriteExt;
 use tracing::Instrument;
 
 impl Queue {
-    /// Adds an uploaded volume durably. Returns the record, and whether it is new for the tenant.
+    /// Adds an uploaded volume durably, with what its file says of the scan. Returns the record, and
+    /// whether it is new for the tenant.
     ///
     /// # Errors
     /// If the files or the record cannot be written.
@@ -26,6 +27,7 @@ impl Queue {
         files: Box<dyn StagedFiles>,
         tenant: &Tenant,
         tags: &Tags,
+        scan: Option<ScanFields>,
     ) -> Result<(Held<StoredVolume>, bool), StoreError> {
         let (queue, tenant, tags) = (self.clone(), tenant.clone(), tags.clone());
         to_its_end(async move {
@@ -34,7 +36,10 @@ impl Queue {
             queue
                 .publish_unless_intact(&ItemRecord::Volume(volume.clone()), files)
                 .await?;
-            let new = queue.catalogue.add_volume(&volume, &tenant, &tags).await?;
+            let added = queue
+                .catalogue
+                .add_volume(&volume, &tenant, &tags, scan.as_ref());
+            let new = added.await?;
             queue.items.settle(&volume.id);
             let stored = queue.catalogue.volume(&tenant, &volume.id).await?;
             Ok((stored.ok_or_else(vanished)?, new))
@@ -52,9 +57,11 @@ impl Queue {
         tenant: &Tenant,
         id: &str,
         tags: &Tags,
+        scan: Option<&ScanFields>,
     ) -> Result<Option<(Held<StoredVolume>, bool)>, StoreError> {
         let now = self.clock.now();
-        self.catalogue.renew_volume(tenant, id, tags, now).await
+        let catalogue = &self.catalogue;
+        catalogue.renew_volume(tenant, id, tags, scan, now).await
     }
 
     /// Adds a template to the library, durably. Returns the record, and whether it is new: the

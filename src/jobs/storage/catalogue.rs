@@ -3,8 +3,8 @@
 //! Every method that takes a [`Tenant`] sees what this tenant has and nothing else.
 
 use super::{
-    Custody, Erased, ErasureOrder, Expiry, Held, LegalHold, ListPage, ListRequest, Product,
-    Receipt, StoreResult, StoredVolume, TagFilter, Tags,
+    Custody, Erased, ErasureOrder, Expiry, Held, ItemFilter, LegalHold, ListPage, ListRequest,
+    Product, Receipt, ScanFields, Scans, StoreResult, StoredVolume, Tags,
 };
 use crate::jobs::{Resource, Tenant, Timestamp};
 use async_trait::async_trait;
@@ -23,24 +23,27 @@ pub enum Deleted {
 /// The tables of volumes and products. Every method is one transaction and fails only if the
 /// database does.
 #[async_trait]
-pub trait Catalogue: Custody {
+pub trait Catalogue: Custody + Scans {
     /// Adds a volume, unless it is stored already, and gives it to a tenant; see
-    /// [`Catalogue::renew_volume`]. Returns whether it is new for the tenant.
+    /// [`Catalogue::renew_volume`]. `scan` is what its file says of the scan. Returns whether it is
+    /// new for the tenant.
     async fn add_volume(
         &self,
         volume: &StoredVolume,
         tenant: &Tenant,
         tags: &Tags,
+        scan: Option<&ScanFields>,
     ) -> StoreResult<bool>;
 
     /// Gives a stored volume to a tenant, or renews it: its age counts from `now` on, and the
-    /// given tags replace those it has. Also returns whether it is new for the tenant. `None` if
-    /// it is not stored.
+    /// given tags replace those it has, and it is noted what its file says of the scan. Also returns
+    /// whether it is new for the tenant. `None` if it is not stored.
     async fn renew_volume(
         &self,
         tenant: &Tenant,
         id: &str,
         tags: &Tags,
+        scan: Option<&ScanFields>,
         now: Timestamp,
     ) -> StoreResult<Option<(Held<StoredVolume>, bool)>>;
 
@@ -51,7 +54,7 @@ pub trait Catalogue: Custody {
     async fn volumes(
         &self,
         tenant: &Tenant,
-        filter: &TagFilter,
+        filter: &ItemFilter,
         page: ListRequest,
     ) -> StoreResult<ListPage<Held<StoredVolume>>>;
 
@@ -72,7 +75,7 @@ pub trait Catalogue: Custody {
         &self,
         tenant: &Tenant,
         kind: Resource,
-        filter: &TagFilter,
+        filter: &ItemFilter,
         page: ListRequest,
     ) -> StoreResult<ListPage<Held<Product>>>;
 

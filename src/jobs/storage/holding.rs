@@ -4,6 +4,7 @@
 //! Content is stored once, however many tenants have it. Each has a [`Holding`] of its own, and
 //! sees neither the others nor what they call the item.
 
+use super::{ScanFilter, ScanIdentity};
 use crate::jobs::{Tenant, Timestamp};
 use std::collections::BTreeMap;
 use std::ops::Deref;
@@ -34,7 +35,7 @@ impl LegalHold {
 }
 
 /// That a tenant has an item.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Holding {
     /// The tenant.
     pub tenant: Tenant,
@@ -48,6 +49,8 @@ pub struct Holding {
     pub legal_hold: Option<LegalHold>,
     /// Whether a volume that the item was made of is on legal hold.
     pub source_on_hold: bool,
+    /// Whose scan it is, or the volume that it was made of.
+    pub scan: ScanIdentity,
 }
 
 /// An item as one tenant has it.
@@ -74,4 +77,13 @@ pub struct TagFilter {
     pub external_id: Option<String>,
     /// Only those with all of these labels.
     pub labels: BTreeMap<String, String>,
+}
+
+/// Which items of a tenant to list.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ItemFilter {
+    /// Only those with these tags.
+    pub tags: TagFilter,
+    /// Only those of these scans, or made of them.
+    pub scan: ScanFilter,
 }

@@ -1,6 +1,6 @@
 //! The interface to the jobs table.
 
-use super::{Deleted, ListPage, ListRequest, Product, StoreResult, TagFilter};
+use super::{Deleted, ListPage, ListRequest, Product, ScanFilter, StoreResult, TagFilter};
 use crate::jobs::{Failure, Filed, Job, JobState, NewJob, Tenant, Timestamp};
 use async_trait::async_trait;
 use std::time::Duration;
@@ -83,6 +83,8 @@ pub struct JobFilter {
     pub volume: Option<String>,
     /// Only those with these tags.
     pub tags: TagFilter,
+    /// Only those on these scans.
+    pub scan: ScanFilter,
     /// Only those filed after this moment.
     pub created_after: Option<Timestamp>,
 }

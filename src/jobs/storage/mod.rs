@@ -1,7 +1,8 @@
 //! The interfaces to storage: a database for jobs and records, a file store for contents.
 //!
 //! [`JobStore`] holds the queue's table, [`Catalogue`] the records of volumes and products, and
-//! [`BlobStore`] their files; [`Custody`] is what is needed to look after both. The module `store` implements them with SQLite and a folder.
+//! [`BlobStore`] their files, and [`Scans`] whose scans the volumes are; [`Custody`] is what is needed to look
+//! after them. The module `store` implements them with SQLite and a folder.
 
 mod blobs;
 mod catalogue;
@@ -13,6 +14,7 @@ mod job_store;
 mod listing;
 mod product;
 mod record;
+mod scan;
 mod volume;
 
 pub use blobs::{
@@ -25,13 +27,14 @@ pub use erasure::{
     Receipt,
 };
 pub use figures::{FigureStore, QueueFigures};
-pub use holding::{Held, Holding, LegalHold, TagFilter, Tags};
+pub use holding::{Held, Holding, ItemFilter, LegalHold, TagFilter, Tags};
 pub use job_store::{
     Claimant, DeathLimit, Interrupted, JobFilter, JobOutcome, JobStore, Lease, QueueLoad,
 };
 pub use listing::{ListPage, ListRequest};
 pub use product::{Product, ProductFile};
 pub use record::ItemRecord;
+pub use scan::{ScanFields, ScanFilter, ScanIdentity, Scans, UnreadScan};
 pub use volume::{FileRecord, StoredVolume};
 
 /// The result of an operation on the database.

@@ -10,6 +10,7 @@ use super::attributes::{
     SERIES_UID, SOFTWARE_VERSIONS, SOP_CLASS, SOP_INSTANCE, STUDY_DATE, STUDY_DESCRIPTION,
     STUDY_ID, STUDY_TIME, STUDY_UID,
 };
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 macro_rules! provenance {
@@ -18,17 +19,25 @@ macro_rules! provenance {
         /// them (PS3.3 C.7, C.8.4). An attribute that is absent or empty is `None`.
         ///
         /// This is personal data. `Debug` shows no value of it, so that it cannot get into a log.
-        #[derive(Clone, Default, PartialEq, Eq)]
+        #[derive(Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+        #[serde(default)]
         pub struct Provenance {
-            $($(#[$doc])* pub $field: Option<String>,)*
+            $(
+                $(#[$doc])*
+                #[serde(skip_serializing_if = "Option::is_none")]
+                pub $field: Option<String>,
+            )*
             /// `rest` or `stress`, from the acquisition context, the protocol, or the descriptions of
             /// series and study.
-            pub rest_or_stress: Option<&'static str>,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            pub rest_or_stress: Option<String>,
             /// SOP Instance UIDs of a series of several instances, in the order of the volume's
             /// slices; empty for a single one.
+            #[serde(skip_serializing_if = "Vec::is_empty")]
             pub instance_uids: Vec<String>,
             /// For every slice of the volume, the number of its stored frame in the instance, from 1;
             /// empty for a series of single-frame instances, and for a segmentation.
+            #[serde(skip_serializing_if = "Vec::is_empty")]
             pub slice_frames: Vec<u32>,
         }
 
@@ -47,7 +56,7 @@ macro_rules! provenance {
             /// The stated values, each with its name, without the numbers of slices.
             pub fn stated(&self) -> Vec<(&'static str, &str)> {
                 let fields = [$((stringify!($field), self.$field.as_deref()),)*];
-                let state = ("rest_or_stress", self.rest_or_stress);
+                let state = ("rest_or_stress", self.rest_or_stress.as_deref());
                 fields
                     .into_iter()
                     .chain([state])
@@ -147,7 +156,7 @@ impl Provenance {
 }
 
 /// `rest` or `stress` if exactly one of them is named, by the most telling attribute that names one.
-fn rest_or_stress(a: &Attributes) -> Option<&'static str> {
+fn rest_or_stress(a: &Attributes) -> Option<String> {
     [
         CONTEXT_MEANING,
         PROTOCOL_MEANING,
@@ -163,8 +172,8 @@ fn rest_or_stress(a: &Attributes) -> Option<&'static str> {
         let rest = any(&["rest", "resting", "rst", "ruhe", "repos"]);
         let stress = any(&["stress", "str", "strs", "exercise", "belastung", "effort"]);
         match (rest, stress) {
-            (true, false) => Some("rest"),
-            (false, true) => Some("stress"),
+            (true, false) => Some("rest".to_owned()),
+            (false, true) => Some("stress".to_owned()),
             _ => None,
         }
     })

@@ -1,0 +1,168 @@
+//! The table of scans in SQLite: whose scan each volume is.
+
+use super::rows::{self, SCAN_COLUMNS, to_json};
+use super::sqlite::SqliteStore;
+use super::writer::Write;
+use crate::jobs::{
+    ScanFields, ScanFilter, ScanIdentity, Scans, StoreResult, Tenant, Timestamp, UnreadScan,
+};
+use async_trait::async_trait;
+use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
+
+#[async_trait]
+impl Scans for SqliteStore {
+    async fn scan(&self, tenant: &Tenant, volume: &str) -> StoreResult<Option<ScanIdentity>> {
+        let row = QueryBuilder::<Sqlite>::new("SELECT ")
+            .push(SCAN_COLUMNS)
+            .push(" FROM scans AS c WHERE c.tenant = ")
+            .push_bind(tenant.to_string())
+            .push(" AND c.volume = ")
+            .push_bind(volume.to_owned())
+            .build()
+            .fetch_optional(&self.readers)
+            .await?;
+        row.map(|row| rows::scan(&row)).transpose()
+    }
+
+    async fn note_scan(
+        &self,
+        tenant: &Tenant,
+        volume: &str,
+        found: Option<&ScanFields>,
+    ) -> StoreResult<()> {
+        sqlx::query(
+            "INSERT INTO scans (tenant, volume, found)
+             SELECT tenant, id, ?3 FROM holdings WHERE tenant = ?1 AND id = ?2
+             ON CONFLICT (tenant, volume) DO NOTHING",
+        )
+        .bind(tenant.as_str())
+        .bind(volume)
+        .bind(found.map(|found| to_json(&found.0)).transpose()?)
+        .write(&self.writer)
+        .await?;
+        Ok(())
+    }
+
+    async fn state_scan(
+        &self,
+        tenant: &Tenant,
+        volume: &str,
+        stated: &ScanFields,
+    ) -> StoreResult<bool> {
+        let changed = sqlx::query(
+            "INSERT INTO scans (tenant, volume, stated)
+             SELECT tenant, id, ?3 FROM holdings
+             WHERE tenant = ?1 AND id = ?2 AND kind = 'volume'
+             ON CONFLICT (tenant, volume) DO UPDATE SET stated = excluded.stated",
+        )
+        .bind(tenant.as_str())
+        .bind(volume)
+        .bind(to_json(&stated.0)?)
+        .write(&self.writer)
+        .await?;
+        Ok(changed == 1)
+    }
+
+    async fn erase_scan(&self, tenant: &Tenant, volume: &str, now: Timestamp) -> StoreResult<bool> {
+        let changed = sqlx::query(
+            "INSERT INTO scans (tenant, volume, erased_at)
+             SELECT tenant, id, ?3 FROM holdings
+             WHERE tenant = ?1 AND id = ?2 AND kind = 'volume' AND held_at IS NULL
+             ON CONFLICT (tenant, volume) DO UPDATE SET
+                 found = NULL, stated = NULL, erased_at = coalesce(erased_at, excluded.erased_at)",
+        )
+        .bind(tenant.as_str())
+        .bind(volume)
+        .bind(now)
+        .write(&self.writer)
+        .await?;
+        Ok(changed == 1)
+    }
+
+    async fn unread_scans(&self, after: i64, limit: u32) -> StoreResult<Vec<UnreadScan>> {
+        let rows = sqlx::query(
+            "SELECT h.sequence, h.tenant, h.id, v.files
+             FROM holdings AS h JOIN volumes AS v ON v.id = h.id
+             LEFT JOIN scans AS c ON c.tenant = h.tenant AND c.volume = h.id
+             WHERE c.volume IS NULL AND h.sequence > ? ORDER BY h.sequence LIMIT ?",
+        )
+        .bind(after)
+        .bind(limit)
+        .fetch_all(&self.readers)
+        .await?;
+        rows::all(rows, |row| {
+            Ok(UnreadScan {
+                sequence: row.try_get("sequence")?,
+                tenant: rows::tenant(&row)?,
+                volume: row.try_get("id")?,
+                files: rows::json(&row, "files")?,
+            })
+        })
+    }
+
+    async fn deidentification_secret(&self, tenant: &Tenant) -> StoreResult<Vec<u8>> {
+        let known = async || {
+            let row = sqlx::query("SELECT secret FROM deidentification_secrets WHERE tenant = ?")
+                .bind(tenant.as_str())
+                .fetch_optional(&self.readers)
+                .await?;
+            StoreResult::Ok(row.map(|row| row.get::<Vec<u8>, _>(0)))
+        };
+        if let Some(secret) = known().await? {
+            return Ok(secret);
+        }
+        sqlx::query("INSERT OR IGNORE INTO deidentification_secrets VALUES (?, randomblob(32))")
+            .bind(tenant.as_str())
+            .write(&self.writer)
+            .await?;
+        Ok(known().await?.unwrap_or_default())
+    }
+}
+
+/// Notes what the file of a volume says that the tenant just uploaded: this ends an erasure.
+pub(super) async fn note_upload(
+    to: &mut SqliteConnection,
+    tenant: &Tenant,
+    volume: &str,
+    found: Option<&ScanFields>,
+) -> StoreResult<()> {
+    sqlx::query(
+        "INSERT INTO scans (tenant, volume, found) VALUES (?, ?, ?)
+         ON CONFLICT (tenant, volume) DO UPDATE SET found = excluded.found, erased_at = NULL
+         WHERE erased_at IS NOT NULL",
+    )
+    .bind(tenant.as_str())
+    .bind(volume)
+    .bind(found.map(|found| to_json(&found.0)).transpose()?)
+    .execute(to)
+    .await?;
+    Ok(())
+}
+
+/// Adds the conditions of a filter to a query whose column `sequence` has that prefix. `listed`
+/// joins the table that is listed, as `x`, to the scans `c`.
+pub(super) fn push_scan(
+    query: &mut QueryBuilder<Sqlite>,
+    (prefix, listed): (&str, &str),
+    tenant: &Tenant,
+    filter: &ScanFilter,
+) {
+    if *filter == ScanFilter::default() {
+        return;
+    }
+    query.push(" AND ").push(prefix);
+    query.push("sequence IN (SELECT x.sequence FROM scans AS c ");
+    query.push(listed).push(" WHERE c.tenant = ");
+    query.push_bind(tenant.to_string());
+    for (column, value) in [
+        ("study_uid", &filter.study),
+        ("series_uid", &filter.series),
+        ("accession_number", &filter.accession),
+    ] {
+        if let Some(value) = value {
+            query.push(" AND c.").push(column).push(" = ");
+            query.push_bind(value.clone());
+        }
+    }
+    query.push(")");
+}
