@@ -48,6 +48,7 @@ fn line(case: &Path) -> Result<String> {
         expert: None,
         models: Vec::new(),
         named: false,
+        reader: None,
         parameters: &parameters,
     };
     let segmented = match from_files(&order, &limits, &monitor) {

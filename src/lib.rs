@@ -129,6 +129,8 @@ pub mod deform;
 
 pub mod polar;
 
+pub mod reader;
+
 pub mod report;
 
 pub mod parameters;

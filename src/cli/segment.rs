@@ -6,8 +6,9 @@ use super::{Bar, FitArgs};
 use crate::export::{self, Format};
 use crate::parameters::FitParameters;
 use crate::progress::{CancelToken, Monitor, Plan};
+use crate::reader::ReaderProfile;
 use crate::segmentation::Segmentation;
-use crate::segmentation::{NamedFile, NamedMesh, SegmentationOrder, from_files};
+use crate::segmentation::{NamedFile, NamedMesh, NamedReader, SegmentationOrder, from_files};
 use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeFile};
 use crate::work::problems::Explain;
 use anyhow::{Context, Result, anyhow, bail};
@@ -40,6 +41,9 @@ pub struct SegmentArgs {
     /// Expert's mask to measure the result against
     #[arg(long, value_name = "MASK")]
     expert: Option<PathBuf>,
+    /// A reader's profile, as `calibrate` writes it: the wall is drawn as that reader would
+    #[arg(long, value_name = "PROFILE")]
+    reader: Option<PathBuf>,
     /// Format of the fitted mesh (repeatable)
     #[arg(
         long = "format",
@@ -90,6 +94,7 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
         expert: expert.as_ref().map(|files| &files[..]),
         models: named.into_iter().map(|m| mesh(m)).collect::<Result<_>>()?,
         named: true,
+        reader: args.reader.as_deref().map(reader).transpose()?,
         parameters: &parameters,
     };
     let bar = Bar::over(Plan::SEGMENTATION);
@@ -133,6 +138,20 @@ fn mesh(path: &Path) -> Result<NamedMesh> {
     Ok(NamedMesh {
         name: stem.map_or_else(context, |s| s.to_string_lossy().into_owned()),
         mesh: export::read_json::decode(&bytes).with_context(context)?,
+    })
+}
+
+/// Reads a reader's profile.
+fn reader(path: &Path) -> Result<NamedReader> {
+    let context = || format!("{}", path.display());
+    let bytes = std::fs::read(path).with_context(context)?;
+    let profile = ReaderProfile::from_json(&bytes)
+        .map_err(|error| anyhow!(error.with_advice()))
+        .with_context(context)?;
+    let stem = path.file_stem();
+    Ok(NamedReader {
+        name: stem.map_or_else(context, |s| s.to_string_lossy().into_owned()),
+        profile,
     })
 }
 

@@ -75,6 +75,23 @@ pub enum WallEdge {
     Anatomical,
 }
 
+impl WallEdge {
+    /// Its name in parameters and reports.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            WallEdge::Apparent => "apparent",
+            WallEdge::Anatomical => "anatomical",
+        }
+    }
+
+    /// The reverse of [`WallEdge::as_str`].
+    pub fn parse(name: &str) -> Option<Self> {
+        [WallEdge::Apparent, WallEdge::Anatomical]
+            .into_iter()
+            .find(|edge| edge.as_str() == name)
+    }
+}
+
 impl DeformParameters {
     /// Checks every number.
     ///

@@ -54,7 +54,7 @@ const TOGETHER: f64 = 3.0;
 const ROUNDS: usize = 30;
 
 /// Length of wall next to the rim that is stretched, mm.
-const REACH: f64 = 25.0;
+pub const REACH: f64 = 25.0;
 
 /// How far towards the base the rim is moved where it lies `distance` mm too near to the apex, mm.
 fn correction(distance: f64) -> f64 {
@@ -75,14 +75,18 @@ pub fn settled(mesh: &TriMesh, cup: &Cup, superior: &Vec3) -> Option<TriMesh> {
         .zip(&shape)
         .map(|(h, e)| correction(h - e))
         .collect();
-    let mut moved = mesh.clone();
-    for p in &mut moved.vertices {
-        let direction = frame.direction(p);
-        let above = frame.along(p) - between(&rim, direction);
-        let share = (1.0 - above / REACH).clamp(0.0, 1.0);
-        *p -= frame.axis * (share * between(&shifts, direction));
-    }
+    let moved = frame.stretched(mesh, &rim, &shifts);
     self_intersections(&moved).is_empty().then_some(moved)
+}
+
+/// `mesh` with its whole rim moved towards the base by `distance` mm. It stays as it is without a rim in
+/// every direction.
+pub fn extended(mesh: &TriMesh, cup: &Cup, superior: &Vec3, distance: f64) -> TriMesh {
+    let frame = RimFrame::of(cup, superior);
+    match frame.heights(mesh) {
+        Some(rim) => frame.stretched(mesh, &rim, &[distance; DIRECTIONS]),
+        None => mesh.clone(),
+    }
 }
 
 /// The shape of a rim with these heights, mm, of a heart of this length.
@@ -149,6 +153,18 @@ impl RimFrame {
         let r = p - self.centre;
         let angle = r.dot(&self.anterior).atan2(r.dot(&self.lateral));
         (angle / TAU * DIRECTIONS as f64 - 0.5).rem_euclid(DIRECTIONS as f64)
+    }
+
+    /// `mesh` with its rim, which has these heights, moved towards the base by `shifts` mm.
+    fn stretched(&self, mesh: &TriMesh, rim: &[f64], shifts: &[f64]) -> TriMesh {
+        let mut moved = mesh.clone();
+        for p in &mut moved.vertices {
+            let direction = self.direction(p);
+            let above = self.along(p) - between(rim, direction);
+            let share = (1.0 - above / REACH).clamp(0.0, 1.0);
+            *p -= self.axis * (share * between(shifts, direction));
+        }
+        moved
     }
 
     /// How far towards the apex the mesh begins in each direction, mm from the cup's centre: the most basal

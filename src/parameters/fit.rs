@@ -18,6 +18,8 @@ pub struct FitParameters {
     pub model: String,
     /// Id of an expert's mask, if there is one.
     pub expert: Option<String>,
+    /// Id of the reader's profile to draw the wall by, if there is one.
+    pub reader: Option<String>,
     /// The organ that the model shows.
     pub organ: Organ,
     /// Known position of the organ.
@@ -34,6 +36,7 @@ impl Default for FitParameters {
             frame: None,
             model: FitParameters::AUTO.into(),
             expert: None,
+            reader: None,
             organ: Organ::LeftVentricle,
             place: KnownPlace::default(),
             deform: DeformParameters::default(),

@@ -55,6 +55,22 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         },
         write: |p| json!(p.expert),
     },
+    ParameterSpec {
+        name: "reader",
+        kind: Kind::Stored {
+            prefixes: &["rdr_"],
+            word: "",
+        },
+        default: "",
+        summary: "Id of a reader's profile to draw the wall by: moves the endocardium, the epicardium and \
+                  the rim by the distances that `ventriform calibrate` learnt from that reader's masks. \
+                  Its edge must be that of `edge`. Default: the wall as it was fitted",
+        read: |d, v| {
+            d.reader = Some(v.text().into());
+            Ok(())
+        },
+        write: |p| json!(p.reader),
+    },
     optional!(
         Integer usize,
         "frame",

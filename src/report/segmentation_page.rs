@@ -4,7 +4,7 @@ use maud::{Markup, html};
 use serde_json::{Map, Value};
 
 use super::sections::Program;
-use super::segmentation_report::SegmentationReport;
+use super::segmentation_report::{ReaderEntry, SegmentationReport};
 use crate::draw::document::{self, HeadlineFigure, HtmlDocument, Sign};
 use crate::draw::text::{data_uri, number, signed};
 use crate::draw::views;
@@ -80,11 +80,24 @@ fn origin(report: &SegmentationReport) -> String {
         format.map(|format| format!("volume: {format}")),
         list("shape", 0).map(|shape| format!("{shape} voxels")),
         list("spacing_mm", 2).map(|spacing| format!("{spacing} mm")),
+        report.reader.as_ref().map(drawn_by),
     ]
     .into_iter()
     .flatten()
     .collect::<Vec<_>>()
     .join(" · ")
+}
+
+/// By which reader's profile the wall was drawn.
+fn drawn_by(reader: &ReaderEntry) -> String {
+    let name = reader.name.as_deref().unwrap_or_default();
+    let moved = [
+        ("endocardium", reader.offsets_mm.endocardium, "outward"),
+        ("epicardium", reader.offsets_mm.epicardium, "outward"),
+        ("rim", reader.offsets_mm.rim, "towards the base"),
+    ]
+    .map(|(what, by, where_to)| format!("{what} {by:+.2} mm {where_to}"));
+    format!("drawn as reader {name}: {}", moved.join(", "))
 }
 
 /// What could be flagged, each with whether it is in order.

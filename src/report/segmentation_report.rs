@@ -31,6 +31,8 @@ pub struct SegmentationReport {
     pub thickness_mm: Option<BothThicknesses>,
     /// Mass of the anatomical wall, g; ventricles only.
     pub mass_g: Option<f64>,
+    /// The reader's profile that the wall was drawn by.
+    pub reader: Option<ReaderEntry>,
     /// Agreement with an expert's mask.
     pub measures: Option<AgreementFigures>,
     /// Uptake of the wall.
@@ -69,6 +71,28 @@ pub struct RefusedTemplateEntry {
     pub template: Option<String>,
     /// Why.
     pub reason: Option<String>,
+}
+
+/// A reader's profile that was applied.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(default)]
+pub struct ReaderEntry {
+    /// Its name.
+    pub name: Option<String>,
+    /// Its distances.
+    pub offsets_mm: ReaderOffsetFigures,
+}
+
+/// The distances of a reader's profile, mm.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+#[serde(default)]
+pub struct ReaderOffsetFigures {
+    /// Of the inner surface, outward.
+    pub endocardium: f64,
+    /// Of the outer surface, outward.
+    pub epicardium: f64,
+    /// Of the rim, towards the base.
+    pub rim: f64,
 }
 
 /// Thickness of both walls of a ventricle.

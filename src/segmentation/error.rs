@@ -57,6 +57,24 @@ pub enum SegmentationError {
         /// Why.
         error: TemplateError,
     },
+    /// A reader's profile says nothing of this organ.
+    #[error("reader {name}: the profile is of left ventricles, not of a {organ}")]
+    ReaderOfVentricles {
+        /// The profile.
+        name: String,
+        /// The organ to segment.
+        organ: &'static str,
+    },
+    /// A reader's profile starts from the other wall.
+    #[error("reader {name}: the profile starts from the {learnt} wall, and `edge` is {asked}")]
+    ReaderOfOtherWall {
+        /// The profile.
+        name: String,
+        /// The wall that it starts from.
+        learnt: &'static str,
+        /// The wall that was asked for.
+        asked: &'static str,
+    },
     /// The expert's mask cannot be compared with the volume's.
     #[error(transparent)]
     ExpertMask(ExpertMaskError),

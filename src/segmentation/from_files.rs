@@ -1,9 +1,10 @@
 //! A segmentation from files: read, segment, keep what the output needs.
 
 use super::error::SegmentationError;
-use super::order::SegmentationOrder;
+use super::order::{NamedReader, SegmentationOrder};
 use super::segment::{Segmentation, SegmentationParameters, segment};
 use super::templates::prepare;
+use crate::model::Organ;
 use crate::parameters::FitParameters;
 use crate::progress::Monitor;
 use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeFile};
@@ -41,7 +42,9 @@ pub fn from_files(
     let fit = SegmentationParameters {
         deform: parameters.on(&reading.volume)?,
         polar: parameters.polar,
+        reader: order.reader.clone(),
     };
+    check_reader(order)?;
     let (templates, refused) = prepare(order, monitor)?;
     let expert = expert.as_ref().map(|expert| &expert.volume);
     let mut segmentation = segment(&reading.volume, &templates, &fit, expert, monitor)?;
@@ -51,6 +54,27 @@ pub fn from_files(
         segmentation,
         parameters,
     })
+}
+
+/// Refuses a reader's profile that says nothing of the wall asked for.
+fn check_reader(order: &SegmentationOrder<'_>) -> Result<(), SegmentationError> {
+    let Some(NamedReader { name, profile }) = &order.reader else {
+        return Ok(());
+    };
+    let (name, organ) = (name.clone(), order.parameters.organ);
+    if organ != Organ::LeftVentricle {
+        let organ = organ.as_str();
+        return Err(SegmentationError::ReaderOfVentricles { name, organ });
+    }
+    let edge = order.parameters.deform.edge;
+    if profile.edge != edge {
+        return Err(SegmentationError::ReaderOfOtherWall {
+            name,
+            learnt: profile.edge.as_str(),
+            asked: edge.as_str(),
+        });
+    }
+    Ok(())
 }
 
 fn read(

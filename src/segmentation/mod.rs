@@ -13,8 +13,9 @@
 //! 5. Every template is fitted, with one search for the organ ([`OrganSearch`]), and the fit with
 //!    the greatest [`Fit::merit`](crate::deform::Fit::merit) is chosen, the first of equals. A
 //!    template whose fit fails is left out, unless all fail.
-//! 6. [`segment`](mod@segment) makes mask, measures, polar map and [`slices`] of the fit.
-//! 7. [`report_json`] is the report; [`SegmentedVolume::files`] are the files written, the same on
+//! 6. With a reader's profile, the wall is drawn as that reader would ([`crate::reader`]).
+//! 7. [`segment`](mod@segment) makes mask, measures, polar map and [`slices`] of the fit.
+//! 8. [`report_json`] is the report; [`SegmentedVolume::files`] are the files written, the same on
 //!    the command line and over HTTP.
 
 mod order;
@@ -42,7 +43,7 @@ pub use expert_mask::{ExpertMaskError, on_grid};
 pub use files::{NamedFile, SegmentationFilesError};
 pub use fitting::{OrganSearch, RankedTemplate};
 pub use from_files::{SegmentedVolume, from_files};
-pub use order::{NamedMesh, SegmentationOrder};
+pub use order::{NamedMesh, NamedReader, SegmentationOrder};
 pub use report::{agreement_json, report_json};
-pub use segment::{ImageResolution, Segmentation, SegmentationParameters, segment};
+pub use segment::{AppliedReader, ImageResolution, Segmentation, SegmentationParameters, segment};
 pub use templates::{NamedTemplate, RefusedTemplate};

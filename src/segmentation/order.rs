@@ -2,6 +2,7 @@
 
 use crate::mesh::TriMesh;
 use crate::parameters::FitParameters;
+use crate::reader::ReaderProfile;
 use crate::volume::VolumeFile;
 
 /// The files, models and parameters of a segmentation.
@@ -16,8 +17,19 @@ pub struct SegmentationOrder<'a> {
     /// Whether every model must be usable. Otherwise models that cannot be used are left out,
     /// and the report says why.
     pub named: bool,
+    /// The reader as whom to draw the wall.
+    pub reader: Option<NamedReader>,
     /// The parameters.
     pub parameters: &'a FitParameters,
+}
+
+/// A reader's profile with its name in the report.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedReader {
+    /// The name.
+    pub name: String,
+    /// The profile.
+    pub profile: ReaderProfile,
 }
 
 /// A model with its name in the report.

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::segment::Segmentation;
+use super::segment::{AppliedReader, Segmentation};
 use crate::deform::{Evidence, Fit, confidence};
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
@@ -76,10 +76,29 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
             "value": round(r.value),
             "source": if r.given { "given" } else { "estimated" },
         })),
+        "reader": segmentation.reader.as_ref().map(reader),
         "measures": segmentation.agreement.as_ref().map(agreement_json),
         "polar": segmentation.polar.as_ref().map(summary),
         "flags": flags,
         "mask_rule": "a voxel belongs to the mask if its centre lies inside the surface",
+    })
+}
+
+/// The reader's profile by which the wall was drawn.
+fn reader(applied: &AppliedReader) -> Value {
+    let profile = &applied.reader.profile;
+    let offsets = profile.offsets();
+    json!({
+        "name": applied.reader.name,
+        "sha256": profile.sha256(),
+        "edge": profile.edge.as_str(),
+        "masks": profile.masks(),
+        "offsets_mm": {
+            "endocardium": offsets.endocardium,
+            "epicardium": offsets.epicardium,
+            "rim": offsets.rim,
+        },
+        "share_applied": round(applied.share),
     })
 }
 

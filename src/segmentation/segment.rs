@@ -3,6 +3,7 @@
 use super::error::SegmentationError;
 use super::expert_mask::on_grid;
 use super::fitting::{RankedTemplate, Trials, try_all};
+use super::order::NamedReader;
 use super::slices::{self, Cut};
 use super::templates::{NamedTemplate, RefusedTemplate};
 use crate::deform::{DeformParameters, Fit, blur_correction};
@@ -10,6 +11,7 @@ use crate::grid::agreement::{Agreement, compare};
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::polar::{self, PolarMap, PolarParameters};
 use crate::progress::{Monitor, Stage};
+use crate::reader;
 use crate::volume::Volume;
 
 /// Parameters of [`segment`].
@@ -19,6 +21,9 @@ pub struct SegmentationParameters {
     pub deform: DeformParameters,
     /// The polar map's.
     pub polar: PolarParameters,
+    /// The reader as whom to draw the wall. The profile must start from the wall that
+    /// [`DeformParameters::edge`] asks for. Default: none.
+    pub reader: Option<NamedReader>,
 }
 
 /// The segmentation of one volume.
@@ -34,6 +39,8 @@ pub struct Segmentation {
     pub polar: Option<PolarMap>,
     /// The image's resolution; ventricles only.
     pub resolution: Option<ImageResolution>,
+    /// The reader's profile that the fit's wall was drawn by.
+    pub reader: Option<AppliedReader>,
     /// Agreement with the expert's mask, if one was given.
     pub agreement: Option<Agreement>,
     /// Slices of the volume with the contours of fit and expert, as a PNG file.
@@ -44,6 +51,15 @@ pub struct Segmentation {
     pub candidates: Vec<RankedTemplate>,
     /// Models that were not fitted, or whose fit failed.
     pub refused: Vec<RefusedTemplate>,
+}
+
+/// A reader's profile that was applied.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AppliedReader {
+    /// The profile.
+    pub reader: NamedReader,
+    /// The share of its distances by which the wall moved: 1 unless the surface would intersect itself.
+    pub share: f64,
 }
 
 /// The width of a point in the image, motion and filters included.
@@ -101,6 +117,14 @@ pub fn segment(
         polar::map(volume, wall, anatomical, &parameters.polar)
             .counted_by(source.unwrap_or_default())
     });
+    let (fit, reader) = match &parameters.reader {
+        Some(reader) => {
+            let (fit, share) = reader::drawn(fit, &reader.profile.offsets(), monitor)?;
+            let reader = reader.clone();
+            (fit, Some(AppliedReader { reader, share }))
+        }
+        None => (fit, None),
+    };
     monitor.report(Stage::Report, 0.0)?;
     let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
     let other_mask = fit
@@ -121,6 +145,7 @@ pub fn segment(
         mask,
         other_mask,
         polar,
+        reader,
         agreement,
         slices,
         chosen,

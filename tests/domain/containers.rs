@@ -86,6 +86,7 @@ fn segmented(file: VolumeFile) -> Vec<NamedFile> {
         expert: None,
         models: Vec::new(),
         named: false,
+        reader: None,
         parameters: &parameters,
     };
     let monitor = Monitor::silent();

@@ -31,6 +31,7 @@ fn segmented(volume: &Volume) -> Result<Fit, SegmentationError> {
         expert: None,
         models: Vec::new(),
         named: false,
+        reader: None,
         parameters: &FitParameters::default(),
     };
     let segmented = from_files(&order, &ReadLimits::default(), &Monitor::silent())?;

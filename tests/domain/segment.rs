@@ -237,6 +237,7 @@ impl Watcher {
             expert: None,
             models: Vec::new(),
             named: false,
+            reader: None,
             parameters: &parameters,
         };
         match from_files(&order, &ReadLimits::default(), &monitor) {

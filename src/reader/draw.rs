@@ -1,0 +1,197 @@
+//! A fitted wall as a reader would draw it.
+//!
+//! 1. Every node moves along its ray from the long axis ([`VentricleWall`]), by the distance of the inner
+//!    surface, of the outer one, or between the two in proportion to its depth in the wall. Where the
+//!    wall would get thinner than [`THINNEST`], both move less.
+//! 2. The rim moves along the long axis; nodes up to [`rim::REACH`] from it move
+//!    less and less, so that the wall is stretched there.
+//!
+//! On a wall that is perpendicular to its rays, the surfaces move by exactly these distances.
+
+use super::profile::ReaderOffsets;
+use crate::deform::{Fit, rim};
+use crate::geometry::Vec3;
+use crate::mesh::TriMesh;
+use crate::mesh::intersections::self_intersections;
+use crate::model::wall::{COLUMNS, ROWS, VentricleWall};
+use crate::progress::{Cancelled, Monitor};
+
+/// The thickness that is left at least, mm.
+const THINNEST: f64 = 3.0;
+
+/// `fit` with the shown wall moved by `offsets`, and the share of them that was applied: 1, or less
+/// where the whole would make the surface intersect itself. Its two measured walls
+/// ([`Fit::surfaces`]) stay. Organs other than ventricles stay as they are.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn drawn(
+    fit: Fit,
+    offsets: &ReaderOffsets,
+    monitor: &Monitor,
+) -> Result<(Fit, f64), Cancelled> {
+    let (Some(cup), Some(orientation), Some(wall)) = (fit.cup, fit.patient_orientation, &fit.wall)
+    else {
+        return Ok((fit, 0.0));
+    };
+    if offsets.to_array() == [0.0; 3] {
+        return Ok((fit, 1.0));
+    }
+    let superior = &orientation.superior;
+    let moved = |share: f64| {
+        let offsets = ReaderOffsets::from_array(offsets.to_array().map(|o| share * o));
+        let mesh = with_surfaces_moved(&fit.mesh, wall, &offsets);
+        rim::extended(&mesh, &cup, superior, offsets.rim)
+    };
+    // A fit that intersects itself already must not do so more often.
+    let before = self_intersections(&fit.mesh).len();
+    let unharmed = |mesh: &TriMesh| self_intersections(mesh).len() <= before;
+    let found = [1.0, 0.75, 0.5, 0.25]
+        .into_iter()
+        .map(|share| (share, moved(share)))
+        .find(|(_, mesh)| unharmed(mesh));
+    let Some((share, mesh)) = found else {
+        return Ok((fit, 0.0));
+    };
+    let wall = VentricleWall::new(&mesh, &cup, superior, monitor)?;
+    let fit = Fit {
+        wall_ml: mesh.volume() / 1000.0,
+        wall: Some(wall),
+        mesh,
+        ..fit
+    };
+    Ok((fit, share))
+}
+
+/// `mesh`, whose wall is `wall`, with its inner and outer surface moved by `offsets`.
+fn with_surfaces_moved(mesh: &TriMesh, wall: &VentricleWall, offsets: &ReaderOffsets) -> TriMesh {
+    let edges = WallEdges::of(wall);
+    let mut moved = mesh.clone();
+    for p in &mut moved.vertices {
+        *p += edges.shift(wall, p, offsets);
+    }
+    moved
+}
+
+/// Where the wall begins and ends on each ray, mm; rays beyond the rim have those of the next ray of
+/// their column.
+struct WallEdges(Vec<[f64; 2]>);
+
+impl WallEdges {
+    fn of(wall: &VentricleWall) -> Self {
+        let mut edges = vec![[0.0, 0.0]; ROWS * COLUMNS];
+        for column in 0..COLUMNS {
+            let mut last = None;
+            let known = |row: usize| wall.rays[row * COLUMNS + column].wall;
+            let first = (0..ROWS).find_map(known);
+            for row in 0..ROWS {
+                last = known(row).or(last);
+                edges[row * COLUMNS + column] = last.or(first).unwrap_or([0.0, THINNEST]);
+            }
+        }
+        Self(edges)
+    }
+
+    /// The displacement of a point of the wall by `offsets`, without that of the rim, mm.
+    fn shift(&self, wall: &VentricleWall, point: &Vec3, offsets: &ReaderOffsets) -> Vec3 {
+        let place = wall.place(point);
+        let [inner, outer] = self.at(place.row, place.column);
+        let thickness = (outer - inner).max(1e-6);
+        let thinner = offsets.endocardium - offsets.epicardium;
+        let most = (thickness - THINNEST).max(0.0);
+        let part = if thinner > most { most / thinner } else { 1.0 };
+        let depth = ((place.distance - inner) / thickness).clamp(0.0, 1.0);
+        let along = offsets.endocardium * (1.0 - depth) + offsets.epicardium * depth;
+        // A point on the axis stays on it.
+        let along = (part * along).max(-place.distance);
+        place.direction * along
+    }
+
+    /// The edges between rays, linear in row and column.
+    fn at(&self, row: f64, column: f64) -> [f64; 2] {
+        let row = row.clamp(0.0, ROWS as f64 - 1.0);
+        let (low, left) = (row.floor().min(ROWS as f64 - 2.0), column.floor());
+        let (up, right) = (row - low, column - left);
+        let value = |r: usize, c: usize, side: usize| {
+            let column = (left as usize + c) % COLUMNS;
+            self.0[(low as usize + r) * COLUMNS + column][side]
+        };
+        [0, 1].map(|side| {
+            (1.0 - up) * ((1.0 - right) * value(0, 0, side) + right * value(0, 1, side))
+                + up * ((1.0 - right) * value(1, 0, side) + right * value(1, 1, side))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::locate::cup::Cup;
+    use crate::mesh::shapes;
+
+    /// A long half ellipsoid, 188 and 200 mm from its centre at the apex (-z), with radii of 19 and 31 mm at
+    /// its rim: there nearly a tube about the axis, across which the rays run.
+    fn tube() -> (TriMesh, Cup, VentricleWall) {
+        let mesh = shapes::cup(200.0, 31.0, 12.0, 48);
+        let cup = Cup {
+            centre: Vec3::zeros(),
+            axis: -Vec3::z(),
+            length: 200.0,
+            breadth: 1.0,
+        };
+        let wall = VentricleWall::new(&mesh, &cup, &Vec3::y(), &Monitor::silent()).unwrap();
+        (mesh, cup, wall)
+    }
+
+    /// Distance from the axis.
+    fn radius(p: &Vec3) -> f64 {
+        p.x.hypot(p.y)
+    }
+
+    #[test]
+    fn the_surfaces_of_a_tube_move_by_the_given_distances() {
+        let (mesh, cup, wall) = tube();
+        for [endocardium, epicardium] in [[1.5, 0.0], [0.0, -1.0], [-2.0, 2.0], [1.0, 1.0]] {
+            let offsets = ReaderOffsets {
+                endocardium,
+                epicardium,
+                rim: 0.0,
+            };
+            let moved = with_surfaces_moved(&mesh, &wall, &offsets);
+            let mut judged = [0; 2];
+            for (before, after) in mesh.vertices.iter().zip(&moved.vertices) {
+                // The rounded rim is neither surface.
+                if !(-80.0..-10.0).contains(&before.z) {
+                    continue;
+                }
+                let side = usize::from(radius(before) > 24.0);
+                let by = radius(after) - radius(before);
+                let wanted = [endocardium, epicardium][side];
+                assert!((by - wanted).abs() < 0.06, "{by} for {wanted}: {before}");
+                judged[side] += 1;
+            }
+            assert!(judged.iter().all(|n| *n > 200), "{judged:?}");
+        }
+        let lower = rim::extended(&mesh, &cup, &Vec3::y(), 3.0);
+        let top = |mesh: &TriMesh| mesh.vertices.iter().map(|p| p.z).fold(f64::MIN, f64::max);
+        assert!((top(&lower) - top(&mesh) - 3.0).abs() < 0.2);
+        let apex = |mesh: &TriMesh| mesh.vertices.iter().map(|p| p.z).fold(f64::MAX, f64::min);
+        assert_eq!(apex(&lower), apex(&mesh));
+    }
+
+    #[test]
+    fn no_wall_gets_thinner_than_three_millimetres() {
+        let (mesh, _, wall) = tube();
+        let offsets = ReaderOffsets::from_array([8.0, -8.0, 0.0]);
+        let moved = with_surfaces_moved(&mesh, &wall, &offsets);
+        let wall = VentricleWall::new(&moved, &tube().1, &Vec3::y(), &Monitor::silent()).unwrap();
+        let thin = wall.rays[ROWS / 2 * COLUMNS..]
+            .iter()
+            .filter_map(|r| r.wall);
+        for [enters, leaves] in thin.take(10 * COLUMNS) {
+            let thickness = leaves - enters;
+            assert!((2.5..3.5).contains(&thickness), "{thickness}");
+        }
+        assert!(self_intersections(&moved).is_empty());
+    }
+}

@@ -1,0 +1,275 @@
+//! A reader's profile and its JSON.
+
+use crate::deform::WallEdge;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::fmt::Write as _;
+
+/// Distances from the fitted wall to a reader's, mm.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ReaderOffsets {
+    /// How far the inner surface lies farther out, away from the cavity.
+    pub endocardium: f64,
+    /// How far the outer surface lies farther out.
+    pub epicardium: f64,
+    /// How far the rim lies farther towards the base.
+    pub rim: f64,
+}
+
+impl ReaderOffsets {
+    /// The three numbers in the order of the fields.
+    pub fn to_array(self) -> [f64; 3] {
+        [self.endocardium, self.epicardium, self.rim]
+    }
+
+    /// The reverse of [`ReaderOffsets::to_array`].
+    pub fn from_array([endocardium, epicardium, rim]: [f64; 3]) -> Self {
+        Self {
+            endocardium,
+            epicardium,
+            rim,
+        }
+    }
+}
+
+/// One distance of a profile, mm.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReaderOffset {
+    /// What is applied: `mean`, drawn towards zero.
+    pub value: f64,
+    /// Mean over the masks.
+    pub mean: f64,
+    /// Standard deviation over the masks; 0 for one mask.
+    pub spread: f64,
+}
+
+/// A scan and the mask drawn of it, as SHA-256 of their files, hexadecimal.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LearntOn {
+    /// The scan.
+    pub scan: String,
+    /// The mask.
+    pub mask: String,
+}
+
+/// A reader's profile.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReaderProfile {
+    /// The wall that the distances start from.
+    pub edge: WallEdge,
+    /// The distances, in the order of [`ReaderOffsets`].
+    pub offsets: [ReaderOffset; 3],
+    /// What it was learnt on, one entry for each mask.
+    pub learnt_on: Vec<LearntOn>,
+}
+
+/// Why a text is no profile that can be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ProfileError {
+    /// It is no JSON, or has other fields.
+    #[error("this is no reader's profile: {0}")]
+    Syntax(String),
+    /// It was written by a program that knows more.
+    #[error("the profile has version {0}; this program reads version {VERSION}")]
+    Version(u32),
+    /// A field holds something that no profile can hold.
+    #[error("`{field}`: {reason}")]
+    Field {
+        /// The field.
+        field: String,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+/// The version of the JSON.
+const VERSION: u32 = 1;
+/// What the JSON says that it is.
+const FORMAT: &str = "ventriform-reader-profile";
+/// The names of the distances and the greatest that are believed, mm.
+const OFFSETS: [(&str, f64); 3] = [("endocardium", 8.0), ("epicardium", 8.0), ("rim", 20.0)];
+/// Longest JSON that is read, bytes.
+pub const MOST_BYTES: usize = 1 << 20;
+/// Most masks of a profile.
+const MOST_MASKS: usize = 5000;
+
+/// The JSON, field by field.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Wire {
+    format: String,
+    version: u32,
+    edge: String,
+    masks: usize,
+    offsets_mm: WireOffsets,
+    learnt_on: Vec<LearntOn>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WireOffsets {
+    endocardium: ReaderOffset,
+    epicardium: ReaderOffset,
+    rim: ReaderOffset,
+}
+
+impl ReaderProfile {
+    /// The distances that are applied.
+    pub fn offsets(&self) -> ReaderOffsets {
+        ReaderOffsets::from_array(self.offsets.map(|o| o.value))
+    }
+
+    /// Number of masks that it was learnt on.
+    pub fn masks(&self) -> usize {
+        self.learnt_on.len()
+    }
+
+    /// The JSON, ending with a line feed.
+    pub fn to_json(&self) -> String {
+        let [endocardium, epicardium, rim] = self.offsets;
+        let wire = Wire {
+            format: FORMAT.into(),
+            version: VERSION,
+            edge: self.edge.as_str().into(),
+            masks: self.masks(),
+            offsets_mm: WireOffsets {
+                endocardium,
+                epicardium,
+                rim,
+            },
+            learnt_on: self.learnt_on.clone(),
+        };
+        let mut text = serde_json::to_string_pretty(&wire).expect("finite numbers and texts");
+        text.push('\n');
+        text
+    }
+
+    /// SHA-256 of [`ReaderProfile::to_json`], hexadecimal: the same for the same profile, however
+    /// its file is spaced.
+    pub fn sha256(&self) -> String {
+        let digest = Sha256::digest(self.to_json());
+        digest.iter().fold(String::new(), |mut text, byte| {
+            write!(text, "{byte:02x}").expect("a string takes any text");
+            text
+        })
+    }
+
+    /// Reads and checks the JSON.
+    ///
+    /// # Errors
+    /// [`ProfileError`].
+    pub fn from_json(text: &[u8]) -> Result<Self, ProfileError> {
+        if text.len() > MOST_BYTES {
+            let reason = format!("it has more than {MOST_BYTES} bytes");
+            return Err(ProfileError::Syntax(reason));
+        }
+        let syntax = |error: serde_json::Error| ProfileError::Syntax(error.to_string());
+        let any: serde_json::Value = serde_json::from_slice(text).map_err(syntax)?;
+        if any["format"] != FORMAT {
+            let reason = format!("`format` is not {FORMAT}");
+            return Err(ProfileError::Syntax(reason));
+        }
+        let version = any["version"].as_u64().unwrap_or(0);
+        if version != u64::from(VERSION) {
+            let version = u32::try_from(version).unwrap_or(u32::MAX);
+            return Err(ProfileError::Version(version));
+        }
+        let wire: Wire = serde_json::from_value(any).map_err(syntax)?;
+        let edge = WallEdge::parse(&wire.edge)
+            .ok_or_else(|| refused("edge", "it must be apparent or anatomical"))?;
+        let given = wire.offsets_mm;
+        let offsets = [given.endocardium, given.epicardium, given.rim];
+        for ((name, most), offset) in OFFSETS.iter().zip(&offsets) {
+            let within = |x: f64| x.abs() <= *most;
+            if !(within(offset.value)
+                && within(offset.mean)
+                && (0.0..=20.0).contains(&offset.spread))
+            {
+                let reason = format!("it must lie within {most} mm, its spread from 0 to 20 mm");
+                return Err(refused(&format!("offsets_mm.{name}"), reason));
+            }
+        }
+        if wire.masks != wire.learnt_on.len() || !(1..=MOST_MASKS).contains(&wire.masks) {
+            let reason = format!("it must count the entries of `learnt_on`, 1 to {MOST_MASKS}");
+            return Err(refused("masks", reason));
+        }
+        let hash = |h: &String| h.len() == 64 && h.bytes().all(|b| b.is_ascii_hexdigit());
+        if !wire
+            .learnt_on
+            .iter()
+            .all(|l| hash(&l.scan) && hash(&l.mask))
+        {
+            let reason = "every scan and mask is a SHA-256 of 64 hexadecimal digits";
+            return Err(refused("learnt_on", reason));
+        }
+        Ok(Self {
+            edge,
+            offsets,
+            learnt_on: wire.learnt_on,
+        })
+    }
+}
+
+fn refused(field: &str, reason: impl Into<String>) -> ProfileError {
+    ProfileError::Field {
+        field: field.into(),
+        reason: reason.into(),
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A profile with these distances, as if learnt on one mask.
+    pub fn profile(offsets: [f64; 3]) -> ReaderProfile {
+        ReaderProfile {
+            edge: WallEdge::Apparent,
+            offsets: offsets.map(|value| ReaderOffset {
+                value,
+                mean: value,
+                spread: 0.0,
+            }),
+            learnt_on: vec![LearntOn {
+                scan: "a".repeat(64),
+                mask: "b".repeat(64),
+            }],
+        }
+    }
+
+    #[test]
+    fn a_profile_reads_back_unchanged() {
+        let written = profile([0.5, -1.25, 3.0]);
+        let text = written.to_json();
+        assert_eq!(
+            ReaderProfile::from_json(text.as_bytes()),
+            Ok(written.clone())
+        );
+        let respaced = text.replace('\n', "");
+        let read = ReaderProfile::from_json(respaced.as_bytes()).unwrap();
+        assert_eq!(read.sha256(), written.sha256());
+    }
+
+    #[test]
+    fn what_no_profile_can_hold_is_refused_by_name() {
+        let text = profile([0.5, -1.25, 3.0]).to_json();
+        for (from, to, field) in [
+            ("\"version\": 1", "\"version\": 2", "version 2"),
+            ("-1.25", "-9.25", "offsets_mm.epicardium"),
+            ("-1.25", "1e999", "profile"),
+            ("\"masks\": 1", "\"masks\": 2", "masks"),
+            ("apparent", "blurred", "edge"),
+            ("aaaa", "zzzz", "learnt_on"),
+            ("ventriform-reader", "other", "format"),
+            ("\"edge\"", "\"patient\": \"x\", \"edge\"", "patient"),
+        ] {
+            let changed = text.replacen(from, to, 1);
+            assert_ne!(changed, text);
+            let error = ReaderProfile::from_json(changed.as_bytes()).unwrap_err();
+            assert!(error.to_string().contains(field), "{error} for {to}");
+        }
+        assert!(ReaderProfile::from_json(b"").is_err());
+    }
+}
