@@ -224,10 +224,17 @@ def everything(walk, folder):
     walk.recorded["operations"]["create_template"].pop("request")
     call("post", "/v1/templates", expect=200, query="?name=healthy&model=" + template_model)
     call("get", "/v1/templates", expect=200)
+    offset = {"value": 0.5, "mean": 0.7, "spread": 0.3}
+    hashes = {"scan": "a" * 64, "mask": "b" * 64}
+    profile = {"format": "ventriform-reader-profile", "version": 1, "edge": "apparent", "masks": 1,
+               "offsets_mm": {"endocardium": offset, "epicardium": offset, "rim": offset}, "learnt_on": [hashes]}
+    _, reader = call("post", "/v1/readers", expect=201, query="?name=first", body=profile)
+    call("post", "/v1/readers", expect=200, query="?name=first", body=profile)
+    call("get", "/v1/readers", expect=200)
 
-    of_kind = {"models": model, "segmentations": segmentation, "templates": added["id"], "volumes": volume["id"]}
+    of_kind = {"models": model, "segmentations": segmentation, "templates": added["id"], "readers": reader["id"], "volumes": volume["id"]}
     for template, item in walk.contract.document["paths"].items():
-        found = re.match(r"/v1/(models|segmentations|templates|volumes)/\{id\}(/.*)?$", template)
+        found = re.match(r"/v1/(models|segmentations|templates|readers|volumes)/\{id\}(/.*)?$", template)
         if found and "get" in item and item["get"]["operationId"] not in walk.seen:
             accept = {"accept": "application/json"} if found[2] in ("/mesh", "/report") else {}
             cut = "mesh" not in template or "models" not in template

@@ -14,7 +14,7 @@ import sys, tempfile, threading, time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 FINAL = ("succeeded", "failed", "cancelled")
-SHELVES = ("volumes", "models", "segmentations", "templates")
+SHELVES = ("volumes", "models", "segmentations", "templates", "readers")
 
 
 class Service:

@@ -283,6 +283,8 @@ settings! {
     wait_limit: Span = "60s";
     /// Largest number of templates in the library
     template_limit: u32 = "50";
+    /// Largest number of readers' profiles
+    reader_limit: u32 = "200";
     /// Largest number of labels of one volume or job
     label_limit: usize = "16";
 

@@ -62,6 +62,7 @@ mod originals;
 mod pagination;
 mod problem;
 mod products;
+mod readers;
 mod readiness;
 mod request;
 mod router;

@@ -151,10 +151,10 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
             .answers::<DownloadAnswers>()
             .answers::<LookupProblems>()
     };
-    let mut routes = vec![
-        shared(mesh).served_by(get(get_mesh::<P>)),
-        shared(file).served_by(get(get_file::<P>)),
-    ];
+    let mut routes = vec![shared(file).served_by(get(get_file::<P>))];
+    if !P::MESHES.is_empty() {
+        routes.push(shared(mesh).served_by(get(get_mesh::<P>)));
+    }
     if P::FILES.contains(&REPORT) {
         let report = download(
             "report",
@@ -171,6 +171,37 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
 
 /// The file that holds the report.
 const REPORT: &str = "report.json";
+
+/// 409 where the tenant has as many products of that kind as the setting of that name allows.
+pub async fn refuse_when_full<P: ProductCollection>(
+    app: &App,
+    tenant: &Tenant,
+    limit: u32,
+    setting: &str,
+) -> Answer<()> {
+    let page = ListRequest {
+        before: None,
+        limit,
+    };
+    let filter = ItemFilter::default();
+    let page = app
+        .queue
+        .catalogue
+        .products(tenant, P::RESOURCE, &filter, page)
+        .await?;
+    if page.items.len() < limit as usize {
+        return Ok(());
+    }
+    let (noun, plural) = (P::RESOURCE.noun(), P::RESOURCE.plural());
+    Err(Problem::new(
+        StatusCode::CONFLICT,
+        "library-full",
+        format!("There are {limit} {plural} already, the most that this service allows."),
+    )
+    .fix(format!(
+        "DELETE a {noun} first, or ask the operator to raise `{setting}`."
+    )))
+}
 
 /// The program that made a product.
 #[derive(Serialize, ToSchema)]

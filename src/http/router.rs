@@ -9,12 +9,14 @@ use super::observe::{self, REQUEST_ID};
 use super::openapi::{self, DocumentFrame};
 use super::problem::not_found::no_such_path;
 use super::problem::{from_panic, method_not_allowed};
+use super::readers::{PROFILE_SIZE, Readers};
 use super::segmentations::Segmentations;
 use super::templates::{MESH_SIZE, Templates};
 use super::volumes::Volumes;
 use super::{
     audit, collection, erasures, front_page, given_webhook, health, idempotency, identities, jobs,
-    keys, legal_hold, models, originals, products, segmentations, templates, volumes, webhooks,
+    keys, legal_hold, models, originals, products, readers, segmentations, templates, volumes,
+    webhooks,
 };
 use crate::config::Settings;
 use axum::Router;
@@ -42,12 +44,14 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         collection::routes::<Models>().to_vec(),
         collection::routes::<Segmentations>().to_vec(),
         collection::routes::<Templates>().to_vec(),
+        collection::routes::<Readers>().to_vec(),
         // GET /v1/KINDS/{id}/mesh, .../report and .../{file}
         products::routes::<Models>(),
         products::routes::<Segmentations>(),
         products::routes::<Templates>(),
+        products::routes::<Readers>(),
     ];
-    let of_one_kind: [UtoipaMethodRouter<App>; 30] = [
+    let of_one_kind: [UtoipaMethodRouter<App>; 31] = [
         routes!(volumes::create_volume).layer(upload()),
         routes!(volumes::preview_volume),
         routes!(volumes::update_volume).layer(json(settings.json_limit)),
@@ -62,6 +66,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(models::create_model).layer(upload()),
         routes!(segmentations::create_segmentation).layer(upload()),
         routes!(templates::create_template).layer(json(MESH_SIZE)),
+        routes!(readers::create_reader).layer(json(PROFILE_SIZE)),
         routes!(jobs::create_job).layer(json(settings.json_limit)),
         routes!(jobs::list_jobs),
         routes!(jobs::get_job, jobs::delete_job),

@@ -6,11 +6,11 @@ use super::decoding::LITTLE_MEMORY;
 use super::openapi::{self, UploadProblems};
 use super::problem::not_found::field_names_nothing;
 use super::problem::{Answer, Problem, ProblemBody};
-use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
+use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody, refuse_when_full};
 use super::request::{json_bytes, query_pairs, refuse_unknown};
 use super::wire::{path_of, rfc3339};
 use crate::config::Size;
-use crate::jobs::{ItemFilter, ListRequest, Resource, TemplateSource, Tenant};
+use crate::jobs::{Resource, TemplateSource, Tenant};
 use crate::progress::Monitor;
 use axum::Json;
 use axum::body::Bytes;
@@ -138,7 +138,8 @@ pub async fn create_template(
     let name = value("name").or(value("model")).unwrap_or("template");
     check_name(name)?;
     let tenant = &caller.tenant;
-    refuse_when_full(&app, tenant).await?;
+    let limit = app.settings.template_limit;
+    refuse_when_full::<Templates>(&app, tenant, limit, "template_limit").await?;
     let body = json_bytes(request).await?;
     let (mesh, volume) = given_mesh(&app, tenant, value("model"), body).await?;
     let reader = app.engine.reader.clone();
@@ -181,7 +182,8 @@ async fn given_mesh(
     }
 }
 
-fn check_name(name: &str) -> Answer<()> {
+/// Refuses a name that is empty, longer than [`NAME_LENGTH`] or not printable.
+pub(super) fn check_name(name: &str) -> Answer<()> {
     let length = name.chars().count();
     if (1..=NAME_LENGTH).contains(&length) && !name.chars().any(char::is_control) {
         return Ok(());
@@ -191,28 +193,6 @@ fn check_name(name: &str) -> Answer<()> {
         format!("The name must have 1 to {NAME_LENGTH} printable characters."),
     )
     .fix("Give a short name such as t1_150."))
-}
-
-async fn refuse_when_full(app: &App, tenant: &Tenant) -> Answer<()> {
-    let limit = app.settings.template_limit;
-    let page = ListRequest {
-        before: None,
-        limit,
-    };
-    let page = app
-        .queue
-        .catalogue
-        .products(tenant, Resource::Template, &ItemFilter::default(), page)
-        .await?;
-    if page.items.len() < limit as usize {
-        return Ok(());
-    }
-    Err(Problem::new(
-        StatusCode::CONFLICT,
-        "library-full",
-        format!("The library already holds {limit} templates, the most that this service allows."),
-    )
-    .fix("DELETE a template first, or ask the operator to raise `template_limit`."))
 }
 
 /// The JSON mesh of a stored model or segmentation, with the id of its volume.

@@ -11,26 +11,30 @@ pub enum Resource {
     Segmentation,
     /// A model of the library, tried by `model=auto`.
     Template,
+    /// A reader's profile.
+    Reader,
     /// A job.
     Job,
 }
 
 impl Resource {
     /// Every kind.
-    pub const ALL: [Resource; 5] = [
+    pub const ALL: [Resource; 6] = [
         Resource::Volume,
         Resource::Model,
         Resource::Segmentation,
         Resource::Template,
+        Resource::Reader,
         Resource::Job,
     ];
 
     /// The kinds that have files.
-    pub const WITH_FILES: [Resource; 4] = [
+    pub const WITH_FILES: [Resource; 5] = [
         Resource::Volume,
         Resource::Model,
         Resource::Segmentation,
         Resource::Template,
+        Resource::Reader,
     ];
 
     /// The prefix of its ids.
@@ -40,6 +44,7 @@ impl Resource {
             Resource::Model => "mdl_",
             Resource::Segmentation => "seg_",
             Resource::Template => "tpl_",
+            Resource::Reader => "rdr_",
             Resource::Job => "job_",
         }
     }
@@ -51,6 +56,7 @@ impl Resource {
             Resource::Model => "model",
             Resource::Segmentation => "segmentation",
             Resource::Template => "template",
+            Resource::Reader => "reader",
             Resource::Job => "job",
         }
     }
@@ -62,6 +68,7 @@ impl Resource {
             Resource::Model => "models",
             Resource::Segmentation => "segmentations",
             Resource::Template => "templates",
+            Resource::Reader => "readers",
             Resource::Job => "jobs",
         }
     }

@@ -5,6 +5,7 @@
 //! | `model` | jobs of kind `model`: a volume's files to a surface model |
 //! | `segmentation` | jobs of kind `segmentation`: a stored model fitted to a volume |
 //! | `template` | a mesh to a template of the library |
+//! | `profile` | a reader's profile, checked |
 //! | `upload` | validating and previewing an uploaded volume |
 //! | [`dicom`] | DICOM objects of a stored result |
 //! | `page` | the HTML page of a stored model or segmentation |
@@ -19,6 +20,7 @@ mod model;
 mod page;
 mod parameters;
 pub mod problems;
+mod profile;
 mod segmentation;
 mod template;
 mod upload;

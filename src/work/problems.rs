@@ -14,6 +14,7 @@ use crate::locate::LocateError;
 use crate::model::{Organ, TemplateError};
 use crate::parameters::ParameterError;
 use crate::pipeline::PipelineError;
+use crate::reader::ProfileError;
 use crate::retile::RetileError;
 use crate::segmentation::{ExpertMaskError, SegmentationError};
 use crate::surface::SurfaceError;
@@ -151,6 +152,22 @@ impl Explain for PipelineError {
     }
 }
 
+impl Explain for ProfileError {
+    fn explain(&self) -> Failure {
+        let field = match self {
+            ProfileError::Syntax(_) => None,
+            ProfileError::Version(_) => Some("version"),
+            ProfileError::Field { field, .. } => Some(field.as_str()),
+        };
+        failure(
+            (Fault::Content, "unusable-profile"),
+            self,
+            field,
+            "Give the file that `ventriform calibrate` wrote.".into(),
+        )
+    }
+}
+
 impl Explain for SegmentationError {
     fn explain(&self) -> Failure {
         let (code, field, advice) = match self {
@@ -174,6 +191,19 @@ impl Explain for SegmentationError {
                 UNSUITABLE_CHOICE,
                 "model",
                 format!("Give a model of that organ, or set `organ` to {shows}."),
+            ),
+            SegmentationError::ReaderOfVentricles { .. } => (
+                UNSUITABLE_CHOICE,
+                "reader",
+                "Leave `reader` out, or set `organ` to left_ventricle.".into(),
+            ),
+            SegmentationError::ReaderOfOtherWall { learnt, asked, .. } => (
+                UNSUITABLE_CHOICE,
+                "reader",
+                format!(
+                    "Set `edge` to {learnt}, or give a profile learnt with `ventriform calibrate \
+                     --edge {asked}`."
+                ),
             ),
             SegmentationError::ExpertMask(ExpertMaskError::Empty) => (
                 (Fault::Content, "empty-mask"),
@@ -406,6 +436,17 @@ pub(super) fn mesh_missing(id: &str) -> Failure {
     )
     .at("model")
     .fix("Choose another model; GET /v1/models and /v1/templates list them.")
+}
+
+/// A reader's profile that was chosen for a segmentation and has no file any more.
+pub(super) fn profile_missing(id: &str) -> Failure {
+    Failure::new(
+        Fault::Request,
+        "invalid-field",
+        format!("The reader `{id}` has no profile any more."),
+    )
+    .at("reader")
+    .fix("Choose another reader; GET /v1/readers lists them.")
 }
 
 /// A stored model whose file cannot be read.

@@ -3,7 +3,9 @@
 use super::files::volume_files;
 use super::page;
 use super::parameters;
-use super::problems::{Explain, mesh_missing, not_exportable, unreadable_model, work_error};
+use super::problems::{
+    Explain, mesh_missing, not_exportable, profile_missing, unreadable_model, work_error,
+};
 use crate::export::{Format, read_json};
 use crate::jobs::{
     Failure, GivenParameters, Needs, OutputFile, Resource, StoredItem, Work, WorkError, WorkInput,
@@ -11,12 +13,16 @@ use crate::jobs::{
 };
 use crate::parameters::{FitParameters, Parameters};
 use crate::progress::{Monitor, Plan};
+use crate::reader::ReaderProfile;
 use crate::segmentation::{
-    NamedFile, NamedMesh, SegmentationError, SegmentationFilesError, SegmentationOrder, from_files,
+    NamedFile, NamedMesh, NamedReader, SegmentationError, SegmentationFilesError,
+    SegmentationOrder, from_files,
 };
 use crate::volume::ReadLimits;
 use serde_json::{Map, Value};
 
+/// The file of a reader's profile.
+pub(super) const PROFILE: &str = "profile.json";
 /// The file of a model that is fitted.
 const MESH: &str = "mesh.json";
 
@@ -42,8 +48,12 @@ impl Work for SegmentationWork {
         let model = id("model").filter(|(_, id)| id != FitParameters::AUTO);
         Needs {
             library: model.is_none(),
-            items: model.into_iter().chain(id("expert")).collect(),
-            files: &[MESH],
+            items: model
+                .into_iter()
+                .chain(id("expert"))
+                .chain(id("reader"))
+                .collect(),
+            files: &[MESH, PROFILE],
         }
     }
 
@@ -66,6 +76,7 @@ impl Work for SegmentationWork {
             expert: expert.as_deref(),
             models,
             named,
+            reader: reader(input)?,
             parameters: &parameters,
         };
         let made = from_files(&order, &self.limits, monitor).map_err(|error| work_error(&error))?;
@@ -131,13 +142,30 @@ fn models(
     Ok((models, false))
 }
 
+/// The reader's profile of the parameters.
+fn reader(input: &WorkInput) -> Result<Option<NamedReader>, WorkError> {
+    let Some(item) = input.items.get("reader") else {
+        return Ok(None);
+    };
+    let name = name_of(item);
+    let bytes = item.read(PROFILE).map_err(|e| unreadable_model(&e))?;
+    let bytes = bytes.ok_or_else(|| profile_missing(&item.id))?;
+    let profile = ReaderProfile::from_json(&bytes).map_err(|error| work_error(&error))?;
+    Ok(Some(NamedReader { name, profile }))
+}
+
+/// The name under which reports mention a stored item.
+fn name_of(item: &StoredItem) -> String {
+    match item.parameters.get("name").and_then(Value::as_str) {
+        Some(name) => format!("{name} ({})", item.id),
+        None => item.id.clone(),
+    }
+}
+
 /// The mesh of a stored model, with the name under which reports mention it; `None` if its file
 /// does not exist.
 fn mesh(item: &StoredItem) -> Result<Option<NamedMesh>, WorkError> {
-    let name = match item.parameters.get("name").and_then(Value::as_str) {
-        Some(name) => format!("{name} ({})", item.id),
-        None => item.id.clone(),
-    };
+    let name = name_of(item);
     let Some(bytes) = item.read(MESH).map_err(|e| unreadable_model(&e))? else {
         return Ok(None);
     };

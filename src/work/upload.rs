@@ -2,7 +2,7 @@
 
 use super::files::volume_files;
 use super::problems::Explain;
-use super::template;
+use super::{profile, template};
 use crate::jobs::{Failure, LocalFile, ScanFields, StoreError, StoredVolume, WorkOutput};
 use crate::progress::Monitor;
 use crate::volume::{self, ReadLimits, ReadOptions};
@@ -54,6 +54,12 @@ pub trait UploadReader: Send + Sync + 'static {
     /// # Errors
     /// Why the mesh cannot be fitted.
     fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure>;
+
+    /// Reads and validates a reader's profile. Returns its main figures and its file.
+    ///
+    /// # Errors
+    /// Why the profile cannot be used.
+    fn profile(&self, profile: &[u8]) -> Result<WorkOutput, Failure>;
 }
 
 /// What is known of a volume after reading it. Stored as JSON in [`StoredVolume::facts`].
@@ -173,5 +179,9 @@ impl UploadReader for DomainReader {
 
     fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure> {
         template::make(mesh, organ)
+    }
+
+    fn profile(&self, profile: &[u8]) -> Result<WorkOutput, Failure> {
+        profile::make(profile)
     }
 }

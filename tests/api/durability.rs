@@ -59,9 +59,16 @@ async fn every_accepted_job_succeeds_once_although_the_service_is_killed() {
         let made: Value = made.send().await.unwrap().json().await.unwrap();
         assert_eq!(made[list].as_array().unwrap().len(), count, "{list}");
     }
-    let folders = ["staging", "volumes", "models", "segmentations", "templates"];
+    let folders = [
+        "staging",
+        "volumes",
+        "models",
+        "segmentations",
+        "templates",
+        "readers",
+    ];
     let stored = folders.map(|name| std::fs::read_dir(data.path().join(name)).unwrap().count());
-    assert_eq!(stored, [0, 2, 8, 4, 0], "no orphans");
+    assert_eq!(stored, [0, 2, 8, 4, 0, 0], "no orphans");
 }
 
 #[tokio::test]

@@ -332,6 +332,10 @@ impl UploadReader for FakeReader {
     fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure> {
         self.0.template(mesh, organ)
     }
+
+    fn profile(&self, profile: &[u8]) -> Result<WorkOutput, Failure> {
+        self.0.profile(profile)
+    }
 }
 
 struct FakeWork(Arc<dyn Work>);

@@ -31,6 +31,7 @@ mod models;
 mod monitoring;
 mod openapi;
 mod operations;
+mod readers;
 mod receiver;
 mod records;
 mod scans;

@@ -120,6 +120,8 @@ impl Belongings {
         let fit = a.until(&fit, &["succeeded"]).await;
         let template = format!("/v1/templates?model={model}&organ=generic");
         let template = sent(a.post(&template)).await;
+        let reader = a.post("/v1/readers").json(&crate::readers::profile(1.0));
+        let reader = sent(reader).await;
         receiver.wait_for(2).await;
         let id = text(&job["id"]);
         let told = a.json(&format!("/v1/jobs/{id}/deliveries")).await;
@@ -132,6 +134,7 @@ impl Belongings {
                 ("models", model),
                 ("segmentations", text(&fit["segmentation"])),
                 ("templates", id_of(&template)),
+                ("readers", id_of(&reader)),
                 ("jobs", id),
                 ("erasures", id_of(&receipt)),
                 ("webhooks", id_of(&webhook)),
@@ -278,7 +281,14 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
             }
         } else {
             // What makes something names others' things in its body or query only; see below.
-            let known = ["volumes", "models", "segmentations", "templates", "jobs"];
+            let known = [
+                "volumes",
+                "models",
+                "segmentations",
+                "templates",
+                "readers",
+                "jobs",
+            ];
             let known = known
                 .into_iter()
                 .chain(["keys", "webhooks", "webhooks/secret"]);
@@ -304,6 +314,7 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
         ("model", "models"),
         ("model", "segmentations"),
         ("model", "templates"),
+        ("reader", "readers"),
         ("expert", "volumes"),
     ] {
         let foreign = json!({field: theirs.ids[kind]});
@@ -325,7 +336,13 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
         let now = a.json(&text(&theirs.job["links"][kind])).await;
         assert_eq!(now, *shown, "{kind}");
     }
-    for kind in ["models", "segmentations", "templates", "erasures"] {
+    for kind in [
+        "models",
+        "segmentations",
+        "templates",
+        "readers",
+        "erasures",
+    ] {
         a.json(&format!("/v1/{kind}/{}", theirs.ids[kind])).await;
     }
     let text_of = async |path: &str| a.get(path).send().await.unwrap().text().await.unwrap();

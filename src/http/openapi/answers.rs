@@ -15,6 +15,9 @@ const JOB: &str = "Job";
 /// The schema of a segmentation's report, which the document's frame registers.
 const SEGMENTATION_REPORT: &str = "SegmentationReport";
 
+/// The schema of a reader's profile, which the handlers register.
+const READER_PROFILE: &str = "ReaderProfile";
+
 type Responses = BTreeMap<String, RefOr<Response>>;
 
 /// A problem object with this status.
@@ -200,6 +203,8 @@ files! {
     SegmentationAnswer: "The mask, the mesh or the report", [meshes(), masks(), report_alone()];
     /// 200 with any of a segmentation's files.
     SegmentationFileAnswer: "The file", [meshes(), masks(), pictures(), reports(), objects()];
+    /// 200 with a reader's profile.
+    ReaderFileAnswer: "The profile", [profiles()];
     /// 200 with any of a model's files.
     ModelFileAnswer: "The file", [meshes(), reports(), objects()];
 }
@@ -287,6 +292,11 @@ fn files_of<const N: usize>(media_types: [&'static str; N]) -> Contents {
     media_types
         .map(|media_type| (media_type, Content::new(Some(binary()))))
         .into()
+}
+
+fn profiles() -> Contents {
+    let profile = Ref::from_schema_name(READER_PROFILE);
+    vec![("application/json", Content::new(Some(profile)))]
 }
 
 fn reports() -> Contents {

@@ -141,6 +141,7 @@ fn of_one_file(folder: &str, name: &str, any: &Value) -> Value {
         ("report.json", _) => report_of(folder),
         ("distance.json", _) => reference("Closeness"),
         ("polar.json", _) => reference("PolarMap"),
+        ("profile.json", _) => reference("ReaderProfile"),
         (_, "model/gltf+json") => json!({"type": "object"}),
         (_, "text/html" | "image/svg+xml") => json!({"type": "string"}),
         _ => binary(),

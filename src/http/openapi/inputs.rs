@@ -402,6 +402,18 @@ impl IntoParams for ConditionalHeaders {
     }
 }
 
+/// `name` of a reader.
+pub struct ReaderQuery;
+
+impl IntoParams for ReaderQuery {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let name = ObjectBuilder::new().schema_type(Type::String);
+        let name = Schema::from(name.min_length(Some(1)).max_length(Some(80)));
+        let summary = "The name that reports show; not a person's name, if results leave the house";
+        vec![query("name", summary).schema(Some(name)).build()]
+    }
+}
+
 /// `name`, `organ` and `model` of a template.
 pub struct TemplateQuery;
 

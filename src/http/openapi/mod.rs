@@ -25,8 +25,8 @@ mod reports;
 pub use answers::{
     DicomProblems, DownloadAnswers, EraseProblems, EventsAnswer, FileProblems, HoldProblems,
     IdentityProblems, ListProblems, LookupProblems, MeshAnswer, ModelFileAnswer, OriginalAnswer,
-    PatchProblems, ReportAnswer, ScopeProblems, SegmentationAnswer, SegmentationFileAnswer,
-    UnchangedAnswer, UploadProblems, WaitAnswers,
+    PatchProblems, ReaderFileAnswer, ReportAnswer, ScopeProblems, SegmentationAnswer,
+    SegmentationFileAnswer, UnchangedAnswer, UploadProblems, WaitAnswers,
 };
 pub use bodies::{
     HoldRequest, JobParameters, JobRequest, MeshDocument, SegmentationForm, StatedScanSchema,
@@ -35,12 +35,13 @@ pub use bodies::{
 pub use inputs::{
     CachedHeaders, CascadeParameter, ConditionalHeaders, DeidentifyParameter, ErasureParameters,
     EventHeader, IdempotencyHeader, ModelParametersObject, ModelQuery, PageParameters,
-    PreferHeader, ScanParameters, SegmentationParametersObject, SegmentationQuery, TagParameters,
-    TemplateQuery, WebhookInputs,
+    PreferHeader, ReaderQuery, ScanParameters, SegmentationParametersObject, SegmentationQuery,
+    TagParameters, TemplateQuery, WebhookInputs,
 };
 pub use operation::Documented;
 pub use reports::{
-    ModelSummarySchema, ScanSchema, SegmentationSummarySchema, TemplateSummarySchema,
+    ModelSummarySchema, ReaderProfileSchema, ReaderSummarySchema, ScanSchema,
+    SegmentationSummarySchema, TemplateSummarySchema,
 };
 
 use utoipa::OpenApi;
@@ -64,6 +65,7 @@ use utoipa::openapi::{RefOr, Required};
         (name = "models", description = "Surface models, and one request from volume to model"),
         (name = "segmentations", description = "Models fitted to volumes, and one request from volume to segmentation"),
         (name = "templates", description = "The library of models that `auto` chooses from"),
+        (name = "readers", description = "How readers draw the wall: profiles that segmentations can be drawn by"),
         (name = "webhooks", description = "Telling other programs about jobs"),
         (name = "access", description = "Keys and the audit trail, for the scope `admin`"),
         (name = "erasures", description = "Receipts of what was erased"),

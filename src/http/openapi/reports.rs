@@ -597,6 +597,86 @@ schemas! {
         length_mm: Option<f64>,
     }
 
+    /// What a reader's profile holds.
+    ReaderSummarySchema as ReaderSummary {
+        /// The wall that the distances start from: `apparent` or `anatomical`.
+        edge: String,
+        /// Number of masks that it was learnt on.
+        masks: u64,
+        /// The distances that are applied, mm.
+        offsets_mm: ReaderOffsetsReport,
+    }
+
+    /// How far a reader's wall lies from the fitted one, mm.
+    ReaderOffsetsReport as ReaderOffsets {
+        /// How far the inner surface lies farther out.
+        endocardium: f64,
+        /// How far the outer surface lies farther out.
+        epicardium: f64,
+        /// How far the rim lies farther towards the base.
+        rim: f64,
+    }
+
+    /// A reader's profile, as `ventriform calibrate` writes it.
+    ReaderProfileSchema as ReaderProfile {
+        /// `ventriform-reader-profile`.
+        format: String,
+        /// 1.
+        version: u64,
+        /// The wall that the distances start from: `apparent` or `anatomical`.
+        edge: String,
+        /// Number of masks that it was learnt on: the length of `learnt_on`.
+        masks: u64,
+        /// The distances, mm.
+        offsets_mm: LearntOffsetsSchema,
+        /// What it was learnt on.
+        learnt_on: Vec<LearntOnSchema>,
+    }
+
+    /// The distances of a reader's profile.
+    LearntOffsetsSchema as LearntOffsets {
+        /// Inner surface, outward.
+        endocardium: LearntOffsetSchema,
+        /// Outer surface, outward.
+        epicardium: LearntOffsetSchema,
+        /// Rim, towards the base.
+        rim: LearntOffsetSchema,
+    }
+
+    /// One distance of a reader's profile, mm.
+    LearntOffsetSchema as LearntOffset {
+        /// What is applied: the mean, drawn towards zero.
+        value: f64,
+        /// Mean over the masks.
+        mean: f64,
+        /// Standard deviation over the masks.
+        spread: f64,
+    }
+
+    /// A scan and its mask that a profile was learnt on.
+    LearntOnSchema as LearntOn {
+        /// SHA-256 of the scan's file, hexadecimal.
+        scan: String,
+        /// SHA-256 of the mask's file, hexadecimal.
+        mask: String,
+    }
+
+    /// The reader's profile that a wall was drawn by.
+    AppliedReaderReport as AppliedReader {
+        /// Its name.
+        name: String,
+        /// SHA-256 of the profile, hexadecimal.
+        sha256: String,
+        /// The wall that the distances start from.
+        edge: String,
+        /// Number of masks that it was learnt on.
+        masks: u64,
+        /// The distances, mm.
+        offsets_mm: ReaderOffsetsReport,
+        /// Share of the distances that was applied: 1 unless the surface would intersect itself.
+        share_applied: f64,
+    }
+
     /// The main figures of a segmentation; the report has all.
     SegmentationSummarySchema as SegmentationSummary {
         /// Name of the fitted model.
@@ -647,6 +727,8 @@ schemas! {
         thickness_mm: Option<ThicknessesReport>,
         /// Full width at half maximum of the image's point response; ventricles only.
         resolution_mm: Option<ResolutionReport>,
+        /// The reader's profile that the shown wall was drawn by.
+        reader: Option<AppliedReaderReport>,
         /// Agreement with the expert's mask.
         measures: Option<AgreementReport>,
         /// Uptake of the wall; ventricles only.

@@ -39,6 +39,7 @@ fn erased(resource: Resource, id: &str, at: Timestamp) -> Problem {
             "Send the same volume with the same parameters again; the result gets the same id."
         }
         Resource::Template => "Add the same mesh again; it gets the same id.",
+        Resource::Reader => "Add the same profile again; it gets the same id.",
         Resource::Job => "File a new job.",
     };
     Problem::new(

@@ -47,7 +47,7 @@ impl RetentionAges {
             Resource::Volume => self.volumes,
             Resource::Model | Resource::Segmentation => self.results,
             Resource::Job => self.jobs,
-            Resource::Template => None,
+            Resource::Template | Resource::Reader => None,
         };
         age.map(|age| renewed.saturating_add(milliseconds(age)))
     }

@@ -80,21 +80,55 @@ impl Queue {
             .map(|(key, value)| (key.to_owned(), Value::from(value)))
             .into_iter()
             .collect();
-        let origin = [organ];
         let made = (source.tenant, Resource::Template);
-        let template = self.product(made, &origin, None, parameters, &output);
+        let template = self.product(made, &[organ], None, parameters, &output);
+        self.add_product(template, source, output).await
+    }
+
+    /// Adds a reader's profile, durably. Returns the record, and whether it is new: the same profile is
+    /// the same reader, whatever its name.
+    ///
+    /// # Errors
+    /// If the files or the record cannot be written.
+    pub async fn add_reader(
+        self: &Arc<Self>,
+        tenant: &Tenant,
+        name: &str,
+        output: WorkOutput,
+    ) -> Result<(Held<Product>, bool), StoreError> {
+        self.blobs.require_room(0)?;
+        let parameters = [("name".to_owned(), Value::from(name))]
+            .into_iter()
+            .collect();
+        let made = (tenant, Resource::Reader);
+        let reader = self.product(made, &[], None, parameters, &output);
+        let source = TemplateSource {
+            tenant,
+            name,
+            volume: None,
+        };
+        self.add_product(reader, source, output).await
+    }
+
+    /// Adds a product that no job made.
+    async fn add_product(
+        self: &Arc<Self>,
+        product: Product,
+        source: TemplateSource<'_>,
+        output: WorkOutput,
+    ) -> Result<(Held<Product>, bool), StoreError> {
         let (queue, tenant) = (self.clone(), source.tenant.clone());
         let volume = source.volume.map(str::to_owned);
         to_its_end(async move {
-            let _lock = queue.items.lock(&template.id).await;
-            queue.items.unsettle(&template.id);
-            queue.write_files(&template, &output).await?;
+            let _lock = queue.items.lock(&product.id).await;
+            queue.items.unsettle(&product.id);
+            queue.write_files(&product, &output).await?;
             let new = queue
                 .catalogue
-                .add_product(&template, &tenant, volume.as_deref())
+                .add_product(&product, &tenant, volume.as_deref())
                 .await?;
-            queue.items.settle(&template.id);
-            let stored = queue.catalogue.product(&tenant, &template.id).await?;
+            queue.items.settle(&product.id);
+            let stored = queue.catalogue.product(&tenant, &product.id).await?;
             Ok((stored.ok_or_else(vanished)?, new))
         })
         .await
