@@ -4,7 +4,9 @@ use super::Bar;
 use super::cohort_args::CohortArgs;
 use crate::deform::DeformParameters;
 use crate::deform::elastic::{Stiffness, SupportScaling};
+use crate::evaluate::parameters::InSample;
 use crate::evaluate::rows::{self, Gold, Variant};
+use crate::evaluate::sample::Sample;
 use crate::evaluate::table::Evaluation;
 use crate::evaluate::{
     EvaluateError, EvaluationObserver, EvaluationParameters, EvaluationStep, evaluate,
@@ -73,6 +75,13 @@ pub struct EvaluateArgs {
     /// Skip the alignment of the model as a whole, as for models that are placed by hand
     #[arg(long, help_heading = "Experiment")]
     no_align: bool,
+    /// Choose model, number of points and reader's profile for each case without that case, and judge
+    /// templates by the models of the others
+    #[arg(long)]
+    leave_one_out: bool,
+    /// Cases that the program's constants were chosen on, or all: their figures are labelled in-sample
+    #[arg(long, value_name = "CASE,...|all", value_delimiter = ',')]
+    in_sample: Vec<String>,
     /// Folder for the results (created if missing)
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -126,6 +135,11 @@ impl EvaluateArgs {
                 },
                 ..DeformParameters::default()
             },
+            in_sample: match self.in_sample.as_slice() {
+                [word] if word == "all" => InSample::All,
+                names => InSample::Named(names.to_vec()),
+            },
+            leave_one_out: self.leave_one_out,
         }
     }
 }
@@ -143,7 +157,10 @@ impl EvaluationObserver for Bar {
 pub fn run(args: &EvaluateArgs) -> Result<()> {
     let parameters = args.parameters();
     parameters.validate().map_err(with_advice)?;
-    let cohort = args.cohort.open()?;
+    let mut cohort = args.cohort.open()?;
+    if args.leave_one_out {
+        cohort.judge_templates();
+    }
     // Another build may fit otherwise.
     let program = std::env::current_exe().and_then(std::fs::read);
     let bar = Bar::start();
@@ -181,8 +198,9 @@ fn print_summary(evaluation: &Evaluation) {
         for gold in Gold::ALL {
             if let Some(cell) = rows::mean(rows::of_kind(rows, None, kind), gold) {
                 line += &format!(
-                    "; {} E_J {:.3} (least {:.3}), E_CD {:.3}",
+                    "; {}, {}: E_J {:.3} (least {:.3}), E_CD {:.3}",
                     gold.as_str(),
+                    cell.sample.as_str(),
                     cell.jaccard,
                     cell.least,
                     cell.contour.unwrap_or(f64::NAN)
@@ -190,5 +208,16 @@ fn print_summary(evaluation: &Evaluation) {
             }
         }
         eprintln!("{line}");
+    }
+    if let Some(found) = &evaluation.leave_one_out {
+        let [held_out, in_sample] = found.means().map(|mean| mean.unwrap_or(f64::NAN));
+        eprintln!(
+            "model chosen without the case: held-out E_J {held_out:.3}; with it: in-sample {in_sample:.3}"
+        );
+    }
+    if let Some(made) = &evaluation.reader {
+        for sample in [Sample::HeldOut, Sample::InSample] {
+            eprint!("reader's profile: {}", super::calibrate::gain(made, sample));
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 mod audit;
 mod bar;
+mod calibrate;
 mod cohort_args;
 mod demo;
 mod dicom_args;
@@ -47,6 +48,7 @@ enum Command {
     Segment(Box<segment::SegmentArgs>),
     Inspect(inspect::InspectArgs),
     Measure(measure::MeasureArgs),
+    Calibrate(Box<calibrate::CalibrateArgs>),
     Evaluate(Box<evaluate::EvaluateArgs>),
     Templates(templates::TemplatesArgs),
     Statistics(statistics::StatisticsArgs),
@@ -74,6 +76,7 @@ pub fn main() -> ExitCode {
         Command::Segment(args) => segment::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Measure(args) => measure::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Templates(args) => templates::run(&args),
         Command::Statistics(args) => statistics::run(&args),

@@ -112,6 +112,13 @@ impl Cohort {
         Ok(cohort)
     }
 
+    /// Makes templates patients, too: each is judged by the models of the others.
+    pub fn judge_templates(&mut self) {
+        self.patients.extend(self.templates.iter().cloned());
+        self.patients.sort();
+        self.patients.dedup();
+    }
+
     fn problem(&mut self, case: &str, what: &str) {
         self.problems.push((case.to_owned(), what.to_owned()));
     }
@@ -193,10 +200,7 @@ impl Cohort {
 
     /// The file `stem` of a case, in the first format that exists.
     fn file(&self, case: &str, stem: &str) -> Option<PathBuf> {
-        ["nii.gz", "nii", "dcm"]
-            .iter()
-            .map(|ending| self.folder.join(case).join(format!("{stem}.{ending}")))
-            .find(|path| path.is_file())
+        case_file(&self.folder, case, stem)
     }
 
     /// A case's scan.
@@ -218,6 +222,14 @@ impl Cohort {
             Some((self.scan(template)?, "the scan, by threshold"))
         }
     }
+}
+
+/// The file `stem` of the folder `case` in `folder`, in the first format that exists.
+pub fn case_file(folder: &Path, case: &str, stem: &str) -> Option<PathBuf> {
+    ["nii.gz", "nii", "dcm"]
+        .iter()
+        .map(|ending| folder.join(case).join(format!("{stem}.{ending}")))
+        .find(|path| path.is_file())
 }
 
 /// Reads a volume of a cohort: a file of one frame.

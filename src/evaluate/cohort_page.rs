@@ -4,9 +4,12 @@
 
 use maud::{Markup, html};
 
+use super::calibration::CaseFigures;
 use super::findings::FindingVerdict;
+use super::leave_one_out::Candidate;
 use super::rows::{self, Cell, FitRow, Gold, ModelKind, ModelRow, Variant};
-use super::table::{Evaluation, table1};
+use super::sample::Sample;
+use super::table::{Evaluation, OF_MODELS, table1};
 use crate::draw::chart::{self, Series};
 use crate::draw::document::HtmlDocument;
 use crate::draw::text::data_uri;
@@ -23,6 +26,8 @@ pub fn cohort_page(evaluation: &Evaluation) -> String {
             (findings(evaluation))
             (figure3(&evaluation.models))
             @for gold in Gold::ALL { (agreement(&evaluation.rows, gold)) }
+            (leave_one_out(evaluation))
+            (reader(evaluation))
             (pictures(evaluation))
         },
         turning: false,
@@ -84,6 +89,7 @@ fn findings(evaluation: &Evaluation) -> Markup {
                                 .bad[finding.verdict == FindingVerdict::Refuted] {
                                 (finding.verdict.as_str())
                             }
+                            td.text { (finding.sample.as_str()) }
                             td.text { (finding.figures) }
                         }
                     }
@@ -130,7 +136,7 @@ fn figure3(models: &[ModelRow]) -> Markup {
     };
     html! {
         section {
-            h2 { "Figure 3: mean fitness of the models" }
+            h2 { "Figure 3: mean fitness of the models (" (OF_MODELS.as_str()) ")" }
             p {
                 "Over the templates; higher is better. The paper gives neither units nor floors, "
                 "so only the shapes of the curves can be compared with its figure. The reciprocals "
@@ -160,7 +166,7 @@ fn agreement(rows: &[FitRow], gold: Gold) -> Markup {
     };
     html! {
         section {
-            h2 { (title) }
+            h2 { (title) " (" (sample(rows).as_str()) ")" }
             @if rows.iter().any(|r| r.golds[gold as usize]) {
                 p { (about) }
                 div.row.beside {
@@ -175,7 +181,7 @@ fn agreement(rows: &[FitRow], gold: Gold) -> Markup {
                         &curves(rows, gold, |c| c.contour),
                     ))
                 }
-                h3 { "Table 1 against " (gold.file()) ": E_J / E_CD (voxels)" }
+                h3 { "Table 1 against " (gold.file()) ": E_J / E_CD (voxels), " (sample(rows).as_str()) }
                 (table_by_template(rows, gold))
             } @else {
                 p { "No patient has " (gold.file()) "." }
@@ -222,7 +228,7 @@ fn table_line(rows: &[FitRow], case: &str, cells: &[(ModelKind, Option<Cell>)]) 
         .fold(0.0, f64::max);
     html! {
         tr.mean[case == "mean"] {
-            th scope="row" { (case) }
+            th scope="row" { (case) " " span.soft { (line_sample(cells)) } }
             @for (_, cell) in cells {
                 @match cell {
                     Some(Cell { jaccard, contour: Some(contour), .. }) => {
@@ -232,6 +238,100 @@ fn table_line(rows: &[FitRow], case: &str, cells: &[(ModelKind, Option<Cell>)]) 
                     }
                     Some(cell) => { td.n { (format_args!("{:.3} / -", cell.jaccard)) } }
                     None => { td { (why_empty(rows, case)) } }
+                }
+            }
+        }
+    }
+}
+
+/// The sample of figures over all rows.
+fn sample(rows: &[FitRow]) -> Sample {
+    let samples = rows.iter().map(|r| r.sample);
+    samples.fold(Sample::HeldOut, Sample::and)
+}
+
+/// The sample of a line of Table 1.
+fn line_sample(cells: &[(ModelKind, Option<Cell>)]) -> &'static str {
+    let samples = cells.iter().filter_map(|(_, cell)| Some((*cell)?.sample));
+    samples.reduce(Sample::and).map_or("", Sample::as_str)
+}
+
+fn leave_one_out(evaluation: &Evaluation) -> Markup {
+    let Some(found) = &evaluation.leave_one_out else {
+        return html! {};
+    };
+    let name = |m: &Candidate| {
+        format!(
+            "{}, {}, {}",
+            m.template,
+            m.kind.variant.title(),
+            m.kind.points
+        )
+    };
+    let figure = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
+    let [held_out, in_sample] = found.means();
+    html! {
+        section {
+            h2 { "The model chosen for each case without it" }
+            p {
+                "Held-out: E_J of the model that is best over the other cases. In-sample: that of the \
+                 model that is best over all cases (" (name(&found.best)) ")."
+            }
+            table.agreement {
+                thead { tr { th { "case" } th { "model" } th.n { "held-out" } th.n { "in-sample" } } }
+                tbody {
+                    @for choice in &found.choices {
+                        tr {
+                            th scope="row" { (choice.case) }
+                            td.text { (name(&choice.chosen)) }
+                            td.n { (figure(Some(choice.held_out))) }
+                            td.n { (figure(choice.in_sample)) }
+                        }
+                    }
+                    tr.mean {
+                        th scope="row" { "mean" }
+                        td {}
+                        td.n { (figure(held_out)) }
+                        td.n { (figure(in_sample)) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn reader(evaluation: &Evaluation) -> Markup {
+    let Some(made) = &evaluation.reader else {
+        return html! {};
+    };
+    let offsets = made.profile.offsets();
+    let figure = |f: &CaseFigures| format!("{:.3} / {:.3}", f.jaccard, f.contour);
+    html! {
+        section {
+            h2 { "The reader's profile" }
+            p {
+                "Learnt on " (made.profile.masks()) " masks: endocardium "
+                (format_args!("{:+.2}", offsets.endocardium)) ", epicardium "
+                (format_args!("{:+.2}", offsets.epicardium)) " mm outward, rim "
+                (format_args!("{:+.2}", offsets.rim)) " mm towards the base. E_J / E_CD of the built-in "
+                "model without a profile, by a profile learnt on the other masks (held-out), and by the "
+                "one that has seen the case (in-sample)."
+            }
+            table.agreement {
+                thead {
+                    tr {
+                        th { "case" } th.n { "without" } th.n { "held-out" } th.n { "in-sample" }
+                    }
+                }
+                tbody {
+                    @for row in &made.rows {
+                        tr {
+                            th scope="row" { (row.case) }
+                            td.n { (figure(&row.without)) }
+                            td.n { @if let Some(f) = &row.held_out { (figure(f)) } @else { "-" } }
+                            td.n { (figure(&row.in_sample)) }
+                        }
+                    }
                 }
             }
         }
@@ -347,5 +447,6 @@ mod tests {
         assert!(page.contains("0.000 / -") && page.contains("<td>unreadable</td>"));
         assert!(page.contains("data:image/png;base64,AQID"));
         assert!(page.contains("What is missing"));
+        assert!(page.contains("(voxels), held-out"));
     }
 }

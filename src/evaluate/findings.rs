@@ -1,6 +1,8 @@
 //! Whether the results confirm the paper's findings, each as a claim, a verdict and figures.
 
+use super::paired::PairedDifference;
 use super::rows::{self, FitRow, Gold, ModelKind, ModelRow, Variant};
+use super::sample::Sample;
 
 /// Whether the results agree with a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,6 +43,8 @@ pub struct Finding {
     pub verdict: FindingVerdict,
     /// The figures that decide it.
     pub figures: String,
+    /// Whether the cases behind them had a part in what is judged.
+    pub sample: Sample,
 }
 
 /// All findings of the paper's evaluation.
@@ -78,6 +82,8 @@ fn flips_raise_fitness(models: &[ModelRow]) -> Finding {
             "gain in the raw form {least:.1} to {most:.1} % over {} models",
             gains.len()
         ),
+        // Each model is measured against the surface that it was made of.
+        sample: Sample::InSample,
     }
 }
 
@@ -103,31 +109,50 @@ fn best(curve: &[(usize, f64)]) -> Option<(usize, f64)> {
 /// The claim holds where all numbers of points whose mean E_J is within [`NOTICEABLE`] of the greatest
 /// lie between 110 and 200, and fails where none of them does. A curve that is flat across a border of
 /// that range, or ends there, decides nothing.
+/// The sample of figures over all rows.
+fn sample_of(rows: &[FitRow]) -> Sample {
+    let samples = rows.iter().map(|r| r.sample);
+    samples.fold(Sample::HeldOut, Sample::and)
+}
+
+/// With fewer patients, nothing about a difference can be told.
+const LEAST_PATIENTS: usize = 6;
+
 fn best_number(rows: &[FitRow]) -> Finding {
     let curve = curve(rows, Variant::Optimised);
+    let kind = |points: usize| ModelKind {
+        variant: Variant::Optimised,
+        points,
+    };
     let top = best(&curve);
-    let claimed = |c: &&(usize, f64)| (110..=200).contains(&c.0);
-    let good: Vec<&(usize, f64)> = top.map_or_else(Vec::new, |top| {
-        let good = |c: &&(usize, f64)| top.1 - c.1 <= NOTICEABLE;
-        curve.iter().filter(good).collect()
+    let alike: Vec<usize> = top.map_or_else(Vec::new, |top| {
+        let cannot_be_told = |points: &usize| {
+            let found = PairedDifference::of(&differences(rows, kind(top.0), kind(*points)));
+            found.is_none_or(|d| d.count < LEAST_PATIENTS || d.may_be_none())
+        };
+        curve.iter().map(|c| c.0).filter(cannot_be_told).collect()
     });
-    let enough = good.first().copied();
-    let within = good.iter().copied().filter(claimed).count();
+    let claimed = |n: &usize| (110..=200).contains(n);
+    let within = alike.iter().filter(|n| claimed(n)).count();
     let beyond_both = curve.iter().any(|c| c.0 < 110) && curve.iter().any(|c| c.0 > 200);
     let holds = match within {
-        0 => curve.iter().any(|c| claimed(&c)).then_some(false),
-        n => (n == good.len() && beyond_both).then_some(true),
+        0 => curve.iter().any(|c| claimed(&c.0)).then_some(false),
+        n => (n == alike.len() && beyond_both).then_some(true),
     };
     Finding {
         claim: "The best number of points lies between 110 and 200.",
         verdict: FindingVerdict::of(holds),
-        figures: enough.zip(top).map_or_else(String::new, |(enough, top)| {
+        figures: top.map_or_else(String::new, |top| {
+            let alike: Vec<String> = alike.iter().map(usize::to_string).collect();
             format!(
-                "{} points are the least that are as good as any (E_J {:.3}, within \
-                 {NOTICEABLE}); the greatest mean, {:.3}, is that of {}",
-                enough.0, enough.1, top.1, top.0
+                "the greatest mean E_J, {:.4}, is that of {} points; {} cannot be told from it (paired \
+                 bootstrap over the patients, 95 %)",
+                top.1,
+                top.0,
+                alike.join(", ")
             )
         }),
+        sample: sample_of(rows),
     }
 }
 
@@ -137,40 +162,69 @@ const NOTICEABLE: f64 = 0.005;
 fn more_points_hurt(rows: &[FitRow]) -> Finding {
     let curve = curve(rows, Variant::Optimised);
     let most = curve.last().copied().filter(|c| c.0 > 200);
-    let best = best(&curve);
-    let holds = most
-        .zip(best)
-        .map(|(most, best)| best.1 - most.1 > NOTICEABLE);
+    let fewer: Vec<(usize, f64)> = curve.iter().copied().filter(|c| c.0 <= 200).collect();
+    let kind = |points: usize| ModelKind {
+        variant: Variant::Optimised,
+        points,
+    };
+    let found = most.zip(best(&fewer)).and_then(|(most, best)| {
+        let lost = differences(rows, kind(best.0), kind(most.0));
+        Some((most, best, PairedDifference::of(&lost)?))
+    });
+    let holds = found.and_then(|(_, _, lost)| {
+        let told = lost.count >= LEAST_PATIENTS;
+        match lost.interval {
+            [low, _] if told && low > 0.0 && lost.mean > NOTICEABLE => Some(true),
+            [_, high] if told && high < NOTICEABLE => Some(false),
+            _ => None,
+        }
+    });
     Finding {
         claim: "More than 200 points hurt.",
         verdict: FindingVerdict::of(holds),
-        figures: most.zip(best).map_or_else(String::new, |(most, best)| {
+        figures: found.map_or_else(String::new, |(most, best, lost)| {
             format!(
-                "mean E_J {:.3} at {} points, {:.3} at the best number, {}",
-                most.1, most.0, best.1, best.0
+                "mean E_J {:.4} at {} points, {:.4} at the best number up to 200, {}: lost {}",
+                most.1,
+                most.0,
+                best.1,
+                best.0,
+                described(&lost)
             )
         }),
+        sample: sample_of(rows),
     }
 }
 
-/// Differences of E_J (new minus old) over the pairs of fits that differ in the kind alone.
-fn differences(rows: &[FitRow], new: ModelKind, old: ModelKind) -> Vec<f64> {
-    rows::of_kind(rows, None, new)
-        .filter_map(|row| {
-            let other =
-                rows::of_kind(rows, Some(&row.template), old).find(|o| o.case == row.case)?;
-            Some(row.jaccard(Gold::Expert)? - other.jaccard(Gold::Expert)?)
-        })
-        .collect()
+/// A difference with its interval and its signs.
+fn described(d: &PairedDifference) -> String {
+    format!(
+        "{:+.4} (95 % interval {:+.4} to {:+.4}; {} of {} patients up, sign test p = {:.2})",
+        d.mean, d.interval[0], d.interval[1], d.signs[0], d.count, d.p
+    )
 }
 
-fn compare(
-    rows: &[FitRow],
-    claim: &'static str,
-    old: Variant,
-    accept: impl Fn(f64) -> bool,
-) -> Finding {
-    let mut holds = None;
+/// Differences of E_J (new minus old), one for each patient: means over the pairs of fits that differ in
+/// the kind alone. Pairs of one patient say the same thing several times.
+fn differences(rows: &[FitRow], new: ModelKind, old: ModelKind) -> Vec<f64> {
+    let cases = rows::distinct(rows, |r| r.case.clone());
+    let of_case = |case: &String| {
+        let own = rows::of_kind(rows, None, new).filter(|row| row.case == *case);
+        let pairs: Vec<f64> = own
+            .filter_map(|row| {
+                let other =
+                    rows::of_kind(rows, Some(&row.template), old).find(|o| o.case == row.case)?;
+                Some(row.jaccard(Gold::Expert)? - other.jaccard(Gold::Expert)?)
+            })
+            .collect();
+        rows::average(&pairs)
+    };
+    cases.iter().filter_map(of_case).collect()
+}
+
+/// A claim that `new` minus `old` exceeds `least`, at every number of points.
+fn compare(rows: &[FitRow], claim: &'static str, old: Variant, least: f64) -> Finding {
+    let mut verdicts = Vec::new();
     let mut figures = Vec::new();
     for new in rows::kinds(rows) {
         if new.variant != Variant::Optimised {
@@ -180,33 +234,38 @@ fn compare(
             variant: old,
             ..new
         };
-        let found = differences(rows, new, old);
-        let Some(mean) = rows::average(&found) else {
+        let Some(found) = PairedDifference::of(&differences(rows, new, old)) else {
             continue;
         };
-        let wins = found.iter().filter(|d| **d > 0.0).count();
-        holds = Some(holds.unwrap_or(true) && accept(mean));
-        figures.push(format!(
-            "N = {}: {mean:+.4} in the mean, better in {wins} of {}",
-            new.points,
-            found.len()
-        ));
+        let told = found.count >= LEAST_PATIENTS;
+        verdicts.push(match found.interval {
+            [low, _] if told && low > least => Some(true),
+            [_, high] if told && high < least => Some(false),
+            _ => None,
+        });
+        figures.push(format!("N = {}: {}", new.points, described(&found)));
     }
+    let holds = match verdicts.is_empty() {
+        true => None,
+        false if verdicts.contains(&Some(false)) => Some(false),
+        false => verdicts.iter().all(|v| *v == Some(true)).then_some(true),
+    };
     Finding {
         claim,
         verdict: FindingVerdict::of(holds),
         figures: figures.join("; "),
+        sample: sample_of(rows),
     }
 }
 
 fn new_models_beat_the_reference(rows: &[FitRow]) -> Finding {
     let claim = "New models segment better than the reference model of as many points (E_J).";
-    compare(rows, claim, Variant::Reference, |mean| mean > 0.0)
+    compare(rows, claim, Variant::Reference, 0.0)
 }
 
 fn flips_help_the_fit(rows: &[FitRow]) -> Finding {
     let claim = "Models after the flips segment no worse than after re-tiling alone (E_J).";
-    compare(rows, claim, Variant::Retiled, |mean| mean > -NOTICEABLE)
+    compare(rows, claim, Variant::Retiled, -NOTICEABLE)
 }
 
 #[cfg(test)]
@@ -220,6 +279,24 @@ mod tests {
         found.iter().find(of).unwrap().verdict
     }
 
+    /// Eight patients, each of whom differs from the curve by as much at every number of points, but
+    /// for `noise`.
+    fn patients(variant: Variant, curve: &[(usize, f64)], noise: f64) -> Vec<FitRow> {
+        let mut rows = Vec::new();
+        for patient in 0..8usize {
+            for (place, (n, j)) in curve.iter().enumerate() {
+                let by_chance = if (patient + place) % 2 == 0 {
+                    noise
+                } else {
+                    -noise
+                };
+                let own = j + 0.01 * patient as f64 - 0.035 + by_chance;
+                rows.push(row(&format!("p{patient}"), variant, *n, Some(own)));
+            }
+        }
+        rows
+    }
+
     #[test]
     fn the_papers_own_curve_confirms_its_findings() {
         let curve = [
@@ -229,11 +306,9 @@ mod tests {
             (200, 0.748),
             (300, 0.649),
         ];
-        let mut rows: Vec<FitRow> = curve
-            .map(|(n, j)| row("p1", Variant::Optimised, n, Some(j)))
-            .into();
+        let mut rows = patients(Variant::Optimised, &curve, 0.0);
         assert_eq!(verdict(&rows, "reference model"), FindingVerdict::Open);
-        rows.push(row("p1", Variant::Reference, 67, Some(0.6)));
+        rows.extend(patients(Variant::Reference, &[(67, 0.6)], 0.0));
         for claim in ["between 110 and 200", "hurt", "reference model"] {
             assert_eq!(verdict(&rows, claim), FindingVerdict::Confirmed, "{claim}");
         }
@@ -242,27 +317,41 @@ mod tests {
             verdict(&rows, "raise the mean fitness"),
             FindingVerdict::Open
         );
+        // One patient tells nothing.
+        rows.retain(|r| r.case == "p0");
+        for claim in ["between 110 and 200", "hurt", "reference model"] {
+            assert_eq!(verdict(&rows, claim), FindingVerdict::Open, "{claim}");
+        }
     }
 
     #[test]
     fn a_flat_curve_refutes_that_more_points_hurt() {
-        let rows = [150, 300].map(|n| row("p1", Variant::Optimised, n, Some(0.8)));
+        let rows = patients(Variant::Optimised, &[(150, 0.8), (300, 0.8)], 0.001);
         assert_eq!(verdict(&rows, "hurt"), FindingVerdict::Refuted);
         assert_eq!(verdict(&rows, "between 110"), FindingVerdict::Open);
+        let noisy = patients(Variant::Optimised, &[(150, 0.8), (300, 0.8)], 0.02);
+        assert_eq!(verdict(&noisy, "hurt"), FindingVerdict::Open);
     }
 
     #[test]
-    fn a_flat_curve_decides_nothing_about_the_best_number() {
-        let verdict_of = |curve: &[(usize, f64)]| {
-            let row = |(n, j): &(usize, f64)| row("p1", Variant::Optimised, *n, Some(*j));
-            let rows: Vec<FitRow> = curve.iter().map(row).collect();
-            verdict(&rows, "between 110")
+    fn the_best_number_is_a_range_that_the_patients_cannot_tell_apart() {
+        let found = |curve: &[(usize, f64)], noise: f64| {
+            let rows = patients(Variant::Optimised, curve, noise);
+            let found = findings(&rows, &[]);
+            let found = found.iter().find(|f| f.claim.contains("between 110"));
+            found.unwrap().clone()
         };
-        let flat = [(67, 0.84), (110, 0.843), (200, 0.844), (300, 0.844)];
-        assert_eq!(verdict_of(&flat), FindingVerdict::Open);
+        let flat = [(67, 0.82), (110, 0.843), (200, 0.844), (300, 0.844)];
+        let flat = found(&flat, 0.004);
+        assert_eq!(flat.verdict, FindingVerdict::Open);
+        assert!(
+            flat.figures.contains("110, 200, 300 cannot be told"),
+            "{flat:?}"
+        );
+        assert_eq!(flat.sample, Sample::HeldOut);
         let rising = [(67, 0.7), (110, 0.75), (200, 0.78), (300, 0.8)];
-        assert_eq!(verdict_of(&rising), FindingVerdict::Refuted);
+        assert_eq!(found(&rising, 0.0).verdict, FindingVerdict::Refuted);
         let open_ended = [(67, 0.7), (150, 0.8)];
-        assert_eq!(verdict_of(&open_ended), FindingVerdict::Open);
+        assert_eq!(found(&open_ended, 0.0).verdict, FindingVerdict::Open);
     }
 }

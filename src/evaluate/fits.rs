@@ -12,6 +12,7 @@ use super::models::CohortModel;
 use super::observer::{EvaluationObserver, EvaluationStep};
 use super::record::{self, Key};
 use super::rows::{FitOutcome, FitRow, Gold};
+use super::sample::Sample;
 use crate::deform::DeformParameters;
 use crate::export::{self, Format, Metadata};
 use crate::grid::agreement::compare;
@@ -175,12 +176,19 @@ impl PatientWork<'_> {
 }
 
 impl PatientFits {
-    /// The patient's rows of the table.
-    pub fn rows<'a>(&'a self, models: &'a [CohortModel]) -> impl Iterator<Item = FitRow> + 'a {
-        models.iter().zip(&self.fits).map(|(model, fit)| FitRow {
+    /// The patient's rows of the table, but for models made of the patient; `sample` is the patient's.
+    pub fn rows<'a>(
+        &'a self,
+        models: &'a [CohortModel],
+        sample: Sample,
+    ) -> impl Iterator<Item = FitRow> + 'a {
+        let pairs = models.iter().zip(&self.fits);
+        let others = pairs.filter(|(model, _)| model.template != self.case);
+        others.map(move |(model, fit)| FitRow {
             template: model.template.clone(),
             kind: model.kind,
             case: self.case.clone(),
+            sample,
             outcome: fit.outcome.clone(),
             agreed: fit.agreed,
             golds: self.golds,

@@ -12,13 +12,16 @@
 //!    continues where it ended.
 //! 4. [`rows`]: the table of all fits, and means over it; [`findings`](mod@findings): what they say about
 //!    each of the paper's findings.
-//! 5. [`pictures`], [`table`], [`cohort_page`]: slices, CSV and JSON, and one page with charts.
+//! 5. If asked for, [`leave_one_out`](mod@leave_one_out): model and reader's profile chosen for each case
+//!    without it.
+//! 6. [`pictures`], [`table`], [`cohort_page`]: slices, CSV and JSON, and one page with charts.
 //!
 //! [`statistics`] stands beside this: mean shape and principal modes of fits of one model.
 //!
 //! Guaranteed: the same cohort, parameters and program give the same bytes, on any number of
 //! threads and however often the run was stopped.
 
+pub mod calibration;
 pub mod cohort;
 pub mod cohort_fit;
 pub mod cohort_page;
@@ -26,12 +29,15 @@ pub mod error;
 pub mod files;
 pub mod findings;
 pub mod fits;
+pub mod leave_one_out;
 pub mod models;
 pub mod observer;
+pub mod paired;
 pub mod parameters;
 pub mod pictures;
 pub mod record;
 pub mod rows;
+pub mod sample;
 pub mod statistics;
 pub mod table;
 
@@ -40,11 +46,14 @@ pub use error::EvaluateError;
 pub use observer::{EvaluationObserver, EvaluationStep};
 pub use parameters::EvaluationParameters;
 
+use crate::parameters::FitParameters;
+use calibration::{Calibration, CalibrationCase, calibrate};
 use files::{make_folder, write_whole};
 use findings::findings;
 use fits::{FitRun, PatientFits};
+use leave_one_out::LeaveOneOut;
 use models::CohortModel;
-use rows::FitRow;
+use rows::{FitRow, Gold};
 use std::path::Path;
 use table::Evaluation;
 
@@ -83,7 +92,11 @@ pub fn evaluate(
     };
     let patients = fits::fit_all(cohort, &models, &run, observer)?;
     observer.progress(EvaluationStep::Pictures, 1.0);
-    let mut evaluation = summarise(cohort, &models, &patients, problems)?;
+    let mut evaluation = summarise(cohort, &models, &patients, problems, parameters)?;
+    if parameters.leave_one_out {
+        evaluation.leave_one_out = LeaveOneOut::of(&evaluation.rows, Gold::Expert);
+        evaluation.reader = reader(cohort, parameters);
+    }
     evaluation.settings = parameters.settings(cohort);
     write_results(out, &evaluation)?;
     Ok(evaluation)
@@ -94,8 +107,13 @@ fn summarise(
     models: &[CohortModel],
     patients: &[PatientFits],
     of_models: Vec<(String, String)>,
+    parameters: &EvaluationParameters,
 ) -> Result<Evaluation, EvaluateError> {
-    let rows: Vec<FitRow> = patients.iter().flat_map(|p| p.rows(models)).collect();
+    let in_sample = &parameters.in_sample;
+    let rows: Vec<FitRow> = patients
+        .iter()
+        .flat_map(|p| p.rows(models, in_sample.of(&p.case)))
+        .collect();
     let of_patients = patients
         .iter()
         .flat_map(|p| p.problems.iter().map(|text| (p.case.clone(), text.clone())));
@@ -110,10 +128,33 @@ fn summarise(
             .collect(),
         problems: problems.chain(of_models).chain(of_patients).collect(),
         findings: findings(&rows, &figure3),
-        pictures: pictures::draw(cohort, models, patients, &rows)?,
+        pictures: pictures::draw(cohort, models, patients, &rows, in_sample)?,
+        leave_one_out: None,
+        reader: None,
         models: figure3,
         rows,
     })
+}
+
+/// The profile of the reader who drew the patients' masks, with its held-out figures; `None` without any
+/// mask to learn from.
+fn reader(cohort: &Cohort, parameters: &EvaluationParameters) -> Option<Calibration> {
+    let cases: Vec<CalibrationCase> = cohort
+        .patients
+        .iter()
+        .filter_map(|name| {
+            Some(CalibrationCase {
+                scan: cohort.scan(name)?,
+                mask: cohort.gold(name, Gold::Expert)?,
+                name: name.clone(),
+            })
+        })
+        .collect();
+    let fit = FitParameters {
+        deform: parameters.deform.clone(),
+        ..FitParameters::default()
+    };
+    calibrate(&cases, &fit, &|_| ()).ok()
 }
 
 fn write_results(out: &Path, evaluation: &Evaluation) -> Result<(), EvaluateError> {

@@ -3,6 +3,7 @@
 use super::cohort::Cohort;
 use super::error::EvaluateError;
 use super::rows::Variant;
+use super::sample::Sample;
 use crate::deform::DeformParameters;
 use crate::deform::elastic::SupportScaling;
 use crate::parameters::{ModelParameters, ParameterError};
@@ -20,6 +21,29 @@ pub struct EvaluationParameters {
     pub method: String,
     /// How the models are fitted.
     pub deform: DeformParameters,
+    /// Cases that had a part in choosing the program's constants.
+    pub in_sample: InSample,
+    /// Whether to choose model, number of points and reader's profile for each case without it.
+    pub leave_one_out: bool,
+}
+
+/// Cases that had a part in choosing the program's constants.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum InSample {
+    /// All cases.
+    All,
+    /// Those of these names.
+    Named(Vec<String>),
+}
+
+impl InSample {
+    /// How figures of that case are labelled.
+    pub fn of(&self, case: &str) -> Sample {
+        match self {
+            InSample::Named(names) if !names.iter().any(|name| name == case) => Sample::HeldOut,
+            _ => Sample::InSample,
+        }
+    }
 }
 
 impl EvaluationParameters {
@@ -70,6 +94,15 @@ impl EvaluationParameters {
                 format!("ventriform {}", env!("CARGO_PKG_VERSION")),
             ),
         ];
+        let seen = match &self.in_sample {
+            InSample::All => "all".to_owned(),
+            InSample::Named(names) if names.is_empty() => "none".to_owned(),
+            InSample::Named(names) => names.join(", "),
+        };
+        settings.push((
+            "cases that the program's constants were chosen on (in-sample)".to_owned(),
+            seen,
+        ));
         if !self.deform.align {
             settings.push(("alignment as a whole".to_owned(), "left out".to_owned()));
         }

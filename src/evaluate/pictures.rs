@@ -9,6 +9,7 @@ use super::cohort_fit::CohortFit;
 use super::error::EvaluateError;
 use super::fits::PatientFits;
 use super::models::CohortModel;
+use super::parameters::InSample;
 use super::rows::{self, FitRow, Gold, ModelKind};
 use super::table::Picture;
 use crate::progress::Monitor;
@@ -24,6 +25,7 @@ pub fn draw(
     models: &[CohortModel],
     patients: &[PatientFits],
     rows: &[FitRow],
+    in_sample: &InSample,
 ) -> Result<Vec<Picture>, EvaluateError> {
     let Some(kind) = shown(rows) else {
         return Ok(Vec::new());
@@ -33,7 +35,7 @@ pub fn draw(
         .map(|patient| {
             let pairs = models.iter().zip(&patient.fits);
             let Some((model, fit)) = pairs
-                .filter(|(m, f)| m.kind == kind && f.cup.is_some())
+                .filter(|(m, f)| m.kind == kind && m.template != patient.case && f.cup.is_some())
                 .min_by(|a, b| a.0.template.cmp(&b.0.template))
             else {
                 return Ok(None);
@@ -41,7 +43,7 @@ pub fn draw(
             let png = png(cohort, &patient.case, model, fit)?;
             Ok(png.map(|png| Picture {
                 case: patient.case.clone(),
-                caption: caption(patient, model, fit),
+                caption: caption(patient, model, fit) + ", " + in_sample.of(&patient.case).as_str(),
                 png,
             }))
         })

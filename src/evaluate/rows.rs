@@ -4,6 +4,7 @@
 //! A fit that failed counts as E_J = 0, so that losing a hard case does not raise a mean. Patients
 //! without a gold standard, or whose scan could not be read, are left out of means.
 
+use super::sample::Sample;
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
@@ -134,6 +135,8 @@ pub struct FitRow {
     pub kind: ModelKind,
     /// The patient.
     pub case: String,
+    /// Whether the patient had a part in choosing the program's constants. It had none in the model.
+    pub sample: Sample,
     /// How it went.
     pub outcome: FitOutcome,
     /// Agreement with [`Gold::ALL`]; `None` where there is no such gold standard or no fit.
@@ -189,12 +192,18 @@ pub struct Cell {
     pub least: f64,
     /// Rows that the mean is over.
     pub count: usize,
+    /// In-sample if one of them is.
+    pub sample: Sample,
 }
 
 /// The mean over the rows that `choose` takes; `None` if none of them can be measured.
 pub fn mean<'a>(rows: impl IntoIterator<Item = &'a FitRow>, gold: Gold) -> Option<Cell> {
     let (mut jaccards, mut contours) = (Vec::new(), Vec::new());
+    let mut sample = Sample::HeldOut;
     for row in rows {
+        if row.jaccard(gold).is_some() {
+            sample = sample.and(row.sample);
+        }
         jaccards.extend(row.jaccard(gold));
         contours.extend(row.contour(gold));
     }
@@ -204,6 +213,7 @@ pub fn mean<'a>(rows: impl IntoIterator<Item = &'a FitRow>, gold: Gold) -> Optio
         contour: average(&contours),
         least: jaccards.iter().copied().fold(1.0, f64::min),
         count: jaccards.len(),
+        sample,
     })
 }
 
@@ -257,6 +267,7 @@ pub(super) mod tests {
             template: "t1".into(),
             kind: ModelKind { variant, points },
             case: case.into(),
+            sample: Sample::HeldOut,
             outcome: match jaccard {
                 Some(_) => FitOutcome::Fitted("converged".into()),
                 None => FitOutcome::Lost("no heart, none at all".into()),

@@ -5,8 +5,12 @@
 
 use serde_json::{Value, json};
 
+use super::calibration::{Calibration, CaseFigures};
 use super::findings::Finding;
+use super::leave_one_out::{Candidate, LeaveOneOut};
+use super::paired::PairedDifference;
 use super::rows::{self, Agreed, Cell, FitOutcome, FitRow, Gold, ModelKind, ModelRow};
+use super::sample::Sample;
 
 /// A cohort's evaluation, ready to be written out.
 #[derive(Debug, Clone, Default)]
@@ -25,6 +29,10 @@ pub struct Evaluation {
     pub findings: Vec<Finding>,
     /// Slices of one fit of each patient.
     pub pictures: Vec<Picture>,
+    /// The choice of a model for each case without it, if asked for.
+    pub leave_one_out: Option<LeaveOneOut>,
+    /// The profile of the reader who drew the experts' masks, if asked for.
+    pub reader: Option<Calibration>,
 }
 
 impl Evaluation {
@@ -99,7 +107,7 @@ pub fn fits_csv(rows: &[FitRow]) -> Result<Vec<u8>, csv::Error> {
         .collect();
     names.sort_unstable();
     names.dedup();
-    let mut head = words("case,template,model,points,state,reason");
+    let mut head = words("case,template,model,points,sample,state,reason");
     for gold in Gold::ALL {
         head.extend(AGREED.map(|name| format!("{name}_{}", gold.as_str())));
     }
@@ -110,6 +118,7 @@ pub fn fits_csv(rows: &[FitRow]) -> Result<Vec<u8>, csv::Error> {
             row.template.clone(),
             row.kind.variant.as_str().to_owned(),
             row.kind.points.to_string(),
+            row.sample.as_str().to_owned(),
             row.outcome.as_str().to_owned(),
             row.outcome.reason().to_owned(),
         ];
@@ -121,6 +130,9 @@ pub fn fits_csv(rows: &[FitRow]) -> Result<Vec<u8>, csv::Error> {
     csv_bytes([head].into_iter().chain(rows.iter().map(line)))
 }
 
+/// A model's fitness is measured against the surface that it was made of.
+pub(super) const OF_MODELS: Sample = Sample::InSample;
+
 /// Figure 3 as CSV: the mean fitness of every model.
 ///
 /// # Errors
@@ -128,7 +140,7 @@ pub fn fits_csv(rows: &[FitRow]) -> Result<Vec<u8>, csv::Error> {
 pub fn figure3_csv(models: &[ModelRow]) -> Result<Vec<u8>, csv::Error> {
     let head = words(
         "template,model,points,fitness_raw,fitness_normalised,fitness_robust,\
-         radius_ratio_mean,radius_ratio_least",
+         radius_ratio_mean,radius_ratio_least,sample",
     );
     let line = |m: &ModelRow| {
         let mut line = vec![
@@ -138,6 +150,7 @@ pub fn figure3_csv(models: &[ModelRow]) -> Result<Vec<u8>, csv::Error> {
         ];
         let figures = [m.raw, m.normalised, m.robust, m.shape, m.worst_shape];
         line.extend(figures.map(|figure| number(Some(figure))));
+        line.push(OF_MODELS.as_str().to_owned());
         line
     };
     csv_bytes([head].into_iter().chain(models.iter().map(line)))
@@ -188,7 +201,8 @@ pub fn table1(rows: &[FitRow], gold: Gold) -> Vec<(Line, TableCells)> {
 /// # Errors
 /// [`csv::Error`].
 pub fn table1_csv(rows: &[FitRow]) -> Result<Vec<u8>, csv::Error> {
-    let head = "gold,template,case,model,points,jaccard,contour_distance_voxels,least_jaccard,fits";
+    let head =
+        "gold,template,case,model,points,jaccard,contour_distance_voxels,least_jaccard,fits,sample";
     let mut lines = vec![words(head)];
     for gold in Gold::ALL {
         for (line, cells) in table1(rows, gold) {
@@ -203,6 +217,7 @@ pub fn table1_csv(rows: &[FitRow]) -> Result<Vec<u8>, csv::Error> {
                     number(cell.and_then(|c| c.contour)),
                     number(cell.map(|c| c.least)),
                     cell.map_or(0, |c| c.count).to_string(),
+                    cell.map_or("", |c| c.sample.as_str()).to_owned(),
                 ]
             }));
         }
@@ -222,7 +237,12 @@ pub fn to_json(evaluation: &Evaluation) -> Value {
     let findings: Vec<Value> = evaluation
         .findings
         .iter()
-        .map(|f| json!({"claim": f.claim, "verdict": f.verdict.as_str(), "figures": f.figures}))
+        .map(|f| {
+            json!({
+                "claim": f.claim, "verdict": f.verdict.as_str(), "figures": f.figures,
+                "sample": f.sample.as_str(),
+            })
+        })
         .collect();
     let settings: serde_json::Map<String, Value> = evaluation
         .settings
@@ -236,6 +256,8 @@ pub fn to_json(evaluation: &Evaluation) -> Value {
         "findings": findings,
         "figure3": figure3,
         "means": means_json(&evaluation.rows),
+        "leave_one_out": evaluation.leave_one_out.as_ref().map(leave_one_out_json),
+        "reader": evaluation.reader.as_ref().map(reader_json),
         "fits": evaluation.rows.iter().map(row_json).collect::<Vec<_>>(),
     })
 }
@@ -246,6 +268,7 @@ fn model_json(m: &ModelRow) -> Value {
         "fitness": {"raw": rounded(m.raw), "normalised": rounded(m.normalised),
                     "robust": rounded(m.robust)},
         "radius_ratio": {"mean": rounded(m.shape), "least": rounded(m.worst_shape)},
+        "sample": OF_MODELS.as_str(),
     })
 }
 
@@ -268,11 +291,83 @@ fn means_json(rows: &[FitRow]) -> Vec<Value> {
                     "contour_distance_voxels": cell.contour.map(rounded),
                     "least_jaccard": rounded(cell.least),
                     "fits": cell.count,
+                    "sample": cell.sample.as_str(),
                 }));
             }
         }
     }
     means
+}
+
+fn difference_json(d: &PairedDifference) -> Value {
+    json!({
+        "mean": rounded(d.mean), "interval95": d.interval.map(rounded), "up": d.signs[0], "down": d.signs[1],
+        "pairs": d.count, "sign_test_p": rounded(d.p),
+    })
+}
+
+fn leave_one_out_json(found: &LeaveOneOut) -> Value {
+    let model = |m: &Candidate| {
+        json!({
+            "template": m.template, "model": m.kind.variant.as_str(), "points": m.kind.points,
+        })
+    };
+    let choices: Vec<Value> = found
+        .choices
+        .iter()
+        .map(|c| {
+            json!({
+                "case": c.case,
+                "chosen": model(&c.chosen),
+                "held-out": {
+                    "jaccard": rounded(c.held_out),
+                    "contour_distance_voxels": c.contour.map(rounded),
+                },
+                "in-sample": {"jaccard": c.in_sample.map(rounded)},
+            })
+        })
+        .collect();
+    let [held_out, in_sample] = found.means().map(|mean| mean.map(rounded));
+    json!({
+        "choices": choices,
+        "best_over_all": model(&found.best),
+        "mean_jaccard": {"held-out": held_out, "in-sample": in_sample},
+        "optimism": found.optimism.as_ref().map(difference_json),
+    })
+}
+
+fn reader_json(made: &Calibration) -> Value {
+    let figures = |f: &CaseFigures| {
+        json!({
+            "jaccard": rounded(f.jaccard), "contour_distance_voxels": rounded(f.contour),
+            "wall_ml": rounded(f.wall_ml), "cavity_ml": rounded(f.cavity_ml),
+        })
+    };
+    let rows: Vec<Value> = made
+        .rows
+        .iter()
+        .map(|row| {
+            json!({
+                "case": row.case,
+                "reader_wall_ml": rounded(row.reader_ml),
+                "without": figures(&row.without),
+                "held-out": row.held_out.as_ref().map(figures),
+                "in-sample": figures(&row.in_sample),
+            })
+        })
+        .collect();
+    let gain = |sample| made.gain(sample).as_ref().map(difference_json);
+    let offsets = made.profile.offsets();
+    json!({
+        "masks": made.profile.masks(),
+        "offsets_mm": {
+            "endocardium": offsets.endocardium, "epicardium": offsets.epicardium, "rim": offsets.rim,
+        },
+        "cases": rows,
+        "gain_in_jaccard": {
+            "held-out": gain(Sample::HeldOut), "in-sample": gain(Sample::InSample),
+        },
+    })
 }
 
 fn row_json(row: &FitRow) -> Value {
@@ -288,6 +383,7 @@ fn row_json(row: &FitRow) -> Value {
         "template": row.template,
         "model": row.kind.variant.as_str(),
         "points": row.kind.points,
+        "sample": row.sample.as_str(),
         "state": row.outcome.as_str(),
         "reason": row.outcome.reason(),
         "expert": agreed(Gold::Expert),
@@ -310,7 +406,7 @@ mod tests {
         ];
         let text = |rows: &[FitRow]| String::from_utf8(fits_csv(rows).unwrap()).unwrap();
         let fields: Vec<usize> = text(&rows).lines().map(|l| l.split(',').count()).collect();
-        assert_eq!(fields, [17; 3]);
+        assert_eq!(fields, [18; 3]);
         // A comma in a reason is quoted.
         let lost = text(&[row("p2", Variant::Optimised, 150, None)]);
         assert!(lost.contains(",lost,\"no heart, none at all\","));

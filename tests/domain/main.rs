@@ -27,9 +27,12 @@ mod doubt;
 
 mod containers;
 mod edges;
+mod hot_neighbours;
 mod orientation;
 mod pipeline;
 mod segment;
+
+mod reader;
 
 mod evaluate_cohort;
 mod evaluate_reference;

@@ -43,6 +43,10 @@ const USES: &[(&str, &[&str])] = &[
     ),
     ("polar", &["geometry", "grid", "draw", "locate", "model"]),
     (
+        "reader",
+        &["geometry", "mesh", "progress", "grid", "model", "deform"],
+    ),
+    (
         "report",
         &[
             "geometry", "numeric", "mesh", "progress", "draw", "volume", "surface", "retile",
@@ -85,6 +89,7 @@ const USES: &[(&str, &[&str])] = &[
             "model",
             "deform",
             "polar",
+            "reader",
             "report",
             "parameters",
             "pipeline",
@@ -106,6 +111,7 @@ const USES: &[(&str, &[&str])] = &[
             "export",
             "model",
             "deform",
+            "reader",
             "parameters",
             "pipeline",
             "segmentation",
@@ -130,6 +136,7 @@ const USES: &[(&str, &[&str])] = &[
             "export",
             "model",
             "deform",
+            "reader",
             "report",
             "parameters",
             "pipeline",
@@ -161,6 +168,7 @@ const USES: &[(&str, &[&str])] = &[
             "volume",
             "export",
             "deform",
+            "reader",
             "report",
             "parameters",
             "pipeline",

@@ -1,0 +1,137 @@
+//! `ventriform calibrate`: [`crate::evaluate::calibration`] on the command line.
+
+use super::output::write_file;
+use super::{Bar, FitArgs};
+use crate::evaluate::calibration::{
+    Calibration, CalibrationError, CaseFigures, calibrate, cases_of,
+};
+use crate::evaluate::sample::Sample;
+use crate::progress::Plan;
+use crate::reader::ReaderOffset;
+use crate::work::problems::Explain;
+use anyhow::{Result, anyhow};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Learn how a reader draws the wall, from scans and the reader's masks
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  ventriform calibrate cohort -o reader.json
+  ventriform segment scan.nii.gz --model auto --reader reader.json -o out
+COHORT holds a folder for each case, with spect.nii.gz (or .nii, .dcm) and the reader's mask. The profile
+holds three distances in millimetres from the fitted wall (endocardium, epicardium, rim), drawn towards
+zero the more the fewer masks there are, and hashes of the files: no names. The table printed says what
+the profile is worth: held-out figures are of profiles learnt without the case, in-sample figures are of
+the profile that has seen it.")]
+pub struct CalibrateArgs {
+    /// Folder of the cases
+    #[arg(value_name = "COHORT")]
+    cohort: PathBuf,
+    /// File to write the profile to
+    #[arg(short, long = "output", value_name = "FILE")]
+    output: PathBuf,
+    /// Name of the masks' files, without .nii.gz
+    #[arg(long, value_name = "NAME", default_value = "lv_expert_img")]
+    mask: String,
+    #[command(flatten)]
+    fit: FitArgs,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// If no mask can be learnt from, or the profile cannot be written.
+pub fn run(args: &CalibrateArgs) -> Result<()> {
+    let parameters = args.fit.parameters();
+    let parameters = parameters.map_err(|error| anyhow!(error.with_advice()))?;
+    let cases = cases_of(&args.cohort, &args.mask).map_err(|error| CalibrationError::Folder {
+        folder: args.cohort.clone(),
+        error,
+    })?;
+    let bar = Bar::over(Plan::SEGMENTATION);
+    let made = calibrate(&cases, &parameters, &|share| bar.show("fit", share));
+    bar.finish();
+    let made = made?;
+    write_file(&args.output, made.profile.to_json().as_bytes())?;
+    for (case, problem) in &made.problems {
+        eprintln!("warning: {case}: {problem}");
+    }
+    print!("{}", table(&made));
+    Ok(())
+}
+
+/// What is printed of each case: the name, the figure and its decimals.
+type Column = (&'static str, fn(&CaseFigures) -> f64, usize);
+
+const COLUMNS: [Column; 4] = [
+    ("E_J", |f| f.jaccard, 3),
+    ("E_CD, voxels", |f| f.contour, 3),
+    ("wall, ml", |f| f.wall_ml, 1),
+    ("cavity, ml", |f| f.cavity_ml, 1),
+];
+
+/// The figures as text: one block for each figure, without a profile, held-out and in-sample.
+fn table(made: &Calibration) -> String {
+    let masks = made.profile.masks();
+    let edge = made.profile.edge.as_str();
+    let mut text = format!("profile of {masks} masks, from the {edge} wall, mm:\n");
+    let names = [
+        "endocardium, outward",
+        "epicardium, outward",
+        "rim, towards the base",
+    ];
+    for (name, offset) in names.iter().zip(made.profile.offsets) {
+        let ReaderOffset {
+            value,
+            mean,
+            spread,
+        } = offset;
+        text += &format!("  {name:<22} {value:>6.2} (mean {mean:.2}, spread {spread:.2})\n");
+    }
+    let samples = [Sample::HeldOut, Sample::InSample];
+    let [held_out, in_sample] = samples.map(Sample::as_str);
+    for (what, figure, decimals) in COLUMNS {
+        text += &format!(
+            "{what:<16} {:>10} {held_out:>10} {in_sample:>10}\n",
+            "without"
+        );
+        for row in &made.rows {
+            let judged = samples.map(|sample| Calibration::figures(row, sample));
+            text += &format!("  {:<14}", row.case);
+            for figures in [Some(row.without)].into_iter().chain(judged) {
+                let cell = figures.map(|f| format!("{:.decimals$}", figure(&f)));
+                text += &format!(" {:>10}", cell.unwrap_or_else(|| "-".into()));
+            }
+            if what.starts_with("wall") {
+                text += &format!("   reader's {:.1}", row.reader_ml);
+            }
+            text.push('\n');
+        }
+    }
+    for sample in samples {
+        text += &gain(made, sample);
+    }
+    text
+}
+
+/// What the profile changes, as a line.
+pub(super) fn gain(made: &Calibration, sample: Sample) -> String {
+    let Some(gain) = made.gain(sample) else {
+        return format!("E_J, {}: there is one mask only\n", sample.as_str());
+    };
+    let [low, high] = gain.interval;
+    let verdict = if gain.may_be_none() {
+        ": cannot be told from none"
+    } else {
+        ""
+    };
+    format!(
+        "E_J, {}: {:+.4} by the profile (95 % interval {low:+.4} to {high:+.4}), better in {} of {}, \
+         sign test p = {:.2}{verdict}\n",
+        sample.as_str(),
+        gain.mean,
+        gain.signs[0],
+        gain.count,
+        gain.p,
+    )
+}
