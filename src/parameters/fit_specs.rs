@@ -318,7 +318,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "polar_threshold",
         polar.threshold,
         0.0..=1.0,
-        "0.65",
+        "0.6",
         "Share of the wall's reference uptake below which a sample counts as a defect"
     ),
     number!(
