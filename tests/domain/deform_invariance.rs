@@ -107,9 +107,11 @@ fn worst_variation(runs: &[Vec<f64>]) -> (f64, usize) {
 /// The largest variation allowed.
 const LIMIT: f64 = 0.05;
 
-/// The largest variation allowed between noise of 5 and 10 %. Noise changes the image itself, above
-/// all the uptake along the rim, which the basal thirds of the wall reach.
-const NOISE_LIMIT: f64 = 0.06;
+/// The largest variation of the basal segments between noise of 5 and 10 %. Noise changes the image
+/// itself, above all the uptake along the rim, which the basal thirds of the wall reach; 0.0515 was measured.
+const BASAL_NOISE_LIMIT: f64 = 0.055;
+/// The places of the basal segments among the measures.
+const BASAL: std::ops::Range<usize> = 2..8;
 
 #[test]
 fn shifts_turns_of_the_patient_and_turns_of_the_grid_change_nothing() {
@@ -211,9 +213,15 @@ fn doubled_noise_changes_little() {
         .iter()
         .map(|(seed, noise)| measure(&patient(*seed, *noise).volume, &template))
         .collect();
-    let (variation, measure) = worst_variation(&runs);
-    assert!(
-        variation < NOISE_LIMIT,
-        "measure {measure} varies by {variation}"
-    );
+    let (basal, others): (Vec<Vec<f64>>, Vec<Vec<f64>>) = runs
+        .into_iter()
+        .map(|run| {
+            let others = [&run[..BASAL.start], &run[BASAL.end..]].concat();
+            (run[BASAL].to_vec(), others)
+        })
+        .unzip();
+    for (measures, limit) in [(basal, BASAL_NOISE_LIMIT), (others, LIMIT)] {
+        let (variation, measure) = worst_variation(&measures);
+        assert!(variation < limit, "measure {measure} varies by {variation}");
+    }
 }
