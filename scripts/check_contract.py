@@ -9,12 +9,14 @@
 3. A walk through the whole API: every JSON answer satisfies its schema, and has no field that the schema
    does not name.
 
-Needs openapi-spec-validator and jsonschema, and `ventriform phantom` for a scan.
+Needs openapi-spec-validator, jsonschema and pydicom, and `ventriform phantom` for a scan.
 """
-import copy, json, os, re, subprocess, sys, time, urllib.error, urllib.parse, urllib.request
+import copy, io, json, os, re, subprocess, sys, time, urllib.error, urllib.parse, urllib.request
 
+import pydicom
 from jsonschema import Draft202012Validator
 from openapi_spec_validator import validate
+from pydicom.uid import ExplicitVRLittleEndian, NuclearMedicineImageStorage, generate_uid
 from referencing import Registry, Resource
 from referencing.jsonschema import DRAFT202012
 
@@ -148,7 +150,7 @@ class Walk:
                 self.failures.append(f"{what}: {error}")
             if media_type == PROBLEM:
                 self.recorded["problems"].setdefault(status, value)
-            elif media_type == "application/json":
+            elif media_type in ("application/json", "application/dicom+json"):
                 own[status] = {media_type: short(value) if cut else value}
             return answer, value
         elif media_type == "text/plain":
@@ -245,6 +247,7 @@ def everything(walk, folder):
     meshes["create_template"]["request"] = meshes["get_model_mesh_json"]["200"]
 
     webhooks(walk, order)
+    received(walk)
 
     # Problems.
     call("get", "/v1/models/{id}", expect=400, query="?verbose=1", id=model)
@@ -298,6 +301,49 @@ def webhooks(walk, order):
     call("post", "/v1/jobs/{id}/deliveries/{delivery}/redeliver", expect=202,
          id=job["id"], delivery=told["deliveries"][0]["id"])
     call("delete", "/v1/webhooks/{id}", expect=204, id=webhook["id"])
+
+
+def nuclear(image_type):
+    """A Nuclear Medicine Image of four frames as a file, and its study."""
+    data = pydicom.Dataset()
+    data.SOPClassUID, data.SOPInstanceUID = NuclearMedicineImageStorage, generate_uid()
+    data.StudyInstanceUID, data.SeriesInstanceUID = generate_uid(), generate_uid()
+    data.Modality, data.ImageType = "NM", ["ORIGINAL", "PRIMARY", image_type, "EMISSION"]
+    data.SamplesPerPixel, data.PhotometricInterpretation = 1, "MONOCHROME2"
+    data.Rows, data.Columns, data.NumberOfFrames = 4, 4, 4
+    data.PixelSpacing, data.SliceThickness, data.SpacingBetweenSlices = [4, 4], 4, 4
+    data.BitsAllocated, data.BitsStored, data.HighBit, data.PixelRepresentation = 16, 16, 15, 0
+    data.FrameIncrementPointer, data.SliceVector = 0x00540080, [1, 2, 3, 4]
+    data.PixelData = bytes(128)
+    data.file_meta = pydicom.dataset.FileMetaDataset()
+    data.file_meta.TransferSyntaxUID = ExplicitVRLittleEndian
+    file = io.BytesIO()
+    data.save_as(file, enforce_file_format=True)
+    return file.getvalue(), data.StudyInstanceUID
+
+
+def received(walk):
+    """Objects by STOW-RS: a volume, projections, none; what became of them."""
+    call, one = walk.call, {"content-type": "application/dicom"}
+    (scan, study), (projections, _) = nuclear("RECON TOMO"), nuclear("TOMO")
+    parts = b"".join(b"--m\r\nContent-Type: application/dicom\r\n\r\n" + part + b"\r\n"
+                     for part in (projections, b"no object")) + b"--m--\r\n"
+    related = {"content-type": 'multipart/related; type="application/dicom"; boundary=m'}
+    for template, of in (("/dicom-web/studies", {}), ("/dicom-web/studies/{study}", {"study": study})):
+        call("post", template, expect=200, body=scan, headers=one, **of)
+        call("post", template, expect=409, body=b"no object", headers=one, **of)
+        both = parts.replace(projections, scan)
+        call("post", template, expect=202, body=both, headers=related, **of)
+    call("post", "/dicom-web/studies", expect=406, body=scan, headers={**one, "accept": "application/dicom+xml"})
+    call("post", "/dicom-web/studies", expect=202, body=parts, headers=related)
+    while any(group["state"] in ("gathering", "filing") for group in intake(walk)):
+        time.sleep(0.05)
+    failed = [group["id"] for group in intake(walk) if group["state"] == "failed"]
+    call("delete", "/v1/intake/{id}", expect=204, id=failed[0])
+
+
+def intake(walk):
+    return walk.call("get", "/v1/intake", expect=200)[1]["intake"]
 
 
 def access(walk):

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs the fuzzers of fuzz/ with libFuzzer and the address sanitiser, one after the other, on one core.
 #
-#   scripts/fuzz.sh [SECONDS] [TARGET...]     60 seconds each of nifti, dicom, parameters and multipart
+#   scripts/fuzz.sh [SECONDS] [TARGET...]     60 seconds each of nifti, dicom, parameters, multipart and association
 #
 # Needs cargo-fuzz's compiler flags, which only a nightly compiler takes; RUSTC_BOOTSTRAP=1 makes the stable one
 # take them. New inputs go to fuzz/corpus/, inputs that fail to fuzz/artifacts/; neither is committed.
@@ -10,10 +10,10 @@ cd "$(dirname "$0")/../fuzz"
 seconds=${1:-60}
 shift || true
 targets=("$@")
-[ ${#targets[@]} -gt 0 ] || targets=(nifti dicom parameters multipart)
+[ ${#targets[@]} -gt 0 ] || targets=(nifti dicom parameters multipart association)
 host=$(rustc -vV | sed -n 's/^host: //p')
 features=()
-case " ${targets[*]} " in *" multipart "*) features=(--features service) ;; esac
+case " ${targets[*]} " in *" multipart "* | *" association "*) features=(--features service) ;; esac
 export RUSTC_BOOTSTRAP=1
 export RUSTFLAGS="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \

@@ -121,6 +121,7 @@ if wait "${running[install]}"; then
   start clients scripts/check_clients.sh
   start crashes "$PYTHON" scripts/crash_rounds.py --program target/debug/ventriform --rounds 10
   start dicom scripts/check_dicom.sh
+  start intake scripts/check_intake.sh
   start dependencies "$PYTHON" scripts/dependencies.py check
   collect formats "formats read by trimesh, vtk and the glTF validator"
   collect geodesics "geodesics against pygeodesic"
@@ -129,6 +130,7 @@ if wait "${running[install]}"; then
   collect clients "generated Python and TypeScript clients"
   collect crashes "ten kills at random moments"
   collect dicom "DICOM objects read by dciodvfy, highdicom and dcmqi"
+  collect intake "images received from dcmtk, pynetdicom and dicomweb-client"
   collect dependencies "licences, sources and bill of materials"
 else
   cat "$tools/install.log"

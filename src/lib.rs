@@ -154,6 +154,9 @@ pub mod hooks;
 pub mod archive;
 
 #[cfg(feature = "service")]
+pub mod intake;
+
+#[cfg(feature = "service")]
 pub mod store;
 
 #[cfg(feature = "service")]

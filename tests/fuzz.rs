@@ -115,3 +115,10 @@ fn damaged_forms_are_answered() {
     let service = service::Target::start();
     drive("multipart", 400, |file| service.multipart(file));
 }
+
+#[cfg(feature = "service")]
+#[test]
+fn damaged_associations_end_and_harm_nobody() {
+    let service = service::Target::start();
+    drive("association", 400, |file| service.association(file));
+}

@@ -1,7 +1,7 @@
-//! The target that needs the service: forms, sent to it over loopback.
+//! The targets that need the service: forms and associations, sent to it over loopback.
 
-use std::io::{Read as _, Write as _};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::io::{ErrorKind, Read as _, Write as _};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::time::Duration;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
@@ -13,6 +13,7 @@ use ventriform::work::Engine;
 /// A running service.
 pub struct Target {
     address: SocketAddr,
+    dicom: SocketAddr,
     _running: Running,
     _runtime: Runtime,
     _data: TempDir,
@@ -27,6 +28,9 @@ impl Target {
             data_dir: data.path().to_owned(),
             body_limit: "1MiB".parse().unwrap(),
             body_timeout: "1s".parse().unwrap(),
+            dicom_listen: "127.0.0.1:0".parse().unwrap(),
+            association_idle: "1s".parse().unwrap(),
+            object_limit: "1MiB".parse().unwrap(),
             ..Settings::default()
         };
         let limits = ReadLimits {
@@ -39,10 +43,37 @@ impl Target {
             .unwrap();
         Self {
             address: running.address(),
+            dicom: running.dicom_address().unwrap(),
             _running: running,
             _runtime: runtime,
             _data: data,
         }
+    }
+
+    /// Sends the bytes as an association. The service answers by PDUs and closes; then it still answers
+    /// others.
+    pub fn association(&self, data: &[u8]) {
+        let sent = |data: &[u8]| {
+            let mut stream = TcpStream::connect(self.dicom).unwrap();
+            let patience = Some(Duration::from_secs(30));
+            stream.set_read_timeout(patience).unwrap();
+            // The service may close before it has read everything.
+            let _ = stream.write_all(data);
+            let _ = stream.shutdown(Shutdown::Write);
+            let mut answer = Vec::new();
+            let read = stream.read_to_end(&mut answer);
+            let timed_out = read.is_err_and(|e| e.kind() == ErrorKind::WouldBlock);
+            assert!(!timed_out, "the service did not close");
+            answer
+        };
+        let answer = sent(data);
+        let told = answer.first().copied();
+        assert!(
+            told.is_none_or(|kind| (2..=7).contains(&kind)),
+            "{answer:?}"
+        );
+        let whole = crate::targets::corpus("association").swap_remove(0);
+        assert_eq!(sent(&whole).first(), Some(&2), "it accepts no association");
     }
 
     /// Sends the bytes as a form. The service answers 2xx, or a problem of the client's.

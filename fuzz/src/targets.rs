@@ -86,8 +86,74 @@ pub fn corpus(target: &str) -> Vec<Vec<u8>> {
         .map(|text| text.as_bytes().to_vec())
         .to_vec(),
         "multipart" => multipart_corpus(),
+        "association" => association_corpus(),
         other => panic!("no target `{other}`"),
     }
+}
+
+/// A PDU or an item of one: type, length, content.
+fn framed(kind: u8, wide: bool, content: &[u8]) -> Vec<u8> {
+    let length = content.len();
+    let length = match wide {
+        true => (length as u32).to_be_bytes().to_vec(),
+        false => (length as u16).to_be_bytes().to_vec(),
+    };
+    [&[kind, 0], &length[..], content].concat()
+}
+
+/// An association with C-ECHO, and one with a C-STORE that is cut off.
+fn association_corpus() -> Vec<Vec<u8>> {
+    let item = |kind, content: &[u8]| framed(kind, false, content);
+    let context = |id, class: &[u8], syntax: &[u8]| {
+        let parts = [&[id, 0, 0, 0], &item(0x30, class)[..], &item(0x40, syntax)];
+        item(0x20, &parts.concat())
+    };
+    let request = [
+        b"\0\x01\0\0VENTRIFORM      FUZZ            ".to_vec(),
+        vec![0; 32],
+        item(0x10, b"1.2.840.10008.3.1.1.1"),
+        context(1, b"1.2.840.10008.1.1", b"1.2.840.10008.1.2"),
+        context(3, b"1.2.840.10008.5.1.4.1.1.20", b"1.2.840.10008.1.2.1"),
+        item(0x50, &item(0x51, &16384_u32.to_be_bytes())),
+    ];
+    let value = |context, control, content: &[u8]| {
+        let length = (content.len() as u32 + 2).to_be_bytes();
+        framed(
+            4,
+            true,
+            &[&length, &[context, control][..], content].concat(),
+        )
+    };
+    let element = |number: u16, content: &[u8]| {
+        let head = [&[0, 0], &number.to_le_bytes()[..]].concat();
+        [&head, &(content.len() as u32).to_le_bytes()[..], content].concat()
+    };
+    let command = |field: u8, class: &[u8], data: [u8; 2]| {
+        let parts = [
+            element(0x0002, class),
+            element(0x0100, &[field, 0]),
+            element(0x0110, &[1, 0]),
+            element(0x0800, &data),
+            element(0x1000, b"1.2.3.45"),
+        ];
+        parts.concat()
+    };
+    let echo = command(0x30, b"1.2.840.10008.1.1\0", [1, 1]);
+    let store = command(0x01, b"1.2.840.10008.5.1.4.1.1.20", [0, 0]);
+    let request = framed(1, true, &request.concat());
+    let release = framed(5, true, &[0; 4]);
+    let object = dicom_corpus().swap_remove(0);
+    let object = object.get(132..).unwrap_or_default();
+    vec![
+        [&request[..], &value(1, 3, &echo), &release].concat(),
+        [
+            &request[..],
+            &value(3, 3, &store),
+            &value(3, 0, object),
+            &value(3, 2, b"\0\0"),
+        ]
+        .concat(),
+    ]
 }
 
 fn nifti_corpus() -> Vec<Vec<u8>> {

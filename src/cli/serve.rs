@@ -59,7 +59,12 @@ pub fn run(args: &ServeArgs) -> Result<()> {
     let scheme = scheme(&settings);
     Runtime::new()?.block_on(async {
         let running = http::start(settings, engine, listener).await?;
-        println!("Listening on {scheme}://{address} (documentation: {scheme}://{address}/docs)");
+        let dicom = running.dicom_address();
+        let dicom = dicom.map(|address| format!(", for DICOM on {address}"));
+        println!(
+            "Listening on {scheme}://{address} (documentation: {scheme}://{address}/docs){}",
+            dicom.unwrap_or_default()
+        );
         shutdown_signal().await?;
         running.stop().await?;
         Ok(())

@@ -4,21 +4,25 @@
 //! environment variable, the TOML file given by `--config`, the default. The table below lists
 //! every setting with its description, type and default; flags, variables, file keys, `--help`
 //! and `--print-config` are generated from it. Nothing else in the program reads the environment.
-//! Lists (`[[archives]]`) are in the file only.
+//! Archives (`[[archives]]`) are in the file only.
 //!
 //! The crate `config` is not used: it does not combine with flags of `clap`, does not say in an
 //! error which setting came from where, and cannot print the origins.
 
 mod archives;
+mod tables;
 mod units;
 
+pub use tables::Tables;
 pub use units::{
-    Auto, AutoSize, Count, Keyword, Limit, LogFormat, MinFree, Networks, NoLimit, Off,
-    OptionalPath, OrKeyword, OtlpEndpoint, OwnRetention, Retention, Size, Span, Words,
+    Auto, AutoSize, Count, Keyword, Limit, LogFormat, MinFree, Networks, NoAddress, NoLimit, Off,
+    OptionalAddress, OptionalPath, OrKeyword, OtlpEndpoint, OwnRetention, Retention, Size, Span,
+    Words,
 };
 
 use crate::archive::Archives;
 use crate::hooks::AllowList;
+use crate::intake::{AeTitle, Rule, Sender};
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::net::SocketAddr;
@@ -287,6 +291,45 @@ settings! {
     reader_limit: u32 = "200";
     /// Largest number of labels of one volume or job
     label_limit: usize = "16";
+
+    ["DICOM"]
+    /// Address and port on which other systems send images by DICOM C-STORE; `off` listens on none
+    dicom_listen: OptionalAddress = "off";
+    /// AE title of this service, which callers must name
+    ae_title: AeTitle = "VENTRIFORM";
+    /// The systems that may send: tables `[[senders]]` with `ae_title`, `addresses` (none allows any) and
+    /// `tenant`. Without any, every system may send on loopback, and with allow_anonymous elsewhere
+    senders: Tables<Sender> = "[]";
+    /// Largest number of associations
+    association_limit: usize = "32";
+    /// Largest number of associations of one client address
+    client_association_limit: usize = "8";
+    /// Largest P-DATA-TF PDU, from 4KiB to 16MiB
+    pdu_limit: Size = "256KiB";
+    /// Largest object that is received by C-STORE or STOW-RS
+    object_limit: Size = "1GiB";
+    /// Largest number of bytes of one association
+    association_bytes: Size = "16GiB";
+    /// Longest time of an association for one PDU, and between two
+    association_idle: Span = "60s";
+    /// Longest time of an association
+    association_time_limit: Span = "1h";
+    /// How long after the end of an association (or a STOW-RS request) a series of single slices is
+    /// taken to be complete
+    series_quiet: Span = "5s";
+    /// How long after its last slice a series is taken to be complete while an association is open, or
+    /// if one broke off
+    series_patience: Span = "2m";
+    /// Largest number of received objects that are not part of a volume yet; more are refused
+    intake_objects: u64 = "20000";
+    /// Largest size of received objects that are not part of a volume yet; more are refused
+    intake_bytes: Size = "8GiB";
+    /// Age at which received objects that make up no volume are erased; `off` keeps them
+    intake_keep: Retention = "7d";
+    /// The jobs that received volumes start: tables `[[rules]]` with `modality`, `image_type`,
+    /// `calling_ae`, `study_description` (what is absent matches anything), `kind`, `parameters`,
+    /// `send` and `to`. The first rule that matches counts
+    rules: Tables<Rule> = "[]";
 
     ["Retention"]
     /// Age at which volumes, results and finished jobs are erased, unless one of the three settings
@@ -617,6 +660,7 @@ macro_rules! shown_by_display {
 }
 
 shown_by_display!(
+    AeTitle,
     AllowList,
     OtlpEndpoint,
     SocketAddr,
@@ -628,7 +672,10 @@ shown_by_display!(
     OwnRetention,
     LogFormat,
     Networks,
+    OptionalAddress,
     OptionalPath,
+    Tables<Rule>,
+    Tables<Sender>,
     String,
     usize,
     u32,

@@ -6,7 +6,7 @@
 use ipnet::IpNet;
 use std::fmt;
 use std::marker::PhantomData;
-use std::net::IpAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -148,6 +148,18 @@ pub type Count = OrKeyword<NonZeroUsize, Auto>;
 
 /// How long results are kept; `off` keeps them until they are deleted.
 pub type Retention = OrKeyword<Span, Off>;
+
+/// The keyword `off` in place of an address.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NoAddress;
+
+impl Keyword for NoAddress {
+    const WORD: &'static str = "off";
+    const EXPECTED: &'static str = "an address with a port, such as 127.0.0.1:11112";
+}
+
+/// An address to listen on; `off` is none.
+pub type OptionalAddress = OrKeyword<SocketAddr, NoAddress>;
 
 /// The address of a collector; `off` is none.
 pub type OtlpEndpoint = OrKeyword<String, Off>;

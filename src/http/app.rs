@@ -4,6 +4,7 @@ use super::decoding::Decoding;
 use super::exchange::Exchange;
 use super::guard::state::Guard;
 use super::hooks::Hooks;
+use super::intake::Intake;
 use super::kept_answers::KeptAnswers;
 use super::metrics::Metrics;
 use super::readiness::Readiness;
@@ -55,6 +56,8 @@ pub struct Shared {
     pub hooks: Hooks,
     /// Archives.
     pub exchange: Exchange,
+    /// Receiving objects from other systems.
+    pub intake: Intake,
     /// Figures for operators.
     pub metrics: Metrics,
     /// Whether the storage works.
@@ -82,7 +85,7 @@ impl App {
         engine: Engine,
         (access, guard): (Arc<dyn AccessStore>, Guard),
         settings: Settings,
-        (hooks, exchange): (Hooks, Exchange),
+        (hooks, exchange, intake): (Hooks, Exchange, Intake),
         watching: Watching,
         closing: CancellationToken,
     ) -> Self {
@@ -99,6 +102,7 @@ impl App {
             settings,
             hooks,
             exchange,
+            intake,
             closing,
             metrics: watching.metrics,
             figures: watching.figures,

@@ -65,6 +65,7 @@ pub async fn metrics(State(app): State<App>, RawQuery(query): RawQuery) -> Answe
     let reading = MetricReadings {
         load: app.queue.jobs.load().await?,
         figures: app.figures.queue_figures().await?,
+        received: app.intake.store.waiting().await?,
         backlog: app.hooks.store.backlog().await?,
         sent: app.hooks.dispatcher.counts(),
         ready: app.readiness.check(&app.queue).await.is_ok(),

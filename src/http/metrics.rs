@@ -6,6 +6,7 @@
 
 use crate::config::Settings;
 use crate::hooks::{Backlog, DeliveryCounts};
+use crate::intake::{AssociationEnd, IntakeObserver, Protocol};
 use crate::jobs::{DiskSpace, QueueFigures, QueueLoad, Timestamp};
 use prometheus::core::Collector;
 use prometheus::{
@@ -34,6 +35,8 @@ pub struct Metrics {
     pub requests: RequestMetrics,
     /// Jobs, as they change.
     pub jobs: JobMetrics,
+    /// Received objects.
+    pub intake: IntakeMetrics,
     stored: Gauges,
     started: Instant,
 }
@@ -80,6 +83,45 @@ pub struct JobMetrics {
     pub stages: HistogramVec,
 }
 
+/// Figures on received objects.
+#[derive(Clone)]
+pub struct IntakeMetrics {
+    /// Connections for DICOM that have ended, by how.
+    ended: IntCounterVec,
+    /// Open associations.
+    associations: IntGauge,
+    /// Objects by protocol and outcome.
+    objects: IntCounterVec,
+    /// Their bytes by protocol.
+    bytes: IntCounterVec,
+    /// Groups of objects by outcome.
+    groups: IntCounterVec,
+}
+
+impl IntakeObserver for IntakeMetrics {
+    fn associated(&self) {
+        self.associations.inc();
+    }
+
+    fn ended(&self, end: AssociationEnd, accepted: bool) {
+        self.ended.with_label_values(&[end.as_str()]).inc();
+        if accepted {
+            self.associations.dec();
+        }
+    }
+
+    fn object(&self, protocol: Protocol, outcome: &'static str, bytes: u64) {
+        let protocol = protocol.as_str();
+        self.objects.with_label_values(&[protocol, outcome]).inc();
+        self.bytes.with_label_values(&[protocol]).inc_by(bytes);
+    }
+
+    fn group(&self, made: bool) {
+        let outcome = if made { "stored" } else { "failed" };
+        self.groups.with_label_values(&[outcome]).inc();
+    }
+}
+
 /// What is read when somebody asks.
 struct Gauges {
     jobs: IntGaugeVec,
@@ -97,6 +139,8 @@ struct Gauges {
     hooks_pending: IntGauge,
     hooks_dead: IntGauge,
     oldest_hook: Gauge,
+    received_waiting: IntGauge,
+    received_waiting_bytes: IntGauge,
 }
 
 /// Makes metrics and registers them.
@@ -167,6 +211,7 @@ impl Metrics {
         Ok(Self {
             requests: RequestMetrics::registered(&make)?,
             jobs: JobMetrics::registered(&make)?,
+            intake: IntakeMetrics::registered(&make)?,
             stored: Gauges::registered(&make)?,
             registry,
             started: Instant::now(),
@@ -190,6 +235,8 @@ pub struct MetricReadings<'a> {
     pub load: QueueLoad,
     /// What waits and what is stored.
     pub figures: QueueFigures,
+    /// Number and bytes of received objects that are not part of a volume.
+    pub received: (u64, u64),
     /// Webhooks that wait.
     pub backlog: Backlog,
     /// Webhooks that were sent.
@@ -290,6 +337,45 @@ impl JobMetrics {
     }
 }
 
+impl IntakeMetrics {
+    fn registered(make: &Maker<'_>) -> Made<Self> {
+        let made = Self {
+            ended: make.counters(
+                "ventriform_dicom_connections_total",
+                "Connections for DICOM that have ended, by how.",
+                &["end"],
+            )?,
+            associations: make.whole("ventriform_dicom_associations", "Open associations.")?,
+            objects: make.counters(
+                "ventriform_received_objects_total",
+                "Objects sent by C-STORE or STOW-RS, by outcome.",
+                &["protocol", "outcome"],
+            )?,
+            bytes: make.counters(
+                "ventriform_received_bytes_total",
+                "Bytes of objects sent by C-STORE or STOW-RS.",
+                &["protocol"],
+            )?,
+            groups: make.counters(
+                "ventriform_received_volumes_total",
+                "Received objects and series that became a volume, or could not.",
+                &["outcome"],
+            )?,
+        };
+        for end in AssociationEnd::ALL {
+            made.ended.with_label_values(&[end.as_str()]);
+        }
+        for protocol in Protocol::ALL.map(Protocol::as_str) {
+            made.objects.with_label_values(&[protocol, "stored"]);
+            made.bytes.with_label_values(&[protocol]);
+        }
+        for outcome in ["stored", "failed"] {
+            made.groups.with_label_values(&[outcome]);
+        }
+        Ok(made)
+    }
+}
+
 impl Gauges {
     fn registered(make: &Maker<'_>) -> Made<Self> {
         Ok(Self {
@@ -339,6 +425,14 @@ impl Gauges {
                 "ventriform_oldest_webhook_age_seconds",
                 "Age of the oldest pending webhook delivery; 0 if none is pending.",
             )?,
+            received_waiting: make.whole(
+                "ventriform_received_waiting_objects",
+                "Received objects that are not part of a volume.",
+            )?,
+            received_waiting_bytes: make.whole(
+                "ventriform_received_waiting_bytes",
+                "Bytes of received objects that are not part of a volume.",
+            )?,
         })
     }
 
@@ -378,6 +472,9 @@ impl Gauges {
         self.hooks_pending.set(signed(backlog.pending));
         self.hooks_dead.set(signed(backlog.dead));
         self.oldest_hook.set(age(backlog.oldest));
+        let (objects, bytes) = reading.received;
+        self.received_waiting.set(signed(objects));
+        self.received_waiting_bytes.set(signed(bytes));
     }
 }
 

@@ -13,6 +13,7 @@
 //! | who may do what, and the record of it | [`guard`] (before every handler), [`caller`], [`keys`], [`audit`] |
 //! | a tenant's names for its things, legal holds, receipts of erasures | [`tags`], [`legal_hold`], [`erasures`] |
 //! | whose scan a volume is | [`scans`] (in answers and searches), [`identities`] (stated, erased) |
+//! | objects that other systems send | [`stow`], [`received`], [`intake`], [`volume_maker`] |
 //! | errors and their wording | [`problem`]; 404 and 410 in [`problem::not_found`] |
 //! | limits on bodies, connections and decoding | [`limits`], [`connections`], [`decoding`] |
 //! | the address that sent a request | [`client`] |
@@ -47,6 +48,7 @@ mod health;
 mod hooks;
 mod idempotency;
 mod identities;
+mod intake;
 mod job_watch;
 mod jobs;
 mod kept_answers;
@@ -64,17 +66,20 @@ mod problem;
 mod products;
 mod readers;
 mod readiness;
+mod received;
 mod request;
 mod router;
 mod scans;
 mod segmentations;
 mod server;
 mod spans;
+mod stow;
 mod streams;
 mod tags;
 mod templates;
 mod upload;
 mod validators;
+mod volume_maker;
 mod volumes;
 mod webhooks;
 mod wire;

@@ -15,8 +15,8 @@ use super::templates::{MESH_SIZE, Templates};
 use super::volumes::Volumes;
 use super::{
     audit, collection, erasures, front_page, given_webhook, health, idempotency, identities, jobs,
-    keys, legal_hold, models, originals, products, readers, segmentations, templates, volumes,
-    webhooks,
+    keys, legal_hold, models, originals, products, readers, received, segmentations, stow,
+    templates, volumes, webhooks,
 };
 use crate::config::Settings;
 use axum::Router;
@@ -51,7 +51,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         products::routes::<Templates>(),
         products::routes::<Readers>(),
     ];
-    let of_one_kind: [UtoipaMethodRouter<App>; 31] = [
+    let of_one_kind: [UtoipaMethodRouter<App>; 35] = [
         routes!(volumes::create_volume).layer(upload()),
         routes!(volumes::preview_volume),
         routes!(volumes::update_volume).layer(json(settings.json_limit)),
@@ -80,6 +80,10 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(webhooks::delete_webhook),
         routes!(webhooks::list_deliveries),
         routes!(webhooks::redeliver),
+        routes!(stow::store_instances).layer(upload()),
+        routes!(stow::store_study_instances).layer(upload()),
+        routes!(received::list_received),
+        routes!(received::forget_received),
         routes!(health::alive),
         routes!(health::ready),
         routes!(health::metrics),

@@ -8,14 +8,17 @@ use super::exchange::Exchange;
 use super::guard::hosts::HostPolicy;
 use super::guard::state::Guard;
 use super::hooks::Hooks;
+use super::intake::{self, Intake};
 use super::job_watch::JobWatch;
 use super::metrics::Metrics;
 use super::router::router;
 use super::scans;
 use super::spans::{OtlpError, Spans};
+use super::volume_maker::check_rules;
 use crate::access::{AccessStore, Gate, Issuer, IssuerError, IssuerSettings, Recorder, Scope};
 use crate::config::Settings;
 use crate::hooks::{Dispatcher, HookSettings, RetrySchedule, UrlGuard};
+use crate::intake::{GatherSettings, Gatherer, Listener, Receiver, ScpSettings, Sessions};
 use crate::jobs::{
     Clock, Custodian, DeathLimit, Failure, Fault, Queue, QueueSettings, SteadyClock, StoreError,
     SystemClock, Upkeep, WorkerSettings, Workers, recover_after_crash,
@@ -49,6 +52,24 @@ pub enum ServeError {
          or set `oidc_issuer`, or serve everybody by `--allow-anonymous`"
     )]
     Open(SocketAddr),
+    /// Everybody who can reach the address could send objects by DICOM.
+    #[error(
+        "{0} can be reached from other machines, but no system is listed that may send images there. \
+         List them as `[[senders]]` in the file of `--config`, or let everybody send by \
+         `--allow-anonymous`"
+    )]
+    OpenDicom(SocketAddr),
+    /// The address for DICOM cannot be used.
+    #[error("cannot listen on {address} for DICOM: {reason}")]
+    Dicom {
+        /// The address.
+        address: SocketAddr,
+        /// The system's message.
+        reason: io::Error,
+    },
+    /// A rule of the settings cannot be used.
+    #[error("{0}")]
+    Rules(String),
     /// The settings of the OpenID Connect issuer cannot be used.
     #[error("the OpenID Connect issuer: {0}")]
     Issuer(#[from] IssuerError),
@@ -69,6 +90,8 @@ pub struct Running {
     app: App,
     queue: Arc<Queue>,
     server: JoinHandle<()>,
+    dicom: Option<JoinHandle<()>>,
+    dicom_address: Option<SocketAddr>,
     workers: Workers,
     dispatcher: JoinHandle<()>,
     spans: Spans,
@@ -104,6 +127,7 @@ pub async fn start(
     listener: TcpListener,
 ) -> Result<Running, ServeError> {
     install_cryptography();
+    let dicom = dicom_listener(&settings)?;
     let tls = Tls::of(&settings)?;
     let workers = worker_settings(&settings);
     let store = Store::open_with(&settings.data_dir, store_settings(&settings)).await?;
@@ -132,15 +156,17 @@ pub async fn start(
         closing.clone(),
         settings.shutdown_grace.0,
     ));
+    let intake = receiving(&settings, &store, &queue, &watching);
     let app = App::new(
         queue.clone(),
         engine.clone(),
         (store.rows.clone(), guard),
         settings.clone(),
-        (hooks, exchange(&settings)),
+        (hooks, exchange(&settings), intake),
         watching,
         closing.clone(),
     );
+    check_rules(&app).map_err(ServeError::Rules)?;
     let limits = ConnectionLimits {
         connections: settings.connection_limit,
         of_one_client: settings.client_connection_limit,
@@ -173,6 +199,9 @@ pub async fn start(
         scrub_rate: settings.scrub_rate.0,
     };
     tokio::spawn(custodian.run(closing.clone()));
+    tokio::spawn(gatherer(&app).run(closing.clone()));
+    let dicom_address = dicom.as_ref().map(|dicom| dicom.address);
+    let dicom = dicom.map(|dicom| serve_dicom(&app, dicom)).transpose()?;
     let workers = Workers::start(&queue, &engine.works, workers)?;
     tracing::info!(%address, "listening");
     Ok(Running {
@@ -180,6 +209,8 @@ pub async fn start(
         app,
         queue,
         server,
+        dicom,
+        dicom_address,
         workers,
         dispatcher,
         spans,
@@ -195,6 +226,11 @@ impl Running {
         self.address
     }
 
+    /// The address on which it listens for DICOM; `None` if it does not.
+    pub fn dicom_address(&self) -> Option<SocketAddr> {
+        self.dicom_address
+    }
+
     /// Its queue of jobs.
     pub fn queue(&self) -> &Arc<Queue> {
         &self.queue
@@ -207,13 +243,107 @@ impl Running {
     pub async fn stop(mut self) -> Result<(), ServeError> {
         tracing::info!("shutting down");
         self.closing.cancel();
-        let (server, (), dispatcher) =
-            tokio::join!(self.server, self.workers.stop(self.grace), self.dispatcher);
+        let dicom = async {
+            match self.dicom {
+                Some(dicom) => dicom.await,
+                None => Ok(()),
+            }
+        };
+        let (server, dicom, (), dispatcher) = tokio::join!(
+            self.server,
+            dicom,
+            self.workers.stop(self.grace),
+            self.dispatcher
+        );
         self.app.guard.recorder.flush().await;
         self.spans.flush().await;
         self.store.close().await;
-        server.and(dispatcher).map_err(io::Error::other)?;
+        server
+            .and(dicom)
+            .and(dispatcher)
+            .map_err(io::Error::other)?;
         Ok(())
+    }
+}
+
+/// Where objects are received by DICOM, and from whom.
+struct DicomListener {
+    listener: TcpListener,
+    address: SocketAddr,
+    settings: ScpSettings,
+}
+
+/// Listens for DICOM if the settings ask for it.
+///
+/// # Errors
+/// If the address cannot be used, or strangers could send and the settings do not say that they may.
+fn dicom_listener(settings: &Settings) -> Result<Option<DicomListener>, ServeError> {
+    let Some(address) = settings.dicom_listen.0 else {
+        return Ok(None);
+    };
+    let unusable = |reason| ServeError::Dicom { address, reason };
+    let loopback = address.ip().to_canonical().is_loopback();
+    let scp = intake::scp_settings(settings, loopback).ok_or(ServeError::OpenDicom(address))?;
+    if scp.senders.others && !loopback {
+        tracing::warn!(%address, "every system may send images by DICOM (allow_anonymous)");
+    }
+    let listener = TcpListener::bind(address).map_err(unusable)?;
+    listener.set_nonblocking(true).map_err(unusable)?;
+    Ok(Some(DicomListener {
+        address: listener.local_addr().map_err(unusable)?,
+        listener,
+        settings: scp,
+    }))
+}
+
+/// Serves DICOM until the service shuts down.
+fn serve_dicom(app: &App, dicom: DicomListener) -> io::Result<JoinHandle<()>> {
+    let scp = Listener::new(
+        dicom.settings,
+        app.intake.receiver.clone(),
+        app.intake.sessions.clone(),
+        app.guard.recorder.clone(),
+        (
+            app.queue.clock.clone(),
+            Arc::new(app.metrics.intake.clone()),
+        ),
+        app.closing.clone(),
+    );
+    let listener = tokio::net::TcpListener::from_std(dicom.listener)?;
+    tracing::info!(address = %dicom.address, "listening for DICOM");
+    Ok(tokio::spawn(scp.run(listener)))
+}
+
+/// What receives objects.
+fn receiving(settings: &Settings, store: &Store, queue: &Queue, watching: &Watching) -> Intake {
+    let receiver = Receiver::new(
+        store.rows.clone(),
+        store.blobs.clone(),
+        queue.clock.clone(),
+        Arc::new(watching.metrics.intake.clone()),
+        intake::receiver_settings(settings),
+    );
+    Intake {
+        receiver: Arc::new(receiver),
+        sessions: Sessions::new(intake::waits(settings)),
+        store: store.rows.clone(),
+        files: store.blobs.clone(),
+    }
+}
+
+/// What makes volumes of received objects.
+fn gatherer(app: &App) -> Gatherer {
+    Gatherer {
+        store: app.intake.store.clone(),
+        files: app.intake.files.clone(),
+        queue: app.queue.clone(),
+        maker: Arc::new(app.clone()),
+        observer: Arc::new(app.metrics.intake.clone()),
+        sessions: app.intake.sessions.clone(),
+        settings: GatherSettings {
+            rules: app.settings.rules.0.clone(),
+            keep_failed: app.settings.intake_keep.0.map(|age| age.0),
+        },
     }
 }
 

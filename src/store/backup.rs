@@ -1,7 +1,7 @@
 //! A copy of a data folder, while the service runs or not.
 //!
 //! 1. `VACUUM INTO` takes a snapshot of the database in one read transaction.
-//! 2. The files of each row of the snapshot are copied and hashed on the way. Files never change
+//! 2. The files of each row of the snapshot (received objects first) are copied and hashed on the way. Files never change
 //!    once published, so those that an earlier backup into the same folder has copied are kept.
 //! 3. A row whose item was erased meanwhile is removed from the snapshot.
 //! 4. The snapshot replaces the target's database; items that it does not name are deleted.
@@ -9,7 +9,7 @@
 //! So at every moment the target is a whole backup: the last one until step 4, the new one after.
 //! To restore, copy the target to the data folder, or start the service on it.
 
-use super::blobs::{self, RECORD, STAGING};
+use super::blobs::{self, RECEIVED, RECORD, STAGING};
 use super::content;
 use super::doctor::{DoctorError, names};
 use super::sqlite::SqliteStore;
@@ -58,7 +58,8 @@ pub async fn backup(folder: &Path, target: &Path) -> Result<Backup, DoctorError>
     }
     fs::create_dir_all(target)?;
     let _lock = FolderLock::take(target)?;
-    for shelf in Resource::WITH_FILES.map(Resource::plural) {
+    let shelves = Resource::WITH_FILES.map(Resource::plural);
+    for shelf in shelves.into_iter().chain([RECEIVED]) {
         fs::create_dir_all(target.join(shelf))?;
     }
     let _ = fs::remove_dir_all(target.join(STAGING));
@@ -70,9 +71,10 @@ pub async fn backup(folder: &Path, target: &Path) -> Result<Backup, DoctorError>
     let rows = SqliteStore::open(&snapshot, StoreSettings::default().write_wait, gauge)
         .await
         .map_err(StoreError::from)?;
+    let received = copy_received(folder, target, &rows).await;
     let copied = copy_items(folder, target, &rows).await;
     rows.close().await;
-    let (done, kept) = copied?;
+    let (received, (done, kept)) = (received?, copied?);
 
     blobs::sync(&snapshot)?;
     for end in ["-wal", "-shm"] {
@@ -85,6 +87,11 @@ pub async fn backup(folder: &Path, target: &Path) -> Result<Backup, DoctorError>
             if !kept.contains(&id) {
                 fs::remove_dir_all(target.join(kind.plural()).join(id))?;
             }
+        }
+    }
+    for name in names(&target.join(RECEIVED))? {
+        if !received.contains(&name) {
+            fs::remove_file(target.join(RECEIVED).join(name))?;
         }
     }
     Ok(done)
@@ -120,6 +127,39 @@ async fn copy_items(
         blobs::sync(&target.join(shelf))?;
     }
     Ok((done, kept))
+}
+
+/// Copies the files of received objects. Returns the names of those that the target has.
+async fn copy_received(
+    folder: &Path,
+    target: &Path,
+    rows: &SqliteStore,
+) -> Result<BTreeSet<String>, DoctorError> {
+    let mut kept = BTreeSet::new();
+    for (name, sha256) in rows.waiting_files().await? {
+        let place = target.join(RECEIVED).join(&name);
+        if !place.exists() {
+            let draft = target.join(STAGING).join(&name);
+            match fs::copy(folder.join(RECEIVED).join(&name), &draft) {
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                other => {
+                    other?;
+                    blobs::sync(&draft)?;
+                    fs::rename(&draft, &place)?;
+                }
+            }
+        }
+        let hash = File::open(&place).and_then(|file| content::hash(&file));
+        match hash.is_ok_and(|hash| hash == sha256) {
+            true => {
+                kept.insert(name);
+            }
+            // It became part of a volume meanwhile, or is damaged.
+            false => rows.forget_received(&name).await?,
+        }
+    }
+    blobs::sync(&target.join(RECEIVED))?;
+    Ok(kept)
 }
 
 enum Copied {

@@ -35,6 +35,8 @@ pub(super) const RECORD: &str = "record.json";
 
 /// Files that are not published yet.
 pub(super) const STAGING: &str = "staging";
+/// Received objects, which are not volumes yet.
+pub(super) const RECEIVED: &str = "received";
 /// What is to be deleted.
 pub(super) const DISCARDED: &str = "discarded";
 /// What was found without a row, by day.
@@ -50,8 +52,8 @@ const CHUNK: u64 = 256 << 10;
 
 /// Files below one folder.
 pub struct FileBlobs {
-    folder: PathBuf,
-    gauge: DiskGauge,
+    pub(super) folder: PathBuf,
+    pub(super) gauge: DiskGauge,
     verified: Arc<Verified>,
 }
 
@@ -72,7 +74,7 @@ impl FileBlobs {
             _ => {}
         }
         let kinds = Resource::WITH_FILES.map(Resource::plural);
-        for name in kinds.into_iter().chain([STAGING, QUARANTINE]) {
+        for name in kinds.into_iter().chain([STAGING, QUARANTINE, RECEIVED]) {
             fs::create_dir_all(folder.join(name))?;
         }
         sync(folder)?;
@@ -83,7 +85,8 @@ impl FileBlobs {
         })
     }
 
-    fn new_staging_folder(&self) -> PathBuf {
+    /// A new path under `staging/`.
+    pub(super) fn new_staging_folder(&self) -> PathBuf {
         self.folder.join(STAGING).join(random_id(""))
     }
 
@@ -132,7 +135,7 @@ fn open_verified(
     Ok(Some((file, stamp)))
 }
 
-fn is_absent(error: &io::Error) -> bool {
+pub(super) fn is_absent(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory)
 }
 
@@ -161,10 +164,21 @@ impl Reading {
 const ROOM_CHECKED_EVERY: u64 = 4 << 20;
 
 /// A file of an upload, which ends with an error when the disk is nearly full.
-struct UploadFile {
+pub(super) struct UploadFile {
     file: tokio::fs::File,
     gauge: DiskGauge,
     unchecked: u64,
+}
+
+impl UploadFile {
+    /// An empty file on the disk of `gauge`.
+    pub(super) fn new(file: tokio::fs::File, gauge: DiskGauge) -> Self {
+        Self {
+            file,
+            gauge,
+            unchecked: 0,
+        }
+    }
 }
 
 impl AsyncWrite for UploadFile {
@@ -282,11 +296,7 @@ impl StagedFiles for StagingFolder {
         self.settled.store(false, Ordering::Release);
         let file = tokio::fs::File::create(self.folder.join(name)).await?;
         Ok(match &self.gauge {
-            Some(gauge) => Box::pin(UploadFile {
-                file,
-                gauge: gauge.clone(),
-                unchecked: 0,
-            }),
+            Some(gauge) => Box::pin(UploadFile::new(file, gauge.clone())),
             None => Box::pin(file),
         })
     }
@@ -517,13 +527,19 @@ fn set_aside_of(folder: &Path, id: &str) -> io::Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// Moves the folder of an item into the quarantine of the day. Succeeds if there is none.
-pub(super) fn set_aside(folder: &Path, id: &str, now: Timestamp) -> io::Result<()> {
+/// The quarantine of the day, which is made if it does not exist.
+pub(super) fn quarantine_shelf(folder: &Path, now: Timestamp) -> io::Result<PathBuf> {
     let day = day(now).and_then(|day| day.format(&DAY).ok());
     let shelf = folder
         .join(QUARANTINE)
         .join(day.as_deref().unwrap_or("unknown"));
     fs::create_dir_all(&shelf)?;
+    Ok(shelf)
+}
+
+/// Moves the folder of an item into the quarantine of the day. Succeeds if there is none.
+pub(super) fn set_aside(folder: &Path, id: &str, now: Timestamp) -> io::Result<()> {
+    let shelf = quarantine_shelf(folder, now)?;
     let mut place = shelf.join(id);
     if fs::exists(&place)? {
         place = shelf.join(random_id(&format!("{id}.")));

@@ -9,16 +9,19 @@
 //!    Repair moves a broken item into the quarantine and removes its row.
 //! 3. Every folder of an item: does it have a row? Repair makes the row from the `record.json`
 //!    beside the files if these are what it says, else moves the folder into the quarantine.
-//! 4. Every item in the quarantine: repair brings back those that are whole, have a record, and
+//! 4. Every received object that is not part of a volume yet: is its file there, with the right
+//!    SHA-256? Repair removes the rows of damaged ones, which can be sent again.
+//! 5. Every item in the quarantine: repair brings back those that are whole, have a record, and
 //!    were not erased by anybody.
-//! 5. Leftovers of writes and deletions: repair deletes them.
+//! 6. Leftovers of writes and deletions: repair deletes them.
 //!
 //! Repair deletes no content that was ever published. Rows that it makes anew belong to the tenant
 //! that the caller names, unless the database still says who holds the item: the record beside the
 //! files does not name tenants. Jobs, keys and receipts live in the database only.
 
-use super::blobs::{self, DISCARDED, QUARANTINE, RECORD, STAGING};
+use super::blobs::{self, DISCARDED, QUARANTINE, RECEIVED, RECORD, STAGING};
 use super::content;
+use super::received;
 use super::sqlite::SqliteStore;
 use super::{CLOSED, DATABASE, DiskGauge, FolderLock, OpenError, StoreSettings};
 use crate::jobs::{
@@ -255,6 +258,7 @@ impl Doctor<'_> {
     async fn items(&mut self, rows: &SqliteStore) -> Result<(), DoctorError> {
         let known = self.rows(rows).await?;
         self.folders(rows, &known).await?;
+        self.received(rows).await?;
         self.quarantine(rows).await?;
         self.leftovers()
     }
@@ -270,6 +274,44 @@ impl Doctor<'_> {
             }
         }
         Ok(known)
+    }
+
+    /// Checks the files of received objects against their rows.
+    async fn received(&mut self, rows: &SqliteStore) -> Result<(), DoctorError> {
+        let shelf = self.folder.join(RECEIVED);
+        let mut known = BTreeSet::new();
+        for (name, sha256) in rows.waiting_files().await? {
+            let wrong = match File::open(shelf.join(&name)) {
+                Ok(file) => {
+                    self.found.files += 1;
+                    (content::hash(&file)? != sha256)
+                        .then_some("It has another content than was received.")
+                }
+                Err(error) if error.kind() == io::ErrorKind::NotFound => Some("It is missing."),
+                Err(error) => return Err(error.into()),
+            };
+            if let Some(wrong) = wrong {
+                if self.heirs.is_some() {
+                    received::set_aside(self.folder, &name, SystemClock.now())?;
+                    rows.forget_received(&name).await?;
+                }
+                let repair = "its row was removed; the object can be sent again";
+                let repair = self.if_repairing(repair);
+                self.found.note("damaged-object", &name, wrong, repair);
+            }
+            known.insert(name);
+        }
+        for name in names(&shelf)? {
+            if !known.contains(&name) {
+                if self.heirs.is_some() {
+                    received::set_aside(self.folder, &name, SystemClock.now())?;
+                }
+                let repair = self.if_repairing("it was moved into the quarantine");
+                let detail = "It was received and not acknowledged.";
+                self.found.remark("unknown-object", &name, detail, repair);
+            }
+        }
+        Ok(())
     }
 
     async fn row(&mut self, rows: &SqliteStore, record: &ItemRecord) -> Result<(), DoctorError> {

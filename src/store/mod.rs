@@ -7,6 +7,7 @@
 //!   staging/          files not yet published; emptied at every start
 //!   discarded/        files that are being deleted
 //!   quarantine/DAY/   files that were found without a record
+//!   received/         objects that came by C-STORE or STOW-RS and are not volumes yet
 //!   volumes/vol_.../  files of a volume
 //!   models/mdl_.../   files of a model; likewise segmentations/, templates/
 //! ```
@@ -24,6 +25,7 @@ mod content;
 mod doctor;
 mod erasure;
 mod faults;
+mod received;
 mod rows;
 mod space;
 mod sqlite;
@@ -32,6 +34,7 @@ mod sqlite_catalogue;
 mod sqlite_custody;
 mod sqlite_figures;
 mod sqlite_hooks;
+mod sqlite_intake;
 mod sqlite_jobs;
 mod sqlite_repair;
 mod sqlite_scans;
@@ -207,9 +210,10 @@ async fn is_migrated(database: &Path) -> Result<bool, sqlx::Error> {
     Ok(usize::try_from(done) == Ok(sqlx::migrate!("src/store/migrations").iter().count()))
 }
 
-/// Whether a folder for items holds anything.
+/// Whether a folder for items or received objects holds anything.
 fn has_items(folder: &Path) -> std::io::Result<bool> {
-    for shelf in Resource::WITH_FILES.map(Resource::plural) {
+    let shelves = Resource::WITH_FILES.map(Resource::plural);
+    for shelf in shelves.into_iter().chain([blobs::RECEIVED]) {
         match std::fs::read_dir(folder.join(shelf)) {
             Ok(mut entries) => {
                 if entries.next().is_some() {

@@ -89,7 +89,9 @@ impl AccessStore for SqliteStore {
     async fn usage(&self, tenant: &Tenant) -> StoreResult<Usage> {
         let row = sqlx::query(
             "SELECT (SELECT coalesce(sum(bytes), 0) FROM volumes WHERE id IN
-                        (SELECT id FROM holdings WHERE tenant = ?1 AND kind = 'volume')),
+                        (SELECT id FROM holdings WHERE tenant = ?1 AND kind = 'volume'))
+                    + (SELECT coalesce(sum(bytes), 0) FROM intake_objects
+                       WHERE tenant = ?1 AND file IS NOT NULL),
                     (SELECT count(*) FROM jobs WHERE tenant = ?1 AND state = 'queued')",
         )
         .bind(tenant.as_str())

@@ -4,6 +4,7 @@ use reqwest::header::{AUTHORIZATION, HeaderValue};
 use reqwest::{Client, RequestBuilder, Response, StatusCode};
 use serde_json::{Map, Value, json};
 use std::io::{BufRead, BufReader};
+use std::net::SocketAddr;
 use std::ops::Deref;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -496,6 +497,8 @@ pub fn send_signal(process: u32, name: &str) {
 pub struct Service {
     process: Child,
     api: Api,
+    /// Where it listens for DICOM.
+    pub dicom: Option<SocketAddr>,
 }
 
 impl Deref for Service {
@@ -531,9 +534,11 @@ impl Service {
             .split_whitespace()
             .find(|word| word.starts_with("http"))
             .expect("the first line names the address");
+        let dicom = line.split_once("DICOM on ").map(|(_, rest)| rest.trim());
         Self {
             process,
             api: Api::new(url.to_owned()),
+            dicom: dicom.map(|address| address.parse().unwrap()),
         }
     }
 

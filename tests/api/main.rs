@@ -23,6 +23,7 @@ mod end_to_end;
 mod events;
 mod faults;
 mod hostile;
+mod intake;
 #[cfg(target_os = "linux")]
 mod isolation;
 mod items;
@@ -35,6 +36,7 @@ mod readers;
 mod receiver;
 mod records;
 mod scans;
+mod scu;
 mod security;
 mod segmentations;
 mod shutdown;

@@ -3,6 +3,7 @@
 
 use crate::helpers::{TestApp, closed, key, problem, text, volume};
 use crate::receiver::Receiver;
+use crate::scu::nuclear;
 use reqwest::{Method, RequestBuilder, StatusCode};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -122,6 +123,10 @@ impl Belongings {
         let template = sent(a.post(&template)).await;
         let reader = a.post("/v1/readers").json(&crate::readers::profile(1.0));
         let reader = sent(reader).await;
+        let object = a.post("/dicom-web/studies");
+        let object = object.header("content-type", "application/dicom");
+        sent(object.body(nuclear("1.2.3", 1, "TOMO").file())).await;
+        let received = a.json("/v1/intake").await;
         receiver.wait_for(2).await;
         let id = text(&job["id"]);
         let told = a.json(&format!("/v1/jobs/{id}/deliveries")).await;
@@ -139,6 +144,7 @@ impl Belongings {
                 ("erasures", id_of(&receipt)),
                 ("webhooks", id_of(&webhook)),
                 ("keys", id_of(&key)),
+                ("intake", id_of(&received["intake"][0])),
             ]
             .into(),
             job,

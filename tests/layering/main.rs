@@ -121,7 +121,11 @@ const USES: &[(&str, &[&str])] = &[
     ("access", &["jobs"]),
     ("hooks", &["jobs"]),
     ("archive", &["jobs"]),
-    ("store", &["jobs", "access", "hooks"]),
+    (
+        "intake",
+        &["progress", "volume", "export", "jobs", "access"],
+    ),
+    ("store", &["jobs", "access", "hooks", "intake"]),
     (
         "work",
         &[
@@ -144,16 +148,18 @@ const USES: &[(&str, &[&str])] = &[
             "jobs",
         ],
     ),
-    ("config", &["jobs", "hooks", "archive"]),
+    ("config", &["jobs", "hooks", "archive", "intake"]),
     (
         "http",
         &[
             "progress",
+            "volume",
             "export",
             "parameters",
             "jobs",
             "access",
             "hooks",
+            "intake",
             "store",
             "work",
             "config",
@@ -217,7 +223,7 @@ const SERVICE_CRATES: &[&str] = &[
 
 /// The service: what stands here may name [`SERVICE_CRATES`].
 const SERVICE: &[&str] = &[
-    "jobs", "access", "hooks", "archive", "work", "store", "config", "http", "cli",
+    "jobs", "access", "hooks", "archive", "intake", "work", "store", "config", "http", "cli",
 ];
 
 /// Standard-library facilities that would make a result depend on more than its input.

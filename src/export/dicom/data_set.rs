@@ -9,7 +9,10 @@ use dicom_dictionary_std::{StandardDataDictionary, tags, uids};
 use dicom_object::{FileMetaTableBuilder, InMemDicomObject};
 
 /// Implementation Class UID (0002,0012) of this software: derived from a UUID that was drawn once.
-const IMPLEMENTATION: &str = "2.25.212046303391268093411418305311126403873";
+pub const IMPLEMENTATION: &str = "2.25.212046303391268093411418305311126403873";
+
+/// Implementation Version Name (0002,0013) of this software.
+pub const IMPLEMENTATION_NAME: &str = "VENTRIFORM";
 
 /// Elements by tag. The value representation of an attribute is the dictionary's.
 #[derive(Debug, Clone)]
@@ -128,12 +131,35 @@ impl DataSet {
         let meta = FileMetaTableBuilder::new()
             .transfer_syntax(uids::EXPLICIT_VR_LITTLE_ENDIAN)
             .implementation_class_uid(IMPLEMENTATION)
-            .implementation_version_name("VENTRIFORM");
+            .implementation_version_name(IMPLEMENTATION_NAME);
         let object = self.0.with_meta(meta).map_err(encoding)?;
         let mut bytes = Vec::new();
         object.write_all(&mut bytes).map_err(encoding)?;
         Ok(bytes)
     }
+}
+
+/// Preamble and File Meta Information (PS3.10, 7.1) of an object that follows as a data set.
+///
+/// # Errors
+/// [`DicomError::Encoding`] if a UID is too long.
+pub fn file_start(
+    sop_class: &str,
+    sop_instance: &str,
+    transfer_syntax: &str,
+) -> Result<Vec<u8>, DicomError> {
+    let meta = FileMetaTableBuilder::new()
+        .media_storage_sop_class_uid(sop_class)
+        .media_storage_sop_instance_uid(sop_instance)
+        .transfer_syntax(transfer_syntax)
+        .implementation_class_uid(IMPLEMENTATION)
+        .implementation_version_name(IMPLEMENTATION_NAME)
+        .build()
+        .map_err(encoding)?;
+    let mut bytes = vec![0; 128];
+    bytes.extend_from_slice(b"DICM");
+    meta.write(&mut bytes).map_err(encoding)?;
+    Ok(bytes)
 }
 
 fn encoding(error: impl std::error::Error) -> DicomError {

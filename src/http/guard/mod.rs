@@ -42,10 +42,11 @@ const RATE_LIMIT: HeaderName = HeaderName::from_static("ratelimit");
 const RATE_LIMIT_POLICY: HeaderName = HeaderName::from_static("ratelimit-policy");
 
 /// The paths under which everything needs the scope `admin`.
-const ADMIN_PATHS: [&str; 4] = [
+const ADMIN_PATHS: [&str; 5] = [
     "/v1/keys",
     "/v1/audit",
     "/v1/webhooks",
+    "/v1/intake",
     "/v1/volumes/{id}/hold",
 ];
 

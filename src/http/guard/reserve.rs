@@ -68,6 +68,7 @@ fn amount(app: &App, request: &Parts) -> Usage {
         "/v1/volumes" => Usage { bytes, jobs: 0 },
         "/v1/models" | "/v1/segmentations" => Usage { bytes, jobs: 1 },
         "/v1/jobs" => Usage { bytes: 0, jobs: 1 },
+        path if path.starts_with("/dicom-web/studies") => Usage { bytes, jobs: 0 },
         _ => Usage::default(),
     }
 }

@@ -4,13 +4,14 @@ use super::hosts::HostPolicy;
 use super::reservations::Reservations;
 use crate::access::{Gate, Quota, Recorder, RequestCounter};
 use crate::config::Settings;
+use std::sync::Arc;
 
 /// What the guard knows and counts.
 pub struct Guard {
     /// Tells callers by their credentials.
     pub gate: Gate,
     /// The audit trail.
-    pub recorder: Recorder,
+    pub recorder: Arc<Recorder>,
     /// Which `Host` headers are answered.
     pub hosts: HostPolicy,
     /// Limits on every caller that has none of its own.
@@ -38,7 +39,7 @@ impl Guard {
     ) -> Self {
         Self {
             gate,
-            recorder,
+            recorder: Arc::new(recorder),
             hosts,
             quota: Quota {
                 requests: settings.quota_requests.0,

@@ -1,9 +1,9 @@
 //! `/v1/jobs`: jobs are filed, followed, cancelled and erased.
 
+pub mod archives;
 pub mod events;
 pub mod filing;
 
-mod archives;
 mod body;
 
 pub use body::{JobBody, describe, describe_all};

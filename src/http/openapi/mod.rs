@@ -68,6 +68,7 @@ use utoipa::openapi::{RefOr, Required};
         (name = "readers", description = "How readers draw the wall: profiles that segmentations can be drawn by"),
         (name = "webhooks", description = "Telling other programs about jobs"),
         (name = "access", description = "Keys and the audit trail, for the scope `admin`"),
+        (name = "dicomweb", description = "Images from other systems: STOW-RS, and what became of them"),
         (name = "erasures", description = "Receipts of what was erased"),
         (name = "operations", description = "For operators"),
     ),

@@ -33,6 +33,16 @@ pub fn form_interrupted(error: &(dyn Error + 'static), limit: Size) -> Problem {
     })
 }
 
+/// Why reading a `multipart/related` body of at most `limit` failed.
+pub fn related_interrupted(error: &(dyn Error + 'static), limit: Size) -> Problem {
+    let endless = causes(error).any(|cause| cause.is::<EndlessFormHeader>());
+    let known = known_cause(error, limit).filter(|_| !endless);
+    known.unwrap_or_else(|| {
+        let innermost = causes(error).last().unwrap_or(error);
+        malformed_related(&innermost.to_string())
+    })
+}
+
 /// The problem of a limit that was met, if one is among the sources of `error`.
 fn known_cause(error: &(dyn Error + 'static), limit: Size) -> Option<Problem> {
     causes(error).find_map(|cause| {
@@ -90,6 +100,17 @@ pub fn malformed_form(reason: &str) -> Problem {
         format!("The form cannot be read: {reason}."),
     )
     .fix("Send multipart/form-data with the volume as a file: curl -F file=@volume.nii.gz ...")
+}
+
+/// 400: the structure of a `multipart/related` body cannot be read.
+pub fn malformed_related(reason: &str) -> Problem {
+    Problem::bad_request(
+        "malformed-parts",
+        format!("The parts of the body cannot be read: {reason}."),
+    )
+    .fix(
+        "Send multipart/related; type=\"application/dicom\"; boundary=..., each object as one part.",
+    )
 }
 
 /// 400: the body holds no volume.

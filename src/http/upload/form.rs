@@ -26,7 +26,7 @@ const HEADER_BYTES: usize = 256 << 10;
 
 /// Bytes of the body that were read since the parser last returned something.
 #[derive(Clone, Default)]
-struct Unparsed(Arc<AtomicUsize>);
+pub struct Unparsed(Arc<AtomicUsize>);
 
 impl Unparsed {
     /// Adds a piece of the body. An error if the parser has gathered too much: the form has a
@@ -41,7 +41,7 @@ impl Unparsed {
     }
 
     /// The parser returned a field or a piece of one.
-    fn reset(&self) {
+    pub fn reset(&self) {
         self.0.store(0, Ordering::Relaxed);
     }
 }
@@ -135,7 +135,8 @@ async fn receive_parts(
     Ok(())
 }
 
-fn counted(body: Body, unparsed: Unparsed) -> Body {
+/// The body, whose bytes are counted by `unparsed` as they are read.
+pub fn counted(body: Body, unparsed: Unparsed) -> Body {
     let pieces = body.into_data_stream();
     Body::from_stream(pieces.map(move |piece| unparsed.add(piece?)))
 }

@@ -46,6 +46,17 @@ const READ: [(&str, Kind); 12] = [
 /// Beginning of the SOP classes of stored objects.
 const STORAGE: &str = "1.2.840.10008.5.1.4.1.1.";
 
+/// UIDs of the SOP classes that can hold slices.
+pub(super) fn classes() -> impl Iterator<Item = String> {
+    READ.iter().map(|(suffix, _)| format!("{STORAGE}{suffix}"))
+}
+
+/// Whether an object of that SOP class is one slice of a series.
+pub(super) fn is_slice_class(class: &str) -> bool {
+    let suffix = class.strip_prefix(STORAGE).unwrap_or_default();
+    READ.contains(&(suffix, Kind::Slice))
+}
+
 /// Why an object holds no volume, by the beginning of its SOP class after [`STORAGE`]; the first entry
 /// that fits counts.
 const OTHERS: [(&str, &str); 17] = [

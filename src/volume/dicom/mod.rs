@@ -24,6 +24,7 @@ mod codec;
 mod fragments;
 mod frames;
 mod geometry;
+mod header;
 mod kind;
 mod pixels;
 mod provenance;
@@ -35,6 +36,7 @@ mod syntax;
 #[cfg(test)]
 mod tests;
 
+pub use header::{DicomHeader, read_header, storage_classes, transfer_syntaxes};
 pub use provenance::Provenance;
 pub(super) use syntax::is_dicom;
 
@@ -91,6 +93,21 @@ struct StoredSlice {
     slice: usize,
 }
 
+/// Runs a pass over the data set of `file`. The parser states invariants of its own by panics, which
+/// are errors of the file.
+fn guarded<T>(
+    file: &VolumeFile,
+    pass: impl FnOnce() -> Result<T, VolumeError>,
+) -> Result<T, VolumeError> {
+    catch_unwind(AssertUnwindSafe(pass)).unwrap_or_else(|_| {
+        Err(VolumeError::Corrupt {
+            file: file.name().into(),
+            byte: 0,
+            reason: "the data set's structure contradicts itself".into(),
+        })
+    })
+}
+
 /// The scan of one file.
 struct ScannedFile {
     scan: Scan,
@@ -105,17 +122,7 @@ impl ScannedFile {
     ) -> Result<Self, VolumeError> {
         let syntax = syntax::find(file, limits)?;
         let mut source = syntax.open(file, limits.unpacked_bytes)?;
-        // The parser states invariants of its own by panics.
-        let scanned = catch_unwind(AssertUnwindSafe(|| {
-            scan::scan(&mut source, &syntax, monitor)
-        }));
-        let scan = scanned.unwrap_or_else(|_| {
-            Err(VolumeError::Corrupt {
-                file: file.name().into(),
-                byte: 0,
-                reason: "the data set's structure contradicts itself".into(),
-            })
-        })?;
+        let scan = guarded(file, || scan::scan(&mut source, &syntax, monitor))?;
         let pixels = Pixels::of(&scan, file, syntax, limits)?;
         Ok(Self { scan, pixels })
     }

@@ -88,12 +88,7 @@ pub(super) fn scan(
     syntax: &Syntax,
     monitor: &Monitor,
 ) -> Result<Scan, VolumeError> {
-    let byte_order = match syntax.transfer_syntax.endianness() {
-        Endianness::Little => ByteOrder::Little,
-        Endianness::Big => ByteOrder::Big,
-    };
-    let mut walk = Walk::new(Attributes::new(source.file(), byte_order));
-    walk.attributes.media_class.clone_from(&syntax.media_class);
+    let mut walk = Walk::of(source, syntax);
     let found = find_pixels(source, syntax, &mut walk, monitor);
     // For another kind of object, the kind is the more useful error.
     let kind = match &found {
@@ -115,6 +110,20 @@ pub(super) fn scan(
         words: found.words,
         pixels: found.pixels,
     })
+}
+
+/// Reads the needed attributes of a data set of any kind, up to its pixels if it has any.
+///
+/// # Errors
+/// As [`scan`], except that neither the kind of object nor pixels are asked for.
+pub(super) fn attributes(
+    source: &mut Source,
+    syntax: &Syntax,
+    monitor: &Monitor,
+) -> Result<Attributes, VolumeError> {
+    let mut walk = Walk::of(source, syntax);
+    find_pixels(source, syntax, &mut walk, monitor)?;
+    Ok(walk.attributes)
 }
 
 /// The pixel element.
@@ -301,7 +310,14 @@ struct Walk {
 }
 
 impl Walk {
-    fn new(attributes: Attributes) -> Self {
+    /// At the start of the data set of `source`.
+    fn of(source: &Source, syntax: &Syntax) -> Self {
+        let byte_order = match syntax.transfer_syntax.endianness() {
+            Endianness::Little => ByteOrder::Little,
+            Endianness::Big => ByteOrder::Big,
+        };
+        let mut attributes = Attributes::new(source.file(), byte_order);
+        attributes.media_class.clone_from(&syntax.media_class);
         Self {
             attributes,
             path: Vec::new(),

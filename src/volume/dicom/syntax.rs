@@ -21,6 +21,14 @@ const EXPLICIT_BIG: &str = "1.2.840.10008.1.2.2";
 /// Deflated Explicit VR Little Endian, the only transfer syntax that compresses whole data sets.
 const DEFLATED: &str = "1.2.840.10008.1.2.1.99";
 
+/// The transfer syntaxes that are read.
+pub(super) fn read() -> impl Iterator<Item = &'static str> {
+    let whole = [IMPLICIT_LITTLE, EXPLICIT_LITTLE, EXPLICIT_BIG, DEFLATED];
+    whole
+        .into_iter()
+        .chain(COMPRESSED.iter().map(|(uid, _)| *uid))
+}
+
 /// How the pixels are compressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Compression {

@@ -1,0 +1,31 @@
+#!/usr/bin/env bash
+# Checks the C-STORE SCP and STOW-RS by other programs: storescu and echoscu (dcmtk), pynetdicom, dicomweb-client.
+#
+#   scripts/check_intake.sh
+#
+# scripts/check_intake.py starts the service on a folder of its own, sends objects in every way that docs/pacs.md
+# names, kills the service between objects, and sends garbage. Takes about a minute. Exits with 1 if anything is
+# wrong.
+#
+# PYTHON: an interpreter that has numpy, pydicom, pynetdicom and dicomweb-client. Without it the script installs
+# them under target/. dcmtk (Debian) is installed if it is missing.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+out=$(mktemp -d)
+trap 'rm -rf "$out"' EXIT
+
+as_root() { if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo "$@"; fi; }
+if ! command -v storescu >/dev/null; then
+  as_root apt-get update -qq
+  as_root apt-get install -y -qq --no-install-recommends dcmtk >/dev/null
+fi
+if [ -z "${PYTHON:-}" ]; then
+  tools=target/check-intake
+  PYTHON=$tools/bin/python
+  [ -x "$PYTHON" ] || python3 -m venv "$tools"
+  "$PYTHON" -c 'import pynetdicom, dicomweb_client' 2>/dev/null ||
+    "$PYTHON" -m pip install --quiet --disable-pip-version-check -r scripts/requirements.txt
+fi
+[ -x target/debug/ventriform ] || cargo build --quiet --bins --test layering
+
+"$PYTHON" scripts/check_intake.py target/debug/ventriform "$out"

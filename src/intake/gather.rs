@@ -1,0 +1,292 @@
+//! Making volumes of complete groups, and starting the jobs that rules ask for.
+//!
+//! Each step is written down before the next one begins, and can be done again: a volume is known by
+//! its content, a job by its idempotency key. What fails for a passing reason (a full disk, a full
+//! queue) is tried again; a group that cannot be read is kept with the reason for a set time.
+
+use super::observer::IntakeObserver;
+use super::record::{GroupState, IntakeGroup, IntakeStore, ReceivedFiles};
+use super::rules::Rule;
+use super::session::Sessions;
+use crate::jobs::{
+    BlobError, Failure, Fault, LocalFile, Queue, StoreError, StoreFault, StoreResult, Timestamp,
+};
+use async_trait::async_trait;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio_util::sync::CancellationToken;
+
+/// Pause after a failure that may pass.
+const RETRY: Duration = Duration::from_secs(10);
+/// Time between two sweeps.
+const SWEEP_EVERY: Duration = Duration::from_secs(600);
+/// A file without a row that was written this long ago will not get one.
+const ABANDONED: Duration = Duration::from_secs(3600);
+
+/// Why a step could not be done.
+#[derive(Debug)]
+pub enum MakeError {
+    /// It may be possible later.
+    Later(String),
+    /// It is never possible.
+    Never(Failure),
+}
+
+impl From<StoreError> for MakeError {
+    fn from(error: StoreError) -> Self {
+        match error.cause() {
+            StoreFault::DamagedFile => Self::Never(damaged()),
+            _ => Self::Later(error.to_string()),
+        }
+    }
+}
+
+impl From<BlobError> for MakeError {
+    fn from(error: BlobError) -> Self {
+        StoreError::from(error).into()
+    }
+}
+
+fn damaged() -> Failure {
+    Failure::new(
+        Fault::Service,
+        "damaged-file",
+        "A stored file of the series no longer holds what was received.",
+    )
+    .fix("Erase the volume of the series, then send the series again.")
+}
+
+/// Makes volumes and files jobs.
+#[async_trait]
+pub trait VolumeMaker: Send + Sync + 'static {
+    /// Stores the volume of these files for the tenant of `group`. Returns its id. Done again, it gives
+    /// the same id.
+    async fn make(&self, group: &IntakeGroup, files: &[LocalFile]) -> Result<String, MakeError>;
+
+    /// Files the job of `rule` on the volume of `group`. Returns its id. Done again with the same `key`,
+    /// it gives the same job.
+    async fn file(
+        &self,
+        group: &IntakeGroup,
+        rule: &Rule,
+        volume: &str,
+        key: String,
+    ) -> Result<String, MakeError>;
+}
+
+/// What is done with complete groups.
+pub struct GatherSettings {
+    /// The rules; the first that matches counts.
+    pub rules: Vec<Rule>,
+    /// How long a group that cannot be read is kept; `None` keeps it.
+    pub keep_failed: Option<Duration>,
+}
+
+/// Makes volumes of what was received.
+pub struct Gatherer {
+    /// The rows of received objects.
+    pub store: Arc<dyn IntakeStore>,
+    /// Their files.
+    pub files: Arc<dyn ReceivedFiles>,
+    /// Volumes, and the time of day.
+    pub queue: Arc<Queue>,
+    /// Makes volumes and files jobs.
+    pub maker: Arc<dyn VolumeMaker>,
+    /// Is told of the volumes.
+    pub observer: Arc<dyn IntakeObserver>,
+    /// The groups that wait.
+    pub sessions: Arc<Sessions>,
+    /// See [`GatherSettings`].
+    pub settings: GatherSettings,
+}
+
+impl Gatherer {
+    /// Runs until `end` is cancelled.
+    pub async fn run(self, end: CancellationToken) {
+        let work = async { tokio::join!(self.gather_for_ever(), self.sweep_for_ever()) };
+        end.run_until_cancelled(work).await;
+    }
+
+    async fn gather_for_ever(&self) {
+        while let Err(error) = self.resume().await {
+            tracing::error!(%error, "what was received before the start could not be listed");
+            tokio::time::sleep(RETRY).await;
+        }
+        loop {
+            let group = self.sessions.next().await;
+            if let Err(error) = self.advance(&group).await {
+                tracing::warn!(group, error, "a received series waits: {error}");
+                self.sessions.retry(&group, RETRY);
+            }
+        }
+    }
+
+    /// Watches what an earlier run has left, and deletes the files that it no longer needed.
+    async fn resume(&self) -> StoreResult<()> {
+        let files = self.store.releasable().await?;
+        self.release(&files).await?;
+        for group in self.store.unfinished().await? {
+            let whole = group.instance.is_some() || group.state == GroupState::Filing;
+            self.sessions.resume(&group.id, whole);
+        }
+        Ok(())
+    }
+
+    async fn release(&self, files: &[String]) -> StoreResult<()> {
+        if !files.is_empty() {
+            self.files.discard(files).await?;
+            self.store.released(files).await?;
+        }
+        Ok(())
+    }
+
+    /// Takes a complete group as far as possible.
+    ///
+    /// # Errors
+    /// Why it has to wait.
+    async fn advance(&self, id: &str) -> Result<(), String> {
+        let text = |error: StoreError| error.to_string();
+        let Some(mut group) = self.store.group(id).await.map_err(text)? else {
+            return Ok(());
+        };
+        if group.state == GroupState::Gathering {
+            match self.make(&group).await {
+                Ok(()) => self.observer.group(true),
+                Err(MakeError::Later(reason)) => return Err(reason),
+                Err(MakeError::Never(failure)) => {
+                    tracing::warn!(
+                        group = id,
+                        code = failure.code,
+                        "received objects make no volume"
+                    );
+                    self.observer.group(false);
+                    let now = self.queue.clock.now();
+                    let failed = self.store.failed(id, group.revision, &failure, now);
+                    failed.await.map_err(text)?;
+                }
+            }
+            match self.store.group(id).await.map_err(text)? {
+                Some(now) => group = now,
+                None => return Ok(()),
+            }
+        }
+        if group.state == GroupState::Filing {
+            self.file(&group).await?;
+        }
+        Ok(())
+    }
+
+    async fn make(&self, group: &IntakeGroup) -> Result<(), MakeError> {
+        let files = self.local_files(group).await?;
+        let volume = self.maker.make(group, &files).await?;
+        let now = self.queue.clock.now();
+        self.store
+            .made(&group.id, group.revision, &volume, now)
+            .await?;
+        tracing::info!(
+            group = group.id,
+            volume,
+            files = files.len(),
+            "received a volume"
+        );
+        Ok(())
+    }
+
+    /// The files of all objects of a group: those that wait, and those that are part of its volume.
+    async fn local_files(&self, group: &IntakeGroup) -> Result<Vec<LocalFile>, MakeError> {
+        let objects = self.store.objects(&group.id).await?;
+        let volume = match &group.volume {
+            Some(id) => {
+                let tenant = &group.origin.tenant;
+                self.queue.catalogue.volume(tenant, id).await?
+            }
+            None => None,
+        };
+        let mut files = Vec::with_capacity(objects.len());
+        for object in objects {
+            let found = match (object.file, &volume) {
+                (Some(name), _) => self.files.received(&name).await?,
+                (None, Some(volume)) => {
+                    let mut stored = volume.files.iter();
+                    match stored.find(|file| file.sha256 == object.file_sha256) {
+                        Some(file) => self.queue.blobs.local(&volume.id, file).await?,
+                        None => None,
+                    }
+                }
+                (None, None) => None,
+            };
+            files.push(found.ok_or_else(|| MakeError::Never(damaged()))?);
+        }
+        Ok(files)
+    }
+
+    /// Files the job that a rule asks for, and deletes the files that are part of the volume.
+    async fn file(&self, group: &IntakeGroup) -> Result<(), String> {
+        let Some(volume) = &group.volume else {
+            return Ok(());
+        };
+        let rule = self.settings.rules.iter().find(|rule| rule.matches(group));
+        let (job, failure) = match rule {
+            None => (None, None),
+            Some(rule) => {
+                let key = format!("{}-{volume}", group.id);
+                match self.maker.file(group, rule, volume, key).await {
+                    Ok(job) => (Some(job), None),
+                    Err(MakeError::Later(reason)) => return Err(reason),
+                    Err(MakeError::Never(failure)) => {
+                        tracing::warn!(
+                            group = group.id,
+                            code = failure.code,
+                            "the job of a rule was refused"
+                        );
+                        (None, Some(failure))
+                    }
+                }
+            }
+        };
+        let now = self.queue.clock.now();
+        let ended = self
+            .store
+            .filed(&group.id, job.as_deref(), failure.as_ref(), now);
+        let files = ended.await.map_err(|error| error.to_string())?;
+        // What is not deleted now is deleted after the next start.
+        if let Err(error) = self.release(&files).await {
+            tracing::warn!(%error, "received files that are stored could not be deleted");
+        }
+        Ok(())
+    }
+
+    async fn sweep_for_ever(&self) {
+        let mut round = tokio::time::interval(SWEEP_EVERY);
+        loop {
+            round.tick().await;
+            if let Err(error) = self.sweep().await {
+                tracing::error!(%error, "the sweep of received files failed; the next one tries again");
+            }
+        }
+    }
+
+    /// Forgets failed groups that are too old, and sets files without a row aside.
+    async fn sweep(&self) -> StoreResult<()> {
+        let now = self.queue.clock.now();
+        if let Some(age) = self.settings.keep_failed {
+            let age = Timestamp::try_from(age.as_millis()).unwrap_or(Timestamp::MAX);
+            let failed = self.store.failed_before(now.saturating_sub(age)).await?;
+            for (tenant, id) in failed {
+                if let Some(files) = self.store.remove(&tenant, &id).await? {
+                    self.files.discard(&files).await?;
+                }
+            }
+        }
+        // Listed before the rows are: a file that gets its row meanwhile is among the rows.
+        let kept = self.files.kept(ABANDONED).await?;
+        let known = self.store.files().await?;
+        for name in kept.iter().filter(|name| !known.contains(*name)) {
+            self.files.quarantine(name, now).await?;
+            tracing::error!(
+                "a received file without a record was moved to the folder `quarantine`"
+            );
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,96 @@
+//! What a DICOM object says of itself, without reading its pixels: for those who receive objects and
+//! have to tell which belong together.
+
+use super::super::VolumeError;
+use super::super::limits::ReadLimits;
+use super::super::source::VolumeFile;
+use super::attributes::{
+    Attribute, Attributes, IMAGE_TYPE, MODALITY, SERIES_UID, SOP_CLASS, SOP_INSTANCE,
+    STUDY_DESCRIPTION, STUDY_UID,
+};
+use super::{guarded, kind, scan, syntax};
+use crate::progress::Monitor;
+use std::fmt;
+
+/// Longest UID (PS3.5, 9.1).
+const LONGEST_UID: usize = 64;
+
+/// Identity and kind of one object. This is personal data: `Debug` shows none of it.
+#[derive(Clone, PartialEq, Eq)]
+pub struct DicomHeader {
+    /// SOP Class UID (0008,0016).
+    pub sop_class: String,
+    /// SOP Instance UID (0008,0018).
+    pub sop_instance: String,
+    /// Study Instance UID (0020,000D).
+    pub study: String,
+    /// Series Instance UID (0020,000E).
+    pub series: String,
+    /// Whether the object is one slice of its series, and not a volume of its own.
+    pub is_slice: bool,
+    /// Modality (0008,0060).
+    pub modality: Option<String>,
+    /// The values of Image Type (0008,0008).
+    pub image_type: Vec<String>,
+    /// Study Description (0008,1030).
+    pub study_description: Option<String>,
+    /// Offset of the data set in the file, bytes.
+    pub data_set: u64,
+}
+
+impl fmt::Debug for DicomHeader {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("DicomHeader").finish_non_exhaustive()
+    }
+}
+
+/// Reads the header of the object in `file`, which must be whole up to the end of its pixels.
+///
+/// # Errors
+/// [`VolumeError`] if the file is no DICOM object, is damaged or cut off, has a transfer syntax that is
+/// not read, or lacks one of its four UIDs.
+pub fn read_header(
+    file: &VolumeFile,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<DicomHeader, VolumeError> {
+    let syntax = syntax::find(file, limits)?;
+    let mut source = syntax.open(file, limits.unpacked_bytes)?;
+    let a = guarded(file, || scan::attributes(&mut source, &syntax, monitor))?;
+    let sop_class = uid(&a, SOP_CLASS)?;
+    Ok(DicomHeader {
+        is_slice: kind::is_slice_class(&sop_class),
+        sop_class,
+        sop_instance: uid(&a, SOP_INSTANCE)?,
+        study: uid(&a, STUDY_UID)?,
+        series: uid(&a, SERIES_UID)?,
+        modality: a.text(MODALITY),
+        image_type: a.texts(IMAGE_TYPE),
+        study_description: a.prose(STUDY_DESCRIPTION),
+        data_set: syntax.data_set,
+    })
+}
+
+/// A UID that the object must have.
+fn uid(a: &Attributes, attribute: Attribute) -> Result<String, VolumeError> {
+    let text = a.text(attribute).ok_or_else(|| a.missing(attribute))?;
+    let formed = |b: u8| b.is_ascii_digit() || b == b'.';
+    match text.len() <= LONGEST_UID && text.bytes().all(formed) {
+        true => Ok(text),
+        false => Err(a.wrong(
+            attribute.name,
+            &text,
+            format!("a UID has at most {LONGEST_UID} digits and dots"),
+        )),
+    }
+}
+
+/// UIDs of the SOP classes of objects that can hold slices.
+pub fn storage_classes() -> Vec<String> {
+    kind::classes().collect()
+}
+
+/// UIDs of the transfer syntaxes that are read.
+pub fn transfer_syntaxes() -> Vec<&'static str> {
+    syntax::read().collect()
+}

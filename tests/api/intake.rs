@@ -1,0 +1,647 @@
+//! Objects that come by C-STORE and STOW-RS.
+
+use crate::helpers::{Service, TestApp, fake_engine, key, problem, text};
+use crate::scu::{CT, NM, Object, Scu, command, nuclear, slice};
+use dicom_ul::pdu::{PDataValueType, Pdu};
+use reqwest::StatusCode;
+use serde_json::{Value, json};
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use ventriform::access::{Quota, Scope};
+use ventriform::config::Settings;
+use ventriform::http::{ServeError, start};
+use ventriform::volume::ReadLimits;
+use ventriform::work::Engine;
+
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Reads volumes as the product does; computes as the fake does.
+fn engine() -> Engine {
+    Engine {
+        reader: Engine::new(ReadLimits::default()).reader,
+        ..fake_engine()
+    }
+}
+
+fn listening(settings: &mut Settings) {
+    settings.dicom_listen = "127.0.0.1:0".parse().unwrap();
+    settings.series_quiet = "100ms".parse().unwrap();
+    settings.series_patience = "400ms".parse().unwrap();
+}
+
+async fn service(change: impl FnOnce(&mut Settings)) -> (TestApp, SocketAddr) {
+    let data = Arc::new(tempfile::tempdir().unwrap());
+    on(data, change).await
+}
+
+async fn on(
+    data: Arc<tempfile::TempDir>,
+    change: impl FnOnce(&mut Settings),
+) -> (TestApp, SocketAddr) {
+    let app = TestApp::on(data, engine(), |settings| {
+        listening(settings);
+        change(settings);
+    })
+    .await;
+    let address = app.running.as_ref().unwrap().dicom_address().unwrap();
+    (app, address)
+}
+
+async fn intake(app: &TestApp) -> Vec<Value> {
+    let list = app.json("/v1/intake").await;
+    list["intake"].as_array().unwrap().clone()
+}
+
+/// Waits until `number` groups were received and none of them is unfinished; returns them.
+async fn settled(app: &TestApp, number: usize) -> Vec<Value> {
+    let deadline = Instant::now() + PATIENCE;
+    loop {
+        let groups = intake(app).await;
+        let ended =
+            |group: &Value| ["stored", "failed"].contains(&group["state"].as_str().unwrap());
+        if groups.len() == number && groups.iter().all(ended) {
+            return groups;
+        }
+        assert!(Instant::now() < deadline, "still {groups:?}");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+}
+
+/// Waits until that many received files are kept: those of a volume are deleted after it is shown.
+async fn kept(data: &Path, number: usize) {
+    let deadline = Instant::now() + PATIENCE;
+    loop {
+        let files = std::fs::read_dir(data.join("received")).unwrap();
+        let names: Vec<_> = files.map(|file| file.unwrap().file_name()).collect();
+        if names.len() == number {
+            return;
+        }
+        assert!(Instant::now() < deadline, "still {names:?}");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+}
+
+async fn volumes(app: &TestApp) -> Vec<Value> {
+    let list = app.json("/v1/volumes").await;
+    list["volumes"].as_array().unwrap().clone()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_multi_frame_image_is_a_volume_at_once_and_stored_once() {
+    let (app, address) = service(|_| {}).await;
+    let object = nuclear("1.2.3", 1, "RECON TOMO");
+    let mut scu = Scu::open(address);
+    assert_eq!(scu.echo(), 0);
+    assert_eq!(scu.store(&object), 0);
+    // While the association is still open.
+    let groups = settled(&app, 1).await;
+    assert_eq!(groups[0]["state"], "stored", "{groups:?}");
+    assert_eq!(groups[0]["sender"], "CAMERA");
+    assert_eq!(groups[0]["job"], Value::Null);
+    let volume = app.json(&text(&groups[0]["links"]["volume"])).await;
+    assert_eq!(volume["format"], "DICOM NM");
+    assert_eq!(volume["shape"], json!([4, 4, 3]));
+    kept(app.data.path(), 0).await;
+
+    // The same again: the same answer, and nothing new.
+    assert_eq!(scu.store(&object), 0);
+    let mut other = nuclear("1.2.3", 2, "RECON TOMO");
+    (other.instance, other.set) = (object.instance.clone(), {
+        let mut set = other.set.clone();
+        set.put(
+            object
+                .set
+                .element_by_name("SOPInstanceUID")
+                .unwrap()
+                .clone(),
+        );
+        set
+    });
+    assert_eq!(
+        scu.store(&other),
+        0x0111,
+        "another object with the same UID"
+    );
+    let mut wrong = object.clone();
+    wrong.instance = "1.2.3.99".into();
+    assert_eq!(scu.store(&wrong), 0xA900, "not the announced object");
+    scu.release();
+    assert_eq!(settled(&app, 1).await[0]["volume"], groups[0]["volume"]);
+    assert_eq!(volumes(&app).await.len(), 1);
+    kept(app.data.path(), 0).await;
+
+    // Once the volume is erased, nothing is known of the object: it is stored again.
+    let erased = app
+        .delete(&text(&groups[0]["links"]["volume"]))
+        .send()
+        .await;
+    assert!(erased.unwrap().status().is_success());
+    assert!(intake(&app).await.is_empty());
+    let mut scu = Scu::open(address);
+    assert_eq!(scu.store(&other), 0);
+    scu.release();
+    assert_eq!(settled(&app, 1).await[0]["state"], "stored");
+    let audit = app.json("/v1/audit?agent=CAMERA").await;
+    assert!(!audit["events"].as_array().unwrap().is_empty());
+    assert!(!audit.to_string().contains("CANARY"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn each_context_is_accepted_or_rejected_by_itself() {
+    let (_app, address) = service(|_| {}).await;
+    let mut scu = Scu::open(address);
+    assert_eq!(scu.contexts(), [1, 3, 5]);
+    // C-FIND, and C-STORE of another class than the context's.
+    scu.send(PDataValueType::Command, 3, command(0x0020, NM, None), true);
+    assert_eq!(scu.status(), 0x0211);
+    scu.send(
+        PDataValueType::Command,
+        3,
+        command(0x0001, CT, Some("1.2")),
+        true,
+    );
+    scu.send(PDataValueType::Data, 3, vec![1, 2], true);
+    assert_eq!(scu.status(), 0x0122);
+    scu.send(
+        PDataValueType::Command,
+        3,
+        command(0x0001, NM, Some("1.2")),
+        true,
+    );
+    scu.send(PDataValueType::Data, 3, vec![7; 99], true);
+    assert_eq!(scu.status(), 0xC000, "no data set");
+    assert_eq!(scu.echo(), 0);
+    scu.release();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn slices_are_gathered_and_late_ones_are_added() {
+    let (app, address) = service(|settings| {
+        settings.rules = r#"[{ modality = "CT", kind = "model" }]"#.parse().unwrap();
+    })
+    .await;
+    let mut scu = Scu::open(address);
+    for number in [3, 1, 2] {
+        assert_eq!(scu.store(&slice("1.2.4", number)), 0);
+    }
+    assert_eq!(intake(&app).await[0]["state"], "gathering");
+    scu.release();
+    let first = settled(&app, 1).await.remove(0);
+    assert_eq!(first["objects"], 3);
+    let volume = app.json(&text(&first["links"]["volume"])).await;
+    assert_eq!(volume["shape"], json!([4, 4, 3]));
+    assert!(first["job"].is_string(), "{first}");
+
+    let mut scu = Scu::open(address);
+    assert_eq!(scu.store(&slice("1.2.4", 4)), 0);
+    assert_eq!(scu.store(&slice("1.2.4", 1)), 0, "known");
+    scu.abort();
+    let second = settled(&app, 1).await.remove(0);
+    assert_ne!(second["volume"], first["volume"]);
+    assert_ne!(second["job"], first["job"]);
+    let volume = app.json(&text(&second["links"]["volume"])).await;
+    assert_eq!(volume["shape"], json!([4, 4, 4]));
+    kept(app.data.path(), 0).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_rule_starts_its_job_once_whatever_is_sent_again() {
+    let rules = r#"[{ image_type = "RECON TOMO", kind = "model", parameters = { points = 170 } },
+                    { kind = "segmentation" }]"#
+        .replace('\n', " ");
+    let rules = move |settings: &mut Settings| settings.rules = rules.parse().unwrap();
+    let (app, address) = service(rules.clone()).await;
+    let object = nuclear("1.2.3", 1, "RECON TOMO");
+    let send = |address, object: &Object| {
+        let mut scu = Scu::open(address);
+        assert_eq!(scu.store(object), 0);
+        scu.release();
+    };
+    send(address, &object);
+    let job = settled(&app, 1).await[0]["job"].clone();
+    send(address, &object);
+    let data = app.stop().await;
+    let (app, address) = on(data, rules).await;
+    send(address, &object);
+    assert_eq!(settled(&app, 1).await[0]["job"], job);
+    let jobs = app.json("/v1/jobs").await;
+    let jobs = jobs["jobs"].as_array().unwrap();
+    assert_eq!(jobs.len(), 1);
+    assert_eq!((&jobs[0]["id"], &jobs[0]["kind"]), (&job, &json!("model")));
+    assert_eq!(jobs[0]["parameters"]["points"], 170);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_makes_no_volume_is_shown_with_the_reason_until_it_is_forgotten() {
+    let (app, address) = service(|_| {}).await;
+    let object = nuclear("1.2.3", 1, "TOMO");
+    for _ in 0..2 {
+        let mut scu = Scu::open(address);
+        assert_eq!(
+            scu.store(&object),
+            0,
+            "it is stored, though it is no volume"
+        );
+        scu.release();
+        let group = settled(&app, 1).await.remove(0);
+        assert_eq!(group["state"], "failed");
+        let error = &group["error"];
+        assert!(text(&error["detail"]).contains("projections"), "{error}");
+        assert!(text(&error["fix"]).contains("RECON TOMO"), "{error}");
+        kept(app.data.path(), 1).await;
+    }
+    let failed = app.json("/v1/intake?state=failed").await;
+    let path = text(&failed["intake"][0]["links"]["self"]);
+    assert_eq!(
+        app.json("/v1/intake?state=stored").await["intake"],
+        json!([])
+    );
+    let answer = app.get("/v1/intake?state=lost").send().await.unwrap();
+    problem(answer, 400, "invalid-parameter").await;
+    let forgotten = app.delete(&path).send().await.unwrap();
+    assert_eq!(forgotten.status(), StatusCode::NO_CONTENT);
+    assert!(intake(&app).await.is_empty());
+    kept(app.data.path(), 0).await;
+    problem(app.delete(&path).send().await.unwrap(), 404, "not-found").await;
+    let metrics = app
+        .get("/metrics")
+        .send()
+        .await
+        .unwrap()
+        .text()
+        .await
+        .unwrap();
+    for line in [
+        "ventriform_received_objects_total{outcome=\"stored\",protocol=\"c-store\"} 2",
+        "ventriform_received_volumes_total{outcome=\"failed\"} 2",
+        "ventriform_dicom_connections_total{end=\"released\"} 2",
+        "ventriform_dicom_associations 0",
+    ] {
+        assert!(metrics.contains(line), "{line} in {metrics}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn only_listed_systems_may_send_and_each_for_its_tenant() {
+    let (app, address) = service(|settings| {
+        settings.senders =
+            r#"[{ ae_title = "CAMERA", addresses = ["127.0.0.0/8"], tenant = "nuclear" },
+            { ae_title = "PACS", addresses = ["192.0.2.1"] }]"#
+                .replace('\n', " ")
+                .parse()
+                .unwrap();
+    })
+    .await;
+    for (calling, called, reason) in [
+        ("STRANGER", "VENTRIFORM", "CallingAETitleNotRecognized"),
+        ("PACS", "VENTRIFORM", "CallingAETitleNotRecognized"),
+        ("CAMERA", "ORTHANC", "CalledAETitleNotRecognized"),
+    ] {
+        let refused = Scu::call(address, calling, called).err().unwrap();
+        assert!(refused.contains(reason), "{refused}");
+    }
+    let mut scu = Scu::open(address);
+    assert_eq!(scu.store(&nuclear("1.2.3", 1, "RECON TOMO")), 0);
+    scu.release();
+    assert!(intake(&app).await.is_empty(), "it is another tenant's");
+    let (_, admin) = key(app.data.path(), Scope::Admin, "nuclear", Quota::default()).await;
+    let nuclear = app.seen_with(&admin);
+    assert_eq!(settled(&nuclear, 1).await[0]["state"], "stored");
+    let (_, reader) = key(app.data.path(), Scope::Submit, "nuclear", Quota::default()).await;
+    let answer = app
+        .seen_with(&reader)
+        .get("/v1/intake")
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(answer.status(), StatusCode::FORBIDDEN);
+}
+
+#[tokio::test]
+async fn strangers_cannot_send_from_other_machines_unless_told_so() {
+    let data = tempfile::tempdir().unwrap();
+    let settings = |change: fn(&mut Settings)| {
+        let mut settings = Settings {
+            data_dir: data.path().to_owned(),
+            dicom_listen: "0.0.0.0:0".parse().unwrap(),
+            ..Settings::default()
+        };
+        change(&mut settings);
+        settings
+    };
+    let begin = async |change| {
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        start(settings(change), engine(), listener).await
+    };
+    assert!(matches!(begin(|_| {}).await, Err(ServeError::OpenDicom(_))));
+    let open = begin(|settings| settings.allow_anonymous = true).await;
+    open.unwrap().stop().await.unwrap();
+    let listed = begin(|settings| settings.senders = r#"[{ ae_title = "A" }]"#.parse().unwrap());
+    listed.await.unwrap().stop().await.unwrap();
+    let rules = begin(|settings| {
+        settings.dicom_listen = "off".parse().unwrap();
+        settings.rules = r#"[{ kind = "cup" }]"#.parse().unwrap();
+    });
+    assert!(matches!(rules.await, Err(ServeError::Rules(why)) if why.contains("rule 1")));
+    let to = begin(|settings| {
+        settings.dicom_listen = "off".parse().unwrap();
+        let rule = r#"[{ kind = "segmentation", send = ["mask.dcm"], to = "pacs" }]"#;
+        settings.rules = rule.parse().unwrap();
+    });
+    assert!(matches!(to.await, Err(ServeError::Rules(why)) if why.contains("pacs")));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn limits_refuse_and_leave_room_for_others() {
+    let (app, address) = service(|settings| {
+        settings.client_association_limit = 2;
+        settings.object_limit = "4KiB".parse().unwrap();
+        settings.intake_objects = 2;
+        settings.series_quiet = "1h".parse().unwrap();
+    })
+    .await;
+    let (mut first, _second) = (Scu::open(address), Scu::open(address));
+    let refused = Scu::call(address, "CAMERA", "VENTRIFORM").err().unwrap();
+    assert!(refused.contains("LocalLimitExceeded"), "{refused}");
+    let mut large = slice("1.2.5", 1);
+    let name = large
+        .set
+        .element_by_name("PatientName")
+        .unwrap()
+        .header()
+        .tag;
+    let text = dicom_core::PrimitiveValue::from("x".repeat(5000));
+    large
+        .set
+        .put(dicom_core::DataElement::new(name, dicom_core::VR::UT, text));
+    assert_eq!(first.store(&large), 0xA700);
+    assert_eq!(first.store(&slice("1.2.5", 1)), 0);
+    assert_eq!(first.store(&slice("1.2.5", 2)), 0);
+    assert_eq!(first.store(&slice("1.2.5", 3)), 0xA700, "two may wait");
+    assert_eq!(first.store(&slice("1.2.5", 2)), 0, "it is there already");
+    assert_eq!(intake(&app).await[0]["objects"], 2);
+    kept(app.data.path(), 2).await;
+    assert_eq!(first.echo(), 0);
+}
+
+/// Bytes of a generator, the same in every run.
+fn noise(seed: u64, length: usize) -> Vec<u8> {
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    let next = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state as u8
+    };
+    std::iter::repeat_with(next).take(length).collect()
+}
+
+fn connect(address: SocketAddr) -> TcpStream {
+    let stream = TcpStream::connect(address).unwrap();
+    stream.set_read_timeout(Some(PATIENCE)).unwrap();
+    stream
+}
+
+/// What the service sends before it closes the connection.
+fn answer(mut stream: TcpStream) -> Vec<u8> {
+    let mut answer = Vec::new();
+    // The connection may be reset.
+    let _ = stream.read_to_end(&mut answer);
+    answer
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn garbage_harms_nobody() {
+    let (app, address) = service(|settings| {
+        settings.association_idle = "300ms".parse().unwrap();
+    })
+    .await;
+    let mut good = Scu::open(address);
+    // PDUs of 4 GB, of unknown types, of wrong lengths; requests that are cut off.
+    for kind in 0..=255_u8 {
+        let mut stream = connect(address);
+        let length: u32 = if kind % 2 == 0 { u32::MAX } else { 70 };
+        let header = [&[kind, 0][..], &length.to_be_bytes()].concat();
+        let _ = stream.write_all(&[header, noise(u64::from(kind), 70)].concat());
+        let _ = stream.shutdown(std::net::Shutdown::Write);
+        let told = answer(stream);
+        assert!(told.is_empty() || told[0] == 7, "{kind}: {told:?}");
+    }
+    for seed in 0..100 {
+        let mut stream = connect(address);
+        let _ = stream.write_all(&noise(seed, 1 + 37 * seed as usize));
+    }
+    // Garbage within an association: half a command, commands without end, data without command.
+    for (value_type, context, data, last) in [
+        (PDataValueType::Command, 1, noise(1, 40), true),
+        (PDataValueType::Command, 1, noise(2, 20_000), false),
+        (PDataValueType::Data, 3, noise(3, 40), true),
+        (PDataValueType::Command, 99, noise(4, 40), true),
+        (PDataValueType::Command, 7, noise(5, 40), true),
+    ] {
+        let mut scu = Scu::open(address);
+        scu.send(value_type, context, data, last);
+        assert!(matches!(scu.receive(), Ok(Pdu::AbortRQ { .. }) | Err(_)));
+    }
+    // An object that does not go on, and one whose sender goes away.
+    let mut stopped = Scu::open(address);
+    stopped.send(
+        PDataValueType::Command,
+        3,
+        command(1, NM, Some("1.2.3.1")),
+        true,
+    );
+    stopped.send(PDataValueType::Data, 3, vec![8; 1000], false);
+    assert!(matches!(stopped.receive(), Ok(Pdu::AbortRQ { .. })));
+    // Many connections that say nothing keep nobody out.
+    let silent: Vec<TcpStream> = (0..300).map(|_| connect(address)).collect();
+    let mut late = Scu::open(address);
+    assert_eq!(late.store(&nuclear("1.2.3", 1, "RECON TOMO")), 0);
+    late.release();
+    drop(silent);
+    // It was idle all the while.
+    assert!(matches!(good.receive(), Ok(Pdu::AbortRQ { .. }) | Err(_)));
+    assert_eq!(settled(&app, 1).await[0]["state"], "stored");
+    kept(app.data.path(), 0).await;
+    let staged = std::fs::read_dir(app.data.path().join("staging")).unwrap();
+    assert_eq!(staged.count(), 0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_shutdown_aborts_associations_and_keeps_what_was_acknowledged() {
+    let (app, address) = service(|_| {}).await;
+    let mut scu = Scu::open(address);
+    assert_eq!(scu.store(&slice("1.2.4", 1)), 0);
+    assert_eq!(scu.store(&slice("1.2.4", 2)), 0);
+    let told = std::thread::spawn(move || scu.receive());
+    let data = app.stop().await;
+    assert!(matches!(told.join().unwrap(), Ok(Pdu::AbortRQ { .. })));
+    let (app, _) = on(data, |_| {}).await;
+    let group = settled(&app, 1).await.remove(0);
+    assert_eq!(
+        (&group["state"], &group["objects"]),
+        (&json!("stored"), &json!(2))
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_was_acknowledged_survives_kills() {
+    let data = tempfile::tempdir().unwrap();
+    let flags = [
+        "--dicom-listen",
+        "127.0.0.1:0",
+        "--series-quiet",
+        "200ms",
+        "--series-patience",
+        "5s",
+    ];
+    for round in 0..4_u16 {
+        let service = Service::start(data.path(), &flags).await;
+        let mut scu = Scu::open(service.dicom.unwrap());
+        for number in 0..3 {
+            assert_eq!(scu.store(&slice("1.2.4", 3 * round + number)), 0);
+        }
+        // The next one is under way.
+        let next = slice("1.2.4", 3 * round + 3);
+        scu.send(
+            PDataValueType::Command,
+            5,
+            command(1, CT, Some(&next.instance)),
+            true,
+        );
+        scu.send(PDataValueType::Data, 5, vec![8; 100], false);
+        service.kill();
+    }
+    let service = Service::start(data.path(), &flags).await;
+    let deadline = Instant::now() + PATIENCE;
+    let group = loop {
+        let list = service.get("/v1/intake").send().await.unwrap();
+        let list: Value = list.json().await.unwrap();
+        let group = list["intake"][0].clone();
+        if group["state"] == "stored" {
+            break group;
+        }
+        assert!(Instant::now() < deadline, "still {list}");
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    };
+    assert_eq!(group["objects"], 12);
+    let volume = service
+        .get(&text(&group["links"]["volume"]))
+        .send()
+        .await
+        .unwrap();
+    let volume: Value = volume.json().await.unwrap();
+    assert_eq!(volume["shape"], json!([4, 4, 12]));
+    kept(data.path(), 0).await;
+}
+
+/// A `multipart/related` body.
+fn related(parts: &[Vec<u8>]) -> Vec<u8> {
+    let mut body = Vec::new();
+    for part in parts {
+        body.extend_from_slice(b"--b\r\nContent-Type: application/dicom\r\n\r\n");
+        body.extend_from_slice(part);
+        body.extend_from_slice(b"\r\n");
+    }
+    body.extend_from_slice(b"--b--\r\n");
+    body
+}
+
+const RELATED: &str = "multipart/related; type=\"application/dicom\"; boundary=b";
+
+async fn stow(app: &TestApp, path: &str, kind: &str, body: Vec<u8>) -> reqwest::Response {
+    let request = app.post(path).header("content-type", kind).body(body);
+    request.send().await.unwrap()
+}
+
+#[tokio::test]
+async fn objects_are_stored_over_http() {
+    let (app, _) = service(|_| {}).await;
+    let files: Vec<_> = (1..4).map(|number| slice("1.2.4", number).file()).collect();
+    let answer = stow(&app, "/dicom-web/studies", RELATED, related(&files)).await;
+    assert_eq!(answer.status(), StatusCode::OK);
+    assert_eq!(answer.headers()["content-type"], "application/dicom+json");
+    let module: Value = answer.json().await.unwrap();
+    assert_eq!(module["00081199"]["Value"].as_array().unwrap().len(), 3);
+    assert_eq!(module["00081199"]["Value"][0]["00081150"]["Value"][0], CT);
+    let groups = settled(&app, 1).await;
+    let volume = app.json(&text(&groups[0]["links"]["volume"])).await;
+    assert_eq!(volume["shape"], json!([4, 4, 3]));
+    assert_eq!(groups[0]["protocol"], "stow-rs");
+
+    // One object alone; again; of another study; and one that is none.
+    let object = nuclear("1.2.3", 1, "RECON TOMO");
+    for _ in 0..2 {
+        let answer = stow(
+            &app,
+            "/dicom-web/studies/1.2.3.1",
+            "application/dicom",
+            object.file(),
+        );
+        assert_eq!(answer.await.status(), StatusCode::OK);
+    }
+    let answer = stow(
+        &app,
+        "/dicom-web/studies/1.2.9",
+        "application/dicom",
+        object.file(),
+    )
+    .await;
+    assert_eq!(answer.status(), StatusCode::CONFLICT);
+    let module: Value = answer.json().await.unwrap();
+    let failed = &module["00081198"]["Value"][0];
+    assert_eq!(failed["00081197"]["Value"][0], 0xA900);
+    assert_eq!(failed["00081155"]["Value"][0], object.instance);
+    let mixed = related(&[
+        b"no object".to_vec(),
+        nuclear("1.2.3", 2, "RECON TOMO").file(),
+    ]);
+    let answer = stow(&app, "/dicom-web/studies", RELATED, mixed).await;
+    assert_eq!(answer.status(), StatusCode::ACCEPTED);
+    let module: Value = answer.json().await.unwrap();
+    assert_eq!(
+        module["0008119A"]["Value"][0]["00081197"]["Value"][0],
+        0xC000
+    );
+    assert_eq!(settled(&app, 3).await.len(), 3);
+    assert_eq!(volumes(&app).await.len(), 3);
+    kept(app.data.path(), 0).await;
+}
+
+#[tokio::test]
+async fn bodies_that_are_not_stow_are_refused() {
+    let (app, _) = service(|_| {}).await;
+    let path = "/dicom-web/studies";
+    let file = || slice("1.2.4", 1).file();
+    let xml = app.post(path).header("accept", "application/dicom+xml");
+    let xml = xml.header("content-type", RELATED).body(related(&[file()]));
+    problem(xml.send().await.unwrap(), 406, "not-acceptable").await;
+    let code = "unsupported-media-type";
+    problem(
+        stow(&app, path, "multipart/form-data; boundary=b", vec![]).await,
+        415,
+        code,
+    )
+    .await;
+    let code = "malformed-parts";
+    problem(stow(&app, path, RELATED, related(&[])).await, 400, code).await;
+    problem(
+        stow(&app, path, RELATED, b"--b\r\nA: ".to_vec()).await,
+        400,
+        code,
+    )
+    .await;
+    let endless = [b"--b\r\nA: ".to_vec(), vec![b'a'; 2 << 20]].concat();
+    problem(stow(&app, path, RELATED, endless).await, 400, code).await;
+    // The body breaks off after the first object, which is stored.
+    let mut cut = related(&[file(), slice("1.2.4", 2).file()]);
+    cut.truncate(cut.len() - 200);
+    problem(stow(&app, path, RELATED, cut).await, 400, code).await;
+    assert_eq!(settled(&app, 1).await[0]["objects"], 1);
+    let (_, reader) = key(app.data.path(), Scope::Read, "default", Quota::default()).await;
+    let answer = stow(&app.seen_with(&reader), path, RELATED, related(&[file()])).await;
+    assert_eq!(answer.status(), StatusCode::FORBIDDEN);
+}

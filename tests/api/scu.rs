@@ -1,0 +1,249 @@
+//! A system that sends images by DICOM: objects, and associations that carry them.
+
+use dicom_core::value::DataSetSequence;
+use dicom_core::{DataElement, PrimitiveValue, Tag, VR};
+use dicom_encoding::transfer_syntax::TransferSyntaxIndex;
+use dicom_object::InMemDicomObject;
+use dicom_transfer_syntax_registry::TransferSyntaxRegistry;
+use dicom_ul::association::ClientAssociationOptions;
+use dicom_ul::association::client::ClientAssociation;
+use dicom_ul::pdu::{PDataValue, PDataValueType, Pdu};
+use std::net::{SocketAddr, TcpStream};
+
+pub const VERIFICATION: &str = "1.2.840.10008.1.1";
+pub const NM: &str = "1.2.840.10008.5.1.4.1.1.20";
+pub const CT: &str = "1.2.840.10008.5.1.4.1.1.2";
+pub const EXPLICIT: &str = "1.2.840.10008.1.2.1";
+pub const IMPLICIT: &str = "1.2.840.10008.1.2";
+
+/// Values of an object.
+#[derive(Clone)]
+pub struct Object {
+    pub class: &'static str,
+    pub instance: String,
+    pub set: InMemDicomObject,
+}
+
+fn put(set: &mut InMemDicomObject, tag: (u16, u16), vr: VR, value: impl Into<PrimitiveValue>) {
+    set.put(DataElement::new(Tag(tag.0, tag.1), vr, value.into()));
+}
+
+fn image(class: &'static str, instance: &str, series: &str) -> InMemDicomObject {
+    let mut set = InMemDicomObject::new_empty();
+    put(&mut set, (0x0008, 0x0016), VR::UI, class);
+    put(&mut set, (0x0008, 0x0018), VR::UI, instance);
+    put(&mut set, (0x0010, 0x0010), VR::PN, "Canary^Patient");
+    put(&mut set, (0x0010, 0x0020), VR::LO, "CANARY-17");
+    put(&mut set, (0x0020, 0x000d), VR::UI, format!("{series}.1"));
+    put(&mut set, (0x0020, 0x000e), VR::UI, series);
+    put(&mut set, (0x0028, 0x0002), VR::US, 1_u16);
+    put(&mut set, (0x0028, 0x0004), VR::CS, "MONOCHROME2");
+    put(&mut set, (0x0028, 0x0010), VR::US, 4_u16);
+    put(&mut set, (0x0028, 0x0011), VR::US, 4_u16);
+    put(&mut set, (0x0028, 0x0030), VR::DS, "4\\4");
+    put(&mut set, (0x0028, 0x0100), VR::US, 16_u16);
+    put(&mut set, (0x0028, 0x0101), VR::US, 16_u16);
+    put(&mut set, (0x0028, 0x0102), VR::US, 15_u16);
+    put(&mut set, (0x0028, 0x0103), VR::US, 0_u16);
+    set
+}
+
+/// One slice of a CT series.
+pub fn slice(series: &str, number: u16) -> Object {
+    let instance = format!("{series}.{}", number + 100);
+    let mut set = image(CT, &instance, series);
+    put(
+        &mut set,
+        (0x0008, 0x0008),
+        VR::CS,
+        "ORIGINAL\\PRIMARY\\AXIAL",
+    );
+    put(&mut set, (0x0008, 0x0060), VR::CS, "CT");
+    put(&mut set, (0x0018, 0x0050), VR::DS, "5");
+    put(
+        &mut set,
+        (0x0020, 0x0032),
+        VR::DS,
+        format!("0\\0\\{}", 5 * number),
+    );
+    put(&mut set, (0x0020, 0x0037), VR::DS, "1\\0\\0\\0\\1\\0");
+    put(
+        &mut set,
+        (0x7fe0, 0x0010),
+        VR::OW,
+        PrimitiveValue::U16(vec![number; 16].into()),
+    );
+    Object {
+        class: CT,
+        instance,
+        set,
+    }
+}
+
+/// A Nuclear Medicine Image of three frames.
+pub fn nuclear(series: &str, instance: u16, image_type: &str) -> Object {
+    let uid = format!("{series}.{instance}");
+    let mut set = image(NM, &uid, series);
+    put(
+        &mut set,
+        (0x0008, 0x0008),
+        VR::CS,
+        format!("ORIGINAL\\PRIMARY\\{image_type}\\EMISSION"),
+    );
+    put(&mut set, (0x0008, 0x0060), VR::CS, "NM");
+    put(&mut set, (0x0008, 0x1030), VR::LO, "Myocardial perfusion");
+    put(&mut set, (0x0018, 0x0050), VR::DS, "4");
+    put(&mut set, (0x0018, 0x0088), VR::DS, "4");
+    put(&mut set, (0x0028, 0x0008), VR::IS, "3");
+    let pointer = PrimitiveValue::Tags([Tag(0x0054, 0x0080)].as_slice().into());
+    put(&mut set, (0x0028, 0x0009), VR::AT, pointer);
+    put(
+        &mut set,
+        (0x0054, 0x0080),
+        VR::US,
+        PrimitiveValue::U16(vec![1, 2, 3].into()),
+    );
+    let mut detector = InMemDicomObject::new_empty();
+    put(&mut detector, (0x0020, 0x0032), VR::DS, "0\\0\\0");
+    put(&mut detector, (0x0020, 0x0037), VR::DS, "1\\0\\0\\0\\1\\0");
+    let sequence = DataSetSequence::from(vec![detector]);
+    set.put(DataElement::new(Tag(0x0054, 0x0022), VR::SQ, sequence));
+    let pixels: Vec<u16> = (0..48).map(|n| n + instance).collect();
+    put(
+        &mut set,
+        (0x7fe0, 0x0010),
+        VR::OW,
+        PrimitiveValue::U16(pixels.into()),
+    );
+    Object {
+        class: NM,
+        instance: uid,
+        set,
+    }
+}
+
+impl Object {
+    /// The data set in that transfer syntax.
+    pub fn data_set(&self, syntax: &str) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let syntax = TransferSyntaxRegistry.get(syntax).unwrap();
+        self.set.write_dataset_with_ts(&mut bytes, syntax).unwrap();
+        bytes
+    }
+
+    /// The object as a file.
+    pub fn file(&self) -> Vec<u8> {
+        let start = ventriform::export::dicom::file_start(self.class, &self.instance, EXPLICIT);
+        [start.unwrap(), self.data_set(EXPLICIT)].concat()
+    }
+}
+
+/// An open association.
+pub struct Scu(ClientAssociation<TcpStream>);
+
+impl Scu {
+    pub fn call(to: SocketAddr, calling: &str, called: &str) -> Result<Self, String> {
+        let options = ClientAssociationOptions::new()
+            .calling_ae_title(calling.to_owned())
+            .called_ae_title(called.to_owned())
+            .with_presentation_context(VERIFICATION, vec![IMPLICIT])
+            .with_presentation_context(NM, vec![EXPLICIT])
+            .with_presentation_context(CT, vec![IMPLICIT])
+            // Secondary Capture and High-Throughput JPEG 2000 are not read.
+            .with_presentation_context("1.2.840.10008.5.1.4.1.1.7", vec![IMPLICIT])
+            .with_presentation_context(NM, vec!["1.2.840.10008.1.2.4.201"]);
+        options
+            .establish(to)
+            .map(Self)
+            .map_err(|e| format!("{e:?}"))
+    }
+
+    pub fn open(to: SocketAddr) -> Self {
+        Self::call(to, "CAMERA", "VENTRIFORM").unwrap()
+    }
+
+    /// The ids of the accepted contexts.
+    pub fn contexts(&self) -> Vec<u8> {
+        let contexts = self.0.presentation_contexts().iter();
+        contexts.map(|context| context.id).collect()
+    }
+
+    pub fn send(&mut self, value_type: PDataValueType, context: u8, data: Vec<u8>, is_last: bool) {
+        let value = PDataValue {
+            presentation_context_id: context,
+            value_type,
+            is_last,
+            data,
+        };
+        self.0.send(&Pdu::PData { data: vec![value] }).unwrap();
+    }
+
+    pub fn receive(&mut self) -> Result<Pdu, String> {
+        self.0.receive().map_err(|e| e.to_string())
+    }
+
+    /// The status of the next response.
+    pub fn status(&mut self) -> u16 {
+        let Pdu::PData { data } = self.receive().unwrap() else {
+            panic!("no response");
+        };
+        let set = &data[0].data;
+        let at = set.windows(8).position(|w| w == [0, 0, 0, 9, 2, 0, 0, 0]);
+        let at = at.unwrap() + 8;
+        u16::from_le_bytes([set[at], set[at + 1]])
+    }
+
+    pub fn echo(&mut self) -> u16 {
+        let set = command(0x0030, VERIFICATION, None);
+        self.send(PDataValueType::Command, 1, set, true);
+        self.status()
+    }
+
+    /// Sends an object and returns the status.
+    pub fn store(&mut self, object: &Object) -> u16 {
+        let (context, syntax) = match object.class {
+            NM => (3, EXPLICIT),
+            _ => (5, IMPLICIT),
+        };
+        let set = command(0x0001, object.class, Some(&object.instance));
+        self.send(PDataValueType::Command, context, set, true);
+        let data = object.data_set(syntax);
+        let (first, second) = data.split_at(data.len() / 2);
+        self.send(PDataValueType::Data, context, first.to_vec(), false);
+        self.send(PDataValueType::Data, context, second.to_vec(), true);
+        self.status()
+    }
+
+    pub fn release(self) {
+        self.0.release().unwrap();
+    }
+
+    pub fn abort(self) {
+        self.0.abort().unwrap();
+    }
+}
+
+/// A command set.
+pub fn command(field: u16, class: &str, instance: Option<&str>) -> Vec<u8> {
+    let mut set = Vec::new();
+    let mut put = |element: u16, value: &[u8]| {
+        set.extend_from_slice(&[0, 0]);
+        set.extend_from_slice(&element.to_le_bytes());
+        set.extend_from_slice(&(value.len() as u32).to_le_bytes());
+        set.extend_from_slice(value);
+    };
+    let uid = |text: &str| {
+        let mut bytes = text.as_bytes().to_vec();
+        bytes.resize(bytes.len().next_multiple_of(2), 0);
+        bytes
+    };
+    let data: u16 = if instance.is_some() { 0 } else { 0x0101 };
+    put(0x0002, &uid(class));
+    put(0x0100, &field.to_le_bytes());
+    put(0x0110, &7_u16.to_le_bytes());
+    put(0x0800, &data.to_le_bytes());
+    if let Some(instance) = instance {
+        put(0x1000, &uid(instance));
+    }
+    set
+}
