@@ -2,7 +2,7 @@
 //!
 //! 1. [`cases_of`]: the folders that hold a scan and a mask.
 //! 2. Every scan is segmented as `segment` does, without a profile, and the distances to its mask are
-//!    measured ([`crate::reader::measure`]).
+//!    measured ([`crate::reader::measure()`]).
 //! 3. The profile is learnt on all masks.
 //! 4. Every case is judged three times: without a profile; by a profile learnt on the *other* masks
 //!    (held-out); by the profile itself, which has seen the case (in-sample).

@@ -5,9 +5,9 @@
 //! them; out comes a [`ReaderProfile`]: three distances in millimetres. In go a profile and a fit; out comes
 //! the wall as that reader would draw it.
 //!
-//! 1. [`measure`]: how far the mask's inner surface, outer surface and rim lie from those of the
+//! 1. [`measure`](mod@measure): how far the mask's inner surface, outer surface and rim lie from those of the
 //!    fitted wall, as medians over the wall.
-//! 2. [`learn`]: the mean over the masks, drawn towards zero the more the fewer masks there are and
+//! 2. [`learn`](mod@learn): the mean over the masks, drawn towards zero the more the fewer masks there are and
 //!    the more they scatter.
 //! 3. [`profile`]: the profile as JSON, checked when it is read.
 //! 4. [`draw`]: a fitted wall, moved by the profile.
