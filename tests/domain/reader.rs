@@ -106,7 +106,7 @@ fn calibrated(folder: &Path) -> Calibration {
 fn calibration_recovers_the_distances_that_masks_were_drawn_by() {
     let known = ReaderOffsets {
         endocardium: 1.2,
-        epicardium: -0.8,
+        epicardium: -1.2,
         rim: 4.0,
     };
     let folder = cohort(&[1, 2, 3, 4], &known);
