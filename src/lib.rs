@@ -157,6 +157,9 @@ pub mod archive;
 pub mod intake;
 
 #[cfg(feature = "service")]
+pub mod worklist;
+
+#[cfg(feature = "service")]
 pub mod store;
 
 #[cfg(feature = "service")]

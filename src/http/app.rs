@@ -15,6 +15,7 @@ use crate::access::AccessStore;
 use crate::config::Settings;
 use crate::jobs::{FigureStore, Holding, Queue, Resource, RetentionAges};
 use crate::work::Engine;
+use crate::worklist::Worklist;
 use std::sync::Arc;
 use tokio_util::sync::CancellationToken;
 
@@ -40,6 +41,8 @@ pub struct Shared {
     pub engine: Engine,
     /// Keys and audit trail.
     pub access: Arc<dyn AccessStore>,
+    /// Work items of other systems.
+    pub worklist: Arc<dyn Worklist>,
     /// Tells and limits callers.
     pub guard: Guard,
     /// The operator's settings.
@@ -83,7 +86,7 @@ impl App {
     pub fn new(
         queue: Arc<Queue>,
         engine: Engine,
-        (access, guard): (Arc<dyn AccessStore>, Guard),
+        (access, worklist, guard): (Arc<dyn AccessStore>, Arc<dyn Worklist>, Guard),
         settings: Settings,
         (hooks, exchange, intake): (Hooks, Exchange, Intake),
         watching: Watching,
@@ -93,6 +96,7 @@ impl App {
             queue,
             engine,
             access,
+            worklist,
             guard,
             decoding: Decoding::new(&settings, watching.metrics.requests.decoding_waits.clone()),
             answers: KeptAnswers::new(

@@ -14,6 +14,7 @@
 //! | a tenant's names for its things, legal holds, receipts of erasures | [`tags`], [`legal_hold`], [`erasures`] |
 //! | whose scan a volume is | [`scans`] (in answers and searches), [`identities`] (stated, erased) |
 //! | objects that other systems send | [`stow`], [`received`], [`intake`], [`volume_maker`] |
+//! | work items of other systems (UPS-RS) | [`workitems`] |
 //! | errors and their wording | [`problem`]; 404 and 410 in [`problem::not_found`] |
 //! | limits on bodies, connections and decoding | [`limits`], [`connections`], [`decoding`] |
 //! | the address that sent a request | [`client`] |
@@ -83,6 +84,7 @@ mod volume_maker;
 mod volumes;
 mod webhooks;
 mod wire;
+mod workitems;
 
 pub use app::App;
 pub use connections::tls::TlsError;

@@ -31,6 +31,7 @@ pub struct Readers;
 
 impl ProductCollection for Readers {
     const RESOURCE: Resource = Resource::Reader;
+    const SCANNED: bool = false;
     type Body = ReaderBody;
     const MESHES: &'static [&'static str] = &[];
     const FILES: &'static [&'static str] = &[PROFILE];

@@ -112,7 +112,11 @@ pub async fn json_bytes(request: Request) -> Answer<Bytes> {
     bytes_of(request, &["application/json"]).await
 }
 
-async fn bytes_of(request: Request, types: &[&str]) -> Answer<Bytes> {
+/// The bytes of a body of one of these types, the first of which is recommended.
+///
+/// # Errors
+/// As [`json_bytes`].
+pub async fn bytes_of(request: Request, types: &[&str]) -> Answer<Bytes> {
     refuse_content_encoding(request.headers())?;
     match media_type(request.headers()).as_deref() {
         None => {}

@@ -16,7 +16,7 @@ use super::volumes::Volumes;
 use super::{
     audit, collection, erasures, front_page, given_webhook, health, idempotency, identities, jobs,
     keys, legal_hold, models, originals, products, readers, received, segmentations, stow,
-    templates, volumes, webhooks,
+    templates, volumes, webhooks, workitems,
 };
 use crate::config::Settings;
 use axum::Router;
@@ -51,7 +51,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         products::routes::<Templates>(),
         products::routes::<Readers>(),
     ];
-    let of_one_kind: [UtoipaMethodRouter<App>; 35] = [
+    let of_one_kind: [UtoipaMethodRouter<App>; 39] = [
         routes!(volumes::create_volume).layer(upload()),
         routes!(volumes::preview_volume),
         routes!(volumes::update_volume).layer(json(settings.json_limit)),
@@ -84,6 +84,12 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(stow::store_study_instances).layer(upload()),
         routes!(received::list_received),
         routes!(received::forget_received),
+        routes!(workitems::create_workitem, workitems::search_workitems)
+            .layer(json(settings.json_limit)),
+        routes!(workitems::get_workitem, workitems::update_workitem)
+            .layer(json(settings.json_limit)),
+        routes!(workitems::change_workitem_state).layer(json(settings.json_limit)),
+        routes!(workitems::cancel_workitem).layer(json(settings.json_limit)),
         routes!(health::alive),
         routes!(health::ready),
         routes!(health::metrics),

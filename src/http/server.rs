@@ -160,7 +160,7 @@ pub async fn start(
     let app = App::new(
         queue.clone(),
         engine.clone(),
-        (store.rows.clone(), guard),
+        (store.rows.clone(), store.rows.clone(), guard),
         settings.clone(),
         (hooks, exchange(&settings), intake),
         watching,
@@ -190,6 +190,9 @@ pub async fn start(
     };
     tokio::spawn(upkeep.run(closing.clone()));
     tokio::spawn(scans::read_old(app.clone(), closing.clone()));
+    if let Some(age) = retention_ages(&settings).jobs {
+        tokio::spawn(prune_workitems(app.clone(), age, closing.clone()));
+    }
     if let Some(age) = settings.audit_retention.0 {
         tokio::spawn(prune_audit(store.rows.clone(), age.0, closing.clone()));
     }
@@ -415,6 +418,18 @@ async fn prune_audit(store: Arc<dyn AccessStore>, age: Duration, end: Cancellati
         let now = SystemClock.now();
         if let Err(error) = store.prune(now.saturating_sub(age), now).await {
             tracing::error!(%error, "old rows of the audit trail could not be removed");
+        }
+    }
+}
+
+/// Deletes work items that ended as long ago as jobs are kept.
+async fn prune_workitems(app: App, age: Duration, end: CancellationToken) {
+    let mut round = tokio::time::interval(PRUNE_EVERY);
+    let age = i64::try_from(age.as_millis()).unwrap_or(i64::MAX);
+    while end.run_until_cancelled(round.tick()).await.is_some() {
+        let before = app.queue.clock.now().saturating_sub(age);
+        if let Err(error) = app.worklist.delete_ended_workitems(before).await {
+            tracing::error!(%error, "ended work items could not be deleted");
         }
     }
 }

@@ -38,6 +38,7 @@ mod sqlite_intake;
 mod sqlite_jobs;
 mod sqlite_repair;
 mod sqlite_scans;
+mod sqlite_worklist;
 mod writer;
 
 pub use backup::{Backup, backup};

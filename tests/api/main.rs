@@ -46,3 +46,4 @@ mod tls;
 mod traces;
 mod volumes;
 mod webhooks;
+mod workitems;

@@ -125,7 +125,8 @@ const USES: &[(&str, &[&str])] = &[
         "intake",
         &["progress", "volume", "export", "jobs", "access"],
     ),
-    ("store", &["jobs", "access", "hooks", "intake"]),
+    ("worklist", &["jobs"]),
+    ("store", &["jobs", "access", "hooks", "intake", "worklist"]),
     (
         "work",
         &[
@@ -160,6 +161,7 @@ const USES: &[(&str, &[&str])] = &[
             "access",
             "hooks",
             "intake",
+            "worklist",
             "store",
             "work",
             "config",
@@ -223,7 +225,8 @@ const SERVICE_CRATES: &[&str] = &[
 
 /// The service: what stands here may name [`SERVICE_CRATES`].
 const SERVICE: &[&str] = &[
-    "jobs", "access", "hooks", "archive", "intake", "work", "store", "config", "http", "cli",
+    "jobs", "access", "hooks", "archive", "intake", "worklist", "work", "store", "config", "http",
+    "cli",
 ];
 
 /// Standard-library facilities that would make a result depend on more than its input.

@@ -52,7 +52,7 @@ const ADMIN_PATHS: [&str; 5] = [
 
 /// The paths under which everything needs at least the scope `submit`: they tell whose scans are
 /// stored.
-const PATIENT_PATHS: [&str; 1] = ["/v1/volumes/{id}/identity"];
+const PATIENT_PATHS: [&str; 2] = ["/v1/volumes/{id}/identity", "/dicom-web/workitems"];
 
 /// Whether everybody may read this path: health, the page for people and the documentation. They
 /// show nothing that is stored.
@@ -290,6 +290,8 @@ mod tests {
         assert_eq!(needs(Method::DELETE, "/v1/volumes/{id}"), Scope::Submit);
         let identity = "/v1/volumes/{id}/identity";
         assert_eq!(needs(Method::GET, identity), Scope::Submit);
+        let items = "/dicom-web/workitems";
+        assert_eq!(needs(Method::GET, items), Scope::Submit);
         assert_eq!(needs(Method::GET, "/v1/auditors"), Scope::Read);
         assert_eq!(
             needed(&Method::from_bytes(b"PURGE").unwrap(), None),

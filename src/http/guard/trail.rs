@@ -110,7 +110,9 @@ impl Act {
     }
 
     fn activity(&self, status: StatusCode) -> Option<Activity> {
-        let mut segments = self.route.strip_prefix("/v1/")?.split('/');
+        let below = ["/v1/", "/dicom-web/"];
+        let mut paths = below.iter().filter_map(|top| self.route.strip_prefix(top));
+        let mut segments = paths.next()?.split('/');
         let kind = segments.next()?;
         let is_list = segments.next().is_none();
         if self.method.is_safe() {

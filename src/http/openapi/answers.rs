@@ -95,6 +95,20 @@ problems! {
         409: "Nobody said whose scan the volume is, or the volume was erased",
         422: "DICOM cannot express the result",
     }
+    /// Problems of requests about work items.
+    WorkitemProblems {
+        400: "The body is not DICOM JSON, or an attribute or parameter cannot be used",
+        403: "The caller's scope does not allow it",
+        408: "The body did not arrive in time",
+        413: "The body is larger than the operator allows",
+        415: "The body has a type or encoding that this path does not read",
+        500: "The service met an error of its own",
+        507: "There are too many work items, or the disk is full",
+    }
+    /// Problems of changing a work item.
+    WorkitemConflict {
+        409: "The item's state or its Transaction UID does not allow it",
+    }
     /// Problems of uploads.
     UploadProblems {
         400: "The body is empty or malformed or broke off, or a query parameter is unknown",

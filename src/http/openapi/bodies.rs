@@ -237,6 +237,31 @@ pub struct StatedScanSchema {
     frame_of_reference_uid: Option<String>,
 }
 
+/// Data sets as DICOM JSON.
+pub struct WorkitemBody;
+
+impl ToSchema for WorkitemBody {
+    fn name() -> Cow<'static, str> {
+        "DicomJson".into()
+    }
+}
+
+impl PartialSchema for WorkitemBody {
+    fn schema() -> RefOr<Schema> {
+        let set = ObjectBuilder::new()
+            .schema_type(Type::Object)
+            .description(Some(
+                "Elements by tag, each with `vr` and `Value` (PS3.18 annex F)",
+            ))
+            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(true)));
+        let sets = ArrayBuilder::new()
+            .description(Some("Data sets; a request has one"))
+            .items(RefOr::T(Schema::from(set)))
+            .examples([json!([{"00741000": {"vr": "CS", "Value": ["SCHEDULED"]}}])]);
+        Schema::Array(sets.build()).into()
+    }
+}
+
 /// The parameters of a job of any kind.
 pub struct JobParameters;
 

@@ -250,6 +250,22 @@ impl IntoParams for DeidentifyParameter {
     }
 }
 
+/// `transaction-uid`, `transaction` and `Transaction-UID`.
+pub struct TransactionParameters;
+
+impl IntoParams for TransactionParameters {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let uid = || ObjectBuilder::new().schema_type(Type::String);
+        let help =
+            "The Transaction UID under which the item is claimed; it may also be in the body";
+        let mut all: Vec<Parameter> = ["transaction-uid", "transaction"]
+            .map(|name| query(name, help).schema(Some(Schema::from(uid()))).build())
+            .into();
+        all.push(header("Transaction-UID", help));
+        all
+    }
+}
+
 /// `cascade`.
 pub struct CascadeParameter;
 

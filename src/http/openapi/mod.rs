@@ -26,17 +26,18 @@ pub use answers::{
     DicomProblems, DownloadAnswers, EraseProblems, EventsAnswer, FileProblems, HoldProblems,
     IdentityProblems, ListProblems, LookupProblems, MeshAnswer, ModelFileAnswer, OriginalAnswer,
     PatchProblems, ReaderFileAnswer, ReportAnswer, ScopeProblems, SegmentationAnswer,
-    SegmentationFileAnswer, UnchangedAnswer, UploadProblems, WaitAnswers,
+    SegmentationFileAnswer, UnchangedAnswer, UploadProblems, WaitAnswers, WorkitemConflict,
+    WorkitemProblems,
 };
 pub use bodies::{
     HoldRequest, JobParameters, JobRequest, MeshDocument, SegmentationForm, StatedScanSchema,
-    TagsPatch, UploadForm, WebhookRequest,
+    TagsPatch, UploadForm, WebhookRequest, WorkitemBody,
 };
 pub use inputs::{
     CachedHeaders, CascadeParameter, ConditionalHeaders, DeidentifyParameter, ErasureParameters,
     EventHeader, IdempotencyHeader, ModelParametersObject, ModelQuery, PageParameters,
     PreferHeader, ReaderQuery, ScanParameters, SegmentationParametersObject, SegmentationQuery,
-    TagParameters, TemplateQuery, WebhookInputs,
+    TagParameters, TemplateQuery, TransactionParameters, WebhookInputs,
 };
 pub use operation::Documented;
 pub use reports::{
@@ -67,6 +68,7 @@ use utoipa::openapi::{RefOr, Required};
         (name = "templates", description = "The library of models that `auto` chooses from"),
         (name = "readers", description = "How readers draw the wall: profiles that segmentations can be drawn by"),
         (name = "webhooks", description = "Telling other programs about jobs"),
+        (name = "workitems", description = "Unified Procedure Steps (DICOM UPS-RS): work that is scheduled, claimed, done"),
         (name = "access", description = "Keys and the audit trail, for the scope `admin`"),
         (name = "dicomweb", description = "Images from other systems: STOW-RS, and what became of them"),
         (name = "erasures", description = "Receipts of what was erased"),

@@ -1,0 +1,112 @@
+//! The table of work items in SQLite.
+
+use super::rows::{self, to_json};
+use super::sqlite::SqliteStore;
+use super::writer::Write;
+use crate::jobs::{StoreError, StoreResult, Tenant, Timestamp};
+use crate::worklist::{AddedWorkitem, DataSetJson, Workitem, WorkitemState, Worklist};
+use async_trait::async_trait;
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+
+#[async_trait]
+impl Worklist for SqliteStore {
+    async fn add_workitem(&self, item: &Workitem, limit: u64) -> StoreResult<AddedWorkitem> {
+        self.require_room()?;
+        let added = sqlx::query(
+            "INSERT INTO workitems (tenant, uid, state, attributes, changed_at)
+             SELECT ?1, ?2, ?3, ?4, ?5
+             WHERE (SELECT count(*) FROM workitems WHERE tenant = ?1) < ?6
+             ON CONFLICT (tenant, uid) DO NOTHING",
+        )
+        .bind(item.tenant.as_str())
+        .bind(&item.uid)
+        .bind(item.state.as_str())
+        .bind(to_json(item.attributes.object())?)
+        .bind(item.changed_at)
+        .bind(i64::try_from(limit).unwrap_or(i64::MAX))
+        .write(&self.writer)
+        .await?;
+        if added == 1 {
+            return Ok(AddedWorkitem::Done);
+        }
+        Ok(match self.workitem(&item.tenant, &item.uid).await? {
+            Some(_) => AddedWorkitem::Exists,
+            None => AddedWorkitem::Full,
+        })
+    }
+
+    async fn workitem(&self, tenant: &Tenant, uid: &str) -> StoreResult<Option<Workitem>> {
+        let row = sqlx::query("SELECT * FROM workitems WHERE tenant = ? AND uid = ?")
+            .bind(tenant.as_str())
+            .bind(uid)
+            .fetch_optional(&self.readers)
+            .await?;
+        row.map(item_of).transpose()
+    }
+
+    async fn change_workitem(&self, item: &Workitem) -> StoreResult<bool> {
+        let changed = sqlx::query(
+            "UPDATE workitems SET state = ?, transaction_uid = ?, attributes = ?, changed_at = ?,
+                 revision = revision + 1
+             WHERE tenant = ? AND uid = ? AND revision = ?",
+        )
+        .bind(item.state.as_str())
+        .bind(&item.transaction)
+        .bind(to_json(item.attributes.object())?)
+        .bind(item.changed_at)
+        .bind(item.tenant.as_str())
+        .bind(&item.uid)
+        .bind(item.revision)
+        .write(&self.writer)
+        .await?;
+        Ok(changed == 1)
+    }
+
+    async fn workitems(
+        &self,
+        tenant: &Tenant,
+        state: Option<WorkitemState>,
+        after: i64,
+        limit: u32,
+    ) -> StoreResult<Vec<Workitem>> {
+        let rows = sqlx::query(
+            "SELECT * FROM workitems
+             WHERE tenant = ?1 AND (?2 IS NULL OR state = ?2) AND sequence > ?3
+             ORDER BY sequence LIMIT ?4",
+        )
+        .bind(tenant.as_str())
+        .bind(state.map(WorkitemState::as_str))
+        .bind(after)
+        .bind(limit)
+        .fetch_all(&self.readers)
+        .await?;
+        rows::all(rows, item_of)
+    }
+
+    async fn delete_ended_workitems(&self, before: Timestamp) -> StoreResult<u64> {
+        sqlx::query(
+            "DELETE FROM workitems
+             WHERE state IN ('COMPLETED', 'CANCELED') AND changed_at < ?",
+        )
+        .bind(before)
+        .write(&self.writer)
+        .await
+    }
+}
+
+fn item_of(row: SqliteRow) -> StoreResult<Workitem> {
+    let damaged = |what: String| StoreError::database(format!("damaged row: {what}"));
+    let state: &str = row.try_get("state")?;
+    let attributes = DataSetJson::of(rows::json(&row, "attributes")?);
+    Ok(Workitem {
+        tenant: rows::tenant(&row)?,
+        uid: row.try_get("uid")?,
+        sequence: row.try_get("sequence")?,
+        revision: row.try_get("revision")?,
+        state: WorkitemState::parse(state).ok_or_else(|| damaged(state.to_owned()))?,
+        transaction: row.try_get("transaction_uid")?,
+        attributes: attributes.map_err(|error| damaged(error.to_string()))?,
+        changed_at: row.try_get("changed_at")?,
+    })
+}

@@ -1,0 +1,43 @@
+//! The interface to the table of work items.
+
+use super::{Workitem, WorkitemState};
+use crate::jobs::{StoreResult, Tenant, Timestamp};
+use async_trait::async_trait;
+
+/// The result of adding a work item.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AddedWorkitem {
+    /// It is stored.
+    Done,
+    /// The tenant has an item of that UID.
+    Exists,
+    /// The tenant has too many items.
+    Full,
+}
+
+/// The table of work items. Every method is one transaction and fails only if the database does.
+#[async_trait]
+pub trait Worklist: Send + Sync + 'static {
+    /// Adds an item, unless there is one with its UID, or the tenant has `limit` items.
+    async fn add_workitem(&self, item: &Workitem, limit: u64) -> StoreResult<AddedWorkitem>;
+
+    /// A tenant's item of that UID.
+    async fn workitem(&self, tenant: &Tenant, uid: &str) -> StoreResult<Option<Workitem>>;
+
+    /// Stores a changed item, unless another change came between: the stored revision is no longer
+    /// that of `item`. Returns whether it was stored.
+    async fn change_workitem(&self, item: &Workitem) -> StoreResult<bool>;
+
+    /// At most `limit` items of a tenant after position `after`, oldest first, in that state or in
+    /// any.
+    async fn workitems(
+        &self,
+        tenant: &Tenant,
+        state: Option<WorkitemState>,
+        after: i64,
+        limit: u32,
+    ) -> StoreResult<Vec<Workitem>>;
+
+    /// Deletes the items that ended before that moment. Returns how many.
+    async fn delete_ended_workitems(&self, before: Timestamp) -> StoreResult<u64>;
+}

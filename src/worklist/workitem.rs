@@ -1,0 +1,523 @@
+//! One work item and what may be done to it in each state.
+
+use super::dataset::DataSetJson;
+use crate::jobs::{Tenant, Timestamp};
+use serde_json::{Map, Value};
+
+const SOP_CLASS: &str = "00080016";
+const SOP_INSTANCE: &str = "00080018";
+const TRANSACTION: &str = "00081195";
+const STATE: &str = "00741000";
+const PRIORITY: &str = "00741200";
+const PROGRESS: &str = "00741002";
+const LABEL: &str = "00741204";
+const PERFORMED: &str = "00741216";
+const READINESS: &str = "00404041";
+const CANCELLED_AT: &str = "00404052";
+const MODIFIED_AT: &str = "00404010";
+const INPUT: &str = "00404021";
+
+/// The SOP class Unified Procedure Step Push.
+const PUSH: &str = "1.2.840.10008.5.1.4.34.6.1";
+
+/// What an item of the Performed Procedure Sequence must have when the work is completed
+/// (PS3.4 table CC.2.5-3, final state).
+const FINAL: [(&str, &str); 5] = [
+    ("00404028", "Performed Station Name Code Sequence"),
+    ("00404050", "Performed Procedure Step Start DateTime"),
+    ("00404019", "Performed Workitem Code Sequence"),
+    ("00404051", "Performed Procedure Step End DateTime"),
+    ("00404033", "Output Information Sequence"),
+];
+
+/// The attributes of a cancellation request that are passed on to the performer.
+const CANCELLATION: [&str; 4] = ["00741238", "0074100E", "0074100A", "0074100C"];
+
+/// The state of a work item.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WorkitemState {
+    /// It waits for a performer.
+    Scheduled,
+    /// A performer has claimed it.
+    InProgress,
+    /// Done.
+    Completed,
+    /// Given up.
+    Canceled,
+}
+
+impl WorkitemState {
+    /// Every state.
+    pub const ALL: [Self; 4] = [
+        Self::Scheduled,
+        Self::InProgress,
+        Self::Completed,
+        Self::Canceled,
+    ];
+
+    /// The value of Procedure Step State (0074,1000).
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Scheduled => "SCHEDULED",
+            Self::InProgress => "IN PROGRESS",
+            Self::Completed => "COMPLETED",
+            Self::Canceled => "CANCELED",
+        }
+    }
+
+    /// The state with that value.
+    pub fn parse(text: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|state| state.as_str() == text)
+    }
+
+    /// Whether the item can change no more.
+    pub fn is_final(self) -> bool {
+        matches!(self, Self::Completed | Self::Canceled)
+    }
+}
+
+/// Why a request about a work item is refused.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Refusal {
+    /// An attribute is missing or has a value that it must not have.
+    #[error("{name} ({tag}): {reason}")]
+    Attribute {
+        /// Tag.
+        tag: &'static str,
+        /// Name.
+        name: &'static str,
+        /// What is wrong.
+        reason: &'static str,
+    },
+    /// The request names no Transaction UID, and the item is claimed.
+    #[error("The Transaction UID is missing.")]
+    NoTransaction,
+    /// The request names another Transaction UID than that by which the item was claimed.
+    #[error("The Transaction UID is incorrect.")]
+    OtherTransaction,
+    /// The item's state does not allow it.
+    #[error("The submitted request is inconsistent with the current state of the UPS Instance.")]
+    State {
+        /// The state.
+        state: WorkitemState,
+    },
+    /// What the final state needs is not there.
+    #[error(
+        "The submitted request does not meet the requirements of the requested state: {0} is missing."
+    )]
+    Unfinished(&'static str),
+}
+
+/// What a permitted request did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Change {
+    /// It was carried out.
+    Done,
+    /// The item was in that state already.
+    Already,
+}
+
+/// A work item of a tenant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Workitem {
+    /// Whose item it is.
+    pub tenant: Tenant,
+    /// SOP Instance UID.
+    pub uid: String,
+    /// Position in the order of creation; 0 before it is stored.
+    pub sequence: i64,
+    /// Increases with every change.
+    pub revision: i64,
+    /// Procedure Step State.
+    pub state: WorkitemState,
+    /// The Transaction UID under which it was claimed.
+    pub transaction: Option<String>,
+    /// All attributes but the Transaction UID.
+    pub attributes: DataSetJson,
+    /// When it was last changed.
+    pub changed_at: Timestamp,
+}
+
+impl Workitem {
+    /// A new item with the identifier `uid`. Attributes that a schedule needs and that are absent get
+    /// the standard's neutral values; also returns whether there were any.
+    ///
+    /// # Errors
+    /// [`Refusal::Attribute`] if the attributes are not those of a scheduled item.
+    pub fn create(
+        tenant: &Tenant,
+        uid: &str,
+        mut attributes: DataSetJson,
+        now: (Timestamp, &str),
+    ) -> Result<(Self, bool), Refusal> {
+        let wrong = |tag, name, reason| Err(Refusal::Attribute { tag, name, reason });
+        match attributes.text(STATE) {
+            Some("SCHEDULED") => {}
+            _ => return wrong(STATE, "Procedure Step State", "must be SCHEDULED"),
+        }
+        if attributes.has_value(TRANSACTION) {
+            return wrong(
+                TRANSACTION,
+                "Transaction UID",
+                "must be empty in a new item",
+            );
+        }
+        if attributes.has_value(PERFORMED) {
+            let name = "Performed Procedure Sequence";
+            return wrong(PERFORMED, name, "must be empty in a new item");
+        }
+        if attributes.text(SOP_INSTANCE).is_some_and(|own| own != uid) {
+            let reason = "differs from the UID in the path";
+            return wrong(SOP_INSTANCE, "SOP Instance UID", reason);
+        }
+        match attributes.text(PRIORITY) {
+            None | Some("HIGH" | "MEDIUM" | "LOW") => {}
+            _ => {
+                let name = "Scheduled Procedure Step Priority";
+                return wrong(PRIORITY, name, "must be HIGH, MEDIUM or LOW");
+            }
+        }
+        match attributes.text(READINESS) {
+            None | Some("READY" | "UNAVAILABLE" | "INCOMPLETE") => {}
+            _ => {
+                let reason = "must be READY, UNAVAILABLE or INCOMPLETE";
+                return wrong(READINESS, "Input Readiness State", reason);
+            }
+        }
+        let mut completed = false;
+        for (tag, vr, neutral) in [
+            (PRIORITY, "CS", "MEDIUM"),
+            (READINESS, "CS", "READY"),
+            (LABEL, "LO", "Work item"),
+        ] {
+            if attributes.text(tag).is_none() {
+                attributes.put(tag, vr, neutral);
+                completed = true;
+            }
+        }
+        if !attributes.has(INPUT) {
+            let empty = Map::from_iter([("vr".to_owned(), Value::from("SQ"))]);
+            let element = Map::from_iter([(INPUT.to_owned(), Value::from(empty))]);
+            attributes.replace(DataSetJson::of(element).unwrap_or_default());
+            completed = true;
+        }
+        attributes.remove(TRANSACTION);
+        attributes.put(SOP_CLASS, "UI", PUSH);
+        attributes.put(SOP_INSTANCE, "UI", uid);
+        let mut item = Self {
+            tenant: tenant.clone(),
+            uid: uid.to_owned(),
+            sequence: 0,
+            revision: 0,
+            state: WorkitemState::Scheduled,
+            transaction: None,
+            attributes,
+            changed_at: 0,
+        };
+        item.stamp(now);
+        Ok((item, completed))
+    }
+
+    /// Replaces attributes. A claimed item needs the Transaction UID of its claim.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub fn update(
+        &mut self,
+        transaction: Option<&str>,
+        mut changes: DataSetJson,
+        now: (Timestamp, &str),
+    ) -> Result<(), Refusal> {
+        self.require(transaction)?;
+        if self.state.is_final() {
+            return Err(Refusal::State { state: self.state });
+        }
+        for (tag, name) in [
+            (STATE, "Procedure Step State"),
+            (SOP_CLASS, "SOP Class UID"),
+            (SOP_INSTANCE, "SOP Instance UID"),
+        ] {
+            let same = changes.text(tag) == self.attributes.text(tag);
+            if changes.has_value(tag) && !same {
+                let reason = "cannot be changed by an update";
+                return Err(Refusal::Attribute { tag, name, reason });
+            }
+            changes.remove(tag);
+        }
+        changes.remove(TRANSACTION);
+        self.attributes.replace(changes);
+        self.stamp(now);
+        Ok(())
+    }
+
+    /// Claims or ends the item, for the performer with that Transaction UID.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub fn change_state(
+        &mut self,
+        transaction: Option<&str>,
+        wanted: WorkitemState,
+        now: (Timestamp, &str),
+    ) -> Result<Change, Refusal> {
+        use WorkitemState::{Canceled, Completed, InProgress, Scheduled};
+        let Some(transaction) = transaction else {
+            return Err(Refusal::NoTransaction);
+        };
+        match (self.state, wanted) {
+            (Scheduled, InProgress) => self.transaction = Some(transaction.to_owned()),
+            (InProgress, Completed | Canceled) => {
+                self.require(Some(transaction))?;
+                if wanted == Completed {
+                    self.require_results()?;
+                }
+            }
+            (Completed, Completed) | (Canceled, Canceled) => {
+                self.require(Some(transaction))?;
+                return Ok(Change::Already);
+            }
+            (state, _) => return Err(Refusal::State { state }),
+        }
+        self.enter(wanted, now);
+        Ok(Change::Done)
+    }
+
+    /// Cancels a scheduled item. Of a claimed one, notes the request where its performer sees it: in
+    /// the Procedure Step Progress Information.
+    ///
+    /// # Errors
+    /// [`Refusal::State`] if the item is completed.
+    pub fn request_cancel(
+        &mut self,
+        details: &DataSetJson,
+        now: (Timestamp, &str),
+    ) -> Result<Change, Refusal> {
+        match self.state {
+            WorkitemState::Canceled => return Ok(Change::Already),
+            WorkitemState::Completed => return Err(Refusal::State { state: self.state }),
+            WorkitemState::Scheduled | WorkitemState::InProgress => {}
+        }
+        let known = self.attributes.items(PROGRESS).next().cloned();
+        let mut progress = DataSetJson::of(known.unwrap_or_default()).unwrap_or_default();
+        for tag in CANCELLATION {
+            if let Some(element) = details.object().get(tag) {
+                let element = Map::from_iter([(tag.to_owned(), element.clone())]);
+                progress.replace(DataSetJson::of(element).unwrap_or_default());
+            }
+        }
+        progress.put(CANCELLED_AT, "DT", now.1);
+        self.attributes
+            .put_item(PROGRESS, progress.object().clone());
+        match self.state {
+            WorkitemState::Scheduled => self.enter(WorkitemState::Canceled, now),
+            _ => self.stamp(now),
+        }
+        Ok(Change::Done)
+    }
+
+    /// The item as it is shown: without the Transaction UID.
+    pub fn shown(&self) -> &Map<String, Value> {
+        self.attributes.object()
+    }
+
+    fn require(&self, transaction: Option<&str>) -> Result<(), Refusal> {
+        match (&self.transaction, transaction) {
+            (None, _) => Ok(()),
+            (Some(_), None) => Err(Refusal::NoTransaction),
+            (Some(own), Some(given)) if own == given => Ok(()),
+            _ => Err(Refusal::OtherTransaction),
+        }
+    }
+
+    fn require_results(&self) -> Result<(), Refusal> {
+        let performed = self.attributes.items(PERFORMED).next();
+        let Some(performed) = performed else {
+            return Err(Refusal::Unfinished(
+                "Unified Procedure Step Performed Procedure Sequence",
+            ));
+        };
+        match FINAL.iter().find(|(tag, _)| !performed.contains_key(*tag)) {
+            Some((_, name)) => Err(Refusal::Unfinished(name)),
+            None => Ok(()),
+        }
+    }
+
+    fn enter(&mut self, state: WorkitemState, now: (Timestamp, &str)) {
+        self.state = state;
+        self.stamp(now);
+    }
+
+    /// Notes state and time in the attributes. `now` is the time, also as DICOM writes it (DT).
+    fn stamp(&mut self, (now, text): (Timestamp, &str)) {
+        self.attributes.put(STATE, "CS", self.state.as_str());
+        self.attributes.put(MODIFIED_AT, "DT", text);
+        self.changed_at = now;
+    }
+}
+
+#[cfg(test)]
+#[allow(
+    clippy::unwrap_used,
+    reason = "tests state their expectations by panicking"
+)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    const NOW: (Timestamp, &str) = (7, "20261123050000");
+
+    fn set(value: Value) -> DataSetJson {
+        let Value::Object(object) = value else {
+            panic!("{value}")
+        };
+        DataSetJson::of(object).unwrap()
+    }
+
+    fn scheduled() -> Workitem {
+        let attributes = set(json!({"00741000": {"vr": "CS", "Value": ["SCHEDULED"]}}));
+        Workitem::create(&Tenant::default(), "1.2", attributes, NOW)
+            .unwrap()
+            .0
+    }
+
+    fn finished() -> DataSetJson {
+        let item: Map<String, Value> = FINAL
+            .iter()
+            .map(|(tag, _)| ((*tag).to_owned(), json!({"vr": "SQ"})))
+            .collect();
+        set(json!({"00741216": {"vr": "SQ", "Value": [item]}}))
+    }
+
+    #[test]
+    fn every_transition_is_permitted_or_refused_as_the_standard_says() {
+        use WorkitemState::{Canceled, Completed, InProgress, Scheduled};
+        for (from, to, allowed) in [
+            (Scheduled, Scheduled, false),
+            (Scheduled, InProgress, true),
+            (Scheduled, Completed, false),
+            (Scheduled, Canceled, false),
+            (InProgress, Scheduled, false),
+            (InProgress, InProgress, false),
+            (InProgress, Completed, true),
+            (InProgress, Canceled, true),
+            (Completed, InProgress, false),
+            (Completed, Canceled, false),
+            (Canceled, Completed, false),
+            (Canceled, InProgress, false),
+        ] {
+            let mut item = scheduled();
+            if from != Scheduled {
+                item.change_state(Some("9.9"), InProgress, NOW).unwrap();
+                item.update(Some("9.9"), finished(), NOW).unwrap();
+            }
+            if from.is_final() {
+                item.change_state(Some("9.9"), from, NOW).unwrap();
+            }
+            let before = item.clone();
+            let result = item.change_state(Some("9.9"), to, NOW);
+            if allowed {
+                assert_eq!(result, Ok(Change::Done), "{from:?} {to:?}");
+                assert_eq!(item.attributes.text(STATE), Some(to.as_str()));
+            } else {
+                assert_eq!(
+                    result,
+                    Err(Refusal::State { state: from }),
+                    "{from:?} {to:?}"
+                );
+                assert_eq!(item, before);
+            }
+        }
+    }
+
+    #[test]
+    fn a_claimed_item_obeys_its_performer_alone() {
+        let mut item = scheduled();
+        item.update(
+            None,
+            set(json!({"00741204": {"vr": "LO", "Value": ["A"]}})),
+            NOW,
+        )
+        .unwrap();
+        let claim = WorkitemState::InProgress;
+        assert_eq!(
+            item.change_state(None, claim, NOW),
+            Err(Refusal::NoTransaction)
+        );
+        item.change_state(Some("9.9"), claim, NOW).unwrap();
+        let change = || set(json!({"00741204": {"vr": "LO", "Value": ["B"]}}));
+        assert_eq!(
+            item.update(None, change(), NOW),
+            Err(Refusal::NoTransaction)
+        );
+        assert_eq!(
+            item.update(Some("9.8"), change(), NOW),
+            Err(Refusal::OtherTransaction)
+        );
+        item.update(Some("9.9"), change(), NOW).unwrap();
+        assert_eq!(item.attributes.text(LABEL), Some("B"));
+        let done = WorkitemState::Completed;
+        let missing = item.change_state(Some("9.9"), done, NOW);
+        assert!(
+            matches!(missing, Err(Refusal::Unfinished(_))),
+            "{missing:?}"
+        );
+        item.update(Some("9.9"), finished(), NOW).unwrap();
+        let other = item.change_state(Some("9.8"), done, NOW);
+        assert_eq!(other, Err(Refusal::OtherTransaction));
+        assert_eq!(item.change_state(Some("9.9"), done, NOW), Ok(Change::Done));
+        assert_eq!(
+            item.change_state(Some("9.9"), done, NOW),
+            Ok(Change::Already)
+        );
+        let late = item.update(Some("9.9"), change(), NOW);
+        assert_eq!(late, Err(Refusal::State { state: done }));
+        assert!(!serde_json::to_string(item.shown()).unwrap().contains("9.9"));
+        let cancel = item.request_cancel(&DataSetJson::default(), NOW);
+        assert_eq!(cancel, Err(Refusal::State { state: done }));
+    }
+
+    #[test]
+    fn a_cancellation_ends_what_waits_and_is_noted_where_work_goes_on() {
+        let reason = set(json!({"00741238": {"vr": "LT", "Value": ["wrong patient"]}}));
+        let mut item = scheduled();
+        assert_eq!(item.request_cancel(&reason, NOW), Ok(Change::Done));
+        assert_eq!(item.state, WorkitemState::Canceled);
+        assert_eq!(item.request_cancel(&reason, NOW), Ok(Change::Already));
+        let mut item = scheduled();
+        item.change_state(Some("9.9"), WorkitemState::InProgress, NOW)
+            .unwrap();
+        assert_eq!(item.request_cancel(&reason, NOW), Ok(Change::Done));
+        assert_eq!(item.state, WorkitemState::InProgress);
+        let noted = item.attributes.items(PROGRESS).next().unwrap();
+        assert_eq!(noted["00741238"]["Value"][0], "wrong patient");
+    }
+
+    #[test]
+    fn a_new_item_must_be_one() {
+        for (tag, value) in [
+            (STATE, json!({"vr": "CS", "Value": ["IN PROGRESS"]})),
+            (TRANSACTION, json!({"vr": "UI", "Value": ["1.2.3"]})),
+            (PRIORITY, json!({"vr": "CS", "Value": ["SOON"]})),
+            (SOP_INSTANCE, json!({"vr": "UI", "Value": ["1.3"]})),
+        ] {
+            let mut object = scheduled().attributes.object().clone();
+            object.insert(tag.into(), value);
+            let set = DataSetJson::of(object).unwrap();
+            let refused = Workitem::create(&Tenant::default(), "1.2", set, NOW);
+            assert!(
+                matches!(refused, Err(Refusal::Attribute { tag: at, .. }) if at == tag),
+                "{tag}: {refused:?}"
+            );
+        }
+        for (wrong, part) in [
+            (json!({"123": {"vr": "LO"}}), "eight"),
+            (json!({"00741000": 1}), "object"),
+            (json!({"00741000": {"vr": "lo"}}), "representation"),
+            (json!({"00741000": {"vr": "LO", "Value": 1}}), "array"),
+            (json!({"00741002": {"vr": "SQ", "Value": [1]}}), "objects"),
+        ] {
+            let error = DataSetJson::of(wrong.as_object().unwrap().clone()).unwrap_err();
+            assert!(error.to_string().contains(part), "{error}");
+        }
+    }
+}
