@@ -30,7 +30,8 @@ from pynetdicom import AE, build_context
 from pynetdicom.sop_class import Verification
 
 AE_TITLE = "VENTRIFORM"
-PATIENCE = 60
+# Long, for machines that do much else.
+PATIENCE = 120
 
 
 def check(condition, what):
@@ -145,6 +146,7 @@ class Service:
 
     def associate(self, *contexts):
         ae = AE("PYNETDICOM")
+        ae.acse_timeout = ae.dimse_timeout = ae.network_timeout = PATIENCE
         ae.requested_contexts = [build_context(Verification), *contexts]
         association = ae.associate("127.0.0.1", self.port, ae_title=AE_TITLE)
         check(association.is_established, "pynetdicom: association")
