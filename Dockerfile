@@ -11,6 +11,7 @@ RUN mkdir src \
  && cargo build --profile dist --locked --bin ventriform \
  && rm -rf src
 COPY src src
+COPY web/dist web/dist
 COPY README.md ./
 # cargo compares modification times: the sources must be newer than the placeholders above.
 RUN find src -exec touch {} + \

@@ -205,6 +205,7 @@ def everything(walk, folder):
     call("get", "/v1/volumes", expect=200)
     call("get", "/v1/volumes/{id}", expect=200, id=volume["id"])
     call("get", "/v1/volumes/{id}/preview.png", expect=200, id=volume["id"])
+    call("get", "/v1/volumes/{id}/voxels.nii.gz", expect=200, id=volume["id"])
     call("get", "/v1/volumes/{id}/content", expect=200, id=volume["id"])
     call("get", "/v1/volumes/{id}/files/{name}", expect=200, id=volume["id"], name=volume["originals"][0]["name"])
     names = {"external_id": "A-2026-17", "labels": {"study": "42"}}

@@ -4,7 +4,8 @@
     python scripts/dependencies.py write     writes ventriform.cdx.json anew
 
 The bill is CycloneDX 1.6. It holds what the program of the image is built of: every crate that the default
-features need at run time or at build time on Linux, and the C libraries inside of them. It has no date, so
+features need at run time or at build time on Linux, the C libraries inside of them, and the npm packages inside
+of the page. It has no date, so
 that the same Cargo.lock gives the same bytes. Needs cyclonedx-python-lib[json-validation]; no network beyond
 what cargo needs to have the crates.
 
@@ -111,6 +112,12 @@ def bill():
             entry["components"] = inside
         return entry
 
+    # What the page is built of, apart from its tools: web/dist holds it.
+    locked = json.loads((ROOT / "web/package-lock.json").read_text())["packages"]
+    page = [{"type": "library", "bom-ref": f"pkg:npm/{name}@{of['version']}", "name": name, "version": of["version"],
+             "licenses": [{"expression": of["license"]}], "purl": f"pkg:npm/{name}@{of['version']}"}
+            for name, of in ((name, locked[f"node_modules/{name}"]) for name in sorted(locked[""]["dependencies"]))]
+
     libraries = sorted((packages[i] for i in reached - {root}), key=lambda p: (p["name"], p["version"]))
     document = {
         "$schema": "http://cyclonedx.org/schema/bom-1.6.schema.json",
@@ -118,7 +125,7 @@ def bill():
         "specVersion": "1.6",
         "version": 1,
         "metadata": {"component": component(packages[root], "application")},
-        "components": [component(package, "library") for package in libraries],
+        "components": [component(package, "library") for package in libraries] + page,
         "dependencies": [{"ref": purl(packages[i]), "dependsOn": sorted(purl(packages[d]) for d in needs(i))}
                          for i in sorted(reached, key=lambda i: purl(packages[i]))],
     }

@@ -4,7 +4,7 @@
 #
 #   scripts/test.sh            everything
 #   scripts/test.sh --quick    without the demo and the external checks (trimesh, vtk, glTF validator,
-#                              pygeodesic, schemathesis, generated clients, kills, DICOM, licences and SBOM)
+#                              pygeodesic, schemathesis, the page in a browser, generated clients, kills, DICOM, licences and SBOM)
 set -uo pipefail
 cd "$(dirname "$0")/.."
 
@@ -68,6 +68,7 @@ install_external_tools() {
   need node nodejs npm
   need npm npm
   need dciodvfy dicom3tools dcmtk
+  need chromium chromium fonts-dejavu-core
   python3 -c 'import ensurepip, venv' 2>/dev/null || need no-such-command python3 python3-venv python3-pip
   if ! cmp -s scripts/requirements.txt "$tools/python.done"; then
     python3 -m venv "$tools/python" &&
@@ -137,5 +138,7 @@ else
   echo "could not install the tools for the external checks"
   failed=$((failed + 1))
 fi
+# Alone, since a browser on busy processors is slow.
+check "page in a browser" scripts/check_page.sh --bundle
 check "demo" scripts/check_demo.sh
 finish

@@ -1,45 +1,120 @@
-//! `GET /`: an HTML page for browsers, a few commands for curl.
+//! `GET /`: the page for browsers, a few commands for curl. `/docs`, `/assets/*`: the rest of the page.
+//!
+//! The page is built from `web/` and committed as `web/dist`, each file beside its compressed forms. The
+//! names of what lies in `assets/` hold a hash of the content, so browsers keep those files for ever.
 
 use super::negotiate;
+use super::problem::not_found::no_such_path;
+use axum::extract::Path;
 use axum::http::{HeaderMap, HeaderValue, header};
-use axum::response::{Html, IntoResponse, Response};
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
-use sha2::{Digest, Sha256};
-use std::sync::LazyLock;
+use axum::response::{IntoResponse, Response};
+use include_dir::{Dir, include_dir};
 
-const PAGE: &str = include_str!("front_page.html");
+static BUNDLE: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/web/dist");
 
-/// What the page may do: run its own script and style, which are named by their hashes, and call
-/// its own service. Nothing comes from elsewhere.
-static CONTENT_SECURITY_POLICY: LazyLock<HeaderValue> = LazyLock::new(|| {
-    let hash = |start: &str, end: &str| {
-        let (_, rest) = PAGE.split_once(start).unwrap_or_default();
-        let (text, _) = rest.split_once(end).unwrap_or_default();
-        BASE64_STANDARD.encode(Sha256::digest(text.as_bytes()))
-    };
-    let policy = format!(
-        "default-src 'none'; script-src 'sha256-{}'; style-src 'sha256-{}'; img-src 'self'; \
-         connect-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'none'",
-        hash("<script>", "</script>"),
-        hash("<style>", "</style>"),
-    );
-    HeaderValue::try_from(policy).unwrap_or(HeaderValue::from_static("default-src 'none'"))
-});
+const INDEX: &str = "index.html";
+
+/// What the page may do: run the programs and styles that are files of this service, show pictures that
+/// it fetched or drew itself, and call its own service. Nothing comes from elsewhere.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; \
+    connect-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'none'";
+
+/// What may be kept for ever.
+const FOR_EVER: &str = "public, max-age=31536000, immutable";
+
+/// What is asked for again each time.
+const CURRENT: &str = "no-cache";
 
 /// The page if the client prefers HTML, else text.
 pub async fn welcome(headers: HeaderMap) -> Response {
-    let mut response = match negotiate::best_offer(&headers, &["text/plain", "text/html"]) {
-        Some(1) => Html(PAGE).into_response(),
-        _ => commands(&base_url(&headers)).into_response(),
+    let html = negotiate::best_offer(&headers, &["text/plain", "text/html"]) == Some(1);
+    let page = html.then(|| file(INDEX, "text/html; charset=utf-8", CURRENT, &headers));
+    let mut response = match page.flatten() {
+        Some(page) => page,
+        None => commands(&base_url(&headers)).into_response(),
     };
-    let headers = response.headers_mut();
-    headers.insert(
-        header::CONTENT_SECURITY_POLICY,
-        CONTENT_SECURITY_POLICY.clone(),
-    );
-    headers.insert(header::VARY, HeaderValue::from_static("accept"));
+    let vary = HeaderValue::from_static("accept, accept-encoding");
+    response.headers_mut().insert(header::VARY, vary);
     response
+}
+
+/// The documentation of the API: the same page, which reads `/openapi.json`.
+pub async fn documentation(headers: HeaderMap) -> Response {
+    match file(INDEX, "text/html; charset=utf-8", CURRENT, &headers) {
+        Some(page) => page,
+        None => no_such_path().await.into_response(),
+    }
+}
+
+/// A program, style or picture of the page.
+pub async fn asset(Path(name): Path<String>, headers: HeaderMap) -> Response {
+    let media_type = match name.rsplit('.').next() {
+        Some("js") => "text/javascript",
+        Some("css") => "text/css",
+        Some("svg") => "image/svg+xml",
+        _ => return no_such_path().await.into_response(),
+    };
+    match file(&format!("assets/{name}"), media_type, FOR_EVER, &headers) {
+        Some(response) => response,
+        None => no_such_path().await.into_response(),
+    }
+}
+
+/// The picture that browsers ask every site for, also when they show a report.
+pub async fn icon(headers: HeaderMap) -> Response {
+    let assets = BUNDLE.get_dir("assets").into_iter().flat_map(Dir::files);
+    let mut names = assets.filter_map(|file| file.path().to_str());
+    let name = names.find(|name| name.contains("/icon-") && name.ends_with(".svg"));
+    match name.and_then(|name| file(name, "image/svg+xml", CURRENT, &headers)) {
+        Some(response) => response,
+        None => no_such_path().await.into_response(),
+    }
+}
+
+/// A file of the bundle, in the smallest form that the client can unpack; `None` if there is none.
+fn file(
+    name: &str,
+    media_type: &'static str,
+    kept: &'static str,
+    headers: &HeaderMap,
+) -> Option<Response> {
+    let packed = [("br", ".br"), ("gzip", ".gz")]
+        .into_iter()
+        .find_map(|(coding, ending)| {
+            let content = BUNDLE.get_file(format!("{name}{ending}"))?;
+            accepts(headers, coding).then_some((Some(coding), content))
+        });
+    let (coding, content) = packed.or_else(|| Some((None, BUNDLE.get_file(name)?)))?;
+    let mut response = content.contents().into_response();
+    let mut set = |name, value| {
+        response
+            .headers_mut()
+            .insert(name, HeaderValue::from_static(value))
+    };
+    set(header::CONTENT_TYPE, media_type);
+    set(header::CACHE_CONTROL, kept);
+    set(header::VARY, "accept-encoding");
+    set(header::CONTENT_SECURITY_POLICY, POLICY);
+    if let Some(coding) = coding {
+        set(header::CONTENT_ENCODING, coding);
+    }
+    Some(response)
+}
+
+/// Whether `Accept-Encoding` names this coding and does not refuse it by `q=0`.
+fn accepts(headers: &HeaderMap, coding: &str) -> bool {
+    let values = headers.get_all(header::ACCEPT_ENCODING).iter();
+    let mut offers = values
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split(','));
+    offers.any(|offer| {
+        let (name, weight) = offer.split_once(';').unwrap_or((offer, ""));
+        let weight = weight
+            .trim()
+            .strip_prefix("q=")
+            .and_then(|text| text.parse::<f32>().ok());
+        name.trim().eq_ignore_ascii_case(coding) && weight != Some(0.0)
+    })
 }
 
 /// The address under which the client reached the service.

@@ -82,6 +82,7 @@ mod upload;
 mod validators;
 mod volume_maker;
 mod volumes;
+mod voxels;
 mod webhooks;
 mod wire;
 mod workitems;

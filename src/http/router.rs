@@ -16,7 +16,7 @@ use super::volumes::Volumes;
 use super::{
     audit, collection, erasures, front_page, given_webhook, health, idempotency, identities, jobs,
     keys, legal_hold, models, originals, products, readers, received, segmentations, stow,
-    templates, volumes, webhooks, workitems,
+    templates, volumes, voxels, webhooks, workitems,
 };
 use crate::config::Settings;
 use axum::Router;
@@ -32,7 +32,6 @@ use tower_http::trace::TraceLayer;
 use utoipa::OpenApi;
 use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouter, UtoipaMethodRouterExt};
 use utoipa_axum::routes;
-use utoipa_swagger_ui::SwaggerUi;
 
 /// Every documented route.
 fn routes(settings: &Settings) -> OpenApiRouter<App> {
@@ -51,9 +50,10 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         products::routes::<Templates>(),
         products::routes::<Readers>(),
     ];
-    let of_one_kind: [UtoipaMethodRouter<App>; 39] = [
+    let of_one_kind: [UtoipaMethodRouter<App>; 40] = [
         routes!(volumes::create_volume).layer(upload()),
         routes!(volumes::preview_volume),
+        routes!(voxels::download_voxels),
         routes!(volumes::update_volume).layer(json(settings.json_limit)),
         routes!(originals::download_volume),
         routes!(originals::download_volume_file),
@@ -154,7 +154,10 @@ pub fn router(app: App) -> Router {
             "/openapi.json",
             get(move |headers: HeaderMap| async move { document.answer(&headers) }),
         )
-        .merge(SwaggerUi::new("/docs").config(utoipa_swagger_ui::Config::from("/openapi.json")))
+        .route("/docs", get(front_page::documentation))
+        .route("/docs/", get(front_page::documentation))
+        .route("/assets/{name}", get(front_page::asset))
+        .route("/favicon.ico", get(front_page::icon))
         .fallback(no_such_path)
         .method_not_allowed_fallback(method_not_allowed)
         .layer(middleware::from_fn_with_state(app.clone(), guard::guard));

@@ -11,8 +11,8 @@ use super::wire::{path_of, rfc3339};
 use super::{scans, tags, upload};
 use crate::access::Scope;
 use crate::jobs::{
-    BlobError, Catalogue, FileRecord, Held, ItemFilter, LegalHold, ListPage, ListRequest, Resource,
-    StoreError, StoreFault, StoredVolume, Tenant, content_id,
+    BlobError, Catalogue, FileRecord, Held, ItemFilter, LegalHold, ListPage, ListRequest,
+    LocalFile, Resource, StoreError, StoreFault, StoredVolume, Tenant, content_id,
 };
 use crate::progress::Monitor;
 use crate::work::{UploadFacts, preview_memory};
@@ -370,13 +370,7 @@ pub async fn preview_volume(
     if let Some(unchanged) = not_modified(&headers, &etag, PREVIEW_CACHE_CONTROL) {
         return Ok(unchanged);
     }
-    let files = app.queue.volume_files(&id, &volume.files).await?;
-    let files = files.ok_or_else(|| {
-        BlobError::new(
-            StoreFault::DamagedFile,
-            format!("a file of {id} is missing"),
-        )
-    })?;
+    let files = files_of(&app, &volume).await?;
     let reader = app.engine.reader.clone();
     let memory = preview_memory(UploadFacts::of(&volume)?.shape);
     let draw = move |monitor: &Monitor<'_>| reader.preview(&files, monitor);
@@ -388,4 +382,19 @@ pub async fn preview_volume(
         (header::CACHE_CONTROL, PREVIEW_CACHE_CONTROL),
     ];
     Ok((headers, png).into_response())
+}
+
+/// The files of a stored volume, to be read.
+///
+/// # Errors
+/// If one of them is missing or the store fails.
+pub async fn files_of(app: &App, volume: &StoredVolume) -> Answer<Vec<LocalFile>> {
+    let id = &volume.id;
+    let files = app.queue.volume_files(id, &volume.files).await?;
+    Ok(files.ok_or_else(|| {
+        BlobError::new(
+            StoreFault::DamagedFile,
+            format!("a file of {id} is missing"),
+        )
+    })?)
 }

@@ -30,6 +30,7 @@ pub use page::PageError;
 pub use segmentation::SegmentationWork;
 pub use upload::{
     DomainReader, INSPECTION_MEMORY, IntensityFacts, UploadFacts, UploadReader, preview_memory,
+    voxels_memory,
 };
 
 use crate::jobs::{Work, Works};

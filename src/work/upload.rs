@@ -3,8 +3,9 @@
 use super::files::volume_files;
 use super::problems::Explain;
 use super::{profile, template};
-use crate::jobs::{Failure, LocalFile, ScanFields, StoreError, StoredVolume, WorkOutput};
+use crate::jobs::{Failure, Fault, LocalFile, ScanFields, StoreError, StoredVolume, WorkOutput};
 use crate::progress::Monitor;
+use crate::volume::nifti::{self, StoredType};
 use crate::volume::{self, ReadLimits, ReadOptions};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -20,6 +21,14 @@ pub fn preview_memory(shape: [usize; 3]) -> u64 {
     let [x, y, z] = shape.map(|n| n as u64);
     let voxels = x.saturating_mul(y) + y.saturating_mul(z) + x.saturating_mul(z);
     INSPECTION_MEMORY + voxels.saturating_mul(size_of::<f32>() as u64)
+}
+
+/// Most memory that [`UploadReader::voxels`] takes for volumes of `shape`, bytes: the voxels, the
+/// same as 16-bit integers, and those packed, beside what an inspection takes.
+pub fn voxels_memory(shape: [usize; 3]) -> u64 {
+    let [x, y, z] = shape.map(|n| n as u64);
+    let voxels = x.saturating_mul(y).saturating_mul(z);
+    INSPECTION_MEMORY.saturating_add(voxels.saturating_mul(8))
 }
 
 /// Validates uploads. Its methods are called on blocking threads.
@@ -47,6 +56,17 @@ pub trait UploadReader: Send + Sync + 'static {
     /// # Errors
     /// As [`UploadReader::inspect`].
     fn preview(&self, files: &[LocalFile], monitor: &Monitor<'_>) -> Result<Vec<u8>, Failure>;
+
+    /// The voxels of one frame as a `.nii.gz` file of 16-bit integers.
+    ///
+    /// # Errors
+    /// As [`UploadReader::inspect`], or why there is no such frame.
+    fn voxels(
+        &self,
+        files: &[LocalFile],
+        frame: Option<usize>,
+        monitor: &Monitor<'_>,
+    ) -> Result<Vec<u8>, Failure>;
 
     /// Reads and validates a JSON mesh that is to serve as a template of `organ`. Returns its main
     /// figures and every download.
@@ -175,6 +195,21 @@ impl UploadReader for DomainReader {
         let picture = volume::preview_files(&volume_files(files), &self.limits, monitor)
             .map_err(|error| error.explain())?;
         Ok(picture.png())
+    }
+
+    fn voxels(
+        &self,
+        files: &[LocalFile],
+        frame: Option<usize>,
+        monitor: &Monitor<'_>,
+    ) -> Result<Vec<u8>, Failure> {
+        let options = ReadOptions { frame };
+        let reading = volume::read(&volume_files(files), &options, &self.limits, monitor)
+            .map_err(|error| error.explain())?;
+        nifti::write(&reading.volume, StoredType::Int16, true).map_err(|error| {
+            Failure::new(Fault::Content, "axis-too-long", error.to_string())
+                .fix("Download the upload itself instead.")
+        })
     }
 
     fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure> {

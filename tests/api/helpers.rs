@@ -330,6 +330,21 @@ impl UploadReader for FakeReader {
         Ok(b"\x89PNG\r\n\x1a\n".to_vec())
     }
 
+    fn voxels(
+        &self,
+        files: &[LocalFile],
+        frame: Option<usize>,
+        _: &Monitor<'_>,
+    ) -> Result<Vec<u8>, Failure> {
+        words(files)?;
+        match frame {
+            None | Some(0) => Ok(b"\x1f\x8b".to_vec()),
+            Some(_) => {
+                Err(Failure::new(Fault::Request, "frame-out-of-range", "one frame").at("frame"))
+            }
+        }
+    }
+
     fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure> {
         self.0.template(mesh, organ)
     }

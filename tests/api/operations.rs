@@ -60,13 +60,39 @@ async fn the_start_page_is_html_for_browsers_and_text_for_curl() {
 #[tokio::test]
 async fn the_documentation_needs_no_network() {
     let app = TestApp::start().await;
-    let page = app.get("/docs/").send().await.unwrap();
+    let page = app.get("/docs").send().await.unwrap();
     assert_eq!(page.status(), StatusCode::OK);
     let page = page.text().await.unwrap();
-    assert!(
-        page.contains("swagger-ui") && !page.contains("https://"),
-        "{page}"
-    );
+    assert!(!page.contains("http://") && !page.contains("https://"));
+    let mut scripts = page.split('"').filter(|word| word.ends_with(".js"));
+    let script = scripts.next().unwrap();
+    let plain = app.get(script).send().await.unwrap();
+    assert_eq!(plain.headers()["content-type"], "text/javascript");
+    let kept = plain.headers()["cache-control"].to_str().unwrap();
+    assert!(kept.contains("immutable"));
+    let plain = plain.bytes().await.unwrap();
+    for (accepted, coding) in [
+        ("gzip, br", Some("br")),
+        ("gzip", Some("gzip")),
+        ("br;q=0", None),
+    ] {
+        let packed = app.get(script).header("accept-encoding", accepted);
+        let packed = packed.send().await.unwrap();
+        let stated = packed.headers().get("content-encoding");
+        assert_eq!(stated.map(|value| value.to_str().unwrap()), coding);
+        assert_eq!(packed.headers()["vary"], "accept-encoding");
+        let length = packed.bytes().await.unwrap().len();
+        assert_eq!(length < plain.len(), coding.is_some(), "{accepted}");
+    }
+    for path in [
+        "/assets/nothing.js",
+        "/assets/index.html",
+        "/assets/..%2findex.html",
+    ] {
+        problem(app.get(path).send().await.unwrap(), 404, "no-such-path").await;
+    }
+    let icon = app.get("/favicon.ico").send().await.unwrap();
+    assert_eq!(icon.headers()["content-type"], "image/svg+xml");
 }
 
 #[tokio::test]

@@ -243,3 +243,29 @@ async fn a_volume_has_a_preview() {
     assert_eq!(answer.headers()["content-type"], "image/png");
     assert!(answer.bytes().await.unwrap().starts_with(b"\x89PNG"));
 }
+
+#[tokio::test]
+async fn the_voxels_of_a_volume_can_be_read_in_one_format() {
+    let app = TestApp::start().await;
+    let id = app.volume("sphere").await;
+    let path = format!("/v1/volumes/{id}/voxels.nii.gz");
+    let answer = app.get(&path).send().await.unwrap();
+    assert_eq!(answer.headers()["content-type"], "application/gzip");
+    let etag = answer.headers()["etag"].clone();
+    assert!(answer.bytes().await.unwrap().starts_with(b"\x1f\x8b"));
+    let again = app.get(&path).header("if-none-match", etag.clone());
+    assert_eq!(
+        again.send().await.unwrap().status(),
+        StatusCode::NOT_MODIFIED
+    );
+    let first = app.get(&format!("{path}?frame=0")).send().await.unwrap();
+    assert_ne!(first.headers()["etag"], etag);
+    for (query, code) in [
+        ("frame=7", "frame-out-of-range"),
+        ("frame=x", "invalid-parameter"),
+    ] {
+        let answer = app.get(&format!("{path}?{query}")).send().await.unwrap();
+        let body = problem(answer, 422, code).await;
+        assert_eq!(body["field"], "frame");
+    }
+}

@@ -206,7 +206,7 @@ const SERVICE_CRATES: &[&str] = &[
     "object_store",
     "utoipa",
     "utoipa_axum",
-    "utoipa_swagger_ui",
+    "include_dir",
     "reqwest",
     "clap",
     "indicatif",

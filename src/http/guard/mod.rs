@@ -59,8 +59,8 @@ const PATIENT_PATHS: [&str; 2] = ["/v1/volumes/{id}/identity", "/dicom-web/worki
 fn is_open_path(path: &str, settings: &Settings) -> bool {
     matches!(
         path,
-        "/" | "/healthz" | "/readyz" | "/openapi.json" | "/docs"
-    ) || path.starts_with("/docs/")
+        "/" | "/healthz" | "/readyz" | "/openapi.json" | "/docs" | "/docs/" | "/favicon.ico"
+    ) || path.starts_with("/assets/")
         || (settings.open_metrics && path == "/metrics")
 }
 

@@ -14,12 +14,6 @@ use tower_http::cors::{AllowOrigin, CorsLayer};
 const DATA: &str =
     "default-src 'none'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
-/// The policy of the API documentation. Its program is a file of this service; it sets styles at
-/// run time and draws pictures from `data:` addresses.
-const DOCUMENTATION: &str = "default-src 'none'; script-src 'self'; \
-    style-src 'self' 'unsafe-inline'; img-src 'self' data:; font-src 'self'; connect-src 'self'; \
-    frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
-
 /// Reports carry a policy of their own, with the hashes of their style and script; they are files
 /// that also work without the service. What a file cannot say of itself is who may frame it.
 const REPORT: &str = "frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
@@ -36,14 +30,12 @@ const PREFLIGHT: Duration = Duration::from_secs(600);
 
 /// The layer that adds the headers; `tls` says whether the service speaks TLS.
 pub async fn protect(State(tls): State<bool>, request: Request, next: Next) -> Response {
-    let documentation = request.uri().path().starts_with("/docs");
     let mut response = next.run(request).await;
     let headers = response.headers_mut();
     if !headers.contains_key(header::CONTENT_SECURITY_POLICY) {
         let media_type = headers.get(header::CONTENT_TYPE);
         let media_type = media_type.and_then(|value| value.to_str().ok());
         let policy = match media_type.unwrap_or_default() {
-            _ if documentation => DOCUMENTATION,
             kind if kind.starts_with("text/html") => REPORT,
             kind if kind.starts_with("image/svg") => PICTURE,
             _ => DATA,

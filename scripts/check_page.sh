@@ -1,0 +1,25 @@
+#!/usr/bin/env bash
+# Tests the page in Debian's Chromium: from an upload to a corrected fit, at two widths, light and dark.
+#
+#   scripts/check_page.sh             against a service of its own
+#   scripts/check_page.sh --bundle    also builds web/dist anew and compares it with what is committed
+#
+# Screenshots of every view are kept in target/page. Needs node, npm and chromium.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+# The packages are laid under target/, so that the sources stay clean.
+tools=$PWD/target/test-tools/web
+mkdir -p "$tools"
+cp -r web/package.json web/package-lock.json web/tsconfig.json web/vite.config.ts web/index.html web/src web/tests "$tools/"
+if ! cmp -s web/package-lock.json "$tools/installed"; then
+  npm ci --silent --no-fund --no-audit --prefix "$tools" && cp web/package-lock.json "$tools/installed"
+fi
+if [ "${1:-}" = --bundle ]; then
+  (cd "$tools" && rm -rf dist && npx tsc --noEmit && npx vite build --logLevel warn)
+  diff -r "$tools/dist" web/dist || { echo "web/dist is not what web/src gives: cd web && npm ci && npm run build"; exit 1; }
+fi
+rm -rf target/page && mkdir -p target/page
+export PROGRAM=${PROGRAM:-$PWD/target/debug/ventriform} SCREENSHOTS=$PWD/target/page CHROMIUM=${CHROMIUM:-/usr/bin/chromium}
+[ -x "$PROGRAM" ] || cargo build --quiet --bins --test layering
+"$PROGRAM" phantom -o "$SCREENSHOTS/phantom" >/dev/null
+node "$tools/tests/page.mjs"

@@ -1,0 +1,212 @@
+// Requests to the service, with the key of the caller and with problems as the service words them.
+
+import { Watched } from "./state";
+
+export interface Problem {
+  type: string;
+  title: string;
+  status: number;
+  detail: string;
+  field?: string | null;
+  fix?: string | null;
+}
+
+export interface FileOfResult {
+  name: string;
+  href: string;
+  media_type: string;
+  bytes: number;
+}
+
+export interface Volume {
+  id: string;
+  created_at: string;
+  external_id?: string | null;
+  labels: Record<string, string>;
+  legal_hold?: unknown;
+  /** Whose scan it is, as far as the caller may see it. */
+  dicom?: Record<string, string | null> | null;
+  bytes: number;
+  files: number;
+  originals: FileOfResult[];
+  format: string;
+  shape: number[];
+  frames: number;
+  spacing_mm: number[];
+  label_values?: number[] | null;
+  warnings: string[];
+  links: { self: string; preview: string; content: string };
+}
+
+export type JobState = "queued" | "running" | "succeeded" | "failed" | "cancelled";
+
+export type ParameterValue = string | number | boolean | (number | string)[];
+export type Parameters = Record<string, ParameterValue | null>;
+
+export interface Job {
+  id: string;
+  external_id?: string | null;
+  labels: Record<string, string>;
+  kind: "model" | "segmentation";
+  volume: string;
+  parameters: Parameters;
+  state: JobState;
+  stage?: string | null;
+  progress: number;
+  queue_position?: number | null;
+  estimated_start?: string | null;
+  revision: number;
+  created_at: string;
+  finished_at?: string | null;
+  error?: Problem | null;
+  model?: string | null;
+  segmentation?: string | null;
+  links: { self: string; events: string; volume: string };
+}
+
+export interface Flag {
+  [name: string]: unknown;
+}
+
+export interface Walls {
+  wall: number;
+  cavity: number;
+}
+
+export interface Result {
+  id: string;
+  created_at: string;
+  volume: string;
+  parameters: Parameters;
+  summary: Record<string, unknown>;
+  files: FileOfResult[];
+  links: Record<string, string>;
+}
+
+export class ProblemError extends Error {
+  constructor(readonly problem: Problem) {
+    super(problem.detail);
+  }
+}
+
+/** The service did not answer at all. */
+export class Unreachable extends Error {}
+
+const KEY = "ventriform.key";
+
+/** The key of the caller, kept in this tab only. */
+export const key = new Watched<string>(sessionStorage.getItem(KEY) ?? "");
+/** Why a key is asked for; empty if none is. */
+export const wanted = new Watched<string>("");
+/** Whether the service answers. */
+export const reachable = new Watched<boolean>(true);
+
+let waiting: (() => void)[] = [];
+
+export function signIn(text: string): void {
+  key.value = text.trim();
+  if (key.value) sessionStorage.setItem(KEY, key.value);
+  else sessionStorage.removeItem(KEY);
+  wanted.value = "";
+  const resume = waiting;
+  waiting = [];
+  for (const go of resume) go();
+}
+
+/** Resolves when the person has given another key. Requests that met a 401 wait here, so nothing is lost. */
+export function nextKey(reason: string): Promise<void> {
+  wanted.value = reason;
+  return new Promise(resolve => waiting.push(resolve));
+}
+
+export function authorization(): Record<string, string> {
+  return key.value ? { authorization: `Bearer ${key.value}` } : {};
+}
+
+/** What a body says is wrong; a body that is no problem document is described by its status. */
+export function problemOf(status: number, text: string): Problem {
+  try {
+    const body = JSON.parse(text) as Partial<Problem>;
+    if (typeof body.detail === "string") {
+      return { type: "about:blank", title: "", status, detail: "", ...body };
+    }
+  } catch {
+    // Not JSON: a proxy answered.
+  }
+  return { type: "about:blank", title: "", status, detail: `The service answered with status ${status}.` };
+}
+
+export interface CallOptions extends RequestInit {
+  headers?: Record<string, string>;
+}
+
+/** Sends a request. Throws `ProblemError` on a refusal and `Unreachable` if nothing answers. */
+export async function call(path: string, options: CallOptions = {}): Promise<Response> {
+  for (;;) {
+    const used = key.value;
+    let answer: Response;
+    try {
+      answer = await fetch(path, { ...options, headers: { ...options.headers, ...authorization() } });
+    } catch (error) {
+      if (options.signal?.aborted) throw error;
+      reachable.value = false;
+      throw new Unreachable("The service does not answer. Nothing is lost: try again when it is back.");
+    }
+    reachable.value = true;
+    if (answer.ok) return answer;
+    const problem = problemOf(answer.status, await answer.text());
+    if (answer.status !== 401) throw new ProblemError(problem);
+    if (key.value === used) {
+      await nextKey(used ? "The service no longer accepts the key. Give another one; what you did is kept." : "This service asks for a key.");
+    }
+  }
+}
+
+export async function get<T>(path: string, signal?: AbortSignal): Promise<T> {
+  const answer = await call(path, signal ? { signal } : {});
+  return (await answer.json()) as T;
+}
+
+export async function post<T>(path: string, body: unknown): Promise<T> {
+  const answer = await call(path, {
+    method: "POST",
+    headers: { "content-type": "application/json" },
+    body: JSON.stringify(body),
+  });
+  return (await answer.json()) as T;
+}
+
+/** One page of a list. */
+export async function page<T>(kind: string, query: Record<string, string | number> = {}): Promise<{ items: T[]; next: string | null }> {
+  const words = new URLSearchParams(Object.entries(query).map(([name, value]) => [name, String(value)]));
+  const body = await get<Record<string, unknown>>(`/v1/${kind}?${words}`);
+  return { items: body[kind] as T[], next: (body["next_cursor"] as string | undefined) ?? null };
+}
+
+export function words(error: unknown): string {
+  if (error instanceof ProblemError) {
+    return [error.problem.detail, error.problem.fix].filter(Boolean).join(" ");
+  }
+  return error instanceof Error ? error.message : String(error);
+}
+
+/** The parameter that a problem names, without the object it lies in. */
+export function fieldOf(error: unknown): string | null {
+  if (!(error instanceof ProblemError)) return null;
+  return error.problem.field?.split(/[./]/).pop() ?? null;
+}
+
+/** Saves a file of the service under `name`. A link cannot carry a key, so the page fetches the file. */
+export async function save(path: string, name: string): Promise<void> {
+  const answer = await call(path);
+  saveBlob(await answer.blob(), name);
+}
+
+export function saveBlob(blob: Blob, name: string): void {
+  const url = URL.createObjectURL(blob);
+  const link = document.createElement("a");
+  link.href = url;
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(url), 60_000);
+}

@@ -1,0 +1,43 @@
+// One job: its state while it lasts, and why it failed.
+
+import { useState } from "preact/hooks";
+import { type Job, words } from "./api";
+import { cancel, forget, isActive } from "./library";
+import { open } from "./route";
+import { ordinal, stage } from "./words";
+
+export function JobLine({ job, onChange }: { job: Job; onChange?: ((job: Job) => void) | undefined }) {
+  const [problem, setProblem] = useState("");
+  const what = job.kind === "model" ? "Model" : "Fit";
+  const act = (go: () => Promise<void>) => () => void go().catch((error: unknown) => setProblem(words(error)));
+  const change = () => (onChange ? onChange(job) : open(job.volume, job.id));
+  return (
+    <div class={`job ${job.state}`}>
+      <span class="what">{what}</span>
+      {job.state === "queued" && <span>{job.queue_position ? `${ordinal(job.queue_position)} in the queue` : "queued"}</span>}
+      {job.state === "running" && (
+        <>
+          <progress value={job.progress} max={1} aria-label={`${what}: ${stage(job)}`} />
+          <span>{stage(job)}</span>
+        </>
+      )}
+      {job.state === "failed" && (
+        <span class="error">
+          {job.error?.detail} {job.error?.fix && <strong>{job.error.fix}</strong>}
+        </span>
+      )}
+      {job.state === "cancelled" && <span>cancelled</span>}
+      {problem && <span class="error">{problem}</span>}
+      {isActive(job) ? (
+        <button type="button" class="plain" disabled={job.state === "running" && problem === "" && job.stage === "cancelling"} onClick={act(() => cancel(job))}>Cancel</button>
+      ) : (
+        job.state !== "succeeded" && (
+          <>
+            <button type="button" onClick={change}>Change and retry</button>
+            <button type="button" class="plain" onClick={act(() => forget(job))}>Remove</button>
+          </>
+        )
+      )}
+    </div>
+  );
+}

@@ -1,0 +1,185 @@
+// What is stored, as far as this page has read it, and the states of jobs as they change.
+
+import { type Job, type Result, type Volume, authorization, call, get, page, reachable, words } from "./api";
+import { Watched } from "./state";
+
+export const volumes = new Watched<Volume[]>([]);
+export const models = new Watched<Result[]>([]);
+export const fits = new Watched<Result[]>([]);
+export const templates = new Watched<Result[]>([]);
+export const jobs = new Watched<Job[]>([]);
+/** Where the list of volumes goes on; null at its end. */
+export const more = new Watched<string | null>(null);
+export const loaded = new Watched<boolean>(false);
+export const trouble = new Watched<string>("");
+
+const PAGE = 30;
+
+/** Reads the newest of everything. */
+export async function refresh(): Promise<void> {
+  try {
+    const [v, j, m, s, t] = await Promise.all([
+      page<Volume>("volumes", { limit: Math.max(PAGE, Math.min(100, volumes.value.length)) }),
+      page<Job>("jobs", { limit: 100 }),
+      page<Result>("models", { limit: 100 }),
+      page<Result>("segmentations", { limit: 100 }),
+      page<Result>("templates", { limit: 100 }),
+    ]);
+    volumes.value = v.items;
+    more.value = v.next;
+    jobs.value = j.items;
+    models.value = m.items;
+    fits.value = s.items;
+    templates.value = t.items;
+    trouble.value = "";
+    loaded.value = true;
+  } catch (error) {
+    trouble.value = words(error);
+  }
+  watchActive();
+}
+
+export async function loadMore(limit = PAGE): Promise<void> {
+  if (!more.value) return;
+  try {
+    const next = await page<Volume>("volumes", { limit, cursor: more.value });
+    const known = new Set(volumes.value.map(volume => volume.id));
+    volumes.value = [...volumes.value, ...next.items.filter(volume => !known.has(volume.id))];
+    more.value = next.next;
+  } catch (error) {
+    trouble.value = words(error);
+  }
+}
+
+/** Reads one scan with everything made of it, also what is too old for the first pages. */
+export async function loadScan(id: string): Promise<Volume> {
+  const volume = await get<Volume>(`/v1/volumes/${id}`);
+  if (!volumes.value.some(other => other.id === id)) volumes.value = [...volumes.value, volume];
+  const own = await page<Job>("jobs", { volume: id, limit: 100 });
+  for (const job of own.items.reverse()) put(job);
+  const missing = own.items.flatMap(job => (job.state === "succeeded" ? [job.segmentation, job.model] : []));
+  await Promise.all([...new Set(missing)].map(result => (result && !find(result) ? loadResult(result) : null)));
+  return volume;
+}
+
+export function find(id: string): Result | undefined {
+  return fits.value.find(fit => fit.id === id) ?? models.value.find(model => model.id === id);
+}
+
+export async function loadResult(id: string): Promise<Result | undefined> {
+  const [kind, list] = id.startsWith("seg_") ? (["segmentations", fits] as const) : (["models", models] as const);
+  try {
+    const result = await get<Result>(`/v1/${kind}/${id}`);
+    list.value = [result, ...list.value.filter(other => other.id !== id)];
+    return result;
+  } catch {
+    return undefined; // It was erased.
+  }
+}
+
+export function resultsOf(volume: string): Result[] {
+  const own = [...fits.value, ...models.value].filter(result => result.volume === volume);
+  return own.sort((a, b) => b.created_at.localeCompare(a.created_at));
+}
+
+export function isActive(job: Job): boolean {
+  return job.state === "queued" || job.state === "running";
+}
+
+/** Puts a newer state of a job in the list. */
+export function put(job: Job): void {
+  const at = jobs.value.findIndex(other => other.id === job.id);
+  const known = jobs.value[at];
+  if (known && known.revision > job.revision) return;
+  jobs.value = known ? jobs.value.with(at, job) : [job, ...jobs.value];
+  if (known?.state !== job.state && job.state === "succeeded") {
+    const made = job.segmentation ?? job.model;
+    if (made && !find(made)) void loadResult(made);
+  }
+}
+
+// Browsers open at most six connections to a host, so few jobs are followed by events; the list tells of the others.
+const STREAMS = 2;
+const followed = new Set<string>();
+let timer: ReturnType<typeof setTimeout> | undefined;
+
+/** Follows what has not ended yet. */
+export function watchActive(): void {
+  const active = jobs.value.filter(isActive).sort((a, b) => rank(a) - rank(b));
+  for (const job of active) {
+    if (followed.size >= STREAMS) break;
+    if (!followed.has(job.id)) void follow(job);
+  }
+  clearTimeout(timer);
+  const wait = active.length > followed.size ? 2000 : reachable.value ? 15_000 : 3000;
+  timer = setTimeout(() => void refreshJobs(), wait);
+}
+
+function rank(job: Job): number {
+  return job.state === "running" ? 0 : (job.queue_position ?? 1);
+}
+
+async function refreshJobs(): Promise<void> {
+  if (document.hidden) {
+    timer = setTimeout(() => void refreshJobs(), 5000);
+    return;
+  }
+  if (!reachable.value || !loaded.value) return refresh();
+  try {
+    for (const job of (await page<Job>("jobs", { limit: 100 })).items.reverse()) put(job);
+  } catch (error) {
+    trouble.value = words(error);
+  }
+  watchActive();
+}
+
+/** Reads the events of a job until it ends. `EventSource` cannot send a key, so the stream is read by fetch. */
+async function follow(job: Job): Promise<void> {
+  followed.add(job.id);
+  try {
+    const answer = await fetch(job.links.events, { headers: { ...authorization(), accept: "text/event-stream" } });
+    if (!answer.ok || !answer.body) throw new Error("no events");
+    const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
+    let text = "";
+    for (;;) {
+      const { value, done } = await reader.read();
+      if (done) break;
+      text += value;
+      const events = text.split("\n\n");
+      text = events.pop() ?? "";
+      for (const event of events) {
+        const data = event.split("\n").filter(line => line.startsWith("data:")).map(line => line.slice(5)).join("\n");
+        if (data) put(JSON.parse(data) as Job);
+      }
+    }
+  } catch {
+    // The list of jobs tells the state; the next round follows the job again.
+    await new Promise(resolve => setTimeout(resolve, 1500));
+  }
+  followed.delete(job.id);
+  watchActive();
+}
+
+export async function cancel(job: Job): Promise<void> {
+  await call(job.links.self, { method: "DELETE" });
+  const now = await get<Job>(job.links.self).catch(() => null);
+  if (now) put(now);
+  watchActive();
+}
+
+export async function forget(job: Job): Promise<void> {
+  await call(`${job.links.self}${job.state === "cancelled" ? "?erase=true" : ""}`, { method: "DELETE" });
+  jobs.value = jobs.value.filter(other => other.id !== job.id);
+}
+
+export async function eraseResult(id: string): Promise<void> {
+  await call(`/v1/${id.startsWith("seg_") ? "segmentations" : "models"}/${id}`, { method: "DELETE" });
+  fits.value = fits.value.filter(fit => fit.id !== id);
+  models.value = models.value.filter(model => model.id !== id);
+}
+
+export async function eraseVolume(id: string): Promise<void> {
+  await call(`/v1/volumes/${id}?cascade=true`, { method: "DELETE" });
+  volumes.value = volumes.value.filter(volume => volume.id !== id);
+  await refresh();
+}

@@ -1,0 +1,345 @@
+// Every parameter of a model or fit: names, ranges, defaults and help come from the service's own document.
+
+import { useEffect, useState } from "preact/hooks";
+import { type ParameterValue, type Parameters, type Result, type Volume, get, page } from "./api";
+import { fits, models, templates, volumes } from "./library";
+import { useWatched } from "./state";
+import { isLabelMap, moment, nameOf } from "./words";
+
+export type Kind = "model" | "segmentation";
+
+interface Schema {
+  type?: string | string[];
+  enum?: string[];
+  default?: ParameterValue;
+  minimum?: number;
+  maximum?: number;
+  pattern?: string;
+  items?: { type: string };
+  minItems?: number;
+  maxItems?: number;
+  description?: string;
+}
+
+export interface Spec {
+  name: string;
+  schema: Schema;
+  help: string;
+  unit: string;
+}
+
+interface Operation {
+  parameters: { in: string; name?: string; description?: string; schema?: Schema }[];
+}
+
+const NOT_OF_THE_WORK = new Set(["external_id", "labels", "webhook", "webhook_events"]);
+
+let specs: Promise<Record<Kind, Spec[]>> | undefined;
+
+/** The parameters of both kinds of work. */
+export function parameterSpecs(): Promise<Record<Kind, Spec[]>> {
+  specs ??= get<{ paths: Record<string, { post?: Operation }> }>("/openapi.json").then(
+    document => ({
+      model: read(document.paths["/v1/models"]?.post),
+      segmentation: read(document.paths["/v1/segmentations"]?.post),
+    }),
+    error => {
+      specs = undefined;
+      throw error;
+    },
+  );
+  return specs;
+}
+
+const UNITS: [RegExp, string][] = [
+  [/square millimetres/, "mm²"],
+  [/millimetres|LPS mm/, "mm"],
+  [/degrees/, "°"],
+  [/[Ss]igma in voxels/, "voxels"],
+];
+
+function read(operation?: Operation): Spec[] {
+  return (operation?.parameters ?? []).flatMap(parameter => {
+    const { name, schema } = parameter;
+    if (parameter.in !== "query" || !name || !schema || NOT_OF_THE_WORK.has(name)) return [];
+    const help = parameter.description ?? schema.description ?? "";
+    const numeric = ["number", "integer", "array"].includes(String(schema.type));
+    const unit = numeric && name !== "axis" && name !== "anterior" ? (UNITS.find(([words]) => words.test(help))?.[1] ?? "") : "";
+    return [{ name, schema, help, unit }];
+  });
+}
+
+const FEW: Record<Kind, string[]> = {
+  model: ["points", "method", "iso"],
+  segmentation: ["model", "edge", "reader", "expert", "frame"],
+};
+
+const GROUPS: Record<Kind, [string, string[]][]> = {
+  model: [
+    ["Repeat and choose", ["seed", "starts", "frame"]],
+    ["Object", ["isolate", "box", "seed_point", "label", "topology", "mask_smoothing"]],
+    ["Points", ["adaptive", "adaptive_from", "repulsion_iterations", "repulsion_strength", "geodesics", "relaxation_iterations"]],
+    ["Fit to the surface", ["fit_*"]],
+    ["Triangles", ["fitness", "w1", "w2", "w3", "w4", "gain", "guard"]],
+  ],
+  segmentation: [
+    ["Where the heart is", ["organ", "center", "axis", "seed_point", "box", "roll", "superior", "anterior"]],
+    ["Edge of the wall", ["sensor", "blur", "reach", "last_reach", "narrowing", "margin", "resolution"]],
+    ["Springs", ["spring_stiffness", "torsion_stiffness", "body_stiffness", "thickness_stiffness", "mass", "damping", "time_step", "tolerance", "max_iterations"]],
+    ["Polar map", ["polar_*"]],
+  ],
+};
+
+function arranged(kind: Kind, all: Spec[]): { few: Spec[]; groups: [string, Spec[]][] } {
+  const left = new Map(all.map(spec => [spec.name, spec]));
+  const take = (names: string[]): Spec[] =>
+    names.flatMap(name => {
+      const start = name.endsWith("*") ? name.slice(0, -1) : null;
+      const found = start === null ? [left.get(name)] : [...left.values()].filter(spec => spec.name.startsWith(start));
+      return found.flatMap(spec => (spec && left.delete(spec.name) ? [spec] : []));
+    });
+  const few = take(FEW[kind]);
+  const groups = GROUPS[kind].map(([title, names]): [string, Spec[]] => [title, take(names)]);
+  if (left.size) groups.push(["Other", [...left.values()]]);
+  return { few, groups };
+}
+
+/** What a person has written, by parameter; the text of a field, so that a slip can be corrected. */
+export type Draft = Record<string, string>;
+
+/** The values of a draft as the service wants them. Empty fields mean the default. */
+export function valuesOf(draft: Draft, all: Spec[]): Record<string, ParameterValue> {
+  const values: Record<string, ParameterValue> = {};
+  for (const { name, schema } of all) {
+    const text = draft[name]?.trim();
+    if (!text) continue;
+    if (schema.type === "array") values[name] = text.split(/[\s,;]+/).map(part => (Number.isFinite(Number(part)) ? Number(part) : part));
+    else if (schema.type === "integer" || schema.type === "number") values[name] = Number.isFinite(Number(text)) ? Number(text) : text;
+    else values[name] = text;
+  }
+  return values;
+}
+
+/** The draft that repeats the parameters of a job or result: only what differs from the defaults. */
+export function draftOf(parameters: Parameters, all: Spec[]): Draft {
+  const draft: Draft = {};
+  for (const { name, schema } of all) {
+    const value = parameters[name];
+    if (value == null || JSON.stringify(value) === JSON.stringify(schema.default)) continue;
+    draft[name] = Array.isArray(value) ? value.join(", ") : String(value);
+  }
+  return draft;
+}
+
+const PRESETS = "ventriform.presets";
+type Presets = Record<string, Draft>;
+
+function presetsOf(kind: Kind): Presets {
+  try {
+    return JSON.parse(localStorage.getItem(`${PRESETS}.${kind}`) ?? "{}") as Presets;
+  } catch {
+    return {};
+  }
+}
+
+function keep(kind: Kind, presets: Presets): void {
+  localStorage.setItem(`${PRESETS}.${kind}`, JSON.stringify(presets));
+}
+
+interface FormProps {
+  kind: Kind;
+  volume: Volume;
+  draft: Draft;
+  onChange: (draft: Draft) => void;
+  problem: { field: string | null; text: string } | null;
+}
+
+export function ParameterForm({ kind, volume, draft, onChange, problem }: FormProps) {
+  const [all, setAll] = useState<Spec[] | null>(null);
+  const [presets, setPresets] = useState(() => presetsOf(kind));
+  const [naming, setNaming] = useState("");
+  useEffect(() => {
+    void parameterSpecs().then(found => setAll(found[kind]), () => setAll([]));
+    setPresets(presetsOf(kind));
+  }, [kind]);
+  if (!all) return <p class="quiet">Reading the parameters …</p>;
+  const { few, groups } = arranged(kind, all);
+  const field = (spec: Spec) => (
+    <Field
+      key={spec.name}
+      spec={spec}
+      volume={volume}
+      text={draft[spec.name] ?? ""}
+      onText={text => onChange({ ...draft, [spec.name]: text })}
+      error={problem?.field === spec.name ? problem.text : ""}
+    />
+  );
+  const changed = (list: Spec[]) => list.filter(spec => draft[spec.name]).length;
+  const inMore = groups.flatMap(([, list]) => list);
+  const mustShow = inMore.some(spec => spec.name === problem?.field);
+  return (
+    <div class="parameters">
+      <div class="fields">{few.filter(spec => spec.name !== "frame" || volume.frames > 1).map(field)}</div>
+      <details open={mustShow || undefined}>
+        <summary>
+          More{changed(inMore) ? <span class="count">{changed(inMore)} set</span> : null}
+        </summary>
+        {groups.map(([title, list]) => (
+          <details class="group" key={title} open={list.some(spec => spec.name === problem?.field) || undefined}>
+            <summary>
+              {title}
+              {changed(list) ? <span class="count">{changed(list)} set</span> : null}
+            </summary>
+            <div class="fields">{list.map(field)}</div>
+          </details>
+        ))}
+        <div class="presets">
+          <label>
+            Preset
+            <select value="" onChange={event => {
+              const chosen = presets[event.currentTarget.value];
+              if (chosen) onChange(chosen);
+            }}>
+              <option value="">choose …</option>
+              {Object.keys(presets).map(name => <option key={name}>{name}</option>)}
+            </select>
+          </label>
+          <label>
+            Keep as
+            <input value={naming} placeholder="a name" onInput={event => setNaming(event.currentTarget.value)} />
+          </label>
+          <button type="button" disabled={!naming.trim()} onClick={() => {
+            const next = { ...presets, [naming.trim()]: draft };
+            keep(kind, next);
+            setPresets(next);
+            setNaming("");
+          }}>Keep</button>
+          {Object.keys(presets).length > 0 && (
+            <button type="button" class="plain" onClick={() => {
+              keep(kind, {});
+              setPresets({});
+            }}>Forget all</button>
+          )}
+          <button type="button" class="plain" onClick={() => onChange({})}>All defaults</button>
+        </div>
+      </details>
+    </div>
+  );
+}
+
+const NAMES: Record<string, string> = {
+  iso: "Iso-value",
+  model: "Model to fit",
+  expert: "Expert's mask",
+  reader: "Drawn as by",
+  edge: "Wall shown",
+  center: "Centre",
+  w1: "Weight 1",
+  w2: "Weight 2",
+  w3: "Weight 3",
+  w4: "Weight 4",
+};
+
+function title(name: string): string {
+  const text = name.replaceAll("_", " ");
+  return NAMES[name] ?? text.charAt(0).toUpperCase() + text.slice(1);
+}
+
+interface FieldProps {
+  spec: Spec;
+  volume: Volume;
+  text: string;
+  onText: (text: string) => void;
+  error: string;
+}
+
+function Field({ spec, volume, text, onText, error }: FieldProps) {
+  const { name, schema, help, unit } = spec;
+  const id = `parameter-${name}`;
+  const described = `${id}-help${error ? ` ${id}-error` : ""}`;
+  const common = { id, "aria-describedby": described, "aria-invalid": error ? true : undefined };
+  const standard = schema.default === undefined ? "automatic" : String(schema.default);
+  const range = [
+    schema.minimum !== undefined && schema.maximum !== undefined ? `${schema.minimum} to ${schema.maximum}` : "",
+    schema.default !== undefined ? `default ${standard}` : "",
+  ].filter(Boolean).join(", ");
+  let input;
+  if (name === "model") input = <ModelChoice common={common} text={text} onText={onText} volume={volume} />;
+  else if (name === "expert") input = <ExpertChoice common={common} text={text} onText={onText} volume={volume} />;
+  else if (name === "reader") input = <ReaderChoice common={common} text={text} onText={onText} />;
+  else if (schema.enum) {
+    input = (
+      <select {...common} value={text || (schema.default as string | undefined) || ""} onChange={event => onText(event.currentTarget.value === schema.default ? "" : event.currentTarget.value)}>
+        {schema.default === undefined && <option value="">automatic</option>}
+        {schema.enum.map(choice => <option key={choice} value={choice}>{choice.replaceAll("_", " ")}</option>)}
+      </select>
+    );
+  } else {
+    const numeric = schema.type === "number" || schema.type === "integer";
+    const shown = schema.type === "array" ? (schema.maxItems === 3 ? "x, y, z" : schema.maxItems === 6 ? "i0, j0, k0, i1, j1, k1" : "") : standard;
+    input = <input {...common} value={text} inputMode={numeric ? "decimal" : "text"} placeholder={shown} onInput={event => onText(event.currentTarget.value)} autocomplete="off" spellcheck={false} />;
+  }
+  return (
+    <div class={error ? "field wrong" : "field"}>
+      <label for={id}>
+        {title(name)}
+        {unit && <span class="unit"> {unit}</span>}
+      </label>
+      {input}
+      <details class="help">
+        <summary aria-label={`About ${title(name)}`}>?</summary>
+        <span>{help}{range && ` (${range})`}</span>
+      </details>
+      <span id={`${id}-help`} class="hidden">{help} {range}</span>
+      {error && <p id={`${id}-error`} class="error">{error}</p>}
+    </div>
+  );
+}
+
+interface ChoiceProps {
+  common: { id: string };
+  text: string;
+  onText: (text: string) => void;
+  volume: Volume;
+}
+
+function ModelChoice({ common, text, onText, volume }: ChoiceProps) {
+  const known = useWatched(models);
+  const library = useWatched(templates) as (Result & { name?: string })[];
+  const own = useWatched(fits).filter(fit => fit.volume === volume.id);
+  return (
+    <select {...common} value={text || "auto"} onChange={event => onText(event.currentTarget.value === "auto" ? "" : event.currentTarget.value)}>
+      <option value="auto">auto: the best of the library</option>
+      {library.length > 0 && <optgroup label="Library">{library.map(item => <option key={item.id} value={item.id}>{item.name ?? item.id}</option>)}</optgroup>}
+      {known.length > 0 && <optgroup label="Models">{known.map(item => <option key={item.id} value={item.id}>{String(item.summary["vertices"])} points, {moment(item.created_at)}</option>)}</optgroup>}
+      {own.length > 0 && <optgroup label="Fits of this scan">{own.map(item => <option key={item.id} value={item.id}>fit of {moment(item.created_at)}</option>)}</optgroup>}
+      {text && ![...known, ...library, ...own].some(item => item.id === text) && <option value={text}>{text}</option>}
+    </select>
+  );
+}
+
+function ExpertChoice({ common, text, onText, volume }: ChoiceProps) {
+  const masks = useWatched(volumes).filter(other => isLabelMap(other) && other.id !== volume.id);
+  return (
+    <select {...common} value={text} onChange={event => onText(event.currentTarget.value)}>
+      <option value="">none</option>
+      {masks.map(mask => <option key={mask.id} value={mask.id}>{nameOf(mask)}</option>)}
+      {text && !masks.some(mask => mask.id === text) && <option value={text}>{text}</option>}
+    </select>
+  );
+}
+
+/** Readers' profiles: how a person draws the wall. */
+function ReaderChoice({ common, text, onText }: Omit<ChoiceProps, "volume">) {
+  const [readers, setReaders] = useState<{ id: string; name: string }[]>([]);
+  useEffect(() => {
+    void page<{ id: string; name: string }>("readers", { limit: 100 }).then(found => setReaders(found.items), () => undefined);
+  }, []);
+  return (
+    <select {...common} value={text} onChange={event => onText(event.currentTarget.value)}>
+      <option value="">nobody: the wall as fitted</option>
+      {readers.map(reader => <option key={reader.id} value={reader.id}>{reader.name}</option>)}
+      {text && !readers.some(reader => reader.id === text) && <option value={text}>{text}</option>}
+    </select>
+  );
+}

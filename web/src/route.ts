@@ -1,0 +1,26 @@
+// The address of the view: #/ is the list, #/scan/VOLUME/RESULT/OTHER a scan, what was made of it and what it is compared with.
+
+import { Watched } from "./state";
+
+export interface Route {
+  volume: string | null;
+  result: string | null;
+  other: string | null;
+}
+
+function read(): Route {
+  const [, view, volume, result, other] = location.hash.split("/");
+  if (view !== "scan" || !volume) return { volume: null, result: null, other: null };
+  return { volume, result: result || null, other: other || null };
+}
+
+export const route = new Watched<Route>(read());
+addEventListener("hashchange", () => (route.value = read()));
+
+export function open(volume: string, result?: string | null, other?: string | null): void {
+  location.hash = ["#", "scan", volume, result ?? "", other ?? ""].join("/").replace(/\/+$/, "");
+}
+
+export function home(): void {
+  location.hash = "#/";
+}

@@ -1,0 +1,30 @@
+// Values that components watch.
+
+import { useEffect, useState } from "preact/hooks";
+
+export class Watched<T> {
+  private watchers = new Set<() => void>();
+  constructor(private current: T) {}
+
+  get value(): T {
+    return this.current;
+  }
+
+  set value(next: T) {
+    if (Object.is(next, this.current)) return;
+    this.current = next;
+    for (const watcher of [...this.watchers]) watcher();
+  }
+
+  watch(watcher: () => void): () => void {
+    this.watchers.add(watcher);
+    return () => this.watchers.delete(watcher);
+  }
+}
+
+/** The value of `watched`; the component is drawn again when it changes. */
+export function useWatched<T>(watched: Watched<T>): T {
+  const [, draw] = useState(0);
+  useEffect(() => watched.watch(() => draw(n => n + 1)), [watched]);
+  return watched.value;
+}

@@ -1,0 +1,209 @@
+// Files chosen or dropped by a person: which of them make up one scan, and how far each has been sent.
+
+import { type Volume, type Problem, authorization, key, nextKey, problemOf, reachable } from "./api";
+import { Watched } from "./state";
+
+export interface Group {
+  name: string;
+  files: File[];
+}
+
+export type UploadState = "waiting" | "sending" | "reading" | "stored" | "refused" | "interrupted" | "cancelled";
+
+export interface Upload {
+  id: number;
+  group: Group;
+  bytes: number;
+  sent: number;
+  state: UploadState;
+  problem?: Problem;
+  volume?: Volume;
+  existed?: boolean;
+}
+
+/** Whether the name of a file is stored as the label `name`; it may name a patient. */
+export const keepNames = new Watched<boolean>(localStorage.getItem("ventriform.names") !== "no");
+keepNames.watch(() => localStorage.setItem("ventriform.names", keepNames.value ? "yes" : "no"));
+
+export const uploads = new Watched<Upload[]>([]);
+
+/** What to do with each scan that has been stored. */
+let whenStored: (volume: Volume) => void = () => undefined;
+export function onStored(act: (volume: Volume) => void): void {
+  whenStored = act;
+}
+
+/** Files that make up one scan: a header with its image, and the files of one DICOM series. */
+export async function grouped(files: File[]): Promise<Group[]> {
+  const groups = new Map<string, Group>();
+  const add = (id: string, name: string, file: File) => {
+    const group = groups.get(id);
+    if (group) group.files.push(file);
+    else groups.set(id, { name, files: [file] });
+  };
+  const useful = files.filter(file => !file.name.startsWith(".") && file.name !== "DICOMDIR");
+  for (const file of useful) {
+    const folder = folderOf(file);
+    const pair = /^(.*)\.(hdr|img)(\.gz)?$/i.exec(file.name);
+    if (pair) {
+      add(`pair ${folder}/${pair[1]}`, `${pair[1]}.hdr`, file);
+      continue;
+    }
+    const series = await seriesOf(file);
+    if (series) add(`series ${series}`, folder.split("/").pop() || file.name, file);
+    else add(`file ${folder}/${file.name}`, file.name, file);
+  }
+  return [...groups.values()].map(group => {
+    const name = group.files.length === 1 ? (group.files[0]?.name ?? group.name) : group.name;
+    return { ...group, name };
+  });
+}
+
+function folderOf(file: File): string {
+  return (placed.get(file) ?? file.webkitRelativePath).split("/").slice(0, -1).join("/");
+}
+
+/** The series of a DICOM file with one slice; null for other files. A file of many frames is a scan by itself. */
+async function seriesOf(file: File): Promise<string | null> {
+  if (/\.(nii|gz|zip)$/i.test(file.name) || file.size < 200) return null;
+  const head = new Uint8Array(await file.slice(0, 16_384).arrayBuffer());
+  if (String.fromCharCode(...head.subarray(128, 132)) !== "DICM") return null;
+  const text = (group: number, element: number): string | null => {
+    const tag = [group & 255, group >> 8, element & 255, element >> 8];
+    for (let at = 132; at + 8 < head.length; at++) {
+      if (!tag.every((byte, i) => head[at + i] === byte)) continue;
+      const explicit = /^[A-Z]{2}$/.test(String.fromCharCode(head[at + 4]!, head[at + 5]!));
+      const length = explicit ? head[at + 6]! | (head[at + 7]! << 8) : head[at + 4]! | (head[at + 5]! << 8);
+      return String.fromCharCode(...head.subarray(at + 8, at + 8 + length)).replace(/[\0 ]+$/, "");
+    }
+    return null;
+  };
+  const frames = Number(text(0x0028, 0x0008) ?? "1");
+  return frames > 1 ? null : text(0x0020, 0x000e);
+}
+
+const placed = new WeakMap<File, string>();
+
+/** Every file of what was dropped, also inside folders. */
+export async function dropped(transfer: DataTransfer): Promise<File[]> {
+  const entries = [...transfer.items].flatMap(item => item.webkitGetAsEntry?.() ?? []);
+  if (entries.length === 0) return [...transfer.files];
+  const files: File[] = [];
+  const walk = async (entry: FileSystemEntry): Promise<void> => {
+    if (entry.isFile) {
+      const file = await new Promise<File>((done, fail) => (entry as FileSystemFileEntry).file(done, fail));
+      placed.set(file, entry.fullPath.slice(1));
+      files.push(file);
+      return;
+    }
+    const reader = (entry as FileSystemDirectoryEntry).createReader();
+    for (;;) {
+      const some = await new Promise<FileSystemEntry[]>((done, fail) => reader.readEntries(done, fail));
+      if (some.length === 0) return;
+      for (const inner of some) await walk(inner);
+    }
+  };
+  for (const entry of entries) await walk(entry);
+  return files;
+}
+
+let count = 0;
+
+export async function add(files: File[]): Promise<void> {
+  const groups = await grouped(files);
+  const made = groups.map(group => ({
+    id: ++count,
+    group,
+    bytes: group.files.reduce((sum, file) => sum + file.size, 0),
+    sent: 0,
+    state: "waiting" as const,
+  }));
+  uploads.value = [...made, ...uploads.value];
+  void work();
+}
+
+function change(id: number, part: Partial<Upload>): void {
+  uploads.value = uploads.value.map(upload => (upload.id === id ? { ...upload, ...part } : upload));
+}
+
+let busy = false;
+const requests = new Map<number, XMLHttpRequest>();
+
+/** Sends what waits, one after the other. */
+async function work(): Promise<void> {
+  if (busy) return;
+  busy = true;
+  try {
+    for (;;) {
+      const [next] = uploads.value.filter(upload => upload.state === "waiting").sort((a, b) => a.id - b.id);
+      if (!next) return;
+      await send(next);
+    }
+  } finally {
+    busy = false;
+  }
+}
+
+async function send(upload: Upload): Promise<void> {
+  for (;;) {
+    const used = key.value;
+    const answer = await attempt(upload);
+    if (answer === null) return;
+    if (answer.status === 401) {
+      if (key.value === used) await nextKey(used ? "The service no longer accepts the key. Give another one; the upload goes on then." : "This service asks for a key.");
+      continue;
+    }
+    if (answer.status === 200 || answer.status === 201) {
+      const volume = JSON.parse(answer.text) as Volume;
+      change(upload.id, { state: "stored", volume, existed: answer.status === 200, sent: upload.bytes });
+      whenStored(volume);
+    } else {
+      change(upload.id, { state: "refused", problem: problemOf(answer.status, answer.text) });
+    }
+    return;
+  }
+}
+
+/** One request; null if it was cancelled or interrupted. Only XMLHttpRequest reports how much was sent. */
+function attempt(upload: Upload): Promise<{ status: number; text: string } | null> {
+  const form = new FormData();
+  for (const file of upload.group.files) form.append("volume", file, file.name);
+  const name = upload.group.name.replace(/[\u0000-\u001f\u007f]/g, " ").slice(0, 200);
+  const request = new XMLHttpRequest();
+  requests.set(upload.id, request);
+  change(upload.id, { state: "sending", sent: 0 });
+  return new Promise(resolve => {
+    request.upload.onprogress = event => change(upload.id, { sent: Math.min(upload.bytes, event.loaded) });
+    request.upload.onload = () => change(upload.id, { state: "reading", sent: upload.bytes });
+    request.onload = () => resolve({ status: request.status, text: request.responseText });
+    request.onerror = () => {
+      // A refusal may close the connection before the body is sent; then nobody can read the answer.
+      reachable.value = navigator.onLine && reachable.value;
+      change(upload.id, { state: "interrupted" });
+      resolve(null);
+    };
+    request.onabort = () => {
+      change(upload.id, { state: "cancelled" });
+      resolve(null);
+    };
+    request.onloadend = () => requests.delete(upload.id);
+    request.open("POST", `/v1/volumes${keepNames.value ? `?${new URLSearchParams({ labels: `name:${name}` })}` : ""}`);
+    for (const [header, value] of Object.entries(authorization())) request.setRequestHeader(header, value);
+    request.send(form);
+  });
+}
+
+export function stop(upload: Upload): void {
+  const request = requests.get(upload.id);
+  if (request) request.abort();
+  else change(upload.id, { state: "cancelled" });
+}
+
+export function again(upload: Upload): void {
+  change(upload.id, { state: "waiting", sent: 0 });
+  void work();
+}
+
+export function dismiss(upload: Upload): void {
+  uploads.value = uploads.value.filter(other => other.id !== upload.id);
+}

@@ -1,0 +1,142 @@
+// Putting the heart where it is: by handles in the slices or by numbers, then a new fit from there.
+
+import { useEffect, useState } from "preact/hooks";
+import { type ParameterValue, type Volume, fieldOf, words } from "../api";
+import { draftOf, parameterSpecs, valuesOf } from "../parameters";
+import { useWatched } from "../state";
+import { isFit } from "../words";
+import { file } from "../work";
+import type { Loaded } from "./loaded";
+import { frameOf } from "./plane";
+import type { Edit, Scene } from "./scene";
+import { type Vec, add, scale, sub, turned, unit } from "./vector";
+
+interface Props {
+  scene: Scene;
+  volume: Volume;
+  shown: Loaded | null;
+}
+
+/** Where most hearts point: to the left, forward and down. */
+const USUAL: Vec = unit([0.65, -0.6, -0.45]);
+const HALF_LENGTH = 36;
+
+function start(scene: Scene, shown: Loaded | null): Edit {
+  const heart = shown?.heart;
+  if (heart) {
+    const center = shown.report?.localisation?.centre ?? shown.middle;
+    return { base: heart.base, apex: heart.apex, center, roll: 0, changed: new Set() };
+  }
+  const center = scene.cursor.value;
+  return { center, base: sub(center, scale(USUAL, HALF_LENGTH)), apex: add(center, scale(USUAL, HALF_LENGTH)), roll: 0, changed: new Set(["center"]) };
+}
+
+export function Correction({ scene, volume, shown }: Props) {
+  const edit = useWatched(scene.edit);
+  const cursor = useWatched(scene.cursor);
+  const [problem, setProblem] = useState<{ field: string | null; text: string } | null>(null);
+  const [sending, setSending] = useState(false);
+  const [edge, setEdge] = useState("");
+  useEffect(() => {
+    scene.edit.value = start(scene, shown);
+    scene.tool.value = "correct";
+    setProblem(null);
+    setEdge(String(shown?.result.parameters["edge"] ?? "apparent"));
+  }, [scene, shown]);
+  if (!edit) return null;
+
+  const axis = unit(sub(edit.apex, edit.base));
+  const centreTo = (center: Vec) => {
+    const way = sub(center, edit.center);
+    scene.edit.value = { ...edit, center, base: add(edit.base, way), apex: add(edit.apex, way), changed: new Set(edit.changed).add("center") };
+  };
+  const axisTo = (wanted: Vec) => {
+    if (!(Math.hypot(...wanted) > 1e-6)) return;
+    const way = unit(wanted);
+    const length = Math.hypot(...sub(edit.apex, edit.base));
+    const base = sub(edit.center, scale(way, 0.45 * length));
+    scene.edit.value = { ...edit, base, apex: add(base, scale(way, length)), changed: new Set(edit.changed).add("axis") };
+  };
+  const send = async () => {
+    setProblem(null);
+    setSending(true);
+    try {
+      const specs = (await parameterSpecs()).segmentation;
+      const before = shown && isFit(shown.result.id) ? valuesOf(draftOf(shown.result.parameters, specs), specs) : {};
+      const next: Record<string, ParameterValue> = { ...before, edge };
+      if (edit.changed.has("center")) {
+        next["center"] = edit.center.map(value => Math.round(value * 100) / 100);
+        delete next["seed_point"];
+        delete next["box"];
+      }
+      if (edit.changed.has("axis")) next["axis"] = axis.map(value => Math.round(value * 1e4) / 1e4);
+      if (edit.changed.has("roll") && scene.heart.value) {
+        // The wall that now stands on top is anterior, so that is where superior lies across the axis.
+        const { axis: way, anterior } = frameOf(scene.heart.value);
+        next["superior"] = turned(anterior, way, (edit.roll * Math.PI) / 180).map(value => value.toFixed(4)).join(",");
+        delete next["anterior"];
+      }
+      const changed = [...edit.changed, ...(edge !== (shown?.result.parameters["edge"] ?? "apparent") ? ["edge"] : [])];
+      const labels: Record<string, string> = { changed: changed.join(" ") || "nothing" };
+      if (shown && isFit(shown.result.id)) labels["parent"] = shown.result.id;
+      await file("segmentation", volume, next, labels);
+    } catch (error) {
+      setProblem({ field: fieldOf(error), text: words(error) });
+    }
+    setSending(false);
+  };
+  return (
+    <div class="panel correction" role="group" aria-label="Correct by hand">
+      <p class="quiet">Drag <b>centre</b>, <b>apex</b> and <b>base</b> in the long-axis slices, and <b>turn</b> in the short axis so that it points to the anterior wall. The new fit is kept beside this one.</p>
+      <Triple name="Centre, mm (L, P, S)" value={edit.center} digits={1} wrong={problem?.field === "center"} onValue={centreTo} />
+      <button type="button" onClick={() => centreTo(cursor)}>Centre at the cursor</button>
+      <Triple name="Axis, base to apex" value={axis} digits={3} wrong={problem?.field === "axis"} onValue={axisTo} />
+      <label class="field">
+        Turn about the axis, °
+        <input type="number" step={5} value={edit.roll} onInput={event => (scene.edit.value = { ...edit, roll: Number(event.currentTarget.value) || 0, changed: new Set(edit.changed).add("roll") })} />
+      </label>
+      <label class="field">
+        Wall shown
+        <select value={edge} onChange={event => setEdge(event.currentTarget.value)}>
+          <option value="apparent">apparent: as the image shows it</option>
+          <option value="anatomical">anatomical: without blur</option>
+        </select>
+      </label>
+      {problem && <p class="error" role="alert">{problem.text}</p>}
+      <div class="buttons">
+        <button type="button" class="main" disabled={sending} onClick={() => void send()}>Fit from here</button>
+        <button type="button" class="plain" onClick={() => (scene.edit.value = start(scene, shown))}>Undo changes</button>
+      </div>
+      <p class="quiet" role="status">{edit.changed.size ? `Changed: ${[...edit.changed].join(", ")}` : "Nothing changed yet"}</p>
+    </div>
+  );
+}
+
+interface TripleProps {
+  name: string;
+  value: Vec;
+  digits: number;
+  wrong: boolean;
+  onValue: (value: Vec) => void;
+}
+
+function Triple({ name, value, digits, wrong, onValue }: TripleProps) {
+  return (
+    <fieldset class={wrong ? "field triple wrong" : "field triple"}>
+      <legend>{name}</legend>
+      {value.map((part, n) => (
+        <input
+          key={n}
+          type="number"
+          step={digits > 1 ? 0.05 : 1}
+          aria-label={`${name}, ${["x", "y", "z"][n]}`}
+          value={part.toFixed(digits)}
+          onChange={event => {
+            const number = Number(event.currentTarget.value);
+            if (Number.isFinite(number)) onValue(value.map((old, at) => (at === n ? number : old)) as unknown as Vec);
+          }}
+        />
+      ))}
+    </fieldset>
+  );
+}

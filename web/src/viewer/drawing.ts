@@ -1,0 +1,242 @@
+// How a slice is drawn: the resampled voxels, what lies over them, and what a reader needs to know of the picture.
+
+import type { Lut } from "./colours";
+import { outline } from "./mesh";
+import { type Plane, letters, point } from "./plane";
+import type { Layer, Scene } from "./scene";
+import { type Vec, add, dot, scale, sub, turned, unit } from "./vector";
+import type { Voxels } from "./volume";
+
+export interface SliceStyle {
+  width: number;
+  height: number;
+  /** Pixels for one CSS pixel. */
+  ratio: number;
+  letters: boolean;
+  cursor: boolean;
+}
+
+/** The place in the middle of the picture, in the slice through the cursor, and CSS pixels for one millimetre. */
+export function sliceOrigin(scene: Scene, plane: Plane, width: number, height: number): { origin: Vec; scale: number } {
+  const middle = scene.middle;
+  const origin = add(middle, scale(plane.normal, dot(sub(scene.cursor.value, middle), plane.normal)));
+  return { origin, scale: Math.min(width, height) / (scene.view.value.width || 200) };
+}
+
+/** Values on a grid of `nx` by `ny` places, `step` millimetres apart, with `origin` in the middle. */
+function sample(voxels: Voxels, plane: Plane, origin: Vec, nx: number, ny: number, step: number): Float32Array {
+  const out = new Float32Array(nx * ny);
+  const right = scale(plane.right, step);
+  for (let y = 0; y < ny; y++) {
+    const start = point(plane, origin, (0.5 - nx / 2) * step, (y + 0.5 - ny / 2) * step);
+    voxels.line(start, right, nx, out, y * nx);
+  }
+  return out;
+}
+
+const scratch = document.createElement("canvas");
+
+/** Paints the slice through `origin` into a rectangle of the context. */
+export function paint(context: CanvasRenderingContext2D, scene: Scene, plane: Plane, origin: Vec, box: { x: number; y: number; width: number; height: number }, factor: number): void {
+  const finest = scene.voxels.spacing / (scene.smooth.value ? 3 : 1);
+  const step = Math.max(finest, 1 / factor);
+  const [nx, ny] = [Math.max(1, Math.ceil(box.width / factor / step)), Math.max(1, Math.ceil(box.height / factor / step))];
+  const values = sample(scene.voxels, plane, origin, nx, ny, step);
+  const { low, high } = scene.window.value;
+  const lut: Lut = scene.lut.value;
+  const image = new ImageData(nx, ny);
+  const gain = 255 / (high - low || 1);
+  const pixels = image.data;
+  for (let n = 0; n < values.length; n++) {
+    const value = values[n]!;
+    const outside = Number.isNaN(value);
+    const at = outside ? 0 : 3 * Math.max(0, Math.min(255, Math.round((value - low) * gain)));
+    pixels[4 * n] = outside ? 10 : lut[at]!;
+    pixels[4 * n + 1] = outside ? 14 : lut[at + 1]!;
+    pixels[4 * n + 2] = outside ? 17 : lut[at + 2]!;
+    pixels[4 * n + 3] = 255;
+  }
+  const difference = scene.difference.value;
+  if (difference) {
+    const [fit, other] = [difference.fit, difference.other].map(voxels => sample(voxels, plane, origin, nx, ny, step));
+    for (let n = 0; n < values.length; n++) {
+      const [a, b] = [fit![n]! > 0.5, other![n]! > 0.5];
+      if (a === b) continue;
+      const tint = a ? [255, 140, 0] : [40, 170, 255];
+      for (let channel = 0; channel < 3; channel++) pixels[4 * n + channel] = 0.4 * pixels[4 * n + channel]! + 0.6 * tint[channel]!;
+    }
+  }
+  if (scratch.width < nx || scratch.height < ny) Object.assign(scratch, { width: Math.max(nx, scratch.width), height: Math.max(ny, scratch.height) });
+  scratch.getContext("2d")?.putImageData(image, 0, 0);
+  context.imageSmoothingEnabled = scene.smooth.value;
+  const [width, height] = [nx * step * factor, ny * step * factor];
+  context.drawImage(scratch, 0, 0, nx, ny, box.x + (box.width - width) / 2, box.y + (box.height - height) / 2, width, height);
+}
+
+/** Strokes the contours of the layers; the context's origin is the slice's, in CSS pixels. */
+export function contours(context: CanvasRenderingContext2D, layers: Layer[], plane: Plane, origin: Vec, factor: number, reach: number): void {
+  for (const layer of layers) {
+    if (!layer.shown) continue;
+    const ends = layer.mesh ? outline(layer.mesh, plane, origin) : layer.mask ? marched(layer.mask, plane, origin, reach) : null;
+    if (!ends?.length) continue;
+    context.beginPath();
+    for (let n = 0; n < ends.length; n += 4) {
+      context.moveTo(ends[n]! * factor, ends[n + 1]! * factor);
+      context.lineTo(ends[n + 2]! * factor, ends[n + 3]! * factor);
+    }
+    context.lineCap = "round";
+    context.setLineDash(layer.dashed ? [2, 4] : []);
+    context.strokeStyle = "rgba(0,0,0,.55)";
+    context.lineWidth = 3.2;
+    context.stroke();
+    context.strokeStyle = layer.colour;
+    context.lineWidth = 1.7;
+    context.stroke();
+    context.setLineDash([]);
+  }
+}
+
+/** The border of a mask in a plane, by Marching Squares at one half. */
+function marched(mask: Voxels, plane: Plane, origin: Vec, reach: number): Float32Array {
+  const step = mask.spacing / 2;
+  const n = Math.min(400, Math.ceil((2 * reach) / step));
+  const values = sample(mask, plane, origin, n, n, step);
+  const out: number[] = [];
+  const value = (x: number, y: number) => values[y * n + x]! || 0;
+  const at = (x: number) => (x + 0.5 - n / 2) * step;
+  for (let y = 0; y + 1 < n; y++) {
+    for (let x = 0; x + 1 < n; x++) {
+      const corners: [number, number, number][] = [[x, y, value(x, y)], [x + 1, y, value(x + 1, y)], [x + 1, y + 1, value(x + 1, y + 1)], [x, y + 1, value(x, y + 1)]];
+      const ends: number[] = [];
+      for (let e = 0; e < 4; e++) {
+        const [a, b] = [corners[e]!, corners[(e + 1) % 4]!];
+        if (a[2] > 0.5 === b[2] > 0.5) continue;
+        const t = (0.5 - a[2]) / (b[2] - a[2]);
+        ends.push(at(a[0] + t * (b[0] - a[0])), at(a[1] + t * (b[1] - a[1])));
+      }
+      if (ends.length >= 4) out.push(...ends.slice(0, 4));
+      if (ends.length === 8) out.push(...ends.slice(4));
+    }
+  }
+  return new Float32Array(out);
+}
+
+export function label(context: CanvasRenderingContext2D, text: string, x: number, y: number, align: CanvasTextAlign = "center", size = 12): void {
+  context.font = `600 ${size}px system-ui, sans-serif`;
+  context.textAlign = align;
+  context.textBaseline = "middle";
+  context.lineJoin = "round";
+  context.lineWidth = 3;
+  context.strokeStyle = "rgba(0,0,0,.8)";
+  context.strokeText(text, x, y);
+  context.fillStyle = "#f4f7f8";
+  context.fillText(text, x, y);
+}
+
+export function drawSlice(element: HTMLCanvasElement, scene: Scene, plane: Plane, style: SliceStyle): void {
+  const context = element.getContext("2d");
+  const { width, height, ratio } = style;
+  if (!context || width < 2 || height < 2) return;
+  const { origin, scale: factor } = sliceOrigin(scene, plane, width, height);
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.fillStyle = "#0a0e11";
+  context.fillRect(0, 0, width, height);
+  paint(context, scene, plane, origin, { x: 0, y: 0, width, height }, factor);
+  context.save();
+  context.translate(width / 2, height / 2);
+  contours(context, scene.layers.value, plane, origin, factor, Math.hypot(width, height) / 2 / factor);
+  const flat = (place: Vec): [number, number] => {
+    const r = sub(place, origin);
+    return [dot(r, plane.right) * factor, dot(r, plane.down) * factor];
+  };
+  if (style.cursor) {
+    const [x, y] = flat(scene.cursor.value);
+    context.strokeStyle = "rgba(77,227,255,.75)";
+    context.lineWidth = 1;
+    context.beginPath();
+    for (const [a, b] of [[-width, x - 9], [x + 9, width]] as const) {
+      context.moveTo(a, y);
+      context.lineTo(b, y);
+    }
+    for (const [a, b] of [[-height, y - 9], [y + 9, height]] as const) {
+      context.moveTo(x, a);
+      context.lineTo(x, b);
+    }
+    context.stroke();
+  }
+  if (scene.edit.value && scene.tool.value === "correct") handles(context, scene, plane, flat);
+  context.restore();
+  if (!style.letters) return;
+  const [left, right, top, bottom] = plane.sides ?? [letters(scale(plane.right, -1)), letters(plane.right), letters(scale(plane.down, -1)), letters(plane.down)];
+  const patient = plane.sides ? [letters(scale(plane.right, -1)), letters(plane.right), letters(scale(plane.down, -1)), letters(plane.down)] : ["", "", "", ""];
+  label(context, left, 8, height / 2, "left");
+  label(context, right, width - 8, height / 2, "right");
+  label(context, top, width / 2, 11);
+  label(context, bottom, width / 2, height - 11);
+  if (plane.sides && width > 200) {
+    label(context, patient[0] ?? "", 8, height / 2 + 14, "left", 9);
+    label(context, patient[1] ?? "", width - 8, height / 2 + 14, "right", 9);
+  }
+  label(context, width < 260 ? plane.short : plane.name, 8, 12, "left", 12);
+  const value = scene.voxels.at(scene.cursor.value);
+  label(context, Number.isNaN(value) ? "" : value.toPrecision(3), width - 8, 12, "right", 12);
+  // A bar of a round length, at most a third of the picture.
+  const length = [100, 50, 20, 10, 5, 2, 1].find(mm => mm * factor < width / 3.2) ?? 1;
+  const [from, to, y] = [10, 10 + length * factor, height - 12];
+  context.strokeStyle = "rgba(0,0,0,.8)";
+  context.lineWidth = 5;
+  context.beginPath();
+  context.moveTo(from, y);
+  context.lineTo(to, y);
+  context.stroke();
+  context.strokeStyle = "#f4f7f8";
+  context.lineWidth = 2;
+  context.stroke();
+  label(context, `${length} mm`, from, y - 11, "left", 11);
+}
+
+function handles(context: CanvasRenderingContext2D, scene: Scene, plane: Plane, flat: (place: Vec) => [number, number]): void {
+  const edit = scene.edit.value;
+  if (!edit) return;
+  const knob = rollKnob(scene, plane);
+  const [base, apex, center] = [flat(edit.base), flat(edit.apex), flat(edit.center)];
+  const line = (a: [number, number], b: [number, number]) => {
+    for (const [stroke, width] of [["rgba(0,0,0,.7)", 4], ["#ffe45c", 2]] as const) {
+      context.strokeStyle = stroke;
+      context.lineWidth = width;
+      context.beginPath();
+      context.moveTo(...a);
+      context.lineTo(...b);
+      context.stroke();
+    }
+  };
+  line(base, apex);
+  const dot_ = ([x, y]: [number, number], fill: string, name: string) => {
+    context.beginPath();
+    context.arc(x, y, 7, 0, 2 * Math.PI);
+    context.fillStyle = fill;
+    context.fill();
+    context.lineWidth = 2;
+    context.strokeStyle = "#000";
+    context.stroke();
+    label(context, name, x + 11, y, "left", 11);
+  };
+  if (knob) {
+    line(center, flat(knob));
+    dot_(flat(knob), "#ff8bd1", "turn");
+  } else {
+    dot_(base, "#ffe45c", "base");
+    dot_(apex, "#ffe45c", "apex");
+  }
+  dot_(center, "#7dff9c", "centre");
+}
+
+/** Where the knob that turns the sides stands; null where the plane does not look along the axis. */
+export function rollKnob(scene: Scene, plane: Plane): Vec | null {
+  const edit = scene.edit.value;
+  const heart = scene.heart.value;
+  if (!edit || !heart) return null;
+  const axis = unit(sub(edit.apex, edit.base));
+  if (Math.abs(dot(axis, plane.normal)) < 0.9) return null;
+  return add(edit.center, scale(turned(scale(plane.down, -1), axis, (edit.roll * Math.PI) / 180), 48));
+}

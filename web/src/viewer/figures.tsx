@@ -1,0 +1,133 @@
+// What was measured, beside what it is compared with; the reasons to doubt it; and every file of it.
+
+import { useState } from "preact/hooks";
+import { type Result, type Volume, call, key, save, saveBlob, words } from "../api";
+import { bytes, isFit, moment, nameOf, number, resultName } from "../words";
+import type { FitReport, Loaded } from "./loaded";
+import { zip } from "./zip";
+
+type Row = [string, (loaded: Loaded) => number | null | undefined, number, string];
+
+const of = (read: (report: FitReport) => number | null | undefined) => (loaded: Loaded) => loaded.report && read(loaded.report);
+const summary = (name: string) => (loaded: Loaded) => loaded.result.summary[name] as number | undefined;
+const measure = (name: string) => of(report => report.measures?.[name]);
+
+const FIT: [string, Row[]][] = [
+  ["", [
+    ["Cavity", of(r => r.volumes_ml.anatomical?.cavity ?? r.volumes_ml.cavity), 0, "ml"],
+    ["Wall", of(r => r.volumes_ml.anatomical?.wall ?? r.volumes_ml.wall), 0, "ml"],
+    ["Mass", of(r => r.mass_g), 0, "g"],
+    ["Thickness", of(r => r.thickness_mm?.anatomical.mean), 1, "mm"],
+    ["Below the threshold", of(r => r.polar?.extent_percent), 1, "%"],
+  ]],
+  ["As the blurred image shows it", [
+    ["Cavity", of(r => r.volumes_ml.apparent?.cavity), 0, "ml"],
+    ["Wall", of(r => r.volumes_ml.apparent?.wall), 0, "ml"],
+    ["Thickness", of(r => r.thickness_mm?.apparent.mean), 1, "mm"],
+  ]],
+  ["Against the expert", [
+    ["Jaccard", measure("jaccard"), 3, ""],
+    ["Dice", measure("dice"), 3, ""],
+    ["Contour distance", measure("contour_distance_mm"), 1, "mm"],
+    ["Volume difference", measure("volume_difference_ml"), 0, "ml"],
+  ]],
+];
+
+const MODEL: [string, Row[]][] = [
+  ["", [
+    ["Points", summary("vertices"), 0, ""],
+    ["Distance to the surface, mean", summary("distance_mean_mm"), 2, "mm"],
+    ["Hausdorff distance", summary("hausdorff_mm"), 1, "mm"],
+    ["Volume error", summary("volume_error_percent"), 2, "%"],
+    ["Triangle shape 2r/R, mean", summary("radius_ratio_mean"), 3, ""],
+    ["Triangle shape 2r/R, least", summary("radius_ratio_min"), 3, ""],
+    ["Self-intersections", summary("self_intersections"), 0, ""],
+  ]],
+];
+
+export function Figures({ shown, other }: { shown: Loaded; other: Loaded | null }) {
+  const sections = isFit(shown.result.id) ? FIT : MODEL;
+  const { report } = shown;
+  const confidence = report?.fit.confidence;
+  return (
+    <section class="figures" aria-label="Figures">
+      {report && (
+        <div class={report.flags.length ? "verdict doubt" : "verdict"}>
+          {typeof confidence === "number" && (
+            <p>
+              <b>{(100 * confidence).toFixed(0)} %</b> likely a good fit
+              <meter min={0} max={1} low={0.5} high={0.8} optimum={1} value={confidence} aria-label="Confidence" />
+            </p>
+          )}
+          {report.flags.length > 0 ? <ul>{report.flags.map(flag => <li key={flag.code}>{flag.reason}</li>)}</ul> : <p class="quiet">No reason to doubt it was found.</p>}
+          {report.warnings.map(text => <p key={text} class="warning">{text}</p>)}
+        </div>
+      )}
+      <table>
+        <caption class="hidden">Figures of the shown result{other && " and of the compared one"}</caption>
+        <thead class={other ? "" : "hidden"}>
+          <tr><td /><th scope="col">shown</th>{other && <th scope="col">compared</th>}</tr>
+        </thead>
+        {sections.map(([title, rows]) => {
+          const filled = rows.filter(([, read]) => typeof read(shown) === "number");
+          if (filled.length === 0) return null;
+          return (
+            <tbody key={title}>
+              {title && <tr><th scope="colgroup" colSpan={3} class="part">{title}</th></tr>}
+              {filled.map(([name, read, digits, unit]) => (
+                <tr key={name}>
+                  <th scope="row">{name}</th>
+                  <td>{number(read(shown), digits, unit)}</td>
+                  {other && <td>{number(read(other), digits, unit)}</td>}
+                </tr>
+              ))}
+            </tbody>
+          );
+        })}
+      </table>
+      <p class="quiet">{resultName(shown.result)} of {moment(shown.result.created_at)}{report && `; ${report.choice}`}</p>
+    </section>
+  );
+}
+
+export function Downloads({ result, volume }: { result: Result; volume: Volume }) {
+  const [state, setState] = useState("");
+  const name = nameOf(volume).replace(/\.(nii|gz|hdr|img|dcm|zip)/gi, "").replace(/[^\w.-]+/g, "_") || "scan";
+  const whole = async () => {
+    try {
+      const files = [];
+      for (const [n, one] of result.files.entries()) {
+        setState(`File ${n + 1} of ${result.files.length} …`);
+        const answer = await call(one.href);
+        files.push({ name: `${name}_${result.id.slice(0, 12)}/${one.name}`, bytes: new Uint8Array(await answer.arrayBuffer()) });
+      }
+      saveBlob(zip(files), `${name}_${result.id.slice(0, 12)}.zip`);
+      setState("");
+    } catch (error) {
+      setState(words(error));
+    }
+  };
+  const page = result.links["page"];
+  return (
+    <section class="downloads" aria-label="Downloads">
+      <div class="buttons">
+        <button type="button" onClick={() => void whole()}>Everything as zip</button>
+        {page && (key.value
+          ? <button type="button" onClick={() => void save(page, `${name}_report.html`).catch(error => setState(words(error)))}>Report</button>
+          : <a class="button" href={page} target="_blank" rel="noopener">Report</a>)}
+      </div>
+      <p role="status" class="quiet">{state}</p>
+      <details>
+        <summary>{result.files.length} files</summary>
+        <ul class="files">
+          {result.files.map(one => (
+            <li key={one.name}>
+              <button type="button" class="plain" onClick={() => void save(one.href, `${name}_${one.name}`).catch(error => setState(words(error)))}>{one.name}</button>
+              <span class="quiet">{bytes(one.bytes)}</span>
+            </li>
+          ))}
+        </ul>
+      </details>
+    </section>
+  );
+}

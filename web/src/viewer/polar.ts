@@ -1,0 +1,309 @@
+// The polar map of the service, drawn, and the places of the wall that its pixels show.
+
+import { type Lut, colour } from "./colours";
+import type { Mesh } from "./mesh";
+import { type Axis, frameOf } from "./plane";
+import { type Vec, add, dot, scale, sub } from "./vector";
+
+export interface PolarSegment {
+  number: number;
+  name: string;
+  territory: string | null;
+  mean_percent: number | null;
+  extent_percent: number;
+}
+
+export interface PolarMap {
+  threshold_percent: number;
+  extent_percent: number;
+  note: string;
+  segments: PolarSegment[];
+  territories: { name: string; mean_percent: number | null; extent_percent: number }[];
+  rows: number;
+  columns: number;
+  orientation: string;
+  values_percent: (number | null)[][];
+  segment_of: number[][];
+}
+
+/** Rings of equal width: apex, apical, mid, basal. */
+const RINGS = 4;
+
+function level(segment: number): number {
+  return segment === 17 ? 0 : segment > 12 ? 1 : segment > 6 ? 2 : 3;
+}
+
+/** The rows at which the levels of a column end. */
+function ends(map: PolarMap, column: number): number[] {
+  const out = [0, 0, 0, map.rows];
+  for (let row = 0; row < map.rows; row++) {
+    const at = level(map.segment_of[row]![column]!);
+    for (let n = at; n < 3; n++) out[n] = row + 1;
+  }
+  return out;
+}
+
+/** Share of the radius of a place `rows` from the apex. */
+export function radiusOf(map: PolarMap, rows: number, column: number): number {
+  let from = 0;
+  const all = ends(map, column);
+  for (let n = 0; n < RINGS; n++) {
+    const to = all[n]!;
+    if (rows <= to) return (n + (rows - from) / Math.max(1e-6, to - from)) / RINGS;
+    from = to;
+  }
+  return 1;
+}
+
+function rowsAt(map: PolarMap, radius: number, column: number): number {
+  const all = ends(map, column);
+  const n = Math.min(RINGS - 1, Math.floor(radius * RINGS));
+  const from = n === 0 ? 0 : all[n - 1]!;
+  return from + (radius * RINGS - n) * (all[n]! - from);
+}
+
+/** The value between the rays, in per cent; NaN where there is no wall. */
+export function valueAt(map: PolarMap, rows: number, columns: number): number {
+  const row = Math.max(0, Math.min(map.rows - 1, rows - 0.5));
+  const column = ((columns % map.columns) + map.columns) % map.columns;
+  const [r, c] = [Math.floor(row), Math.floor(column)];
+  const [fr, fc] = [row - r, column - c];
+  let [sum, weight] = [0, 0];
+  for (const [dr, wr] of [[0, 1 - fr], [1, fr]] as const) {
+    for (const [dc, wc] of [[0, 1 - fc], [1, fc]] as const) {
+      const value = map.values_percent[Math.min(map.rows - 1, r + dr)]![(c + dc) % map.columns];
+      if (value == null) continue;
+      sum += value * wr * wc;
+      weight += wr * wc;
+    }
+  }
+  return weight > 0.3 ? sum / weight : NaN;
+}
+
+/** The lines of the wall's coordinates, as the service lays them through a mesh. */
+export class WallFrame {
+  private readonly frame;
+  private readonly rim: number;
+  private readonly focus: number;
+  private readonly apex: number;
+  readonly radius: number;
+
+  constructor(mesh: Mesh, axis: Axis, private readonly rows: number, private readonly columns: number) {
+    this.frame = frameOf(axis);
+    const sectors = new Array<number>(12).fill(Infinity);
+    let [apex, radius] = [-Infinity, 0];
+    for (const vertex of mesh.vertices) {
+      const [along, angle, across] = this.parts(vertex);
+      const at = Math.min(11, Math.floor((angle / (2 * Math.PI)) * 12));
+      sectors[at] = Math.min(sectors[at]!, along);
+      apex = Math.max(apex, along);
+      radius += across / mesh.vertices.length;
+    }
+    const known = sectors.filter(Number.isFinite);
+    this.rim = known.reduce((sum, value) => sum + value, 0) / known.length;
+    this.apex = apex;
+    this.radius = radius;
+    this.focus = Math.max(this.rim, apex - radius);
+  }
+
+  private parts(place: Vec): [number, number, number] {
+    const { axis, anterior, lateral, middle } = this.frame;
+    const r = sub(place, middle);
+    const along = dot(r, axis);
+    const [x, y] = [dot(r, lateral), dot(r, anterior)];
+    return [along, (Math.atan2(y, x) + 2 * Math.PI) % (2 * Math.PI), Math.hypot(x, y)];
+  }
+
+  private get arc(): number {
+    return (Math.PI / 2) * (this.apex - this.focus);
+  }
+
+  private get spacing(): number {
+    return (this.arc + this.focus - this.rim) / this.rows;
+  }
+
+  /** Rows from the apex and columns from lateral of a place. */
+  place(place: Vec): [number, number] {
+    const [along, angle, across] = this.parts(place);
+    const way = along > this.focus ? Math.atan2(across, along - this.focus) * (this.apex - this.focus) : this.arc + this.focus - along;
+    return [way / this.spacing, (angle / (2 * Math.PI)) * this.columns];
+  }
+
+  /** The place in the middle of the wall, `distance` from the axis. */
+  at(rows: number, columns: number): Vec {
+    const { axis, anterior, lateral, middle } = this.frame;
+    const angle = (columns / this.columns) * 2 * Math.PI;
+    const side = add(scale(lateral, Math.cos(angle)), scale(anterior, Math.sin(angle)));
+    const way = rows * this.spacing;
+    const distance = this.radius;
+    if (way < this.arc) {
+      const tilt = way / (this.apex - this.focus);
+      const start = add(middle, scale(axis, this.focus));
+      return add(start, add(scale(axis, distance * Math.cos(tilt)), scale(side, distance * Math.sin(tilt))));
+    }
+    return add(add(middle, scale(axis, this.arc + this.focus - way)), scale(side, distance));
+  }
+}
+
+/** Share of the radius and turns from lateral, counter-clockwise, of a place on the drawn map. */
+function polarOf(x: number, y: number, size: number): [number, number] {
+  const [dx, dy] = [x - size / 2, size / 2 - y];
+  const radius = Math.hypot(dx, dy) / (size / 2 - MARGIN * size);
+  return [radius, (Math.atan2(dy, dx) / (2 * Math.PI) + 1) % 1];
+}
+
+const MARGIN = 0.07;
+
+export function placeOnMap(map: PolarMap, x: number, y: number, size: number): [number, number] | null {
+  const [radius, turns] = polarOf(x, y, size);
+  if (radius > 1) return null;
+  const columns = turns * map.columns;
+  return [rowsAt(map, radius, Math.round(columns) % map.columns), columns];
+}
+
+export function segmentAt(map: PolarMap, rows: number, columns: number): PolarSegment | undefined {
+  const row = Math.max(0, Math.min(map.rows - 1, Math.floor(rows)));
+  const number = map.segment_of[row]![Math.round(columns) % map.columns];
+  return map.segments.find(segment => segment.number === number);
+}
+
+export interface PolarStyle {
+  lut: Lut;
+  /** What is painted: the uptake of every ray, the means of the segments. */
+  segments: boolean;
+  threshold: boolean;
+  territories: boolean;
+  cursor: [number, number] | null;
+}
+
+const TERRITORY: Record<string, string> = { LAD: "#7ee0ff", LCX: "#b6ff8a", RCA: "#ffb3f0" };
+
+/** Draws the map into a square of `size` CSS pixels. */
+export function drawPolar(context: CanvasRenderingContext2D, map: PolarMap, size: number, ratio: number, style: PolarStyle): void {
+  const pixels = Math.round(size * ratio);
+  const image = context.createImageData(pixels, pixels);
+  const means = new Map(map.segments.map(segment => [segment.number, segment.mean_percent]));
+  for (let y = 0; y < pixels; y++) {
+    for (let x = 0; x < pixels; x++) {
+      const [radius, turns] = polarOf(x + 0.5, y + 0.5, pixels);
+      if (radius > 1) continue;
+      const columns = turns * map.columns;
+      const nearest = Math.round(columns) % map.columns;
+      const rows = rowsAt(map, radius, nearest);
+      const row = Math.min(map.rows - 1, Math.floor(rows));
+      const value = style.segments ? (means.get(map.segment_of[row]![nearest]!) ?? NaN) : valueAt(map, rows, columns);
+      const at = 4 * (y * pixels + x);
+      const rgb = Number.isNaN(value) ? [60, 60, 60] : colour(style.lut, value / 100);
+      image.data.set([...rgb, 255], at);
+    }
+  }
+  context.setTransform(1, 0, 0, 1, 0, 0);
+  context.clearRect(0, 0, pixels, pixels);
+  context.putImageData(image, 0, 0);
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  const middle = size / 2;
+  const full = size / 2 - MARGIN * size;
+  const at = (radius: number, turns: number): [number, number] => [middle + full * radius * Math.cos(2 * Math.PI * turns), middle - full * radius * Math.sin(2 * Math.PI * turns)];
+  const oriented = map.orientation !== "unknown";
+  context.lineWidth = 1;
+  context.strokeStyle = "rgba(255,255,255,.55)";
+  for (let ring = 1; ring <= RINGS; ring++) {
+    context.beginPath();
+    context.arc(middle, middle, (full * ring) / RINGS, 0, 2 * Math.PI);
+    context.stroke();
+  }
+  const spokes: [number, number, number[]][] = [
+    [1 / 4, 2 / 4, [1, 3, 5, 7].map(n => n / 8)],
+    [2 / 4, 1, [0, 1, 2, 3, 4, 5].map(n => n / 6)],
+  ];
+  for (const [from, to, turns] of spokes) {
+    for (const turn of turns) {
+      context.beginPath();
+      context.moveTo(...at(from, turn));
+      context.lineTo(...at(to, turn));
+      context.stroke();
+    }
+  }
+  if (style.threshold) {
+    // The border between pixels below and above the threshold.
+    context.strokeStyle = "#fff";
+    context.lineWidth = 2;
+    const below = (row: number, column: number) => {
+      const value = map.values_percent[row]?.[((column % map.columns) + map.columns) % map.columns];
+      return value != null && value < map.threshold_percent;
+    };
+    context.beginPath();
+    for (let row = 0; row < map.rows; row++) {
+      for (let column = 0; column < map.columns; column++) {
+        const [low, high] = [(column - 0.5) / map.columns, (column + 0.5) / map.columns];
+        if (row + 1 < map.rows && below(row, column) !== below(row + 1, column)) {
+          const radius = radiusOf(map, row + 1, column);
+          context.moveTo(...at(radius, low));
+          context.lineTo(...at(radius, high));
+        }
+        if (below(row, column) !== below(row, column + 1)) {
+          context.moveTo(...at(radiusOf(map, row, column), high));
+          context.lineTo(...at(radiusOf(map, row + 1, column), high));
+        }
+      }
+    }
+    context.stroke();
+  }
+  if (style.territories && oriented) {
+    const territory = new Map(map.segments.map(segment => [segment.number, segment.territory]));
+    const of = (row: number, column: number) => territory.get(map.segment_of[row]![(column + map.columns) % map.columns]!);
+    context.lineWidth = 3;
+    for (let row = 0; row < map.rows; row++) {
+      for (let column = 0; column < map.columns; column++) {
+        const name = of(row, column);
+        if (!name || name === of(row, column + 1)) continue;
+        context.strokeStyle = TERRITORY[name] ?? "#fff";
+        context.beginPath();
+        context.moveTo(...at(radiusOf(map, row, column), (column + 0.5) / map.columns));
+        context.lineTo(...at(radiusOf(map, row + 1, column), (column + 0.5) / map.columns));
+        context.stroke();
+      }
+    }
+  }
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  const write = (text: string, x: number, y: number, font: string) => {
+    context.font = font;
+    context.lineWidth = 3;
+    context.lineJoin = "round";
+    context.strokeStyle = "rgba(0,0,0,.85)";
+    context.strokeText(text, x, y);
+    context.fillStyle = "#fff";
+    context.fillText(text, x, y);
+  };
+  const text = Math.max(10, Math.min(14, size / 26));
+  for (const { number, mean_percent } of map.segments) {
+    const [ring, turns] = labelPlace(number);
+    const [x, y] = at(ring, turns);
+    write(mean_percent == null ? "–" : mean_percent.toFixed(0), x, y, `600 ${text}px system-ui, sans-serif`);
+  }
+  if (oriented) {
+    for (const [name, turns] of [["A", 0.25], ["S", 0.5], ["I", 0.75], ["L", 0]] as const) {
+      write(name, ...at(1.075, turns), `600 ${text}px system-ui, sans-serif`);
+    }
+  }
+  if (style.cursor) {
+    const [rows, columns] = style.cursor;
+    const [x, y] = at(Math.min(1, radiusOf(map, Math.max(0, rows), Math.round(columns) % map.columns)), columns / map.columns);
+    for (const [width, stroke] of [[4, "#000"], [2, "#4de3ff"]] as const) {
+      context.lineWidth = width;
+      context.strokeStyle = stroke;
+      context.beginPath();
+      context.arc(x, y, 6, 0, 2 * Math.PI);
+      context.stroke();
+    }
+  }
+}
+
+function labelPlace(number: number): [number, number] {
+  if (number === 17) return [0, 0];
+  const turn = (first: number, of: number, from: number) => (first + (number - from) / of) % 1;
+  if (number <= 6) return [7 / 8, turn(0.25, 6, 1)];
+  if (number <= 12) return [5 / 8, turn(0.25, 6, 7)];
+  return [3 / 8, turn(0.25, 4, 13)];
+}

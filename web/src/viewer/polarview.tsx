@@ -1,0 +1,96 @@
+// The polar map on the page: a click takes the cursor to that place of the wall.
+
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { useWatched } from "../state";
+import { number } from "../words";
+import { LUTS } from "./colours";
+import type { Mesh } from "./mesh";
+import { type PolarMap, WallFrame, drawPolar, placeOnMap, segmentAt, valueAt } from "./polar";
+import type { Axis } from "./plane";
+import type { Scene } from "./scene";
+import { fit } from "./slice";
+import { ColourBar } from "./wall";
+
+/** Where the browser keeps the choice of colours. */
+export const WALL_LUT = "ventriform.wall-lut";
+
+interface Props {
+  scene: Scene;
+  map: PolarMap;
+  mesh: Mesh;
+  heart: Axis;
+  title: string;
+}
+
+export function PolarView({ scene, map, mesh, heart, title }: Props) {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const lut = useWatched(scene.wallLut);
+  const cursor = useWatched(scene.cursor);
+  const [segments, setSegments] = useState(false);
+  const [threshold, setThreshold] = useState(true);
+  const [territories, setTerritories] = useState(false);
+  const frame = useMemo(() => new WallFrame(mesh, heart, map.rows, map.columns), [mesh, heart, map]);
+  const [rows, columns] = frame.place(cursor);
+  const onWall = rows >= 0 && rows <= map.rows + 1;
+  useEffect(() => {
+    const element = canvas.current;
+    if (!element) return;
+    const draw = () => {
+      fit(element);
+      const context = element.getContext("2d");
+      if (context) drawPolar(context, map, element.clientWidth, element.width / element.clientWidth, { lut, segments, threshold, territories, cursor: onWall ? [rows, columns] : null });
+    };
+    const sizes = new ResizeObserver(draw);
+    sizes.observe(element);
+    draw();
+    return () => sizes.disconnect();
+  });
+  const segment = onWall ? segmentAt(map, rows, columns) : undefined;
+  const go = (x: number, y: number, size: number) => {
+    const place = placeOnMap(map, x, y, size);
+    if (place) scene.cursor.value = frame.at(...place);
+  };
+  return (
+    <figure class="polar">
+      <canvas
+        ref={canvas}
+        tabIndex={0}
+        role="img"
+        aria-label={`${title}: ${map.segments.map(one => `${one.name} ${number(one.mean_percent, 0, "%")}`).join(", ")}`}
+        onPointerDown={event => {
+          event.currentTarget.setPointerCapture(event.pointerId);
+          go(event.offsetX, event.offsetY, event.currentTarget.clientWidth);
+        }}
+        onPointerMove={event => event.buttons && go(event.offsetX, event.offsetY, event.currentTarget.clientWidth)}
+        onKeyDown={event => {
+          const step: Record<string, [number, number]> = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, 1], ArrowRight: [0, -1] };
+          const by = step[event.key];
+          if (!by) return;
+          event.preventDefault();
+          scene.cursor.value = frame.at(Math.max(0.5, Math.min(map.rows, rows + by[0])), columns + 2 * by[1]);
+        }}
+      />
+      <figcaption>
+        <p class="at">
+          {segment ? <><b>{segment.name}</b> {number(segment.mean_percent, 0, "%")}, here {number(valueAt(map, rows, columns), 0, "%")}</> : "Cursor off the wall"}
+        </p>
+        <span class="inline">
+          <ColourBar lut={lut} low="0" high="100 %" />
+          <select aria-label="Colours of polar map and wall" value={Object.keys(LUTS).find(name => LUTS[name] === lut)} onChange={event => {
+            scene.wallLut.value = LUTS[event.currentTarget.value]!;
+            localStorage.setItem(WALL_LUT, event.currentTarget.value);
+          }}>
+            {Object.keys(LUTS).map(name => <option key={name}>{name}</option>)}
+          </select>
+        </span>
+        <div class="options">
+          <label class="inline"><input type="checkbox" checked={threshold} onChange={event => setThreshold(event.currentTarget.checked)} /> below {number(map.threshold_percent, 0, "%")}</label>
+          <label class="inline"><input type="checkbox" checked={segments} onChange={event => setSegments(event.currentTarget.checked)} /> segment means</label>
+          {map.orientation !== "unknown" && <label class="inline"><input type="checkbox" checked={territories} onChange={event => setTerritories(event.currentTarget.checked)} /> territories</label>}
+        </div>
+        {territories && <p class="quiet">{map.territories.map(one => `${one.name} ${number(one.mean_percent, 0, "%")}`).join(" · ")}</p>}
+        {map.orientation === "unknown" && <p class="warning">Nothing tells which side is anterior: segments have no names.</p>}
+      </figcaption>
+    </figure>
+  );
+}

@@ -1,0 +1,127 @@
+// The short axis from apex to base as a row of small slices; a click takes the cursor there.
+
+import { useEffect, useRef } from "preact/hooks";
+import { contours, label, paint } from "./drawing";
+import { type Plane, frameOf } from "./plane";
+import type { Scene } from "./scene";
+import { fit } from "./slice";
+import { type Vec, add, dot, scale, sub } from "./vector";
+
+interface Props {
+  scene: Scene;
+  plane: Plane;
+}
+
+/** Places along the axis, apex first, and how many of them fit. */
+function places(scene: Scene, width: number, height: number): Vec[] {
+  const heart = scene.heart.value;
+  if (!heart) return [];
+  const { axis, length } = frameOf(heart);
+  const count = Math.max(4, Math.min(14, Math.round(width / height)));
+  return Array.from({ length: count }, (_, n) => {
+    const way = length * (0.04 + (0.98 * n) / (count - 1));
+    return add(heart.apex, scale(axis, -way));
+  });
+}
+
+export function Stack({ scene, plane }: Props) {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const latest = useRef(plane);
+  latest.current = plane;
+  useEffect(() => {
+    const element = canvas.current;
+    if (!element) return;
+    let asked = 0;
+    const draw = () => {
+      asked = 0;
+      fit(element);
+      drawStack(element, scene, latest.current);
+    };
+    const ask = () => (asked ||= requestAnimationFrame(draw));
+    const sizes = new ResizeObserver(ask);
+    sizes.observe(element);
+    const end = scene.watch(ask);
+    ask();
+    return () => {
+      cancelAnimationFrame(asked);
+      sizes.disconnect();
+      end();
+    };
+  }, [scene, plane]);
+  const go = (by: number) => {
+    const element = canvas.current;
+    if (!element) return;
+    const all = places(scene, element.clientWidth, element.clientHeight);
+    const now = nearest(scene, all, latest.current);
+    const to = all[Math.max(0, Math.min(all.length - 1, now + by))];
+    if (to) moveTo(scene, to, latest.current);
+  };
+  return (
+    <canvas
+      ref={canvas}
+      class="stack"
+      tabIndex={0}
+      role="slider"
+      aria-label="Short-axis slices from apex to base"
+      aria-valuenow={0}
+      onClick={event => {
+        const element = event.currentTarget;
+        const all = places(scene, element.clientWidth, element.clientHeight);
+        const to = all[Math.floor((event.offsetX / element.clientWidth) * all.length)];
+        if (to) moveTo(scene, to, plane);
+      }}
+      onKeyDown={event => {
+        const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+        if (!by) return;
+        event.preventDefault();
+        go(by);
+      }}
+    />
+  );
+}
+
+function moveTo(scene: Scene, to: Vec, plane: Plane): void {
+  const way = dot(sub(to, scene.cursor.value), plane.normal);
+  scene.cursor.value = add(scene.cursor.value, scale(plane.normal, way));
+}
+
+function nearest(scene: Scene, all: Vec[], plane: Plane): number {
+  const distance = (place: Vec) => Math.abs(dot(sub(place, scene.cursor.value), plane.normal));
+  return all.reduce((best, place, n) => (distance(place) < distance(all[best]!) ? n : best), 0);
+}
+
+function drawStack(element: HTMLCanvasElement, scene: Scene, plane: Plane): void {
+  const context = element.getContext("2d");
+  const [width, height] = [element.clientWidth, element.clientHeight];
+  const all = places(scene, width, height);
+  if (!context || all.length === 0) return;
+  const ratio = element.width / width;
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.fillStyle = "#0a0e11";
+  context.fillRect(0, 0, width, height);
+  const cell = width / all.length;
+  const size = Math.min(cell - 2, height);
+  const factor = size / 110;
+  const now = nearest(scene, all, plane);
+  all.forEach((origin, n) => {
+    const box = { x: n * cell + 1, y: 0, width: cell - 2, height };
+    context.save();
+    context.beginPath();
+    context.rect(box.x, box.y, box.width, box.height);
+    context.clip();
+    paint(context, scene, plane, origin, box, factor);
+    context.translate(box.x + box.width / 2, height / 2);
+    contours(context, scene.layers.value, plane, origin, factor, 70);
+    context.restore();
+    if (n === now) {
+      context.strokeStyle = "#4de3ff";
+      context.lineWidth = 2;
+      context.strokeRect(box.x + 1, 1, box.width - 2, height - 2);
+    }
+  });
+  label(context, "Apex", 6, 10, "left", 11);
+  label(context, "Base", width - 6, 10, "right", 11);
+  element.setAttribute("aria-valuemin", "1");
+  element.setAttribute("aria-valuemax", String(all.length));
+  element.setAttribute("aria-valuenow", String(now + 1));
+}

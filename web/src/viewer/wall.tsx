@@ -1,0 +1,262 @@
+// The wall in three dimensions with a colour for what the files offer, and its colour bar.
+
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { useWatched } from "../state";
+import { DIVERGING, LUTS, type Lut, colour, css } from "./colours";
+import { MeshView } from "./glview";
+import { type Mesh, apart, thickness, triangleShape } from "./mesh";
+import { type Axis, frameOf, letters } from "./plane";
+import { type PolarMap, WallFrame, valueAt } from "./polar";
+import type { Scene } from "./scene";
+import { fit } from "./slice";
+import { type Vec, add, scale, sub, dot } from "./vector";
+import type { Voxels } from "./volume";
+
+interface Paint {
+  name: string;
+  unit: string;
+  lut: Lut;
+  range: [number, number];
+  values: () => Float32Array;
+}
+
+interface Props {
+  scene: Scene;
+  mesh: Mesh;
+  /** The same wall by the other edge, or what the result is compared with. */
+  inner: Mesh | null;
+  other: Mesh | null;
+  polar: PolarMap | null;
+  displacement: number[] | null;
+  /** Distance of a model to the surface it was made of, at every vertex, mm. */
+  surface: Float32Array | null;
+}
+
+/** The largest value within a wall's depth behind every vertex. */
+export function uptake(voxels: Voxels, mesh: Mesh): Float32Array {
+  const out = Float32Array.from(mesh.vertices, (vertex, at) => {
+    let most = 0;
+    for (let depth = 0; depth <= 12; depth += 1.5) {
+      const value = voxels.at(sub(vertex, scale(mesh.normals[at]!, depth)));
+      if (value > most) most = value;
+    }
+    return most;
+  });
+  return out;
+}
+
+function percent(values: Float32Array): Float32Array {
+  const hottest = Math.max(...values) || 1;
+  return values.map(value => (100 * value) / hottest);
+}
+
+function polarUptake(mesh: Mesh, polar: PolarMap, heart: Axis): Float32Array {
+  const frame = new WallFrame(mesh, heart, polar.rows, polar.columns);
+  return Float32Array.from(mesh.vertices, vertex => {
+    const [rows, columns] = frame.place(vertex);
+    return valueAt(polar, rows, columns);
+  });
+}
+
+function paints({ scene, mesh, inner, other, polar, displacement, surface }: Props, lut: Lut, heart: Axis | null): Paint[] {
+  const list: Paint[] = [];
+  const viridis = LUTS["Viridis"]!;
+  if (polar && heart) list.push({ name: "Uptake", unit: "%", lut, range: [0, 100], values: () => polarUptake(mesh, polar, heart) });
+  else list.push({ name: "Uptake", unit: "%", lut, range: [0, 100], values: () => percent(uptake(scene.voxels, mesh)) });
+  list.push({ name: "Thickness", unit: "mm", lut: viridis, range: [4, 20], values: () => thickness(mesh) });
+  if (inner) list.push({ name: "Distance between the two walls", unit: "mm", lut: DIVERGING, range: [-6, 6], values: () => apart(mesh, inner) });
+  if (other) list.push({ name: "Distance to the compared wall", unit: "mm", lut: DIVERGING, range: [-8, 8], values: () => apart(mesh, other) });
+  if (displacement?.length === mesh.vertices.length) list.push({ name: "Moved by the fit", unit: "mm", lut: viridis, range: [0, 12], values: () => Float32Array.from(displacement) });
+  if (surface) list.push({ name: "Distance to the surface", unit: "mm", lut: DIVERGING, range: [-2, 2], values: () => surface });
+  list.push({ name: "Triangle shape (2r/R)", unit: "", lut: viridis, range: [0.4, 1], values: () => triangleShape(mesh) });
+  return list;
+}
+
+export function Wall(props: Props) {
+  const { scene, mesh, other } = props;
+  const canvas = useRef<HTMLCanvasElement>(null);
+  const view = useRef<MeshView | null>(null);
+  const [off, setOff] = useState(false);
+  const [chosen, setChosen] = useState("Uptake");
+  const [edges, setEdges] = useState(false);
+  const lut = useWatched(scene.wallLut);
+  const heart = useWatched(scene.heart);
+  const list = paints(props, lut, heart);
+  const paint = list.find(one => one.name === chosen) ?? list[0]!;
+  const values = useMemo(() => paint.values(), [mesh, paint.name, props.polar, props.other, props.inner, heart]);
+
+  useEffect(() => {
+    const element = canvas.current;
+    if (!element) return;
+    try {
+      view.current = new MeshView(element);
+    } catch {
+      setOff(true);
+      return;
+    }
+    const made = view.current;
+    const draw = () => {
+      fit(element);
+      made.setPoint("cursor", scene.cursor.value, [0.3, 0.89, 1]);
+      made.draw();
+      const toward = made.camera.toward;
+      element.setAttribute("aria-valuetext", `seen from ${letters(toward)}`);
+    };
+    redraw.current = draw;
+    const sizes = new ResizeObserver(draw);
+    sizes.observe(element);
+    const ends = [scene.cursor.watch(draw), listen(element, made, draw, scene)];
+    return () => {
+      sizes.disconnect();
+      ends.forEach(end => end());
+      made.end();
+      view.current = null;
+    };
+  }, [scene]);
+  const redraw = useRef(() => undefined as void);
+
+  // The camera starts where the anterior and lateral wall are seen, apex down to the left as in the patient.
+  useEffect(() => {
+    const made = view.current;
+    if (!made) return;
+    const all = mesh.vertices;
+    const middle = scale(all.reduce((sum, vertex) => add(sum, vertex), [0, 0, 0] as Vec), 1 / all.length);
+    made.camera = { toward: [0.35, -0.9, 0.25], up: [0, 0, 1], target: middle, height: 135 };
+    if (heart) {
+      const { anterior, lateral, axis } = frameOf(heart);
+      const toward = add(add(scale(lateral, 0.65), scale(anterior, 0.55)), scale(axis, 0.52));
+      const up = sub(scale(axis, -1), scale(toward, -dot(axis, toward) / dot(toward, toward)));
+      made.camera.toward = scale(toward, 1 / Math.hypot(...toward));
+      made.camera.up = scale(up, 1 / Math.hypot(...up));
+    }
+    redraw.current();
+  }, [scene, mesh]);
+
+  useEffect(() => {
+    const made = view.current;
+    if (!made) return;
+    const [low, high] = paint.range;
+    const colours = new Float32Array(3 * values.length);
+    values.forEach((value, at) => {
+      const rgb = Number.isNaN(value) ? [90, 96, 100] : colour(paint.lut, (value - low) / (high - low));
+      colours.set(rgb.map(part => part / 255), 3 * at);
+    });
+    made.setSurface("wall", mesh, colours);
+    if (edges) made.setWire("edges", mesh, [0.05, 0.07, 0.09]);
+    else made.remove("edges");
+    if (other) made.setWire("other", other, [0.78, 0.55, 1]);
+    else made.remove("other");
+    redraw.current();
+  }, [scene, mesh, values, paint.lut, other, edges]);
+
+  if (off) return <p class="off">This browser offers no WebGL, so the three-dimensional view is off. Slices, contours and polar map work.</p>;
+  const [low, high] = paint.range;
+  return (
+    <figure class="wall">
+      <canvas ref={canvas} tabIndex={0} role="slider" aria-label="The wall in three dimensions; arrow keys turn it" aria-valuenow={0} />
+      <figcaption>
+        <select aria-label="Colour of the wall" value={paint.name} onChange={event => setChosen(event.currentTarget.value)}>
+          {list.map(one => <option key={one.name}>{one.name}</option>)}
+        </select>
+        <label class="inline"><input type="checkbox" checked={edges} onChange={event => setEdges(event.currentTarget.checked)} /> edges</label>
+        <ColourBar lut={paint.lut} low={`${low}`} high={`${high}${paint.unit && ` ${paint.unit}`}`} />
+      </figcaption>
+    </figure>
+  );
+}
+
+export function ColourBar({ lut, low, high }: { lut: Lut; low: string; high: string }) {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  useEffect(() => {
+    const context = canvas.current?.getContext("2d");
+    if (!context) return;
+    for (let n = 0; n < 128; n++) {
+      context.fillStyle = css(lut, n / 127);
+      context.fillRect(n, 0, 1, 8);
+    }
+  }, [lut]);
+  return (
+    <span class="bar">
+      <span>{low}</span>
+      <canvas ref={canvas} width={128} height={8} aria-hidden="true" />
+      <span>{high}</span>
+    </span>
+  );
+}
+
+function listen(element: HTMLCanvasElement, view: MeshView, draw: () => void, scene: Scene): () => void {
+  const pointers = new Map<number, PointerEvent>();
+  let moved = 0;
+  const down = (event: PointerEvent) => {
+    element.setPointerCapture(event.pointerId);
+    element.focus({ preventScroll: true });
+    pointers.set(event.pointerId, event);
+    moved = 0;
+  };
+  const zoom = (by: number) => {
+    view.camera.height = Math.max(30, Math.min(500, view.camera.height * by));
+    draw();
+  };
+  const move = (event: PointerEvent) => {
+    const before = pointers.get(event.pointerId);
+    if (!before) return;
+    const [dx, dy] = [event.clientX - before.clientX, event.clientY - before.clientY];
+    moved += Math.abs(dx) + Math.abs(dy);
+    const other = [...pointers].find(([id]) => id !== event.pointerId)?.[1];
+    if (other) {
+      const span = (e: PointerEvent) => Math.hypot(e.clientX - other.clientX, e.clientY - other.clientY) || 1;
+      zoom(span(before) / span(event));
+    } else {
+      view.turn(dx, dy);
+      draw();
+    }
+    pointers.set(event.pointerId, event);
+  };
+  const up = (event: PointerEvent) => {
+    pointers.delete(event.pointerId);
+    if (event.type === "pointerup" && moved < 4) pick(event);
+  };
+  // A click takes the cursor to the wall's nearest vertex in front.
+  const pick = (event: PointerEvent) => {
+    const box = element.getBoundingClientRect();
+    const [x, y] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+    let [best, depth]: [Vec | null, number] = [null, -Infinity];
+    for (const layer of scene.layers.value) {
+      for (const vertex of layer.mesh?.vertices ?? []) {
+        const [u, v] = view.project(vertex);
+        if (Math.hypot((u - x) * box.width, (v - y) * box.height) > 16) continue;
+        const toward = dot(vertex, view.camera.toward);
+        if (toward > depth) [best, depth] = [vertex, toward];
+      }
+    }
+    if (best) scene.cursor.value = best;
+  };
+  const wheel = (event: WheelEvent) => {
+    event.preventDefault();
+    zoom(Math.exp(event.deltaY / 500));
+  };
+  const press = (event: KeyboardEvent) => {
+    const turn: Record<string, [number, number]> = { ArrowLeft: [-12, 0], ArrowRight: [12, 0], ArrowUp: [0, -12], ArrowDown: [0, 12] };
+    const by = turn[event.key];
+    if (by) view.turn(...by);
+    else if (event.key === "+" || event.key === "=") zoom(1 / 1.15);
+    else if (event.key === "-") zoom(1.15);
+    else return;
+    event.preventDefault();
+    draw();
+  };
+  element.addEventListener("pointerdown", down);
+  element.addEventListener("pointermove", move);
+  element.addEventListener("pointerup", up);
+  element.addEventListener("pointercancel", up);
+  element.addEventListener("wheel", wheel, { passive: false });
+  element.addEventListener("keydown", press);
+  return () => {
+    element.removeEventListener("pointerdown", down);
+    element.removeEventListener("pointermove", move);
+    element.removeEventListener("pointerup", up);
+    element.removeEventListener("pointercancel", up);
+    element.removeEventListener("wheel", wheel);
+    element.removeEventListener("keydown", press);
+  };
+}

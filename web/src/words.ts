@@ -1,0 +1,82 @@
+// How things are called and numbers are written.
+
+import type { Job, Result, Volume } from "./api";
+
+export function nameOf(volume: Volume): string {
+  return volume.external_id || volume.labels["name"] || `Scan ${volume.id.slice(4, 12)}`;
+}
+
+/** Patient and study of a scan, as DICOM or the caller states them. */
+export function study({ dicom }: Volume): string {
+  if (!dicom) return "";
+  const patient = dicom["patient_name"]?.replaceAll("^", " ").trim();
+  const date = dicom["study_date"]?.replace(/^(\d{4})(\d\d)(\d\d)$/, "$1-$2-$3");
+  const parts = [patient, dicom["patient_id"], date && `study of ${date}`, dicom["accession_number"]];
+  return parts.filter(Boolean).join(" · ");
+}
+
+export function bytes(count: number): string {
+  if (count < 1e3) return `${count} B`;
+  if (count < 1e6) return `${(count / 1e3).toFixed(0)} kB`;
+  if (count < 1e9) return `${(count / 1e6).toFixed(1)} MB`;
+  return `${(count / 1e9).toFixed(2)} GB`;
+}
+
+const DAY = new Intl.DateTimeFormat(undefined, { dateStyle: "medium", timeStyle: "short" });
+
+export function moment(text: string): string {
+  return DAY.format(new Date(text));
+}
+
+export function number(value: unknown, digits = 1, unit = ""): string {
+  if (typeof value !== "number" || !Number.isFinite(value)) return "–";
+  return value.toFixed(digits) + (unit ? `\u2009${unit}` : "");
+}
+
+export function shape(volume: Volume): string {
+  const voxel = volume.spacing_mm.slice(0, 3).map(mm => mm.toFixed(1));
+  const edge = new Set(voxel).size === 1 ? voxel[0] : voxel.join(" × ");
+  const frames = volume.frames > 1 ? `, ${volume.frames} frames` : "";
+  return `${volume.shape.join(" × ")} voxels of ${edge} mm${frames}`;
+}
+
+export function isLabelMap(volume: Volume): boolean {
+  return volume.label_values != null;
+}
+
+const STAGES: Record<string, string> = {
+  read: "reading the scan",
+  localise: "looking for the heart",
+  align: "placing the model",
+  surface: "extracting the surface",
+  retile: "placing the points",
+  optimise: "improving the triangles",
+  deform: "fitting the wall",
+  polar: "measuring the uptake",
+  report: "measuring",
+  export: "writing files",
+};
+
+export function stage(job: Job): string {
+  return job.stage ? (STAGES[job.stage] ?? job.stage.replaceAll("_", " ")) : "starting";
+}
+
+export function isFit(id: string): boolean {
+  return id.startsWith("seg_");
+}
+
+/** What distinguishes a result from others of the same scan. */
+export function resultName(result: Result): string {
+  if (isFit(result.id)) {
+    const changed = ["center", "axis", "roll"].filter(name => result.parameters[name] != null && result.parameters[name] !== 0);
+    const model = result.parameters["model"];
+    const by = typeof model === "string" && model !== "auto" ? ` of ${model.slice(0, 10)}…` : "";
+    return changed.length ? `Corrected fit${by}` : `Fit${by}`;
+  }
+  return `Model, ${String(result.summary["vertices"])} points`;
+}
+
+export function ordinal(n: number): string {
+  const last = n % 100 > 10 && n % 100 < 14 ? 0 : n % 10;
+  return `${n}${["th", "st", "nd", "rd"][last] ?? "th"}`;
+}

@@ -1,0 +1,314 @@
+// The list of scans: what is being sent, what is stored, what was made of it.
+
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { type Job, type Result, type Volume, words } from "./api";
+import { Confirm } from "./confirm";
+import { JobLine } from "./jobline";
+import { eraseVolume, fits, isActive, jobs, loadMore, loaded, models, more, put, refresh, trouble, volumes } from "./library";
+import { Picture } from "./picture";
+import { open } from "./route";
+import { useWatched } from "./state";
+import { type Upload, add, again, dismiss, dropped, keepNames, onStored, stop, uploads } from "./upload";
+import { bytes, isFit, isLabelMap, moment, nameOf, number, resultName, shape, study } from "./words";
+import { file } from "./work";
+
+type Then = "fit" | "model" | "nothing";
+type Show = "all" | "fits" | "models" | "nothing" | "failed";
+type Order = "newest" | "name" | "largest";
+
+const THEN = "ventriform.then";
+const SHOWN = 30;
+
+export function WorkList() {
+  const [then, setThen] = useState<Then>(() => (localStorage.getItem(THEN) as Then | null) ?? "fit");
+  const [message, setMessage] = useState("");
+  useEffect(() => {
+    localStorage.setItem(THEN, then);
+    onStored(volume => {
+      volumes.value = [volume, ...volumes.value.filter(other => other.id !== volume.id)];
+      if (then === "nothing" || isLabelMap(volume)) return;
+      const alone = uploads.value.filter(upload => upload.state !== "stored").length === 0 && uploads.value.length === 1;
+      file(then === "fit" ? "segmentation" : "model", volume, {}).then(
+        () => alone && open(volume.id),
+        error => setMessage(words(error)),
+      );
+    });
+  }, [then]);
+  return (
+    <div class="list">
+      <h1 class="hidden">Scans</h1>
+      <Drop then={then} onThen={setThen} />
+      <p class="error" role="status">{message}</p>
+      <Uploads />
+      <Scans />
+    </div>
+  );
+}
+
+function Drop({ then, onThen }: { then: Then; onThen: (then: Then) => void }) {
+  const [over, setOver] = useState(false);
+  const chooser = useRef<HTMLInputElement>(null);
+  const folder = useRef<HTMLInputElement>(null);
+  const known = useWatched(volumes).length + useWatched(uploads).length;
+  const isLoaded = useWatched(loaded);
+  const named = useWatched(keepNames);
+  useEffect(() => {
+    const allow = (event: DragEvent) => {
+      if (!event.dataTransfer?.types.includes("Files")) return;
+      event.preventDefault();
+      setOver(true);
+    };
+    const leave = (event: DragEvent) => !event.relatedTarget && setOver(false);
+    const take = (event: DragEvent) => {
+      setOver(false);
+      if (!event.dataTransfer) return;
+      event.preventDefault();
+      void dropped(event.dataTransfer).then(add);
+    };
+    addEventListener("dragover", allow);
+    addEventListener("dragleave", leave);
+    addEventListener("drop", take);
+    return () => {
+      removeEventListener("dragover", allow);
+      removeEventListener("dragleave", leave);
+      removeEventListener("drop", take);
+    };
+  }, []);
+  const chosen = (input: HTMLInputElement) => {
+    void add([...(input.files ?? [])]);
+    input.value = "";
+  };
+  const empty = isLoaded && known === 0;
+  return (
+    <section class={`drop${over ? " over" : ""}${empty ? " empty" : ""}`} aria-label="Add scans">
+      <div class="choose">
+        <strong>{over ? "Let go to send" : "Drop cardiac SPECT scans here"}</strong>
+        <span class="quiet">DICOM, NIfTI, .hdr with .img: files, series, folders, zips.</span>
+      </div>
+      <div class="buttons">
+        <button type="button" class="main" onClick={() => chooser.current?.click()}>Choose files</button>
+        <button type="button" onClick={() => folder.current?.click()}>Choose a folder</button>
+        <input ref={chooser} class="hidden" type="file" multiple tabIndex={-1} aria-label="Files of scans" onChange={event => chosen(event.currentTarget)} />
+        <input ref={folder} class="hidden" type="file" multiple tabIndex={-1} aria-label="Folder of scans" {...{ webkitdirectory: true }} onChange={event => chosen(event.currentTarget)} />
+        <label class="inline">
+          then
+          <select value={then} onChange={event => onThen(event.currentTarget.value as Then)}>
+            <option value="fit">fit the left ventricle</option>
+            <option value="model">make a surface model</option>
+            <option value="nothing">only store</option>
+          </select>
+        </label>
+        <label class="inline"><input type="checkbox" checked={named} onChange={event => (keepNames.value = event.currentTarget.checked)} /> keep file names</label>
+      </div>
+    </section>
+  );
+}
+
+const STATES: Record<Upload["state"], string> = {
+  waiting: "waits",
+  sending: "is sent",
+  reading: "is being read",
+  stored: "stored",
+  refused: "refused",
+  interrupted: "The connection was lost, or the service refused the size. The file is still here: send it again.",
+  cancelled: "cancelled",
+};
+
+function Uploads() {
+  const all = useWatched(uploads);
+  if (all.length === 0) return null;
+  return (
+    <section aria-label="Uploads" class="uploads">
+      <ul>
+        {all.map(upload => {
+          const underway = upload.state === "waiting" || upload.state === "sending" || upload.state === "reading";
+          return (
+            <li key={upload.id} class={upload.state}>
+              <span class="name">{upload.group.name}</span>
+              <span class="quiet">{bytes(upload.bytes)}{upload.group.files.length > 1 && `, ${upload.group.files.length} files`}</span>
+              {upload.state === "sending" && <progress value={upload.sent} max={upload.bytes || 1} aria-label={`Sending ${upload.group.name}`} />}
+              <span role="status" class={upload.state === "refused" || upload.state === "interrupted" ? "error" : "state"}>
+                {upload.problem ? <>{upload.problem.detail} <strong>{upload.problem.fix}</strong></> : upload.existed ? "was stored before" : STATES[upload.state]}
+              </span>
+              <span class="end">
+                {underway && <button type="button" class="plain" onClick={() => stop(upload)}>Cancel</button>}
+                {(upload.state === "refused" || upload.state === "interrupted" || upload.state === "cancelled") && <button type="button" onClick={() => again(upload)}>Send again</button>}
+                {upload.volume && <button type="button" onClick={() => upload.volume && open(upload.volume.id)}>Open</button>}
+                {!underway && <button type="button" class="plain" aria-label={`Take ${upload.group.name} off this list`} onClick={() => dismiss(upload)}>✕</button>}
+              </span>
+            </li>
+          );
+        })}
+      </ul>
+    </section>
+  );
+}
+
+interface Row {
+  volume: Volume;
+  results: Result[];
+  open: Job[];
+}
+
+function Scans() {
+  const all = useWatched(volumes);
+  const allFits = useWatched(fits);
+  const allModels = useWatched(models);
+  const allJobs = useWatched(jobs);
+  const next = useWatched(more);
+  const isLoaded = useWatched(loaded);
+  const problem = useWatched(trouble);
+  const [search, setSearch] = useState("");
+  const [show, setShow] = useState<Show>("all");
+  const [order, setOrder] = useState<Order>("newest");
+  const [at, setAt] = useState(0);
+  const rows = useMemo((): Row[] => {
+    const results = [...allFits, ...allModels].sort((a, b) => b.created_at.localeCompare(a.created_at));
+    return all.map(volume => ({
+      volume,
+      results: results.filter(result => result.volume === volume.id),
+      open: allJobs.filter(job => job.volume === volume.id && job.state !== "succeeded"),
+    }));
+  }, [all, allFits, allModels, allJobs]);
+  // A search looks at everything stored, so the rest of the list is read first.
+  useEffect(() => {
+    if ((search || order !== "newest" || show !== "all") && next && all.length < 2000) void loadMore(100);
+  }, [search, order, show, next, all.length]);
+  const shown = rows.filter(row => matches(row, search) && passes(row, show)).sort(COMPARE[order]);
+  useEffect(() => setAt(0), [search, show, order]);
+  const part = shown.slice(at, at + SHOWN);
+  if (!isLoaded) return problem ? <p class="error pad">{problem} <button type="button" onClick={() => void refresh()}>Try again</button></p> : <p class="quiet pad">Reading the list …</p>;
+  if (all.length === 0) {
+    return (
+      <section class="welcome">
+        <h2>From scan to ventricle</h2>
+        <ol>
+          <li><b>Drop a scan.</b> It is stored on this service and nowhere else.</li>
+          <li><b>The left ventricle is found and fitted</b>, usually within two seconds.</li>
+          <li><b>Look at slices, wall and polar map together</b>; correct axis and centre by hand, compare, download.</li>
+        </ol>
+        <p class="quiet">No scan at hand? <code>ventriform phantom</code> simulates one.</p>
+      </section>
+    );
+  }
+  return (
+    <section aria-label="Stored scans">
+      <div class="tools">
+        <input type="search" aria-label="Search name, id or label" placeholder="Search name, id or label" value={search} onInput={event => setSearch(event.currentTarget.value)} />
+        <label class="inline">
+          Show
+          <select value={show} onChange={event => setShow(event.currentTarget.value as Show)}>
+            <option value="all">all scans</option>
+            <option value="fits">with a fit</option>
+            <option value="models">with a model</option>
+            <option value="nothing">without a result</option>
+            <option value="failed">with a failed job</option>
+          </select>
+        </label>
+        <label class="inline">
+          Sort
+          <select value={order} onChange={event => setOrder(event.currentTarget.value as Order)}>
+            <option value="newest">newest first</option>
+            <option value="name">by name</option>
+            <option value="largest">largest first</option>
+          </select>
+        </label>
+        <span class="quiet" role="status">{shown.length}{next ? "+" : ""} {shown.length === 1 ? "scan" : "scans"}</span>
+      </div>
+      {problem && <p class="error" role="alert">{problem}</p>}
+      <ul class="scans">{part.map(row => <ScanRow key={row.volume.id} row={row} />)}</ul>
+      {shown.length === 0 && <p class="quiet pad">Nothing matches.</p>}
+      {(at > 0 || shown.length > at + SHOWN || next) && (
+        <nav class="paging" aria-label="Pages of the list">
+          <button type="button" disabled={at === 0} onClick={() => setAt(Math.max(0, at - SHOWN))}>Newer</button>
+          <span>{at + 1} to {at + part.length}</span>
+          <button type="button" disabled={shown.length <= at + SHOWN && !next} onClick={() => {
+            const go = () => setAt(at + SHOWN);
+            if (shown.length <= at + SHOWN) void loadMore().then(go);
+            else go();
+          }}>Older</button>
+        </nav>
+      )}
+    </section>
+  );
+}
+
+function matches({ volume, results }: Row, search: string): boolean {
+  const text = search.trim().toLowerCase();
+  if (!text) return true;
+  const labels = Object.entries(volume.labels).map(([name, value]) => `${name}:${value}`);
+  const all = [nameOf(volume), volume.id, volume.external_id ?? "", volume.format, study(volume), ...labels, ...results.map(result => result.id)];
+  return all.some(word => word.toLowerCase().includes(text));
+}
+
+function passes(row: Row, show: Show): boolean {
+  switch (show) {
+    case "fits": return row.results.some(result => isFit(result.id));
+    case "models": return row.results.some(result => !isFit(result.id));
+    case "nothing": return row.results.length === 0;
+    case "failed": return row.open.some(job => job.state === "failed");
+    case "all": return true;
+  }
+}
+
+const COMPARE: Record<Order, (a: Row, b: Row) => number> = {
+  newest: (a, b) => b.volume.created_at.localeCompare(a.volume.created_at),
+  name: (a, b) => nameOf(a.volume).localeCompare(nameOf(b.volume), undefined, { numeric: true }),
+  largest: (a, b) => b.volume.bytes - a.volume.bytes,
+};
+
+function ScanRow({ row: { volume, results, open: openJobs } }: { row: Row }) {
+  const [problem, setProblem] = useState("");
+  const name = nameOf(volume);
+  const labels = Object.entries(volume.labels).filter(([label]) => label !== "name");
+  const start = (kind: "model" | "segmentation") => () => {
+    setProblem("");
+    file(kind, volume, {}).then(put, error => setProblem(words(error)));
+  };
+  return (
+    <li class="scan">
+      <a class="thumb" href={`#/scan/${volume.id}`} tabIndex={-1} aria-hidden="true"><Picture path={volume.links.preview} label="" /></a>
+      <div class="what">
+        <a class="name" href={`#/scan/${volume.id}`}>{name}</a>
+        {study(volume) && <span>{study(volume)}</span>}
+        <span class="quiet">
+          {moment(volume.created_at)} · {bytes(volume.bytes)} · {volume.format} · {shape(volume)}
+          {isLabelMap(volume) && " · label map"}
+          {volume.legal_hold ? " · on legal hold" : ""}
+        </span>
+        {labels.length > 0 && <span class="labels">{labels.map(([label, value]) => <span key={label}>{label}: {value}</span>)}</span>}
+        {volume.warnings.length > 0 && <span class="warning">{volume.warnings.join(" ")}</span>}
+      </div>
+      <div class="results">
+        {openJobs.map(job => <JobLine key={job.id} job={job} />)}
+        {results.slice(0, 4).map(result => (
+          <a key={result.id} class="result" href={`#/scan/${volume.id}/${result.id}`}>
+            <b>{resultName(result)}</b> {figures(result)}
+          </a>
+        ))}
+        {results.length > 4 && <a class="result" href={`#/scan/${volume.id}`}>and {results.length - 4} more</a>}
+        {results.length === 0 && !openJobs.some(isActive) && <span class="quiet">no result yet</span>}
+        {problem && <span class="error">{problem}</span>}
+      </div>
+      <div class="actions">
+        <button type="button" onClick={start("segmentation")} aria-label={`Fit the ventricle of ${name}`}>Fit</button>
+        <button type="button" onClick={start("model")} aria-label={`Make a model of ${name}`}>Model</button>
+        <Confirm label={`Erase ${name}`} question="Erase the scan and all that was made of it?" act={() => eraseVolume(volume.id)}>Erase</Confirm>
+      </div>
+    </li>
+  );
+}
+
+function figures(result: Result) {
+  const { summary } = result;
+  if (!isFit(result.id)) return <span>distance {number(summary["distance_mean_mm"], 2, "mm")}</span>;
+  const volumesMl = summary["volumes_ml"] as { wall: number; cavity: number } | undefined;
+  const flags = (summary["flags"] as unknown[] | undefined)?.length ?? 0;
+  return (
+    <>
+      <span>cavity {number(volumesMl?.cavity, 0, "ml")}, wall {number(volumesMl?.wall, 0, "ml")}</span>
+      {flags > 0 && <span>{" · "}</span>}
+      {flags > 0 && <span class="warning">{flags} {flags === 1 ? "doubt" : "doubts"}</span>}
+    </>
+  );
+}

@@ -1,0 +1,361 @@
+// The page in a browser, as a person uses it. Run by scripts/check_page.sh, which sets PROGRAM, SCREENSHOTS and CHROMIUM.
+//
+// Every view is looked at by axe-core; anything that the console reports, that the policy forbids, or that leaves this
+// machine fails the check.
+
+import { spawn, spawnSync } from "node:child_process";
+import { createRequire } from "node:module";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import assert from "node:assert/strict";
+import { chromium } from "playwright-core";
+import { nm } from "./nm.mjs";
+
+const { PROGRAM, SCREENSHOTS, CHROMIUM } = process.env;
+const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+const SCAN = join(SCREENSHOTS, "phantom/spect.nii.gz");
+const TRUTH = join(SCREENSHOTS, "phantom/lv_truth.nii.gz");
+const PATIENCE = 120_000;
+
+let [passed, failed] = [0, 0];
+const ends = [];
+
+/** Starts a service with a data folder of its own; returns its address and folder. */
+async function service(...flags) {
+  const data = mkdtempSync(join(tmpdir(), "page-"));
+  const child = spawn(PROGRAM, ["serve", "--listen", "127.0.0.1:0", "--data-dir", join(data, "data"), ...flags]);
+  const stopped = new Promise(done => child.on("exit", done));
+  const stop = async () => {
+    child.kill();
+    await stopped;
+  };
+  ends.push(async () => {
+    await stop();
+    rmSync(data, { recursive: true, force: true });
+  });
+  const address = await new Promise((found, fail) => {
+    let log = "";
+    const read = chunk => {
+      log += chunk;
+      const match = /http:\/\/127[0-9.:]+/.exec(log);
+      if (match) found(match[0]);
+    };
+    child.stdout.on("data", read);
+    child.stderr.on("data", read);
+    child.on("exit", () => fail(new Error(log)));
+  });
+  return { address, data: join(data, "data"), stop };
+}
+
+/** A tab that fails the check if anything is wrong behind the view. */
+async function tab(browser, address, { width = 1280, dark = false, expected = [], script } = {}) {
+  const context = await browser.newContext({
+    viewport: { width, height: width > 600 ? 800 : 850 },
+    colorScheme: dark ? "dark" : "light",
+    hasTouch: width < 600,
+    acceptDownloads: true,
+  });
+  const page = await context.newPage();
+  page.setDefaultTimeout(PATIENCE);
+  const faults = [];
+  // The software renderer of this browser reports its own slowness.
+  const usual = [/GL Driver Message/, /software WebGL/, ...expected];
+  page.on("console", message => {
+    if (["error", "warning"].includes(message.type()) && !usual.some(words => words.test(message.text()))) faults.push(`console: ${message.text()}`);
+  });
+  page.on("pageerror", error => faults.push(`error: ${error.stack}`));
+  page.on("request", request => {
+    const url = request.url();
+    if (!url.startsWith(new URL(address).origin) && !/^(blob|data):/.test(url)) faults.push(`leaves the host: ${url}`);
+  });
+  await page.addInitScript(() => document.addEventListener("securitypolicyviolation", event => console.error("policy", event.violatedDirective, event.blockedURI)));
+  if (script) await page.addInitScript(script);
+  await page.goto(address);
+  return { page, faults, close: () => context.close() };
+}
+
+/** axe finds nothing, nothing sticks out to the right; the picture is kept. */
+async function look(page, name) {
+  await page.waitForTimeout(150);
+  await page.screenshot({ path: join(SCREENSHOTS, `${name}.png`), fullPage: true });
+  const wider = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+  assert.ok(wider <= 0, `${name}: ${wider} px wider than the window`);
+  // axe runs in a world of its own, so the policy of the page does not apply to it.
+  const session = await page.context().newCDPSession(page);
+  const { frameTree } = await session.send("Page.getFrameTree");
+  const { executionContextId } = await session.send("Page.createIsolatedWorld", { frameId: frameTree.frame.id });
+  const run = async expression => {
+    const { result, exceptionDetails } = await session.send("Runtime.evaluate", { contextId: executionContextId, expression, awaitPromise: true, returnByValue: true });
+    if (exceptionDetails) throw new Error(exceptionDetails.exception?.description ?? exceptionDetails.text);
+    return result.value;
+  };
+  await run(AXE);
+  const text = await run("axe.run().then(r => JSON.stringify(r.violations.map(v => [v.id, v.nodes.slice(0, 3).map(n => n.html.slice(0, 160))])))");
+  assert.deepEqual(JSON.parse(text), [], name);
+  await session.detach();
+}
+
+/** Checks whose name holds the first argument, if there is one. */
+async function check(name, act) {
+  if (process.argv[2] && !name.includes(process.argv[2])) return;
+  const start = Date.now();
+  try {
+    await act();
+    passed++;
+    console.log(`ok: ${name} (${((Date.now() - start) / 1000).toFixed(1)} s)`);
+  } catch (error) {
+    failed++;
+    console.log(`FAILED: ${name}\n${error.stack}`);
+  }
+}
+
+const choose = (page, ...files) => page.setInputFiles("input[aria-label='Files of scans']", files);
+/** Opens the list, with a fitted scan on it. */
+const filled = async (page, address) => {
+  await page.waitForSelector(".drop");
+  await choose(page, SCAN);
+  await drawn(page);
+  await page.goto(`${address}/#/`);
+  await page.waitForSelector(".scan .result");
+};
+/** The views of a fit are drawn. */
+const drawn = page => page.waitForSelector(".polar canvas");
+
+async function main() {
+  const browser = await chromium.launch({ executablePath: CHROMIUM, args: ["--no-sandbox", "--enable-unsafe-swiftshader"] });
+  ends.push(() => browser.close());
+  const { address } = await service();
+
+  await check("the first view is small", async () => {
+    const { page, faults, close } = await tab(browser, address);
+    await page.waitForSelector(".welcome");
+    const sizes = await page.evaluate(() => performance.getEntriesByType("resource").concat(performance.getEntriesByType("navigation")).map(entry => [entry.name, entry.encodedBodySize]));
+    const whole = sizes.filter(([name]) => !name.includes("/v1/")).reduce((sum, [, size]) => sum + size, 0);
+    console.log(`  first view: ${whole} bytes, ${await page.evaluate(() => Math.round(performance.getEntriesByName("first-contentful-paint")[0]?.startTime ?? 0))} ms to the first paint`);
+    assert.ok(whole > 5_000 && whole < 400_000, `${whole} bytes`);
+    assert.ok(!sizes.some(([name]) => name.includes("viewer")), "the viewer is loaded when it is needed");
+    await look(page, "empty-1280");
+    assert.deepEqual(faults, []);
+    await close();
+  });
+
+  for (const [width, dark] of [[1280, false], [1280, true], [400, false], [400, true]]) {
+    const name = `${width}-${dark ? "dark" : "light"}`;
+    await check(`upload, model, view, fit, correct, compare, download at ${name}`, async () => {
+      // The browser reports the answer to the parameter that is out of range.
+      const { page, faults, close } = await tab(browser, address, { width, dark, expected: [/status of 422/] });
+      // A newcomer: one choice of files leads to a fitted ventricle on the screen.
+      await page.waitForSelector(".drop");
+      await choose(page, SCAN);
+      await drawn(page);
+      await page.waitForSelector(".wall canvas");
+      await look(page, `fit-${name}`);
+      assert.match(await page.textContent(".figures"), /Cavity\s*\d+.ml/);
+
+      // Through the slices by keys; the polar map follows.
+      const slice = page.locator(".slice canvas").first();
+      await slice.focus();
+      const before = await slice.getAttribute("aria-valuenow");
+      for (let n = 0; n < 4; n++) await page.keyboard.press("PageUp");
+      await page.waitForFunction(([old]) => document.querySelector(".slice canvas").getAttribute("aria-valuenow") !== old, [before]);
+      await page.getByRole("button", { name: "Patient" }).click();
+      await look(page, `patient-${name}`);
+      await page.getByRole("button", { name: "Heart" }).click();
+
+      // A click on the polar map takes the cursor to the wall.
+      const map = page.locator(".polar canvas").first();
+      const box = await map.boundingBox();
+      await map.click({ position: { x: box.width * 0.5, y: box.height * 0.2 } });
+      await page.waitForFunction(() => /anterior/.test(document.querySelector(".polar .at").textContent));
+
+      // A model of the same scan, and a parameter that is out of range.
+      await page.getByRole("button", { name: "New fit or model" }).click();
+      await page.getByRole("button", { name: "Surface model" }).click();
+      await page.waitForSelector("#parameter-points");
+      await page.fill("#parameter-points", "5");
+      await page.getByRole("button", { name: "Make the model" }).click();
+      await page.waitForSelector("#parameter-points-error");
+      await page.locator(".parameters > details > summary").click();
+      await look(page, `parameters-${name}`);
+      await page.fill("#parameter-points", width === 400 ? "90" : "110");
+      await page.getByRole("button", { name: "Make the model" }).click();
+      await page.waitForFunction(() => /Hausdorff/.test(document.querySelector(".figures")?.textContent ?? ""));
+      await look(page, `model-${name}`);
+
+      // Back to the fit; put the heart elsewhere by a drag, and fit from there.
+      await page.locator(".choices .pick", { hasText: "Fit" }).first().click();
+      await drawn(page);
+      await page.getByRole("button", { name: "Correct by hand" }).click();
+      await page.waitForSelector(".correction");
+      const long = page.locator(".slice canvas").nth(1);
+      await long.scrollIntoViewIfNeeded();
+      const place = await long.boundingBox();
+      const scale = Math.min(place.width, place.height) / 140;
+      await page.waitForTimeout(300);
+      const centre = await page.evaluate(() => document.querySelector(".correction input").value);
+      const top = [place.x + place.width / 2, place.y + place.height / 2 - 33 * scale];
+      await page.mouse.move(...top);
+      await page.mouse.down();
+      await page.mouse.move(top[0] + 8, top[1] + 2, { steps: 4 });
+      await page.mouse.up();
+      await page.waitForFunction(old => document.querySelector(".correction input").value !== old, centre);
+      await page.locator(".correction label", { hasText: "Turn" }).locator("input").fill(width === 400 ? "10" : "5");
+      await look(page, `correct-${name}`);
+      await page.getByRole("button", { name: "Fit from here" }).click();
+      // The new fit is shown beside the one it came from.
+      await page.waitForSelector(".choices .other");
+      await page.waitForFunction(() => document.querySelectorAll(".figures thead th").length >= 2);
+      await page.waitForFunction(() => document.querySelectorAll(".polar").length === 2);
+      await page.locator(".layers label", { hasText: "difference" }).locator("input").check();
+      await look(page, `compare-${name}`);
+
+      const [zip] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "Everything as zip" }).click()]);
+      const bytes = readFileSync(await zip.path());
+      assert.equal(bytes.readUInt32LE(0), 0x04034b50);
+      writeFileSync(join(SCREENSHOTS, `result-${name}.zip`), bytes);
+      assert.equal(spawnSync("python3", ["-m", "zipfile", "-t", join(SCREENSHOTS, `result-${name}.zip`)]).status, 0, "the zip is sound");
+      await page.getByRole("button", { name: "Screenshot" }).click();
+      await page.goto(`${address}/#/`);
+      await page.waitForSelector(".scan");
+      await look(page, `list-${name}`);
+      assert.deepEqual(faults, []);
+      await close();
+    });
+  }
+
+  await check("the documentation of the API", async () => {
+    for (const [width, dark] of [[1280, false], [400, true]]) {
+      const { page, faults, close } = await tab(browser, `${address}/docs`, { width, dark });
+      await page.waitForSelector(".operation");
+      await page.fill("input[type=search]", "volumes");
+      await page.locator(".operation summary").first().click();
+      await page.locator(".operation", { hasText: "Upload a volume" }).locator("summary").first().click();
+      await page.getByRole("button", { name: "Send" }).first().click();
+      await page.waitForFunction(() => /next_cursor|"volumes"/.test(document.querySelector("pre[aria-label=Answer]")?.textContent ?? ""));
+      await look(page, `docs-${width}`);
+      assert.deepEqual(faults, []);
+      await close();
+    }
+  });
+
+  await check("an expert's mask is measured against, and the list is searched", async () => {
+    const { page, faults, close } = await tab(browser, address);
+    await filled(page, address);
+    await choose(page, TRUTH);
+    await page.waitForFunction(() => document.querySelectorAll(".uploads .stored").length === 2);
+    await page.fill("input[type=search]", "spect");
+    await page.waitForFunction(() => document.querySelectorAll(".scan").length === 1);
+    await page.locator(".scan .name").click();
+    await drawn(page);
+    await page.getByRole("button", { name: "New fit or model" }).click();
+    await page.waitForSelector("#parameter-expert");
+    await page.selectOption("#parameter-expert", { index: 1 });
+    await page.getByRole("button", { name: "Fit", exact: true }).click();
+    await page.waitForFunction(() => /Jaccard/.test(document.querySelector(".figures")?.textContent ?? ""));
+    await look(page, "expert-1280");
+    assert.deepEqual(faults, []);
+    await close();
+  });
+
+  await check("a DICOM NM file is read, named and fitted", async () => {
+    const file = join(SCREENSHOTS, "spect.dcm");
+    writeFileSync(file, nm(readFileSync(SCAN), "Phantom^Fritz"));
+    const { page, faults, close } = await tab(browser, address);
+    await page.waitForSelector(".drop");
+    await choose(page, file);
+    await drawn(page);
+    await page.waitForSelector(".wall canvas");
+    await look(page, "dicom-1280");
+    await page.goto(`${address}/#/`);
+    await page.waitForFunction(() => /Phantom Fritz/.test(document.querySelector(".scans")?.textContent ?? ""));
+    assert.deepEqual(faults, []);
+    await close();
+  });
+
+  await check("bad files are named with what is wrong, and nothing is lost", async () => {
+    const { page, faults, close } = await tab(browser, address, { expected: [/status of 4\d\d/] });
+    const text = join(SCREENSHOTS, "notes.txt");
+    writeFileSync(text, "not a scan\n".repeat(50));
+    await page.waitForSelector(".drop");
+    await choose(page, text, SCAN);
+    await page.waitForSelector(".uploads .refused .error strong");
+    await page.waitForSelector(".uploads .stored");
+    await look(page, "refused-1280");
+    assert.deepEqual(faults, []);
+    await close();
+  });
+
+  await check("a file over the limit and a lost connection", async () => {
+    const small = await service("--body-limit", "1MiB");
+    const { page, close } = await tab(browser, small.address, { expected: [/.*/] });
+    await page.waitForSelector(".welcome");
+    await choose(page, SCAN);
+    await page.waitForSelector(".uploads .refused, .uploads .interrupted");
+    await look(page, "too-large-1280");
+    await choose(page, TRUTH);
+    await page.waitForSelector(".uploads .stored");
+    await small.stop();
+    await choose(page, TRUTH);
+    await page.waitForSelector(".uploads .interrupted");
+    assert.ok(await page.locator(".uploads .interrupted", { hasText: "lv_truth" }).getByRole("button", { name: "Send again" }).isVisible());
+    await look(page, "lost-1280");
+    await close();
+  });
+
+  await check("a key is asked for, and again when it has expired", async () => {
+    const closed = await service();
+    const keys = (...words) => spawnSync(PROGRAM, ["keys", ...words, "--data-dir", closed.data], { encoding: "utf8" }).stdout;
+    const make = name => /vf_\S+|[A-Za-z0-9_-]{30,}/.exec(keys("create", "--name", name, "--scope", "submit"))[0];
+    const first = make("first");
+    const { page, close } = await tab(browser, closed.address, { expected: [/401/] });
+    await page.waitForSelector(".sign-in");
+    await look(page, "sign-in-1280");
+    await page.fill(".sign-in input", first);
+    await page.keyboard.press("Enter");
+    await page.waitForSelector(".welcome");
+    await choose(page, SCAN);
+    await drawn(page);
+    const second = make("second");
+    const id = /\b[0-9a-f]{16}\b(?=[^\n]*first)/.exec(keys("list"))[0];
+    keys("revoke", id);
+    await page.waitForTimeout(1500);
+    await page.getByRole("button", { name: "New fit or model" }).click();
+    await page.selectOption("#parameter-edge", "anatomical");
+    await page.getByRole("button", { name: "Fit", exact: true }).click();
+    await page.waitForSelector(".sign-in");
+    await page.fill(".sign-in input", second);
+    await page.keyboard.press("Enter");
+    // The order that was refused goes on by itself.
+    await page.waitForFunction(() => document.querySelectorAll(".choices li").length === 2);
+    await close();
+  });
+
+  await check("without WebGL, slices and polar map work and the page says what is off", async () => {
+    const script = () => {
+      const get = HTMLCanvasElement.prototype.getContext;
+      HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+        return kind.startsWith("webgl") ? null : get.call(this, kind, ...rest);
+      };
+    };
+    const { page, faults, close } = await tab(browser, address, { script });
+    await filled(page, address);
+    await page.locator(".scan .result", { hasText: "Fit" }).first().click();
+    await drawn(page);
+    await page.waitForSelector(".off");
+    assert.match(await page.textContent(".off"), /WebGL/);
+    await look(page, "no-webgl-1280");
+    assert.deepEqual(faults, []);
+    await close();
+  });
+}
+
+try {
+  await main();
+} catch (error) {
+  failed++;
+  console.log(error.stack);
+}
+for (const end of ends.reverse()) await end();
+console.log(`${passed} passed, ${failed} failed`);
+process.exit(failed ? 1 : 0);
