@@ -5,6 +5,7 @@
 #   scripts/test.sh            everything
 #   scripts/test.sh --quick    without the demo and the external checks (trimesh, vtk, glTF validator,
 #                              pygeodesic, schemathesis, the page in a browser, generated clients, kills, DICOM, licences and SBOM)
+#                              pygeodesic, schemathesis, generated clients, kills, DICOM, Orthanc, licences and SBOM)
 set -uo pipefail
 cd "$(dirname "$0")/.."
 
@@ -123,6 +124,7 @@ if wait "${running[install]}"; then
   start crashes "$PYTHON" scripts/crash_rounds.py --program target/debug/ventriform --rounds 10
   start dicom scripts/check_dicom.sh
   start intake scripts/check_intake.sh
+  start pacs scripts/check_pacs.sh
   start dependencies "$PYTHON" scripts/dependencies.py check
   collect formats "formats read by trimesh, vtk and the glTF validator"
   collect geodesics "geodesics against pygeodesic"
@@ -132,6 +134,7 @@ if wait "${running[install]}"; then
   collect crashes "ten kills at random moments"
   collect dicom "DICOM objects read by dciodvfy, highdicom and dcmqi"
   collect intake "images received from dcmtk, pynetdicom and dicomweb-client"
+  collect pacs "series fetched from Orthanc, objects delivered to it"
   collect dependencies "licences, sources and bill of materials"
 else
   cat "$tools/install.log"

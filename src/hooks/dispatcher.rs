@@ -1,30 +1,18 @@
-//! Sends what is due: reads the table, starts attempts within the limits, writes down how they
-//! ended.
-//!
-//! The table is the queue, so nothing is lost with the process: what was on the way when it ended
-//! is sent again under the same id. In memory there are only the deliveries on the way, whose
-//! number is limited.
+//! Sends webhooks that are due, and writes down how that ended.
 
+use super::rounds::random_share;
 use super::schedule::milliseconds;
 use super::{
-    AttemptOutcome, DeliveryLimits, DeliveryStore, DueDelivery, Lanes, RetrySchedule, Sender,
-    Settlement, SigningSecret, UrlGuard,
+    AttemptEnd, AttemptOutcome, DeliveryLimits, DeliveryStore, DueDelivery, Errands, Lanes,
+    RetrySchedule, Rounds, Sender, Settlement, SigningSecret, UrlGuard,
 };
-use crate::jobs::{Clock, Job, JobState, StoreResult};
+use crate::jobs::{Clock, Job, JobState, StoreResult, Timestamp};
+use async_trait::async_trait;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
-use tokio::sync::Notify;
-use tokio::sync::broadcast::{self, error::RecvError};
-use tokio::task::JoinSet;
-use tokio::time::Instant;
+use tokio::sync::{Notify, broadcast};
 use tokio_util::sync::CancellationToken;
-
-/// The table is read at least this often.
-const IDLE: Duration = Duration::from_secs(5);
-
-/// How often what is too old is given up or deleted.
-const EXPIRE_EVERY: Duration = Duration::from_secs(30);
 
 /// How webhooks are sent.
 #[derive(Debug, Clone, Copy)]
@@ -73,15 +61,7 @@ pub struct Dispatcher {
     sender: Sender,
     settings: HookSettings,
     counts: DeliveryCounts,
-    woken: Notify,
-}
-
-/// An attempt that has ended.
-struct Ended {
-    destination: String,
-    id: String,
-    /// `None` if the attempt could not be made or written down because the database failed.
-    outcome: Option<(AttemptOutcome, Option<Duration>)>,
+    woken: Arc<Notify>,
 }
 
 impl Dispatcher {
@@ -98,7 +78,7 @@ impl Dispatcher {
             sender: Sender::new(guard, settings.attempt_limit),
             settings,
             counts: DeliveryCounts::default(),
-            woken: Notify::new(),
+            woken: Arc::default(),
         }
     }
 
@@ -115,104 +95,22 @@ impl Dispatcher {
     /// Sends what is due until `end`; then attempts on the way get `grace`.
     pub async fn run(
         self: Arc<Self>,
-        mut changes: broadcast::Receiver<Arc<Job>>,
+        changes: broadcast::Receiver<Arc<Job>>,
         end: CancellationToken,
         grace: Duration,
     ) {
-        let mut on_the_way = JoinSet::new();
-        let mut lanes = Lanes::new(
-            self.settings.places,
-            self.settings.per_destination,
-            self.settings.retries,
-        );
-        let mut expiry = tokio::time::interval_at(Instant::now() + EXPIRE_EVERY, EXPIRE_EVERY);
-        loop {
-            let pause = match self.send_due(&mut lanes, &mut on_the_way).await {
-                Ok(pause) => pause,
-                Err(error) => {
-                    tracing::error!(%error, "due webhooks could not be read; tried again");
-                    IDLE
-                }
-            };
-            let idle = tokio::time::sleep(pause);
-            tokio::pin!(idle);
-            loop {
-                tokio::select! {
-                    () = end.cancelled() => {
-                        let drained = async { while on_the_way.join_next().await.is_some() {} };
-                        // What is still on the way is sent again after the next start.
-                        let _ = tokio::time::timeout(grace, drained).await;
-                        return;
-                    }
-                    Some(ended) = on_the_way.join_next() => {
-                        if let Ok(ended) = ended {
-                            self.leave(&mut lanes, &ended);
-                        }
-                    }
-                    change = changes.recv() => match change {
-                        Ok(job) if !is_told(&job) => continue,
-                        Ok(_) | Err(RecvError::Lagged(_)) => {}
-                        Err(RecvError::Closed) => return,
-                    },
-                    _ = expiry.tick() => self.expire().await,
-                    () = self.woken.notified() => {}
-                    () = &mut idle => {}
-                }
-                break;
-            }
-        }
-    }
-
-    /// Starts the attempts that are due and have a place. Returns when to look again.
-    async fn send_due(
-        self: &Arc<Self>,
-        lanes: &mut Lanes,
-        on_the_way: &mut JoinSet<Ended>,
-    ) -> StoreResult<Duration> {
-        let pending = self.store.destinations().await?;
-        lanes.keep(&pending);
-        let now = self.clock.now();
-        let mut next = now.saturating_add(milliseconds(IDLE));
-        for (destination, due_at) in lanes.in_turn(pending) {
-            let room = lanes.room(&destination, now);
-            if due_at > now || room == 0 {
-                let rest = lanes.rests_until(&destination);
-                let when = due_at.max(rest);
-                if when > now {
-                    next = next.min(when);
-                }
-                continue;
-            }
-            let limit = room + lanes.busy(&destination);
-            let mut started = 0;
-            for delivery in self.store.due(&destination, now, limit).await? {
-                if started < room && lanes.enter(&destination, &delivery.id) {
-                    started += 1;
-                    on_the_way.spawn(self.clone().deliver(destination.clone(), delivery));
-                }
-            }
-        }
-        let pause = u64::try_from(next - now).unwrap_or(0).max(1);
-        Ok(Duration::from_millis(pause))
-    }
-
-    /// Makes one attempt and writes down how it ended.
-    async fn deliver(self: Arc<Self>, destination: String, delivery: DueDelivery) -> Ended {
-        let outcome = match self.attempt(&delivery).await {
-            Ok(outcome) => Some(outcome),
-            Err(error) => {
-                tracing::error!(delivery = %delivery.id, %error, "a webhook was not written down");
-                None
-            }
+        let settings = &self.settings;
+        let lanes = Lanes::new(settings.places, settings.per_destination, settings.retries);
+        let rounds = Rounds {
+            clock: self.clock.clone(),
+            woken: self.woken.clone(),
+            errands: self,
+            lanes,
         };
-        Ended {
-            destination,
-            id: delivery.id,
-            outcome,
-        }
+        rounds.run(changes, end, grace).await;
     }
 
-    async fn attempt(
+    async fn send(
         &self,
         delivery: &DueDelivery,
     ) -> StoreResult<(AttemptOutcome, Option<Duration>)> {
@@ -258,14 +156,38 @@ impl Dispatcher {
         let fresh = SigningSecret::random();
         self.store.signing_secret(&delivery.tenant, &fresh).await
     }
+}
 
-    fn leave(&self, lanes: &mut Lanes, ended: &Ended) {
-        let failed = match ended.outcome {
-            Some((AttemptOutcome::Delivered(_) | AttemptOutcome::Gone, _)) => None,
-            Some((_, asked)) => Some(asked),
-            None => Some(Some(IDLE)),
-        };
-        lanes.leave(&ended.destination, &ended.id, self.clock.now(), failed);
+#[async_trait]
+impl Errands for Dispatcher {
+    type Due = DueDelivery;
+
+    async fn destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
+        self.store.destinations().await
+    }
+
+    async fn due(
+        &self,
+        destination: &str,
+        now: Timestamp,
+        limit: usize,
+    ) -> StoreResult<Vec<DueDelivery>> {
+        self.store.due(destination, now, limit).await
+    }
+
+    fn id(due: &DueDelivery) -> &str {
+        &due.id
+    }
+
+    async fn attempt(&self, delivery: DueDelivery) -> AttemptEnd {
+        match self.send(&delivery).await {
+            Ok((AttemptOutcome::Delivered(_) | AttemptOutcome::Gone, _)) => AttemptEnd::Fine,
+            Ok((_, asked)) => AttemptEnd::Failing(asked),
+            Err(error) => {
+                tracing::error!(delivery = %delivery.id, %error, "a webhook was not written down");
+                AttemptEnd::NotWritten
+            }
+        }
     }
 
     async fn expire(&self) {
@@ -287,15 +209,9 @@ impl Dispatcher {
             Err(error) => tracing::error!(%error, "old webhooks could not be deleted"),
         }
     }
-}
 
-/// Whether a change of a job may have made deliveries.
-fn is_told(job: &Job) -> bool {
-    job.state.is_final() || (job.state == JobState::Running && job.stage.is_none())
-}
-
-/// A random number from 0 to 1.
-fn random_share() -> f64 {
-    let bits = uuid::Uuid::new_v4().as_u128() as u32;
-    f64::from(bits) / f64::from(u32::MAX)
+    /// Every end of a job, and every start.
+    fn concerns(&self, job: &Job) -> bool {
+        job.state.is_final() || (job.state == JobState::Running && job.stage.is_none())
+    }
 }

@@ -127,9 +127,12 @@ pub struct UrlRefusal(pub &'static str);
 
 /// A URL that may be told, and the addresses to which it leads.
 #[derive(Debug, Clone)]
-pub(super) struct CheckedUrl {
+pub struct CheckedUrl {
+    /// The URL.
     pub url: Url,
+    /// Its host.
     pub host: String,
+    /// The addresses that were checked.
     pub addresses: Vec<SocketAddr>,
 }
 
@@ -180,7 +183,10 @@ impl UrlGuard {
     }
 
     /// Checks a URL and resolves its host.
-    pub(super) async fn resolve(&self, text: &str) -> Result<CheckedUrl, UrlRefusal> {
+    ///
+    /// # Errors
+    /// Why it may not be told.
+    pub async fn resolve(&self, text: &str) -> Result<CheckedUrl, UrlRefusal> {
         if text.len() > LONGEST_URL {
             return Err(UrlRefusal("The URL is longer than 2048 bytes."));
         }
@@ -254,13 +260,13 @@ async fn resolve_host(host: &str, port: u16) -> Result<Vec<SocketAddr>, UrlRefus
 
 /// The resolver of the HTTP client: it knows only names that were checked, while they are pinned.
 #[derive(Debug, Clone, Default)]
-pub(super) struct PinnedNames(Arc<Mutex<BTreeMap<String, PinnedAddresses>>>);
+pub struct PinnedNames(Arc<Mutex<BTreeMap<String, PinnedAddresses>>>);
 
 /// How often a name is pinned, and the addresses that were checked.
 type PinnedAddresses = (usize, Vec<SocketAddr>);
 
 /// Keeps a name pinned.
-pub(super) struct Pin {
+pub struct Pin {
     names: PinnedNames,
     host: String,
 }

@@ -28,6 +28,7 @@
 //! | `record` | deliveries and endpoints, the trait that a database implements |
 //! | `schedule`, `lanes` | when to try again, and whose turn it is |
 //! | `sender`, `outcome`, `dispatcher` | one attempt and how it ends; all of them |
+//! | `rounds` | the loop over a table of what is due; that of [`crate::archive`] too |
 
 mod dispatcher;
 mod event;
@@ -36,13 +37,14 @@ mod lanes;
 mod message;
 mod outcome;
 mod record;
+mod rounds;
 mod schedule;
 mod secret;
 mod sender;
 
 pub use dispatcher::{DeliveryCounts, Dispatcher, HookSettings};
 pub use event::HookEvent;
-pub use guard::{AllowList, UrlGuard, UrlRefusal};
+pub use guard::{AllowList, CheckedUrl, Pin, PinnedNames, UrlGuard, UrlRefusal};
 pub use lanes::Lanes;
 pub use message::message_body;
 pub use outcome::AttemptOutcome;
@@ -50,6 +52,7 @@ pub use record::{
     Backlog, Delivery, DeliveryLimits, DeliveryState, DeliveryStore, DueDelivery, HookEndpoint,
     Settlement,
 };
+pub use rounds::{AttemptEnd, Errands, Rounds, random_share};
 pub use schedule::RetrySchedule;
 pub use secret::{InvalidSecret, SigningSecret, signature_header};
-pub use sender::Sender;
+pub use sender::{Sender, retry_after};

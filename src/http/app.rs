@@ -1,7 +1,7 @@
 //! The state that all handlers share.
 
+use super::archives::ArchiveDesk;
 use super::decoding::Decoding;
-use super::exchange::Exchange;
 use super::guard::state::Guard;
 use super::hooks::Hooks;
 use super::intake::Intake;
@@ -58,7 +58,7 @@ pub struct Shared {
     /// Telling other programs about jobs.
     pub hooks: Hooks,
     /// Archives.
-    pub exchange: Exchange,
+    pub archives: ArchiveDesk,
     /// Receiving objects from other systems.
     pub intake: Intake,
     /// Figures for operators.
@@ -88,7 +88,7 @@ impl App {
         engine: Engine,
         (access, worklist, guard): (Arc<dyn AccessStore>, Arc<dyn Worklist>, Guard),
         settings: Settings,
-        (hooks, exchange, intake): (Hooks, Exchange, Intake),
+        (hooks, archives, intake): (Hooks, ArchiveDesk, Intake),
         watching: Watching,
         closing: CancellationToken,
     ) -> Self {
@@ -105,7 +105,7 @@ impl App {
             streams: EventStreams::new(&settings),
             settings,
             hooks,
-            exchange,
+            archives,
             intake,
             closing,
             metrics: watching.metrics,

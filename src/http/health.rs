@@ -68,6 +68,7 @@ pub async fn metrics(State(app): State<App>, RawQuery(query): RawQuery) -> Answe
         received: app.intake.store.waiting().await?,
         backlog: app.hooks.store.backlog().await?,
         sent: app.hooks.dispatcher.counts(),
+        archives: app.archives.read().await?,
         ready: app.readiness.check(&app.queue).await.is_ok(),
         space: app.queue.blobs.space(),
         settings: &app.settings,

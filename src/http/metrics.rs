@@ -4,6 +4,7 @@
 //! Names follow Prometheus: base units, `_total` for counters. Every label has a fixed set of
 //! values: the pattern of a path and never the path, the code of a failure and never its text.
 
+use super::archives::ArchiveReadings;
 use crate::config::Settings;
 use crate::hooks::{Backlog, DeliveryCounts};
 use crate::intake::{AssociationEnd, IntakeObserver, Protocol};
@@ -141,6 +142,12 @@ struct Gauges {
     oldest_hook: Gauge,
     received_waiting: IntGauge,
     received_waiting_bytes: IntGauge,
+    fetches: IntCounterVec,
+    fetches_pending: IntGauge,
+    deliveries: IntCounterVec,
+    deliveries_pending: IntGauge,
+    deliveries_dead: IntGauge,
+    oldest_delivery: Gauge,
 }
 
 /// Makes metrics and registers them.
@@ -241,6 +248,8 @@ pub struct MetricReadings<'a> {
     pub backlog: Backlog,
     /// Webhooks that were sent.
     pub sent: &'a DeliveryCounts,
+    /// Archives.
+    pub archives: ArchiveReadings<'a>,
     /// Whether the storage works.
     pub ready: bool,
     /// The space of the disk, where it is known.
@@ -433,6 +442,32 @@ impl Gauges {
                 "ventriform_received_waiting_bytes",
                 "Bytes of received objects that are not part of a volume.",
             )?,
+            fetches: make.counters(
+                "ventriform_archive_fetches_total",
+                "Attempts to fetch a series from an archive, by how they ended.",
+                &["outcome"],
+            )?,
+            fetches_pending: make.whole(
+                "ventriform_archive_fetches_pending",
+                "Jobs that wait for a series from an archive.",
+            )?,
+            deliveries: make.counters(
+                "ventriform_archive_deliveries_total",
+                "Attempts to deliver an object to an archive, by how they ended.",
+                &["outcome"],
+            )?,
+            deliveries_pending: make.whole(
+                "ventriform_archive_deliveries_pending",
+                "Objects that are to be delivered to an archive.",
+            )?,
+            deliveries_dead: make.whole(
+                "ventriform_archive_deliveries_dead",
+                "Objects whose delivery to an archive was given up.",
+            )?,
+            oldest_delivery: make.gauge(
+                "ventriform_oldest_archive_delivery_age_seconds",
+                "Age of the oldest pending delivery to an archive; 0 if none is pending.",
+            )?,
         })
     }
 
@@ -475,6 +510,18 @@ impl Gauges {
         let (objects, bytes) = reading.received;
         self.received_waiting.set(signed(objects));
         self.received_waiting_bytes.set(signed(bytes));
+        let archives = &reading.archives;
+        for (outcome, count) in archives.pulls.all() {
+            raise(&self.fetches.with_label_values(&[outcome]), count);
+        }
+        for (outcome, count) in archives.sends.all() {
+            raise(&self.deliveries.with_label_values(&[outcome]), count);
+        }
+        self.fetches_pending.set(signed(archives.backlog.pulls));
+        let sends = archives.backlog.sends;
+        self.deliveries_pending.set(signed(sends.pending));
+        self.deliveries_dead.set(signed(sends.dead));
+        self.oldest_delivery.set(age(sends.oldest));
     }
 }
 

@@ -31,6 +31,7 @@
 //! setting `allow_anonymous`, it admits everybody; see `docs/security.md`.
 
 mod app;
+mod archives;
 mod audit;
 pub mod caller;
 mod client;

@@ -1,10 +1,11 @@
 //! Starting the service from its settings, and shutting it down.
 
 use super::app::{App, Watching, retention_ages};
+use super::archives::ArchiveDesk;
 use super::connections::tls::{Tls, TlsError};
 use super::connections::{self, ConnectionLimits};
 use super::cryptography::install_cryptography;
-use super::exchange::Exchange;
+use super::exchange;
 use super::guard::hosts::HostPolicy;
 use super::guard::state::Guard;
 use super::hooks::Hooks;
@@ -94,6 +95,7 @@ pub struct Running {
     dicom_address: Option<SocketAddr>,
     workers: Workers,
     dispatcher: JoinHandle<()>,
+    exchange: JoinHandle<()>,
     spans: Spans,
     closing: CancellationToken,
     grace: Duration,
@@ -162,7 +164,11 @@ pub async fn start(
         engine.clone(),
         (store.rows.clone(), store.rows.clone(), guard),
         settings.clone(),
-        (hooks, exchange(&settings), intake),
+        (
+            hooks,
+            ArchiveDesk::new(&settings, store.rows.clone()),
+            intake,
+        ),
         watching,
         closing.clone(),
     );
@@ -205,6 +211,7 @@ pub async fn start(
     tokio::spawn(gatherer(&app).run(closing.clone()));
     let dicom_address = dicom.as_ref().map(|dicom| dicom.address);
     let dicom = dicom.map(|dicom| serve_dicom(&app, dicom)).transpose()?;
+    let exchange = tokio::spawn(exchange::run(app.clone(), closing.clone()));
     let workers = Workers::start(&queue, &engine.works, workers)?;
     tracing::info!(%address, "listening");
     Ok(Running {
@@ -216,6 +223,7 @@ pub async fn start(
         dicom_address,
         workers,
         dispatcher,
+        exchange,
         spans,
         closing,
         grace: settings.shutdown_grace.0,
@@ -252,11 +260,12 @@ impl Running {
                 None => Ok(()),
             }
         };
-        let (server, dicom, (), dispatcher) = tokio::join!(
+        let (server, dicom, (), dispatcher, exchange) = tokio::join!(
             self.server,
             dicom,
             self.workers.stop(self.grace),
-            self.dispatcher
+            self.dispatcher,
+            self.exchange
         );
         self.app.guard.recorder.flush().await;
         self.spans.flush().await;
@@ -264,6 +273,7 @@ impl Running {
         server
             .and(dicom)
             .and(dispatcher)
+            .and(exchange)
             .map_err(io::Error::other)?;
         Ok(())
     }
@@ -470,12 +480,6 @@ fn hooks(settings: &Settings, store: &Store, queue: &Queue) -> Hooks {
         store: store.rows.clone(),
         guard,
         dispatcher: Arc::new(dispatcher),
-    }
-}
-
-fn exchange(settings: &Settings) -> Exchange {
-    Exchange {
-        guard: UrlGuard::of_listed(settings.dicomweb_allow.clone()),
     }
 }
 

@@ -6,13 +6,13 @@
 use super::app::App;
 use super::caller::Caller;
 use super::given_webhook::GivenWebhook;
-use super::jobs;
+use super::jobs::{self, ObjectDeliveryBody};
 use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
 use super::problem::{Answer, Problem, shorten};
 use super::request::{PathSegments, json_object, query_pairs, refuse_unknown};
 use super::wire::rfc3339;
 use crate::hooks::{Delivery, HookEndpoint, SigningSecret};
-use crate::jobs::random_id;
+use crate::jobs::{Timestamp, random_id};
 use axum::Json;
 use axum::extract::{RawQuery, Request, State};
 use axum::http::{StatusCode, header};
@@ -26,6 +26,9 @@ const SECRET_OVERLAP: Duration = Duration::from_secs(24 * 3600);
 
 /// Most deliveries in one answer.
 const MOST_DELIVERIES: u32 = 100;
+
+/// What ids of deliveries to archives begin with.
+const OBJECT_PREFIX: &str = "snd_";
 
 /// A registered receiver.
 #[derive(Serialize, ToSchema)]
@@ -288,14 +291,27 @@ pub async fn list_deliveries(
     Ok(Json(DeliveryList { deliveries }))
 }
 
+/// A delivery that is tried again.
+#[derive(Serialize, ToSchema)]
+#[schema(as = Redelivered)]
+#[serde(untagged)]
+pub enum RedeliveredBody {
+    /// A message.
+    Message(DeliveryBody),
+    /// A DICOM object.
+    Object(ObjectDeliveryBody),
+}
+
 /// Deliver again
 ///
 /// A delivery that has ended is tried again at once, with the same id and content. One that is
-/// pending stays as it is.
+/// pending stays as it is. Takes the id of a webhook delivery (`msg_...`), or of a DICOM object on
+/// its way to an archive (`snd_...`, in the job's `deliveries`).
 #[utoipa::path(post, path = "/v1/jobs/{id}/deliveries/{delivery}/redeliver", tag = "webhooks",
     params(("id" = String, Path, description = "The job's id"),
         ("delivery" = String, Path, description = "The delivery's id")),
-    responses((status = 202, description = "It will be tried", body = DeliveryBody), LookupProblems))]
+    responses((status = 202, description = "It will be tried", body = RedeliveredBody),
+        LookupProblems))]
 pub async fn redeliver(
     State(app): State<App>,
     caller: Caller,
@@ -304,12 +320,30 @@ pub async fn redeliver(
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let now = app.queue.clock.now();
+    if delivery.starts_with(OBJECT_PREFIX) {
+        return send_again(&app, &caller, &id, &delivery, now).await;
+    }
     let store = &app.hooks.store;
     let found = store.redeliver(&caller.tenant, &id, &delivery, now).await?;
     let list = format!("GET /v1/jobs/{}/deliveries", shorten(&id));
     let found = found.ok_or_else(|| nothing_here("delivery", &delivery, &list))?;
     app.hooks.dispatcher.wake();
-    Ok((StatusCode::ACCEPTED, Json(DeliveryBody::from(found))).into_response())
+    Ok((
+        StatusCode::ACCEPTED,
+        Json(RedeliveredBody::Message(found.into())),
+    )
+        .into_response())
+}
+
+/// Sends a DICOM object to its archive again.
+async fn send_again(app: &App, caller: &Caller, job: &str, id: &str, now: Timestamp) -> Answer {
+    let store = &app.archives.store;
+    let found = store.send_again(&caller.tenant, job, id, now).await?;
+    let list = format!("GET /v1/jobs/{}", shorten(job));
+    let found = found.ok_or_else(|| nothing_here("delivery", id, &list))?;
+    app.archives.woken.notify_one();
+    let body = RedeliveredBody::Object(found.into());
+    Ok((StatusCode::ACCEPTED, Json(body)).into_response())
 }
 
 fn nothing_here(noun: &str, id: &str, list: &str) -> Problem {

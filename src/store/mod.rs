@@ -30,6 +30,7 @@ mod rows;
 mod space;
 mod sqlite;
 mod sqlite_access;
+mod sqlite_archives;
 mod sqlite_catalogue;
 mod sqlite_custody;
 mod sqlite_figures;

@@ -40,7 +40,8 @@ pub(super) fn job(row: SqliteRow) -> StoreResult<Job> {
     })
 }
 
-fn count(row: &SqliteRow, column: &str) -> StoreResult<u32> {
+/// A count of a row.
+pub(super) fn count(row: &SqliteRow, column: &str) -> StoreResult<u32> {
     Ok(u32::try_from(row.try_get::<i64, _>(column)?).unwrap_or(u32::MAX))
 }
 

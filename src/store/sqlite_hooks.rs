@@ -345,9 +345,9 @@ fn due_delivery(row: SqliteRow) -> StoreResult<DueDelivery> {
         kind: row.try_get("kind")?,
         result: row.try_get("result")?,
         cause: row.try_get("cause")?,
-        run: count(&row, "run")?,
+        run: rows::count(&row, "run")?,
         occurred_at: row.try_get("occurred_at")?,
-        attempts: count(&row, "attempts")?,
+        attempts: rows::count(&row, "attempts")?,
         since: row.try_get("since")?,
     })
 }
@@ -362,7 +362,7 @@ fn delivery(row: SqliteRow) -> StoreResult<Delivery> {
         url: row.try_get("url")?,
         event: event(row.try_get("event")?),
         state,
-        attempts: count(&row, "attempts")?,
+        attempts: rows::count(&row, "attempts")?,
         occurred_at: row.try_get("occurred_at")?,
         next_attempt_at: (state == DeliveryState::Pending).then_some(next_attempt_at),
         last_attempt_at: row.try_get("last_attempt_at")?,
@@ -387,8 +387,4 @@ fn endpoint(row: SqliteRow) -> StoreResult<HookEndpoint> {
 /// The event of that name; the trigger writes no others.
 fn event(name: &str) -> HookEvent {
     HookEvent::parse(name).unwrap_or(HookEvent::Failed)
-}
-
-fn count(row: &SqliteRow, column: &str) -> StoreResult<u32> {
-    Ok(u32::try_from(row.try_get::<i64, _>(column)?).unwrap_or(u32::MAX))
 }

@@ -34,7 +34,11 @@ fn expiry(now: Timestamp, length: Duration) -> Timestamp {
 }
 
 /// The age of the volumes that a job works on counts from now, for the tenant of the job.
-async fn renew_volumes(to: &mut SqliteConnection, job: &Job, now: Timestamp) -> StoreResult<()> {
+pub(super) async fn renew_volumes(
+    to: &mut SqliteConnection,
+    job: &Job,
+    now: Timestamp,
+) -> StoreResult<()> {
     sqlx::query(
         "UPDATE holdings SET renewed_at = max(renewed_at, ?1)
          WHERE tenant = ?2 AND kind = 'volume' AND id IN (

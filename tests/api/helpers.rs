@@ -428,7 +428,8 @@ fn work_for(time: Duration, monitor: &Monitor<'_>) -> Result<(), WorkError> {
     Ok(())
 }
 
-fn sphere() -> WorkOutput {
+/// The files of a model: a sphere.
+pub fn sphere() -> WorkOutput {
     let mesh = icosphere(30.0, 1);
     let encoded = |format| export::encode(format, &mesh, &Metadata::new("sphere")).unwrap();
     let names = [

@@ -21,6 +21,7 @@ mod documents;
 mod durability;
 mod end_to_end;
 mod events;
+mod fake_archive;
 mod faults;
 mod hostile;
 mod intake;

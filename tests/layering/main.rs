@@ -120,13 +120,16 @@ const USES: &[(&str, &[&str])] = &[
     ("jobs", &["progress"]),
     ("access", &["jobs"]),
     ("hooks", &["jobs"]),
-    ("archive", &["jobs"]),
+    ("archive", &["jobs", "hooks"]),
     (
         "intake",
         &["progress", "volume", "export", "jobs", "access"],
     ),
     ("worklist", &["jobs"]),
-    ("store", &["jobs", "access", "hooks", "intake", "worklist"]),
+    (
+        "store",
+        &["jobs", "access", "hooks", "archive", "intake", "worklist"],
+    ),
     (
         "work",
         &[
@@ -162,6 +165,7 @@ const USES: &[(&str, &[&str])] = &[
             "hooks",
             "intake",
             "worklist",
+            "archive",
             "store",
             "work",
             "config",

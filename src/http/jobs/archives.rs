@@ -93,7 +93,7 @@ fn with_dicomweb(app: &App, tenant: &Tenant, name: &str) -> Answer<String> {
 
 /// A URL for which no archive is configured, if the operator allows it.
 async fn allowed(app: &App, url: &str) -> Answer<String> {
-    match app.exchange.guard.check(url).await {
+    match app.archives.guard.check(url).await {
         Ok(_) if url.contains('?') => Err(Problem::invalid_field(
             "dicomweb",
             "The base URL of a DICOMweb service has no query.",

@@ -1,10 +1,12 @@
 //! A job as JSON.
 
+use crate::archive::{ObjectDelivery, Pull};
+use crate::hooks::DeliveryState;
 use crate::http::app::App;
 use crate::http::openapi::JobParameters;
 use crate::http::problem::{Answer, Problem, ProblemBody};
 use crate::http::wire::{path_of, rfc3339};
-use crate::jobs::{Job, JobState, QueuePosition, Resource, SeriesSource, Timestamp};
+use crate::jobs::{Job, JobState, QueuePosition, Resource, SendOrder, SeriesSource, Timestamp};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -30,6 +32,9 @@ pub struct JobBody {
     /// The series in an archive that the volume comes from.
     #[serde(skip_serializing_if = "Option::is_none")]
     source: Option<SourceBody>,
+    /// The DICOM objects of its result that are sent to an archive.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    deliveries: Option<Vec<ObjectDeliveryBody>>,
     /// The parameters, including every default.
     #[schema(value_type = JobParameters)]
     parameters: Map<String, Value>,
@@ -102,11 +107,105 @@ struct SourceBody {
     study: String,
     /// Series Instance UID.
     series: String,
+    /// `pending`, `fetched`, or `failed`.
+    #[schema(example = "fetched")]
+    state: &'static str,
+    /// Number of attempts to fetch it.
+    attempts: u32,
+    /// When it is tried next (RFC 3339).
+    #[schema(format = DateTime)]
+    next_attempt_at: Option<String>,
+    /// Why the last attempt failed.
+    last_error: Option<String>,
 }
 
-impl From<SeriesSource> for SourceBody {
-    fn from(source: SeriesSource) -> Self {
+/// The delivery of a DICOM object to an archive.
+#[derive(Serialize, ToSchema)]
+#[schema(as = ObjectDelivery)]
+pub struct ObjectDeliveryBody {
+    /// Its id; absent until the job has succeeded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(example = "snd_2c26b46b68ffc68ff99b453c1d304134")]
+    id: Option<String>,
+    /// The object.
+    #[schema(example = "mask.dcm")]
+    name: String,
+    /// The archive.
+    #[schema(example = "pacs")]
+    to: String,
+    /// `pending`, `delivered`, or `dead` if it was given up.
+    #[schema(example = "delivered")]
+    state: &'static str,
+    /// Number of attempts.
+    attempts: u32,
+    /// When it is tried next (RFC 3339).
+    #[schema(format = DateTime)]
+    next_attempt_at: Option<String>,
+    /// When it was tried last (RFC 3339).
+    #[schema(format = DateTime)]
+    last_attempt_at: Option<String>,
+    /// How it last ended: `stored`, `present` (the archive had it already), `failed`, `refused`,
+    /// `erased` (here, before it was sent).
+    last_outcome: Option<String>,
+    /// Why the last attempt failed.
+    last_error: Option<String>,
+}
+
+impl From<ObjectDelivery> for ObjectDeliveryBody {
+    fn from(delivery: ObjectDelivery) -> Self {
         Self {
+            id: Some(delivery.id),
+            name: delivery.name,
+            to: delivery.to,
+            state: delivery.state.as_str(),
+            attempts: delivery.attempts,
+            next_attempt_at: delivery.next_attempt_at.map(rfc3339),
+            last_attempt_at: delivery.last_attempt_at.map(rfc3339),
+            last_outcome: delivery.last_outcome,
+            last_error: delivery.last_error,
+        }
+    }
+}
+
+/// The deliveries of a job: those that were ordered, until it has succeeded.
+fn deliveries(
+    order: SendOrder,
+    made: Option<&Vec<ObjectDelivery>>,
+    job: JobState,
+) -> Vec<ObjectDeliveryBody> {
+    if let Some(made) = made {
+        return made.iter().cloned().map(Into::into).collect();
+    }
+    // A job that failed or was cancelled has nothing to send.
+    let state = match job.is_final() && job != JobState::Succeeded {
+        true => DeliveryState::Dead,
+        false => DeliveryState::Pending,
+    };
+    let ordered = order.names.into_iter().map(|name| ObjectDeliveryBody {
+        id: None,
+        name,
+        to: order.to.clone(),
+        state: state.as_str(),
+        attempts: 0,
+        next_attempt_at: None,
+        last_attempt_at: None,
+        last_outcome: None,
+        last_error: None,
+    });
+    ordered.collect()
+}
+
+impl SourceBody {
+    fn of(source: SeriesSource, pull: Option<&Pull>) -> Self {
+        Self {
+            state: pull.map_or("failed", |pull| match pull.state {
+                DeliveryState::Pending => "pending",
+                DeliveryState::Delivered => "fetched",
+                DeliveryState::Dead => "failed",
+            }),
+            attempts: pull.map_or(0, |pull| pull.attempts),
+            next_attempt_at: pull.and_then(|pull| pull.next_attempt_at).map(rfc3339),
+            last_error: pull.and_then(|pull| pull.last_error.clone()),
             archive: source.archive,
             dicomweb: source.dicomweb,
             study: source.study,
@@ -157,20 +256,51 @@ impl From<JobState> for JobStateName {
 
 /// The JSON of a job, with its place in the queue if it waits.
 pub async fn describe(app: &App, job: Job) -> Answer<JobBody> {
-    let positions = app.queue.positions(std::slice::from_ref(&job)).await?;
-    Ok(body(job, &positions, app.queue.clock.now()))
+    let context = Context::of(app, std::slice::from_ref(&job)).await?;
+    Ok(body(job, &context))
+}
+
+/// What is to be told of jobs beside their rows.
+struct Context {
+    positions: BTreeMap<i64, QueuePosition>,
+    pulls: BTreeMap<String, Pull>,
+    deliveries: BTreeMap<String, Vec<ObjectDelivery>>,
+    now: Timestamp,
+}
+
+impl Context {
+    async fn of(app: &App, jobs: &[Job]) -> Answer<Self> {
+        let ids = |with: fn(&Job) -> bool| -> Vec<&str> {
+            let those = jobs.iter().filter(|job| with(job));
+            those.map(|job| job.id.as_str()).collect()
+        };
+        let store = &app.archives.store;
+        let sourced = ids(|job| job.source.is_some());
+        let sent = ids(|job| job.send.is_some() && job.state == JobState::Succeeded);
+        Ok(Self {
+            positions: app.queue.positions(jobs).await?,
+            pulls: match sourced.is_empty() {
+                true => BTreeMap::new(),
+                false => store.pulls(&sourced).await?,
+            },
+            deliveries: match sent.is_empty() {
+                true => BTreeMap::new(),
+                false => store.sends(&sent).await?,
+            },
+            now: app.queue.clock.now(),
+        })
+    }
 }
 
 /// The JSON of each job, with the places in the queue of those that wait.
 pub async fn describe_all(app: &App, jobs: Vec<Job>) -> Answer<Vec<JobBody>> {
-    let positions = app.queue.positions(&jobs).await?;
-    let now = app.queue.clock.now();
-    let bodies = jobs.into_iter().map(|job| body(job, &positions, now));
+    let context = Context::of(app, &jobs).await?;
+    let bodies = jobs.into_iter().map(|job| body(job, &context));
     Ok(bodies.collect())
 }
 
-fn body(job: Job, positions: &BTreeMap<i64, QueuePosition>, now: Timestamp) -> JobBody {
-    let standing = positions.get(&job.sequence);
+fn body(job: Job, context: &Context) -> JobBody {
+    let standing = context.positions.get(&job.sequence);
     let made = |resource: Resource| {
         let id = job.result.clone();
         id.filter(|id| Resource::of(id) == Some(resource))
@@ -179,12 +309,20 @@ fn body(job: Job, positions: &BTreeMap<i64, QueuePosition>, now: Timestamp) -> J
     let result = job.result.as_deref().map(path_of);
     let below = |name: &str| result.as_ref().map(|path| format!("{path}/{name}"));
     let itself = format!("/v1/jobs/{}", job.id);
+    let source = job.source.map(|source| {
+        let pull = context.pulls.get(&job.id);
+        SourceBody::of(source, pull)
+    });
+    let deliveries = job.send.map(|order| {
+        let made = context.deliveries.get(&job.id);
+        deliveries(order, made, job.state)
+    });
     JobBody {
         state: job.state.into(),
         queue_position: standing.map(|s| s.position),
         estimated_start: standing
             .and_then(|s| s.starts_in_ms)
-            .map(|ms| rfc3339(now.saturating_add(ms as i64))),
+            .map(|ms| rfc3339(context.now.saturating_add(ms as i64))),
         error: job.failure.map(|f| Problem::from(f).into_body()),
         created_at: rfc3339(job.created_at),
         started_at: job.started_at.map(rfc3339),
@@ -204,7 +342,8 @@ fn body(job: Job, positions: &BTreeMap<i64, QueuePosition>, now: Timestamp) -> J
         labels: job.tags.labels,
         kind: job.kind,
         volume: job.volume,
-        source: job.source.map(SourceBody::from),
+        source,
+        deliveries,
         parameters: job.parameters,
         stage: job.stage,
         progress: job.progress,

@@ -6,7 +6,7 @@ pub mod filing;
 
 mod body;
 
-pub use body::{JobBody, describe, describe_all};
+pub use body::{JobBody, ObjectDeliveryBody, describe, describe_all};
 pub use filing::Filing;
 
 use super::app::App;

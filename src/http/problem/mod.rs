@@ -55,6 +55,13 @@ pub struct ProblemBody {
     pub job: Option<String>,
 }
 
+impl ProblemBody {
+    /// The word that tells the kind of problem.
+    pub fn code(&self) -> &str {
+        self.kind.strip_prefix(TYPE_PREFIX).unwrap_or_default()
+    }
+}
+
 /// A problem object together with the headers of its answer.
 #[derive(Debug, Clone)]
 pub struct Problem {

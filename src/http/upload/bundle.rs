@@ -165,6 +165,27 @@ impl Bundle {
         Ok(&mut self.files[last])
     }
 
+    /// Bytes of all files.
+    pub fn bytes(&self) -> u64 {
+        self.files.iter().map(|file| file.bytes).sum()
+    }
+
+    /// Makes one of the last file and an earlier one with the same content.
+    ///
+    /// # Errors
+    /// 500 if the file cannot be renamed.
+    pub async fn join_repeated(&mut self) -> Answer<()> {
+        let Some((last, before)) = self.files.split_last() else {
+            return Ok(());
+        };
+        let twin = before.iter().find(|file| file.digest == last.digest);
+        if let (Some(twin), Some(staged)) = (twin, &self.staged) {
+            staged.rename(&last.name, &twin.name).await?;
+            self.files.pop();
+        }
+        Ok(())
+    }
+
     /// Checks and stores the volume. One that is stored already is not checked again; its age
     /// counts from now.
     ///

@@ -62,6 +62,7 @@ pub struct Queue {
     overwrite_due: AtomicBool,
     settings: QueueSettings,
     filed: Notify,
+    sourced: Arc<Notify>,
     changes: broadcast::Sender<Arc<Job>>,
     /// Cancel tokens of the running jobs by lease token, with the ids of the jobs.
     running: Mutex<BTreeMap<String, (String, CancelToken)>>,
@@ -88,6 +89,7 @@ impl Queue {
             overwrite_due: AtomicBool::new(false),
             settings,
             filed: Notify::new(),
+            sourced: Arc::default(),
             changes: broadcast::Sender::new(CHANGES_BUFFERED),
             running: Mutex::default(),
             observer: OnceLock::new(),
@@ -108,7 +110,10 @@ impl Queue {
             if let Some(observer) = self.observer.get() {
                 observer.filed(job);
             }
-            self.filed.notify_one();
+            match job.volume {
+                Some(_) => self.filed.notify_one(),
+                None => self.sourced.notify_one(),
+            }
         }
         Ok(filed)
     }
@@ -212,6 +217,18 @@ impl Queue {
             .into_iter()
             .zip(ahead.into_iter().map(position))
             .collect())
+    }
+
+    /// Told when a job is filed whose volume is to be fetched from its source.
+    pub fn sourced(&self) -> Arc<Notify> {
+        self.sourced.clone()
+    }
+
+    /// Tells everybody of a waiting job that has got its volume from its source, or has failed
+    /// because it cannot.
+    pub fn supplied(&self, job: &Job) {
+        self.announce(job);
+        self.filed.notify_one();
     }
 
     /// Tells the observer that the computation of a job has ended.

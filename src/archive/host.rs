@@ -1,0 +1,39 @@
+//! What the exchange with archives needs of the service around it.
+
+use super::parts::SeriesParts;
+use super::trouble::Trouble;
+use super::{ArchiveObject, DuePull, DueSend, ExchangeEnd};
+use crate::jobs::{Hold, Tenant};
+use async_trait::async_trait;
+
+/// A stored volume, which is not deleted while this exists.
+pub struct StoredSeries {
+    /// Its id.
+    pub volume: String,
+    /// Keeps it from being deleted.
+    pub hold: Hold,
+}
+
+/// Stores volumes, makes objects, keeps the audit trail.
+#[async_trait]
+pub trait ExchangeHost: Send + Sync + 'static {
+    /// Stores the files of a series as a volume, as if the tenant had uploaded them.
+    async fn store(&self, tenant: &Tenant, parts: SeriesParts) -> Result<StoredSeries, Trouble>;
+
+    /// The tenant's volume of that id, if it is complete.
+    async fn held(&self, tenant: &Tenant, volume: &str) -> Result<Option<StoredSeries>, Trouble>;
+
+    /// An object of a result.
+    async fn object(
+        &self,
+        tenant: &Tenant,
+        result: &str,
+        name: &str,
+    ) -> Result<ArchiveObject, Trouble>;
+
+    /// A fetch has ended.
+    async fn fetched(&self, pull: &DuePull, end: ExchangeEnd);
+
+    /// A delivery has ended.
+    async fn delivered(&self, send: &DueSend, end: ExchangeEnd);
+}

@@ -1,0 +1,207 @@
+//! Fetching the series of waiting jobs.
+
+use super::end::{ExchangeCounts, ExchangeEnd};
+use super::exchange::{Exchange, means};
+use super::host::StoredSeries;
+use super::parts::PartLimits;
+use super::trouble::Trouble;
+use super::web::DicomWeb;
+use super::{DuePull, HeldSeries, SeriesKey};
+use crate::hooks::{AttemptEnd, Errands, Rounds};
+use crate::jobs::{Failure, Fault, Job, StoreResult, Timestamp, content_id};
+use async_trait::async_trait;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::sync::broadcast::{Receiver, error::RecvError};
+use tokio_util::sync::CancellationToken;
+
+/// Fetches the series of waiting jobs.
+pub struct Puller {
+    exchange: Arc<Exchange>,
+    counts: Arc<ExchangeCounts>,
+}
+
+impl Puller {
+    /// A puller that counts its attempts there.
+    pub fn new(exchange: Arc<Exchange>, counts: Arc<ExchangeCounts>) -> Self {
+        Self { exchange, counts }
+    }
+
+    /// Fetches what is due until `end`; then attempts on the way get `grace`.
+    pub async fn run(self, end: CancellationToken, grace: Duration) {
+        let exchange = self.exchange.clone();
+        let rounds = Rounds {
+            clock: exchange.clock().clone(),
+            lanes: exchange.lanes(),
+            woken: exchange.queue.sourced(),
+            errands: Arc::new(self),
+        };
+        rounds.run(exchange.queue.changes(), end, grace).await;
+    }
+
+    /// Fetches a series, or finds that it is held already.
+    async fn fetch(&self, due: &DuePull) -> Result<(StoredSeries, ExchangeEnd), Trouble> {
+        let exchange = &self.exchange;
+        let now = exchange.clock().now();
+        let source = &due.source;
+        let web = match (&source.archive, &source.dicomweb) {
+            (Some(name), _) => {
+                let archive = exchange.archive(name, &due.tenant)?;
+                exchange.web.of(archive, now).await?
+            }
+            (None, url) => {
+                let url = url.as_deref().unwrap_or_default();
+                exchange.web.at(url, now).await?
+            }
+        };
+        let key = SeriesKey {
+            tenant: &due.tenant,
+            base: web.base(),
+            study: &source.study,
+            series: &source.series,
+        };
+        let instances = instances(&web, key).await?;
+        if let Some(instances) = &instances
+            && let Some(held) = exchange.store.held_series(key).await?
+            && held.instances == *instances
+            && let Some(stored) = exchange.host.held(&due.tenant, &held.volume).await?
+        {
+            return Ok((stored, ExchangeEnd::Present));
+        }
+        let limits = PartLimits {
+            bytes: exchange.settings.bytes,
+            parts: exchange.settings.parts,
+        };
+        let parts = web.series(key.study, key.series, limits).await?;
+        let stored = exchange.host.store(&due.tenant, parts).await?;
+        if let Some(instances) = instances {
+            let held = HeldSeries {
+                instances,
+                volume: stored.volume.clone(),
+            };
+            exchange.store.note_series(key, &held).await?;
+        }
+        Ok((stored, ExchangeEnd::Done))
+    }
+
+    /// Writes down how an attempt ended.
+    async fn settle(
+        &self,
+        due: &DuePull,
+        fetched: Result<(StoredSeries, ExchangeEnd), Trouble>,
+    ) -> StoreResult<(ExchangeEnd, AttemptEnd)> {
+        let (exchange, store) = (&self.exchange, &self.exchange.store);
+        let now = exchange.clock().now();
+        let trouble = match fetched {
+            Ok((stored, end)) => {
+                // The volume is held until the job has it.
+                let job = store.pulled(&due.job, &stored.volume, now).await?;
+                drop(stored.hold);
+                if let Some(job) = job {
+                    exchange.queue.supplied(&job);
+                }
+                return Ok((end, AttemptEnd::Fine));
+            }
+            Err(trouble) => trouble,
+        };
+        let meaning = means(&trouble);
+        tracing::info!(job = %due.job, error = trouble.what(), "a series was not fetched");
+        let failure = match trouble {
+            Trouble::Passing { what, asked } => {
+                let attempts = due.attempts.saturating_add(1);
+                match exchange.again_at(attempts, due.since, asked) {
+                    Some(again_at) => {
+                        store.pull_failed(&due.job, &what, again_at, now).await?;
+                        return Ok((ExchangeEnd::Failed, meaning));
+                    }
+                    None => unavailable(attempts, &what),
+                }
+            }
+            Trouble::Final(failure) => failure,
+        };
+        if let Some(job) = store.pull_given_up(&due.job, &failure, now).await? {
+            exchange.queue.supplied(&job);
+        }
+        Ok((ExchangeEnd::GivenUp, meaning))
+    }
+
+    /// Waits until the job is cancelled.
+    async fn until_ended(&self, mut changes: Receiver<Arc<Job>>, id: &str) {
+        loop {
+            match changes.recv().await {
+                Ok(job) if job.id == id && job.state.is_final() => return,
+                Ok(_) => {}
+                Err(RecvError::Closed) => std::future::pending().await,
+                Err(RecvError::Lagged(_)) => {
+                    let job = self.exchange.queue.jobs.job(id).await;
+                    if job.is_ok_and(|job| job.is_none_or(|job| job.state.is_final())) {
+                        return;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A hash of the SOP Instance UIDs of a series; `None` if the archive does not list them.
+async fn instances(web: &DicomWeb, key: SeriesKey<'_>) -> Result<Option<String>, Trouble> {
+    let listed = web.instances(key.study, key.series).await?;
+    Ok(listed.filter(|uids| !uids.is_empty()).map(|mut uids| {
+        uids.sort_unstable();
+        content_id("", uids.iter().map(String::as_bytes))
+    }))
+}
+
+fn unavailable(attempts: u32, what: &str) -> Failure {
+    let detail = format!("The series could not be fetched in {attempts} attempts. {what}");
+    Failure::new(Fault::Service, "archive-unavailable", detail)
+        .fix("Ask the operator to look after the archive, then start the job again.")
+}
+
+#[async_trait]
+impl Errands for Puller {
+    type Due = DuePull;
+
+    async fn destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
+        self.exchange.store.pull_destinations().await
+    }
+
+    async fn due(
+        &self,
+        destination: &str,
+        now: Timestamp,
+        limit: usize,
+    ) -> StoreResult<Vec<DuePull>> {
+        let store = &self.exchange.store;
+        store.due_pulls(destination, now, limit).await
+    }
+
+    fn id(due: &DuePull) -> &str {
+        &due.job
+    }
+
+    async fn attempt(&self, due: DuePull) -> AttemptEnd {
+        let changes = self.exchange.queue.changes();
+        let fetched = tokio::select! {
+            fetched = self.exchange.in_time(self.fetch(&due)) => fetched,
+            () = self.until_ended(changes, &due.job) => return AttemptEnd::Fine,
+        };
+        match self.settle(&due, fetched).await {
+            Ok((end, meaning)) => {
+                self.counts.add(end);
+                self.exchange.host.fetched(&due, end).await;
+                meaning
+            }
+            Err(error) => {
+                tracing::error!(job = %due.job, %error, "a fetch was not written down");
+                AttemptEnd::NotWritten
+            }
+        }
+    }
+
+    async fn expire(&self) {}
+
+    fn concerns(&self, _: &Job) -> bool {
+        false
+    }
+}

@@ -1,0 +1,201 @@
+//! Fetches and deliveries, and the trait that a database implements.
+
+use crate::hooks::{Backlog, DeliveryState};
+use crate::jobs::{Failure, Job, SeriesSource, StoreResult, Tenant, Timestamp};
+use async_trait::async_trait;
+use std::collections::BTreeMap;
+
+/// The fetching of a job's series, whose time has come.
+#[derive(Debug, Clone)]
+pub struct DuePull {
+    /// The job.
+    pub job: String,
+    /// Whose job it is.
+    pub tenant: Tenant,
+    /// The series.
+    pub source: SeriesSource,
+    /// Attempts before this one.
+    pub attempts: u32,
+    /// From when its age counts.
+    pub since: Timestamp,
+}
+
+/// The fetching of a job's series, for people who ask what became of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Pull {
+    /// How far it has come: delivered means that the volume is stored.
+    pub state: DeliveryState,
+    /// Number of attempts.
+    pub attempts: u32,
+    /// When it will be tried next; only while it is pending.
+    pub next_attempt_at: Option<Timestamp>,
+    /// Why the last attempt failed.
+    pub last_error: Option<String>,
+}
+
+/// A series as it was when it was fetched.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HeldSeries {
+    /// A hash of the SOP Instance UIDs.
+    pub instances: String,
+    /// The volume.
+    pub volume: String,
+}
+
+/// Names a series of an archive that a tenant holds.
+#[derive(Debug, Clone, Copy)]
+pub struct SeriesKey<'a> {
+    /// The tenant.
+    pub tenant: &'a Tenant,
+    /// Base URL of the DICOMweb service.
+    pub base: &'a str,
+    /// Study Instance UID.
+    pub study: &'a str,
+    /// Series Instance UID.
+    pub series: &'a str,
+}
+
+/// A delivery whose time has come.
+#[derive(Debug, Clone)]
+pub struct DueSend {
+    /// See [`ObjectDelivery::id`].
+    pub id: String,
+    /// Whose job it is.
+    pub tenant: Tenant,
+    /// The job.
+    pub job: String,
+    /// Id of the result.
+    pub result: String,
+    /// See [`ObjectDelivery::name`].
+    pub name: String,
+    /// See [`ObjectDelivery::to`].
+    pub to: String,
+    /// Attempts before this one.
+    pub attempts: u32,
+    /// From when its age counts.
+    pub since: Timestamp,
+}
+
+/// The delivery of one object, for people who ask what became of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ObjectDelivery {
+    /// `snd_...`
+    pub id: String,
+    /// The object: `mask.dcm` ...
+    pub name: String,
+    /// The archive.
+    pub to: String,
+    /// How far it has come.
+    pub state: DeliveryState,
+    /// Number of attempts.
+    pub attempts: u32,
+    /// When it will be tried next; only while it is pending.
+    pub next_attempt_at: Option<Timestamp>,
+    /// When it was tried last.
+    pub last_attempt_at: Option<Timestamp>,
+    /// How the last attempt ended.
+    pub last_outcome: Option<String>,
+    /// Why the last attempt failed.
+    pub last_error: Option<String>,
+}
+
+/// What to write down after an attempt to deliver.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SendSettlement {
+    /// How far it has come.
+    pub state: DeliveryState,
+    /// How the attempt ended.
+    pub outcome: &'static str,
+    /// Why it failed.
+    pub error: Option<String>,
+    /// When to try again, if it is pending.
+    pub again_at: Option<Timestamp>,
+}
+
+/// The tables of archives. Every method is one transaction and fails only if the database does.
+#[async_trait]
+pub trait ArchiveStore: Send + Sync + 'static {
+    /// The archives from which is to be fetched, each with the time when the first is due.
+    async fn pull_destinations(&self) -> StoreResult<Vec<(String, Timestamp)>>;
+
+    /// The fetches from an archive that are due, the longest due first.
+    async fn due_pulls(
+        &self,
+        destination: &str,
+        now: Timestamp,
+        limit: usize,
+    ) -> StoreResult<Vec<DuePull>>;
+
+    /// Gives a waiting job its volume. `None` if the job waits no more.
+    async fn pulled(&self, job: &str, volume: &str, now: Timestamp) -> StoreResult<Option<Job>>;
+
+    /// Writes down that an attempt to fetch failed.
+    async fn pull_failed(
+        &self,
+        job: &str,
+        error: &str,
+        again_at: Timestamp,
+        now: Timestamp,
+    ) -> StoreResult<()>;
+
+    /// Fails a job whose volume cannot be fetched. `None` if it waits no more.
+    async fn pull_given_up(
+        &self,
+        job: &str,
+        failure: &Failure,
+        now: Timestamp,
+    ) -> StoreResult<Option<Job>>;
+
+    /// What became of the fetches of those jobs.
+    async fn pulls(&self, jobs: &[&str]) -> StoreResult<BTreeMap<String, Pull>>;
+
+    /// The volume as which a series is held.
+    async fn held_series(&self, key: SeriesKey<'_>) -> StoreResult<Option<HeldSeries>>;
+
+    /// Notes the volume as which a series is held, if the tenant has that volume.
+    async fn note_series(&self, key: SeriesKey<'_>, held: &HeldSeries) -> StoreResult<()>;
+
+    /// The archives to which is to be delivered, each with the time when the first is due.
+    async fn send_destinations(&self) -> StoreResult<Vec<(String, Timestamp)>>;
+
+    /// The deliveries to an archive that are due, the longest due first.
+    async fn due_sends(
+        &self,
+        destination: &str,
+        now: Timestamp,
+        limit: usize,
+    ) -> StoreResult<Vec<DueSend>>;
+
+    /// Writes down how an attempt to deliver ended.
+    async fn settle_send(
+        &self,
+        id: &str,
+        settled: &SendSettlement,
+        now: Timestamp,
+    ) -> StoreResult<()>;
+
+    /// What became of the deliveries of those jobs, in the order of the job's list.
+    async fn sends(&self, jobs: &[&str]) -> StoreResult<BTreeMap<String, Vec<ObjectDelivery>>>;
+
+    /// Makes an ended delivery pending again, due at once. Returns it as it is then; `None` if
+    /// that job has no such delivery, or its result was erased.
+    async fn send_again(
+        &self,
+        tenant: &Tenant,
+        job: &str,
+        id: &str,
+        now: Timestamp,
+    ) -> StoreResult<Option<ObjectDelivery>>;
+
+    /// How many fetches and deliveries wait.
+    async fn archive_backlog(&self) -> StoreResult<ArchiveBacklog>;
+}
+
+/// How much waits for archives.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ArchiveBacklog {
+    /// Number of pending fetches.
+    pub pulls: u64,
+    /// Deliveries.
+    pub sends: Backlog,
+}

@@ -1,0 +1,485 @@
+//! The archive's DICOMweb services (PS3.18): QIDO-RS, WADO-RS and STOW-RS.
+//!
+//! Redirects are followed within the archive's own scheme, host and port only. For a URL without a
+//! configured archive, connections go to the addresses that the guard has checked.
+
+use super::parts::{PartLimits, SeriesParts};
+use super::trouble::{Trouble, odd_answer};
+use super::{Archive, Credentials};
+use crate::hooks::{Pin, PinnedNames, UrlGuard, retry_after};
+use crate::jobs::{Failure, Fault, Timestamp};
+use futures::StreamExt;
+use reqwest::header::{ACCEPT, CONTENT_TYPE, HeaderMap};
+use reqwest::redirect::{Attempt, Policy};
+use reqwest::{Certificate, Client, ClientBuilder, Response, StatusCode};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::sync::PoisonError;
+use std::time::Duration;
+
+/// The largest JSON answer that is read, bytes.
+const JSON_BYTES: usize = 16 << 20;
+
+/// Longest time to connect.
+const CONNECT: Duration = Duration::from_secs(10);
+
+/// Most redirects within an archive.
+const REDIRECTS: usize = 3;
+
+const DICOM_JSON: &str = "application/dicom+json";
+const BOUNDARY: &str = "ventriform-dicom-object";
+
+/// SOP Instance UID, as DICOM JSON names it.
+const SOP_INSTANCE_UID: &str = "00080018";
+const FAILED_SOP_SEQUENCE: &str = "00081198";
+const FAILURE_REASON: &str = "00081197";
+
+/// Connects to DICOMweb services.
+pub struct WebClients {
+    /// Which services may be used beside the configured archives.
+    guard: UrlGuard,
+    names: PinnedNames,
+    timeout: Duration,
+    /// Made for the first use: reading the system's certificates takes time and memory. By the
+    /// name of the archive; the empty name is for URLs without one.
+    clients: Mutex<BTreeMap<String, Client>>,
+}
+
+/// One DICOMweb service.
+pub struct DicomWeb {
+    client: Client,
+    base: String,
+    credentials: Credentials,
+    now: Timestamp,
+    /// Keeps the checked addresses.
+    _pin: Option<Pin>,
+}
+
+/// What became of an object that was sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stored {
+    /// It was stored now.
+    Now,
+    /// It was there already.
+    Before,
+}
+
+impl WebClients {
+    /// Clients that allow pauses of that length in answers.
+    pub fn new(guard: UrlGuard, timeout: Duration) -> Self {
+        Self {
+            guard,
+            names: PinnedNames::default(),
+            timeout,
+            clients: Mutex::default(),
+        }
+    }
+
+    /// The DICOMweb service of a configured archive.
+    ///
+    /// # Errors
+    /// If it has none, or the file of its authorities cannot be read.
+    pub async fn of(&self, archive: &Archive, now: Timestamp) -> Result<DicomWeb, Trouble> {
+        let base = archive.dicomweb.clone().ok_or_else(|| {
+            Trouble::passing("The archive has no `dicomweb` in the settings any more.")
+        })?;
+        let client = match self.known(&archive.name) {
+            Some(client) => client,
+            None => {
+                let mut builder = self.builder().redirect(Policy::custom(within_origin));
+                if let Some(path) = &archive.ca_file {
+                    let unusable = |error: String| {
+                        tracing::error!(archive = %archive.name, error, "ca_file is unusable");
+                        Trouble::passing("The file `ca_file` of the archive cannot be used.")
+                    };
+                    let pem = tokio::fs::read(path).await;
+                    let pem = pem.map_err(|error| unusable(error.to_string()))?;
+                    let authorities = Certificate::from_pem_bundle(&pem);
+                    builder = builder
+                        .tls_certs_merge(authorities.map_err(|error| unusable(error.to_string()))?);
+                }
+                self.made(&archive.name, builder).await?
+            }
+        };
+        Ok(DicomWeb {
+            client,
+            base,
+            credentials: archive.credentials.clone(),
+            now,
+            _pin: None,
+        })
+    }
+
+    /// The DICOMweb service at a URL that a job gave.
+    ///
+    /// # Errors
+    /// If the guard does not let it pass.
+    pub async fn at(&self, url: &str, now: Timestamp) -> Result<DicomWeb, Trouble> {
+        let checked = self.guard.resolve(url).await.map_err(|refusal| {
+            Trouble::lasting(
+                Fault::Request,
+                "invalid-field",
+                format!("Nothing can be fetched from the source's URL. {refusal}"),
+                "Name a configured archive, or ask the operator for an entry in `[[archives]]`.",
+            )
+        })?;
+        let pin = self.names.pin(&checked);
+        let client = match self.known("") {
+            Some(client) => client,
+            None => {
+                let builder = self.builder().redirect(Policy::none());
+                self.made("", builder.dns_resolver(self.names.clone()))
+                    .await?
+            }
+        };
+        Ok(DicomWeb {
+            client,
+            base: url.trim_end_matches('/').to_owned(),
+            credentials: Credentials::None,
+            now,
+            _pin: Some(pin),
+        })
+    }
+
+    fn builder(&self) -> ClientBuilder {
+        Client::builder()
+            .no_proxy()
+            .referer(false)
+            .pool_idle_timeout(Duration::from_secs(10))
+            .connect_timeout(CONNECT.min(self.timeout))
+            .read_timeout(self.timeout)
+            .user_agent(concat!("ventriform/", env!("CARGO_PKG_VERSION")))
+    }
+
+    fn known(&self, name: &str) -> Option<Client> {
+        let clients = self.clients.lock().unwrap_or_else(PoisonError::into_inner);
+        clients.get(name).cloned()
+    }
+
+    async fn made(&self, name: &str, builder: ClientBuilder) -> Result<Client, Trouble> {
+        let built = tokio::task::spawn_blocking(|| builder.build()).await;
+        let failed = |error: String| {
+            tracing::error!(error, "archives cannot be reached");
+            Trouble::passing("The connection to the archive could not be set up.")
+        };
+        let client = built.map_err(|e| failed(e.to_string()))?;
+        let client = client.map_err(|e| failed(e.to_string()))?;
+        let mut clients = self.clients.lock().unwrap_or_else(PoisonError::into_inner);
+        clients.insert(name.to_owned(), client.clone());
+        Ok(client)
+    }
+}
+
+/// Follows redirects to the same scheme, host and port.
+fn within_origin(attempt: Attempt<'_>) -> reqwest::redirect::Action {
+    let known = attempt.previous().first().map(reqwest::Url::origin);
+    match known == Some(attempt.url().origin()) && attempt.previous().len() <= REDIRECTS {
+        true => attempt.follow(),
+        false => attempt.stop(),
+    }
+}
+
+impl DicomWeb {
+    /// Its base URL.
+    pub fn base(&self) -> &str {
+        &self.base
+    }
+
+    /// The SOP Instance UIDs of a series, as the archive lists them; `None` if it does not say.
+    ///
+    /// # Errors
+    /// If the archive does not answer.
+    pub async fn instances(
+        &self,
+        study: &str,
+        series: &str,
+    ) -> Result<Option<Vec<String>>, Trouble> {
+        self.search(&format!("studies/{study}/series/{series}/instances"))
+            .await
+    }
+
+    /// Whether the archive has that object; `None` if it does not say.
+    ///
+    /// # Errors
+    /// If the archive does not answer.
+    pub async fn has(&self, study: &str, instance: &str) -> Result<Option<bool>, Trouble> {
+        let path = format!("studies/{study}/instances?SOPInstanceUID={instance}");
+        let found = self.search(&path).await?;
+        Ok(found.map(|found| found.iter().any(|uid| uid == instance)))
+    }
+
+    /// The SOP Instance UIDs that a search finds.
+    async fn search(&self, path: &str) -> Result<Option<Vec<String>>, Trouble> {
+        let request = self.client.get(format!("{}/{path}", self.base));
+        let answer = self.send(request.header(ACCEPT, DICOM_JSON)).await?;
+        match answer.status() {
+            StatusCode::NO_CONTENT => return Ok(Some(Vec::new())),
+            StatusCode::OK => {}
+            StatusCode::UNAUTHORIZED => return Err(unauthorised()),
+            // It does not search, or not so.
+            status if status == StatusCode::NOT_IMPLEMENTED || !may_pass(status) => {
+                return Ok(None);
+            }
+            status => return Err(busy(status, answer.headers(), self.now)),
+        }
+        let bytes = limited(answer).await?;
+        let Ok(Value::Array(found)) = serde_json::from_slice(&bytes) else {
+            return Ok(None);
+        };
+        let uid = |object: &Value| {
+            let uid = object.get(SOP_INSTANCE_UID)?.get("Value")?.get(0)?;
+            Some(uid.as_str()?.to_owned())
+        };
+        Ok(found.iter().map(uid).collect())
+    }
+
+    /// The files of a series, as they are stored.
+    ///
+    /// # Errors
+    /// If the archive does not have it, does not give it, or does not answer.
+    pub async fn series(
+        &self,
+        study: &str,
+        series: &str,
+        limits: PartLimits,
+    ) -> Result<SeriesParts, Trouble> {
+        let url = format!("{}/studies/{study}/series/{series}", self.base);
+        let accept = "multipart/related; type=\"application/dicom\"; transfer-syntax=*";
+        let answer = self
+            .send(self.client.get(url).header(ACCEPT, accept))
+            .await?;
+        let status = answer.status();
+        if status != StatusCode::OK {
+            return Err(match status {
+                StatusCode::NOT_FOUND | StatusCode::GONE | StatusCode::NO_CONTENT => {
+                    Trouble::lasting(
+                        Fault::Content,
+                        "no-such-series",
+                        "The archive has no such series.",
+                        "Check the Study and the Series Instance UID, and that the archive has \
+                         received the series.",
+                    )
+                }
+                status => refused(status, answer.headers(), self.now),
+            });
+        }
+        if answer
+            .content_length()
+            .is_some_and(|length| length > limits.bytes)
+        {
+            return Err(Trouble::lasting(
+                Fault::TooLarge,
+                "too-large",
+                format!("The series is larger than {} bytes.", limits.bytes),
+                "Ask the operator to raise `body_limit`.",
+            ));
+        }
+        let content_type = text(answer.headers(), CONTENT_TYPE.as_str()).to_owned();
+        SeriesParts::new(&content_type, answer.bytes_stream().boxed(), limits)
+    }
+
+    /// Stores an object.
+    ///
+    /// # Errors
+    /// If the archive does not take it, or does not answer.
+    pub async fn store(&self, object: &[u8]) -> Result<Stored, Trouble> {
+        let head = format!("--{BOUNDARY}\r\nContent-Type: application/dicom\r\n\r\n");
+        let tail = format!("\r\n--{BOUNDARY}--\r\n");
+        let body = [head.as_bytes(), object, tail.as_bytes()].concat();
+        let content_type =
+            format!("multipart/related; type=\"application/dicom\"; boundary={BOUNDARY}");
+        let request = self
+            .client
+            .post(format!("{}/studies", self.base))
+            .header(CONTENT_TYPE, content_type)
+            .header(ACCEPT, DICOM_JSON)
+            .body(body);
+        let answer = self.send(request).await?;
+        let status = answer.status();
+        if !matches!(status.as_u16(), 200 | 202 | 409) {
+            return Err(refused(status, answer.headers(), self.now));
+        }
+        let bytes = limited(answer).await?;
+        judge(status, &bytes)
+    }
+
+    async fn send(&self, request: reqwest::RequestBuilder) -> Result<Response, Trouble> {
+        let request = match &self.credentials {
+            Credentials::None => request,
+            Credentials::Basic { username, password } => {
+                request.basic_auth(username, Some(password))
+            }
+            Credentials::Bearer(token) => request.bearer_auth(token),
+        };
+        request.send().await.map_err(|error| {
+            Trouble::passing(match error.is_timeout() {
+                true => "The archive did not answer in time.",
+                false => "The archive could not be reached, or broke the connection off.",
+            })
+        })
+    }
+}
+
+/// What an answer to STOW-RS says of the only object (PS3.18, 10.5.3; Store Instances Response
+/// Module, PS3.18 annex I).
+fn judge(status: StatusCode, answer: &[u8]) -> Result<Stored, Trouble> {
+    let json: Option<Value> = serde_json::from_slice(answer).ok();
+    let failed = json
+        .as_ref()
+        .and_then(|answer| answer.get(FAILED_SOP_SEQUENCE)?.get("Value")?.get(0));
+    let Some(failed) = failed else {
+        let said = match status {
+            StatusCode::OK => json.is_some() || answer.is_empty() || is_xml_without_failure(answer),
+            StatusCode::ACCEPTED => json.is_some(),
+            _ => false,
+        };
+        return match said {
+            true => Ok(Stored::Now),
+            // The page of a proxy, for instance. The next attempt asks whether it is stored.
+            false => Err(Trouble::passing(
+                "The archive did not say whether it has stored the object.",
+            )),
+        };
+    };
+    let reason = failed
+        .get(FAILURE_REASON)
+        .and_then(|reason| reason.get("Value")?.get(0)?.as_u64());
+    store_failure(reason.and_then(|reason| u16::try_from(reason).ok()))
+}
+
+/// Whether it is the Native DICOM Model (PS3.19 A.1) of a response that lists no failure.
+fn is_xml_without_failure(answer: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(answer);
+    let model = text.contains("<NativeDicomModel");
+    model && !text.contains(FAILED_SOP_SEQUENCE) && !text.contains("FailedSOPSequence")
+}
+
+/// What a Failure Reason of STOW-RS, or a status of C-STORE, means (PS3.3 C.14, PS3.4 B.2.3).
+pub(super) fn store_failure(reason: Option<u16>) -> Result<Stored, Trouble> {
+    let refuses = |what: &str| {
+        let code = reason.unwrap_or_default();
+        Trouble::lasting(
+            Fault::Service,
+            "archive-refuses",
+            format!("The archive does not take the object: {what} (reason {code:04X}H)."),
+            "Ask the archive's administrator; then send it again.",
+        )
+    };
+    match reason {
+        Some(0x0111) => Ok(Stored::Before),
+        Some(0x0122 | 0xA800) => Err(refuses("it does not support the SOP class")),
+        Some(0xA900..=0xA9FF) => Err(refuses("the data set does not match the SOP class")),
+        Some(0xC000..=0xCFFF) => Err(refuses("it cannot understand the data set")),
+        Some(0x0124) => Err(Trouble::passing(
+            "The archive does not allow this service to store (reason 0124H).",
+        )),
+        Some(code) => Err(Trouble::passing(format!(
+            "The archive could not store the object (reason {code:04X}H)."
+        ))),
+        None => Err(Trouble::passing("The archive could not store the object.")),
+    }
+}
+
+/// Whether a request that was answered so can succeed later.
+fn may_pass(status: StatusCode) -> bool {
+    status.is_server_error() || matches!(status.as_u16(), 408 | 425 | 429)
+}
+
+fn busy(status: StatusCode, headers: &HeaderMap, now: Timestamp) -> Trouble {
+    Trouble::Passing {
+        what: format!("The archive answered with status {}.", status.as_u16()),
+        asked: retry_after(headers, now),
+    }
+}
+
+fn unauthorised() -> Trouble {
+    Trouble::Final(
+        Failure::new(
+            Fault::Service,
+            "archive-credentials",
+            "The archive does not accept the credentials of this service (status 401).",
+        )
+        .fix(
+            "Ask the operator to check the variables that `username_env` and `password_env`, or \
+             `token_env`, of the archive name.",
+        ),
+    )
+}
+
+fn refused(status: StatusCode, headers: &HeaderMap, now: Timestamp) -> Trouble {
+    match status {
+        StatusCode::UNAUTHORIZED => unauthorised(),
+        status if may_pass(status) => busy(status, headers, now),
+        status if status.is_redirection() => {
+            odd_answer("The archive sends elsewhere (redirect), which is not followed.")
+        }
+        status => Trouble::lasting(
+            Fault::Service,
+            "archive-refuses",
+            format!(
+                "The archive refuses the request with status {}.",
+                status.as_u16()
+            ),
+            "Ask the operator whether the archive allows this service to do that.",
+        ),
+    }
+}
+
+/// The body of an answer, if it is not too long.
+async fn limited(mut answer: Response) -> Result<Vec<u8>, Trouble> {
+    let mut bytes = Vec::new();
+    loop {
+        match answer.chunk().await {
+            Ok(Some(piece)) if bytes.len() + piece.len() <= JSON_BYTES => {
+                bytes.extend_from_slice(&piece);
+            }
+            Ok(Some(_)) => return Err(odd_answer("The archive's answer has no end.")),
+            Ok(None) => return Ok(bytes),
+            Err(_) => {
+                return Err(Trouble::passing(
+                    "The connection to the archive broke off in its answer.",
+                ));
+            }
+        }
+    }
+}
+
+fn text<'a>(headers: &'a HeaderMap, name: &str) -> &'a str {
+    let value = headers.get(name).and_then(|value| value.to_str().ok());
+    value.unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_object_of_a_stow_answer_is_judged_by_itself() {
+        let failed = |reason: u32| {
+            format!(
+                r#"{{"00081198": {{"vr": "SQ", "Value": [{{"00081197": {{"vr": "US", "Value": [{reason}]}}}}]}}}}"#
+            )
+        };
+        let judge =
+            |status: u16, body: &str| judge(StatusCode::from_u16(status).unwrap(), body.as_bytes());
+        let stored = r#"{"00081199": {"vr": "SQ", "Value": [{}]}}"#;
+        assert_eq!(judge(200, stored).unwrap(), Stored::Now);
+        assert_eq!(judge(200, "").unwrap(), Stored::Now);
+        assert_eq!(judge(202, stored).unwrap(), Stored::Now);
+        let xml = "<?xml version=\"1.0\"?><NativeDicomModel>";
+        assert_eq!(judge(200, xml).unwrap(), Stored::Now);
+        assert!(judge(200, &format!("{xml}<DicomAttribute tag=\"00081198\"")).is_err());
+        assert!(judge(200, "<html>Log in").is_err());
+        assert_eq!(judge(409, &failed(0x0111)).unwrap(), Stored::Before);
+        for status in [200, 202, 409] {
+            let refused = judge(status, &failed(0xC000)).unwrap_err();
+            assert!(refused.what().contains("C000H"));
+            assert!(matches!(refused, Trouble::Final(_)));
+            let full = judge(status, &failed(0xA700)).unwrap_err();
+            assert!(matches!(full, Trouble::Passing { .. }), "{full:?}");
+        }
+        assert!(matches!(judge(202, "<xml/>"), Err(Trouble::Passing { .. })));
+        assert!(matches!(judge(409, ""), Err(Trouble::Passing { .. })));
+    }
+}

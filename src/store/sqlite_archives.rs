@@ -1,0 +1,362 @@
+//! The tables of archives in SQLite. Triggers of the jobs table write their rows; see the migration.
+
+use super::rows::{self, to_json};
+use super::sqlite::SqliteStore;
+use super::sqlite_jobs::renew_volumes;
+use super::writer::Write;
+use crate::archive::{
+    ArchiveBacklog, ArchiveStore, DuePull, DueSend, HeldSeries, ObjectDelivery, Pull,
+    SendSettlement, SeriesKey,
+};
+use crate::hooks::{Backlog, DeliveryState};
+use crate::jobs::{Failure, Job, StoreResult, Tenant, Timestamp};
+use async_trait::async_trait;
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+use std::collections::BTreeMap;
+
+#[async_trait]
+impl ArchiveStore for SqliteStore {
+    async fn pull_destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
+        let rows = sqlx::query(
+            "SELECT destination, min(next_attempt_at) FROM pulls WHERE state = 'pending'
+             GROUP BY destination",
+        )
+        .fetch_all(&self.readers)
+        .await?;
+        rows.iter().map(destination).collect()
+    }
+
+    async fn due_pulls(
+        &self,
+        destination: &str,
+        now: Timestamp,
+        limit: usize,
+    ) -> StoreResult<Vec<DuePull>> {
+        let rows = sqlx::query(
+            "SELECT p.*, j.tenant, j.source FROM pulls AS p JOIN jobs AS j ON j.id = p.job
+             WHERE p.state = 'pending' AND p.destination = ?1 AND p.next_attempt_at <= ?2
+             ORDER BY p.next_attempt_at, p.job LIMIT ?3",
+        )
+        .bind(destination)
+        .bind(now)
+        .bind(i64::try_from(limit).unwrap_or(i64::MAX))
+        .fetch_all(&self.readers)
+        .await?;
+        rows::all(rows, |row| {
+            Ok(DuePull {
+                job: row.try_get("job")?,
+                tenant: rows::tenant(&row)?,
+                source: rows::json(&row, "source")?,
+                attempts: rows::count(&row, "attempts")?,
+                since: row.try_get("since")?,
+            })
+        })
+    }
+
+    async fn pulled(&self, job: &str, volume: &str, now: Timestamp) -> StoreResult<Option<Job>> {
+        let mut transaction = self.writer.begin().await?;
+        let row = sqlx::query(
+            "UPDATE jobs SET volume = ?1, revision = revision + 1
+             WHERE id = ?2 AND state = 'queued' AND volume = '' RETURNING *",
+        )
+        .bind(volume)
+        .bind(job)
+        .fetch_optional(&mut *transaction)
+        .await?;
+        let job = row.map(rows::job).transpose()?;
+        if let Some(job) = &job {
+            sqlx::query(
+                "UPDATE pulls SET state = 'done', attempts = attempts + 1, last_attempt_at = ?1,
+                        last_error = NULL WHERE job = ?2",
+            )
+            .bind(now)
+            .bind(&job.id)
+            .execute(&mut *transaction)
+            .await?;
+            renew_volumes(&mut transaction, job, now).await?;
+        }
+        transaction.commit().await?;
+        Ok(job)
+    }
+
+    async fn pull_failed(
+        &self,
+        job: &str,
+        error: &str,
+        again_at: Timestamp,
+        now: Timestamp,
+    ) -> StoreResult<()> {
+        sqlx::query(
+            "UPDATE pulls SET attempts = attempts + 1, last_attempt_at = ?1, last_error = ?2,
+                    next_attempt_at = ?3
+             WHERE job = ?4 AND state = 'pending' RETURNING job",
+        )
+        .bind(now)
+        .bind(error)
+        .bind(again_at)
+        .bind(job)
+        .write_optional(&self.writer)
+        .await?;
+        Ok(())
+    }
+
+    async fn pull_given_up(
+        &self,
+        job: &str,
+        failure: &Failure,
+        now: Timestamp,
+    ) -> StoreResult<Option<Job>> {
+        let mut transaction = self.writer.begin().await?;
+        let row = sqlx::query(
+            "UPDATE jobs SET state = 'failed', failure = ?1, finished_at = ?2,
+                    revision = revision + 1
+             WHERE id = ?3 AND state = 'queued' AND volume = '' RETURNING *",
+        )
+        .bind(to_json(failure)?)
+        .bind(now)
+        .bind(job)
+        .fetch_optional(&mut *transaction)
+        .await?;
+        sqlx::query(
+            "UPDATE pulls SET attempts = attempts + 1, last_attempt_at = ?1, last_error = ?2
+             WHERE job = ?3",
+        )
+        .bind(now)
+        .bind(&failure.detail)
+        .bind(job)
+        .execute(&mut *transaction)
+        .await?;
+        transaction.commit().await?;
+        row.map(rows::job).transpose()
+    }
+
+    async fn pulls(&self, jobs: &[&str]) -> StoreResult<BTreeMap<String, Pull>> {
+        let rows = sqlx::query("SELECT * FROM pulls WHERE job IN (SELECT value FROM json_each(?))")
+            .bind(to_json(&jobs)?)
+            .fetch_all(&self.readers)
+            .await?;
+        rows.iter()
+            .map(|row| {
+                let state = match row.try_get("state")? {
+                    "pending" => DeliveryState::Pending,
+                    "done" => DeliveryState::Delivered,
+                    _ => DeliveryState::Dead,
+                };
+                let pull = Pull {
+                    state,
+                    attempts: rows::count(row, "attempts")?,
+                    next_attempt_at: next_attempt(row, state)?,
+                    last_error: row.try_get("last_error")?,
+                };
+                Ok((row.try_get("job")?, pull))
+            })
+            .collect()
+    }
+
+    async fn held_series(&self, key: SeriesKey<'_>) -> StoreResult<Option<HeldSeries>> {
+        let row = sqlx::query(
+            "SELECT instances, volume FROM pulled_series
+             WHERE tenant = ? AND base = ? AND study = ? AND series = ?",
+        )
+        .bind(key.tenant.as_str())
+        .bind(key.base)
+        .bind(key.study)
+        .bind(key.series)
+        .fetch_optional(&self.readers)
+        .await?;
+        row.map(|row| {
+            Ok(HeldSeries {
+                instances: row.try_get("instances")?,
+                volume: row.try_get("volume")?,
+            })
+        })
+        .transpose()
+    }
+
+    async fn note_series(&self, key: SeriesKey<'_>, held: &HeldSeries) -> StoreResult<()> {
+        sqlx::query(
+            "INSERT INTO pulled_series (tenant, base, study, series, instances, volume)
+             SELECT ?1, ?2, ?3, ?4, ?5, ?6
+             WHERE EXISTS (SELECT 1 FROM holdings WHERE tenant = ?1 AND id = ?6)
+             ON CONFLICT (tenant, base, study, series)
+             DO UPDATE SET instances = ?5, volume = ?6 RETURNING volume",
+        )
+        .bind(key.tenant.as_str())
+        .bind(key.base)
+        .bind(key.study)
+        .bind(key.series)
+        .bind(&held.instances)
+        .bind(&held.volume)
+        .write_optional(&self.writer)
+        .await?;
+        Ok(())
+    }
+
+    async fn send_destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
+        let rows = sqlx::query(
+            "SELECT destination, min(next_attempt_at) FROM sends WHERE state = 'pending'
+             GROUP BY destination",
+        )
+        .fetch_all(&self.readers)
+        .await?;
+        rows.iter().map(destination).collect()
+    }
+
+    async fn due_sends(
+        &self,
+        destination: &str,
+        now: Timestamp,
+        limit: usize,
+    ) -> StoreResult<Vec<DueSend>> {
+        let rows = sqlx::query(
+            "SELECT * FROM sends
+             WHERE state = 'pending' AND destination = ?1 AND next_attempt_at <= ?2
+             ORDER BY next_attempt_at, sequence LIMIT ?3",
+        )
+        .bind(destination)
+        .bind(now)
+        .bind(i64::try_from(limit).unwrap_or(i64::MAX))
+        .fetch_all(&self.readers)
+        .await?;
+        rows::all(rows, |row| {
+            Ok(DueSend {
+                id: row.try_get("id")?,
+                tenant: rows::tenant(&row)?,
+                job: row.try_get("job")?,
+                result: row.try_get("result")?,
+                name: row.try_get("name")?,
+                to: row.try_get("destination")?,
+                attempts: rows::count(&row, "attempts")?,
+                since: row.try_get("since")?,
+            })
+        })
+    }
+
+    async fn settle_send(
+        &self,
+        id: &str,
+        settled: &SendSettlement,
+        now: Timestamp,
+    ) -> StoreResult<()> {
+        let ended = (settled.state != DeliveryState::Pending).then_some(now);
+        let mut transaction = self.writer.begin().await?;
+        sqlx::query(
+            "UPDATE sends SET state = ?1, attempts = attempts + 1, last_attempt_at = ?2,
+                    last_outcome = ?3, last_error = ?4, ended_at = ?5,
+                    next_attempt_at = coalesce(?6, next_attempt_at)
+             WHERE id = ?7 AND state = 'pending'",
+        )
+        .bind(settled.state.as_str())
+        .bind(now)
+        .bind(settled.outcome)
+        .bind(&settled.error)
+        .bind(ended)
+        .bind(settled.again_at)
+        .bind(id)
+        .execute(&mut *transaction)
+        .await?;
+        // Nobody can ask about the deliveries of a job that was erased.
+        sqlx::query(
+            "DELETE FROM sends WHERE id = ? AND state != 'pending'
+                 AND NOT EXISTS (SELECT 1 FROM jobs WHERE jobs.id = sends.job)",
+        )
+        .bind(id)
+        .execute(&mut *transaction)
+        .await?;
+        transaction.commit().await?;
+        Ok(())
+    }
+
+    async fn sends(&self, jobs: &[&str]) -> StoreResult<BTreeMap<String, Vec<ObjectDelivery>>> {
+        let rows = sqlx::query(
+            "SELECT * FROM sends WHERE job IN (SELECT value FROM json_each(?))
+             ORDER BY sequence",
+        )
+        .bind(to_json(&jobs)?)
+        .fetch_all(&self.readers)
+        .await?;
+        let mut found: BTreeMap<String, Vec<ObjectDelivery>> = BTreeMap::new();
+        for row in rows {
+            found
+                .entry(row.try_get("job")?)
+                .or_default()
+                .push(delivery(&row)?);
+        }
+        Ok(found)
+    }
+
+    async fn send_again(
+        &self,
+        tenant: &Tenant,
+        job: &str,
+        id: &str,
+        now: Timestamp,
+    ) -> StoreResult<Option<ObjectDelivery>> {
+        let mut transaction = self.writer.begin().await?;
+        sqlx::query(
+            "UPDATE sends SET state = 'pending', attempts = 0, since = ?1, next_attempt_at = ?1,
+                    ended_at = NULL
+             WHERE id = ?2 AND job = ?3 AND tenant = ?4 AND state != 'pending'
+               AND last_outcome IS NOT 'erased'",
+        )
+        .bind(now)
+        .bind(id)
+        .bind(job)
+        .bind(tenant.as_str())
+        .execute(&mut *transaction)
+        .await?;
+        let row = sqlx::query("SELECT * FROM sends WHERE id = ? AND job = ? AND tenant = ?")
+            .bind(id)
+            .bind(job)
+            .bind(tenant.as_str())
+            .fetch_optional(&mut *transaction)
+            .await?;
+        transaction.commit().await?;
+        row.as_ref().map(delivery).transpose()
+    }
+
+    async fn archive_backlog(&self) -> StoreResult<ArchiveBacklog> {
+        let row = sqlx::query(
+            "SELECT (SELECT count(*) FROM pulls WHERE state = 'pending'),
+                    (SELECT count(*) FROM sends WHERE state = 'pending'),
+                    (SELECT min(since) FROM sends WHERE state = 'pending'),
+                    (SELECT count(*) FROM sends WHERE state = 'dead')",
+        )
+        .fetch_one(&self.readers)
+        .await?;
+        let count = |column: usize| u64::try_from(row.get::<i64, _>(column)).unwrap_or(0);
+        Ok(ArchiveBacklog {
+            pulls: count(0),
+            sends: Backlog {
+                pending: count(1),
+                oldest: row.try_get(2)?,
+                dead: count(3),
+            },
+        })
+    }
+}
+
+fn destination(row: &SqliteRow) -> StoreResult<(String, Timestamp)> {
+    Ok((row.try_get(0)?, row.try_get(1)?))
+}
+
+fn next_attempt(row: &SqliteRow, state: DeliveryState) -> StoreResult<Option<Timestamp>> {
+    let at: Timestamp = row.try_get("next_attempt_at")?;
+    Ok((state == DeliveryState::Pending).then_some(at))
+}
+
+fn delivery(row: &SqliteRow) -> StoreResult<ObjectDelivery> {
+    let state = DeliveryState::parse(row.try_get("state")?).unwrap_or(DeliveryState::Dead);
+    Ok(ObjectDelivery {
+        id: row.try_get("id")?,
+        name: row.try_get("name")?,
+        to: row.try_get("destination")?,
+        state,
+        attempts: rows::count(row, "attempts")?,
+        next_attempt_at: next_attempt(row, state)?,
+        last_attempt_at: row.try_get("last_attempt_at")?,
+        last_outcome: row.try_get("last_outcome")?,
+        last_error: row.try_get("last_error")?,
+    })
+}
