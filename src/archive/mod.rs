@@ -24,15 +24,15 @@
 //!
 //! | where | what |
 //! |---|---|
-//! | `archive` | an archive as the operator describes it |
+//! | `description` | an archive as the operator describes it |
 //! | `record` | fetches and deliveries, the trait that a database implements |
 //! | `host` | the trait that the service around implements: storing volumes, making objects |
 //! | `web`, `parts`, `dimse` | DICOMweb, `multipart/related`, C-STORE |
 //! | `trouble`, `end` | why an attempt failed, and whether that may pass; how attempts end |
 //! | `exchange`, `pull`, `deliver` | what both have in common; fetching; delivering |
 
-mod archive;
 mod deliver;
+mod description;
 mod dimse;
 mod end;
 mod exchange;
@@ -44,8 +44,8 @@ mod record;
 mod trouble;
 mod web;
 
-pub use archive::{Archive, ArchiveFault, Archives, Credentials, DicomPeer};
 pub use deliver::Deliverer;
+pub use description::{Archive, ArchiveFault, Archives, Credentials, DicomPeer};
 pub use end::{ExchangeCounts, ExchangeEnd};
 pub use exchange::{Exchange, ExchangeSettings};
 pub use host::{ExchangeHost, StoredSeries};
