@@ -76,7 +76,7 @@ fn segmented(
 fn cohort(seeds: &[u64], offsets: &ReaderOffsets) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     for seed in seeds {
-        let case = folder.path().join(format!("c{seed}"));
+        let case = folder.path().join(format!("case{seed}"));
         let path = case.join("spect.nii.gz");
         scan(&path, *seed);
         let made = segmented(&path, None, &FitParameters::default()).unwrap();
@@ -137,11 +137,16 @@ fn calibration_recovers_the_distances_that_masks_were_drawn_by() {
     // The profile names no case, and is the same whatever the folders are called.
     let text = made.profile.to_json();
     assert!(
-        !text.contains("c1") && !text.contains("lv_expert"),
+        !text.contains("case") && !text.contains("lv_expert"),
         "{text}"
     );
     let other = tempfile::tempdir().unwrap();
-    for (from, to) in [("c1", "z"), ("c2", "y"), ("c3", "x"), ("c4", "w")] {
+    for (from, to) in [
+        ("case1", "z"),
+        ("case2", "y"),
+        ("case3", "x"),
+        ("case4", "w"),
+    ] {
         std::fs::rename(folder.path().join(from), other.path().join(to)).unwrap();
     }
     assert_eq!(calibrated(other.path()).profile, made.profile);
