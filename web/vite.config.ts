@@ -1,3 +1,5 @@
+import { readFileSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
 import { defineConfig } from "vite";
 import { brotliCompressSync, constants, gzipSync } from "node:zlib";
 
@@ -18,15 +20,16 @@ export default defineConfig({
   },
   plugins: [
     {
-      // Every file is committed beside its compressed forms, so the service compresses nothing.
+      // Every file is committed beside its compressed forms, so the service compresses nothing. They are made of the files as
+      // they were written: other plugins still change the bundle while it is generated.
       name: "compress",
-      enforce: "post",
-      generateBundle(_options, bundle) {
-        for (const [name, file] of Object.entries(bundle)) {
-          const source = Buffer.from(file.type === "asset" ? file.source : file.code);
+      writeBundle({ dir }, bundle) {
+        for (const name of Object.keys(bundle)) {
+          const path = join(dir ?? "dist", name);
+          const source = readFileSync(path);
           const level = { params: { [constants.BROTLI_PARAM_QUALITY]: 11 } };
-          this.emitFile({ type: "asset", fileName: `${name}.br`, source: brotliCompressSync(source, level) });
-          this.emitFile({ type: "asset", fileName: `${name}.gz`, source: gzipSync(source, { level: 9 }) });
+          writeFileSync(`${path}.br`, brotliCompressSync(source, level));
+          writeFileSync(`${path}.gz`, gzipSync(source, { level: 9 }));
         }
       },
     },

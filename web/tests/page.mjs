@@ -127,6 +127,19 @@ async function main() {
   ends.push(() => browser.close());
   const { address } = await service();
 
+  await check("packed files hold what the plain ones do", async () => {
+    const read = async (path, coding) => Buffer.from(await (await fetch(address + path, { headers: { accept: "text/html", "accept-encoding": coding } })).arrayBuffer());
+    const names = [...(await read("/", "identity")).toString().matchAll(/"(\/assets\/[^"]+)"/g)].map(match => match[1]);
+    const program = (await read(names.find(name => name.endsWith(".js")), "identity")).toString();
+    for (const [chunk] of program.matchAll(/assets\/[\w-]+\.(js|css)/g)) names.push(`/${chunk}`);
+    assert.ok(names.length >= 5, names.join());
+    for (const name of ["/", ...names]) {
+      // fetch unpacks what it is sent.
+      const plain = await read(name, "identity");
+      for (const coding of ["br", "gzip"]) assert.ok(plain.equals(await read(name, coding)), `${name} as ${coding}`);
+    }
+  });
+
   await check("the first view is small", async () => {
     const { page, faults, close } = await tab(browser, address);
     await page.waitForSelector(".welcome");
