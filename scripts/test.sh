@@ -4,8 +4,8 @@
 #
 #   scripts/test.sh            everything
 #   scripts/test.sh --quick    without the demo and the external checks (trimesh, vtk, glTF validator,
-#                              pygeodesic, schemathesis, the page in a browser, generated clients, kills, DICOM, licences and SBOM)
-#                              pygeodesic, schemathesis, generated clients, kills, DICOM, Orthanc, licences and SBOM)
+#                              pygeodesic, schemathesis, the page in a browser, generated clients, kills, DICOM, Orthanc,
+#                              licences and SBOM)
 set -uo pipefail
 cd "$(dirname "$0")/.."
 

@@ -210,7 +210,8 @@ mod tests {
 
     #[tokio::test]
     async fn a_large_file_that_comes_at_once_is_not_gathered() {
-        let body = format!("--b:1\r\n\r\n{}\r\n--b:1--\r\n", "x".repeat(900_000));
+        let head = "--b:1\r\nContent-Type: application/dicom\r\n\r\n";
+        let body = format!("{head}{}\r\n--b:1--\r\n", "x".repeat(900_000));
         assert_eq!(read(TYPE, &body).await.unwrap()[0].len(), 900_000);
     }
 
