@@ -176,15 +176,18 @@ def event(walk, job):
 
 
 def workitems(walk):
-    """A work item's life: scheduled, claimed, changed, completed."""
+    """A work item's life: scheduled, claimed, changed, canceled."""
     uid, transaction = "1.2.840.99999.3", {"vr": "UI", "Value": ["1.2.840.99999.4"]}
-    step = lambda name: {"00741000": {"vr": "CS", "Value": [name]}}  # noqa: E731
-    json_type = {"content-type": "application/dicom+json"}
-    call = lambda method, path, body, expect, query="": walk.call(  # noqa: E731
-        method, f"/dicom-web/workitems{path}", expect=expect, query=query, headers=json_type,
-        body=json.dumps([body]).encode(), **({"uid": uid} if path else {}))
-    call("post", "", step("SCHEDULED"), 201, f"?workitem={uid}")
-    call("put", "/{uid}/state", {**step("IN PROGRESS"), "00081195": transaction}, 200)
+
+    def call(method, path, body, expect, query=""):
+        named = {"uid": uid} if path else {}
+        walk.call(method, f"/dicom-web/workitems{path}", expect=expect, query=query, body=[body], **named)
+
+    def state(name):
+        return {"00741000": {"vr": "CS", "Value": [name]}}
+
+    call("post", "", state("SCHEDULED"), 201, f"?workitem={uid}")
+    call("put", "/{uid}/state", {**state("IN PROGRESS"), "00081195": transaction}, 200)
     call("post", "/{uid}", {"00741204": {"vr": "LO", "Value": ["Fit"]}, "00081195": transaction}, 200)
     call("post", "/{uid}/cancelrequest", {"00741238": {"vr": "LT", "Value": ["not needed"]}}, 202)
     walk.call("get", "/dicom-web/workitems/{uid}", expect=200, uid=uid)
