@@ -397,7 +397,13 @@ def hide(value):
 
 
 def state_of(job):
-    return json.load(urllib.request.urlopen(f"{URL}/v1/jobs/{job}"))["state"]
+    try:
+        return json.load(urllib.request.urlopen(f"{URL}/v1/jobs/{job}"))["state"]
+    except urllib.error.HTTPError as error:
+        # It had ended before it could be cancelled, so it was erased.
+        if error.code == 410:
+            return "erased"
+        raise
 
 
 def example_failures(contract):

@@ -24,7 +24,6 @@ use axum::extract::{RawQuery, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
 use futures::{Stream, StreamExt, TryStreamExt};
-use mediatype::{MediaType, Name, ReadParams};
 use multer::Multipart;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
@@ -316,15 +315,18 @@ fn boundary(headers: &HeaderMap) -> Answer<Option<String>> {
         return Ok(None);
     }
     let value = headers.get(header::CONTENT_TYPE);
-    let parsed = value
-        .and_then(|value| value.to_str().ok())
-        .and_then(|value| MediaType::parse(value).ok());
-    let Some(parsed) = parsed.filter(|_| given == RELATED) else {
+    let Some(value) = value
+        .and_then(|v| v.to_str().ok())
+        .filter(|_| given == RELATED)
+    else {
         return Err(body::unsupported_type(&given, wanted));
     };
-    let parameter = |name| {
-        let value = parsed.get_param(Name::new_unchecked(name))?;
-        Some(value.unquoted_str().into_owned())
+    // Many senders write `type=application/dicom` without the quotes that its slash asks for. No
+    // boundary holds a semicolon (RFC 2046, section 5.1.1).
+    let parameter = |wanted: &str| {
+        let mut given = value.split(';').skip(1).filter_map(|p| p.split_once('='));
+        let found = given.find(|(name, _)| name.trim().eq_ignore_ascii_case(wanted));
+        found.map(|(_, value)| value.trim().trim_matches('"').to_owned())
     };
     if let Some(kind) = parameter("type")
         && !kind.eq_ignore_ascii_case(OBJECT)

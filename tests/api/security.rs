@@ -111,12 +111,13 @@ async fn a_scope_allows_what_it_says_and_no_more() {
         }
         let url = format!("{}{path}", app.url);
         let send = |key: &str| app.client.request(method.clone(), &url).bearer_auth(key);
-        let for_admins = ["/v1/keys", "/v1/audit", "/v1/webhooks"]
-            .iter()
-            .any(|admin| path.starts_with(admin))
+        let begins = |with: &[&str]| with.iter().any(|start| path.starts_with(start));
+        let for_admins = begins(&["/v1/keys", "/v1/audit", "/v1/webhooks", "/v1/intake"])
             || path.ends_with("/hold");
+        // They name patients.
+        let for_submitters = begins(&["/dicom-web/workitems"]) || path.ends_with("/identity");
         let refused = [
-            (&read, for_admins || !method.is_safe()),
+            (&read, for_admins || for_submitters || !method.is_safe()),
             (&submit, for_admins),
             (&admin, false),
         ];

@@ -98,7 +98,7 @@ async fn segmentations_are_listed_downloaded_and_deleted_like_models() {
         mesh.send().await.unwrap().headers()["content-type"],
         "model/stl"
     );
-    let unknown = app.get(&format!("{path}/mask.dcm")).send().await.unwrap();
+    let unknown = app.get(&format!("{path}/mask.nrrd")).send().await.unwrap();
     problem(unknown, 404, "not-found").await;
     let as_model = text(&made["id"]);
     let as_model = app.get(&format!("/v1/models/{as_model}")).send().await;

@@ -308,7 +308,7 @@ mod tests {
             "/readyz",
             "/openapi.json",
             "/docs",
-            "/docs/index.css",
+            "/assets/page.js",
         ] {
             assert!(is_open_path(open, &settings), "{open}");
         }
