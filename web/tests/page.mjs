@@ -131,8 +131,8 @@ async function main() {
     const read = async (path, coding) => Buffer.from(await (await fetch(address + path, { headers: { accept: "text/html", "accept-encoding": coding } })).arrayBuffer());
     const names = [...(await read("/", "identity")).toString().matchAll(/"(\/assets\/[^"]+)"/g)].map(match => match[1]);
     const program = (await read(names.find(name => name.endsWith(".js")), "identity")).toString();
-    for (const [chunk] of program.matchAll(/assets\/[\w-]+\.(js|css)/g)) names.push(`/${chunk}`);
-    assert.ok(names.length >= 5, names.join());
+    for (const [, chunk] of program.matchAll(/["'`]\.\/([\w-]+\.js)["'`]/g)) names.push(`/assets/${chunk}`);
+    assert.ok(names.some(name => name.includes("viewer")) && names.some(name => name.includes("docs")), names.join());
     for (const name of ["/", ...names]) {
       // fetch unpacks what it is sent.
       const plain = await read(name, "identity");
