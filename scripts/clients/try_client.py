@@ -9,7 +9,7 @@ from ventriform_client import Client
 from ventriform_client.api.jobs import create_job, get_job
 from ventriform_client.api.models import get_model, get_model_mesh_glb, get_model_report, list_models
 from ventriform_client.api.volumes import create_volume, get_volume
-from ventriform_client.models import Job, JobRequest, JobState, Model, ModelReport, Problem, Volume
+from ventriform_client.models import Job, JobState, Model, ModelReport, Problem, Volume, VolumeJobRequest
 from ventriform_client.types import File
 
 # Every module of the client can be imported.
@@ -22,7 +22,7 @@ scan = open(sys.argv[1], "rb").read()
 
 volume = create_volume.sync(client=client, body=File(payload=io.BytesIO(scan)))
 assert isinstance(volume, Volume), volume
-request = JobRequest.from_dict({"kind": "model", "volume": volume.id, "parameters": {"points": 110, "seed": 3}})
+request = VolumeJobRequest.from_dict({"kind": "model", "volume": volume.id, "parameters": {"points": 110, "seed": 3}})
 job = create_job.sync(client=client, body=request)
 assert isinstance(job, Job), job
 deadline = time.time() + 60
