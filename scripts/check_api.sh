@@ -22,6 +22,8 @@ try() {
     --workers 1 --seed 1 --suppress-health-check all \
     --exclude-checks positive_data_acceptance --no-color "$@"
 }
+# Schemathesis makes no bodies of application/dicom and multipart/related, the only ones of STOW-RS;
+# scripts/check_intake.sh sends these.
 # Revoking keys comes last: it takes ids from answers, among them that of the key of the requests.
-try --exclude-operation-id revoke_key
+try --exclude-operation-id revoke_key --exclude-path-regex '^/dicom-web/studies'
 try --include-operation-id revoke_key
