@@ -11,9 +11,11 @@ cd "$(dirname "$0")/.."
 tools=$PWD/target/test-tools/web
 mkdir -p "$tools"
 cp -r web/package.json web/package-lock.json web/tsconfig.json web/vite.config.ts web/index.html web/src web/tests "$tools/"
-if ! cmp -s web/package.json "$tools/installed"; then
-  (cd "$tools" && npm install --silent --no-save --no-package-lock --no-fund --no-audit)
-  cp web/package.json "$tools/installed"
+# Not `npm ci`: it refuses a lock file without the packages for other systems, which npm leaves out where a
+# registry does not have them. What the lock file names is installed in that version.
+if ! cmp -s web/package-lock.json "$tools/installed"; then
+  (cd "$tools" && npm install --silent --no-fund --no-audit)
+  cp web/package-lock.json "$tools/installed"
 fi
 if [ "${1:-}" = --bundle ]; then
   (cd "$tools" && rm -rf dist && npx tsc --noEmit && npx vite build --logLevel warn)
