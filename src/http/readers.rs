@@ -8,14 +8,11 @@ use super::problem::{Answer, ProblemBody};
 use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody, refuse_when_full};
 use super::request::{json_bytes, query_pairs, refuse_unknown};
 use super::templates::check_name;
-use super::wire::{path_of, rfc3339};
+use super::wire::{added, path_of, rfc3339};
 use crate::config::Size;
 use crate::jobs::Resource;
 use crate::progress::Monitor;
-use axum::Json;
 use axum::extract::{RawQuery, Request, State};
-use axum::http::{StatusCode, header};
-use axum::response::IntoResponse;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
@@ -127,12 +124,6 @@ pub async fn create_reader(
     let check = move |_: &Monitor<'_>| reader.profile(&profile);
     let output = app.decoding.run(LITTLE_MEMORY, check).await??;
     let (stored, new) = app.queue.add_reader(tenant, name, output).await?;
-    let status = if new {
-        StatusCode::CREATED
-    } else {
-        StatusCode::OK
-    };
-    let location = [(header::LOCATION, path_of(&stored.id))];
-    let body = Json(ReaderBody::from(Presented::of(&app, stored)));
-    Ok((status, location, body).into_response())
+    let body = ReaderBody::from(Presented::of(&app, stored));
+    Ok(added(new, &body.id, &body))
 }

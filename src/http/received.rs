@@ -6,7 +6,7 @@ use super::caller::Caller;
 use super::openapi::{ListProblems, LookupProblems, PageParameters};
 use super::pagination::{list_query, next_cursor};
 use super::problem::{Answer, Problem, ProblemBody, shorten};
-use super::request::{PathSegments, query_pairs, refuse_unknown};
+use super::request::{PathSegments, query_pairs, refuse_unknown, unknown_state};
 use super::wire::{path_of, rfc3339};
 use crate::intake::{GroupState, IntakeGroup};
 use axum::Json;
@@ -155,17 +155,8 @@ pub async fn list_received(
 }
 
 fn parse_state(name: &str) -> Answer<GroupState> {
-    GroupState::parse(name).ok_or_else(|| {
-        Problem::bad_request(
-            "invalid-parameter",
-            format!("There is no state `{}`.", shorten(name)),
-        )
-        .at("state")
-        .fix(format!(
-            "Give one of {}.",
-            GroupState::ALL.map(GroupState::as_str).join(", ")
-        ))
-    })
+    GroupState::parse(name)
+        .ok_or_else(|| unknown_state(name, &GroupState::ALL.map(GroupState::as_str)))
 }
 
 /// Forget what was sent

@@ -73,6 +73,16 @@ pub fn flag(name: &str, text: &str) -> Answer<bool> {
     })
 }
 
+/// 400: the parameter `state` names none of the `known` states.
+pub fn unknown_state(name: &str, known: &[&str]) -> Problem {
+    Problem::bad_request(
+        "invalid-parameter",
+        format!("There is no state `{}`.", shorten(name)),
+    )
+    .at("state")
+    .fix(format!("Give one of {}.", known.join(", ")))
+}
+
 /// 400 for an unknown name, with the most similar known one.
 pub fn unknown(what: &str, name: &str, known: &[&str]) -> Problem {
     let fix = match nearest(name, known.iter().copied()) {

@@ -8,15 +8,12 @@ use super::problem::not_found::field_names_nothing;
 use super::problem::{Answer, Problem, ProblemBody};
 use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody, refuse_when_full};
 use super::request::{json_bytes, query_pairs, refuse_unknown};
-use super::wire::{path_of, rfc3339};
+use super::wire::{added, path_of, rfc3339};
 use crate::config::Size;
 use crate::jobs::{Resource, TemplateSource, Tenant};
 use crate::progress::Monitor;
-use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{RawQuery, Request, State};
-use axum::http::{StatusCode, header};
-use axum::response::IntoResponse;
 use futures::TryStreamExt;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -153,14 +150,8 @@ pub async fn create_template(
         volume: volume.as_deref(),
     };
     let (template, new) = app.queue.add_template(source, &organ, output).await?;
-    let status = if new {
-        StatusCode::CREATED
-    } else {
-        StatusCode::OK
-    };
-    let location = [(header::LOCATION, path_of(&template.id))];
-    let body = Json(TemplateBody::from(Presented::of(&app, template)));
-    Ok((status, location, body).into_response())
+    let body = TemplateBody::from(Presented::of(&app, template));
+    Ok(added(new, &body.id, &body))
 }
 
 /// The mesh to be added: the body, or that of the stored `model`, with the id of its volume.

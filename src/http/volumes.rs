@@ -7,7 +7,7 @@ use super::openapi::{self, LookupProblems, UploadProblems};
 use super::problem::{Answer, Problem};
 use super::request::{PathSegments, query_pairs, refuse_unknown, unknown};
 use super::validators::not_modified;
-use super::wire::{path_of, rfc3339};
+use super::wire::{added, path_of, rfc3339};
 use super::{scans, tags, upload};
 use crate::access::Scope;
 use crate::jobs::{
@@ -18,7 +18,7 @@ use crate::progress::Monitor;
 use crate::work::{UploadFacts, preview_memory};
 use axum::Json;
 use axum::extract::{RawQuery, Request, State};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, header};
 use axum::response::IntoResponse;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -308,18 +308,8 @@ pub async fn create_volume(
     }
     let stored = upload.volume.store(&app, &caller.tenant, &tags).await?;
     let volume = stored.volume;
-    let status = if stored.new {
-        StatusCode::CREATED
-    } else {
-        StatusCode::OK
-    };
-    let location = [(header::LOCATION, path_of(&volume.id))];
-    Ok((
-        status,
-        location,
-        Json(VolumeBody::of(&app, caller.scope, volume)?),
-    )
-        .into_response())
+    let body = VolumeBody::of(&app, caller.scope, volume)?;
+    Ok(added(stored.new, &body.id, &body))
 }
 
 /// Change a volume's names

@@ -211,9 +211,7 @@ pub async fn update_workitem(
     headers: HeaderMap,
     request: Request,
 ) -> Answer {
-    let stated = transaction(query.as_deref(), &headers)?;
-    let changes = data_set(request).await?;
-    let stated = stated.or_else(|| changes.text(TRANSACTION).map(str::to_owned));
+    let (changes, stated) = claimed_data_set(query.as_deref(), &headers, request).await?;
     change(&app, &caller, &uid, |item, now| {
         item.update(stated.as_deref(), changes.clone(), now)?;
         Ok(Change::Done)
@@ -241,9 +239,7 @@ pub async fn change_workitem_state(
     headers: HeaderMap,
     request: Request,
 ) -> Answer {
-    let stated = transaction(query.as_deref(), &headers)?;
-    let wanted = data_set(request).await?;
-    let stated = stated.or_else(|| wanted.text(TRANSACTION).map(str::to_owned));
+    let (wanted, stated) = claimed_data_set(query.as_deref(), &headers, request).await?;
     if let Some(uid) = &stated {
         require_uid("00081195", uid)?;
     }
@@ -384,6 +380,18 @@ fn transaction(query: Option<&str>, headers: &HeaderMap) -> Answer<Option<String
         .and_then(|value| value.to_str().ok())
         .map(str::to_owned);
     Ok(pairs.into_iter().next().map(|(_, uid)| uid).or(header))
+}
+
+/// The data set of the body, and the Transaction UID wherever the client states it.
+async fn claimed_data_set(
+    query: Option<&str>,
+    headers: &HeaderMap,
+    request: Request,
+) -> Answer<(DataSetJson, Option<String>)> {
+    let stated = transaction(query, headers)?;
+    let body = data_set(request).await?;
+    let stated = stated.or_else(|| body.text(TRANSACTION).map(str::to_owned));
+    Ok((body, stated))
 }
 
 async fn data_set(request: Request) -> Answer<DataSetJson> {

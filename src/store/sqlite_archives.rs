@@ -18,13 +18,11 @@ use std::collections::BTreeMap;
 #[async_trait]
 impl ArchiveStore for SqliteStore {
     async fn pull_destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
-        let rows = sqlx::query(
+        self.due_destinations(
             "SELECT destination, min(next_attempt_at) FROM pulls WHERE state = 'pending'
              GROUP BY destination",
         )
-        .fetch_all(&self.readers)
-        .await?;
-        rows.iter().map(destination).collect()
+        .await
     }
 
     async fn due_pulls(
@@ -194,13 +192,11 @@ impl ArchiveStore for SqliteStore {
     }
 
     async fn send_destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
-        let rows = sqlx::query(
+        self.due_destinations(
             "SELECT destination, min(next_attempt_at) FROM sends WHERE state = 'pending'
              GROUP BY destination",
         )
-        .fetch_all(&self.readers)
-        .await?;
-        rows.iter().map(destination).collect()
+        .await
     }
 
     async fn due_sends(
@@ -337,8 +333,14 @@ impl ArchiveStore for SqliteStore {
     }
 }
 
-fn destination(row: &SqliteRow) -> StoreResult<(String, Timestamp)> {
-    Ok((row.try_get(0)?, row.try_get(1)?))
+impl SqliteStore {
+    /// The rows of a query for destinations, each with the time when its first errand is due.
+    async fn due_destinations(&self, query: &'static str) -> StoreResult<Vec<(String, Timestamp)>> {
+        let rows = sqlx::query(query).fetch_all(&self.readers).await?;
+        rows.iter()
+            .map(|row| Ok((row.try_get(0)?, row.try_get(1)?)))
+            .collect()
+    }
 }
 
 fn next_attempt(row: &SqliteRow, state: DeliveryState) -> StoreResult<Option<Timestamp>> {

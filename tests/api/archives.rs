@@ -297,8 +297,7 @@ async fn what_may_pass_is_tried_again() {
     let job = pulled(&app, &order()).await;
     assert_eq!(job["state"], "succeeded", "{job}");
     assert_eq!(job["source"]["attempts"], 4);
-    let metrics = app.get("/metrics").send().await.unwrap();
-    let metrics = metrics.text().await.unwrap();
+    let metrics = app.metrics().await;
     for line in [
         "ventriform_archive_fetches_total{outcome=\"done\"} 1",
         "ventriform_archive_fetches_total{outcome=\"failed\"} 3",
@@ -568,14 +567,7 @@ async fn results_are_delivered_once_whatever_happens() {
     sent(&app, &refused, "delivered").await;
     let unknown = format!("{itself}/deliveries/snd_0/redeliver");
     problem(app.post(&unknown).send().await.unwrap(), 404, "not-found").await;
-    let metrics = app
-        .get("/metrics")
-        .send()
-        .await
-        .unwrap()
-        .text()
-        .await
-        .unwrap();
+    let metrics = app.metrics().await;
     for line in [
         "ventriform_archive_deliveries_total{outcome=\"failed\"} 5",
         "ventriform_archive_deliveries_total{outcome=\"given-up\"} 1",

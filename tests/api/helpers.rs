@@ -82,6 +82,12 @@ impl Deref for TestApp {
 }
 
 impl TestApp {
+    /// What `/metrics` answers.
+    pub async fn metrics(&self) -> String {
+        let answer = self.get("/metrics").send().await.unwrap();
+        answer.text().await.unwrap()
+    }
+
     /// A service with the fake computation and default settings.
     pub async fn start() -> Self {
         Self::with(|_| {}).await

@@ -266,14 +266,7 @@ async fn what_makes_no_volume_is_shown_with_the_reason_until_it_is_forgotten() {
     assert!(intake(&app).await.is_empty());
     kept(app.data.path(), 0).await;
     problem(app.delete(&path).send().await.unwrap(), 404, "not-found").await;
-    let metrics = app
-        .get("/metrics")
-        .send()
-        .await
-        .unwrap()
-        .text()
-        .await
-        .unwrap();
+    let metrics = app.metrics().await;
     for line in [
         "ventriform_received_objects_total{outcome=\"stored\",protocol=\"c-store\"} 2",
         "ventriform_received_volumes_total{outcome=\"failed\"} 2",

@@ -4,16 +4,6 @@ use crate::helpers::{TestApp, volume};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-async fn metrics(app: &TestApp) -> String {
-    app.get("/metrics")
-        .send()
-        .await
-        .unwrap()
-        .text()
-        .await
-        .unwrap()
-}
-
 /// A service that has done something of everything.
 async fn busy() -> (TestApp, String) {
     let app = TestApp::start().await;
@@ -22,7 +12,7 @@ async fn busy() -> (TestApp, String) {
     app.finished("fail").await;
     app.get("/v1/jobs/job_0").send().await.unwrap();
     app.get("/nowhere/secret-name").send().await.unwrap();
-    let text = metrics(&app).await;
+    let text = app.metrics().await;
     (app, text)
 }
 
@@ -112,7 +102,7 @@ async fn a_waiting_job_grows_old() {
         .await
         .unwrap();
     tokio::time::sleep(std::time::Duration::from_millis(50)).await;
-    let text = metrics(&app).await;
+    let text = app.metrics().await;
     assert_eq!(value(&text, "ventriform_jobs{state=\"queued\"}"), 1.0);
     assert_eq!(value(&text, "ventriform_jobs{state=\"running\"}"), 1.0);
     assert!(value(&text, "ventriform_oldest_queued_job_age_seconds") > 0.0);

@@ -10,14 +10,7 @@ async fn health_readiness_and_metrics_are_served() {
     assert_eq!(app.json("/healthz").await["status"], "ok");
     assert_eq!(app.json("/readyz").await["status"], "ok");
     app.finished("sphere").await;
-    let metrics = app
-        .get("/metrics")
-        .send()
-        .await
-        .unwrap()
-        .text()
-        .await
-        .unwrap();
+    let metrics = app.metrics().await;
     assert!(
         metrics.contains("ventriform_jobs{state=\"queued\"} 0"),
         "{metrics}"

@@ -18,7 +18,9 @@ use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
 use super::pagination::{next_cursor, page_of};
 use super::problem::not_found::missing;
 use super::problem::{Answer, Problem, ProblemBody, shorten};
-use super::request::{PathSegments, flag, json_object, query_pairs, refuse_unknown, text, unknown};
+use super::request::{
+    PathSegments, flag, json_object, query_pairs, refuse_unknown, text, unknown, unknown_state,
+};
 use super::validators::ValidatedJson;
 use super::{scans, tags};
 use crate::jobs::{
@@ -181,17 +183,7 @@ fn parse_moment(text: &str) -> Answer<Timestamp> {
 }
 
 fn parse_state(name: &str) -> Answer<JobState> {
-    JobState::parse(name).ok_or_else(|| {
-        Problem::bad_request(
-            "invalid-parameter",
-            format!("There is no state `{}`.", shorten(name)),
-        )
-        .at("state")
-        .fix(format!(
-            "Give one of {}.",
-            JobState::ALL.map(JobState::as_str).join(", ")
-        ))
-    })
+    JobState::parse(name).ok_or_else(|| unknown_state(name, &JobState::ALL.map(JobState::as_str)))
 }
 
 /// Show a job
