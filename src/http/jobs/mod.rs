@@ -74,7 +74,7 @@ pub async fn create_job(
         tenant: caller.tenant,
         tags: tags::of_object(&app, &object)?,
         key,
-        webhook: webhook_of(&app, &object).await?,
+        webhook: None,
         source: None,
         send: None,
         trace_parent,
@@ -135,6 +135,8 @@ async fn read_job(app: &App, object: &Map<String, Value>, mut filing: Filing) ->
         }
     };
     let parameters = work.parameters_from_json(parameters)?;
+    // Last, since looking up the name of its host may take seconds.
+    filing.webhook = webhook_of(app, object).await?;
     Ok(filing::new_job(&**work, volume, parameters, filing))
 }
 
