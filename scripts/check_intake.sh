@@ -14,18 +14,10 @@ cd "$(dirname "$0")/.."
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 
-as_root() { if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo "$@"; fi; }
-if ! command -v storescu >/dev/null; then
-  as_root apt-get update -qq
-  as_root apt-get install -y -qq --no-install-recommends dcmtk >/dev/null
-fi
-if [ -z "${PYTHON:-}" ]; then
-  tools=target/check-intake
-  PYTHON=$tools/bin/python
-  [ -x "$PYTHON" ] || python3 -m venv "$tools"
-  "$PYTHON" -c 'import pynetdicom, dicomweb_client' 2>/dev/null ||
-    "$PYTHON" -m pip install --quiet --disable-pip-version-check -r scripts/requirements.txt
-fi
+# shellcheck source=scripts/dicom_tools.sh
+. scripts/dicom_tools.sh
+command -v storescu >/dev/null || debian dcmtk
+python_with "pynetdicom, dicomweb_client"
 [ -x target/debug/ventriform ] || cargo build --quiet --bins --test layering
 
 "$PYTHON" scripts/check_intake.py target/debug/ventriform "$out"
