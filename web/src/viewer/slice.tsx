@@ -2,6 +2,7 @@
 
 import { useEffect, useRef } from "preact/hooks";
 import { type SliceStyle, drawSlice, rollKnob, sliceOrigin } from "./drawing";
+import { handleEvents } from "./events";
 import { type Plane, letters, point } from "./plane";
 import type { Scene } from "./scene";
 import { type Vec, add, dot, norm, scale, sub, unit } from "./vector";
@@ -182,22 +183,7 @@ function listen(element: HTMLCanvasElement, scene: Scene, plane: () => Plane): (
     act();
   };
   const quiet = (event: Event) => event.preventDefault();
-  element.addEventListener("pointerdown", down);
-  element.addEventListener("pointermove", move);
-  element.addEventListener("pointerup", up);
-  element.addEventListener("pointercancel", up);
-  element.addEventListener("wheel", wheel, { passive: false });
-  element.addEventListener("keydown", press);
-  element.addEventListener("contextmenu", quiet);
-  return () => {
-    element.removeEventListener("pointerdown", down);
-    element.removeEventListener("pointermove", move);
-    element.removeEventListener("pointerup", up);
-    element.removeEventListener("pointercancel", up);
-    element.removeEventListener("wheel", wheel);
-    element.removeEventListener("keydown", press);
-    element.removeEventListener("contextmenu", quiet);
-  };
+  return handleEvents(element, { pointerdown: down, pointermove: move, pointerup: up, pointercancel: up, wheel, keydown: press, contextmenu: quiet });
 }
 
 /** The handle of the correction near a place, as seen in this plane. */

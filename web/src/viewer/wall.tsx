@@ -3,6 +3,7 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { useWatched } from "../state";
 import { DIVERGING, LUTS, type Lut, colour, css } from "./colours";
+import { handleEvents } from "./events";
 import { MeshView } from "./glview";
 import { type Mesh, apart, thickness, triangleShape } from "./mesh";
 import { type Axis, frameOf, letters } from "./plane";
@@ -245,18 +246,5 @@ function listen(element: HTMLCanvasElement, view: MeshView, draw: () => void, sc
     event.preventDefault();
     draw();
   };
-  element.addEventListener("pointerdown", down);
-  element.addEventListener("pointermove", move);
-  element.addEventListener("pointerup", up);
-  element.addEventListener("pointercancel", up);
-  element.addEventListener("wheel", wheel, { passive: false });
-  element.addEventListener("keydown", press);
-  return () => {
-    element.removeEventListener("pointerdown", down);
-    element.removeEventListener("pointermove", move);
-    element.removeEventListener("pointerup", up);
-    element.removeEventListener("pointercancel", up);
-    element.removeEventListener("wheel", wheel);
-    element.removeEventListener("keydown", press);
-  };
+  return handleEvents(element, { pointerdown: down, pointermove: move, pointerup: up, pointercancel: up, wheel, keydown: press });
 }
