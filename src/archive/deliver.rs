@@ -88,16 +88,12 @@ impl Deliverer {
             Err(trouble) => trouble,
         };
         let meaning = means(&trouble);
+        let attempts = due.attempts.saturating_add(1);
+        let again_after = |asked| self.exchange.again_at(attempts, due.since, asked);
         let again_at = match &trouble {
-            Trouble::Passing { asked, .. } => {
-                let attempts = due.attempts.saturating_add(1);
-                self.exchange.again_at(attempts, due.since, *asked)
-            }
+            Trouble::Passing { asked, .. } => again_after(*asked),
             // The operator may correct the credentials.
-            Trouble::Final(failure) if failure.code == "archive-credentials" => {
-                let attempts = due.attempts.saturating_add(1);
-                self.exchange.again_at(attempts, due.since, None)
-            }
+            Trouble::Final(failure) if failure.code == "archive-credentials" => again_after(None),
             Trouble::Final(_) => None,
         };
         let (state, end) = match again_at {

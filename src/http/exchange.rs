@@ -10,11 +10,10 @@ use crate::archive::{
     ExchangeSettings, Puller, SeriesParts, StoredSeries, Trouble,
 };
 use crate::hooks::RetrySchedule;
-use crate::jobs::{Failure, Fault, Resource, StoreError, Tags, Tenant};
+use crate::jobs::{Fault, Resource, StoreError, Tags, Tenant};
 use crate::progress::Monitor;
 use crate::work::{UploadFacts, dicom};
 use async_trait::async_trait;
-use axum::http::StatusCode;
 use futures::StreamExt;
 use std::sync::Arc;
 use tokio::task::JoinSet;
@@ -57,27 +56,10 @@ pub async fn run(app: App, end: CancellationToken) {
 
 /// A problem of an upload, as the trouble of a fetch.
 fn trouble(problem: Problem) -> Trouble {
-    let body = problem.into_body();
-    let status = StatusCode::from_u16(body.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-    let passes = [
-        StatusCode::TOO_MANY_REQUESTS,
-        StatusCode::SERVICE_UNAVAILABLE,
-        StatusCode::INSUFFICIENT_STORAGE,
-    ];
-    if passes.contains(&status) {
-        return Trouble::passing(body.detail);
+    match problem.into_failure() {
+        Ok(failure) => Trouble::Final(failure),
+        Err(passing) => Trouble::passing(passing),
     }
-    Trouble::Final(Failure {
-        code: body.code().to_owned(),
-        fault: match status {
-            StatusCode::PAYLOAD_TOO_LARGE => Fault::TooLarge,
-            status if status.is_server_error() => Fault::Service,
-            _ => Fault::Content,
-        },
-        detail: body.detail,
-        field: body.field,
-        fix: body.fix,
-    })
 }
 
 #[async_trait]

@@ -9,7 +9,6 @@ use super::upload::Bundle;
 use crate::intake::{IntakeGroup, MakeError, Rule, VolumeMaker};
 use crate::jobs::{Failure, Fault, Filed, LocalFile, Tags};
 use async_trait::async_trait;
-use axum::http::StatusCode;
 use futures::TryStreamExt;
 use serde_json::{Map, Value};
 use tokio_util::io::ReaderStream;
@@ -17,33 +16,12 @@ use tokio_util::io::ReaderStream;
 /// Bytes of a file that are read at a time.
 const CHUNK: usize = 256 << 10;
 
-/// Statuses of problems that may pass.
-const PASSING: [StatusCode; 3] = [
-    StatusCode::TOO_MANY_REQUESTS,
-    StatusCode::SERVICE_UNAVAILABLE,
-    StatusCode::INSUFFICIENT_STORAGE,
-];
-
 impl From<Problem> for MakeError {
     fn from(problem: Problem) -> Self {
-        let body = problem.into_body();
-        let mut passing = PASSING.iter().map(StatusCode::as_u16);
-        if passing.any(|status| status == body.status) {
-            return Self::Later(body.detail);
+        match problem.into_failure() {
+            Ok(failure) => Self::Never(failure),
+            Err(passing) => Self::Later(passing),
         }
-        let code = body.kind.rsplit(':').next().unwrap_or_default();
-        let fault = match body.status {
-            500.. => Fault::Service,
-            413 => Fault::TooLarge,
-            _ => Fault::Content,
-        };
-        Self::Never(Failure {
-            code: code.to_owned(),
-            fault,
-            detail: body.detail,
-            field: body.field,
-            fix: body.fix,
-        })
     }
 }
 

@@ -23,6 +23,37 @@ impl From<Failure> for Problem {
     }
 }
 
+/// Statuses of problems that may pass.
+const PASSING: [StatusCode; 3] = [
+    StatusCode::TOO_MANY_REQUESTS,
+    StatusCode::SERVICE_UNAVAILABLE,
+    StatusCode::INSUFFICIENT_STORAGE,
+];
+
+impl Problem {
+    /// What is to be written down of work that nobody waits for.
+    ///
+    /// # Errors
+    /// What happened, if it may pass and the work is to be tried again.
+    pub fn into_failure(self) -> Result<Failure, String> {
+        let body = self.into_body();
+        if PASSING.iter().any(|status| status.as_u16() == body.status) {
+            return Err(body.detail);
+        }
+        Ok(Failure {
+            code: body.code().to_owned(),
+            fault: match body.status {
+                500.. => Fault::Service,
+                413 => Fault::TooLarge,
+                _ => Fault::Content,
+            },
+            detail: body.detail,
+            field: body.field,
+            fix: body.fix,
+        })
+    }
+}
+
 impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
         let problem = |status, code: &str, detail: &str| {
