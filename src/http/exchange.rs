@@ -4,7 +4,7 @@
 use super::app::App;
 use super::problem::Problem;
 use super::upload::Bundle;
-use crate::access::{Activity, AuditEvent, Outcome};
+use crate::access::{Activity, AuditEvent, Outcome, Usage};
 use crate::archive::{
     ArchiveObject, Deliverer, DuePull, DueSend, Exchange, ExchangeEnd, ExchangeHost,
     ExchangeSettings, Puller, SeriesParts, StoredSeries, Trouble,
@@ -88,14 +88,15 @@ impl ExchangeHost for App {
             written.map_err(trouble)?;
             bundle.join_repeated().await.map_err(trouble)?;
         }
+        // Counted first, so that fetches and uploads that come together cannot exceed the quota together.
+        let amount = Usage {
+            bytes: bundle.bytes(),
+            jobs: 0,
+        };
+        let (_reservation, reserved) = self.guard.reservations.add(tenant, amount);
         if let Some(quota) = self.guard.quota.bytes
-            && self
-                .access
-                .usage(tenant)
-                .await?
-                .bytes
-                .saturating_add(bundle.bytes())
-                > quota
+            && let used = self.access.usage(tenant).await?.bytes
+            && used.saturating_add(reserved.bytes) > quota
         {
             return Err(Trouble::lasting(
                 Fault::TooLarge,
