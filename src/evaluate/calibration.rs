@@ -23,7 +23,6 @@ use crate::segmentation::{SegmentationOrder, from_files, on_grid};
 use crate::volume::{ReadLimits, VolumeFile};
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -275,8 +274,5 @@ impl ReadCase {
 fn sha256(path: &Path) -> Result<String, String> {
     let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
     let digest = Sha256::digest(bytes);
-    Ok(digest.iter().fold(String::new(), |mut text, byte| {
-        write!(text, "{byte:02x}").expect("a string takes any text");
-        text
-    }))
+    Ok(digest.iter().map(|byte| format!("{byte:02x}")).collect())
 }
