@@ -27,7 +27,7 @@
 //! | `description` | an archive as the operator describes it |
 //! | `record` | fetches and deliveries, the trait that a database implements |
 //! | `host` | the trait that the service around implements: storing volumes, making objects |
-//! | `web`, `parts`, `dimse` | DICOMweb, `multipart/related`, C-STORE |
+//! | `web`, `related`, `parts`, `dimse` | DICOMweb, its messages of several objects, C-STORE |
 //! | `trouble`, `end` | why an attempt failed, and whether that may pass; how attempts end |
 //! | `exchange`, `pull`, `deliver` | what both have in common; fetching; delivering |
 
@@ -41,6 +41,7 @@ mod object;
 mod parts;
 mod pull;
 mod record;
+mod related;
 mod trouble;
 mod web;
 
@@ -56,4 +57,5 @@ pub use record::{
     ArchiveBacklog, ArchiveStore, DuePull, DueSend, HeldSeries, ObjectDelivery, Pull,
     SendSettlement, SeriesKey,
 };
+pub use related::RelatedType;
 pub use trouble::Trouble;

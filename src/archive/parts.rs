@@ -1,6 +1,7 @@
 //! The files of a series on their way from an archive: `multipart/related` (PS3.18, 8.7.1), read
 //! part by part within limits.
 
+use super::related::RelatedType;
 use super::trouble::{Trouble, odd_answer};
 use crate::jobs::Fault;
 use futures::stream::BoxStream;
@@ -47,9 +48,12 @@ impl SeriesParts {
         body: BoxStream<'static, reqwest::Result<bytes::Bytes>>,
         limits: PartLimits,
     ) -> Result<Self, Trouble> {
-        let boundary = boundary(content_type).ok_or_else(|| {
-            odd_answer("The archive's answer is no `multipart/related` with DICOM files.")
-        })?;
+        let related = RelatedType::parse(content_type);
+        let boundary = related
+            .and_then(|related| related.boundary)
+            .ok_or_else(|| {
+                odd_answer("The archive's answer is no `multipart/related` with DICOM files.")
+            })?;
         let waiting = Arc::<AtomicUsize>::default();
         let counted = waiting.clone();
         let mut body = body;
@@ -133,17 +137,6 @@ impl Stream for SeriesPart {
         let limits = self.limits;
         Poll::Ready(piece.map(|piece| piece.map_err(|error| trouble(&error, limits))))
     }
-}
-
-/// The boundary of `multipart/related`.
-fn boundary(content_type: &str) -> Option<String> {
-    let media_type = mediatype::MediaTypeBuf::from_string(content_type.to_owned()).ok()?;
-    if media_type.ty() != "multipart" || media_type.subty() != "related" {
-        return None;
-    }
-    let name = mediatype::Name::new("boundary")?;
-    let boundary = mediatype::ReadParams::get_param(&media_type, name)?;
-    Some(boundary.unquoted_str().into_owned())
 }
 
 fn trouble(error: &multer::Error, limits: PartLimits) -> Trouble {

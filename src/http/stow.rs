@@ -17,6 +17,7 @@ use super::request::{
 };
 use super::upload::{Unparsed, counted};
 use crate::access::{Activity, NotRecorded};
+use crate::archive::RelatedType;
 use crate::intake::{Incoming, Origin, Protocol, ReceiveError, Refused, Session, Stated};
 use axum::Extension;
 use axum::body::{Body, Bytes};
@@ -314,32 +315,20 @@ fn boundary(headers: &HeaderMap) -> Answer<Option<String>> {
     if given == OBJECT {
         return Ok(None);
     }
-    let value = headers.get(header::CONTENT_TYPE);
-    let Some(value) = value
-        .and_then(|v| v.to_str().ok())
-        .filter(|_| given == RELATED)
-    else {
+    let text = headers.get(header::CONTENT_TYPE);
+    let text = text.and_then(|value| value.to_str().ok());
+    let Some(related) = text.and_then(RelatedType::parse) else {
         return Err(body::unsupported_type(&given, wanted));
     };
-    // Many senders write `type=application/dicom` without the quotes that its slash asks for. No
-    // boundary holds a semicolon (RFC 2046, section 5.1.1).
-    let parameter = |wanted: &str| {
-        let mut given = value.split(';').skip(1).filter_map(|p| p.split_once('='));
-        let found = given.find(|(name, _)| name.trim().eq_ignore_ascii_case(wanted));
-        found.map(|(_, value)| value.trim().trim_matches('"').to_owned())
-    };
-    if let Some(kind) = parameter("type")
-        && !kind.eq_ignore_ascii_case(OBJECT)
-    {
-        return Err(body::unsupported_type(
-            &format!("{RELATED}; type=\"{kind}\""),
-            wanted,
-        ));
+    if !related.is_dicom() {
+        let found = related.parts.unwrap_or_default();
+        let found = format!("{RELATED}; type=\"{found}\"");
+        return Err(body::unsupported_type(&found, wanted));
     }
-    match parameter("boundary") {
-        Some(boundary) if !boundary.is_empty() => Ok(Some(boundary)),
-        _ => Err(body::malformed_related("Content-Type has no `boundary`")),
-    }
+    let boundary = related.boundary;
+    let boundary =
+        boundary.ok_or_else(|| body::malformed_related("Content-Type has no `boundary`"))?;
+    Ok(Some(boundary))
 }
 
 fn not_recorded() -> Problem {

@@ -3,6 +3,7 @@
 //! and boundaries, which the parser gathers in memory.
 
 use super::{Bundle, Upload};
+use crate::archive::RelatedType;
 use crate::config::Size;
 use crate::http::app::App;
 use crate::http::problem::body::{self, EndlessFormHeader};
@@ -12,7 +13,6 @@ use axum::extract::multipart::Field;
 use axum::extract::{FromRequest, Multipart, Request};
 use axum::http::{HeaderMap, HeaderValue, header};
 use futures::{StreamExt, TryStreamExt};
-use mediatype::{MediaType, Name, ReadParams};
 use std::error::Error;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -77,20 +77,15 @@ fn related_boundary(headers: &HeaderMap) -> Answer<String> {
     let text = headers.get(header::CONTENT_TYPE);
     let text = text.and_then(|value| value.to_str().ok()).unwrap_or("?");
     let unreadable = || body::malformed_form("its Content-Type cannot be read");
-    let media_type = MediaType::parse(text).map_err(|_| unreadable())?;
-    let parameter = |name: &str| {
-        let value = media_type.get_param(Name::new_unchecked(name))?;
-        Some(value.unquoted_str().into_owned())
-    };
-    match parameter("type") {
-        Some(inner) if !inner.eq_ignore_ascii_case("application/dicom") => {
-            let found = format!("multipart/related; type={inner}");
-            let wanted = "multipart/related; type=\"application/dicom\"";
-            return Err(body::unsupported_type(&found, wanted));
-        }
-        _ => {}
+    let related = RelatedType::parse(text).ok_or_else(unreadable)?;
+    if !related.is_dicom() {
+        let found = related.parts.unwrap_or_default();
+        let found = format!("multipart/related; type={found}");
+        let wanted = "multipart/related; type=\"application/dicom\"";
+        return Err(body::unsupported_type(&found, wanted));
     }
-    parameter("boundary").ok_or_else(|| body::malformed_form("it has no boundary"))
+    let boundary = related.boundary;
+    boundary.ok_or_else(|| body::malformed_form("it has no boundary"))
 }
 
 /// Receives the parts of a body; without `apart`, every part is a file.
