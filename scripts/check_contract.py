@@ -245,6 +245,7 @@ def everything(walk, folder):
     _, added = call("post", "/v1/templates", expect=201, query="?name=healthy", body=json.loads(mesh))
     walk.recorded["operations"]["create_template"].pop("request")
     call("post", "/v1/templates", expect=200, query="?name=healthy&model=" + template_model)
+    call("patch", "/v1/templates/{id}", expect=200, id=added["id"], body={"library": True})
     call("get", "/v1/templates", expect=200)
     offset = {"value": 0.5, "mean": 0.7, "spread": 0.3}
     hashes = {"scan": "a" * 64, "mask": "b" * 64}

@@ -27,6 +27,10 @@ pub struct ImportArgs {
     /// Data folder of the service (created if missing)
     #[arg(long, value_name = "DIR")]
     data_dir: PathBuf,
+    /// Fit the models in every job with `model=auto`, beside the built-in hearts; otherwise only jobs
+    /// that name them do
+    #[arg(long)]
+    library: bool,
     /// Organ that the models show: left_ventricle, liver, kidney or generic
     #[arg(long, value_name = "WORD", default_value = "left_ventricle")]
     organ: String,
@@ -51,7 +55,7 @@ pub fn import(args: &ImportArgs) -> Result<()> {
         ));
         let engine = Engine::new(ReadLimits::default());
         for path in &args.models {
-            let id = add(&queue, &engine, path, &args.organ)
+            let id = add(&queue, &engine, path, args)
                 .await
                 .with_context(|| format!("{}", path.display()))?;
             println!("{id} {}", name(path));
@@ -60,7 +64,13 @@ pub fn import(args: &ImportArgs) -> Result<()> {
     })
 }
 
-async fn add(queue: &Arc<Queue>, engine: &Engine, path: &Path, organ: &str) -> Result<String> {
+async fn add(
+    queue: &Arc<Queue>,
+    engine: &Engine,
+    path: &Path,
+    args: &ImportArgs,
+) -> Result<String> {
+    let organ = &args.organ;
     let mesh = std::fs::read(path)?;
     let output = engine
         .reader
@@ -71,6 +81,7 @@ async fn add(queue: &Arc<Queue>, engine: &Engine, path: &Path, organ: &str) -> R
         tenant: &Tenant::default(),
         name: &name,
         volume: None,
+        library: args.library.then_some(true),
     };
     let (template, _) = queue.add_template(source, organ, output).await?;
     Ok(template.item.id)

@@ -101,6 +101,8 @@ pub struct Presented {
     pub expires_at: Option<String>,
     /// The scan of its volume.
     pub scan: Option<ScanUidsBody>,
+    /// Whether every `model=auto` fits it; templates only.
+    pub library: bool,
 }
 
 impl Presented {
@@ -109,6 +111,7 @@ impl Presented {
         Self {
             expires_at: app.expires_at(held.item.resource(), &held.holding),
             scan: ScanUidsBody::of(&held.holding.scan),
+            library: held.holding.library,
             product: held.item,
         }
     }

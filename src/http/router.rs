@@ -67,6 +67,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(segmentations::create_segmentation).layer(upload()),
         routes!(templates::create_template).layer(json(MESH_SIZE)),
         routes!(readers::create_reader).layer(json(PROFILE_SIZE)),
+        routes!(templates::update_template).layer(json(settings.json_limit)),
         routes!(jobs::create_job).layer(json(settings.json_limit)),
         routes!(jobs::list_jobs),
         routes!(jobs::get_job, jobs::delete_job),

@@ -1,13 +1,14 @@
-//! `/v1/templates`: the library of models that `model=auto` chooses from.
+//! `/v1/templates`: models that jobs name, and those that `model=auto` fits beside the built-in hearts.
 
 use super::app::App;
 use super::caller::Caller;
+use super::collection::find;
 use super::decoding::LITTLE_MEMORY;
-use super::openapi::{self, UploadProblems};
+use super::openapi::{self, LookupProblems, UploadProblems};
 use super::problem::not_found::field_names_nothing;
 use super::problem::{Answer, Problem, ProblemBody};
 use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody, refuse_when_full};
-use super::request::{json_bytes, query_pairs, refuse_unknown};
+use super::request::{PathSegments, json_bytes, merge_patch, query_pairs, refuse_unknown, unknown};
 use super::wire::{added, path_of, rfc3339};
 use crate::config::Size;
 use crate::jobs::{Resource, TemplateSource, Tenant};
@@ -42,7 +43,7 @@ impl ProductCollection for Templates {
     type FileAnswer = openapi::MeshAnswer;
 }
 
-/// A template: a model of the library.
+/// A template: a model that jobs name, or that every `model=auto` fits.
 #[derive(Serialize, ToSchema)]
 #[schema(as = Template)]
 pub struct TemplateBody {
@@ -57,6 +58,8 @@ pub struct TemplateBody {
     /// The organ it shows.
     #[schema(example = "left_ventricle")]
     organ: String,
+    /// Whether every `model=auto` fits it. Otherwise only jobs that name it do.
+    library: bool,
     /// Counts and main figures.
     #[schema(value_type = openapi::TemplateSummarySchema)]
     summary: Map<String, Value>,
@@ -90,6 +93,7 @@ impl From<Presented> for TemplateBody {
             created_at: rfc3339(product.created_at),
             name: text("name"),
             organ: text("organ"),
+            library: presented.library,
             files: DownloadBody::all(&product),
             software: SoftwareBody::of(&product),
             links: TemplateLinks {
@@ -106,7 +110,9 @@ impl From<Presented> for TemplateBody {
 ///
 /// The body is a JSON mesh (`mesh.json` of a model, or a file written by `ventriform templates
 /// build`); or `model` names a stored model or segmentation whose mesh is copied. The same mesh
-/// for the same organ is added only once. Retention never erases templates.
+/// for the same organ is added only once. `model=auto` fits it beside the built-in hearts where a job
+/// names it (`model=auto,tpl_...`), and in every job with `library=true`. Retention never erases
+/// templates.
 #[utoipa::path(post, path = "/v1/templates", tag = "templates",
     request_body(content = openapi::MeshDocument, content_type = "application/json"),
     params(openapi::TemplateQuery),
@@ -126,7 +132,7 @@ pub async fn create_template(
     request: Request,
 ) -> Answer {
     let pairs = query_pairs(query.as_deref());
-    refuse_unknown(&pairs, &["name", "organ", "model"])?;
+    refuse_unknown(&pairs, &["name", "organ", "model", LIBRARY])?;
     let value = |name: &str| {
         let found = pairs.iter().find(|(n, _)| n == name);
         found.map(|(_, value)| value.as_str())
@@ -134,6 +140,12 @@ pub async fn create_template(
     let organ = value("organ").unwrap_or("left_ventricle").to_owned();
     let name = value("name").or(value("model")).unwrap_or("template");
     check_name(name)?;
+    let library = match value(LIBRARY) {
+        None => None,
+        Some("true") => Some(true),
+        Some("false") => Some(false),
+        Some(_) => return Err(not_a_flag()),
+    };
     let tenant = &caller.tenant;
     let limit = app.settings.template_limit;
     refuse_when_full::<Templates>(&app, tenant, limit, "template_limit").await?;
@@ -148,10 +160,57 @@ pub async fn create_template(
         tenant,
         name,
         volume: volume.as_deref(),
+        library,
     };
     let (template, new) = app.queue.add_template(source, &organ, output).await?;
     let body = TemplateBody::from(Presented::of(&app, template));
     Ok(added(new, &body.id, &body))
+}
+
+/// Change a template's setting
+///
+/// A JSON merge patch (RFC 7396) of `library`: whether every `model=auto` fits it, beside the built-in
+/// hearts; `null` stands for false.
+#[utoipa::path(patch, path = "/v1/templates/{id}", tag = "templates",
+    operation_id = "update_template",
+    params(("id" = String, Path, description = "The template's id")),
+    request_body(content(
+        (openapi::TemplatePatch = "application/merge-patch+json"),
+        (openapi::TemplatePatch = "application/json"))),
+    responses((status = 200, description = "The template", body = TemplateBody),
+        openapi::PatchProblems, LookupProblems))]
+pub async fn update_template(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    request: Request,
+) -> Answer<Json<TemplateBody>> {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let tenant = &caller.tenant;
+    find::<Templates>(&app, tenant, &id).await?;
+    for (field, value) in &merge_patch(request).await? {
+        let library = match (field.as_str(), value) {
+            (LIBRARY, Value::Bool(library)) => *library,
+            (LIBRARY, Value::Null) => false,
+            (LIBRARY, _) => return Err(not_a_flag()),
+            (other, _) => return Err(unknown("field", other, &[LIBRARY])),
+        };
+        app.queue
+            .catalogue
+            .set_library(tenant, &id, library)
+            .await?;
+    }
+    let template = find::<Templates>(&app, tenant, &id).await?;
+    Ok(Json(Presented::of(&app, template).into()))
+}
+
+/// The setting that [`TemplateBody`] shows.
+const LIBRARY: &str = "library";
+
+fn not_a_flag() -> Problem {
+    Problem::invalid_field(LIBRARY, "`library` must be true or false.")
+        .fix("Give true if every `model=auto` is to fit the template.")
 }
 
 /// The mesh to be added: the body, or that of the stored `model`, with the id of its volume.

@@ -80,7 +80,7 @@ pub enum GivenParameters<'a> {
 pub struct Needs {
     /// Volumes and products named by parameters: parameter name to id.
     pub items: BTreeMap<String, String>,
-    /// Whether it needs every template of the library.
+    /// Whether it needs the templates that the tenant flagged for every `model=auto`.
     pub library: bool,
     /// Names of the files it reads of each product and template. All files of a volume are
     /// provided.

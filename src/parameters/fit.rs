@@ -14,7 +14,8 @@ use crate::volume::Volume;
 pub struct FitParameters {
     /// Frame of a 4-D volume, from 0; `None` for a 3-D volume.
     pub frame: Option<usize>,
-    /// Id of the model to fit, or `auto` for the best of the available models.
+    /// Id of the model to fit, or `auto` for the best of the built-in hearts and the library; ids of
+    /// further models may follow `auto`, separated by commas.
     pub model: String,
     /// Id of an expert's mask, if there is one.
     pub expert: Option<String>,
@@ -61,6 +62,26 @@ pub struct KnownPlace {
 impl FitParameters {
     /// The value of [`FitParameters::model`] that selects the best of the available models.
     pub const AUTO: &str = "auto";
+    /// Most models that [`FitParameters::model`] names after [`FitParameters::AUTO`].
+    pub const MOST_NAMED: usize = 8;
+
+    /// Whether the built-in hearts and the library are fitted, beside the models that are named.
+    pub fn is_auto(&self) -> bool {
+        self.model.split(',').next() == Some(Self::AUTO)
+    }
+
+    /// The fields under which the models that `model` names are looked up, with their ids: `model`,
+    /// and after [`FitParameters::AUTO`] `model[0]`, `model[1]`, ...
+    pub fn named_models(model: &str) -> Vec<(String, String)> {
+        let mut parts = model.split(',');
+        match parts.next() {
+            Some(Self::AUTO) => parts
+                .enumerate()
+                .map(|(n, id)| (format!("model[{n}]"), id.to_owned()))
+                .collect(),
+            _ => vec![("model".to_owned(), model.to_owned())],
+        }
+    }
 
     /// Checks that parameters do not contradict each other.
     ///
@@ -183,6 +204,7 @@ mod tests {
             ],
             &[("superior", "0,-2,1e-1"), ("anterior", "0,-1,0")],
             &[("superior", "frame")],
+            &[("model", "auto,tpl_0123,mdl_4")],
         ]);
     }
 
@@ -242,6 +264,37 @@ mod tests {
         // `seed` is the random seed of a model; a fit has none.
         let seed = refusal(&[("seed", "1,2,3")]);
         assert!(seed.fix.contains("`seed_point`"), "{}", seed.fix);
+    }
+
+    #[test]
+    fn models_are_named_alone_or_after_auto() {
+        let named = |text: &str| FitParameters::named_models(text);
+        let pair = |field: &str, id: &str| (field.to_owned(), id.to_owned());
+        assert_eq!(named("auto"), []);
+        assert_eq!(named("mdl_1"), [pair("model", "mdl_1")]);
+        let both = [pair("model[0]", "tpl_1"), pair("model[1]", "mdl_2")];
+        assert_eq!(named("auto,tpl_1,mdl_2"), both);
+        for text in ["auto", "auto,tpl_1"] {
+            assert!(pairs(&[("model", text)]).unwrap().is_auto());
+        }
+        assert!(!pairs(&[("model", "tpl_1")]).unwrap().is_auto());
+        let ids: Vec<String> = (0..9).map(|n| format!("mdl_{n}")).collect();
+        let most = format!("auto,{}", ids[..FitParameters::MOST_NAMED].join(","));
+        assert!(pairs(&[("model", &most)]).is_ok());
+        let many = format!("auto,{}", ids.join(","));
+        for bad in [
+            many.as_str(),
+            "auto,",
+            "auto,auto",
+            "mdl_1,mdl_2",
+            "auto,mdl_1,mdl_1",
+        ] {
+            assert!(
+                refusal(&[("model", bad)])
+                    .fix
+                    .contains("separated by commas")
+            );
+        }
     }
 
     #[test]

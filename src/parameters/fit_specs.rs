@@ -30,11 +30,13 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         kind: Kind::Stored {
             prefixes: &["mdl_", "tpl_", "seg_"],
             word: FitParameters::AUTO,
+            more: FitParameters::MOST_NAMED,
         },
         default: FitParameters::AUTO,
         summary: "Id of the model to fit (a template, a model or an earlier segmentation), or auto: \
-                  fits every template of the organ and keeps the best fit, or fits a built-in \
-                  ventricle if there are no templates. Alternative name: template",
+                  fits the built-in hearts, the templates flagged `library` and the models named after \
+                  it (auto,tpl_12,mdl_34), and keeps the fit with the greatest confidence. Alternative \
+                  name: template",
         read: |d, v| {
             d.model = v.text().into();
             Ok(())
@@ -46,6 +48,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         kind: Kind::Stored {
             prefixes: &["vol_"],
             word: "",
+            more: 0,
         },
         default: "",
         summary: "Id of a volume with an expert's mask (values above 0.5) to compare with",

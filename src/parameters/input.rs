@@ -129,9 +129,27 @@ impl RawValue<'_> {
                 Some(list) => Err(format!("expected {count} numbers, got {}", list.len())),
                 None => Err(format!("{self} is not a list of finite numbers")),
             },
-            Kind::Stored { prefixes, word } => match self.as_text() {
-                Some(text) if !word.is_empty() && text == word => Ok(Checked::Text(text.into())),
+            Kind::Stored {
+                prefixes,
+                word,
+                more,
+            } => match self.as_text() {
                 Some(text) if is_id(text, prefixes) => Ok(Checked::Text(text.into())),
+                Some(text) if !word.is_empty() => {
+                    let mut parts = text.split(',');
+                    let begins = parts.next() == Some(word);
+                    let ids: Vec<&str> = parts.collect();
+                    let known = ids.iter().all(|id| is_id(id, prefixes));
+                    let twice = (1..ids.len()).any(|n| ids[..n].contains(&ids[n]));
+                    match begins && known {
+                        true if twice => Err(format!("{self} names an id twice")),
+                        true if ids.len() > more => {
+                            Err(format!("{self} names {} ids, at most {more}", ids.len()))
+                        }
+                        true => Ok(Checked::Text(text.into())),
+                        false => Err(format!("{self} is not an id of this kind")),
+                    }
+                }
                 _ => Err(format!("{self} is not an id of this kind")),
             },
             Kind::Text { .. } => self

@@ -44,5 +44,7 @@ pub enum Kind {
         prefixes: &'static [&'static str],
         /// A word that is accepted instead of an id; empty if there is none.
         word: &'static str,
+        /// How many ids may follow the word, separated by commas.
+        more: usize,
     },
 }

@@ -203,14 +203,24 @@ impl<P: Parameters> ParameterSpec<P> {
             Kind::Integers { count } => format!("{count} whole numbers separated by commas"),
             Kind::Numbers { count } => format!("{count} finite numbers separated by commas"),
             Kind::Text { example, .. } => format!("for example {example}"),
-            Kind::Stored { prefixes, word: "" } => {
+            Kind::Stored {
+                prefixes, word: "", ..
+            } => {
                 format!("an id that begins with {}", prefixes.join(" or "))
             }
-            Kind::Stored { prefixes, word } => {
-                format!(
-                    "{word}, or an id that begins with {}",
-                    prefixes.join(" or ")
-                )
+            Kind::Stored {
+                prefixes,
+                word,
+                more,
+            } => {
+                let ids = prefixes.join(" or ");
+                match more {
+                    0 => format!("{word}, or an id that begins with {ids}"),
+                    _ => format!(
+                        "{word}, an id that begins with {ids}, or {word} and at most {more} such ids, \
+                         separated by commas"
+                    ),
+                }
             }
         };
         format!("Give `{}` {range}.", self.name)

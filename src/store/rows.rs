@@ -91,6 +91,7 @@ pub(super) fn held<T>(
         legal_hold,
         source_on_hold: row.try_get::<i64, _>("source_holds")? > 0,
         scan: scan(&row)?,
+        library: row.try_get("library")?,
     };
     Ok(Held {
         item: record(row)?,

@@ -182,6 +182,18 @@ impl Catalogue for SqliteStore {
         Ok(changed == 1)
     }
 
+    async fn set_library(&self, tenant: &Tenant, id: &str, library: bool) -> StoreResult<bool> {
+        let changed = sqlx::query(
+            "UPDATE holdings SET library = ? WHERE tenant = ? AND id = ? AND kind = 'template'",
+        )
+        .bind(library)
+        .bind(tenant.as_str())
+        .bind(id)
+        .write(&self.writer)
+        .await?;
+        Ok(changed == 1)
+    }
+
     async fn set_legal_hold(
         &self,
         tenant: &Tenant,

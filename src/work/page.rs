@@ -57,12 +57,14 @@ pub(super) fn model_page(read: &ReadFile<'_>) -> Result<String, PageError> {
 /// [`PageError`].
 pub(super) fn segmentation_page(read: &ReadFile<'_>) -> Result<String, PageError> {
     let report: SegmentationReport = from_json("report.json", &required(read, "report.json")?)?;
-    let mesh = read_json::decode(&required(read, "mesh.json")?)?;
+    let mesh_file = required(read, "mesh.json")?;
+    let mesh = read_json::decode(&mesh_file)?;
     let slices = optional(read, "slices.png")?;
     let polar = optional(read, "polar.svg")?;
     Ok(report::segmentation_page(&SegmentationPage {
         report: &report,
         mesh: &mesh,
+        uncertainty: &read_json::uncertainty(&mesh_file),
         slices: slices.as_deref(),
         polar: polar.as_deref(),
     }))

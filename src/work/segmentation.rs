@@ -39,20 +39,13 @@ impl Work for SegmentationWork {
     }
 
     fn needs(&self, parameters: &Map<String, Value>) -> Needs {
-        let id = |field: &str| {
-            Some((
-                field.to_owned(),
-                parameters.get(field)?.as_str()?.to_owned(),
-            ))
-        };
-        let model = id("model").filter(|(_, id)| id != FitParameters::AUTO);
+        let text = |field: &str| parameters.get(field)?.as_str();
+        let models = FitParameters::named_models(text("model").unwrap_or(FitParameters::AUTO));
+        let named = |field: &str| Some((field.to_owned(), text(field)?.to_owned()));
+        let (expert, reader) = (named("expert"), named("reader"));
         Needs {
-            library: model.is_none(),
-            items: model
-                .into_iter()
-                .chain(id("expert"))
-                .chain(id("reader"))
-                .collect(),
+            library: !models.iter().any(|(field, _)| field == "model"),
+            items: models.into_iter().chain(expert).chain(reader).collect(),
             files: &[MESH, PROFILE],
         }
     }
@@ -70,12 +63,11 @@ impl Work for SegmentationWork {
             FitParameters::from_json(&input.parameters).map_err(|error| error.explain())?;
         let expert = input.items.get("expert");
         let expert = expert.map(|expert| volume_files(&expert.files));
-        let (models, named) = models(input, &parameters)?;
         let order = SegmentationOrder {
             volume: &volume_files(&input.files),
             expert: expert.as_deref(),
-            models,
-            named,
+            auto: parameters.is_auto(),
+            models: models(input, &parameters)?,
             reader: reader(input)?,
             parameters: &parameters,
         };
@@ -110,18 +102,17 @@ impl From<NamedFile> for OutputFile {
     }
 }
 
-/// The models to fit, and whether the client named them: the model of the parameters, or every
-/// template of the organ.
-fn models(
-    input: &WorkInput,
-    parameters: &FitParameters,
-) -> Result<(Vec<NamedMesh>, bool), WorkError> {
+/// The models to fit beside the built-in hearts: those that the parameters name, and with `auto` the
+/// flagged templates of the organ.
+fn models(input: &WorkInput, parameters: &FitParameters) -> Result<Vec<NamedMesh>, WorkError> {
     let organ = parameters.organ.as_str();
     let organ_of = |item: &StoredItem| {
         let organ = item.parameters.get("organ");
         organ.and_then(Value::as_str).map(str::to_owned)
     };
-    if let Some(item) = input.items.get("model") {
+    let (mut models, mut named) = (Vec::new(), Vec::new());
+    for (field, id) in FitParameters::named_models(&parameters.model) {
+        let item = input.items.get(&field).ok_or_else(|| mesh_missing(&id))?;
         if let Some(other) = organ_of(item).filter(|shown| shown != organ) {
             return Err(work_error(&SegmentationError::OtherOrgan {
                 name: item.id.clone(),
@@ -129,17 +120,16 @@ fn models(
                 wanted: organ,
             }));
         }
-        let model = mesh(item)?.ok_or_else(|| mesh_missing(&item.id))?;
-        return Ok((vec![model], true));
+        models.push(mesh(item, true)?.ok_or_else(|| mesh_missing(&item.id))?);
+        named.push(&item.id);
     }
-    let mut models = Vec::new();
     for item in &input.library {
-        if organ_of(item).is_some_and(|shown| shown == organ) {
+        if organ_of(item).is_some_and(|shown| shown == organ) && !named.contains(&&item.id) {
             // A template that was deleted a moment ago is left out.
-            models.extend(mesh(item)?);
+            models.extend(mesh(item, false)?);
         }
     }
-    Ok((models, false))
+    Ok(models)
 }
 
 /// The reader's profile of the parameters.
@@ -164,13 +154,17 @@ fn name_of(item: &StoredItem) -> String {
 
 /// The mesh of a stored model, with the name under which reports mention it; `None` if its file
 /// does not exist.
-fn mesh(item: &StoredItem) -> Result<Option<NamedMesh>, WorkError> {
+fn mesh(item: &StoredItem, required: bool) -> Result<Option<NamedMesh>, WorkError> {
     let name = name_of(item);
     let Some(bytes) = item.read(MESH).map_err(|e| unreadable_model(&e))? else {
         return Ok(None);
     };
     match read_json::decode(&bytes) {
-        Ok(mesh) => Ok(Some(NamedMesh { name, mesh })),
+        Ok(mesh) => Ok(Some(NamedMesh {
+            name,
+            mesh,
+            required,
+        })),
         Err(error) => Err(work_error(&SegmentationError::UnreadableModel {
             name,
             error,

@@ -178,7 +178,7 @@ async fn a_scan_is_segmented_and_measured_against_an_expert() {
     assert_eq!(answer.status(), 200);
     let path = answer.headers()["location"].to_str().unwrap().to_owned();
     let report: Value = answer.json().await.unwrap();
-    assert_eq!(report["template"], "built-in");
+    assert!(text(&report["template"]).starts_with("built-in "));
     assert_eq!(report["fit"]["reason"], "converged");
     assert!(report["fit"]["confidence"].as_f64().unwrap() > 0.8);
     // Blur moves the apparent edge outward.
@@ -232,26 +232,59 @@ async fn a_scan_is_segmented_and_measured_against_an_expert() {
     let fitted: Value = fitted.json().await.unwrap();
     assert_eq!(fitted["template"], id);
     assert!(fitted["measures"].is_null());
-    for (from, name) in [(id, "own"), (path.rsplit('/').next().unwrap(), "fitted")] {
+    let mut own = String::new();
+    for (from, query) in [
+        (id, "name=own"),
+        (path.rsplit('/').next().unwrap(), "name=fitted&library=true"),
+    ] {
         let template = service
             .0
-            .post(&format!("/v1/templates?model={from}&name={name}"));
-        assert_eq!(template.send().await.unwrap().status(), 201);
+            .post(&format!("/v1/templates?model={from}&{query}"))
+            .send()
+            .await
+            .unwrap();
+        assert_eq!(template.status(), 201);
+        let template: Value = template.json().await.unwrap();
+        own = if own.is_empty() {
+            text(&template["id"])
+        } else {
+            own
+        };
     }
-    let best: Value = service
-        .report("template=auto", scan, None)
-        .await
-        .json()
-        .await
-        .unwrap();
-    let candidates = best["candidates"].as_array().unwrap();
-    assert_eq!(candidates.len(), 2);
-    let greatest = candidates
-        .iter()
-        .max_by(|a, b| f64::total_cmp(&a["merit"].as_f64().unwrap(), &b["merit"].as_f64().unwrap()))
-        .unwrap();
-    assert_eq!(best["template"], greatest["template"]);
-    assert!(text(&best["choice"]).contains("greatest merit"), "{best}");
+    // The built-in hearts always, with the flagged template and those that are named.
+    for (query, added) in [
+        ("template=auto".to_owned(), vec!["fitted"]),
+        (
+            format!("model=auto,{own},{id}"),
+            vec!["own", "mdl_", "fitted"],
+        ),
+    ] {
+        let best = service.report(&query, scan.clone(), None).await;
+        let best: Value = best.json().await.unwrap();
+        let candidates = best["candidates"].as_array().unwrap();
+        let names: Vec<String> = candidates.iter().map(|c| text(&c["template"])).collect();
+        assert_eq!(names.len(), 4 + added.len(), "{names:?}");
+        for (n, name) in names.iter().enumerate() {
+            let begins = if n < 4 { "built-in " } else { added[n - 4] };
+            assert!(name.starts_with(begins), "{names:?}");
+        }
+        let confidence = |c: &&Value| c["confidence"].as_f64().unwrap();
+        let greatest = candidates
+            .iter()
+            .map(|c| confidence(&c))
+            .fold(0.0, f64::max);
+        let chosen = candidates
+            .iter()
+            .find(|c| c["template"] == best["template"]);
+        assert_eq!(confidence(&chosen.unwrap()), greatest, "{best}");
+        assert!(
+            text(&best["choice"]).contains("greatest confidence"),
+            "{best}"
+        );
+        assert!(best["evidence"]["template_spread_mm"].is_number());
+        let greatest = &best["uncertainty_mm"]["anatomical"]["greatest"];
+        assert!(greatest.as_f64().unwrap() > 0.0);
+    }
 }
 
 #[tokio::test]

@@ -263,7 +263,7 @@ async fn idempotency_keys_and_cancelling_work_as_for_models() {
 }
 
 #[tokio::test]
-async fn auto_gets_every_template_of_the_library() {
+async fn auto_gets_the_flagged_templates_and_those_that_are_named() {
     let app = TestApp::with(|s| s.template_limit = 2).await;
     let post = |query: &str, body: Vec<u8>| {
         app.post(&format!("/v1/templates{query}"))
@@ -279,7 +279,7 @@ async fn auto_gets_every_template_of_the_library() {
     assert_eq!(template["name"], "cup");
     assert_eq!(template["organ"], "left_ventricle");
     assert_eq!(app.json(&path).await, template);
-    let again = post("?name=other", cup).await.unwrap();
+    let again = post("?name=other", cup.clone()).await.unwrap();
     assert_eq!(again.status(), StatusCode::OK);
     assert_eq!(again.json::<Value>().await.unwrap(), template);
     let mesh = app.json(&format!("{path}/mesh.json")).await;
@@ -290,8 +290,70 @@ async fn auto_gets_every_template_of_the_library() {
     assert_eq!(copied.await.unwrap().status(), StatusCode::CREATED);
     let list = app.json("/v1/templates").await;
     assert_eq!(list["templates"].as_array().unwrap().len(), 2);
-    let made = app.segmentation("sphere").await;
-    assert_eq!(made["summary"]["seen"]["library"], 2);
+    let seen = async |query: &str| {
+        let answer = app
+            .post(&format!("/v1/segmentations{query}"))
+            .header("prefer", "wait=20")
+            .header(ACCEPT, "application/json")
+            .body(volume("sphere"))
+            .send();
+        let answer = answer.await.unwrap();
+        assert_eq!(answer.status(), StatusCode::OK, "{query}");
+        let made = app.json(answer.headers()[LOCATION].to_str().unwrap()).await;
+        made["summary"]["seen"].clone()
+    };
+    assert_eq!(template["library"], false);
+    assert_eq!(seen("?roll=1").await, json!({"things": [], "library": 0}));
+    let patch = async |path: &str, body: Value| {
+        let patch = app.client.patch(format!("{}{path}", app.url)).json(&body);
+        patch.send().await.unwrap()
+    };
+    let flagged = patch(&path, json!({"library": true})).await;
+    assert_eq!(flagged.status(), StatusCode::OK);
+    assert_eq!(flagged.json::<Value>().await.unwrap()["library"], true);
+    assert_eq!(app.json(&path).await["library"], true);
+    assert_eq!(seen("?roll=2").await, json!({"things": [], "library": 1}));
+    // A model that is named is fitted alone, or beside the others.
+    let alone = seen(&format!("?model={}", text(&template["id"]))).await;
+    assert_eq!(alone, json!({"things": ["model"], "library": 0}));
+    let beside = format!("?model=auto,{model},{}", text(&template["id"]));
+    let expected = json!({"things": ["model[0]", "model[1]"], "library": 1});
+    assert_eq!(seen(&beside).await, expected);
+    let again = post("?name=cup&library=false", cup).await.unwrap();
+    assert_eq!(again.json::<Value>().await.unwrap()["library"], false);
+    assert_eq!(seen("?roll=3").await["library"], 0);
+    for (body, code, field) in [
+        (json!({"library": "yes"}), 422, "library"),
+        (json!({"name": "other"}), 400, "name"),
+    ] {
+        let refused = patch(&path, body).await;
+        assert_eq!(refused.status().as_u16(), code);
+        assert_eq!(refused.json::<Value>().await.unwrap()["field"], field);
+    }
+    let volume = text(&list["templates"][0]["id"]).replace("tpl_", "vol_");
+    problem(
+        patch(&format!("/v1/templates/{volume}"), json!({})).await,
+        404,
+        "not-found",
+    )
+    .await;
+    for query in [
+        "model=auto,auto",
+        "model=auto,",
+        "model=mdl_1,mdl_2",
+        "model=auto,mdl_1,mdl_1",
+    ] {
+        let refused = app
+            .post(&format!("/v1/segmentations?{query}"))
+            .body(self::volume("sphere"));
+        let refused = problem(refused.send().await.unwrap(), 422, "invalid-parameter").await;
+        assert_eq!(refused["field"], "model", "{query}");
+    }
+    let gone = app
+        .post("/v1/segmentations?model=auto,mdl_00")
+        .body(self::volume("sphere"));
+    let gone = problem(gone.send().await.unwrap(), 422, "invalid-field").await;
+    assert_eq!(gone["field"], "model[0]");
     let full = post("?organ=liver", mesh_json(&shapes::icosphere(50.0, 2)));
     problem(full.await.unwrap(), 409, "library-full").await;
 

@@ -214,6 +214,7 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
             .client
             .request(method.clone(), format!("{}{path}", app.url));
         match *method {
+            Method::PATCH if path.contains("templates") => request.json(&json!({"library": true})),
             Method::PATCH => request.json(&json!({"external_id": "x"})),
             Method::PUT => request.json(&json!({"reason": "x"})),
             _ => request,

@@ -310,6 +310,27 @@ fn tag_fields(patch: bool) -> (Schema, Schema) {
     (external_id.into(), labels.into())
 }
 
+/// A JSON merge patch of a template's setting.
+pub struct TemplatePatch;
+
+impl ToSchema for TemplatePatch {
+    fn name() -> Cow<'static, str> {
+        "TemplatePatch".into()
+    }
+}
+
+impl PartialSchema for TemplatePatch {
+    fn schema() -> RefOr<Schema> {
+        let library = ObjectBuilder::new()
+            .schema_type(SchemaType::from_iter([Type::Boolean, Type::Null]))
+            .description(Some("Whether every `model=auto` fits the template"));
+        let patch = ObjectBuilder::new()
+            .property("library", library)
+            .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
+        Schema::from(patch).into()
+    }
+}
+
 /// A JSON merge patch of a caller's names.
 pub struct TagsPatch;
 

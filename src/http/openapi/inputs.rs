@@ -119,11 +119,16 @@ fn schema_of<P: Parameters>(spec: &ParameterSpec<P>) -> Schema {
         }
         Kind::Integers { count } => list_of(Type::Integer, count, spec.summary),
         Kind::Numbers { count } => list_of(Type::Number, count, spec.summary),
-        Kind::Stored { prefixes, word } => {
+        Kind::Stored {
+            prefixes,
+            word,
+            more,
+        } => {
             let id = format!("({})[0-9a-f]{{1,64}}", prefixes.join("|"));
-            let pattern = match word {
-                "" => format!("^{id}$"),
-                _ => format!("^({word}|{id})$"),
+            let pattern = match (word, more) {
+                ("", _) => format!("^{id}$"),
+                (_, 0) => format!("^({word}|{id})$"),
+                _ => format!("^({word}(,{id}){{0,{more}}}|{id})$"),
             };
             object
                 .schema_type(Type::String)
@@ -444,6 +449,11 @@ impl IntoParams for TemplateQuery {
                 "model",
                 "The stored model or segmentation whose mesh is copied",
                 model,
+            ),
+            (
+                "library",
+                "Whether every `model=auto` fits the template, beside the built-in hearts",
+                ObjectBuilder::new().schema_type(Type::Boolean),
             ),
         ]
         .map(|(name, summary, schema)| {

@@ -31,7 +31,7 @@ pub use answers::{
 };
 pub use bodies::{
     HoldRequest, JobParameters, JobRequest, MeshDocument, SegmentationForm, StatedScanSchema,
-    TagsPatch, UploadForm, WebhookRequest, WorkitemBody,
+    TagsPatch, TemplatePatch, UploadForm, WebhookRequest, WorkitemBody,
 };
 pub use inputs::{
     CachedHeaders, CascadeParameter, ConditionalHeaders, DeidentifyParameter, ErasureParameters,

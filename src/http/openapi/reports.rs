@@ -725,6 +725,8 @@ schemas! {
         wall_thickness_mm: Option<f64>,
         /// Thickness of both walls; ventricles only.
         thickness_mm: Option<ThicknessesReport>,
+        /// Standard deviation of the nodes' distance from the walls; ventricles only.
+        uncertainty_mm: Option<UncertaintiesReport>,
         /// Full width at half maximum of the image's point response; ventricles only.
         resolution_mm: Option<ResolutionReport>,
         /// The reader's profile that the shown wall was drawn by.
@@ -749,7 +751,9 @@ schemas! {
     CandidateReport as Candidate {
         /// The model's name.
         template: String,
-        /// What it is ranked by.
+        /// What it is ranked by: its confidence by its own figures.
+        confidence: f64,
+        /// What decides between equals.
         merit: f64,
         /// Share of the surface along which an edge is seen.
         active: f64,
@@ -757,6 +761,24 @@ schemas! {
         strain: f64,
         /// Distance to the edges, weighted root mean square.
         residual_mm: f64,
+    }
+
+    /// Standard deviation of the nodes' distance from the walls, millimetres.
+    UncertaintiesReport as Uncertainties {
+        /// From the wall as it looks.
+        apparent: UncertaintyReport,
+        /// From the wall itself.
+        anatomical: UncertaintyReport,
+    }
+
+    /// Standard deviation of the nodes' distance from a wall, millimetres.
+    UncertaintyReport as Uncertainty {
+        /// Median over the nodes.
+        median: f64,
+        /// 95th percentile over the nodes.
+        percentile_95: f64,
+        /// The greatest.
+        greatest: f64,
     }
 
     /// A model that could not be fitted.
@@ -903,8 +925,14 @@ schemas! {
         slenderness: f64,
         /// Distance of the septum from the axis over that of the free wall.
         septal_bulge: f64,
+        /// Share of the wall that takes up less than half as much as the bright wall does.
+        dark: f64,
+        /// Share of the wall beside which something takes up more than that.
+        beside: f64,
         /// Chance that the patient moved, 0 to 1.
         chance_of_motion: f64,
+        /// Mean distance of the nodes from the fits of the other built-in hearts; null without them.
+        template_spread_mm: Option<f64>,
     }
 
     /// A mask against an expert's.

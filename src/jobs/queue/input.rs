@@ -162,7 +162,8 @@ impl Queue {
         }))
     }
 
-    /// Every template of the tenant in the order of ids, which does not depend on when they were added.
+    /// Every template that the tenant flagged for `model=auto`, in the order of ids, which does not
+    /// depend on when they were added.
     async fn library(
         &self,
         tenant: &Tenant,
@@ -179,7 +180,7 @@ impl Queue {
                 .catalogue
                 .products(tenant, Resource::Template, &filter, request)
                 .await?;
-            for product in page.items {
+            for product in page.items.into_iter().filter(|p| p.holding.library) {
                 library.push(self.with_files(product.item, wanted).await?);
             }
             before = page.next;

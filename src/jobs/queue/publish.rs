@@ -106,6 +106,7 @@ impl Queue {
             tenant,
             name,
             volume: None,
+            library: None,
         };
         self.add_product(reader, source, output).await
     }
@@ -118,7 +119,7 @@ impl Queue {
         output: WorkOutput,
     ) -> Result<(Held<Product>, bool), StoreError> {
         let (queue, tenant) = (self.clone(), source.tenant.clone());
-        let volume = source.volume.map(str::to_owned);
+        let (volume, library) = (source.volume.map(str::to_owned), source.library);
         to_its_end(async move {
             let _lock = queue.items.lock(&product.id).await;
             queue.items.unsettle(&product.id);
@@ -127,6 +128,10 @@ impl Queue {
                 .catalogue
                 .add_product(&product, &tenant, volume.as_deref())
                 .await?;
+            if let Some(library) = library {
+                let catalogue = &queue.catalogue;
+                catalogue.set_library(&tenant, &product.id, library).await?;
+            }
             queue.items.settle(&product.id);
             let stored = queue.catalogue.product(&tenant, &product.id).await?;
             Ok((stored.ok_or_else(vanished)?, new))
@@ -281,6 +286,8 @@ pub struct TemplateSource<'a> {
     pub name: &'a str,
     /// The volume from whose model it was copied.
     pub volume: Option<&'a str>,
+    /// Whether every `model=auto` fits it; `None` leaves that as it is, not so at first.
+    pub library: Option<bool>,
 }
 
 /// The record of an item that was just added under its lock is not there.

@@ -82,6 +82,10 @@ pub trait Catalogue: Custody + Scans {
     /// Replaces the tags of an item or a job. `false` if there is none with that id.
     async fn set_tags(&self, tenant: &Tenant, id: &str, tags: &Tags) -> StoreResult<bool>;
 
+    /// Sets whether every `model=auto` of the tenant fits a template. `false` if it has no such
+    /// template.
+    async fn set_library(&self, tenant: &Tenant, id: &str, library: bool) -> StoreResult<bool>;
+
     /// Sets or lifts a tenant's legal hold on an item. `false` if it has no such item.
     async fn set_legal_hold(
         &self,

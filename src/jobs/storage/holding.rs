@@ -51,6 +51,8 @@ pub struct Holding {
     pub source_on_hold: bool,
     /// Whose scan it is, or the volume that it was made of.
     pub scan: ScanIdentity,
+    /// Whether every `model=auto` of the tenant fits the item; templates only.
+    pub library: bool,
 }
 
 /// An item as one tenant has it.
