@@ -1,18 +1,19 @@
 //! Prints the figures that the confidence of a fit is calibrated on.
 //!
 //! `cargo run --release --example confidence -- FOLDER...` segments `CASE/spect.nii.gz` of every case
-//! in the folders with the built-in models. Each case gives one line: its name, the Jaccard index of
+//! in the folders with the built-in hearts. Each case gives one line: its name, the Jaccard index of
 //! the apparent wall with `lv_expert_img.nii.gz` and of the anatomical wall with `lv_truth.nii.gz`
-//! (`-` without a fit), then, as JSON, the report's evidence, both confidences, the flags and the
-//! reason where no heart was found.
+//! (`-` without a fit), then, as JSON, the report's evidence, each heart's chances, flags and volumes, the
+//! nodes (apparent and anatomical place, strength of the edge, way from apex to rim, distance from the
+//! other hearts' fits) and the triangles, or the reason where no heart was found.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use rayon::prelude::*;
 use serde_json::json;
-use ventriform::deform::WallEdge;
 use ventriform::deform::confidence::of_agreement;
+use ventriform::deform::{Evidence, WallEdge};
 use ventriform::grid::agreement::compare;
 use ventriform::parameters::FitParameters;
 use ventriform::progress::Monitor;
@@ -46,8 +47,8 @@ fn line(case: &Path) -> Result<String> {
     let order = SegmentationOrder {
         volume: &file("spect.nii.gz"),
         expert: None,
+        auto: true,
         models: Vec::new(),
-        named: false,
         reader: None,
         parameters: &parameters,
     };
@@ -67,18 +68,33 @@ fn line(case: &Path) -> Result<String> {
         None => f64::NAN,
     };
     let report = report_json(made);
-    let confidences = made.fit.evidence.map(|evidence| {
-        [WallEdge::Apparent, WallEdge::Anatomical].map(|edge| of_agreement(&evidence, edge))
+    let both = [WallEdge::Apparent, WallEdge::Anatomical];
+    let chances = |evidence: &Evidence| both.map(|edge| of_agreement(evidence, edge));
+    let candidates: Vec<_> = (made.candidates.iter())
+        .map(|c| json!({"template": c.name, "chances": c.evidence.as_ref().map(chances)}))
+        .collect();
+    let surfaces = made.fit.surfaces.as_ref();
+    let nodes: Vec<_> = surfaces.map_or_else(Vec::new, |s| {
+        let places = (s.apparent.mesh.vertices.iter()).zip(&s.anatomical.mesh.vertices);
+        let nodes = places.zip(&made.fit.nodes);
+        nodes
+            .map(|((p, q), n)| json!([p.x, p.y, p.z, q.x, q.y, q.z, n.seen, n.way, n.spread]))
+            .collect()
     });
     Ok(format!(
         "{name}\t{apparent:.4}\t{anatomical:.4}\t{}",
         json!({
             "evidence": report["evidence"],
-            "confidences": confidences,
-            "candidates": report["candidates"],
+            "confidence": made.fit.confidence,
+            "chances": made.fit.evidence.as_ref().map(chances),
+            "candidates": candidates,
             "place": made.fit.place_confidence(),
             "thickness_mm": report["wall_thickness_mm"],
             "flags": report["flags"],
+            "volumes_ml": report["volumes_ml"],
+            "uncertainty_mm": surfaces.map(|s| [&s.apparent.uncertainty, &s.anatomical.uncertainty]),
+            "nodes": nodes,
+            "triangles": made.fit.mesh.triangles,
         })
     ))
 }

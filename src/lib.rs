@@ -61,6 +61,7 @@
 //! let templates = [NamedTemplate {
 //!     name: "first patient".into(),
 //!     template: Template::new(model.mesh, Organ::LeftVentricle, &quiet)?,
+//!     built_in: false,
 //! }];
 //!
 //! let scan = patient(2)?.volume;

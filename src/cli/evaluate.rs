@@ -41,7 +41,7 @@ pub struct EvaluateArgs {
         value_name = "WORD,...",
         value_enum,
         value_delimiter = ',',
-        default_value = "reference,retiled,optimised"
+        default_value = "reference,retiled,optimised,auto"
     )]
     models: Vec<ModelName>,
     /// How our models are made, as with `generate --method`
@@ -95,6 +95,8 @@ enum ModelName {
     Retiled,
     /// Ours after fit and flips
     Optimised,
+    /// What `segment --model auto` keeps of the built-in hearts
+    Auto,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -111,6 +113,7 @@ impl ModelName {
             ModelName::Reference => Variant::Reference,
             ModelName::Retiled => Variant::Retiled,
             ModelName::Optimised => Variant::Optimised,
+            ModelName::Auto => Variant::Auto,
         }
     }
 }

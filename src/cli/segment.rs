@@ -11,7 +11,7 @@ use crate::segmentation::Segmentation;
 use crate::segmentation::{NamedFile, NamedMesh, NamedReader, SegmentationOrder, from_files};
 use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeFile};
 use crate::work::problems::Explain;
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -31,8 +31,8 @@ pub struct SegmentArgs {
     /// MR file, all files of one series, or a zip of them)
     #[arg(value_name = "IN", required = true, num_args = 1..)]
     input: Vec<PathBuf>,
-    /// Model to fit: a JSON mesh written by `generate`, or auto for the built-in ventricle
-    /// (repeatable: the best fit is kept)
+    /// Model to fit: a JSON mesh written by `generate`, or auto for the built-in hearts (repeatable: the
+    /// fit with the greatest confidence is kept)
     #[arg(long, value_name = "MODEL", required = true)]
     model: Vec<PathBuf>,
     /// Folder to write to (created if missing)
@@ -58,7 +58,7 @@ pub struct SegmentArgs {
     fit: FitArgs,
 }
 
-/// The word that stands for the built-in model.
+/// The word that stands for the built-in hearts.
 const AUTO: &str = FitParameters::AUTO;
 
 fn parse_format(text: &str) -> Result<Format, String> {
@@ -83,17 +83,14 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
         .iter()
         .filter(|m| m.as_os_str() != AUTO)
         .collect();
-    if !named.is_empty() && named.len() < args.model.len() {
-        bail!("--model {AUTO} stands for the built-in model; give {AUTO} or files, not both");
-    }
     let volume: Vec<VolumeFile> = args.input.iter().map(VolumeFile::at).collect();
     let dicom = args.dicom.order(&volume, parameters.frame)?;
     let expert = args.expert.as_ref().map(|path| [VolumeFile::at(path)]);
     let order = SegmentationOrder {
         volume: &volume,
         expert: expert.as_ref().map(|files| &files[..]),
+        auto: named.len() < args.model.len(),
         models: named.into_iter().map(|m| mesh(m)).collect::<Result<_>>()?,
-        named: true,
         reader: args.reader.as_deref().map(reader).transpose()?,
         parameters: &parameters,
     };
@@ -138,6 +135,7 @@ fn mesh(path: &Path) -> Result<NamedMesh> {
     Ok(NamedMesh {
         name: stem.map_or_else(context, |s| s.to_string_lossy().into_owned()),
         mesh: export::read_json::decode(&bytes).with_context(context)?,
+        required: true,
     })
 }
 

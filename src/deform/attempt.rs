@@ -9,13 +9,15 @@ use super::fit::Fit;
 use super::flags::Flag;
 use super::parameters::{DeformParameters, WallEdge};
 use super::rim;
-use super::sensors::{SensorReading, SensorSettings};
+use super::sensors::{PER_TRIANGLE, SensorReading, SensorSettings};
 use super::setup::FitSetup;
+use super::uncertainty::NodeEvidence;
+use crate::geometry::Vec3;
 use crate::grid::Volume;
 use crate::locate::patient_orientation::OrientationSource;
 use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
-use crate::model::wall::{self, VentricleWall};
+use crate::model::wall::{self, ROWS, VentricleWall};
 use crate::model::{Organ, Template};
 use crate::progress::{Cancelled, Monitor};
 
@@ -136,6 +138,7 @@ impl Attempt {
             rotation: *setup.pose.rotation(),
             confidence: 0.0,
             evidence: None,
+            nodes: Vec::new(),
             localisation: setup.localisation.clone(),
             reason: self.moved.reason,
             iterations: self.moved.iterations,
@@ -159,7 +162,8 @@ impl Attempt {
                 residual,
                 strain: fit.strain.sqrt(),
             };
-            fit.evidence = Evidence::of(wall, &edges, found.hollowness);
+            fit.evidence = Evidence::of(wall, &edges, found.hollowness, &setup.field);
+            fit.nodes = nodes_seen(&fit.mesh, wall, &self.moved.readings);
         }
         fit.confidence = match &fit.evidence {
             Some(evidence) => confidence::of_agreement(evidence, edge),
@@ -193,6 +197,32 @@ fn edges_seen(readings: &[SensorReading]) -> (f64, f64) {
         f64::INFINITY
     };
     (active, residual)
+}
+
+/// What the sensors say of each node of `mesh`, whose place along the wall is that in `wall`.
+fn nodes_seen(
+    mesh: &TriMesh,
+    wall: &VentricleWall,
+    readings: &[SensorReading],
+) -> Vec<NodeEvidence> {
+    let mut sums = vec![[0.0; 2]; mesh.vertices.len()];
+    for (triangle, sensors) in mesh
+        .triangles
+        .iter()
+        .zip(readings.chunks_exact(PER_TRIANGLE))
+    {
+        for node in triangle {
+            let [seen, share] = &mut sums[*node as usize];
+            *seen += sensors.iter().map(|r| r.weight * r.share).sum::<f64>();
+            *share += sensors.iter().map(|r| r.share).sum::<f64>();
+        }
+    }
+    let of = |(p, [seen, share]): (&Vec3, [f64; 2])| NodeEvidence {
+        seen: if share > 0.0 { seen / share } else { 0.0 },
+        way: ((wall.place(p).row + 0.5) / ROWS as f64).clamp(0.0, 1.0),
+        spread: None,
+    };
+    mesh.vertices.iter().zip(sums).map(of).collect()
 }
 
 /// The number of triangles whose normal turned by 90 degrees or more from `before` to `now`.

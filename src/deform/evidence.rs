@@ -7,7 +7,9 @@
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-use crate::model::wall::{COLUMNS, ROWS, VentricleWall};
+use crate::grid::field::Field;
+use crate::model::wall::{COLUMNS, ROWS, VentricleWall, WallRay};
+use crate::numeric::order;
 
 /// Rows between the apical cap and the rim, where hearts are round.
 const BODY: Range<usize> = 14..28;
@@ -40,6 +42,11 @@ pub struct Evidence {
     pub slenderness: f64,
     /// Distance of the septum from the axis over that of the free wall.
     pub septal_bulge: f64,
+    /// Share of the wall that takes up less than half as much as the bright wall does, 0..=1.
+    pub dark: f64,
+    /// Share of the wall beside which, 12 to 18 mm beyond its outer surface, something takes up more than
+    /// half as much as the bright wall does, 0..=1: other organs, or the wall's own image elsewhere.
+    pub beside: f64,
 }
 
 /// How a model met the edges of the image.
@@ -54,8 +61,14 @@ pub(super) struct Edges {
 
 impl Evidence {
     /// The figures of a fit whose apparent wall, before its rim was moved, is `wall`, in a heart that is hollow by
-    /// `hollowness`; `None` for models whose wall no ray meets.
-    pub(super) fn of(wall: &VentricleWall, edges: &Edges, hollowness: f64) -> Option<Self> {
+    /// `hollowness`, and in this blurred `image`; `None` for models whose wall no ray meets.
+    pub(super) fn of(
+        wall: &VentricleWall,
+        edges: &Edges,
+        hollowness: f64,
+        image: &Field,
+    ) -> Option<Self> {
+        let uptake = WallUptake::of(wall, image)?;
         let middle: Vec<f64> = (0..COLUMNS)
             .map(|column| mean(&middles(wall, column..column + 1)))
             .collect::<Option<_>>()?;
@@ -80,6 +93,61 @@ impl Evidence {
             offset: first_harmonic(&middle) / radius,
             slenderness: (wall.extent[1] - wall.extent[0]) / mean(&outer)?,
             septal_bulge: mean(&middles(wall, SEPTAL))? / mean(&free)?,
+            dark: uptake.dark,
+            beside: uptake.beside,
+        })
+    }
+}
+
+/// [`Evidence::dark`] and [`Evidence::beside`].
+struct WallUptake {
+    dark: f64,
+    beside: f64,
+}
+
+/// Quantile of the wall's uptake that counts as that of bright wall.
+const BRIGHT: f64 = 0.85;
+/// Where it is looked for neighbours, mm beyond the outer surface.
+const BEYOND: [i32; 2] = [12, 18];
+
+impl WallUptake {
+    fn of(wall: &VentricleWall, image: &Field) -> Option<Self> {
+        let greatest = |ray: &WallRay, from: f64, to: f64| {
+            let steps = (to - from).max(0.0).round() as usize;
+            let at = |n: usize| image.at(&(ray.start + ray.direction * (from + n as f64)));
+            (0..=steps).map(at).fold(f64::MIN, f64::max)
+        };
+        // Uptake of the wall, uptake beside it, share of the area.
+        let rays: Vec<[f64; 3]> = wall
+            .rays
+            .iter()
+            .filter_map(|ray| {
+                let [enters, leaves] = ray.wall?;
+                let middle = ray.direction * f64::midpoint(enters, leaves);
+                let along = wall.along_axis(&(ray.start + middle)) - wall.along_axis(&ray.start);
+                let across = (middle.norm_squared() - along * along).max(0.0).sqrt();
+                let [near, far] = BEYOND.map(|mm| leaves + f64::from(mm));
+                Some([
+                    greatest(ray, enters, leaves),
+                    greatest(ray, near, far),
+                    across,
+                ])
+            })
+            .collect();
+        let mut uptakes: Vec<f64> = rays.iter().map(|r| r[0]).collect();
+        uptakes.sort_by(f64::total_cmp);
+        let area: f64 = rays.iter().map(|r| r[2]).sum();
+        if uptakes.is_empty() || !(area > 0.0) {
+            return None;
+        }
+        let half = 0.5 * order::quantile(&uptakes, BRIGHT);
+        let share = |what: &dyn Fn(&[f64; 3]) -> bool| {
+            let of: f64 = rays.iter().filter(|r| what(r)).map(|r| r[2]).sum();
+            of / area
+        };
+        Some(Self {
+            dark: share(&|r| r[0] < half),
+            beside: share(&|r| r[1] > half),
         })
     }
 }

@@ -5,6 +5,7 @@ use super::dynamics::StopReason;
 use super::evidence::Evidence;
 use super::flags::Flag;
 use super::parameters::{DeformParameters, WallEdge};
+use super::uncertainty::{self, NodeEvidence};
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::locate::cup::Cup;
@@ -39,6 +40,8 @@ pub struct WallSurface {
     pub wall: VentricleWall,
     /// Volume of the wall, ml.
     pub wall_ml: f64,
+    /// Standard deviation of each node's distance from the wall, mm ([`super::uncertainty`]).
+    pub uncertainty: Vec<f64>,
 }
 
 /// Both walls of a ventricle, with the same nodes and triangles.
@@ -82,6 +85,8 @@ pub struct Fit {
     pub confidence: f64,
     /// The figures behind it; ventricles only.
     pub evidence: Option<Evidence>,
+    /// What is known of each node; empty for other organs.
+    pub nodes: Vec<NodeEvidence>,
     /// Why the motion ended.
     pub reason: StopReason,
     /// Steps made in the last run.
@@ -172,17 +177,20 @@ impl Fit {
         else {
             return Ok(self);
         };
+        let uncertainty = self.uncertainty(WallEdge::Apparent);
         let thin = anatomical_mesh(&self.mesh, &wall, image, parameters.resolution);
         let surfaces = WallSurfaces {
             anatomical: WallSurface {
                 wall: VentricleWall::new(&thin, &cup, &orientation.superior, monitor)?,
                 wall_ml: thin.volume() / 1000.0,
                 mesh: thin,
+                uncertainty: self.uncertainty(WallEdge::Anatomical),
             },
             apparent: WallSurface {
                 mesh: self.mesh,
                 wall,
                 wall_ml: self.wall_ml,
+                uncertainty,
             },
         };
         let shown = match parameters.edge {
@@ -195,6 +203,19 @@ impl Fit {
             wall_ml: shown.wall_ml,
             surfaces: Some(surfaces),
             ..self
+        })
+    }
+
+    /// The standard deviation of each node's distance from the wall with this `edge`, mm.
+    pub(super) fn uncertainty(&self, edge: WallEdge) -> Vec<f64> {
+        uncertainty::of_nodes(&self.nodes, self.confidence, edge)
+    }
+
+    /// The uncertainty of the wall that a fit with this `edge` shows, mm; ventricles only.
+    pub fn shown_uncertainty(&self, edge: WallEdge) -> Option<&[f64]> {
+        self.surfaces.as_ref().map(|surfaces| match edge {
+            WallEdge::Apparent => surfaces.apparent.uncertainty.as_slice(),
+            WallEdge::Anatomical => surfaces.anatomical.uncertainty.as_slice(),
         })
     }
 

@@ -12,9 +12,12 @@
 //! 4. [`dynamics`]: deform it under [`elastic`] forces and [`sensors`] until it rests.
 //! 5. [`attempt`]: count folds and self-intersections; if there are any, repeat step 4 with four
 //!    times the stiffness, at most three times.
+//!    Where the septum of the result bulges, do steps 3 to 5 again without its sensors, and keep what is
+//!    more likely right: beside a septum without uptake, the right ventricle's wall looks like one.
 //! 6. [`rim`]: move the rim of a ventricle where anatomy and image together put it.
 //! 7. [`fit`](mod@fit): measure the result; [`evidence`], [`confidence`]: how likely it is right;
-//!    [`flags`]: what gives reason to doubt it.
+//!    [`uncertainty`]: how far each node may be off; [`flags`]: what gives reason to doubt it.
+//! 8. [`consensus`]: of several models' fits to one volume, judge the chosen one by all of them.
 //!
 //! The edge that is fitted is the half-way point between the wall's ridge and the trough beside
 //! it. It does not depend on uptake: a wall with half the uptake has its edge in the same place.
@@ -35,6 +38,7 @@ pub mod anatomical;
 pub mod attempt;
 pub mod blur_correction;
 pub mod confidence;
+pub mod consensus;
 mod doubts;
 pub mod dynamics;
 pub mod elastic;
@@ -47,6 +51,7 @@ pub mod place;
 pub mod rim;
 pub mod sensors;
 pub mod setup;
+pub mod uncertainty;
 
 pub use error::DeformError;
 pub use evidence::Evidence;
@@ -93,7 +98,31 @@ pub fn fit_at(
     parameters.validate()?;
     check_supports(template, &parameters.stiffness)?;
     monitor.report(Stage::Align, 0.0)?;
-    let setup = FitSetup::new(place, volume, template, parameters, monitor)?;
+    let mut setup = FitSetup::new(place, volume, template, parameters, monitor)?;
+    let mut fit = fit_from(&setup, volume, template, parameters, monitor)?;
+    // The wall of a hot right ventricle beside a septum without uptake: the rest of the wall may tell.
+    if doubts::bulges(&fit)
+        && let Some(blind) = setup.clone().without_septum()
+    {
+        let other = fit_from(&blind, volume, template, parameters, monitor)?;
+        if other.confidence > fit.confidence {
+            (fit, setup) = (other, blind);
+        }
+    }
+    fit.require_wall(&parameters.hints)?;
+    let fit = fit.with_surfaces(&setup.field, parameters, monitor)?;
+    monitor.report(Stage::Deform, 1.0)?;
+    Ok(fit)
+}
+
+/// The fit from a posed template, its wall as the sensors and the rim's shape put it.
+fn fit_from(
+    setup: &FitSetup,
+    volume: &Volume,
+    template: &Template,
+    parameters: &DeformParameters,
+    monitor: &Monitor,
+) -> Result<Fit, DeformError> {
     // Far from the edge, the ridge and the trough beside a slope may belong to another structure:
     // the model is aligned by slopes.
     let far = match parameters.sensor {
@@ -113,12 +142,8 @@ pub fn fit_at(
         setup.posed.clone()
     };
     monitor.report(Stage::Deform, 0.0)?;
-    let attempt = Attempt::best(&aligned, template, &setup, parameters, monitor)?;
-    let fit = attempt.into_fit(volume, template, &setup, &aligned, parameters.edge, monitor)?;
-    fit.require_wall(&parameters.hints)?;
-    let fit = fit.with_surfaces(&setup.field, parameters, monitor)?;
-    monitor.report(Stage::Deform, 1.0)?;
-    Ok(fit)
+    let attempt = Attempt::best(&aligned, template, setup, parameters, monitor)?;
+    Ok(attempt.into_fit(volume, template, setup, &aligned, parameters.edge, monitor)?)
 }
 
 /// Most nodes of a model with support springs, whose number grows with the square of the nodes.

@@ -4,13 +4,13 @@
 use super::error::DeformError;
 use super::parameters::DeformParameters;
 use super::place::OrganPlace;
-use super::sensors::{EdgeShift, SensorKind, SensorSettings};
+use super::sensors::{BlindSector, EdgeShift, SensorKind, SensorSettings};
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::grid::Volume;
 use crate::grid::field::Field;
 use crate::locate::localisation::Localisation;
-use crate::locate::patient_orientation::PatientOrientation;
+use crate::locate::patient_orientation::{OrientationSource, PatientOrientation};
 use crate::mesh::TriMesh;
 use crate::model::pose::TemplatePose;
 use crate::model::{Template, wall};
@@ -29,6 +29,7 @@ fn edge_shift(sensor: SensorKind) -> [f64; 3] {
 }
 
 /// The posed template, and the image to fit it to.
+#[derive(Clone)]
 pub struct FitSetup {
     /// Where the ventricle was found; `None` for other organs.
     pub localisation: Option<Localisation>,
@@ -46,7 +47,13 @@ pub struct FitSetup {
     cavity_axis: [Vec3; 2],
     /// Typical value of the organ.
     uptake: f64,
+    /// Where sensors see nothing.
+    blind: Option<BlindSector>,
 }
+
+/// Half of the angle that the right ventricle's wall may take up beside the septum, degrees. Chosen
+/// on the calibrating seeds (703 among them).
+const SEPTAL: f64 = 65.0;
 
 impl FitSetup {
     /// Poses `template` at `place` and blurs the image about it.
@@ -96,6 +103,26 @@ impl FitSetup {
             cavity_axis,
             uptake,
             field,
+            blind: None,
+        })
+    }
+
+    /// The same with sensors that see nothing of the septum; `None` for other organs, and where the
+    /// orientation is unknown.
+    pub fn without_septum(self) -> Option<Self> {
+        let cup = self.localisation.as_ref()?.cup;
+        if self.patient_orientation.source == OrientationSource::Unknown {
+            return None;
+        }
+        let anterior = wall::anterior(&cup.axis, &self.patient_orientation.superior);
+        Some(Self {
+            blind: Some(BlindSector {
+                centre: cup.centre,
+                axis: cup.axis,
+                middle: cup.axis.cross(&anterior),
+                half_angle: SEPTAL,
+            }),
+            ..self
         })
     }
 
@@ -117,6 +144,7 @@ impl FitSetup {
                 rim: rim + parameters.margin,
                 axis: self.cavity_axis,
             },
+            blind: self.blind,
         }
     }
 }

@@ -101,6 +101,7 @@ fn findings(evaluation: &Evaluation) -> Markup {
 
 fn class(variant: Variant) -> &'static str {
     match variant {
+        Variant::Auto => "faint",
         Variant::Reference => "red",
         Variant::Retiled => "orange",
         Variant::Optimised => "blue",
@@ -369,7 +370,6 @@ fn curves(rows: &[FitRow], gold: Gold, pick: fn(&Cell) -> Option<f64>) -> Vec<Se
             thin: false,
             points: line(*variant, None),
         })
-        .filter(|s| !s.points.is_empty())
         .collect();
     let templates = rows::distinct(rows, |r| r.template.clone());
     for template in templates.iter().filter(|_| templates.len() > 1) {
@@ -380,6 +380,7 @@ fn curves(rows: &[FitRow], gold: Gold, pick: fn(&Cell) -> Option<f64>) -> Vec<Se
             points: line(Variant::Optimised, Some(template)),
         });
     }
+    series.retain(|s| !s.points.is_empty());
     series
 }
 

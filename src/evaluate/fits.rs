@@ -11,14 +11,14 @@ use super::files::write_whole;
 use super::models::CohortModel;
 use super::observer::{EvaluationObserver, EvaluationStep};
 use super::record::{self, Key};
-use super::rows::{FitOutcome, FitRow, Gold};
+use super::rows::{FitOutcome, FitRow, Gold, ModelKind, Variant};
 use super::sample::Sample;
-use crate::deform::DeformParameters;
+use crate::deform::{DeformParameters, Fit};
 use crate::export::{self, Format, Metadata};
 use crate::grid::agreement::compare;
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::progress::Monitor;
-use crate::segmentation::{OrganSearch, on_grid};
+use crate::segmentation::{OrganSearch, built_in, fit_built_in, on_grid};
 use crate::volume::Volume;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -32,6 +32,8 @@ pub struct PatientFits {
     pub golds: [bool; 2],
     /// One for each model, in the order of the models.
     pub fits: Vec<CohortFit>,
+    /// What `auto` keeps of the built-in hearts.
+    pub auto: Option<CohortFit>,
     /// What is wrong with the patient's files or fits.
     pub problems: Vec<String>,
 }
@@ -40,6 +42,8 @@ pub struct PatientFits {
 pub struct FitRun<'a> {
     /// How the models are fitted.
     pub parameters: &'a DeformParameters,
+    /// Whether the fit that `auto` keeps is a result too.
+    pub auto: bool,
     /// Bytes that identify the program: results of another program are computed again.
     pub program: &'a [u8],
     /// Where records and fitted meshes go.
@@ -58,7 +62,7 @@ pub fn fit_all(
 ) -> Result<Vec<PatientFits>, EvaluateError> {
     let key = Key::new().and(run.program);
     let done = AtomicUsize::new(0);
-    let all = (cohort.patients.len() * models.len()).max(1);
+    let all = (cohort.patients.len() * (models.len() + usize::from(run.auto))).max(1);
     let advance = || {
         let count = 1 + done.fetch_add(1, Ordering::Relaxed);
         observer.progress(EvaluationStep::Fits, count as f64 / all as f64);
@@ -135,6 +139,7 @@ impl PatientWork<'_> {
             case: self.case.to_owned(),
             golds: files.golds.each_ref().map(Option::is_some),
             fits: Vec::new(),
+            auto: None,
             problems: Vec::new(),
         };
         for model in models {
@@ -152,6 +157,21 @@ impl PatientWork<'_> {
                 }
             };
             patient.fits.push(fit);
+            advance();
+        }
+        if self.run.auto {
+            let path = self.run.folder.join(format!("{}_auto.json", self.case));
+            let key = self.key.clone().and(b"auto").text();
+            let kept = record::read(&path, &key);
+            let computed = kept.is_none();
+            let fit = kept.unwrap_or_else(|| {
+                let images = images.get_or_insert_with(|| PatientImages::read(files));
+                images.fit_auto(self.run.parameters)
+            });
+            if computed {
+                record::write(&path, &key, &fit)?;
+            }
+            patient.auto = Some(fit);
             advance();
         }
         patient.note_problems(models);
@@ -182,26 +202,38 @@ impl PatientFits {
         models: &'a [CohortModel],
         sample: Sample,
     ) -> impl Iterator<Item = FitRow> + 'a {
-        let pairs = models.iter().zip(&self.fits);
-        let others = pairs.filter(|(model, _)| model.template != self.case);
-        others.map(move |(model, fit)| FitRow {
-            template: model.template.clone(),
-            kind: model.kind,
+        let row = move |template: &str, kind: ModelKind, fit: &CohortFit| FitRow {
+            template: template.to_owned(),
+            kind,
             case: self.case.clone(),
             sample,
             outcome: fit.outcome.clone(),
             agreed: fit.agreed,
             golds: self.golds,
             figures: fit.figures.clone(),
-        })
+        };
+        let pairs = models.iter().zip(&self.fits);
+        let own = pairs
+            .filter(|(model, _)| model.template != self.case)
+            .map(move |(model, fit)| row(&model.template, model.kind, fit));
+        let auto = self.auto.as_ref().map(move |fit| {
+            let kind = ModelKind {
+                variant: Variant::Auto,
+                points: built_in::POINTS,
+            };
+            row(built_in::NAME, kind, fit)
+        });
+        own.chain(auto)
     }
 
     /// Notes every fit that was lost, and once each problem that all fits of the patient have.
     fn note_problems(&mut self, models: &[CohortModel]) {
-        for (model, fit) in models.iter().zip(&self.fits) {
+        let own = models.iter().map(CohortModel::name).zip(&self.fits);
+        let auto = self.auto.iter().map(|fit| ("auto".to_owned(), fit));
+        for (name, fit) in own.chain(auto) {
             let problem = match &fit.outcome {
                 FitOutcome::Fitted(_) => None,
-                FitOutcome::Lost(reason) => Some(format!("{} lost: {reason}", model.name())),
+                FitOutcome::Lost(reason) => Some(format!("{name} lost: {reason}")),
                 FitOutcome::Unreadable(reason) => Some(format!("not read: {reason}")),
             };
             let gold = Gold::ALL.into_iter().filter_map(|gold| {
@@ -248,14 +280,32 @@ impl PatientImages {
     }
 
     fn fit(&mut self, model: &CohortModel, parameters: &DeformParameters) -> CohortFit {
+        self.measured(|search, volume| {
+            let fit = search.fit(volume, &model.ready, parameters, &Monitor::silent());
+            fit.map_err(|error| error.to_string())
+        })
+    }
+
+    fn fit_auto(&mut self, parameters: &DeformParameters) -> CohortFit {
+        self.measured(|search, volume| {
+            let fit = fit_built_in(volume, parameters, search, &Monitor::silent());
+            fit.map_err(|error| error.to_string())
+        })
+    }
+
+    /// The fit that `make` makes of the volume, measured against the gold standards.
+    fn measured(
+        &mut self,
+        make: impl FnOnce(&mut OrganSearch, &Volume) -> Result<Fit, String>,
+    ) -> CohortFit {
         let volume = match &self.volume {
             Ok(volume) => volume,
             Err(reason) => return CohortFit::without_fit(FitOutcome::Unreadable(reason.clone())),
         };
         let silent = Monitor::silent();
-        let fit = match self.search.fit(volume, &model.ready, parameters, &silent) {
+        let fit = match make(&mut self.search, volume) {
             Ok(fit) => fit,
-            Err(error) => return CohortFit::without_fit(FitOutcome::Lost(error.to_string())),
+            Err(reason) => return CohortFit::without_fit(FitOutcome::Lost(reason)),
         };
         let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
         let spacing = volume.frame.spacing();

@@ -8,7 +8,7 @@
 //! 2. [`models`]: the models of the templates, ours at every number of points and the reference
 //!    model.
 //! 3. [`fits`]: every model fitted to every patient by the functions of
-//!    [`crate::segmentation`]; results are kept in [`record`]s, so that a run that was stopped
+//!    [`crate::segmentation`], and the fit that `auto` keeps; results are kept in [`record`]s, so that a run that was stopped
 //!    continues where it ended.
 //! 4. [`rows`]: the table of all fits, and means over it; [`findings`](mod@findings): what they say about
 //!    each of the paper's findings.
@@ -53,7 +53,7 @@ use findings::findings;
 use fits::{FitRun, PatientFits};
 use leave_one_out::LeaveOneOut;
 use models::CohortModel;
-use rows::{FitRow, Gold};
+use rows::{FitRow, Gold, Variant};
 use std::path::Path;
 use table::Evaluation;
 
@@ -87,6 +87,7 @@ pub fn evaluate(
     }
     let run = FitRun {
         parameters: &parameters.deform,
+        auto: parameters.variants.contains(&Variant::Auto),
         program,
         folder: &fits_folder,
     };

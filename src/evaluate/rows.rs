@@ -12,6 +12,8 @@ use serde::{Deserialize, Serialize};
 /// Which kind of model was fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Variant {
+    /// What `auto` keeps of the built-in hearts, whatever the cohort's templates.
+    Auto,
     /// The stand-in for the paper's older model: Marching Cubes thinned out by quadric error.
     Reference,
     /// Ours after re-tiling, before fit and flips.
@@ -22,11 +24,17 @@ pub enum Variant {
 
 impl Variant {
     /// All of them, in the order of tables.
-    pub const ALL: [Variant; 3] = [Variant::Reference, Variant::Retiled, Variant::Optimised];
+    pub const ALL: [Variant; 4] = [
+        Variant::Auto,
+        Variant::Reference,
+        Variant::Retiled,
+        Variant::Optimised,
+    ];
 
     /// The name in tables and files.
     pub fn as_str(self) -> &'static str {
         match self {
+            Variant::Auto => "auto",
             Variant::Reference => "reference",
             Variant::Retiled => "retiled",
             Variant::Optimised => "optimised",
@@ -36,6 +44,7 @@ impl Variant {
     /// A description for readers.
     pub fn title(self) -> &'static str {
         match self {
+            Variant::Auto => "auto: the best of the built-in hearts",
             Variant::Reference => "reference model",
             Variant::Retiled => "after re-tiling",
             Variant::Optimised => "after fit and flips",

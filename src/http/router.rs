@@ -50,7 +50,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         products::routes::<Templates>(),
         products::routes::<Readers>(),
     ];
-    let of_one_kind: [UtoipaMethodRouter<App>; 40] = [
+    let of_one_kind: [UtoipaMethodRouter<App>; 41] = [
         routes!(volumes::create_volume).layer(upload()),
         routes!(volumes::preview_volume),
         routes!(voxels::download_voxels),

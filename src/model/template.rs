@@ -111,6 +111,21 @@ impl Template {
     }
 }
 
+impl Template {
+    /// A ventricle that was checked before, with the cup found in it then.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn of_cup(mesh: TriMesh, cup: Cup, monitor: &Monitor) -> Result<Self, Cancelled> {
+        Ok(Self {
+            struts: struts(&mesh, monitor)?,
+            mesh,
+            organ: Organ::LeftVentricle,
+            cup: Some(cup),
+        })
+    }
+}
+
 /// Finds the cup in the model by the same search as in patients, so that centre, axis and length
 /// are defined alike in both.
 fn cup_of(mesh: &TriMesh, monitor: &Monitor) -> Result<Cup, TemplateError> {

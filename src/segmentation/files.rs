@@ -80,15 +80,21 @@ impl SegmentedVolume {
             quality: self.summary(),
             ..Metadata::new("Fitted model")
         };
-        let mut meshes = vec![("mesh", &segmentation.fit.mesh)];
+        let fit = &segmentation.fit;
+        let shown = fit.shown_uncertainty(edge).unwrap_or_default();
+        let mut meshes = vec![("mesh", &fit.mesh, shown)];
         if let Some(other) = segmentation.fit.other_surface(edge) {
             let name = match edge {
                 WallEdge::Apparent => "mesh_anatomical",
                 WallEdge::Anatomical => "mesh_apparent",
             };
-            meshes.push((name, &other.mesh));
+            meshes.push((name, &other.mesh, &other.uncertainty));
         }
-        for (name, mesh) in meshes {
+        for (name, mesh, uncertainty) in meshes {
+            let metadata = Metadata {
+                uncertainty: uncertainty.to_vec(),
+                ..metadata.clone()
+            };
             for format in formats {
                 monitor.check()?;
                 files.push(NamedFile {
@@ -131,9 +137,12 @@ impl SegmentedVolume {
         };
         let report: SegmentationReport = serde_json::from_value(self.report())
             .expect("the page reads the fields of the report by the types it was written with");
+        let edge = self.parameters.deform.edge;
+        let uncertainty = self.segmentation.fit.shown_uncertainty(edge);
         let page = report::segmentation_page(&SegmentationPage {
             report: &report,
             mesh: &self.segmentation.fit.mesh,
+            uncertainty: uncertainty.unwrap_or_default(),
             slices: bytes("slices.png"),
             polar: bytes("polar.svg"),
         });

@@ -1,8 +1,12 @@
 //! Fits of templates to one volume, with one search for the organ.
 
+use super::built_in;
 use super::error::SegmentationError;
-use super::templates::{NamedTemplate, RefusedTemplate};
-use crate::deform::{DeformError, DeformParameters, Fit, OrganPlace, fit_at};
+use super::named_template::{NamedTemplate, RefusedTemplate};
+use crate::deform::{
+    DeformError, DeformParameters, Evidence, Fit, OrganPlace, WallEdge, consensus, fit_at,
+};
+use crate::locate::LocateError;
 use crate::model::Template;
 use crate::progress::Monitor;
 use crate::volume::Volume;
@@ -68,7 +72,9 @@ impl OrganSearch {
 pub struct RankedTemplate {
     /// The template's name.
     pub name: String,
-    /// The figure that templates are ranked by ([`Fit::merit`]).
+    /// The figure that templates are ranked by ([`Fit::confidence`]), by this fit alone.
+    pub confidence: f64,
+    /// What decides between equals ([`Fit::merit`]).
     pub merit: f64,
     /// Share of area whose sensors see an edge, 0..=1.
     pub active: f64,
@@ -76,6 +82,8 @@ pub struct RankedTemplate {
     pub strain: f64,
     /// Weighted rms distance to the edges, mm.
     pub residual: f64,
+    /// The figures behind the confidence; ventricles only.
+    pub evidence: Option<Evidence>,
 }
 
 /// The fits of several templates.
@@ -87,9 +95,63 @@ pub struct Trials {
     pub candidates: Vec<RankedTemplate>,
     /// Templates whose fit failed.
     pub refused: Vec<RefusedTemplate>,
+    /// For each built-in heart the place of its fit in `fits`; `None` where it failed.
+    pub built_in: Vec<Option<usize>>,
 }
 
-/// Fits every template to the organ in `volume`.
+impl Trials {
+    /// Leaves out the fits of the built-in hearts for that reason.
+    fn leave_out_built_in(&mut self, reason: &DeformError) {
+        let found: Vec<usize> = self.built_in.drain(..).flatten().collect();
+        for place in found.into_iter().rev() {
+            self.fits.remove(place);
+            let name = self.candidates.remove(place).name;
+            let reason = format!("other built-in hearts found no wall there: {reason}");
+            self.refused.push(RefusedTemplate { name, reason });
+        }
+    }
+
+    /// The fit with the greatest confidence, of equals the one with the greatest merit, of those the
+    /// first, as the built-in hearts' fits judge it, and its place; `None` without any fit.
+    pub fn best(&self, edge: WallEdge) -> Option<(usize, Fit)> {
+        let rank = |n: usize| (self.candidates[n].confidence, self.candidates[n].merit);
+        let best = (0..self.fits.len()).rev().max_by(|a, b| {
+            let ((a, merit), (b, other)) = (rank(*a), rank(*b));
+            a.total_cmp(&b).then(merit.total_cmp(&other))
+        })?;
+        let fit = self.fits[best].clone();
+        let members: Vec<Option<&Fit>> = self
+            .built_in
+            .iter()
+            .map(|place| place.map(|n| &self.fits[n]))
+            .collect();
+        let own = self.built_in.iter().position(|n| *n == Some(best));
+        Some(match members.len() {
+            0 => (best, fit),
+            _ => (best, consensus::judged(fit, &members, own, edge)),
+        })
+    }
+}
+
+/// The fit that `auto` keeps without further models: of the built-in hearts, to the heart in `volume`,
+/// searched before if it has to be.
+///
+/// # Errors
+/// As [`try_all`].
+pub fn fit_built_in(
+    volume: &Volume,
+    parameters: &DeformParameters,
+    search: &mut OrganSearch,
+    monitor: &Monitor,
+) -> Result<Fit, SegmentationError> {
+    let templates = built_in::templates(monitor)?;
+    let trials = try_all(volume, &templates, parameters, search, monitor)?;
+    let best = trials.best(parameters.edge);
+    best.map_or(Err(SegmentationError::NoTemplate), |(_, fit)| Ok(fit))
+}
+
+/// Fits every template to the organ in `volume`. Where half of the built-in hearts find no wall, or more,
+/// the fits of the others are left out: they took something else for one.
 ///
 /// # Errors
 /// Where the organ is not found, no template can be fitted (the first one's error), or the caller
@@ -98,33 +160,56 @@ pub fn try_all(
     volume: &Volume,
     templates: &[NamedTemplate],
     parameters: &DeformParameters,
+    search: &mut OrganSearch,
     monitor: &Monitor,
 ) -> Result<Trials, SegmentationError> {
     let mut trials = Trials::default();
     let mut first = None;
-    let mut search = OrganSearch::default();
-    for (index, NamedTemplate { name, template }) in templates.iter().enumerate() {
+    let mut wall_less = Vec::new();
+    for (index, named) in templates.iter().enumerate() {
+        let NamedTemplate {
+            name,
+            template,
+            built_in,
+        } = named;
         let place = search.place(volume, template, parameters, monitor)?;
         let monitor = monitor.part(index, templates.len());
         let name = name.clone();
         match fit_at(place, volume, template, parameters, &monitor) {
             Ok(fit) => {
+                if *built_in {
+                    trials.built_in.push(Some(trials.fits.len()));
+                }
                 trials.candidates.push(RankedTemplate {
                     name,
+                    confidence: fit.confidence,
                     merit: fit.merit(),
                     active: fit.active,
                     strain: fit.strain.sqrt(),
                     residual: fit.residual,
+                    evidence: fit.evidence,
                 });
                 trials.fits.push(fit);
             }
             Err(error) => {
                 monitor.check()?;
+                if *built_in {
+                    trials.built_in.push(None);
+                    if let DeformError::Localise(LocateError::NoHeart { .. }) = error {
+                        wall_less.push(error.clone());
+                    }
+                }
                 let reason = error.to_string();
                 trials.refused.push(RefusedTemplate { name, reason });
                 first.get_or_insert(error);
             }
         }
+    }
+    if 2 * wall_less.len() >= trials.built_in.len()
+        && let Some(error) = wall_less.into_iter().next()
+    {
+        trials.leave_out_built_in(&error);
+        first = Some(error);
     }
     match first {
         Some(error) if trials.fits.is_empty() => Err(error.into()),

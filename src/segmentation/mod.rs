@@ -6,13 +6,15 @@
 //! 1. [`SegmentationOrder`]: the files, models and parameters.
 //! 2. [`from_files`](mod@from_files) reads the volume and the expert's mask and completes the parameters with what
 //!    depends on the volume ([`FitParameters::on`](crate::parameters::FitParameters::on)).
-//! 3. The models are checked and prepared; without a model, the built-in one is taken. A model
-//!    that was named must be usable; of several that are merely available, unusable ones are left
+//! 3. The models are checked and prepared; with `auto`, the built-in hearts join them. A model
+//!    that was named must be usable; of those that are merely available, unusable ones are left
 //!    out, and the report says why.
 //! 4. The expert's mask is brought to the volume's grid ([`on_grid`]).
 //! 5. Every template is fitted, with one search for the organ ([`OrganSearch`]), and the fit with
-//!    the greatest [`Fit::merit`](crate::deform::Fit::merit) is chosen, the first of equals. A
-//!    template whose fit fails is left out, unless all fail.
+//!    the greatest [`Fit::confidence`](crate::deform::Fit::confidence) is chosen, of equals the one with
+//!    the greatest [`Fit::merit`](crate::deform::Fit::merit). A template whose fit fails is left out,
+//!    unless all fail or half of the built-in hearts find no wall. The fits of the built-in hearts
+//!    judge the chosen one together ([`consensus`](crate::deform::consensus)).
 //! 6. With a reader's profile, the wall is drawn as that reader would ([`crate::reader`]).
 //! 7. [`segment`](mod@segment) makes mask, measures, polar map and [`slices`] of the fit.
 //! 8. [`report_json`] is the report; [`SegmentedVolume::files`] are the files written, the same on
@@ -22,7 +24,8 @@ mod order;
 
 mod from_files;
 
-mod built_in;
+pub mod built_in;
+mod named_template;
 mod templates;
 
 mod expert_mask;
@@ -41,9 +44,9 @@ mod error;
 pub use error::SegmentationError;
 pub use expert_mask::{ExpertMaskError, on_grid};
 pub use files::{NamedFile, SegmentationFilesError};
-pub use fitting::{OrganSearch, RankedTemplate};
+pub use fitting::{OrganSearch, RankedTemplate, fit_built_in};
 pub use from_files::{SegmentedVolume, from_files};
+pub use named_template::{NamedTemplate, RefusedTemplate};
 pub use order::{NamedMesh, NamedReader, SegmentationOrder};
 pub use report::{agreement_json, report_json};
 pub use segment::{AppliedReader, ImageResolution, Segmentation, SegmentationParameters, segment};
-pub use templates::{NamedTemplate, RefusedTemplate};

@@ -12,11 +12,10 @@ pub struct SegmentationOrder<'a> {
     pub volume: &'a [VolumeFile],
     /// The files of an expert's mask to compare with.
     pub expert: Option<&'a [VolumeFile]>,
-    /// The models to fit. Empty: the built-in one, if the organ is the left ventricle.
+    /// Whether the built-in hearts are fitted, if the organ is the left ventricle.
+    pub auto: bool,
+    /// Further models to fit.
     pub models: Vec<NamedMesh>,
-    /// Whether every model must be usable. Otherwise models that cannot be used are left out,
-    /// and the report says why.
-    pub named: bool,
     /// The reader as whom to draw the wall.
     pub reader: Option<NamedReader>,
     /// The parameters.
@@ -39,4 +38,7 @@ pub struct NamedMesh {
     pub name: String,
     /// The model, LPS mm.
     pub mesh: TriMesh,
+    /// Whether it must be usable, as one that the caller named. Otherwise it is left out if it cannot
+    /// be used, and the report says why.
+    pub required: bool,
 }

@@ -3,10 +3,11 @@
 use serde_json::{Value, json};
 
 use super::segment::{AppliedReader, Segmentation};
-use crate::deform::{Evidence, Fit, confidence};
+use crate::deform::{Evidence, Fit, confidence, consensus};
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
 use crate::model::wall::VentricleWall;
+use crate::numeric::order;
 use crate::polar;
 
 fn round(x: f64) -> f64 {
@@ -31,6 +32,7 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
         .map(|c| {
             json!({
                 "template": c.name,
+                "confidence": round(c.confidence),
                 "merit": round(c.merit),
                 "active": round(c.active),
                 "strain": round(c.strain),
@@ -64,13 +66,17 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
             "confidence": round(p.confidence),
         })),
         "fit": fit_json(fit),
-        "evidence": fit.evidence.as_ref().map(evidence),
+        "evidence": fit.evidence.as_ref().map(|e| evidence(e, consensus::spread(&fit.nodes))),
         "volumes_ml": volumes(fit),
         "mass_g": fit.surfaces.as_ref().map(|s| round(MYOCARDIUM * s.anatomical.wall_ml)),
         "wall_thickness_mm": fit.wall.as_ref().map(|w| round(w.thickness)),
         "thickness_mm": fit.surfaces.as_ref().map(|s| json!({
             "apparent": thickness(&s.apparent.wall),
             "anatomical": thickness(&s.anatomical.wall),
+        })),
+        "uncertainty_mm": fit.surfaces.as_ref().map(|s| json!({
+            "apparent": uncertainty(&s.apparent.uncertainty),
+            "anatomical": uncertainty(&s.anatomical.uncertainty),
         })),
         "resolution_mm": segmentation.resolution.map(|r| json!({
             "value": round(r.value),
@@ -131,6 +137,20 @@ fn thickness(wall: &VentricleWall) -> Value {
     json!({"mean": round(wall.thickness), "spread": round(wall.thickness_spread)})
 }
 
+/// Median, 95th percentile and greatest uncertainty of the nodes of a wall, mm.
+fn uncertainty(nodes: &[f64]) -> Value {
+    let mut sorted = nodes.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    match sorted.last() {
+        Some(most) => json!({
+            "median": round(order::quantile(&sorted, 0.5)),
+            "percentile_95": round(order::quantile(&sorted, 0.95)),
+            "greatest": round(*most),
+        }),
+        None => Value::Null,
+    }
+}
+
 /// How the motion went, and the fitted model's pose.
 fn fit_json(fit: &Fit) -> Value {
     let displacements: Vec<f64> = fit.displacements.iter().map(|d| round(d.norm())).collect();
@@ -156,7 +176,7 @@ fn fit_json(fit: &Fit) -> Value {
 }
 
 /// The figures behind confidence and flags.
-fn evidence(e: &Evidence) -> Value {
+fn evidence(e: &Evidence, spread: Option<f64>) -> Value {
     json!({
         "active_sensors": round(e.active),
         "residual_mm": round(e.residual),
@@ -168,7 +188,10 @@ fn evidence(e: &Evidence) -> Value {
         "offset": round(e.offset),
         "slenderness": round(e.slenderness),
         "septal_bulge": round(e.septal_bulge),
+        "dark": round(e.dark),
+        "beside": round(e.beside),
         "chance_of_motion": round(confidence::of_motion(e)),
+        "template_spread_mm": spread.map(round),
     })
 }
 
@@ -179,17 +202,18 @@ fn choice(segmentation: &Segmentation) -> String {
     let next = others
         .filter(|(place, _)| *place != segmentation.chosen)
         .map(|(_, candidate)| candidate)
-        .max_by(|a, b| a.merit.total_cmp(&b.merit));
+        .max_by(|a, b| a.confidence.total_cmp(&b.confidence));
     match next {
         None => format!("{} was the only model fitted", chosen.name),
         Some(next) => format!(
-            "{} has the greatest merit, {:.3} (next {}: {:.3}): edges seen along {:.0} % of its \
-             surface, less strain, misfit and flags",
+            "{} has the greatest confidence by its own figures, {:.2} (next {}: {:.2}): edges seen \
+             along {:.0} % of its surface, {:.1} mm off in the mean",
             chosen.name,
-            chosen.merit,
+            chosen.confidence,
             next.name,
-            next.merit,
+            next.confidence,
             100.0 * chosen.active,
+            chosen.residual,
         ),
     }
 }

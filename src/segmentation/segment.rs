@@ -2,10 +2,10 @@
 
 use super::error::SegmentationError;
 use super::expert_mask::on_grid;
-use super::fitting::{RankedTemplate, Trials, try_all};
+use super::fitting::{OrganSearch, RankedTemplate, Trials, try_all};
+use super::named_template::{NamedTemplate, RefusedTemplate};
 use super::order::NamedReader;
 use super::slices::{self, Cut};
-use super::templates::{NamedTemplate, RefusedTemplate};
 use crate::deform::{DeformParameters, Fit, blur_correction};
 use crate::grid::agreement::{Agreement, compare};
 use crate::grid::voxelise::{Mask, voxelise};
@@ -99,16 +99,16 @@ pub fn segment(
     monitor: &Monitor,
 ) -> Result<Segmentation, SegmentationError> {
     let expert = expert.map(|e| on_grid(e, volume, monitor)).transpose()?;
+    let mut search = OrganSearch::default();
+    let trials = try_all(volume, templates, &parameters.deform, &mut search, monitor)?;
+    let (chosen, fit) = trials
+        .best(parameters.deform.edge)
+        .ok_or(SegmentationError::NoTemplate)?;
     let Trials {
-        mut fits,
         candidates,
         refused,
-    } = try_all(volume, templates, &parameters.deform, monitor)?;
-    let chosen = (0..fits.len())
-        .rev()
-        .max_by(|a, b| candidates[*a].merit.total_cmp(&candidates[*b].merit))
-        .ok_or(SegmentationError::NoTemplate)?;
-    let fit = fits.swap_remove(chosen);
+        ..
+    } = trials;
     monitor.report(Stage::Polar, 0.0)?;
     // Uptake is sampled through the wall as it looks, whichever wall is shown.
     let polar = fit.surfaces.as_ref().map(|surfaces| {

@@ -142,6 +142,7 @@ fn energy_never_rises_without_external_forces() {
             rim: 0.0,
             axis: [Vec3::zeros(); 2],
         },
+        blind: None,
     };
     for damping in [0.0, 1.0] {
         let motion = Motion {

@@ -96,6 +96,7 @@ fn explicit_and_implicit_steps_end_in_the_same_state() {
                 rim: 0.0,
                 axis: [Vec3::zeros(), Vec3::new(0.0, 0.0, -40.0)],
             },
+            blind: None,
         };
         let motion = Motion {
             last_reach: look.reach,

@@ -9,7 +9,7 @@ use ventriform::parameters::FitParameters;
 use ventriform::progress::Monitor;
 use ventriform::segmentation::{SegmentationError, SegmentationOrder, from_files};
 use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PhantomParameters, phantom};
+use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
 use ventriform::volume::{Phantom, ReadLimits, Volume, VolumeFile};
 
 fn patient() -> PhantomParameters {
@@ -29,8 +29,8 @@ fn segmented(volume: &Volume) -> Result<Fit, SegmentationError> {
     let order = SegmentationOrder {
         volume: &[VolumeFile::in_memory("scan.nii", bytes)],
         expert: None,
+        auto: true,
         models: Vec::new(),
-        named: false,
         reader: None,
         parameters: &FitParameters::default(),
     };
@@ -105,5 +105,60 @@ fn balls_shells_and_beans_are_no_hearts() {
     if let Ok(fit) = bean {
         assert!(codes(&fit).contains(&"label_map"), "{:?}", codes(&fit));
         assert!(fit.confidence <= 0.5, "{}", fit.confidence);
+    }
+}
+
+#[test]
+fn the_right_ventricles_wall_is_not_taken_for_an_infarcted_septum_without_doubt() {
+    let septal = [2, 3, 8, 9, 14];
+    let defects = |severity: f64| {
+        let defect = |segment: u8| PerfusionDefect { segment, severity };
+        septal.map(defect).to_vec()
+    };
+    for seed in 1..4 {
+        let beside = PhantomParameters {
+            right_ventricle: 1.2,
+            defects: defects(1.0),
+            seed,
+            ..patient()
+        };
+        let Ok(fit) = segmented(&scan(&beside).volume) else {
+            continue;
+        };
+        let evidence = fit.evidence.unwrap();
+        let round = evidence.unroundness < 0.15 || evidence.septal_bulge < 1.03;
+        assert!(
+            round || codes(&fit).contains(&"right_ventricle"),
+            "{evidence:?}"
+        );
+    }
+}
+
+#[test]
+fn a_wall_that_is_not_seen_is_less_certain() {
+    let infarct = PhantomParameters {
+        defects: [5, 6, 11, 12]
+            .map(|segment| PerfusionDefect {
+                segment,
+                severity: 1.0,
+            })
+            .to_vec(),
+        ..patient()
+    };
+    let median = |parameters: &PhantomParameters| {
+        let fit = segmented(&scan(parameters).volume).unwrap();
+        let surfaces = fit.surfaces.unwrap();
+        assert!(fit.nodes.iter().all(|node| node.spread.is_some()));
+        [surfaces.apparent, surfaces.anatomical].map(|surface| {
+            let mut all = surface.uncertainty;
+            assert_eq!(all.len(), surface.mesh.vertices.len());
+            all.sort_by(f64::total_cmp);
+            all[all.len() * 9 / 10]
+        })
+    };
+    let (whole, dark) = (median(&patient()), median(&infarct));
+    for (whole, dark) in whole.iter().zip(dark) {
+        assert!((0.5..4.0).contains(whole), "{whole}");
+        assert!(dark > 1.2 * whole, "{dark} {whole}");
     }
 }

@@ -70,7 +70,7 @@ fn evaluate(cohort: &Path, out: &Path, threads: usize) -> Output {
             "--points",
             "67",
             "--models",
-            "reference,optimised",
+            "reference,optimised,auto",
         ])
         .arg("--cohort")
         .arg(cohort)
@@ -139,6 +139,15 @@ fn a_cohort_with_gaps_is_evaluated_resumed_and_reproduced() {
     assert_eq!(mean("expert")["fits"], 1);
     assert_eq!(mean("truth")["fits"], 2);
     assert!(mean("truth")["jaccard"].as_f64().unwrap() > 0.6);
+    // What `auto` keeps is a result like any other model's.
+    let fits = String::from_utf8(whole["fits.csv"].clone()).unwrap();
+    let auto = |line: &&str| line.contains("built-in,") && line.contains(",auto,");
+    let auto: Vec<&str> = fits.lines().filter(auto).collect();
+    assert_eq!(auto.len(), 3, "{fits}");
+    assert!(
+        auto[0].contains("p1") && auto[0].contains("fitted"),
+        "{auto:?}"
+    );
 
     // As after a crash: one record truncated, one missing, one file half written.
     let fit = |case: &str, model: &str| first.join(format!("fits/{case}_t1_{model}_67.json"));

@@ -164,7 +164,7 @@ fn errors_name_the_field_and_what_to_do() {
         (format!("{segment} --margin inf"), "-5 to 5"),
         (format!("{segment} --blur 11"), "0 to 10"),
         (format!("{segment} --organ liver"), "no model of a liver"),
-        (format!("{segment} --model sphere.json"), "not both"),
+        (format!("{segment} --model sphere.json"), "no ventricle"),
         (
             "segment scan.nii.gz -o out --model sphere.json".into(),
             "no ventricle",
@@ -235,8 +235,8 @@ impl Watcher {
         let order = SegmentationOrder {
             volume: &[VolumeFile::at(scan)],
             expert: None,
+            auto: true,
             models: Vec::new(),
-            named: false,
             reader: None,
             parameters: &parameters,
         };

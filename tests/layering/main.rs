@@ -79,6 +79,7 @@ const USES: &[(&str, &[&str])] = &[
         "segmentation",
         &[
             "geometry",
+            "numeric",
             "mesh",
             "progress",
             "grid",

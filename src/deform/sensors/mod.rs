@@ -20,7 +20,7 @@
 mod profile;
 mod settings;
 
-pub use settings::{EdgeShift, SensorKind, SensorSettings};
+pub use settings::{BlindSector, EdgeShift, SensorKind, SensorSettings};
 
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
@@ -123,7 +123,10 @@ pub fn read(
                 WallSide::Rim => &mut rim,
                 WallSide::Inner | WallSide::Outer => &mut profile,
             };
-            let edge = line.edge(field, &place, &normal);
+            let mut edge = line.edge(field, &place, &normal);
+            if settings.blind.is_some_and(|sector| sector.holds(&place)) {
+                edge.score = 0.0;
+            }
             widths.push((side, edge.half_width));
             readings.push(SensorReading {
                 place,

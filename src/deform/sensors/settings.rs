@@ -31,6 +31,30 @@ pub struct SensorSettings {
     pub ceiling: f64,
     /// What is added to the distances found.
     pub shift: EdgeShift,
+    /// Where sensors see nothing.
+    pub blind: Option<BlindSector>,
+}
+
+/// A sector about the long axis where sensors see nothing, for a wall that may be another one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BlindSector {
+    /// A point of the long axis, LPS mm.
+    pub centre: Vec3,
+    /// Its direction, a unit vector.
+    pub axis: Vec3,
+    /// The middle of the sector, a unit vector across the axis.
+    pub middle: Vec3,
+    /// Half of its angle, degrees.
+    pub half_angle: f64,
+}
+
+impl BlindSector {
+    /// Whether `place` lies in the sector.
+    pub fn holds(&self, place: &Vec3) -> bool {
+        let from = place - self.centre;
+        let across = from - self.axis * from.dot(&self.axis);
+        across.dot(&self.middle) > across.norm() * self.half_angle.to_radians().cos()
+    }
 }
 
 impl SensorSettings {

@@ -1,0 +1,10 @@
+//! Prints the built-in hearts, made anew from phantoms:
+//! `cargo run --release --example built_in > src/segmentation/built_in/hearts.json`
+
+use ventriform::progress::{Cancelled, Monitor};
+use ventriform::segmentation::built_in::hearts_json;
+
+fn main() -> Result<(), Cancelled> {
+    print!("{}", hearts_json(&Monitor::silent())?);
+    Ok(())
+}
