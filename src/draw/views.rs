@@ -17,6 +17,9 @@ use crate::mesh::TriMesh;
 const SIDE: usize = 500;
 /// Colour of the heart's wall.
 const MYOCARDIUM: Colour = [0.90, 0.42, 0.36];
+/// Uncertainty at which the colour is full, mm, and that colour.
+const UNSURE: f64 = 6.0;
+const UNSURE_COLOUR: Colour = [0.16, 0.27, 0.68];
 /// Most triangles that a browser turns smoothly.
 const MOST_TURNED: usize = 20_000;
 
@@ -25,11 +28,24 @@ pub type Pictures = Vec<String>;
 
 /// A section with the mesh from three sides and, up to [`MOST_TURNED`] triangles, one to turn
 /// ([`HtmlDocument::turning`](super::document::HtmlDocument::turning)).
-pub fn section(title: &str, mesh: &TriMesh) -> Markup {
+/// `uncertainty` of each vertex, mm, colours the pictures; without it they have the wall's colour.
+pub fn section(title: &str, mesh: &TriMesh, uncertainty: &[f64]) -> Markup {
+    let known = !uncertainty.is_empty() && uncertainty.len() == mesh.vertices.len();
+    let colour = |t: usize| match known {
+        true => {
+            let sum: f64 = mesh.triangles[t]
+                .iter()
+                .map(|v| uncertainty[*v as usize])
+                .sum();
+            let share = (sum / 3.0 / UNSURE).clamp(0.0, 1.0);
+            [0, 1, 2].map(|c| MYOCARDIUM[c] + (UNSURE_COLOUR[c] - MYOCARDIUM[c]) * share)
+        }
+        false => MYOCARDIUM,
+    };
     let facets: Vec<Facet> = (0..mesh.triangles.len())
         .map(|t| Facet {
             corners: mesh.corners(t),
-            colour: MYOCARDIUM,
+            colour: colour(t),
             outline: mesh.corners(t),
         })
         .collect();
@@ -39,6 +55,10 @@ pub fn section(title: &str, mesh: &TriMesh) -> Markup {
             p.hint {
                 "Every triangle of the mesh. Letters mark the patient's sides: L left, R right, "
                 "A anterior, P posterior, S superior, I inferior."
+                @if known {
+                    " The bluer a triangle, the less certain its place: full colour where the standard "
+                    "deviation of its distance from the wall is " (UNSURE) " mm or more."
+                }
             }
             div.row.four {
                 (figures(&pictures(&facets, mesh, 0.34), "The model"))

@@ -64,9 +64,14 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
     } else {
         &metadata.title
     };
+    let uncertainty = metadata.uncertainty_of(mesh);
+    let uncertainty_start = buffer.len();
+    let values = uncertainty.unwrap_or_default().iter().map(|x| *x as f32);
+    buffer.extend(values.flat_map(f32::to_le_bytes));
+
     let vertex_bytes = 12 * positions.len();
     let (min, max) = extent(&positions);
-    let document = json!({
+    let mut document = json!({
         "asset": {
             "version": "2.0",
             "generator": metadata.software,
@@ -127,6 +132,21 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
         ],
         "buffers": [{ "byteLength": buffer.len() }],
     });
+    if uncertainty.is_some() {
+        document["meshes"][0]["primitives"][0]["attributes"]["_UNCERTAINTY"] = 3.into();
+        let accessor = json!({
+            "bufferView": 3, "componentType": FLOAT, "type": "SCALAR", "count": positions.len(),
+        });
+        let view = json!({
+            "buffer": 0, "target": ARRAY_BUFFER,
+            "byteOffset": uncertainty_start, "byteLength": buffer.len() - uncertainty_start,
+        });
+        for (list, entry) in [("accessors", accessor), ("bufferViews", view)] {
+            if let Some(list) = document[list].as_array_mut() {
+                list.push(entry);
+            }
+        }
+    }
     Ok((document, buffer))
 }
 

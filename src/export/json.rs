@@ -14,6 +14,8 @@ struct WrittenMesh<'a> {
     vertices: Vec<[f64; 3]>,
     triangles: &'a [[u32; 3]],
     normals: Vec<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    uncertainty_mm: Option<&'a [f64]>,
 }
 
 /// A JSON file with `frame`, `unit`, the other metadata, `vertices`, `triangles` and `normals`.
@@ -24,6 +26,7 @@ pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Vec<u8> {
         vertices: rows(&mesh.vertices),
         triangles: &mesh.triangles,
         normals: rows(&mesh.vertex_normals()),
+        uncertainty_mm: metadata.uncertainty_of(mesh),
     };
     serde_json::to_vec(&document).expect("numbers and text keys can always be serialised")
 }

@@ -15,6 +15,10 @@
 //!
 //! 3D Slicer recognises the frame of STL, PLY and OBJ files by the text `SPACE=LPS`.
 //!
+//! Where it is known, the uncertainty of each vertex is the attribute `_UNCERTAINTY` of glTF files, the
+//! property `uncertainty` of PLY files, the array `Uncertainty` of VTP files and `uncertainty_mm` of
+//! JSON files, millimetres.
+//!
 //! Guaranteed: the same mesh and metadata give the same bytes; vertices stay distinct in single
 //! precision (see `single.rs`). Not checked: whether the mesh is a manifold; see
 //! [`crate::mesh::topology`].
@@ -136,6 +140,9 @@ pub struct Metadata {
     pub software: String,
     /// Measures of quality, in the order in which they are written.
     pub quality: Map<String, Value>,
+    /// Standard deviation of each vertex's distance from the true surface, mm; empty if it is not known.
+    /// STL and OBJ files cannot hold it.
+    pub uncertainty: Vec<f64>,
 }
 
 impl Metadata {
@@ -174,6 +181,12 @@ impl Metadata {
         .filter_map(|(key, value)| Some((key, value?)))
         .filter(|(_, value)| !value.is_empty())
         .collect()
+    }
+
+    /// The uncertainty of each vertex of `mesh`, if it is known.
+    fn uncertainty_of(&self, mesh: &TriMesh) -> Option<&[f64]> {
+        (!mesh.vertices.is_empty() && self.uncertainty.len() == mesh.vertices.len())
+            .then_some(&self.uncertainty)
     }
 
     /// The metadata as comment lines, in ASCII without control characters.

@@ -15,8 +15,10 @@ pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Result<Vec<u8>, ExportErro
     }
     let mut bytes = header(mesh, metadata).into_bytes();
     bytes.reserve(48 * mesh.vertices.len() + 13 * mesh.triangles.len());
-    for (position, normal) in mesh.vertices.iter().zip(mesh.vertex_normals()) {
-        let numbers = position.iter().chain(normal.iter());
+    let uncertainty = metadata.uncertainty_of(mesh);
+    for (vertex, normal) in mesh.vertex_normals().iter().enumerate() {
+        let numbers = mesh.vertices[vertex].iter().chain(normal.iter());
+        let numbers = numbers.chain(uncertainty.map(|all| &all[vertex]));
         bytes.extend(numbers.flat_map(|x| x.to_le_bytes()));
     }
     for t in &mesh.triangles {
@@ -38,6 +40,9 @@ fn header(mesh: &TriMesh, metadata: &Metadata) -> String {
     lines.push(format!("element vertex {}", mesh.vertices.len()));
     for name in ["x", "y", "z", "nx", "ny", "nz"] {
         lines.push(format!("property double {name}"));
+    }
+    if metadata.uncertainty_of(mesh).is_some() {
+        lines.push("property double uncertainty".to_owned());
     }
     lines.push(format!("element face {}", mesh.triangles.len()));
     lines.push("property list uchar int vertex_indices".to_owned());

@@ -74,6 +74,17 @@ pub fn decode(bytes: &[u8]) -> Result<TriMesh, ReadMeshError> {
     })
 }
 
+/// What [`super::Metadata::uncertainty`] was of the mesh in `bytes`; empty if the file has none.
+pub fn uncertainty(bytes: &[u8]) -> Vec<f64> {
+    #[derive(Default, Deserialize)]
+    #[serde(default)]
+    struct ReadUncertainty {
+        uncertainty_mm: Vec<f64>,
+    }
+    serde_json::from_slice(bytes)
+        .map_or_else(|_| Vec::new(), |read: ReadUncertainty| read.uncertainty_mm)
+}
+
 fn demand(
     field: &'static str,
     value: Option<String>,
@@ -102,6 +113,19 @@ mod tests {
         let back = decode(&bytes).unwrap();
         assert_eq!(back.triangles, mesh.triangles);
         assert_eq!(back.vertices, mesh.vertices);
+    }
+
+    #[test]
+    fn the_uncertainty_of_each_vertex_is_read_back_where_it_is_known() {
+        let mesh = shapes::tetrahedron(2.0);
+        let mut metadata = Metadata::new("uncertain");
+        assert!(uncertainty(&json::encode(&mesh, &metadata)).is_empty());
+        metadata.uncertainty = vec![0.5, 1.25, 2.0, 3.5];
+        let bytes = json::encode(&mesh, &metadata);
+        assert_eq!(uncertainty(&bytes), metadata.uncertainty);
+        // A list for another mesh is left out.
+        metadata.uncertainty.pop();
+        assert!(uncertainty(&json::encode(&mesh, &metadata)).is_empty());
     }
 
     #[test]

@@ -24,7 +24,7 @@ pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Vec<u8> {
 <Piece NumberOfPoints="{points}" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="{count}">
 <PointData Normals="Normals">
 <DataArray type="Float64" Name="Normals" NumberOfComponents="3" format="binary">{normals}</DataArray>
-</PointData>
+{uncertainty}</PointData>
 <CellData></CellData>
 <Points>
 <DataArray type="Float64" Name="Points" NumberOfComponents="3" format="binary">{positions}</DataArray>
@@ -40,11 +40,22 @@ pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Vec<u8> {
         fields = fields(metadata),
         points = mesh.vertices.len(),
         normals = vectors(&mesh.vertex_normals()),
+        uncertainty = metadata
+            .uncertainty_of(mesh)
+            .map_or_else(String::new, uncertainty),
         positions = vectors(&mesh.vertices),
         connectivity = array(connectivity.flat_map(i64::to_le_bytes).collect()),
         offsets = array(offsets.flat_map(i64::to_le_bytes).collect()),
     );
     xml.into_bytes()
+}
+
+fn uncertainty(values: &[f64]) -> String {
+    let values = array(values.iter().flat_map(|x| x.to_le_bytes()).collect());
+    format!(
+        "<DataArray type=\"Float64\" Name=\"Uncertainty\" NumberOfComponents=\"1\" \
+         format=\"binary\">{values}</DataArray>\n"
+    )
 }
 
 fn fields(metadata: &Metadata) -> String {

@@ -30,7 +30,7 @@ pub fn model_page(report: &ModelReport, mesh: &TriMesh, closeness: Option<&Close
             (verdict(report))
             (figures(report))
             (document::notes("Please note", report.warnings.iter().map(String::as_str)))
-            (views::section("The model", mesh))
+            (views::section("The model", mesh, &[]))
             @if let Some(closeness) = closeness { (distances(report, mesh, closeness)) }
             (fitness(report))
             (distributions(report))

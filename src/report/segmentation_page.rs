@@ -17,6 +17,8 @@ pub struct SegmentationPage<'a> {
     pub report: &'a SegmentationReport,
     /// The fitted model.
     pub mesh: &'a TriMesh,
+    /// Standard deviation of each vertex's distance from the wall, mm; empty if it is not known.
+    pub uncertainty: &'a [f64],
     /// Slices of the volume with the contour of the fit: a PNG of three squares side by side.
     pub slices: Option<&'a [u8]>,
     /// The polar map as SVG.
@@ -38,7 +40,7 @@ pub fn segmentation_page(page: &SegmentationPage) -> String {
             @if let Some(png) = page.slices { (slices(report, png)) }
             @if let Some(svg) = page.polar { (polar(report, svg)) }
             (agreement(report))
-            (views::section("The fitted model", page.mesh))
+            (views::section("The fitted model", page.mesh, page.uncertainty))
             (candidates(report))
             (particulars(report))
         },
@@ -452,7 +454,13 @@ fn candidates(report: &SegmentationReport) -> Markup {
         return Markup::default();
     }
     let or_dash = |text: &Option<String>| text.clone().unwrap_or_else(|| "–".to_owned());
-    let columns = ["merit", "share with an edge", "strain", "residual, mm"];
+    let columns = [
+        "confidence",
+        "merit",
+        "share with an edge",
+        "strain",
+        "residual, mm",
+    ];
     html! {
         section {
             h2 { "Models tried" }
@@ -468,7 +476,7 @@ fn candidates(report: &SegmentationReport) -> Markup {
                     tbody {
                         @for model in tried {
                             @let figures = [
-                                (model.merit, 3), (model.active, 3),
+                                (model.confidence, 2), (model.merit, 3), (model.active, 3),
                                 (model.strain, 3), (model.residual_mm, 2),
                             ];
                             tr {
@@ -520,6 +528,7 @@ mod tests {
         segmentation_page(&SegmentationPage {
             report: &serde_json::from_value(report).unwrap(),
             mesh: &shapes::tetrahedron(2.0),
+            uncertainty: &[],
             slices: None,
             polar: None,
         })

@@ -53,7 +53,9 @@ pub struct SegmentationReport {
 pub struct CandidateFigures {
     /// The model's name.
     pub template: Option<String>,
-    /// What it is ranked by.
+    /// What it is ranked by: its confidence by its own figures.
+    pub confidence: Option<f64>,
+    /// What decides between equals.
     pub merit: Option<f64>,
     /// Share of the surface along which an edge is seen.
     pub active: Option<f64>,

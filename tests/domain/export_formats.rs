@@ -329,3 +329,53 @@ fn errors_name_the_invalid_vertex_or_triangle() {
         );
     }
 }
+
+#[test]
+fn the_uncertainty_of_each_vertex_is_in_the_formats_that_can_hold_it() {
+    let mesh = cup();
+    let uncertainty: Vec<f64> = (0..mesh.vertices.len())
+        .map(|n| 0.5 + n as f64 / 7.0)
+        .collect();
+    let with = |uncertainty: &[f64], format: Format| {
+        let metadata = Metadata {
+            uncertainty: uncertainty.to_vec(),
+            ..metadata()
+        };
+        encode(format, &mesh, &metadata).unwrap()
+    };
+    let file = |format| with(&uncertainty, format);
+
+    let glb = file(Format::Glb);
+    let (document, binary) = chunks(&glb);
+    let accessor = &document["meshes"][0]["primitives"][0]["attributes"]["_UNCERTAINTY"];
+    let accessor = &document["accessors"][accessor.as_u64().unwrap() as usize];
+    assert_eq!(accessor["type"], "SCALAR");
+    assert_eq!(accessor["count"], mesh.vertices.len());
+    let view = &document["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
+    let number = |key: &str| view[key].as_u64().unwrap() as usize;
+    let start = number("byteOffset");
+    let single: Vec<f32> = uncertainty.iter().map(|x| *x as f32).collect();
+    assert_eq!(floats(&binary[start..start + number("byteLength")]), single);
+
+    let ply = file(Format::Ply);
+    let end = b"end_header\n";
+    let at = ply.windows(end.len()).position(|w| w == end).unwrap() + end.len();
+    assert!(String::from_utf8_lossy(&ply[..at]).contains("property double uncertainty\n"));
+    let rows = doubles(&ply[at..at + 56 * mesh.vertices.len()]);
+    let last: Vec<f64> = rows.chunks_exact(7).map(|row| row[6]).collect();
+    assert_eq!(last, uncertainty);
+
+    let vtp = String::from_utf8(file(Format::Vtp)).unwrap();
+    let array = vtp.split("Name=\"Uncertainty\"").nth(1).unwrap();
+    let array = array.split(['>', '<']).nth(1).unwrap();
+    assert_eq!(doubles(&decode_base64(array)[8..]), uncertainty);
+
+    let read: Value = serde_json::from_slice(&file(Format::Json)).unwrap();
+    assert_eq!(read["uncertainty_mm"], json!(uncertainty));
+
+    // Without it, or with that of another mesh, files are as they were.
+    for format in Format::ALL {
+        assert_eq!(with(&[], format), bytes(format));
+        assert_eq!(with(&uncertainty[1..], format), bytes(format));
+    }
+}
