@@ -84,8 +84,8 @@ fn segmented(file: VolumeFile) -> Vec<NamedFile> {
     let order = SegmentationOrder {
         volume: &[file],
         expert: None,
+        auto: true,
         models: Vec::new(),
-        named: false,
         reader: None,
         parameters: &parameters,
     };

@@ -40,6 +40,7 @@ fn template(scan: &Path) -> NamedTemplate {
     NamedTemplate {
         name: "t1".into(),
         template: Template::new(model.mesh, Organ::LeftVentricle, &Monitor::silent()).unwrap(),
+        built_in: false,
     }
 }
 

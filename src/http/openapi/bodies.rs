@@ -471,6 +471,14 @@ impl PartialSchema for MeshDocument {
                 triples(Type::Number, "Unit normals of the points, outward"),
             )
             .property(
+                "uncertainty_mm",
+                ArrayBuilder::new()
+                    .description(Some(
+                        "Standard deviation of each point's distance from the true surface",
+                    ))
+                    .items(Object::with_type(Type::Number)),
+            )
+            .property(
                 "triangles",
                 triples(
                     Type::Integer,
