@@ -225,8 +225,8 @@ impl ReadCase {
         let order = SegmentationOrder {
             volume: &[VolumeFile::at(&case.scan)],
             expert: None,
+            auto: true,
             models: Vec::new(),
-            named: true,
             reader: None,
             parameters,
         };

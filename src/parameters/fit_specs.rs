@@ -63,6 +63,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         kind: Kind::Stored {
             prefixes: &["rdr_"],
             word: "",
+            more: 0,
         },
         default: "",
         summary: "Id of a reader's profile to draw the wall by: moves the endocardium, the epicardium and \

@@ -29,8 +29,8 @@ fn segmented(scan: &Phantom, edge: &str) -> SegmentedVolume {
     let order = SegmentationOrder {
         volume: &[VolumeFile::in_memory("scan.nii", bytes)],
         expert: None,
+        auto: true,
         models: Vec::new(),
-        named: true,
         reader: None,
         parameters: &parameters,
     };

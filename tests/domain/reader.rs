@@ -61,8 +61,8 @@ fn segmented(
     let order = SegmentationOrder {
         volume: &[VolumeFile::at(scan)],
         expert: None,
+        auto: true,
         models: Vec::new(),
-        named: true,
         reader: profile.map(|profile| NamedReader {
             name: "one".into(),
             profile,
