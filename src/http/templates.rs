@@ -13,6 +13,7 @@ use super::wire::{added, path_of, rfc3339};
 use crate::config::Size;
 use crate::jobs::{Resource, TemplateSource, Tenant};
 use crate::progress::Monitor;
+use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{RawQuery, Request, State};
 use futures::TryStreamExt;

@@ -358,7 +358,7 @@ fn the_uncertainty_of_each_vertex_is_in_the_formats_that_can_hold_it() {
     assert_eq!(floats(&binary[start..start + number("byteLength")]), single);
 
     let ply = file(Format::Ply);
-    let end = b"end_header\n";
+    let end = b"\nend_header\n";
     let at = ply.windows(end.len()).position(|w| w == end).unwrap() + end.len();
     assert!(String::from_utf8_lossy(&ply[..at]).contains("property double uncertainty\n"));
     let rows = doubles(&ply[at..at + 56 * mesh.vertices.len()]);

@@ -253,7 +253,8 @@ impl Watcher {
 impl Observer for Watcher {
     fn progress(&self, stage: Stage, fraction: f64) {
         let mut stages = self.stages.lock().unwrap();
-        if stages.last() != Some(&stage) {
+        // Alignment and deformation come again with each of the built-in hearts.
+        if !stages.contains(&stage) {
             stages.push(stage);
         }
         let now = self.gauge.advance(stage, fraction);
