@@ -209,20 +209,71 @@ async fn filed(store: &Store) -> String {
     }
 }
 
-#[tokio::test]
-async fn models_of_an_older_database_are_migrated() {
-    let folder = tempfile::tempdir().unwrap();
-    let older = folder.path().join("migrations");
+/// A database in `folder` as the program left it when it had the first `count` migrations.
+async fn older_database(folder: &std::path::Path, count: usize) -> sqlx::SqlitePool {
+    let older = folder.join("migrations");
     std::fs::create_dir(&older).unwrap();
-    let first = "0001_queue_and_catalogue.sql";
     let source = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/store/migrations");
-    std::fs::copy(source.join(first), older.join(first)).unwrap();
+    for name in migrations().iter().take(count) {
+        std::fs::copy(source.join(name), older.join(name)).unwrap();
+    }
     let options = sqlx::sqlite::SqliteConnectOptions::new()
-        .filename(folder.path().join("ventriform.db"))
+        .filename(folder.join("ventriform.db"))
         .create_if_missing(true);
     let pool = sqlx::SqlitePool::connect_with(options).await.unwrap();
     let migrator = sqlx::migrate::Migrator::new(older.as_path()).await.unwrap();
     migrator.run(&pool).await.unwrap();
+    pool
+}
+
+/// The names of the migrations, in the order in which they run.
+fn migrations() -> Vec<String> {
+    let source = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/store/migrations");
+    let files = std::fs::read_dir(source).unwrap();
+    let mut names: Vec<String> = files
+        .map(|file| file.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+/// What the database in `folder` consists of: kind, name and definition of each part.
+async fn parts(folder: &std::path::Path) -> Vec<(String, String, Option<String>)> {
+    let options = sqlx::sqlite::SqliteConnectOptions::new().filename(folder.join("ventriform.db"));
+    let pool = sqlx::SqlitePool::connect_with(options).await.unwrap();
+    let sound: String = sqlx::query_scalar("PRAGMA integrity_check")
+        .fetch_one(&pool)
+        .await
+        .unwrap();
+    assert_eq!(sound, "ok");
+    let parts = sqlx::query_as("SELECT type, name, sql FROM sqlite_schema ORDER BY type, name")
+        .fetch_all(&pool)
+        .await
+        .unwrap();
+    pool.close().await;
+    parts
+}
+
+#[tokio::test]
+async fn every_older_database_becomes_what_a_new_one_is() {
+    let new = tempfile::tempdir().unwrap();
+    let mut store = Store::open(new.path()).await.unwrap();
+    store.close().await;
+    let expected = parts(new.path()).await;
+    for count in 1..migrations().len() {
+        let folder = tempfile::tempdir().unwrap();
+        let pool = older_database(folder.path(), count).await;
+        pool.close().await;
+        let mut store = Store::open(folder.path()).await.unwrap();
+        store.close().await;
+        assert_eq!(parts(folder.path()).await, expected, "from {count}");
+    }
+}
+
+#[tokio::test]
+async fn models_of_an_older_database_are_migrated() {
+    let folder = tempfile::tempdir().unwrap();
+    let pool = older_database(folder.path(), 1).await;
     sqlx::query(
         "INSERT INTO models (id, created_at, volume, parameters, summary, software, files)
          VALUES ('mdl_1', 5, 'vol_1', '{}', '{}', '0', '[]')",

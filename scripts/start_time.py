@@ -1,0 +1,112 @@
+#!/usr/bin/env python3
+"""Measures how soon the service is ready on a data folder with many volumes.
+
+    scripts/start_time.py [--program target/release/ventriform] [--volumes 100000] [--starts 20]
+
+Uploads one small volume, then writes the others beside it as the service would have: a folder with the
+file and its record, and rows in the database, under the id that the content has. Starts the service again
+and again, each time after SIGKILL, and measures the time from the start of the process to the first 200
+of `/readyz`; then reads some of the volumes back and compares every byte. Loopback only; stops by itself;
+needs Python 3 and about 1 GB of disk for 100,000 volumes. The last line is a JSON object.
+"""
+import argparse, hashlib, json, os, random, shutil, sqlite3, statistics, struct, tempfile
+
+from crash_rounds import Service
+
+
+def nifti(number):
+    """A volume of 4^3 voxels that holds `number`; all are equally long."""
+    header = bytearray(352)
+    struct.pack_into("<i", header, 0, 348)
+    struct.pack_into("<8h", header, 40, 3, 4, 4, 4, 1, 1, 1, 1)
+    struct.pack_into("<2h", header, 70, 16, 32)
+    struct.pack_into("<8f", header, 76, 1, 4, 4, 4, 1, 1, 1, 1)
+    struct.pack_into("<f", header, 108, 352)
+    struct.pack_into("<f", header, 112, 1)
+    struct.pack_into("<hh", header, 252, 0, 1)
+    for axis in range(3):
+        struct.pack_into("<4f", header, 280 + 16 * axis, *[4.0 if i == axis else 0.0 for i in range(4)])
+    header[344:348] = b"n+1\0"
+    return bytes(header) + struct.pack("<64f", *[float(number + i) for i in range(64)])
+
+
+def fill(data, first, count):
+    """Writes `count` further volumes like the stored one of id `first`."""
+    shelf = os.path.join(data, "volumes")
+    record = open(os.path.join(shelf, first, "record.json")).read()
+    (name,) = [name for name in os.listdir(os.path.join(shelf, first)) if name != "record.json"]
+    digest = hashlib.sha256(open(os.path.join(shelf, first, name), "rb").read()).hexdigest()
+    database = sqlite3.connect(os.path.join(data, "ventriform.db"))
+    rows = {}
+    for table, column in (("volumes", "id"), ("holdings", "id"), ("scans", "volume")):
+        # Without the columns that the database computes.
+        stored = [n for _, n, *_ in database.execute(f"PRAGMA table_info({table})") if n != "sequence"]
+        row = f"SELECT {', '.join(stored)} FROM {table} WHERE {column} = ?"
+        rows[table] = list(zip(stored, database.execute(row, (first,)).fetchone()))
+    written = {}
+    for number in range(count):
+        body = nifti(number + 1)
+        sha = hashlib.sha256(body).hexdigest()
+        folder = os.path.join(shelf, "vol_" + sha[:32])
+        os.mkdir(folder)
+        written[os.path.basename(folder)] = body
+
+        def of_this(text):
+            if not isinstance(text, str):
+                return text
+            return text.replace(first, os.path.basename(folder)).replace(digest, sha)
+
+        with open(os.path.join(folder, name), "wb") as file:
+            file.write(body)
+        with open(os.path.join(folder, "record.json"), "w") as file:
+            file.write(of_this(record))
+        for table, values in rows.items():
+            columns = ", ".join(n for n, _ in values)
+            marks = ", ".join("?" for _ in values)
+            values = [of_this(v) for _, v in values]
+            database.execute(f"INSERT INTO {table} ({columns}) VALUES ({marks})", values)
+    database.commit()
+    database.close()
+    return written
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--program", default="target/release/ventriform")
+    parser.add_argument("--volumes", type=int, default=100_000)
+    parser.add_argument("--starts", type=int, default=20)
+    options = parser.parse_args()
+    work = tempfile.mkdtemp(prefix="ventriform-start-")
+    data = os.path.join(work, "data")
+    try:
+        service = Service(options.program, data)
+        status, volume = service.json("POST", "/v1/volumes", nifti(0))
+        assert status == 201, (status, volume)
+        # Stopped in order: what follows changes the database from outside.
+        service.stop()
+        written = fill(data, volume["id"], options.volumes - 1)
+        ready = []
+        for _ in range(options.starts):
+            service = Service(options.program, data)
+            ready.append(service.ready_ms)
+            service.kill()
+        service = Service(options.program, data)
+        for name in random.Random(1).sample(sorted(written), min(200, len(written))):
+            status, answer = service.json("GET", f"/v1/volumes/{name}")
+            assert status == 200, (name, status, answer)
+            status, body = service.ask("GET", answer["originals"][0]["href"])
+            assert status == 200 and body == written[name], (name, status, body[:300])
+        status, page = service.json("GET", "/v1/volumes?limit=100")
+        assert status == 200 and len(page["volumes"]) == 100, status
+        service.kill()
+        print(json.dumps({
+            "volumes": options.volumes,
+            "starts": len(ready),
+            "ready_ms": {"median": round(statistics.median(ready)), "max": round(max(ready))},
+        }))
+    finally:
+        shutil.rmtree(work)
+
+
+if __name__ == "__main__":
+    main()
