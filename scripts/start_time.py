@@ -70,6 +70,17 @@ def fill(data, first, count):
     return written
 
 
+def compare(service, written):
+    """Reads some of the volumes back, byte by byte."""
+    for name in random.Random(1).sample(sorted(written), min(200, len(written))):
+        status, answer = service.json("GET", f"/v1/volumes/{name}")
+        assert status == 200, (name, status, answer)
+        status, body = service.ask("GET", answer["originals"][0]["href"])
+        assert status == 200 and body == written[name], (name, status, body[:300])
+    status, page = service.json("GET", "/v1/volumes?limit=100")
+    assert status == 200 and len(page["volumes"]) == min(100, len(written) + 1), status
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default="target/release/ventriform")
@@ -91,14 +102,10 @@ def main():
             ready.append(service.ready_ms)
             service.kill()
         service = Service(options.program, data)
-        for name in random.Random(1).sample(sorted(written), min(200, len(written))):
-            status, answer = service.json("GET", f"/v1/volumes/{name}")
-            assert status == 200, (name, status, answer)
-            status, body = service.ask("GET", answer["originals"][0]["href"])
-            assert status == 200 and body == written[name], (name, status, body[:300])
-        status, page = service.json("GET", "/v1/volumes?limit=100")
-        assert status == 200 and len(page["volumes"]) == 100, status
-        service.kill()
+        try:
+            compare(service, written)
+        finally:
+            service.kill()
         print(json.dumps({
             "volumes": options.volumes,
             "starts": len(ready),
