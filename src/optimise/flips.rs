@@ -459,6 +459,81 @@ mod tests {
         }
     }
 
+    /// Algorithm 1, word by word: the flips that gain, from the greatest gain to the smallest; then
+    /// Algorithm 2: each is performed unless a triangle that its gain depends on has changed.
+    fn plain_sweep(state: &mut Configurations, rules: &FlipRules) -> (usize, usize) {
+        let mut list: Vec<(f64, [VertexId; 2])> = Vec::new();
+        for h in state.half_edges().edges() {
+            let found = state.candidate(h, &rules.fitness, rules.gain, rules.guard, MIN_GAIN);
+            if let Some(found) = found.filter(|_| state.half_edges().can_flip(h)) {
+                list.push((found.gain, state.half_edges().edge_ends(h)));
+            }
+        }
+        list.sort_by(|(g, e), (h, f)| h.total_cmp(g).then(e.cmp(f)));
+        let steps = match rules.gain {
+            Gain::Local => 1,
+            Gain::Total => 3,
+        };
+        let mut changed: BTreeSet<FaceId> = BTreeSet::new();
+        let (mut flips, mut affected) = (0, 0);
+        for (_, ends) in list {
+            let half_edges = state.half_edges();
+            let is_it = |h: &HalfEdgeId| half_edges.edge_ends(*h) == ends;
+            let h = half_edges.edges().find(is_it).unwrap();
+            // The two triangles, and all that share an edge with one so far.
+            let mut near: BTreeSet<FaceId> = half_edges.faces_of(h).into();
+            for _ in 0..steps {
+                let beyond: Vec<FaceId> = near
+                    .iter()
+                    .flat_map(|t| t.half_edges())
+                    .map(|side| half_edges.twin(side).face())
+                    .collect();
+                near.extend(beyond);
+            }
+            if near.iter().any(|t| changed.contains(t)) {
+                affected += 1;
+                continue;
+            }
+            let index = &mut intersection_index(state.vertices(), half_edges);
+            if !half_edges.can_flip(h)
+                || legality::flip_intersects(state.vertices(), half_edges, index, h)
+            {
+                continue;
+            }
+            let fitness = &rules.fitness;
+            let found = state.candidate(h, fitness, rules.gain, rules.guard, MIN_GAIN);
+            changed.extend(half_edges.faces_of(h));
+            state.flip(h, found.unwrap().distance);
+            flips += 1;
+        }
+        (flips, affected)
+    }
+
+    #[test]
+    fn a_sweep_is_algorithms_1_and_2() {
+        for (mesh, reference) in cases() {
+            for (form, gain) in [
+                (FitnessForm::Raw, Gain::Local),
+                (FitnessForm::Normalised, Gain::Total),
+            ] {
+                let rules = rules(form, gain, 0.0);
+                let mut plain = configurations(&mesh, &reference).unwrap();
+                let mut swept = plain.clone();
+                let mut gains = Gains::new(swept.half_edges());
+                gains.refresh(&swept, &rules, &Monitor::silent()).unwrap();
+                let mut index = intersection_index(swept.vertices(), swept.half_edges());
+                let changed = run_sweep(&mut swept, &gains, &rules, &mut index);
+                let (flips, affected) = plain_sweep(&mut plain, &rules);
+                assert!(flips > 5 && affected > 5, "{flips} {affected}");
+                assert_eq!(changed.len(), 2 * flips);
+                assert_eq!(
+                    swept.half_edges().triangles(),
+                    plain.half_edges().triangles()
+                );
+            }
+        }
+    }
+
     fn mean_after(
         mesh: &TriMesh,
         flipped: &SweepResult,

@@ -62,6 +62,12 @@ impl<'a> Fairing<'a> {
         }
     }
 
+    /// How far each vertex should move along its normal, mm.
+    #[cfg(test)]
+    pub fn rises(&self) -> &[f64] {
+        &self.rises
+    }
+
     /// Adds the share of triangle `t` in the terms of its corners: each vertex's term is divided
     /// among the triangles around it.
     pub fn add_to(&self, element: &mut Element, t: FaceId) {

@@ -142,7 +142,7 @@ pub fn fit(
 mod tests {
     use super::*;
     use crate::mesh::intersections::self_intersections;
-    use crate::mesh::{HalfEdgeId, shapes};
+    use crate::mesh::{HalfEdgeId, VertexId, shapes};
     use crate::surface::Surface;
 
     fn reference(mesh: TriMesh) -> Reference {
@@ -150,20 +150,97 @@ mod tests {
     }
 
     fn fitted(start: &TriMesh, reference: &Reference) -> FittedMesh {
+        fitted_with(start, reference, &LeastSquaresParameters::default())
+    }
+
+    fn fitted_with(
+        start: &TriMesh,
+        reference: &Reference,
+        parameters: &LeastSquaresParameters,
+    ) -> FittedMesh {
         let n = start.vertices.len();
         let half_edges = HalfEdges::new(n, start.triangles.clone()).unwrap();
-        let monitor = Monitor::silent();
-        let parameters = LeastSquaresParameters::default();
-        let sizing = vec![1.0; n];
-        fit(
-            &start.vertices,
-            half_edges,
-            &sizing,
-            reference,
-            &parameters,
-            &monitor,
+        let (monitor, sizing) = (Monitor::silent(), vec![1.0; n]);
+        let start = &start.vertices;
+        fit(start, half_edges, &sizing, reference, parameters, &monitor).unwrap()
+    }
+
+    /// Mean radius ratio 2r/R.
+    fn regularity(mesh: &TriMesh) -> f64 {
+        let ratio = |t| {
+            let [a, b, c] = mesh.corners(t);
+            crate::geometry::triangle::radius_ratio(&a, &b, &c)
+        };
+        let count = mesh.triangles.len();
+        (0..count).map(ratio).sum::<f64>() / count as f64
+    }
+
+    /// A rough cup, and a coarse one whose vertices were moved at random.
+    fn irregular() -> (TriMesh, Reference) {
+        let jolted = |mut mesh: TriMesh, by: f64| {
+            for (k, v) in (0..).zip(&mut mesh.vertices) {
+                let k = f64::from(k);
+                *v += Vec3::new((k * k).sin(), (k * k * 1.3).sin(), (k * k * 1.7).sin()) * by;
+            }
+            mesh
+        };
+        let start = jolted(shapes::cup(60.0, 30.0, 10.0, 16), 1.5);
+        (
+            start,
+            reference(jolted(shapes::cup(60.0, 30.0, 10.0, 90), 0.6)),
         )
-        .unwrap()
+    }
+
+    #[test]
+    fn the_weight_of_shape_makes_triangles_regular() {
+        let (start, reference) = irregular();
+        let with = |shape_weight: f64| {
+            let parameters = LeastSquaresParameters {
+                shape_weight,
+                ..LeastSquaresParameters::default()
+            };
+            regularity(&fitted_with(&start, &reference, &parameters).mesh)
+        };
+        let (none, usual) = (with(1e-6), with(0.06));
+        assert!(usual > 0.94 && none < usual - 0.15, "{none} {usual}");
+    }
+
+    /// Along the surface only shapes pull the vertices: the same number of rounds takes them
+    /// farther with momentum.
+    #[test]
+    fn momentum_makes_triangles_regular_sooner() {
+        let (start, reference) = irregular();
+        let with = |momentum: f64| {
+            let parameters = LeastSquaresParameters {
+                momentum,
+                glide: 0,
+                ..LeastSquaresParameters::default()
+            };
+            regularity(&fitted_with(&start, &reference, &parameters).mesh)
+        };
+        let (without, usual) = (with(0.0), with(0.6));
+        assert!(usual > without + 0.002, "{without} {usual}");
+    }
+
+    /// A vertex above the sphere is pulled down, its neighbours up, and one below the other way.
+    #[test]
+    fn fairing_levels_what_stands_out() {
+        let reference = reference(shapes::icosphere(30.0, 4));
+        let (parameters, sizing) = (LeastSquaresParameters::default(), Vec::new());
+        let raised = VertexId(100);
+        for height in [1.0, -1.0] {
+            let mut mesh = shapes::icosphere(30.0, 2);
+            mesh.vertices[raised.index()] *= (30.0 + height) / 30.0;
+            let state = state(&mesh, &reference, &parameters, &sizing);
+            let rises = fairing::Fairing::new(&state).rises().to_vec();
+            // A twelfth of the height or so is lost to the curvature of the sphere and its facets.
+            let own = rises[raised.index()] / -height;
+            assert!((0.8..1.2).contains(&own), "{own}");
+            for v in state.half_edges.neighbours(raised) {
+                let share = rises[v.index()] / height;
+                assert!((0.1..0.6).contains(&share), "{share}");
+            }
+        }
     }
 
     fn stretched(mut mesh: TriMesh, axes: [f64; 3]) -> TriMesh {

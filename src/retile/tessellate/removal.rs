@@ -293,3 +293,64 @@ impl EdgeFlip {
             || triangles_intersect(s, &mesh.corners(s), t, &mesh.corners(t))
     }
 }
+
+#[cfg(test)]
+#[allow(
+    clippy::unwrap_used,
+    reason = "tests state their expectations by panicking"
+)]
+mod tests {
+    use super::super::mutual::mutual_tessellation;
+    use super::super::test_surfaces::scattered;
+    use super::*;
+    use crate::mesh::shapes;
+    use std::collections::BTreeSet;
+
+    /// On a surface on which every hole can be closed, a round removes the vertices that the rule
+    /// names: in ascending order of valence, then number, each unless a neighbour went before.
+    #[test]
+    fn a_round_removes_the_vertices_of_lowest_valence_first() {
+        let surface = shapes::icosphere(30.0, 3);
+        let points = scattered(&surface, 300, 7);
+        let triangles =
+            mutual_tessellation(&surface.vertices, &surface.triangles, &points).unwrap();
+        let positions: Vec<Vec3> = points
+            .iter()
+            .map(|p| p.position(&surface.vertices, &surface.triangles))
+            .chain(surface.vertices.iter().copied())
+            .collect();
+        let mut mesh = Patchwork::new(positions, triangles, 5.0);
+        let old: Vec<VertexId> = VertexId::first(mesh.positions.len()).skip(300).collect();
+
+        let mut order = old.clone();
+        order.sort_by_key(|&v| (mesh.valence(v), v));
+        let valences: BTreeSet<usize> = old.iter().map(|&v| mesh.valence(v)).collect();
+        assert!(valences.len() > 4, "{valences:?}");
+        let (mut expected, mut waiting) = (Vec::new(), BTreeSet::new());
+        for v in order {
+            if !waiting.contains(&v) && mesh.valence(v) <= HIGH_VALENCE {
+                waiting.extend(mesh.star(v).ring);
+                expected.push(v);
+            }
+        }
+        // Under another order other vertices go first.
+        assert!(expected.len() < old.len() - 50);
+
+        let mut removal = Removal {
+            remaining: old.clone(),
+            attempts_left: 1000,
+            round: 0,
+            touched: vec![0; mesh.positions.len()],
+            failures: BTreeMap::new(),
+        };
+        let rules = schedule()[0];
+        removal
+            .run_round(&mut mesh, rules, &Monitor::silent())
+            .unwrap();
+        assert!(removal.failures.is_empty());
+        let left: BTreeSet<VertexId> = removal.remaining.into_iter().collect();
+        let gone: Vec<VertexId> = old.into_iter().filter(|v| !left.contains(v)).collect();
+        expected.sort_unstable();
+        assert_eq!(gone, expected);
+    }
+}
