@@ -2,7 +2,7 @@
 
 use super::ParameterError;
 use super::table::Parameters;
-use crate::optimise::OptimiseParameters;
+use crate::optimise::{FitnessForm, Gain, OptimiseParameters};
 use crate::retile::{Method, RetileParameters};
 use crate::surface::{Isolate, SurfaceParameters};
 use serde_json::{Map, Value};
@@ -40,6 +40,9 @@ pub struct ModelDraft {
     pub(super) starts: Option<usize>,
     pub(super) adaptive: Option<f64>,
     pub(super) fit_rounds: Option<usize>,
+    pub(super) fitness: Option<FitnessForm>,
+    pub(super) gain: Option<Gain>,
+    pub(super) guard: Option<f64>,
 }
 
 impl ModelDraft {
@@ -50,8 +53,8 @@ impl ModelDraft {
 }
 
 impl ModelParameters {
-    /// Fills in the defaults of `starts`, `adaptive` and `fit_rounds`, which depend on method and
-    /// number of points.
+    /// Fills in the defaults of `starts`, `adaptive`, `fit_rounds`, `fitness`, `gain` and `guard`, which
+    /// depend on method and number of points.
     ///
     /// # Errors
     /// A [`ParameterError`] if parameters contradict each other.
@@ -70,18 +73,23 @@ impl ModelParameters {
                 fix: "Give at least one of w1, w2, w3, w4 a value above 0.".into(),
             });
         }
-        // The paper's method spreads the points evenly and leaves them on the surface. Varying
-        // density, fit and further starts belong to the refined method.
-        let (usual_starts, usual_adaptive, usual_fit) = match draft.retile.method {
-            Method::Paper => (1, 0.0, 0),
-            Method::Refined => (
-                usual_starts(draft.retile.points),
-                draft.retile.adaptive,
-                draft.optimise.fit.rounds,
-            ),
-        };
-        draft.retile.adaptive = draft.adaptive.unwrap_or(usual_adaptive);
-        draft.optimise.fit.rounds = draft.fit_rounds.unwrap_or(usual_fit);
+        // The paper's method spreads the points evenly, leaves them on the surface and flips by its raw
+        // form. Varying density, fit, further starts and the guard belong to the refined method.
+        let optimise = &mut draft.optimise;
+        let mut usual_starts = usual_starts(draft.retile.points);
+        if draft.retile.method == Method::Paper {
+            usual_starts = 1;
+            draft.retile.adaptive = 0.0;
+            optimise.fit.rounds = 0;
+            optimise.fitness = FitnessForm::Raw;
+            optimise.gain = Gain::Local;
+            optimise.guard = 0.0;
+        }
+        draft.retile.adaptive = draft.adaptive.unwrap_or(draft.retile.adaptive);
+        optimise.fit.rounds = draft.fit_rounds.unwrap_or(optimise.fit.rounds);
+        optimise.fitness = draft.fitness.unwrap_or(optimise.fitness);
+        optimise.gain = draft.gain.unwrap_or(optimise.gain);
+        optimise.guard = draft.guard.unwrap_or(optimise.guard);
         Ok(Self {
             frame: draft.frame,
             starts: draft.starts.unwrap_or(usual_starts),
@@ -154,6 +162,31 @@ mod tests {
             &[("method", "paper"), ("label", "-3"), ("w2", "0.5")],
             &[("seed_point", "3,4,5"), ("guard", "0"), ("frame", "2")],
         ]);
+    }
+
+    /// The paper: even points that stay on the surface, its reciprocals, the gain of the pair, no
+    /// guard. Each can be switched by itself.
+    #[test]
+    fn the_papers_method_has_the_papers_settings() {
+        let paper = pairs(&[("method", "paper")]).unwrap();
+        assert_eq!((paper.starts, paper.optimise.fit.rounds), (1, 0));
+        assert_eq!(paper.retile.adaptive, 0.0);
+        assert_eq!(paper.optimise.fitness, FitnessForm::Raw);
+        assert_eq!(paper.optimise.gain, Gain::Local);
+        assert_eq!(paper.optimise.guard, 0.0);
+        let usual = ModelParameters::default().optimise;
+        for (name, value) in [
+            ("fitness", "normalised"),
+            ("gain", "total"),
+            ("guard", "0.9"),
+        ] {
+            let one = pairs(&[("method", "paper"), (name, value)])
+                .unwrap()
+                .optimise;
+            assert_eq!(one.fitness == usual.fitness, name == "fitness");
+            assert_eq!(one.gain == usual.gain, name == "gain");
+            assert_eq!(one.guard == usual.guard, name == "guard");
+        }
     }
 
     #[test]

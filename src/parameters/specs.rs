@@ -1,7 +1,7 @@
 //! The table of the parameters of a model.
 
 use super::model::ModelDraft;
-use super::table::{choice, integer, number, optional};
+use super::table::{choice, integer, number, optional, optional_choice};
 use super::{Kind, ModelParameters, ParameterError, ParameterSpec, Parameters};
 use crate::optimise::{FitnessForm, Gain};
 use crate::retile::{Geodesics, Method};
@@ -200,6 +200,14 @@ pub const SPECS: &[ParameterSpec<ModelParameters>] = &[
         "0.15",
         "Share of an overlap by which one round of repulsion moves a point"
     ),
+    integer!(
+        "repeats",
+        retile.repeats,
+        0..=100,
+        "8",
+        "Most repetitions of repulsion and tessellation, each from the points of the mesh before (method \
+         paper); fewer if the triangles' shape no longer improves"
+    ),
     choice!(
         "geodesics",
         retile.geodesics,
@@ -296,12 +304,12 @@ pub const SPECS: &[ParameterSpec<ModelParameters>] = &[
         "3",
         "Number of flips that the fit looks ahead to let irregular vertices cancel"
     ),
-    choice!(
+    optional_choice!(
         "fitness",
-        optimise.fitness,
-        "normalised",
+        fitness => optimise.fitness,
         "Form of the fitness that the flips raise: raw (the paper's reciprocals), normalised (each \
-         term between 0 and 1), or robust (reciprocals with a floor of 1 degree and 0.01 mm)",
+         term between 0 and 1), or robust (reciprocals with a floor of 1 degree and 0.01 mm) \
+         (default for refined: normalised, for paper: raw)",
         "raw" => FitnessForm::Raw,
         "normalised" => FitnessForm::Normalised,
         "robust" => FitnessForm::Robust,
@@ -334,22 +342,21 @@ pub const SPECS: &[ParameterSpec<ModelParameters>] = &[
         "1",
         "Weight of the distance to the original surface"
     ),
-    choice!(
+    optional_choice!(
         "gain",
-        optimise.gain,
-        "total",
+        gain => optimise.gain,
         "What a flip must raise: local (the fitness of the pair of triangles, as in the paper) or \
-         total (the fitness of the mesh)",
+         total (the fitness of the mesh) (default for refined: total, for paper: local)",
         "local" => Gain::Local,
         "total" => Gain::Total,
     ),
-    number!(
+    optional!(
+        Number f64,
         "guard",
-        optimise.guard,
+        guard => optimise.guard,
         0.0..=1.0,
-        "0.9",
         "Radius ratio 2r/R below which a flip must not create a triangle, unless it replaces one \
-         that is as bad; 0 allows slivers"
+         that is as bad; 0 allows slivers (default for refined: 0.9, for paper: 0)"
     ),
 ];
 

@@ -83,11 +83,12 @@ macro_rules! optional {
 }
 pub(super) use optional;
 
-/// A row for a choice between words: name, field, default, summary, and the value of each word.
-macro_rules! choice {
+/// A row for a choice between words: name, field of the draft and of the parameters, default, summary,
+/// the value of each word, and what the draft stores of a value.
+macro_rules! words {
     (
-        $name:literal, $($field:ident).+, $default:literal, $summary:literal,
-        $($word:literal => $value:path),+ $(,)?
+        $name:literal, $($draft:ident).+ => $($field:ident).+, $default:literal, $summary:literal,
+        [$($word:literal => $value:path),+], $store:expr
     ) => {
         ParameterSpec {
             name: $name,
@@ -95,10 +96,10 @@ macro_rules! choice {
             default: $default,
             summary: $summary,
             read: |draft, value| {
-                draft.$($field).+ = match value.text() {
+                draft.$($draft).+ = $store(match value.text() {
                     $($word => $value,)+
                     other => return Err(format!("`{other}` is not one of the choices")),
-                };
+                });
                 Ok(())
             },
             write: |parameters| {
@@ -109,7 +110,35 @@ macro_rules! choice {
         }
     };
 }
+pub(super) use words;
+
+/// A row for a choice between words: name, field, default, summary, and the value of each word.
+macro_rules! choice {
+    (
+        $name:literal, $($field:ident).+, $default:literal, $summary:literal,
+        $($word:literal => $value:path),+ $(,)?
+    ) => {
+        $crate::parameters::table::words!(
+            $name, $($field).+ => $($field).+, $default, $summary, [$($word => $value),+],
+            std::convert::identity
+        )
+    };
+}
 pub(super) use choice;
+
+/// A row for a choice without a fixed default: name, field of the draft, field of the parameters,
+/// summary, and the value of each word.
+macro_rules! optional_choice {
+    (
+        $name:literal, $($draft:ident).+ => $($field:ident).+, $summary:literal,
+        $($word:literal => $value:path),+ $(,)?
+    ) => {
+        $crate::parameters::table::words!(
+            $name, $($draft).+ => $($field).+, "", $summary, [$($word => $value),+], Some
+        )
+    };
+}
+pub(super) use optional_choice;
 
 /// A set of parameters with a table of names.
 pub trait Parameters: Sized + 'static {

@@ -71,6 +71,7 @@ pub(super) fn retile(facts: &RetileFacts, starts: &[StartSummary]) -> Map<String
     object(json!({
         "seed": facts.seed,
         "repulsion_rounds": facts.repulsion_rounds,
+        "repeats": facts.repeats,
         "relaxation_rounds": facts.relaxation_rounds,
         "attempts": facts.attempts,
         "starts": starts,

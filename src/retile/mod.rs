@@ -9,7 +9,8 @@
 //! 2. [`repulsion`]: the points push each other apart along the surface ([`geodesics`]) and move
 //!    on straight paths ([`trace`]);
 //! 3. [`tessellate`]: mutual tessellation by constrained Delaunay triangulation, then removal of
-//!    the old vertices.
+//!    the old vertices;
+//! 4. from the points of the new mesh the procedure is repeated until the result is good ([`paper`]).
 //!
 //! [`Method::Refined`]:
 //! 1. [`surface_samples`]: the vertices of the surface, subdivided finely enough for N cells;
@@ -92,6 +93,10 @@ pub struct RetileParameters {
     /// Fraction of the overlap by which one round of repulsion moves points, (0, 1].
     /// Default 0.15 (Turk).
     pub repulsion_strength: f64,
+    /// Most repetitions of the procedure, each from the points of the mesh before
+    /// ([`Method::Paper`]), 0..=100. It ends earlier when the triangles' shape no longer improves.
+    /// Default 8.
+    pub repeats: usize,
     /// Distances that repulsion uses ([`Method::Paper`]). Default [`Geodesics::Approximate`];
     /// exact ones are for validation.
     pub geodesics: Geodesics,
@@ -109,6 +114,7 @@ impl Default for RetileParameters {
             adaptive_from: 0.8,
             repulsion_iterations: 40,
             repulsion_strength: 0.15,
+            repeats: 8,
             geodesics: Geodesics::Approximate,
             relaxation_iterations: 80,
         }
@@ -149,8 +155,10 @@ pub struct Tiled {
 pub struct RetileFacts {
     /// Seed of every random choice.
     pub seed: u64,
-    /// Number of rounds of repulsion.
+    /// Number of rounds of repulsion, each time.
     pub repulsion_rounds: usize,
+    /// Number of times that the procedure was repeated ([`Method::Paper`]).
+    pub repeats: usize,
     /// Number of rounds of centroidal relaxation.
     pub relaxation_rounds: usize,
     /// Number of attempts (new seeds, repairs) until the mesh had the surface's topology.
@@ -306,6 +314,9 @@ fn validate(parameters: &RetileParameters) -> Result<(), RetileError> {
     if p.repulsion_iterations > 1000 {
         let value = p.repulsion_iterations as f64;
         return bad("repulsion_iterations", value, "0..=1000");
+    }
+    if p.repeats > 100 {
+        return bad("repeats", p.repeats as f64, "0..=100");
     }
     if p.relaxation_iterations > 1000 {
         let value = p.relaxation_iterations as f64;

@@ -2,6 +2,14 @@
 //!
 //! In: the surface and N. Out: N points on it, joined to triangles, or the reason why not. If the
 //! points cannot be joined, the next of several seeds is tried.
+//!
+//! The new mesh then replaces the old one and the procedure is repeated until the result is good:
+//! the points of the last mesh push each other again with the full force of the first round, and
+//! are joined anew. It ends when [`PATIENCE`] repetitions in a row have not raised the mean radius
+//! ratio 2r/R of the best mesh by a fraction of [`LEAST_RISE`] together, or after
+//! [`RetileParameters::repeats`]; the best mesh is kept. Unlike in the paper's words the points stay
+//! on the surface S: a mesh of N points that takes the place of S cuts off its bulges, and each
+//! repetition would lose 12, 5 and 2.5 % of the volume at N = 67, 150 and 300.
 
 use super::domain::Domain;
 use super::surface_samples::WeightedSamples;
@@ -10,8 +18,9 @@ use super::{
     RetileError, RetileFacts, RetileParameters, SurfacePoint, Tiled, placement, quotas, repulsion,
     sizing, too_few,
 };
+use crate::geometry::triangle;
 use crate::mesh::TriMesh;
-use crate::progress::{Monitor, Stage};
+use crate::progress::{Cancelled, Monitor, Stage};
 use crate::surface::Surface;
 
 /// Number of seeds tried before re-tiling fails.
@@ -19,6 +28,12 @@ const SEEDS: u64 = 4;
 
 /// Fraction of the stage's time that repulsion takes.
 const REPULSION_SHARE: f64 = 0.6;
+
+/// Number of repetitions in a row without a rise after which the result is good.
+const PATIENCE: usize = 3;
+
+/// Smallest relative rise of the mean radius ratio that counts.
+const LEAST_RISE: f64 = 0.002;
 
 /// Re-tiles `surface` by the paper's method.
 pub(super) fn retile(
@@ -54,17 +69,20 @@ fn tile(run: &PaperRun, seeds: u64) -> Result<Result<Tiled, TessellateError>, Re
         attempt += 1;
         match join(run, &points) {
             Ok(mesh) => {
+                let best = repeat(run, points, mesh)?;
                 let facts = RetileFacts {
                     repulsion_rounds: run.parameters.repulsion_iterations,
+                    repeats: best.repeats,
                     attempts: attempt as usize,
                     ..RetileFacts::default()
                 };
-                let sizing = points
+                let sizing = best
+                    .points
                     .iter()
                     .map(|p| run.domain.interpolate(&run.spacing, p))
                     .collect();
                 return Ok(Ok(Tiled {
-                    mesh,
+                    mesh: best.mesh,
                     sizing,
                     facts,
                 }));
@@ -74,6 +92,61 @@ fn tile(run: &PaperRun, seeds: u64) -> Result<Result<Tiled, TessellateError>, Re
             Err(_) => {}
         }
     }
+}
+
+/// The best mesh of all repetitions.
+struct BestTiling {
+    points: Vec<SurfacePoint>,
+    mesh: TriMesh,
+    /// Its mean radius ratio.
+    ratio: f64,
+    /// Number of repetitions that were run.
+    repeats: usize,
+}
+
+/// Repeats repulsion and tessellation from the points of the last mesh until the result is good.
+fn repeat(
+    run: &PaperRun,
+    points: Vec<SurfacePoint>,
+    mesh: TriMesh,
+) -> Result<BestTiling, RetileError> {
+    let mut last = points.clone();
+    let mut best = BestTiling {
+        ratio: mean_radius_ratio(&mesh),
+        points,
+        mesh,
+        repeats: 0,
+    };
+    // The ratio that a rise is measured from, and the repetitions since.
+    let (mut from, mut waited) = (best.ratio, 0);
+    while best.repeats < run.parameters.repeats && waited < PATIENCE {
+        best.repeats += 1;
+        waited += 1;
+        push_apart(run, &mut last, |_| run.monitor.check())?;
+        let mesh = match join(run, &last) {
+            Ok(mesh) => mesh,
+            Err(TessellateError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Err(_) => continue,
+        };
+        let ratio = mean_radius_ratio(&mesh);
+        if ratio > best.ratio {
+            best.points.clone_from(&last);
+            (best.mesh, best.ratio) = (mesh, ratio);
+        }
+        if best.ratio > from * (1.0 + LEAST_RISE) {
+            (from, waited) = (best.ratio, 0);
+        }
+    }
+    Ok(best)
+}
+
+fn mean_radius_ratio(mesh: &TriMesh) -> f64 {
+    let count = mesh.triangles.len();
+    let ratio = |t| {
+        let [a, b, c] = mesh.corners(t);
+        triangle::radius_ratio(&a, &b, &c)
+    };
+    (0..count).map(ratio).sum::<f64>() / count as f64
 }
 
 /// What all seeds share.
@@ -110,20 +183,23 @@ impl<'a> PaperRun<'a> {
 fn spread(run: &PaperRun, count: usize, attempt: u64) -> Result<Vec<SurfacePoint>, RetileError> {
     let seed = run.parameters.seed.wrapping_add(attempt << 32);
     let mut points = placement::place(&run.surface.mesh, &run.domain, &run.spacing, count, seed);
-    repulsion::repel(
-        &run.domain,
-        &run.spacing,
-        &mut points,
-        run.parameters,
-        |share| {
-            if attempt == 0 {
-                run.monitor.report(Stage::Retile, REPULSION_SHARE * share)
-            } else {
-                run.monitor.check()
-            }
-        },
-    )?;
+    push_apart(run, &mut points, |share| {
+        if attempt == 0 {
+            run.monitor.report(Stage::Retile, REPULSION_SHARE * share)
+        } else {
+            run.monitor.check()
+        }
+    })?;
     Ok(points)
+}
+
+/// All rounds of repulsion, from full force on.
+fn push_apart(
+    run: &PaperRun,
+    points: &mut Vec<SurfacePoint>,
+    tick: impl Fn(f64) -> Result<(), Cancelled> + Sync,
+) -> Result<(), Cancelled> {
+    repulsion::repel(&run.domain, &run.spacing, points, run.parameters, tick)
 }
 
 fn join(run: &PaperRun, points: &[SurfacePoint]) -> Result<TriMesh, TessellateError> {

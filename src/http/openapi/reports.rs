@@ -271,6 +271,8 @@ schemas! {
         seed: u64,
         /// Rounds of repulsion.
         repulsion_rounds: u64,
+        /// Repetitions of repulsion and tessellation.
+        repeats: u64,
         /// Rounds of relaxation.
         relaxation_rounds: u64,
         /// Attempts until the mesh was a manifold.
