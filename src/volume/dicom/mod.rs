@@ -5,7 +5,8 @@
 //!
 //! 1. `syntax`: finds the data set, its encoding and the compression of its pixels.
 //! 2. `scan`: one pass over the data set collects the needed `attributes` and finds the pixels. It
-//!    follows at most 32 nested sequences and rejects lengths beyond the size of the file.
+//!    follows at most 32 nested sequences and rejects lengths beyond the size of the file. `unknown`:
+//!    sequences that a program wrote without knowing them.
 //! 3. `kind`: what the object is. One that holds no slices is refused by its name, with what to send.
 //! 4. `frames`: orders the frames of a Nuclear Medicine Image by its vectors; `geometry` places them.
 //!    `stack`: orders and places all other frames by their positions. `segments`: labels.
@@ -32,6 +33,7 @@ mod scan;
 mod segments;
 mod stack;
 mod syntax;
+mod unknown;
 
 #[cfg(test)]
 mod tests;

@@ -11,13 +11,15 @@ use super::super::source::Source;
 use super::attributes::{Attribute, Attributes};
 use super::kind::Kind;
 use super::syntax::{Compression, Syntax};
+use super::unknown::UnknownSequences;
 use crate::progress::Monitor;
 use dicom_core::header::DataElementHeader;
 use dicom_core::{Tag, VR};
-use dicom_encoding::transfer_syntax::Endianness;
+use dicom_encoding::text::SpecificCharacterSet;
+use dicom_encoding::transfer_syntax::{DynDecoder, Endianness};
 use dicom_parser::dataset::LazyDataToken;
 use dicom_parser::dataset::lazy_read::LazyDataSetReader;
-use dicom_parser::{DynStatefulDecoder, StatefulDecode};
+use dicom_parser::{DynStatefulDecoder, StatefulDecode, StatefulDecoder};
 
 /// Deepest nesting of sequences that is read.
 const DEEPEST: usize = 32;
@@ -149,8 +151,8 @@ fn find_pixels(
         reason: e.to_string(),
     };
     let start = source.position();
-    let decoder = DynStatefulDecoder::new_with(source, ts, Default::default(), start);
-    let mut reader = LazyDataSetReader::new(decoder.map_err(|e| damaged(start, &e))?);
+    let mut reader =
+        LazyDataSetReader::new(decoder(source, syntax).map_err(|e| damaged(start, &e))?);
     let mut pixels: Option<Pieces> = None;
     let mut tokens = 0_usize;
     let mut byte = start;
@@ -257,6 +259,23 @@ fn find_pixels(
             fragments: pieces.fragments,
         },
     }))
+}
+
+/// A decoder of what follows in `source`.
+fn decoder<'a>(
+    source: &'a mut Source,
+    syntax: &Syntax,
+) -> dicom_parser::stateful::decode::Result<DynStatefulDecoder<&'a mut Source>> {
+    let (ts, start) = (syntax.transfer_syntax, source.position());
+    if !syntax.is_explicit_little() {
+        return DynStatefulDecoder::new_with_ts(source, ts, start);
+    }
+    let headers: DynDecoder<_> = Box::<UnknownSequences>::default();
+    let text = SpecificCharacterSet::default();
+    let values = ts.basic_decoder();
+    Ok(StatefulDecoder::new_with_position(
+        source, headers, values, text, start,
+    ))
 }
 
 /// The fragments of the pixels found so far.

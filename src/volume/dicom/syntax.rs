@@ -8,7 +8,7 @@ use super::super::VolumeError;
 use super::super::limits::ReadLimits;
 use super::super::source::{Source, VolumeFile};
 use super::attributes::clip;
-use dicom_encoding::transfer_syntax::{TransferSyntax, TransferSyntaxIndex};
+use dicom_encoding::transfer_syntax::{Endianness, TransferSyntax, TransferSyntaxIndex};
 use dicom_transfer_syntax_registry::TransferSyntaxRegistry;
 
 /// Group 0002 must end within this many bytes.
@@ -84,6 +84,12 @@ impl Syntax {
         let mut source = Source::open(file, limit)?;
         source.skip_to(self.data_set)?;
         Ok(source)
+    }
+
+    /// Whether the data set is in Explicit VR Little Endian, whatever its pixels are in.
+    pub(super) fn is_explicit_little(&self) -> bool {
+        let big = self.transfer_syntax.endianness() == Endianness::Big;
+        !big && self.transfer_syntax.uid() != IMPLICIT_LITTLE
     }
 }
 

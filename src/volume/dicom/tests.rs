@@ -214,6 +214,58 @@ fn every_encoding_gives_the_same() {
 }
 
 #[test]
+fn sequences_of_unknown_representation_are_in_implicit_vr() {
+    let implicit = |tag: [u16; 2], length: u32, value: &[u8]| {
+        let mut bytes: Vec<u8> = tag.iter().flat_map(|n| n.to_le_bytes()).collect();
+        bytes.extend(length.to_le_bytes());
+        bytes.extend(value);
+        bytes
+    };
+    let end_of_item = implicit([0xfffe, 0xe00d], 0, b"");
+    let end_of_sequence = implicit([0xfffe, 0xe0dd], 0, b"");
+    // A text whose length looks like no VR, then a sequence of undefined length, and one of defined length.
+    let text = implicit([0x09, 0x1001], 4, b"text");
+    let begin = implicit([0xfffe, 0xe000], u32::MAX, b"");
+    let inner = [
+        begin.clone(),
+        text.clone(),
+        end_of_item.clone(),
+        end_of_sequence.clone(),
+    ]
+    .concat();
+    let item = implicit([0xfffe, 0xe000], text.len() as u32, &text);
+    let content = [
+        begin,
+        text,
+        implicit([0x09, 0x1002], u32::MAX, &inner),
+        implicit([0x08, 0x1140], item.len() as u32, &item),
+        end_of_item,
+        end_of_sequence,
+    ]
+    .concat();
+    let elements = Encoding::Explicit.elements(&slices());
+    let nm = elements
+        .windows(4)
+        .position(|tag| tag == [0x08, 0, 0x60, 0])
+        .unwrap();
+    let mut unknown = vec![0x08, 0, 0x12, 0x21];
+    unknown.extend(b"UN\0\0");
+    unknown.extend(u32::MAX.to_le_bytes());
+    let data_set = [
+        &elements[..nm + 10],
+        &unknown,
+        &content,
+        &elements[nm + 10..],
+    ]
+    .concat();
+    let found = read_frame(with_meta(Encoding::Explicit.uid(), data_set), None).unwrap();
+    assert_eq!(
+        found.volume.voxels,
+        read_elements(&slices()).unwrap().volume.voxels
+    );
+}
+
+#[test]
 fn slices_lie_where_the_standard_puts_them() {
     let reading = read_elements(&slices()).unwrap();
     let (x, y) = (Vec3::from(X), Vec3::from(Y));
