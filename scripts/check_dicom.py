@@ -5,11 +5,13 @@ usage: check_dicom.py VENTRIFORM DIR
 DIR/phantom/spect.nii.gz is the scan. For every case below the file's geometry is computed here, after PS3.3
 C.8.4.15, and the objects are compared with mask.nii.gz and mesh.json of the same run:
 
-- mask.dcm, read by highdicom and by dcmqi: every voxel, by its place in the patient;
+- mask.dcm, read by highdicom and by dcmqi: every voxel of segment 1, by its place in the patient; segment 2, the
+  cavity, has the volume of report.json and shares no voxel;
 - contours.dcm: voxel centres inside the polygons of every slice;
-- mesh.dcm: every vertex of the STL within 0.01 mm; surface.dcm: points and triangles;
+- mesh.dcm: every vertex of the STL within 0.01 mm, also of the glTF's; surface.dcm: points and triangles;
 - measurements.dcm, read by highdicom: the volumes of report.json;
-- all: patient, study, Frame of Reference, source, no private attribute.
+- all: patient, study, Frame of Reference, source; no private attribute, none that is not of the IOD, none
+  missing that it asks for (tables of highdicom); codes have the meaning of PS3.16 (tables of pydicom).
 """
 import glob
 import json
@@ -22,7 +24,9 @@ import highdicom
 import nibabel
 import numpy as np
 import pydicom
+from highdicom import _standard_utils as standard
 from pydicom.dataset import Dataset, FileMetaDataset
+from pydicom.sr._concepts_dict import concepts
 from pydicom.uid import ExplicitVRLittleEndian
 
 NM = "1.2.840.10008.5.1.4.1.1.20"
@@ -107,18 +111,22 @@ def same_voxels(found, found_affine, mask, affine):
             and {*map(tuple, nearest)} == {*map(tuple, truth)})
 
 
-def check_mask(out, mask, affine):
+def check_mask(out, mask, affine, cavity_ml):
     seg = highdicom.seg.segread(out / "mask.dcm")
+    assert seg.number_of_segments == 2 and seg.NumberOfFrames == 2 * mask.shape[2]
     volume = seg.get_volume(combine_segments=True)
-    assert same_voxels(volume.array > 0, volume.affine, mask, affine), "highdicom: other voxels"
+    assert same_voxels(volume.array == 1, volume.affine, mask, affine), "highdicom: other voxels"
     folder = out / "dcmqi"
     folder.mkdir()
     program = Path(sys.executable).parent / "segimage2itkimage"
     subprocess.run([program, "--inputDICOM", out / "mask.dcm", "--outputDirectory", folder,
-                    "--outputType", "nii"], check=True, capture_output=True)
+                    "--outputType", "nii", "--mergeSegments"], check=True, capture_output=True)
     image = nibabel.load(glob.glob(str(folder / "*.nii*"))[0])
-    found = np.asarray(image.dataobj) > 0
-    assert same_voxels(found, LPS @ image.affine, mask, affine), "dcmqi: other voxels"
+    labels = np.asarray(image.dataobj)
+    assert same_voxels(labels == 1, LPS @ image.affine, mask, affine), "dcmqi: other voxels"
+    cavity = (volume.array == 2).sum() * abs(np.linalg.det(affine[:3, :3])) / 1000
+    assert (labels == 2).sum() == (volume.array == 2).sum()
+    assert abs(cavity / cavity_ml - 1) < 0.1, f"the cavity has {cavity} ml, not {cavity_ml}"
     return seg
 
 
@@ -155,11 +163,63 @@ def check_meshes(out, mesh):
     facets = np.frombuffer(stl[84:], dtype=[("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
     assert count == len(triangles) == len(facets)
     assert np.abs(facets["v"] - vertices[triangles]).max() < 0.01, "STL: other vertices"
+    points = gltf_points((out / "mesh.glb").read_bytes())
+    apart = np.linalg.norm(facets["v"].reshape(-1, 1, 3) - points, axis=2)
+    assert max(apart.min(0).max(), apart.min(1).max()) < 0.01, "STL and glTF: other vertices"
     surface = pydicom.dcmread(out / "surface.dcm").SurfaceSequence[0]
     points = np.frombuffer(surface.SurfacePointsSequence[0].PointCoordinatesData, "<f4").reshape(-1, 3)
     assert np.abs(points - vertices).max() < 0.01, "surface: other points"
     lists = surface.SurfaceMeshPrimitivesSequence[0].LongTrianglePointIndexList
     assert (np.frombuffer(lists, "<u4").reshape(-1, 3) == triangles + 1).all(), "surface: other triangles"
+
+
+def gltf_points(glb):
+    """The vertices of a binary glTF as it stores them: millimetres, LPS."""
+    length = struct.unpack("<I", glb[12:16])[0]
+    content, buffer = json.loads(glb[20:20 + length]), glb[20 + length + 8:]
+    accessor = content["accessors"][content["meshes"][0]["primitives"][0]["attributes"]["POSITION"]]
+    view = content["bufferViews"][accessor["bufferView"]]
+    first = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+    return np.frombuffer(buffer, "<f4", 3 * accessor["count"], first).reshape(-1, 3)
+
+
+def check_attributes(data):
+    """What the modules of the object's IOD ask for is there, and nothing else."""
+    allowed, wrong = set(), []
+    for module in standard.get_iod_module_map()[standard.get_sop_class_iod_map()[data.SOPClassUID]]:
+        for attribute in standard.get_module_attribute_map().get(module["key"], []):
+            path, name = attribute["path"], attribute["keyword"]
+            if not path:
+                allowed.add(name)
+            # Content items are alternatives, and functional groups may be shared or of each frame.
+            apart = {"SharedFunctionalGroupsSequence", "PerFrameFunctionalGroupsSequence"} & {*path}
+            content = module["key"].startswith("sr-document-content")
+            if module["usage"] != "M" or attribute["type"] not in ("1", "2") or apart or content:
+                continue
+            items = [data]
+            for step in path:
+                items = [inner for item in items for inner in item.get(step) or []]
+            for item in items:
+                if name not in item or (attribute["type"] == "1" and item[name].is_empty):
+                    wrong.append("/".join([*path, name]))
+    wrong += [e.keyword for e in data if e.keyword not in allowed]
+    assert not wrong, f"{data.SOPClassUID.name}: {wrong}"
+
+
+MEANINGS = {}
+for scheme, named in concepts.items():
+    for codes in named.values():
+        for code, (meaning, _) in codes.items():
+            MEANINGS.setdefault((scheme, code), set()).add(meaning.lower())
+
+
+def check_codes(data):
+    """Every code that PS3.16 has carries one of its meanings."""
+    for item in [data, *(i for e in data.iterall() if e.VR == "SQ" for i in e.value)]:
+        if "CodeValue" in item:
+            known = MEANINGS.get((item.CodingSchemeDesignator, item.CodeValue))
+            meaning = item.CodeMeaning.lower()
+            assert known is None or meaning in known, f"{item.CodeValue}: {meaning}, not {known}"
 
 
 def check_measurements(out, report, seg):
@@ -171,6 +231,21 @@ def check_measurements(out, report, seg):
     assert report["volumes_ml"]["wall"] in volumes and report["volumes_ml"]["cavity"] in volumes
     segments = sr.content.get_image_measurement_groups()
     assert len(segments) == 17, len(segments)
+
+
+def check_object(data):
+    assert not any(e.tag.is_private for e in data.iterall()), data.SOPClassUID.name
+    check_attributes(data)
+    check_codes(data)
+
+
+def check_results(out, mask, affine):
+    """The objects in `out` beside mesh.json, mesh.glb and report.json of the same result."""
+    report = json.loads((out / "report.json").read_text())
+    seg = check_mask(out, mask, affine, report["volumes_ml"]["cavity"])
+    check_contours(out, mask, affine)
+    check_meshes(out, json.loads((out / "mesh.json").read_text()))
+    check_measurements(out, report, seg)
 
 
 def main():
@@ -197,11 +272,8 @@ def main():
             assert frame == source.FrameOfReferenceUID, kind
             text = str(data)
             assert source.SOPInstanceUID in text, f"{kind} does not name its source"
-            assert not any(e.tag.is_private for e in data.iterall()), kind
-        seg = check_mask(out, mask, affine)
-        check_contours(out, mask, affine)
-        check_meshes(out, json.loads((out / "mesh.json").read_text()))
-        check_measurements(out, json.loads((out / "report.json").read_text()), seg)
+            check_object(data)
+        check_results(out, mask, affine)
         print(f"{name}: {mask.sum()} voxels, 7 objects as they must be")
 
 

@@ -12,8 +12,10 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use crate::geometry::bvh::Bvh;
+use crate::geometry::frame::VoxelToPatient;
 use crate::geometry::rotation::nearest_rotation;
 use crate::geometry::{Vec3, triangle};
+use crate::grid::voxelise::Mask;
 use crate::locate::cup::{Cup, perpendicular};
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Monitor};
@@ -170,6 +172,78 @@ impl VentricleWall {
         }
     }
 
+    /// The voxels of the cavity, on the grid of `wall` at `frame`: those whose centres lie nearer to the
+    /// axis than the inner surface, apical of the plane of the mean rim, and outside of `wall`.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn cavity(
+        &self,
+        wall: &Mask,
+        frame: &VoxelToPatient,
+        monitor: &Monitor,
+    ) -> Result<Mask, Cancelled> {
+        let inner = inner_radii(&self.rays);
+        let mut mask = Mask::empty(wall.shape);
+        let Some([low, high]) = self.inside(&inner, wall.shape, frame) else {
+            return Ok(mask);
+        };
+        for k in low[2]..=high[2] {
+            monitor.check()?;
+            for j in low[1]..=high[1] {
+                for i in low[0]..=high[0] {
+                    let voxel = i + wall.shape[0] * (j + wall.shape[1] * k);
+                    let centre = Vec3::from([i, j, k].map(|x| x as f64));
+                    mask.voxels[voxel] =
+                        !wall.voxels[voxel] && self.encloses(&inner, &frame.to_patient(&centre));
+                }
+            }
+        }
+        Ok(mask)
+    }
+
+    /// Whether `point` lies inside the inner surface, whose distance along each ray is `inner`.
+    fn encloses(&self, inner: &[f64], point: &Vec3) -> bool {
+        if self.along_axis(point) < self.frame.rim {
+            return false;
+        }
+        let place = self.place(point);
+        let row = place.row.clamp(0.0, (ROWS - 1) as f64);
+        let rows = [row.floor() as usize, row.ceil() as usize];
+        let column = place.column.floor() as usize % COLUMNS;
+        let columns = [column, (column + 1) % COLUMNS];
+        let between = |pair: [f64; 2], share: f64| pair[0] + (pair[1] - pair[0]) * share;
+        let across = |row: usize| {
+            let pair = columns.map(|column| inner[row * COLUMNS + column]);
+            between(pair, place.column.fract())
+        };
+        place.distance < between(rows.map(across), row.fract())
+    }
+
+    /// The voxels of a grid between which the inner surface lies: least and greatest indices; `None` if
+    /// it lies beside the grid.
+    fn inside(
+        &self,
+        inner: &[f64],
+        shape: [usize; 3],
+        frame: &VoxelToPatient,
+    ) -> Option<[[usize; 3]; 2]> {
+        let ends = self.rays.iter().zip(inner);
+        let ends = ends.flat_map(|(ray, r)| [ray.start, ray.start + ray.direction * *r]);
+        let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
+        for point in ends {
+            let index = frame.to_voxel(&point);
+            for axis in 0..3 {
+                low[axis] = low[axis].min(index[axis] - 1.0);
+                high[axis] = high[axis].max(index[axis] + 1.0);
+            }
+        }
+        let apart = (0..3).any(|axis| high[axis] < 0.0 || low[axis] > (shape[axis] - 1) as f64);
+        let least = low.map(|x| x.max(0.0) as usize);
+        let greatest = [0, 1, 2].map(|axis| (high[axis] as usize).min(shape[axis] - 1));
+        (!apart && shape.iter().all(|n| *n > 0)).then_some([least, greatest])
+    }
+
     /// `point` in the coordinates of the rays. A point on the axis gets column 0.
     pub fn place(&self, point: &Vec3) -> WallPlace {
         self.frame.place(point)
@@ -269,18 +343,12 @@ impl AxisFrame {
         }
     }
 
-    /// Volume inside the inner surface, mm³. Where a ray misses the wall (a low rim), the nearest
-    /// ray of its column towards the apex is used instead.
+    /// Volume inside the inner surface, mm³.
     fn cavity(&self, rays: &[WallRay]) -> f64 {
-        let mut inner = [0.0; COLUMNS];
         let mut volume = 0.0;
         let step = self.row_spacing();
-        for (index, ray) in rays.iter().enumerate() {
-            let (row, column) = (index / COLUMNS, index % COLUMNS);
-            if let Some([enters, _]) = ray.wall {
-                inner[column] = enters;
-            }
-            let r: f64 = inner[column];
+        for (index, r) in inner_radii(rays).into_iter().enumerate() {
+            let row = index / COLUMNS;
             let near = row as f64 * step;
             let far = near + step;
             let turn = TAU / COLUMNS as f64;
@@ -292,6 +360,20 @@ impl AxisFrame {
         }
         volume
     }
+}
+
+/// The distance at which each ray enters the wall, mm. Where a ray misses the wall (a low rim), that of the
+/// nearest ray of its column towards the apex.
+fn inner_radii(rays: &[WallRay]) -> Vec<f64> {
+    let mut last = [0.0; COLUMNS];
+    let radius = |(index, ray): (usize, &WallRay)| {
+        let inner: &mut f64 = &mut last[index % COLUMNS];
+        if let Some([enters, _]) = ray.wall {
+            *inner = enters;
+        }
+        *inner
+    };
+    rays.iter().enumerate().map(radius).collect()
 }
 
 /// Where a ray first enters the wall and then leaves it.
@@ -317,6 +399,7 @@ fn crossing(mesh: &TriMesh, tree: &Bvh, start: &Vec3, direction: &Vec3) -> Optio
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::voxelise::voxelise;
     use crate::mesh::shapes;
 
     #[test]
@@ -356,6 +439,39 @@ mod tests {
                 );
             }
             assert!((place.direction - ray.direction).norm() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_voxels_of_the_cavity_fill_it_and_leave_the_wall_alone() {
+        let mesh = shapes::cup(70.0, 31.0, 12.0, 24);
+        let axis = Vec3::new(0.0, 0.0, -1.0);
+        let cup = Cup {
+            centre: mesh.vertices.iter().sum::<Vec3>() / mesh.vertices.len() as f64,
+            axis,
+            length: 70.0,
+            breadth: 1.0,
+        };
+        let monitor = Monitor::silent();
+        let wall = VentricleWall::new(&mesh, &cup, &Vec3::y(), &monitor).unwrap();
+        // Left-handed, oblique, and so small a grid that a part of the heart lies beyond it.
+        let turn = *Rotation3::from_euler_angles(0.3, -0.5, 1.1).matrix();
+        let linear = turn * Matrix3::from_diagonal(&Vec3::new(1.5, 1.5, -1.5));
+        for (size, whole) in [(64, true), (30, false)] {
+            let middle = Vec3::repeat(f64::from(size) / 2.0);
+            let frame = VoxelToPatient::new(linear, cup.centre - linear * middle).unwrap();
+            let shape = [size as usize; 3];
+            let mask = voxelise(&mesh, shape, &frame);
+            let cavity = wall.cavity(&mask, &frame, &monitor).unwrap();
+            let both = cavity.voxels.iter().zip(&mask.voxels);
+            assert_eq!(both.filter(|(cavity, wall)| **cavity && **wall).count(), 0);
+            let volume = cavity.count() as f64 * 1.5f64.powi(3) / 1000.0;
+            if whole {
+                let off = (volume / wall.cavity_ml - 1.0).abs();
+                assert!(off < 0.02, "{volume} ml of {}", wall.cavity_ml);
+            } else {
+                assert!(volume > 0.0 && volume < wall.cavity_ml);
+            }
         }
     }
 }

@@ -3,7 +3,7 @@
 use crate::geometry::Vec3;
 use crate::grid::voxelise::Mask;
 use crate::progress::{Cancelled, Monitor};
-use crate::volume::Volume;
+use crate::volume::{FileFormat, Reading, Volume};
 
 /// Why a mask cannot be compared with a volume.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -25,6 +25,18 @@ pub enum ExpertMaskError {
     /// The caller asked for an end.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+/// The mask in a file that was read: voxels above 0.5, of a DICOM Segmentation its first segment. The
+/// others, such as the cavity in `mask.dcm`, are not the structure.
+pub(super) fn of_file(reading: Reading) -> Volume {
+    let mut volume = reading.volume;
+    if reading.facts.format == FileFormat::DicomSeg {
+        for voxel in &mut volume.voxels {
+            *voxel = f32::from(u8::from(*voxel == 1.0));
+        }
+    }
+    volume
 }
 
 /// Voxels between two checks of the cancel token.

@@ -1,5 +1,6 @@
 //! The files of a segmentation.
 
+use super::cavity::cavity;
 use super::from_files::SegmentedVolume;
 use super::report::report_json;
 use crate::deform::WallEdge;
@@ -190,7 +191,13 @@ impl SegmentedVolume {
         let structure = Structure::of(self.parameters.organ.as_str());
         let report = self.report();
         let polar = made.polar.as_ref().map(polar::png);
+        let placed = (&made.mask, &self.reading.volume.frame);
+        let cavity = match cavity(&report, &made.fit.mesh, placed, &Monitor::silent()) {
+            Ok(cavity) => cavity,
+            Err(Cancelled) => None,
+        };
         let results = DicomResults::new(scan, structure, &made.mask, &made.fit.mesh, &report)
+            .with_cavity(cavity.as_ref())
             .with_pictures(Some(&made.slices), polar.as_deref());
         let mut files = Vec::new();
         for object in DicomObject::ALL {

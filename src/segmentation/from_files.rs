@@ -1,6 +1,7 @@
 //! A segmentation from files: read, segment, keep what the output needs.
 
 use super::error::SegmentationError;
+use super::expert_mask;
 use super::order::{NamedReader, SegmentationOrder};
 use super::segment::{Segmentation, SegmentationParameters, segment};
 use super::templates::prepare;
@@ -46,8 +47,8 @@ pub fn from_files(
     };
     check_reader(order)?;
     let (templates, refused) = prepare(order, monitor)?;
-    let expert = expert.as_ref().map(|expert| &expert.volume);
-    let mut segmentation = segment(&reading.volume, &templates, &fit, expert, monitor)?;
+    let expert = expert.map(expert_mask::of_file);
+    let mut segmentation = segment(&reading.volume, &templates, &fit, expert.as_ref(), monitor)?;
     segmentation.refused.splice(0..0, refused);
     Ok(SegmentedVolume {
         reading,

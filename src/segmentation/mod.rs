@@ -37,10 +37,12 @@ pub mod slices;
 
 mod report;
 
+mod cavity;
 mod files;
 
 mod error;
 
+pub use cavity::cavity;
 pub use error::SegmentationError;
 pub use expert_mask::{ExpertMaskError, on_grid};
 pub use files::{NamedFile, SegmentationFilesError};

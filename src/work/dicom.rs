@@ -27,6 +27,7 @@ use crate::jobs::{
 };
 use crate::mesh::TriMesh;
 use crate::progress::Monitor;
+use crate::segmentation::cavity;
 use crate::volume::dicom::Provenance;
 use crate::volume::{self, AffineSource, ReadLimits, ReadOptions, VolumeFile};
 use nalgebra::Matrix3;
@@ -124,7 +125,15 @@ pub fn object(
         .map_err(|error| broken_result(&error))?;
     let pictures = [read(item, "slices.png")?, read(item, "polar.png")?];
     let [slices, polar] = pictures.each_ref().map(Option::as_deref);
+    let cavity = match Resource::of(&item.id) {
+        // A silent monitor is never cancelled.
+        Some(Resource::Segmentation) => {
+            cavity(&report, &mesh, (&mask, &frame), &Monitor::silent()).unwrap_or_default()
+        }
+        _ => None,
+    };
     let made = DicomResults::new(&scan, structure(item, &facts), &mask, &mesh, &report)
+        .with_cavity(cavity.as_ref())
         .with_pictures(slices, polar)
         .write(object);
     let bytes = made.map_err(|error| error.explain())?;

@@ -340,11 +340,26 @@ async fn a_segmentation_is_had_as_dicom_objects_of_the_scans_study() {
         &ReadLimits::default(),
         &Monitor::silent(),
     );
-    assert_eq!(voxels, stored.unwrap().volume.voxels);
+    // Segment 2 is the cavity.
+    let wall: Vec<f32> = voxels
+        .iter()
+        .map(|v| f32::from(u8::from(*v == 1.0)))
+        .collect();
+    assert!(
+        wall == stored.unwrap().volume.voxels,
+        "segment 1 is the mask"
+    );
+    assert!(voxels.contains(&2.0));
     // Frames of the second gate are the source.
     assert!(contains(&mask, "65"), "frame 65 is the first of gate 1");
     let links = app.json(&fit).await["links"]["dicom"].clone();
     assert_eq!(links.as_array().unwrap().len(), 7, "{links}");
+    // As an expert's mask, it is the wall alone.
+    let expert = text(&upload(&app, mask.to_vec()).await["id"]);
+    let again = json!({"model": "auto", "frame": 1, "expert": expert});
+    let again = result(&app, "segmentation", &volume, again).await;
+    let report = app.json(&format!("{again}/report")).await;
+    assert_eq!(report["measures"]["dice"], 1.0, "{}", report["measures"]);
     let refused = get(&app, &format!("{fit}/mask.nii.gz?deidentify=true")).await;
     problem(refused, 400, "unknown-parameter").await;
     let refused = get(&app, &format!("{fit}/mask.dcm?deidentify=yes")).await;

@@ -43,6 +43,8 @@ const fn code(value: &'static str, scheme: &'static str, meaning: &'static str) 
 }
 
 pub(super) const ANATOMICAL_STRUCTURE: Code = sct("91723000", "Anatomical Structure");
+/// PS3.16 has the ventricle and its wall, but not its cavity.
+pub(super) const CAVITY: Code = own("LV-CAVITY", "Cavity of left ventricle");
 pub(super) const DEFORMABLE_MODELS: Code = dcm("123111", "Deformable Models");
 pub(super) const SEGMENTATION: Code = dcm("113076", "Segmentation");
 pub(super) const SOURCE_FOR_PROCESSING: Code =

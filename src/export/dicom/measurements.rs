@@ -6,7 +6,7 @@
 //! DICOM image that the template could name. For a ventricle each of the 17 segments of the heart
 //! association has a group of TID 1501 ([`WALL_SEGMENTS`]). A figure that the report lacks is left out.
 
-use super::codes::{Code, MILLIMETRE, OWN_SCHEME, dcm, own, sct, ucum};
+use super::codes::{CAVITY, Code, MILLIMETRE, OWN_SCHEME, dcm, own, sct, ucum};
 use super::data_set::{DataSet, reference};
 use super::{DicomObject, DicomResults};
 use dicom_core::Tag;
@@ -36,7 +36,6 @@ const DEFECT: Code = sct(
 );
 const PERFUSION: Code = sct("251053005", "Myocardial perfusion (observable entity)");
 const MEAN: Code = sct("373098007", "Mean");
-const CAVITY: Code = own("LV-CAVITY", "Cavity of left ventricle");
 const APPARENT: Code = own("APPARENT", "Wall with the blur of the image");
 const ANATOMICAL: Code = own("ANATOMICAL", "Wall without the blur of the image");
 

@@ -223,6 +223,7 @@ pub struct DicomResults<'a> {
     mask: &'a Mask,
     mesh: &'a TriMesh,
     report: &'a Value,
+    cavity: Option<&'a Mask>,
     slices: Option<&'a [u8]>,
     polar: Option<&'a [u8]>,
     uids: Uids,
@@ -244,6 +245,7 @@ impl<'a> DicomResults<'a> {
             mask,
             mesh,
             report,
+            cavity: None,
             slices: None,
             polar: None,
             uids: Uids::over_all(|add| {
@@ -258,6 +260,12 @@ impl<'a> DicomResults<'a> {
                 add(report.to_string().as_bytes());
             }),
         }
+    }
+
+    /// Adds a ventricle's cavity: voxels of the mask's grid that are not of the mask.
+    #[must_use]
+    pub fn with_cavity(self, cavity: Option<&'a Mask>) -> Self {
+        Self { cavity, ..self }
     }
 
     /// Adds pictures, as PNG files: the slices with contours and the polar map.
@@ -332,21 +340,10 @@ impl<'a> DicomResults<'a> {
         set.empty(tags::CONTENT_CREATOR_NAME);
     }
 
-    /// What a segment shows, for its item in the Segment Sequence.
+    /// The first segment: the structure, for its item in the Segment Sequence.
     fn put_segment(&self, segment: &mut DataSet) {
-        segment.short(tags::SEGMENT_NUMBER, 1);
-        segment.text(tags::SEGMENT_LABEL, self.structure.label);
-        segment.text(tags::SEGMENT_ALGORITHM_TYPE, "AUTOMATIC");
-        segment.code(
-            tags::SEGMENTED_PROPERTY_CATEGORY_CODE_SEQUENCE,
-            ANATOMICAL_STRUCTURE,
-        );
-        segment.code(
-            tags::SEGMENTED_PROPERTY_TYPE_CODE_SEQUENCE,
-            self.structure.kind,
-        );
-        segment.text(tags::TRACKING_ID, self.structure.label);
-        segment.text(tags::TRACKING_UID, self.tracking());
+        let Structure { kind, label, .. } = self.structure;
+        put_segment(segment, 1, (kind, label), &self.tracking());
     }
 
     /// The Referenced Series Sequence of the Common Instance Reference module.
@@ -361,13 +358,18 @@ impl<'a> DicomResults<'a> {
     }
 
     fn instance(&self, object: DicomObject) -> String {
-        let picture = match object {
+        let cavity = self
+            .cavity
+            .map(|mask| mask.voxels.iter().map(|v| u8::from(*v)));
+        let cavity: Option<Vec<u8>> = cavity.map(Iterator::collect);
+        let content = match object {
+            DicomObject::Mask => cavity.as_deref(),
             DicomObject::Polar => self.polar,
             DicomObject::Page => self.slices,
             _ => None,
         };
         let name = object.file_name();
-        self.uids.over(name, picture.unwrap_or_default())
+        self.uids.over(name, content.unwrap_or_default())
     }
 
     fn series(&self, object: DicomObject) -> String {
@@ -378,6 +380,20 @@ impl<'a> DicomResults<'a> {
     fn tracking(&self) -> String {
         self.uids.uid("tracking")
     }
+}
+
+/// What segment `number` shows, for its item in the Segment Sequence.
+fn put_segment(segment: &mut DataSet, number: u16, (kind, label): (Code, &str), tracking: &str) {
+    segment.short(tags::SEGMENT_NUMBER, number);
+    segment.text(tags::SEGMENT_LABEL, label);
+    segment.text(tags::SEGMENT_ALGORITHM_TYPE, "AUTOMATIC");
+    segment.code(
+        tags::SEGMENTED_PROPERTY_CATEGORY_CODE_SEQUENCE,
+        ANATOMICAL_STRUCTURE,
+    );
+    segment.code(tags::SEGMENTED_PROPERTY_TYPE_CODE_SEQUENCE, kind);
+    segment.text(tags::TRACKING_ID, label);
+    segment.text(tags::TRACKING_UID, tracking);
 }
 
 /// An item of the Algorithm Identification Macro.
@@ -395,3 +411,6 @@ const COLOUR: [u8; 3] = [255, 150, 0];
 
 /// [`COLOUR`] as CIELab values (PS3.3 C.10.7.1.1).
 const CIELAB: [u16; 3] = [46928, 41046, 52636];
+
+/// Blue, for the cavity, as CIELab values.
+const CAVITY_CIELAB: [u16; 3] = [33644, 36596, 18297];

@@ -1,15 +1,17 @@
-//! The mask as Segmentation Storage (PS3.3 A.51): one bit for each voxel.
+//! The mask as Segmentation Storage (PS3.3 A.51): one bit for each voxel. Segment 1 is the structure;
+//! segment 2, of a ventricle, its cavity. No voxel is of both.
 //!
-//! Every slice is a frame, also where it is empty: viewers that count frames would otherwise shift
-//! the mask. Frames follow each other along row × column, against the order of the slices if the
+//! Every slice of a segment is a frame, also where it is empty: viewers that count frames would otherwise
+//! shift the mask. First come the frames of segment 1. Frames follow each other along row × column, against the order of the slices if the
 //! volume is left-handed (negative Spacing Between Slices), and each has its own Image Position.
 
-use super::codes::SEGMENTATION;
+use super::codes::{CAVITY, SEGMENTATION};
 use super::data_set::DataSet;
 use super::source::for_processing;
-use super::{CIELAB, DicomError, DicomResults, algorithm};
+use super::{CAVITY_CIELAB, CIELAB, DicomError, DicomResults, algorithm, put_segment};
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
+use crate::grid::voxelise::Mask;
 use dicom_core::Tag;
 use dicom_dictionary_std::tags;
 
@@ -75,22 +77,43 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), D
     set.text(tags::SEGMENTATION_TYPE, "BINARY");
     let mut segment = DataSet::new();
     results.put_segment(&mut segment);
+    put_look(&mut segment, CIELAB);
+    let mut segments = vec![segment];
+    let masks: Vec<&Mask> = [Some(results.mask), results.cavity]
+        .into_iter()
+        .flatten()
+        .collect();
+    if results.cavity.is_some() {
+        let mut segment = DataSet::new();
+        let tracking = results.uids.uid("tracking of the cavity");
+        put_segment(&mut segment, 2, (CAVITY, CAVITY.meaning), &tracking);
+        put_look(&mut segment, CAVITY_CIELAB);
+        segments.push(segment);
+        set.text(tags::SEGMENTS_OVERLAP, "NO");
+    }
+    set.items(tags::SEGMENT_SEQUENCE, segments);
+
+    put_dimensions(results, set);
+    set.text(tags::NUMBER_OF_FRAMES, (masks.len() * slices).to_string());
+    set.item(tags::SHARED_FUNCTIONAL_GROUPS_SEQUENCE, shared(&planes));
+    let numbers = 1..=masks.len() as u16;
+    let frames = numbers.flat_map(|number| {
+        let frames = planes.order.iter().enumerate();
+        frames.map(move |(place, &k)| frame_groups(results, number, place, k))
+    });
+    set.items(tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE, frames.collect());
+    set.bytes(tags::PIXEL_DATA, bits(&masks, &planes.order));
+    Ok(())
+}
+
+/// By what a segment was made, and its colour.
+fn put_look(segment: &mut DataSet, colour: [u16; 3]) {
     segment.text(tags::SEGMENT_ALGORITHM_NAME, "ventriform");
     segment.item(
         tags::SEGMENTATION_ALGORITHM_IDENTIFICATION_SEQUENCE,
         algorithm(),
     );
-    segment.shorts(tags::RECOMMENDED_DISPLAY_CIE_LAB_VALUE, &CIELAB);
-    set.item(tags::SEGMENT_SEQUENCE, segment);
-
-    put_dimensions(results, set);
-    set.text(tags::NUMBER_OF_FRAMES, slices.to_string());
-    set.item(tags::SHARED_FUNCTIONAL_GROUPS_SEQUENCE, shared(&planes));
-    let frames = planes.order.iter().enumerate();
-    let frames = frames.map(|(place, &k)| frame_groups(results, place, k));
-    set.items(tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE, frames.collect());
-    set.bytes(tags::PIXEL_DATA, bits(results, &planes.order));
-    Ok(())
+    segment.shorts(tags::RECOMMENDED_DISPLAY_CIE_LAB_VALUE, &colour);
 }
 
 /// The Multi-frame Dimension module: the segment, then the position of the slice.
@@ -136,11 +159,14 @@ fn shared(planes: &SlicePlanes) -> DataSet {
     group
 }
 
-/// The functional groups of the frame at `place`, which shows slice `k`.
-fn frame_groups(results: &DicomResults<'_>, place: usize, k: usize) -> DataSet {
+/// The functional groups of a segment's frame at `place`, which shows slice `k`.
+fn frame_groups(results: &DicomResults<'_>, number: u16, place: usize, k: usize) -> DataSet {
     let mut group = DataSet::new();
     let mut content = DataSet::new();
-    content.longs(tags::DIMENSION_INDEX_VALUES, vec![1, place as u32 + 1]);
+    content.longs(
+        tags::DIMENSION_INDEX_VALUES,
+        vec![u32::from(number), place as u32 + 1],
+    );
     group.item(tags::FRAME_CONTENT_SEQUENCE, content);
     let mut position = DataSet::new();
     let corner = results
@@ -153,7 +179,7 @@ fn frame_groups(results: &DicomResults<'_>, place: usize, k: usize) -> DataSet {
     );
     group.item(tags::PLANE_POSITION_SEQUENCE, position);
     let mut segment = DataSet::new();
-    segment.short(tags::REFERENCED_SEGMENT_NUMBER, 1);
+    segment.short(tags::REFERENCED_SEGMENT_NUMBER, number);
     group.item(tags::SEGMENT_IDENTIFICATION_SEQUENCE, segment);
     if let Some(source) = results.scan.slice_reference(k) {
         let mut derivation = DataSet::new();
@@ -164,12 +190,15 @@ fn frame_groups(results: &DicomResults<'_>, place: usize, k: usize) -> DataSet {
     group
 }
 
-/// The slices of the mask in `order`, eight voxels to a byte, the first in the lowest bit; frames
+/// The slices of each mask in `order`, eight voxels to a byte, the first in the lowest bit; frames
 /// follow each other without padding (PS3.5 8.1.1).
-fn bits(results: &DicomResults<'_>, order: &[usize]) -> Vec<u8> {
-    let mask = results.mask;
-    let size = mask.shape[0] * mask.shape[1];
-    let slices = order.iter().map(|k| &mask.voxels[k * size..(k + 1) * size]);
+fn bits(masks: &[&Mask], order: &[usize]) -> Vec<u8> {
+    let slices = masks.iter().flat_map(|mask| {
+        let size = mask.shape[0] * mask.shape[1];
+        order
+            .iter()
+            .map(move |k| &mask.voxels[k * size..(k + 1) * size])
+    });
     let voxels: Vec<bool> = slices.flatten().copied().collect();
     let byte = |eight: &[bool]| {
         let bits = eight.iter().enumerate();

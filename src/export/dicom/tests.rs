@@ -218,6 +218,51 @@ fn the_mask_lies_where_it_was_made() {
     }
 }
 
+/// The cavity is a second segment on the same planes, told from the first by its own UIDs.
+#[test]
+fn the_cavity_is_a_segment_of_its_own() {
+    let scene = straight();
+    let mut cavity = Mask::empty(SHAPE);
+    for (voxel, set) in cavity.voxels.iter_mut().enumerate() {
+        *set = voxel % 7 == 3 && !scene.mask.voxels[voxel];
+    }
+    let write = |cavity| scene.results().with_cavity(cavity).write(DicomObject::Mask);
+    let set = from_reader(&write(Some(&cavity)).unwrap().unwrap()[..]).unwrap();
+    let segments = items(&set, tags::SEGMENT_SEQUENCE);
+    assert_eq!(segments.len(), 2);
+    let kind = only(&segments[1], tags::SEGMENTED_PROPERTY_TYPE_CODE_SEQUENCE);
+    assert_eq!(text(kind, tags::CODE_VALUE), "LV-CAVITY");
+    let tracking = [&segments[0], &segments[1]].map(|s| text(s, tags::TRACKING_UID));
+    assert_ne!(tracking[0], tracking[1]);
+    assert_eq!(text(&set, tags::SEGMENTS_OVERLAP), "NO");
+    assert_eq!(
+        text(&set, tags::NUMBER_OF_FRAMES),
+        (2 * SHAPE[2]).to_string()
+    );
+    let frames = items(&set, tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE);
+    let place = |frame: usize| {
+        let position = only(&frames[frame], tags::PLANE_POSITION_SEQUENCE);
+        numbers(position, tags::IMAGE_POSITION_PATIENT)
+    };
+    for k in 0..SHAPE[2] {
+        assert_eq!(place(k), place(SHAPE[2] + k));
+        for (number, frame) in [(1.0, k), (2.0, SHAPE[2] + k)] {
+            let segment = only(&frames[frame], tags::SEGMENT_IDENTIFICATION_SEQUENCE);
+            assert_eq!(numbers(segment, tags::REFERENCED_SEGMENT_NUMBER), [number]);
+            let content = only(&frames[frame], tags::FRAME_CONTENT_SEQUENCE);
+            let index = numbers(content, tags::DIMENSION_INDEX_VALUES);
+            assert_eq!(index, [number, k as f64 + 1.0]);
+        }
+    }
+    let bytes = set.element(tags::PIXEL_DATA).unwrap().to_bytes().unwrap();
+    let bit = |place: usize| bytes[place / 8] >> (place % 8) & 1 == 1;
+    let both = scene.mask.voxels.iter().chain(&cavity.voxels);
+    assert!(both.enumerate().all(|(place, set)| bit(place) == *set));
+    let alone = from_reader(&write(None).unwrap().unwrap()[..]).unwrap();
+    let uid = |set: &DefaultDicomObject| text(set, tags::SOP_INSTANCE_UID);
+    assert_ne!(uid(&alone), uid(&set));
+}
+
 /// Slices of a volume are filled by its contours exactly where voxel centres lie inside the mesh.
 #[test]
 fn the_contours_enclose_the_mask() {
