@@ -27,7 +27,7 @@
 //! | `description` | an archive as the operator describes it |
 //! | `record` | fetches and deliveries, the trait that a database implements |
 //! | `host` | the trait that the service around implements: storing volumes, making objects |
-//! | `web`, `related`, `parts`, `dimse` | DICOMweb, its messages of several objects, C-STORE |
+//! | `web`, `related`, `pieces`, `parts`, `dimse` | DICOMweb, its messages of several objects, C-STORE |
 //! | `trouble`, `end` | why an attempt failed, and whether that may pass; how attempts end |
 //! | `exchange`, `pull`, `deliver` | what both have in common; fetching; delivering |
 
@@ -39,6 +39,7 @@ mod exchange;
 mod host;
 mod object;
 mod parts;
+mod pieces;
 mod pull;
 mod record;
 mod related;
@@ -52,6 +53,7 @@ pub use exchange::{Exchange, ExchangeSettings};
 pub use host::{ExchangeHost, StoredSeries};
 pub use object::ArchiveObject;
 pub use parts::{PartLimits, SeriesPart, SeriesParts};
+pub use pieces::{EndlessHeader, Unparsed};
 pub use pull::Puller;
 pub use record::{
     ArchiveBacklog, ArchiveStore, DuePull, DueSend, HeldSeries, ObjectDelivery, Pull,

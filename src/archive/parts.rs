@@ -1,20 +1,15 @@
 //! The files of a series on their way from an archive: `multipart/related` (PS3.18, 8.7.1), read
 //! part by part within limits.
 
+use super::pieces::{EndlessHeader, Unparsed};
 use super::related::RelatedType;
 use super::trouble::{Trouble, odd_answer};
 use crate::jobs::Fault;
 use futures::stream::BoxStream;
-use futures::{Stream, StreamExt, stream};
+use futures::{Stream, StreamExt};
 use multer::{Constraints, Multipart, SizeLimit};
-use std::error::Error;
 use std::pin::Pin;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::task::{Context, Poll};
-
-/// Most bytes between two pieces of content: headers, boundaries, and what comes before the first.
-const HEADER_BYTES: usize = 256 << 10;
 
 /// Limits on a series.
 #[derive(Debug, Clone, Copy)]
@@ -28,15 +23,10 @@ pub struct PartLimits {
 /// The files of a series.
 pub struct SeriesParts {
     multipart: Multipart<'static>,
-    waiting: Arc<AtomicUsize>,
+    unparsed: Unparsed,
     limits: PartLimits,
     seen: usize,
 }
-
-/// A header or a boundary without end.
-#[derive(Debug, thiserror::Error)]
-#[error("a header or boundary does not end")]
-struct Endless;
 
 impl SeriesParts {
     /// The parts of a body of that content type.
@@ -54,36 +44,13 @@ impl SeriesParts {
             .ok_or_else(|| {
                 odd_answer("The archive's answer is no `multipart/related` with DICOM files.")
             })?;
-        let waiting = Arc::<AtomicUsize>::default();
-        let counted = waiting.clone();
-        let mut body = body;
-        let mut given = false;
-        // The parser reads on as long as there is something to read, and gathers that in memory. A
-        // pause after each piece makes it hand out what it has.
-        let body = stream::poll_fn(move |context| {
-            if std::mem::take(&mut given) {
-                context.waker().wake_by_ref();
-                return Poll::Pending;
-            }
-            let piece = std::task::ready!(body.poll_next_unpin(context));
-            given = piece.is_some();
-            Poll::Ready(
-                piece.map(|piece| -> Result<_, Box<dyn Error + Send + Sync>> {
-                    let piece = piece?;
-                    let length = piece.len();
-                    let unparsed = counted.fetch_add(length, Ordering::Relaxed) + length;
-                    match unparsed > HEADER_BYTES.max(4 * length) {
-                        true => Err(Endless.into()),
-                        false => Ok(piece),
-                    }
-                }),
-            )
-        });
+        let unparsed = Unparsed::default();
+        let body = unparsed.pieces(body);
         let sizes = SizeLimit::new().whole_stream(limits.bytes);
         let constraints = Constraints::new().size_limit(sizes);
         Ok(Self {
             multipart: Multipart::with_constraints(body, boundary, constraints),
-            waiting,
+            unparsed,
             limits,
             seen: 0,
         })
@@ -101,7 +68,7 @@ impl SeriesParts {
                 _ => Ok(None),
             };
         };
-        self.waiting.store(0, Ordering::Relaxed);
+        self.unparsed.reset();
         self.seen += 1;
         if self.seen > self.limits.parts {
             return Err(too_large(format!(
@@ -111,7 +78,7 @@ impl SeriesParts {
         }
         Ok(Some(SeriesPart {
             field,
-            waiting: self.waiting.clone(),
+            unparsed: self.unparsed.clone(),
             limits: self.limits,
         }))
     }
@@ -124,7 +91,7 @@ impl SeriesParts {
 /// One file: a stream of its bytes.
 pub struct SeriesPart {
     field: multer::Field<'static>,
-    waiting: Arc<AtomicUsize>,
+    unparsed: Unparsed,
     limits: PartLimits,
 }
 
@@ -133,7 +100,7 @@ impl Stream for SeriesPart {
 
     fn poll_next(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Self::Item>> {
         let piece = std::task::ready!(self.field.poll_next_unpin(context));
-        self.waiting.store(0, Ordering::Relaxed);
+        self.unparsed.reset();
         let limits = self.limits;
         Poll::Ready(piece.map(|piece| piece.map_err(|error| trouble(&error, limits))))
     }
@@ -144,7 +111,7 @@ fn trouble(error: &multer::Error, limits: PartLimits) -> Trouble {
         multer::Error::StreamSizeExceeded { .. } | multer::Error::FieldSizeExceeded { .. } => {
             too_large(format!("The series is larger than {} bytes.", limits.bytes))
         }
-        multer::Error::StreamReadFailed(cause) if cause.is::<Endless>() => {
+        multer::Error::StreamReadFailed(cause) if cause.is::<EndlessHeader>() => {
             odd_answer("The archive's answer is malformed: a header or boundary does not end.")
         }
         multer::Error::StreamReadFailed(_) => {
@@ -167,6 +134,7 @@ fn too_large(what: String) -> Trouble {
 mod tests {
     use super::*;
     use bytes::Bytes;
+    use futures::stream;
 
     const LIMITS: PartLimits = PartLimits {
         bytes: 1 << 20,
@@ -199,13 +167,6 @@ mod tests {
         let body = "--b:1\r\nContent-Type: application/dicom\r\n\r\none\r\n--b:1\r\n\
                     Content-Type: application/dicom\r\n\r\ntwo --b:1\r\n--b:1--\r\n";
         assert_eq!(read(TYPE, body).await.unwrap(), ["one", "two --b:1"]);
-    }
-
-    #[tokio::test]
-    async fn a_large_file_that_comes_at_once_is_not_gathered() {
-        let head = "--b:1\r\nContent-Type: application/dicom\r\n\r\n";
-        let body = format!("{head}{}\r\n--b:1--\r\n", "x".repeat(900_000));
-        assert_eq!(read(TYPE, &body).await.unwrap()[0].len(), 900_000);
     }
 
     #[tokio::test]

@@ -10,14 +10,13 @@ use super::client::ClientAddress;
 use super::guard::Agent;
 use super::limits::BodyLimits;
 use super::negotiate::require_offer;
-use super::openapi::UploadProblems;
+use super::openapi::{StowAnswers, UploadProblems};
 use super::problem::{Answer, Problem, body};
 use super::request::{
     PathSegments, media_type, query_pairs, refuse_content_encoding, refuse_unknown,
 };
-use super::upload::{Unparsed, counted};
 use crate::access::{Activity, NotRecorded};
-use crate::archive::RelatedType;
+use crate::archive::{RelatedType, Unparsed};
 use crate::intake::{Incoming, Origin, Protocol, ReceiveError, Refused, Session, Stated};
 use axum::Extension;
 use axum::body::{Body, Bytes};
@@ -47,14 +46,7 @@ const NOT_UNDERSTOOD: u16 = 0xC000;
     request_body(content(
         (Vec<u8> = "multipart/related"),
         (Vec<u8> = "application/dicom"))),
-    responses(
-        (status = 200, description = "All are stored", content_type = "application/dicom+json", body = Object),
-        (status = 202, description = "Some are stored", content_type = "application/dicom+json", body = Object),
-        (status = 409, description = "None is stored", content_type = "application/dicom+json", body = Object),
-        (status = 406, description = "The answer is `application/dicom+json` only",
-            content_type = "application/problem+json", body = super::problem::ProblemBody),
-        UploadProblems,
-    ))]
+    responses(StowAnswers, UploadProblems))]
 pub async fn store_instances(
     State(app): State<App>,
     caller: Caller,
@@ -75,14 +67,7 @@ pub async fn store_instances(
     request_body(content(
         (Vec<u8> = "multipart/related"),
         (Vec<u8> = "application/dicom"))),
-    responses(
-        (status = 200, description = "All are stored", content_type = "application/dicom+json", body = Object),
-        (status = 202, description = "Some are stored", content_type = "application/dicom+json", body = Object),
-        (status = 409, description = "None is stored", content_type = "application/dicom+json", body = Object),
-        (status = 406, description = "The answer is `application/dicom+json` only",
-            content_type = "application/problem+json", body = super::problem::ProblemBody),
-        UploadProblems,
-    ))]
+    responses(StowAnswers, UploadProblems))]
 pub async fn store_study_instances(
     State(app): State<App>,
     caller: Caller,
@@ -229,8 +214,8 @@ impl Storing<'_> {
     async fn parts(&mut self, request: Request, boundary: String) -> Answer<()> {
         let limit = BodyLimits::of(&request)?.size;
         let unparsed = Unparsed::default();
-        let stream = counted(request.into_body(), unparsed.clone()).into_data_stream();
-        let mut parts = Multipart::new(stream, boundary);
+        let pieces = unparsed.pieces(request.into_body().into_data_stream());
+        let mut parts = Multipart::new(pieces, boundary);
         let interrupted = |error: multer::Error| body::related_interrupted(&error, limit);
         let mut count = 0;
         while let Some(part) = parts.next_field().await.map_err(interrupted)? {

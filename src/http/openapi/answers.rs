@@ -159,6 +159,28 @@ impl IntoResponses for DownloadAnswers {
     }
 }
 
+/// What became of objects that came by STOW-RS, and 406.
+pub struct StowAnswers;
+
+impl IntoResponses for StowAnswers {
+    fn responses() -> Responses {
+        let answers = [
+            (200, "All are stored"),
+            (202, "Some are stored"),
+            (409, "None is stored"),
+        ];
+        let answers = answers.map(|(status, description)| {
+            let object = ObjectBuilder::new().schema_type(Type::Object);
+            let content = Content::new(Some(object));
+            let answer = ResponseBuilder::new().description(description);
+            let answer = answer.content("application/dicom+json", content).build();
+            (status.to_string(), answer.into())
+        });
+        let refused = problem(406, "The answer is `application/dicom+json` only");
+        answers.into_iter().chain([refused]).collect()
+    }
+}
+
 /// 202, 406 and 409 of requests that upload a volume and may wait for the result.
 pub struct WaitAnswers;
 

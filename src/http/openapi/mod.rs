@@ -26,8 +26,8 @@ pub use answers::{
     DicomProblems, DownloadAnswers, EraseProblems, EventsAnswer, FileProblems, HoldProblems,
     IdentityProblems, ListProblems, LookupProblems, MeshAnswer, ModelFileAnswer, OriginalAnswer,
     PatchProblems, ReaderFileAnswer, ReportAnswer, ScopeProblems, SegmentationAnswer,
-    SegmentationFileAnswer, UnchangedAnswer, UploadProblems, WaitAnswers, WorkitemConflict,
-    WorkitemProblems,
+    SegmentationFileAnswer, StowAnswers, UnchangedAnswer, UploadProblems, WaitAnswers,
+    WorkitemConflict, WorkitemProblems,
 };
 pub use bodies::{
     HoldRequest, JobParameters, JobRequest, MeshDocument, SegmentationForm, StatedScanSchema,

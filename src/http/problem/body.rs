@@ -2,16 +2,12 @@
 //! encoding that the path does not read.
 
 use super::{Problem, shorten};
+use crate::archive::EndlessHeader;
 use crate::config::Size;
 use axum::http::StatusCode;
 use http_body_util::LengthLimitError;
 use std::error::Error;
 use tower_http::timeout::TimeoutError;
-
-/// A form whose headers or boundaries do not end.
-#[derive(Debug, thiserror::Error)]
-#[error("a header or boundary does not end")]
-pub struct EndlessFormHeader;
 
 /// Why reading a body of at most `limit` failed. The limits on bodies report through the error's
 /// sources; anything else means that the client broke off.
@@ -35,7 +31,7 @@ pub fn form_interrupted(error: &(dyn Error + 'static), limit: Size) -> Problem {
 
 /// Why reading a `multipart/related` body of at most `limit` failed.
 pub fn related_interrupted(error: &(dyn Error + 'static), limit: Size) -> Problem {
-    let endless = causes(error).any(|cause| cause.is::<EndlessFormHeader>());
+    let endless = causes(error).any(|cause| cause.is::<EndlessHeader>());
     let known = known_cause(error, limit).filter(|_| !endless);
     known.unwrap_or_else(|| {
         let innermost = causes(error).last().unwrap_or(error);
@@ -50,7 +46,7 @@ fn known_cause(error: &(dyn Error + 'static), limit: Size) -> Option<Problem> {
             Some(too_large(limit))
         } else if cause.is::<TimeoutError>() {
             Some(too_slow())
-        } else if cause.is::<EndlessFormHeader>() {
+        } else if cause.is::<EndlessHeader>() {
             Some(malformed_form(&cause.to_string()))
         } else {
             None

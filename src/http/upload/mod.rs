@@ -11,7 +11,6 @@ mod bundle;
 mod form;
 
 pub use bundle::Bundle;
-pub use form::{Unparsed, counted};
 
 use super::app::App;
 use super::limits::BodyLimits;
