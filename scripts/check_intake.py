@@ -289,6 +289,38 @@ def garbage(service):
     service.echo()
 
 
+def encrypted(program, folder):
+    """dcmtk sends over TLS, with a certificate; without one, and without TLS, it is refused."""
+    folder.mkdir()
+
+    def openssl(*words):
+        subprocess.run(["openssl", *words], check=True, cwd=folder, stderr=subprocess.DEVNULL)
+
+    new = ["-newkey", "rsa:2048", "-nodes"]
+    openssl("req", "-x509", *new, "-subj", "/CN=Hospital", "-keyout", "ca.key", "-out", "ca.pem")
+    (folder / "leaf").write_text("subjectAltName=IP:127.0.0.1\nbasicConstraints=CA:FALSE\n")
+    for name in ("service", "camera"):
+        openssl("req", *new, "-subj", f"/CN={name}", "-keyout", f"{name}.key", "-out", f"{name}.csr")
+        openssl("x509", "-req", "-in", f"{name}.csr", "-CA", "ca.pem", "-CAkey", "ca.key", "-CAcreateserial",
+                "-extfile", "leaf", "-out", f"{name}.pem")
+    service = Service(program, folder, "--dicom-tls-cert", str(folder / "service.pem"),
+                      "--dicom-tls-key", str(folder / "service.key"),
+                      "--dicom-tls-client-ca", str(folder / "ca.pem"))
+    try:
+        trusted = ["+cf", str(folder / "ca.pem")]
+        own = ["+tls", str(folder / "camera.key"), str(folder / "camera.pem")]
+        file = [as_file(nuclear(40))]
+        check(storescu(service, folder, file) != 0, "without TLS")
+        check(storescu(service, folder, file, "+tla", *trusted) != 0, "without a certificate")
+        check(not service.groups(), "nothing is stored")
+        check(storescu(service, folder, file, *own, *trusted) == 0, "storescu: TLS")
+        service.settled(1)
+        log = (folder / "log").read_text()
+        check("panic" not in log, log[-1000:])
+    finally:
+        service.process.kill()
+
+
 def main():
     program, folder = sys.argv[1], Path(sys.argv[2])
     service = Service(program, folder)
@@ -303,7 +335,8 @@ def main():
         check(service.process.wait(30) == 0, "the service ends in order")
     finally:
         service.process.kill()
-    print(f"intake: {number + 1} groups received, {acknowledged} objects kept over 5 kills, 1000 bad connections")
+    encrypted(program, folder / "tls")
+    print(f"intake: {number + 1} groups received, {acknowledged} objects kept over 5 kills, 1000 bad connections, TLS")
 
 
 main()

@@ -75,6 +75,17 @@ pub struct DicomPeer {
     pub called: String,
     /// The application entity title of this service there.
     pub calling: String,
+    /// How to speak TLS with it; `None` for plain DICOM.
+    pub tls: Option<DicomTls>,
+}
+
+/// DICOM over TLS (PS3.15 annex B).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DicomTls {
+    /// PEM file with the authorities that its certificate must come from.
+    pub ca_file: PathBuf,
+    /// PEM files with this service's certificate and private key, if it asks for them.
+    pub own: Option<(PathBuf, PathBuf)>,
 }
 
 /// Why an entry of the settings describes no archive.
@@ -97,7 +108,7 @@ type Given<'a> = Option<&'a str>;
 
 impl Archive {
     /// The keys of an entry that hold a text.
-    pub const KEYS: [&'static str; 9] = [
+    pub const KEYS: [&'static str; 12] = [
         "name",
         "dicomweb",
         "username_env",
@@ -107,6 +118,9 @@ impl Archive {
         "dicom",
         "ae_title",
         "calling_ae_title",
+        "dicom_ca_file",
+        "dicom_cert_file",
+        "dicom_key_file",
     ];
 
     /// The archive that an entry of the settings describes; `given` returns the text of a key.
@@ -131,7 +145,7 @@ impl Archive {
             )?,
             token_variable: variable("token_env", given("token_env"))?,
             ca_file: given("ca_file").map(PathBuf::from),
-            dicom: peer(given("dicom"), given("ae_title"), given("calling_ae_title"))?,
+            dicom: peer(&given)?,
             dicomweb,
             tenants,
             credentials: Credentials::None,
@@ -202,16 +216,23 @@ impl Archive {
         let (username, password) = self.password_variables.clone().unzip();
         let peer = self.dicom.clone();
         let calling = peer.as_ref().map(|peer| peer.calling.clone());
+        let tls = peer.as_ref().and_then(|peer| peer.tls.clone());
+        let own = tls.as_ref().and_then(|tls| tls.own.clone());
+        let (certificate, key) = own.unzip();
+        let path = |path: PathBuf| path.display().to_string();
         let values = [
             Some(self.name.clone()),
             self.dicomweb.clone(),
             username,
             password,
             self.token_variable.clone(),
-            self.ca_file.as_ref().map(|path| path.display().to_string()),
+            self.ca_file.clone().map(path),
             peer.as_ref().map(|peer| peer.address.clone()),
             peer.map(|peer| peer.called),
             calling,
+            tls.map(|tls| path(tls.ca_file)),
+            certificate.map(path),
+            key.map(path),
         ];
         let given = Self::KEYS.into_iter().zip(values);
         given
@@ -269,16 +290,21 @@ fn password_variables(
     }
 }
 
-fn peer(
-    address: Given<'_>,
-    called: Given<'_>,
-    calling: Given<'_>,
-) -> Result<Option<DicomPeer>, ArchiveFault> {
-    let Some(address) = address else {
-        return match (called, calling) {
-            (Some(_), _) => Err(fault("ae_title", "it needs `dicom`")),
-            (_, Some(_)) => Err(fault("calling_ae_title", "it needs `dicom`")),
-            (None, None) => Ok(None),
+/// The keys that need `dicom`.
+const OF_DICOM: [&str; 5] = [
+    "ae_title",
+    "calling_ae_title",
+    "dicom_ca_file",
+    "dicom_cert_file",
+    "dicom_key_file",
+];
+
+fn peer<'a>(given: &impl Fn(&str) -> Given<'a>) -> Result<Option<DicomPeer>, ArchiveFault> {
+    let Some(address) = given("dicom") else {
+        let alone = OF_DICOM.into_iter().find(|key| given(key).is_some());
+        return match alone {
+            Some(key) => Err(fault(key, "it needs `dicom`")),
+            None => Ok(None),
         };
     };
     let (host, port) = address.rsplit_once(':').unwrap_or_default();
@@ -300,12 +326,45 @@ fn peer(
             )),
         }
     };
+    let called = given("ae_title");
     let called = called.ok_or_else(|| fault("ae_title", "it is missing beside `dicom`"))?;
+    let calling = given("calling_ae_title").unwrap_or(CALLING);
     Ok(Some(DicomPeer {
         address: address.to_owned(),
         called: title("ae_title", called)?,
-        calling: title("calling_ae_title", calling.unwrap_or(CALLING))?,
+        calling: title("calling_ae_title", calling)?,
+        tls: tls([
+            given("dicom_ca_file"),
+            given("dicom_cert_file"),
+            given("dicom_key_file"),
+        ])?,
     }))
+}
+
+fn tls([authorities, certificate, key]: [Given<'_>; 3]) -> Result<Option<DicomTls>, ArchiveFault> {
+    let own = match (certificate, key) {
+        (Some(certificate), Some(key)) => Some((certificate.into(), key.into())),
+        (None, None) => None,
+        (Some(_), None) => {
+            let reason = "it is missing beside `dicom_cert_file`";
+            return Err(fault("dicom_key_file", reason));
+        }
+        (None, Some(_)) => {
+            let reason = "it is missing beside `dicom_key_file`";
+            return Err(fault("dicom_cert_file", reason));
+        }
+    };
+    match authorities {
+        Some(file) => Ok(Some(DicomTls {
+            ca_file: file.into(),
+            own,
+        })),
+        None if own.is_some() => Err(fault(
+            "dicom_ca_file",
+            "it is missing: name the file with the authorities of the archive's certificate",
+        )),
+        None => Ok(None),
+    }
 }
 
 /// The archives of a service.
@@ -354,8 +413,11 @@ mod tests {
             ("username_env", "PACS_USER"),
             ("password_env", "PACS_PASSWORD"),
             ("ca_file", "/etc/pacs.pem"),
-            ("dicom", "10.0.0.5:4242"),
+            ("dicom", "10.0.0.5:2762"),
             ("ae_title", "ORTHANC"),
+            ("dicom_ca_file", "/etc/hospital.pem"),
+            ("dicom_cert_file", "/etc/own.pem"),
+            ("dicom_key_file", "/etc/own.key"),
         ];
         let archive = read(&web).unwrap();
         assert_eq!(
@@ -439,6 +501,26 @@ mod tests {
                 "ae_title",
             ),
             (&[name, web, ("ae_title", "A")], "ae_title"),
+            (&[name, web, ("dicom_ca_file", "/ca")], "dicom_ca_file"),
+            (
+                &[
+                    name,
+                    ("dicom", "p:1"),
+                    ("ae_title", "A"),
+                    ("dicom_cert_file", "/c"),
+                ],
+                "dicom_key_file",
+            ),
+            (
+                &[
+                    name,
+                    ("dicom", "p:1"),
+                    ("ae_title", "A"),
+                    ("dicom_cert_file", "/c"),
+                    ("dicom_key_file", "/k"),
+                ],
+                "dicom_ca_file",
+            ),
             (
                 &[
                     name,

@@ -1,9 +1,9 @@
-//! C-STORE to an archive without DICOMweb (PS3.4 annex B): one association for each object. Called
-//! on blocking threads.
+//! C-STORE to an archive without DICOMweb (PS3.4 annex B): one association for each object, over TLS if
+//! the settings say so. Called on blocking threads.
 
 use super::trouble::Trouble;
 use super::web::{Stored, store_failure};
-use super::{ArchiveObject, DicomPeer};
+use super::{ArchiveObject, DicomPeer, DicomTls};
 use crate::jobs::Fault;
 use dicom_core::{PrimitiveValue, VR, dicom_value};
 use dicom_dictionary_std::{tags, uids};
@@ -11,10 +11,15 @@ use dicom_encoding::TransferSyntaxIndex;
 use dicom_object::mem::InMemElement;
 use dicom_object::{InMemDicomObject, OpenFileOptions};
 use dicom_transfer_syntax_registry::{TransferSyntaxRegistry, entries};
-use dicom_ul::association::Error;
-use dicom_ul::association::client::ClientAssociationOptions;
+use dicom_ul::association::client::{ClientAssociation, ClientAssociationOptions};
+use dicom_ul::association::{CloseSocket, Error};
 use dicom_ul::pdu::{PDataValue, PDataValueType, Pdu};
-use std::io::Write;
+use rustls::pki_types::pem::PemObject;
+use rustls::pki_types::{CertificateDer, PrivateKeyDer};
+use rustls::{ClientConfig, RootCertStore};
+use std::io::{Read, Write};
+use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Longest time to connect.
@@ -39,15 +44,35 @@ pub(super) fn store(
         uids::EXPLICIT_VR_LITTLE_ENDIAN,
         uids::IMPLICIT_VR_LITTLE_ENDIAN,
     ];
-    let mut association = ClientAssociationOptions::new()
+    let options = ClientAssociationOptions::new()
         .calling_ae_title(peer.calling.as_str())
         .called_ae_title(peer.called.as_str())
         .with_presentation_context(object.class.as_str(), syntaxes.to_vec())
         .connection_timeout(CONNECT.min(timeout))
         .read_timeout(timeout)
-        .write_timeout(timeout)
-        .establish(peer.address.as_str())
-        .map_err(|error| refusal(&error))?;
+        .write_timeout(timeout);
+    let address = peer.address.as_str();
+    match &peer.tls {
+        None => {
+            let association = options.establish(address);
+            send(association.map_err(|error| refusal(&error))?, object)
+        }
+        Some(files) => {
+            let host = address.rsplit_once(':').map_or(address, |(host, _)| host);
+            let options = options
+                .tls_config(client_config(files)?)
+                .server_name(host.trim_matches(['[', ']']));
+            let association = options.establish_tls(address);
+            send(association.map_err(|error| refusal(&error))?, object)
+        }
+    }
+}
+
+/// Stores an object over an association that offers its SOP class alone.
+fn send<S: CloseSocket + Read + Write>(
+    mut association: ClientAssociation<S>,
+    object: &ArchiveObject,
+) -> Result<Stored, Trouble> {
     let context = association.presentation_contexts().first().cloned();
     let context = context.ok_or_else(unsupported)?;
     let broken = |_| Trouble::passing("The archive broke the association off.");
@@ -97,8 +122,53 @@ pub(super) fn store(
     }
 }
 
+/// TLS with the files of the settings, which are read each time: they may have been renewed.
+fn client_config(files: &DicomTls) -> Result<ClientConfig, Trouble> {
+    let unusable = |key: &str, path: &Path, reason: &dyn std::fmt::Display| {
+        let path = path.display();
+        Trouble::passing(format!("`{key}` ({path}) cannot be used: {reason}."))
+    };
+    let certificates = |key: &str, path: &Path| {
+        let all: Result<Vec<_>, _> =
+            CertificateDer::pem_file_iter(path).and_then(Iterator::collect);
+        match all {
+            Ok(found) if found.is_empty() => Err(unusable(key, path, &"it holds no certificate")),
+            Ok(found) => Ok(found),
+            Err(error) => Err(unusable(key, path, &error)),
+        }
+    };
+    let mut authorities = RootCertStore::empty();
+    for authority in certificates("dicom_ca_file", &files.ca_file)? {
+        let added = authorities.add(authority);
+        added.map_err(|error| unusable("dicom_ca_file", &files.ca_file, &error))?;
+    }
+    let provider = Arc::new(rustls::crypto::ring::default_provider());
+    let builder = ClientConfig::builder_with_provider(provider)
+        .with_protocol_versions(&[&rustls::version::TLS13, &rustls::version::TLS12])
+        .map_err(|error| Trouble::passing(format!("TLS cannot be used: {error}.")))?
+        .with_root_certificates(authorities);
+    let Some((certificate, key)) = &files.own else {
+        return Ok(builder.with_no_client_auth());
+    };
+    let chain = certificates("dicom_cert_file", certificate)?;
+    let secret = PrivateKeyDer::from_pem_file(key)
+        .map_err(|error| unusable("dicom_key_file", key, &error))?;
+    builder
+        .with_client_auth_cert(chain, secret)
+        .map_err(|error| unusable("dicom_cert_file", certificate, &error))
+}
+
 fn refusal(error: &Error) -> Trouble {
     match error {
+        Error::TlsHandshake { .. }
+        | Error::TlsConnection { .. }
+        | Error::InvalidServerName { .. } => Trouble::passing(
+            "The archive and this service do not agree on TLS: check `dicom_ca_file`, the name \
+                 in the archive's certificate, and whether it asks for a certificate of this service.",
+        ),
+        Error::TlsNotSupported { .. } => {
+            Trouble::passing("The archive speaks TLS: set `dicom_ca_file`.")
+        }
         Error::Rejected { .. } => {
             Trouble::passing("The archive rejects the association: check both AE titles.")
         }

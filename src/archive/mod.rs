@@ -47,7 +47,7 @@ mod trouble;
 mod web;
 
 pub use deliver::Deliverer;
-pub use description::{Archive, ArchiveFault, Archives, Credentials, DicomPeer};
+pub use description::{Archive, ArchiveFault, Archives, Credentials, DicomPeer, DicomTls};
 pub use end::{ExchangeCounts, ExchangeEnd};
 pub use exchange::{Exchange, ExchangeSettings};
 pub use host::{ExchangeHost, StoredSeries};

@@ -295,6 +295,13 @@ settings! {
     ["DICOM"]
     /// Address and port on which other systems send images by DICOM C-STORE; `off` listens on none
     dicom_listen: OptionalAddress = "off";
+    /// PEM file with the certificate and its chain for DICOM over TLS; with it, dicom_listen speaks TLS only
+    dicom_tls_cert: OptionalPath = "off";
+    /// PEM file with the private key of dicom_tls_cert
+    dicom_tls_key: OptionalPath = "off";
+    /// PEM file with the authorities that certificates of calling systems must come from; without it,
+    /// callers need no certificate
+    dicom_tls_client_ca: OptionalPath = "off";
     /// AE title of this service, which callers must name
     ae_title: AeTitle = "VENTRIFORM";
     /// The systems that may send: tables `[[senders]]` with `ae_title`, `addresses` (none allows any) and

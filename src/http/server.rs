@@ -19,7 +19,9 @@ use super::volume_maker::check_rules;
 use crate::access::{AccessStore, Gate, Issuer, IssuerError, IssuerSettings, Recorder, Scope};
 use crate::config::Settings;
 use crate::hooks::{Dispatcher, HookSettings, RetrySchedule, UrlGuard};
-use crate::intake::{GatherSettings, Gatherer, Listener, Receiver, ScpSettings, Sessions};
+use crate::intake::{
+    GatherSettings, Gatherer, Listener, Receiver, ScpSettings, Sessions, TlsConfiguration,
+};
 use crate::jobs::{
     Clock, Custodian, DeathLimit, Failure, Fault, Queue, QueueSettings, SteadyClock, StoreError,
     SystemClock, Upkeep, WorkerSettings, Workers, recover_after_crash,
@@ -131,6 +133,7 @@ pub async fn start(
     install_cryptography();
     let dicom = dicom_listener(&settings)?;
     let tls = Tls::of(&settings)?;
+    let dicom_tls = Tls::of_dicom(&settings)?;
     let workers = worker_settings(&settings);
     let store = Store::open_with(&settings.data_dir, store_settings(&settings)).await?;
     let queue = Arc::new(Queue::new(
@@ -182,7 +185,7 @@ pub async fn start(
         grace: settings.shutdown_grace.0,
     };
     let listener = tokio::net::TcpListener::from_std(listener)?;
-    if let Some(tls) = &tls {
+    for tls in [&tls, &dicom_tls].into_iter().flatten() {
         tokio::spawn(tls.clone().follow_changes(closing.clone()));
     }
     let open = app.metrics.requests.connections.clone();
@@ -210,7 +213,8 @@ pub async fn start(
     tokio::spawn(custodian.run(closing.clone()));
     tokio::spawn(gatherer(&app).run(closing.clone()));
     let dicom_address = dicom.as_ref().map(|dicom| dicom.address);
-    let dicom = dicom.map(|dicom| serve_dicom(&app, dicom)).transpose()?;
+    let dicom = dicom.map(|dicom| serve_dicom(&app, dicom, dicom_tls));
+    let dicom = dicom.transpose()?;
     let exchange = tokio::spawn(exchange::run(app.clone(), closing.clone()));
     let workers = Workers::start(&queue, &engine.works, workers)?;
     tracing::info!(%address, "listening");
@@ -310,7 +314,11 @@ fn dicom_listener(settings: &Settings) -> Result<Option<DicomListener>, ServeErr
 }
 
 /// Serves DICOM until the service shuts down.
-fn serve_dicom(app: &App, dicom: DicomListener) -> io::Result<JoinHandle<()>> {
+fn serve_dicom(
+    app: &App,
+    dicom: DicomListener,
+    tls: Option<Arc<Tls>>,
+) -> io::Result<JoinHandle<()>> {
     let scp = Listener::new(
         dicom.settings,
         app.intake.receiver.clone(),
@@ -324,7 +332,8 @@ fn serve_dicom(app: &App, dicom: DicomListener) -> io::Result<JoinHandle<()>> {
     );
     let listener = tokio::net::TcpListener::from_std(dicom.listener)?;
     tracing::info!(address = %dicom.address, "listening for DICOM");
-    Ok(tokio::spawn(scp.run(listener)))
+    let tls: Option<TlsConfiguration> = tls.map(|tls| Arc::new(move || tls.config()) as _);
+    Ok(tokio::spawn(scp.run(listener, tls)))
 }
 
 /// What receives objects.

@@ -31,7 +31,7 @@ use tokio::time::{Instant, timeout, timeout_at};
 use tokio_util::sync::CancellationToken;
 
 /// Longest time until the association is requested, after PS3.8's timer ARTIM.
-const REQUEST_WAIT: Duration = Duration::from_secs(10);
+pub const REQUEST_WAIT: Duration = Duration::from_secs(10);
 /// Longest time for the last PDU to be sent.
 const LAST_WRITE: Duration = Duration::from_secs(5);
 /// Shortest P-DATA-TF PDU in which a response is sent, whatever the caller says.

@@ -4,21 +4,25 @@
 //! that they cannot keep callers out: of too many, the oldest one of the address that has the most is
 //! closed. Associations beyond the limits are rejected as PS3.8 says, for a passing reason.
 
-use super::association::{Connection, serve};
+use super::association::{Connection, REQUEST_WAIT, serve};
 use super::negotiate::Offer;
-use super::observer::IntakeObserver;
+use super::observer::{AssociationEnd, IntakeObserver};
 use super::receive::Receiver;
 use super::service::{Places, ScpSettings, Service};
 use super::session::Sessions;
 use crate::access::Recorder;
 use crate::jobs::Clock;
 use crate::volume::dicom::{storage_classes, transfer_syntaxes};
+use rustls::ServerConfig;
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
-use tokio::net::TcpListener;
+use tokio::net::{TcpListener, TcpStream};
 use tokio::task::JoinSet;
+use tokio::time::timeout;
+use tokio_rustls::TlsAcceptor;
+use tokio_rustls::server::TlsStream;
 use tokio_util::sync::CancellationToken;
 
 /// Most connections that have not requested an association yet.
@@ -59,6 +63,31 @@ impl Unassociated {
     }
 }
 
+/// The configuration of TLS handshakes that begin now.
+pub type TlsConfiguration = Arc<dyn Fn() -> Arc<ServerConfig> + Send + Sync>;
+
+/// The connection after the handshake; `None` if there is none in time.
+async fn handshake(
+    service: &Service,
+    stream: TcpStream,
+    tls: Arc<ServerConfig>,
+    displaced: &CancellationToken,
+) -> Option<TlsStream<TcpStream>> {
+    let made = tokio::select! {
+        made = timeout(REQUEST_WAIT, TlsAcceptor::from(tls).accept(stream)) => made,
+        () = displaced.cancelled() => return None,
+        () = service.closing.cancelled() => return None,
+    };
+    match made {
+        Ok(Ok(stream)) => Some(stream),
+        Ok(Err(error)) => {
+            tracing::info!(%error, "a TLS handshake for DICOM failed");
+            None
+        }
+        Err(_) => None,
+    }
+}
+
 /// The SCP: Verification and Storage.
 pub struct Listener(Arc<Service>);
 
@@ -90,8 +119,9 @@ impl Listener {
         }))
     }
 
-    /// Serves `listener` until the service shuts down; returns when all associations have ended.
-    pub async fn run(self, listener: TcpListener) {
+    /// Serves `listener` until the service shuts down; returns when all associations have ended. With `tls`,
+    /// connections begin with a handshake by the configuration that it returns.
+    pub async fn run(self, listener: TcpListener, tls: Option<TlsConfiguration>) {
         let service = self.0;
         let unassociated: Arc<Mutex<Unassociated>> = Arc::default();
         let mut connections = JoinSet::new();
@@ -117,31 +147,47 @@ impl Listener {
             };
             let (number, displaced) = enter(&unassociated);
             let (service, unassociated) = (service.clone(), unassociated.clone());
+            let tls = tls.as_ref().map(|current| current());
             connections.spawn(async move {
-                let connection = Connection {
-                    stream,
-                    peer,
-                    displaced,
-                };
                 let leave = || {
                     let table = unassociated.lock();
                     let mut table = table.unwrap_or_else(PoisonError::into_inner);
                     table.open.remove(&number);
                 };
-                serve(&service, connection, leave).await;
+                match tls {
+                    None => {
+                        let connection = Connection {
+                            stream,
+                            peer,
+                            displaced,
+                        };
+                        serve(&service, connection, leave).await;
+                    }
+                    Some(tls) => match handshake(&service, stream, tls, &displaced).await {
+                        Some(stream) => {
+                            let connection = Connection {
+                                stream,
+                                peer,
+                                displaced,
+                            };
+                            serve(&service, connection, leave).await;
+                        }
+                        None => service.observer.ended(AssociationEnd::Broken, false),
+                    },
+                }
                 leave();
             });
         }
         drop(listener);
         let grace = service.settings.grace;
         let ended = async { while connections.join_next().await.is_some() {} };
-        if tokio::time::timeout(grace.saturating_sub(LAST_WORDS), ended)
+        if timeout(grace.saturating_sub(LAST_WORDS), ended)
             .await
             .is_err()
         {
             service.ending.cancel();
             let ended = async { while connections.join_next().await.is_some() {} };
-            let _ = tokio::time::timeout(LAST_WORDS, ended).await;
+            let _ = timeout(LAST_WORDS, ended).await;
         }
     }
 }

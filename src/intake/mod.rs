@@ -46,7 +46,7 @@ mod session;
 mod wire;
 
 pub use gather::{GatherSettings, Gatherer, MakeError, VolumeMaker};
-pub use listener::Listener;
+pub use listener::{Listener, TlsConfiguration};
 pub use observer::{AssociationEnd, IntakeObserver};
 pub use receive::{Incoming, ReceiveError, Receiver, ReceiverSettings, Refused, Stated};
 pub use record::{

@@ -13,17 +13,17 @@ use tokio::net::TcpStream;
 use ventriform::config::Settings;
 
 /// An authority that signs certificates.
-struct Authority(CertifiedIssuer<'static, KeyPair>);
+pub struct Authority(CertifiedIssuer<'static, KeyPair>);
 
 impl Authority {
-    fn new() -> Self {
+    pub fn new() -> Self {
         let mut params = CertificateParams::default();
         params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
         Self(CertifiedIssuer::self_signed(params, KeyPair::generate().unwrap()).unwrap())
     }
 
     /// A certificate and its key as PEM.
-    fn sign(&self, names: &[&str], usage: ExtendedKeyUsagePurpose) -> (String, String) {
+    pub fn sign(&self, names: &[&str], usage: ExtendedKeyUsagePurpose) -> (String, String) {
         let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
         let mut params = CertificateParams::new(names).unwrap();
         let name = "workstation 4";
@@ -35,10 +35,15 @@ impl Authority {
     }
 
     /// Writes a certificate for the service into `folder`.
-    fn equip(&self, folder: &Path) {
+    pub fn equip(&self, folder: &Path) {
         let (certificate, key) = self.sign(&["127.0.0.1"], ExtendedKeyUsagePurpose::ServerAuth);
         std::fs::write(folder.join("cert.pem"), certificate).unwrap();
         std::fs::write(folder.join("key.pem"), key).unwrap();
+    }
+
+    /// Its own certificate as PEM.
+    pub fn pem(&self) -> String {
+        self.0.pem()
     }
 
     fn identity(&self) -> Identity {
@@ -57,7 +62,7 @@ impl Authority {
     }
 }
 
-fn file(folder: &Path, name: &str) -> ventriform::config::OptionalPath {
+pub fn file(folder: &Path, name: &str) -> ventriform::config::OptionalPath {
     folder.join(name).to_str().unwrap().parse().unwrap()
 }
 

@@ -10,9 +10,11 @@
 //! the extensions of each request as [`ClientCertificate`].
 //!
 //! A client that speaks plain HTTP gets a 400 in plain HTTP that says so.
+//!
+//! DICOM is served over TLS by the same means, with files of its own ([`Tls::of_dicom`]).
 
 use super::stall::WatchedStream;
-use crate::config::Settings;
+use crate::config::{OptionalPath, Settings};
 use crate::jobs::hex;
 use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer};
@@ -54,7 +56,7 @@ fn plain_http() -> String {
 #[derive(Debug, thiserror::Error)]
 pub enum TlsError {
     /// A setting is missing.
-    #[error("{0} is set without {1}; give both, or neither for plain HTTP")]
+    #[error("{0} is set without {1}; give both, or neither to do without TLS")]
     Incomplete(&'static str, &'static str),
     /// A file cannot be used.
     #[error("{setting}: {path}: {reason}")]
@@ -67,8 +69,8 @@ pub enum TlsError {
         reason: String,
     },
     /// The certificate and the key cannot be used together.
-    #[error("tls_cert and tls_key cannot be used: {0}")]
-    Pair(rustls::Error),
+    #[error("{0} and its key cannot be used together: {1}")]
+    Pair(&'static str, rustls::Error),
 }
 
 /// The TLS side of the service.
@@ -80,33 +82,83 @@ pub struct Tls {
 /// The files that the settings name.
 #[derive(Debug, Clone)]
 struct TlsFiles {
+    names: TlsNames,
     certificate: PathBuf,
     key: PathBuf,
     client_authorities: Option<PathBuf>,
+    /// Whether they are for DICOM, and not for HTTP.
+    dicom: bool,
+}
+
+/// The names of the settings that name the files.
+#[derive(Debug, Clone, Copy)]
+struct TlsNames {
+    certificate: &'static str,
+    key: &'static str,
+    client_authorities: &'static str,
 }
 
 /// Time and size of each file.
 type Versions = Vec<Option<(SystemTime, u64)>>;
 
 impl Tls {
-    /// Reads the files that the settings name; `None` if they ask for plain HTTP.
+    /// Reads the files that the settings name for HTTP; `None` if they ask for plain HTTP.
     ///
     /// # Errors
     /// If a setting is missing, or a file cannot be used.
     pub fn of(settings: &Settings) -> Result<Option<Arc<Self>>, TlsError> {
-        let given = |setting: &crate::config::OptionalPath| setting.0.clone();
-        let authorities = given(&settings.tls_client_ca);
-        let files = match (given(&settings.tls_cert), given(&settings.tls_key)) {
-            (None, None) if authorities.is_some() => {
-                return Err(TlsError::Incomplete("tls_client_ca", "tls_cert"));
+        let names = TlsNames {
+            certificate: "tls_cert",
+            key: "tls_key",
+            client_authorities: "tls_client_ca",
+        };
+        let given = [
+            &settings.tls_cert,
+            &settings.tls_key,
+            &settings.tls_client_ca,
+        ];
+        Self::of_files(names, given, false)
+    }
+
+    /// The same for DICOM. A caller without a certificate is refused in the handshake, if authorities for
+    /// them are named.
+    ///
+    /// # Errors
+    /// If a setting is missing, or a file cannot be used.
+    pub fn of_dicom(settings: &Settings) -> Result<Option<Arc<Self>>, TlsError> {
+        let names = TlsNames {
+            certificate: "dicom_tls_cert",
+            key: "dicom_tls_key",
+            client_authorities: "dicom_tls_client_ca",
+        };
+        let given = [
+            &settings.dicom_tls_cert,
+            &settings.dicom_tls_key,
+            &settings.dicom_tls_client_ca,
+        ];
+        Self::of_files(names, given, true)
+    }
+
+    fn of_files(
+        names: TlsNames,
+        given: [&OptionalPath; 3],
+        dicom: bool,
+    ) -> Result<Option<Arc<Self>>, TlsError> {
+        let [certificate, key, client_authorities] = given.map(|setting| setting.0.clone());
+        let files = match (certificate, key) {
+            (None, None) if client_authorities.is_some() => {
+                let without = names.certificate;
+                return Err(TlsError::Incomplete(names.client_authorities, without));
             }
             (None, None) => return Ok(None),
-            (Some(_), None) => return Err(TlsError::Incomplete("tls_cert", "tls_key")),
-            (None, Some(_)) => return Err(TlsError::Incomplete("tls_key", "tls_cert")),
+            (Some(_), None) => return Err(TlsError::Incomplete(names.certificate, names.key)),
+            (None, Some(_)) => return Err(TlsError::Incomplete(names.key, names.certificate)),
             (Some(certificate), Some(key)) => TlsFiles {
+                names,
                 certificate,
                 key,
-                client_authorities: authorities,
+                client_authorities,
+                dicom,
             },
         };
         // Taken before reading, so that a change in between is seen later.
@@ -121,6 +173,11 @@ impl Tls {
     /// Whether clients need a certificate.
     pub fn demands_certificates(&self) -> bool {
         self.files.client_authorities.is_some()
+    }
+
+    /// What a handshake that begins now goes by.
+    pub fn config(&self) -> Arc<ServerConfig> {
+        self.lock().0.clone()
     }
 
     /// The handshake; `None` after answering a client that speaks plain HTTP.
@@ -140,8 +197,10 @@ impl Tls {
             tokio::io::copy(&mut stream, &mut tokio::io::sink()).await?;
             return Ok(None);
         }
-        let config = self.lock().0.clone();
-        TlsAcceptor::from(config).accept(stream).await.map(Some)
+        TlsAcceptor::from(self.config())
+            .accept(stream)
+            .await
+            .map(Some)
     }
 
     /// Reads the files again when they change and on SIGHUP, until `shutdown`.
@@ -206,34 +265,37 @@ impl TlsFiles {
             reason,
         };
         let chain = certificates(&self.certificate)
-            .map_err(|reason| unusable("tls_cert", &self.certificate, reason))?;
+            .map_err(|reason| unusable(self.names.certificate, &self.certificate, reason))?;
         let key = PrivateKeyDer::from_pem_file(&self.key)
-            .map_err(|error| unusable("tls_key", &self.key, error.to_string()))?;
+            .map_err(|error| unusable(self.names.key, &self.key, error.to_string()))?;
+        let pair = |error| TlsError::Pair(self.names.certificate, error);
         let provider = Arc::new(rustls::crypto::ring::default_provider());
         let builder = ServerConfig::builder_with_provider(provider.clone())
             .with_protocol_versions(&[&rustls::version::TLS13, &rustls::version::TLS12])
-            .map_err(TlsError::Pair)?;
+            .map_err(pair)?;
         let builder = match &self.client_authorities {
             None => builder.with_no_client_auth(),
             Some(path) => {
-                let wrong = |reason| unusable("tls_client_ca", path, reason);
+                let wrong = |reason| unusable(self.names.client_authorities, path, reason);
                 let mut authorities = RootCertStore::empty();
                 for certificate in certificates(path).map_err(wrong)? {
                     let added = authorities.add(certificate);
                     added.map_err(|error| wrong(error.to_string()))?;
                 }
-                let verifier =
-                    WebPkiClientVerifier::builder_with_provider(authorities.into(), provider)
-                        .allow_unauthenticated()
-                        .build()
-                        .map_err(|error| wrong(error.to_string()))?;
+                let mut verifier =
+                    WebPkiClientVerifier::builder_with_provider(authorities.into(), provider);
+                if !self.dicom {
+                    verifier = verifier.allow_unauthenticated();
+                }
+                let verifier = verifier.build();
+                let verifier = verifier.map_err(|error| wrong(error.to_string()))?;
                 builder.with_client_cert_verifier(verifier)
             }
         };
-        let mut config = builder
-            .with_single_cert(chain, key)
-            .map_err(TlsError::Pair)?;
-        config.alpn_protocols = vec![b"http/1.1".to_vec()];
+        let mut config = builder.with_single_cert(chain, key).map_err(pair)?;
+        if !self.dicom {
+            config.alpn_protocols = vec![b"http/1.1".to_vec()];
+        }
         Ok(config)
     }
 }
