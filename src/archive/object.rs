@@ -15,24 +15,28 @@ pub struct ArchiveObject {
     pub instance: String,
     /// Study Instance UID.
     pub study: String,
+    /// Series Instance UID.
+    pub series: String,
 }
 
 impl ArchiveObject {
     /// The object in a file that this program has made; `None` if it lacks an identifier.
     pub fn of(bytes: Vec<u8>) -> Option<Self> {
         let file = OpenFileOptions::new()
-            .read_until(tags::SERIES_INSTANCE_UID)
+            .read_until(tags::STUDY_ID)
             .from_reader(bytes.as_slice())
             .ok()?;
         let trimmed = |uid: &str| uid.trim_end_matches(['\0', ' ']).to_owned();
         let class = trimmed(file.meta().media_storage_sop_class_uid());
         let instance = trimmed(file.meta().media_storage_sop_instance_uid());
         let study = uid(&file, tags::STUDY_INSTANCE_UID)?;
+        let series = uid(&file, tags::SERIES_INSTANCE_UID)?;
         Some(Self {
             bytes,
             class,
             instance,
             study,
+            series,
         })
     }
 }

@@ -23,6 +23,7 @@ pub use units::{
 use crate::archive::Archives;
 use crate::hooks::AllowList;
 use crate::intake::{AeTitle, Rule, Sender};
+use crate::worklist::Procedure;
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::net::SocketAddr;
@@ -337,6 +338,9 @@ settings! {
     /// `calling_ae`, `study_description` (what is absent matches anything), `kind`, `parameters`,
     /// `send` and `to`. The first rule that matches counts
     rules: Tables<Rule> = "[]";
+    /// The work items (UPS) that the service performs itself: tables `[[procedures]]` with `code` and
+    /// `scheme` of the Scheduled Workitem Code, `archive`, `kind`, `parameters`, `send`, `to` and `tenant`
+    procedures: Tables<Procedure> = "[]";
 
     ["Retention"]
     /// Age at which volumes, results and finished jobs are erased, unless one of the three settings
@@ -682,6 +686,7 @@ shown_by_display!(
     OptionalAddress,
     OptionalPath,
     Tables<Rule>,
+    Tables<Procedure>,
     Tables<Sender>,
     String,
     usize,

@@ -17,6 +17,7 @@ use crate::jobs::{FigureStore, Holding, Queue, Resource, RetentionAges};
 use crate::work::Engine;
 use crate::worklist::Worklist;
 use std::sync::Arc;
+use tokio::sync::Notify;
 use tokio_util::sync::CancellationToken;
 
 /// The ages at which the operator lets things be erased.
@@ -43,6 +44,8 @@ pub struct Shared {
     pub access: Arc<dyn AccessStore>,
     /// Work items of other systems.
     pub worklist: Arc<dyn Worklist>,
+    /// Told when an item is scheduled or changed.
+    pub scheduled: Notify,
     /// Tells and limits callers.
     pub guard: Guard,
     /// The operator's settings.
@@ -97,6 +100,7 @@ impl App {
             engine,
             access,
             worklist,
+            scheduled: Notify::new(),
             guard,
             decoding: Decoding::new(&settings, watching.metrics.requests.decoding_waits.clone()),
             answers: KeptAnswers::new(

@@ -64,6 +64,7 @@ mod observe;
 mod openapi;
 mod originals;
 mod pagination;
+mod performer;
 mod problem;
 mod products;
 mod readers;

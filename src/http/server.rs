@@ -12,6 +12,7 @@ use super::hooks::Hooks;
 use super::intake::{self, Intake};
 use super::job_watch::JobWatch;
 use super::metrics::Metrics;
+use super::performer;
 use super::router::router;
 use super::scans;
 use super::spans::{OtlpError, Spans};
@@ -212,6 +213,7 @@ pub async fn start(
     };
     tokio::spawn(custodian.run(closing.clone()));
     tokio::spawn(gatherer(&app).run(closing.clone()));
+    tokio::spawn(performer::run(app.clone(), closing.clone()));
     let dicom_address = dicom.as_ref().map(|dicom| dicom.address);
     let dicom = dicom.map(|dicom| serve_dicom(&app, dicom, dicom_tls));
     let dicom = dicom.transpose()?;

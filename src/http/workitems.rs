@@ -101,6 +101,7 @@ pub async fn create_workitem(
             .fix("Set `job_retention`, so that ended items are deleted."));
         }
     }
+    app.scheduled.notify_one();
     let location = [(header::LOCATION, path(&uid))];
     let warning = completed.then(|| {
         let text = "The Workitem was created with modifications.";
@@ -217,6 +218,8 @@ pub async fn update_workitem(
         Ok(Change::Done)
     })
     .await?;
+    // It may be ready now.
+    app.scheduled.notify_one();
     Ok(StatusCode::OK.into_response())
 }
 
@@ -328,16 +331,21 @@ async fn find(app: &App, caller: &Caller, uid: &str) -> Answer<Workitem> {
     })
 }
 
-/// The time, also as DICOM writes it (DT, UTC).
+/// The time, also as DICOM writes it.
 fn now(app: &App) -> (Timestamp, String) {
     let now = app.queue.clock.now();
-    let text = rfc3339(now);
-    let digits = text.chars().take(19).filter(char::is_ascii_digit);
-    (now, digits.collect::<String>() + "+0000")
+    (now, dicom_time(now))
 }
 
-/// A UID of its own for a new item: a UUID under 2.25 (PS3.5 B.2).
-fn new_uid() -> String {
+/// A moment as DICOM writes it (DT, UTC).
+pub fn dicom_time(moment: Timestamp) -> String {
+    let text = rfc3339(moment);
+    let digits = text.chars().take(19).filter(char::is_ascii_digit);
+    digits.collect::<String>() + "+0000"
+}
+
+/// A new UID: a UUID under 2.25 (PS3.5 B.2).
+pub fn new_uid() -> String {
     let number = u128::from_str_radix(&random_id(""), 16).unwrap_or_default();
     format!("2.25.{number}")
 }

@@ -47,12 +47,13 @@ impl Worklist for SqliteStore {
 
     async fn change_workitem(&self, item: &Workitem) -> StoreResult<bool> {
         let changed = sqlx::query(
-            "UPDATE workitems SET state = ?, transaction_uid = ?, attributes = ?, changed_at = ?,
-                 revision = revision + 1
+            "UPDATE workitems SET state = ?, transaction_uid = ?, performer = ?, attributes = ?,
+                 changed_at = ?, revision = revision + 1
              WHERE tenant = ? AND uid = ? AND revision = ?",
         )
         .bind(item.state.as_str())
         .bind(&item.transaction)
+        .bind(&item.performer)
         .bind(to_json(item.attributes.object())?)
         .bind(item.changed_at)
         .bind(item.tenant.as_str())
@@ -84,6 +85,28 @@ impl Worklist for SqliteStore {
         rows::all(rows, item_of)
     }
 
+    async fn scheduled_workitems(&self, after: i64, limit: u32) -> StoreResult<Vec<Workitem>> {
+        let rows = sqlx::query(
+            "SELECT * FROM workitems WHERE state = 'SCHEDULED' AND sequence > ?
+             ORDER BY sequence LIMIT ?",
+        )
+        .bind(after)
+        .bind(limit)
+        .fetch_all(&self.readers)
+        .await?;
+        rows::all(rows, item_of)
+    }
+
+    async fn performed_workitems(&self) -> StoreResult<Vec<Workitem>> {
+        let rows = sqlx::query(
+            "SELECT * FROM workitems WHERE state = 'IN PROGRESS' AND performer IS NOT NULL
+             ORDER BY sequence",
+        )
+        .fetch_all(&self.readers)
+        .await?;
+        rows::all(rows, item_of)
+    }
+
     async fn delete_ended_workitems(&self, before: Timestamp) -> StoreResult<u64> {
         sqlx::query(
             "DELETE FROM workitems
@@ -106,6 +129,7 @@ fn item_of(row: SqliteRow) -> StoreResult<Workitem> {
         revision: row.try_get("revision")?,
         state: WorkitemState::parse(state).ok_or_else(|| damaged(state.to_owned()))?,
         transaction: row.try_get("transaction_uid")?,
+        performer: row.try_get("performer")?,
         attributes: attributes.map_err(|error| damaged(error.to_string()))?,
         changed_at: row.try_get("changed_at")?,
     })

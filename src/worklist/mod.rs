@@ -11,17 +11,23 @@
 //! 3. [`Workitem::update`]: replaces attributes, such as progress.
 //! 4. [`Workitem::request_cancel`]: cancels a scheduled item; asks the performer of a claimed one.
 //! 5. `query`: which items match a search.
+//! 6. [`Procedure`]: which items this service performs itself. It claims them ([`Workitem::claim`]), and
+//!    ends them with what was made ([`Workitem::complete`]) or with a reason ([`Workitem::give_up`]).
 //!
 //! Guaranteed: an item that has ended never changes again, and the Transaction UID is never shown.
 //!
 //! Not done: subscriptions and event reports, which need a second connection to the client.
 
 mod dataset;
+mod perform;
+mod procedure;
 mod query;
 mod storage;
 mod workitem;
 
 pub use dataset::{DataSetJson, Malformed};
+pub use perform::WorkOutputObject;
+pub use procedure::Procedure;
 pub use query::{Matching, QueryError};
 pub use storage::{AddedWorkitem, Worklist};
 pub use workitem::{Change, Refusal, Workitem, WorkitemState};

@@ -38,6 +38,12 @@ pub trait Worklist: Send + Sync + 'static {
         limit: u32,
     ) -> StoreResult<Vec<Workitem>>;
 
+    /// At most `limit` scheduled items of all tenants after position `after`, oldest first.
+    async fn scheduled_workitems(&self, after: i64, limit: u32) -> StoreResult<Vec<Workitem>>;
+
+    /// The items that this service has claimed and not ended.
+    async fn performed_workitems(&self) -> StoreResult<Vec<Workitem>>;
+
     /// Deletes the items that ended before that moment. Returns how many.
     async fn delete_ended_workitems(&self, before: Timestamp) -> StoreResult<u64>;
 }

@@ -9,9 +9,9 @@ const SOP_INSTANCE: &str = "00080018";
 const TRANSACTION: &str = "00081195";
 const STATE: &str = "00741000";
 const PRIORITY: &str = "00741200";
-const PROGRESS: &str = "00741002";
+pub(super) const PROGRESS: &str = "00741002";
 const LABEL: &str = "00741204";
-const PERFORMED: &str = "00741216";
+pub(super) const PERFORMED: &str = "00741216";
 const READINESS: &str = "00404041";
 const CANCELLED_AT: &str = "00404052";
 const MODIFIED_AT: &str = "00404010";
@@ -132,6 +132,8 @@ pub struct Workitem {
     pub state: WorkitemState,
     /// The Transaction UID under which it was claimed.
     pub transaction: Option<String>,
+    /// If this service has claimed it: the job that does the work, empty until that is filed.
+    pub performer: Option<String>,
     /// All attributes but the Transaction UID.
     pub attributes: DataSetJson,
     /// When it was last changed.
@@ -211,6 +213,7 @@ impl Workitem {
             revision: 0,
             state: WorkitemState::Scheduled,
             transaction: None,
+            performer: None,
             attributes,
             changed_at: 0,
         };
@@ -348,7 +351,7 @@ impl Workitem {
     }
 
     /// Notes state and time in the attributes. `now` is the time, also as DICOM writes it (DT).
-    fn stamp(&mut self, (now, text): (Timestamp, &str)) {
+    pub(super) fn stamp(&mut self, (now, text): (Timestamp, &str)) {
         self.attributes.put(STATE, "CS", self.state.as_str());
         self.attributes.put(MODIFIED_AT, "DT", text);
         self.changed_at = now;

@@ -3,6 +3,9 @@
 use crate::dicom::{JANE, nm};
 use crate::fake_archive::{FakeArchive, FakeScp, Fault, implicit};
 use crate::helpers::{TestApp, fake_engine, problem, sphere, text};
+use crate::scu::Scu;
+use crate::tls::{Authority, file as pem};
+use rcgen::ExtendedKeyUsagePurpose;
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -632,4 +635,224 @@ async fn an_old_archive_takes_objects_by_c_store() {
         assert_eq!(titles, "VENTRIFORM -> OLD");
         assert_eq!(implicit(&data_set), implicit(&offered));
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn objects_go_over_tls_from_and_to_those_who_are_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let (hospital, stranger) = (Authority::new(), Authority::new());
+    hospital.equip(folder.path());
+    let write = |name: &str, text: String| std::fs::write(folder.path().join(name), text).unwrap();
+    write("ca.pem", hospital.pem());
+    write("stranger.pem", stranger.pem());
+    let (certificate, key) = hospital.sign(&["client"], ExtendedKeyUsagePurpose::ClientAuth);
+    write("own.pem", certificate);
+    write("own.key", key);
+    let data = Arc::new(tempfile::tempdir().unwrap());
+    let receiver = TestApp::on(data, engine(), |settings| {
+        settings.dicom_listen = "127.0.0.1:0".parse().unwrap();
+        settings.dicom_tls_cert = pem(folder.path(), "cert.pem");
+        settings.dicom_tls_key = pem(folder.path(), "key.pem");
+        settings.dicom_tls_client_ca = pem(folder.path(), "ca.pem");
+    })
+    .await;
+    let address = receiver.running.as_ref().unwrap().dicom_address().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let own = [
+        ("dicom_cert_file", path("own.pem")),
+        ("dicom_key_file", path("own.key")),
+    ];
+    let (app, _) = real(|settings| {
+        settings.archive_backoff = "50ms".parse().unwrap();
+        for (name, authority, own) in [
+            ("known", "ca.pem", &own[..]),
+            ("nameless", "ca.pem", &[]),
+            ("doubted", "stranger.pem", &own[..]),
+        ] {
+            let address = address.to_string();
+            let authority = path(authority);
+            let mut entry = vec![
+                ("name", name),
+                ("dicom", &address),
+                ("ae_title", "VENTRIFORM"),
+                ("dicom_ca_file", &authority),
+            ];
+            entry.extend(own.iter().map(|(key, file)| (*key, file.as_str())));
+            settings.archives.0.push(archive(&entry, &[]));
+        }
+    })
+    .await;
+    let job = sending(&app, &["mask.dcm"], "known").await;
+    let job = sent(&app, &job, "delivered").await;
+    assert_eq!(outcomes(&job), ["stored"]);
+    let received = receiver.json("/v1/intake").await;
+    assert_eq!(received["intake"].as_array().unwrap().len(), 1);
+
+    // Neither without a certificate, nor to a certificate of another authority, nor without TLS.
+    for name in ["nameless", "doubted"] {
+        let job = sending(&app, &["mask.dcm"], name).await;
+        let deadline = Instant::now() + Duration::from_secs(60);
+        let delivery = loop {
+            let job = app.json(&text(&job["links"]["self"])).await;
+            let delivery = job["deliveries"][0].clone();
+            if delivery["attempts"].as_u64() >= Some(2) {
+                break delivery;
+            }
+            assert!(Instant::now() < deadline, "{job}");
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        };
+        assert_eq!(delivery["state"], "pending", "{name}: {delivery}");
+        if name == "doubted" {
+            assert!(text(&delivery["last_error"]).contains("TLS"), "{delivery}");
+        }
+    }
+    let plain =
+        tokio::task::spawn_blocking(move || Scu::call(address, "CAMERA", "VENTRIFORM").err());
+    assert!(plain.await.unwrap().is_some());
+}
+
+#[tokio::test]
+async fn who_erases_whose_scan_it_is_erases_its_uids_in_jobs() {
+    for whole in [false, true] {
+        let (app, _) = real(|_| {}).await;
+        let job = sending(&app, &["mesh.dcm"], "pacs").await;
+        let job = sent(&app, &job, "delivered").await;
+        assert_eq!(job["source"]["study"], JANE.study);
+        let volume = text(&job["links"]["volume"]);
+        let erased = match whole {
+            true => volume.clone(),
+            false => format!("{volume}/identity"),
+        };
+        let erased = app.delete(&erased).send().await.unwrap();
+        assert!(erased.status().is_success());
+        let source = app.json(&text(&job["links"]["self"])).await["source"].clone();
+        assert_eq!(source["archive"], "pacs");
+        assert_eq!(
+            (&source["study"], &source["series"]),
+            (&Value::Null, &Value::Null)
+        );
+        let jobs = app.json("/v1/jobs").await.to_string();
+        assert!(!jobs.contains(JANE.study), "{jobs}");
+    }
+}
+
+const WORKITEMS: &str = "/dicom-web/workitems";
+
+/// Schedules work on a series of the patient; returns the item's path.
+async fn scheduled(app: &TestApp, code: &str, series: &str) -> String {
+    let text = |vr: &str, value: &str| json!({"vr": vr, "Value": [value]});
+    let body = json!([{
+        "00741000": text("CS", "SCHEDULED"),
+        "00404041": text("CS", "READY"),
+        "00404018": {"vr": "SQ", "Value": [{
+            "00080100": text("SH", code),
+            "00080102": text("SH", "99TEST"),
+            "00080104": text("LO", "Model of the left ventricle"),
+        }]},
+        "00404021": {"vr": "SQ", "Value": [{
+            "0040E020": text("CS", "DICOM"),
+            "0020000D": text("UI", JANE.study),
+            "0020000E": text("UI", series),
+        }]},
+    }]);
+    let request = app
+        .post(WORKITEMS)
+        .header("content-type", "application/dicom+json");
+    let answer = request.body(body.to_string()).send().await.unwrap();
+    assert_eq!(answer.status(), 201);
+    answer.headers()["location"].to_str().unwrap().to_owned()
+}
+
+/// Waits until an item is in that state; returns it.
+async fn becomes(app: &TestApp, path: &str, state: &str) -> Value {
+    let deadline = Instant::now() + Duration::from_secs(120);
+    loop {
+        let item = app.json(path).await[0].clone();
+        if item["00741000"]["Value"][0] == state {
+            return item;
+        }
+        assert!(Instant::now() < deadline, "not {state}: {item}");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+}
+
+fn performing(settings: &mut Settings) {
+    let procedures = r#"[{ code = "LVMODEL", scheme = "99TEST", archive = "pacs", kind = "model",
+        parameters = { points = 60 }, send = ["mesh.dcm", "mask.dcm"] }]"#;
+    settings.procedures = procedures.replace('\n', " ").parse().unwrap();
+}
+
+#[tokio::test]
+async fn work_items_with_the_code_of_a_procedure_are_performed() {
+    let (app, fake) = real(performing).await;
+    let other = scheduled(&app, "OTHER", "1.2.3").await;
+    let path = scheduled(&app, "LVMODEL", "1.2.3").await;
+    let item = becomes(&app, &path, "COMPLETED").await;
+    let performed = &item["00741216"]["Value"][0];
+    let outputs = performed["00404033"]["Value"].as_array().unwrap();
+    let mut named: Vec<String> = outputs
+        .iter()
+        .map(|output| {
+            assert_eq!(output["0020000D"]["Value"][0], JANE.study);
+            let url = text(&output["0040E025"]["Value"][0]["00081190"]["Value"][0]);
+            assert!(
+                url.starts_with(&format!("{}/studies/{}", fake.url, JANE.study)),
+                "{url}"
+            );
+            text(&output["00081199"]["Value"][0]["00081155"]["Value"][0])
+        })
+        .collect();
+    named.sort();
+    assert_eq!(named, fake.stored().0.into_keys().collect::<Vec<_>>());
+    assert_eq!(
+        performed["00404019"]["Value"][0]["00080100"]["Value"][0],
+        "LVMODEL"
+    );
+    let progress = &item["00741002"]["Value"][0];
+    assert_eq!(progress["00741004"]["Value"][0], "100");
+    becomes(&app, &other, "SCHEDULED").await;
+
+    // What cannot be done is given up with the reason.
+    fake.fail(&[Fault::Status(404)]);
+    let path = scheduled(&app, "LVMODEL", "1.2.4").await;
+    let item = becomes(&app, &path, "CANCELED").await;
+    let reason = text(&item["00741002"]["Value"][0]["00741238"]["Value"][0]);
+    assert!(!reason.is_empty());
+    let path = scheduled(&app, "LVMODEL", "").await;
+    let item = becomes(&app, &path, "CANCELED").await;
+    let reason = text(&item["00741002"]["Value"][0]["00741238"]["Value"][0]);
+    assert!(reason.contains("Series Instance UID"), "{reason}");
+
+    // Who asks to cancel it ends the job.
+    fake.fail(&vec![Fault::Status(503); 1000]);
+    let path = scheduled(&app, "LVMODEL", "1.2.5").await;
+    becomes(&app, &path, "IN PROGRESS").await;
+    let answer = app.post(&format!("{path}/cancelrequest")).send().await;
+    assert_eq!(answer.unwrap().status(), 202);
+    becomes(&app, &path, "CANCELED").await;
+}
+
+#[tokio::test]
+async fn a_work_item_is_performed_once_across_a_restart() {
+    let (app, fake) = real(performing).await;
+    fake.fail_storing(&vec![Fault::Status(503); 1000]);
+    let path = scheduled(&app, "LVMODEL", "1.2.3").await;
+    becomes(&app, &path, "IN PROGRESS").await;
+    let claim = json!([{"00741000": {"vr": "CS", "Value": ["IN PROGRESS"]},
+                        "00081195": {"vr": "UI", "Value": ["9.9"]}}]);
+    let request = app.client.put(format!("{}{path}/state", app.url));
+    let request = request.header("content-type", "application/dicom+json");
+    let answer = request.body(claim.to_string()).send().await.unwrap();
+    problem(answer, 409, "workitem-state").await;
+    let data = app.stop().await;
+    fake.recover();
+    let app = TestApp::on(data, engine(), |settings| {
+        set(settings, &fake);
+        performing(settings);
+    })
+    .await;
+    becomes(&app, &path, "COMPLETED").await;
+    let jobs = app.json("/v1/jobs").await;
+    assert_eq!(jobs["jobs"].as_array().unwrap().len(), 1, "{jobs}");
+    assert_eq!(fake.stored().1, 2);
 }

@@ -153,7 +153,10 @@ const USES: &[(&str, &[&str])] = &[
             "jobs",
         ],
     ),
-    ("config", &["jobs", "hooks", "archive", "intake"]),
+    (
+        "config",
+        &["jobs", "hooks", "archive", "intake", "worklist"],
+    ),
     (
         "http",
         &[

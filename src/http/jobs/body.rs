@@ -103,10 +103,10 @@ struct SourceBody {
     /// Base URL of its DICOMweb service, if no archive is configured for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     dicomweb: Option<String>,
-    /// Study Instance UID.
-    study: String,
-    /// Series Instance UID.
-    series: String,
+    /// Study Instance UID; `null` after the volume, or whose scan it is, was erased.
+    study: Option<String>,
+    /// Series Instance UID; `null` likewise.
+    series: Option<String>,
     /// `pending`, `fetched`, or `failed`.
     #[schema(example = "fetched")]
     state: &'static str,
@@ -208,8 +208,8 @@ impl SourceBody {
             last_error: pull.and_then(|pull| pull.last_error.clone()),
             archive: source.archive,
             dicomweb: source.dicomweb,
-            study: source.study,
-            series: source.series,
+            study: Some(source.study).filter(|uid| !uid.is_empty()),
+            series: Some(source.series).filter(|uid| !uid.is_empty()),
         }
     }
 }

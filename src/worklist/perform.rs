@@ -1,0 +1,218 @@
+//! Performing a work item: claim, progress, result, giving up.
+
+use super::dataset::DataSetJson;
+use super::procedure::WORK;
+use super::workitem::{PERFORMED, PROGRESS, Refusal, Workitem, WorkitemState};
+use crate::jobs::Timestamp;
+use serde_json::{Map, Value, json};
+
+const STEP_PROGRESS: &str = "00741004";
+const CANCELLED_AT: &str = "00404052";
+const REASON: &str = "00741238";
+
+/// An object that was made and stored in an archive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WorkOutputObject {
+    /// SOP Class UID.
+    pub class: String,
+    /// SOP Instance UID.
+    pub instance: String,
+    /// Study Instance UID.
+    pub study: String,
+    /// Series Instance UID.
+    pub series: String,
+    /// Base URL of the archive's DICOMweb service.
+    pub dicomweb: Option<String>,
+    /// AE title of the archive.
+    pub ae_title: Option<String>,
+}
+
+impl Workitem {
+    /// Claims the item for this service under a Transaction UID that nobody else knows.
+    ///
+    /// # Errors
+    /// [`Refusal::State`] if it is not scheduled.
+    pub fn claim(&mut self, transaction: &str, now: (Timestamp, &str)) -> Result<(), Refusal> {
+        self.change_state(Some(transaction), WorkitemState::InProgress, now)?;
+        self.performer = Some(String::new());
+        Ok(())
+    }
+
+    /// Whether somebody has asked to cancel it since it was claimed.
+    pub fn is_to_be_cancelled(&self) -> bool {
+        let mut progress = self.attributes.items(PROGRESS);
+        progress.any(|item| item.contains_key(CANCELLED_AT))
+    }
+
+    /// Notes the progress of the work, 0 to 100. Returns whether that is news.
+    pub fn note_progress(&mut self, percent: u8, now: (Timestamp, &str)) -> bool {
+        let mut progress = self.progress();
+        let percent = percent.to_string();
+        if progress.text(STEP_PROGRESS) == Some(percent.as_str()) {
+            return false;
+        }
+        progress.put(STEP_PROGRESS, "DS", &percent);
+        self.put_progress(progress, now);
+        true
+    }
+
+    /// Completes the item, of which the work began at `began` (DT): what was made is its output.
+    ///
+    /// # Errors
+    /// [`Refusal`] if it is not claimed.
+    pub fn complete(
+        &mut self,
+        began: &str,
+        outputs: &[WorkOutputObject],
+        now: (Timestamp, &str),
+    ) -> Result<(), Refusal> {
+        let station = json!({
+            "00080100": {"vr": "SH", "Value": ["VENTRIFORM"]},
+            "00080102": {"vr": "SH", "Value": ["99VENTRIFORM"]},
+            "00080104": {"vr": "LO", "Value": ["ventriform"]},
+        });
+        let code: Vec<_> = self.attributes.items(WORK).cloned().collect();
+        let outputs: Vec<Value> = outputs.iter().map(output).collect();
+        let performed = json!({
+            "00404028": {"vr": "SQ", "Value": [station]},
+            "00404050": {"vr": "DT", "Value": [began]},
+            "00404019": {"vr": "SQ", "Value": code},
+            "00404051": {"vr": "DT", "Value": [now.1]},
+            "00404033": {"vr": "SQ", "Value": outputs},
+        });
+        let Value::Object(performed) = performed else {
+            return Ok(());
+        };
+        self.note_progress(100, now);
+        self.attributes.put_item(PERFORMED, performed);
+        let transaction = self.transaction.clone();
+        self.change_state(transaction.as_deref(), WorkitemState::Completed, now)?;
+        Ok(())
+    }
+
+    /// Gives the item up for that reason, unless somebody who wanted it cancelled gave one.
+    ///
+    /// # Errors
+    /// [`Refusal`] if it is not claimed.
+    pub fn give_up(&mut self, reason: &str, now: (Timestamp, &str)) -> Result<(), Refusal> {
+        let mut progress = self.progress();
+        if !progress.has(CANCELLED_AT) {
+            progress.put(CANCELLED_AT, "DT", now.1);
+            progress.put(REASON, "LT", reason);
+        }
+        self.put_progress(progress, now);
+        let transaction = self.transaction.clone();
+        self.change_state(transaction.as_deref(), WorkitemState::Canceled, now)?;
+        Ok(())
+    }
+
+    fn progress(&self) -> DataSetJson {
+        let known: Option<Map<String, Value>> = self.attributes.items(PROGRESS).next().cloned();
+        DataSetJson::of(known.unwrap_or_default()).unwrap_or_default()
+    }
+
+    fn put_progress(&mut self, progress: DataSetJson, now: (Timestamp, &str)) {
+        self.attributes
+            .put_item(PROGRESS, progress.object().clone());
+        self.stamp(now);
+    }
+}
+
+/// An item of the Output Information Sequence.
+fn output(object: &WorkOutputObject) -> Value {
+    let mut item = json!({
+        "0040E020": {"vr": "CS", "Value": ["DICOM"]},
+        "0020000D": {"vr": "UI", "Value": [object.study]},
+        "0020000E": {"vr": "UI", "Value": [object.series]},
+        "00081199": {"vr": "SQ", "Value": [{
+            "00081150": {"vr": "UI", "Value": [object.class]},
+            "00081155": {"vr": "UI", "Value": [object.instance]},
+        }]},
+    });
+    if let Some(title) = &object.ae_title {
+        let retrieval = json!({"00080054": {"vr": "AE", "Value": [title]}});
+        item["0040E021"] = json!({"vr": "SQ", "Value": [retrieval]});
+    }
+    if let Some(base) = &object.dicomweb {
+        let (study, series) = (&object.study, &object.series);
+        let url = format!("{base}/studies/{study}/series/{series}");
+        let retrieval = json!({"00081190": {"vr": "UR", "Value": [url]}});
+        item["0040E025"] = json!({"vr": "SQ", "Value": [retrieval]});
+    }
+    item
+}
+
+#[cfg(test)]
+#[allow(
+    clippy::unwrap_used,
+    reason = "tests state their expectations by panicking"
+)]
+mod tests {
+    use super::*;
+    use crate::jobs::Tenant;
+
+    const NOW: (Timestamp, &str) = (7, "20261123050000+0000");
+
+    fn claimed() -> Workitem {
+        let set = json!({"00741000": {"vr": "CS", "Value": ["SCHEDULED"]},
+            "00404018": {"vr": "SQ", "Value": [{"00080100": {"vr": "SH", "Value": ["LVSEG"]}}]}});
+        let set = DataSetJson::of(set.as_object().unwrap().clone()).unwrap();
+        let (mut item, _) = Workitem::create(&Tenant::default(), "1.2", set, NOW).unwrap();
+        item.claim("9.9", NOW).unwrap();
+        item
+    }
+
+    #[test]
+    fn an_item_is_claimed_once_and_completed_with_its_outputs() {
+        let mut item = claimed();
+        assert_eq!(item.performer.as_deref(), Some(""));
+        assert!(item.claim("9.8", NOW).is_err());
+        assert!(item.note_progress(40, NOW));
+        assert!(!item.note_progress(40, NOW));
+        let object = WorkOutputObject {
+            class: "1.1".into(),
+            instance: "1.2".into(),
+            study: "1.3".into(),
+            series: "1.4".into(),
+            dicomweb: Some("http://pacs/dicom-web".into()),
+            ae_title: None,
+        };
+        item.complete("20261123045900+0000", &[object], NOW)
+            .unwrap();
+        assert_eq!(item.state, WorkitemState::Completed);
+        let performed = item.attributes.items(PERFORMED).next().unwrap();
+        assert_eq!(performed["00404050"]["Value"][0], "20261123045900+0000");
+        assert_eq!(
+            performed["00404019"]["Value"][0]["00080100"]["Value"][0],
+            "LVSEG"
+        );
+        let output = &performed["00404033"]["Value"][0];
+        assert_eq!(
+            output["00081199"]["Value"][0]["00081155"]["Value"][0],
+            "1.2"
+        );
+        let url = &output["0040E025"]["Value"][0]["00081190"]["Value"][0];
+        assert_eq!(url, "http://pacs/dicom-web/studies/1.3/series/1.4");
+        assert_eq!(item.progress().text(STEP_PROGRESS), Some("100"));
+    }
+
+    #[test]
+    fn what_is_given_up_says_why() {
+        let mut item = claimed();
+        assert!(!item.is_to_be_cancelled());
+        item.give_up("There is no such series.", NOW).unwrap();
+        assert_eq!(item.state, WorkitemState::Canceled);
+        assert_eq!(
+            item.progress().text(REASON),
+            Some("There is no such series.")
+        );
+        // Who asked for it has said why.
+        let mut item = claimed();
+        let reason = json!({"00741238": {"vr": "LT", "Value": ["wrong patient"]}});
+        let reason = DataSetJson::of(reason.as_object().unwrap().clone()).unwrap();
+        item.request_cancel(&reason, NOW).unwrap();
+        assert!(item.is_to_be_cancelled());
+        item.give_up("The job was cancelled.", NOW).unwrap();
+        assert_eq!(item.progress().text(REASON), Some("wrong patient"));
+    }
+}
