@@ -179,7 +179,7 @@ pub trait ArchiveStore: Send + Sync + 'static {
 
     /// Makes an ended delivery pending again, due at once. Returns it as it is then; `None` if
     /// that job has no such delivery, or its result was erased.
-    async fn send_again(
+    async fn redeliver_object(
         &self,
         tenant: &Tenant,
         job: &str,

@@ -321,7 +321,7 @@ pub async fn redeliver(
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let now = app.queue.clock.now();
     if delivery.starts_with(OBJECT_PREFIX) {
-        return send_again(&app, &caller, &id, &delivery, now).await;
+        return redeliver_object(&app, &caller, &id, &delivery, now).await;
     }
     let store = &app.hooks.store;
     let found = store.redeliver(&caller.tenant, &id, &delivery, now).await?;
@@ -336,9 +336,15 @@ pub async fn redeliver(
 }
 
 /// Sends a DICOM object to its archive again.
-async fn send_again(app: &App, caller: &Caller, job: &str, id: &str, now: Timestamp) -> Answer {
+async fn redeliver_object(
+    app: &App,
+    caller: &Caller,
+    job: &str,
+    id: &str,
+    now: Timestamp,
+) -> Answer {
     let store = &app.archives.store;
-    let found = store.send_again(&caller.tenant, job, id, now).await?;
+    let found = store.redeliver_object(&caller.tenant, job, id, now).await?;
     let list = format!("GET /v1/jobs/{}", shorten(job));
     let found = found.ok_or_else(|| nothing_here("delivery", id, &list))?;
     app.archives.woken.notify_one();

@@ -282,7 +282,7 @@ impl ArchiveStore for SqliteStore {
         Ok(found)
     }
 
-    async fn send_again(
+    async fn redeliver_object(
         &self,
         tenant: &Tenant,
         job: &str,
