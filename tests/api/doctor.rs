@@ -1,10 +1,12 @@
 //! `ventriform doctor` and `ventriform backup`, on folders of the real program.
 
 use crate::helpers::{Service, scan, text};
+use crate::scu::slice;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
+use std::time::{Duration, Instant};
 use ventriform::jobs::Tenant;
 use ventriform::store::{backup, examine};
 
@@ -117,6 +119,93 @@ async fn a_backup_made_while_the_service_runs_is_restored_with_everything() {
     let found = examine(&target, None).await.unwrap();
     assert!(found.is_healthy() && found.items == 2, "{found:?}");
     serves(&folder.path().join("second"), &paths[1..]).await;
+}
+
+/// Waits until the only group of received objects is a volume; returns it.
+async fn gathered(service: &Service) -> Value {
+    let deadline = Instant::now() + Duration::from_secs(60);
+    loop {
+        let list = service.get("/v1/intake").send().await.unwrap();
+        let list: Value = list.json().await.unwrap();
+        let [group] = &list["intake"].as_array().unwrap()[..] else {
+            panic!("{list}");
+        };
+        if group["state"] == "stored" {
+            return group.clone();
+        }
+        assert!(Instant::now() < deadline, "{list}");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+}
+
+async fn send_slice(service: &Service, number: u16) {
+    let request = service.post("/dicom-web/studies");
+    let request = request.header("content-type", "application/dicom");
+    let answer = request.body(slice("1.2.4", number).file()).send().await;
+    assert_eq!(answer.unwrap().status(), 200);
+}
+
+#[tokio::test]
+async fn received_objects_are_backed_up_checked_and_set_aside() {
+    const WAITING: [&str; 4] = ["--series-quiet", "1h", "--series-patience", "2h"];
+    const AT_ONCE: [&str; 4] = ["--series-quiet", "50ms", "--series-patience", "100ms"];
+    let data = tempfile::tempdir().unwrap();
+    let service = Service::start(data.path(), &WAITING).await;
+    for number in 1..=3 {
+        send_slice(&service, number).await;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("backup");
+    backup(data.path(), &target).await.unwrap();
+    service.kill();
+    let found = examine(&target, None).await.unwrap();
+    assert!(found.is_healthy() && found.files == 3, "{found:?}");
+    let restored = Service::start(&target, &AT_ONCE).await;
+    assert_eq!(gathered(&restored).await["objects"], 3);
+    restored.kill();
+
+    // One is damaged, one is missing, and one has no row.
+    let shelf = data.path().join("received");
+    let names = fs::read_dir(&shelf).unwrap();
+    let names: Vec<_> = names.map(|entry| entry.unwrap().path()).collect();
+    assert_eq!(names.len(), 3);
+    fs::write(&names[0], "other").unwrap();
+    fs::remove_file(&names[1]).unwrap();
+    fs::write(shelf.join("stray"), "x").unwrap();
+    let sick = examine(data.path(), None).await.unwrap();
+    let mut found = kinds(&sick);
+    found.sort_unstable();
+    assert_eq!(
+        found,
+        ["damaged-object", "damaged-object", "unknown-object"]
+    );
+    assert!(!sick.is_healthy());
+    let repaired = examine(data.path(), Some(&Tenant::default()))
+        .await
+        .unwrap();
+    assert!(repaired.is_healthy(), "{repaired:?}");
+    assert_eq!(fs::read_dir(&shelf).unwrap().count(), 1);
+    let mut kept = Vec::new();
+    for day in fs::read_dir(data.path().join("quarantine")).unwrap() {
+        for set_aside in fs::read_dir(day.unwrap().path()).unwrap() {
+            kept.push(set_aside.unwrap().file_name());
+        }
+    }
+    assert_eq!(kept.len(), 2, "{kept:?}");
+    assert!(examine(data.path(), None).await.unwrap().is_healthy());
+    let service = Service::start(data.path(), &AT_ONCE).await;
+    for number in 1..=3 {
+        send_slice(&service, number).await;
+    }
+    let group = loop {
+        let group = gathered(&service).await;
+        if group["objects"] == 3 {
+            break group;
+        }
+    };
+    let volume = service.get(&text(&group["links"]["volume"])).send().await;
+    let volume: Value = volume.unwrap().json().await.unwrap();
+    assert_eq!(volume["shape"][2], 3);
 }
 
 #[test]

@@ -16,6 +16,7 @@ mod blobs;
 mod canary;
 mod config;
 mod dicom;
+mod dicom_flags;
 mod doctor;
 mod documents;
 mod durability;
