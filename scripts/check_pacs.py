@@ -10,7 +10,9 @@ killed and started again. Then:
 - the archive has each source and each object once, under the same study, and nothing else;
 - what it returns is what the service offers, byte by byte (by C-STORE: data set by data set);
 - the objects' geometry is as check_dicom.py computes it from the NM file;
-- a wrong password and a series that does not exist fail the job and say so.
+- a wrong password and a series that does not exist fail the job and say so;
+- a work item with the code of a procedure is performed and names its output, which the archive has;
+- Orthanc sends to the service, by C-STORE and by STOW-RS: every voxel comes as it was stored there.
 """
 import base64
 import io
@@ -29,8 +31,7 @@ import nibabel
 import numpy as np
 import pydicom
 
-from check_dicom import (LPS, NAMES, cases, check_contours, check_mask, check_measurements, check_meshes,
-                         nm)
+from check_dicom import LPS, NAMES, cases, check_object, check_results, nm
 
 MODEL_NAMES = ["mesh", "surface"]
 PATIENCE = 300
@@ -114,6 +115,13 @@ class Archive:
         head, content = part.split(b"\r\n\r\n", 1)
         return content[:-2]
 
+    def ask(self, method, path, content):
+        """A request to Orthanc's own interface."""
+        request = urllib.request.Request(f"http://127.0.0.1:{self.web}{path}", json.dumps(content).encode(),
+                                         self.headers, method=method)
+        with urllib.request.urlopen(request, timeout=60) as answer:
+            return json.loads(answer.read() or "null")
+
     def store(self, path):
         boundary = "check"
         body = (f"--{boundary}\r\nContent-Type: application/dicom\r\n\r\n".encode() + path.read_bytes()
@@ -146,17 +154,28 @@ name = "locked"
 dicomweb = "http://localhost:{archive.web}/dicom-web"
 username_env = "CHECK_USER"
 password_env = "CHECK_WRONG"
+[[procedures]]
+code = "LVMODEL"
+scheme = "99CHECK"
+archive = "pacs"
+kind = "model"
+send = ["mesh.dcm"]
+[[senders]]
+ae_title = "ORTHANC"
+addresses = ["127.0.0.1"]
 ''')
         self.start()
 
     def start(self):
         environment = {**os.environ, "CHECK_USER": self.archive.user,
                        "CHECK_PASSWORD": self.archive.password, "CHECK_WRONG": "wrong"}
-        command = [self.program, "serve", "--listen", "127.0.0.1:0", "--data-dir", self.folder / "data",
-                   "--config", self.folder / "ventriform.toml"]
+        command = [self.program, "serve", "--listen", "127.0.0.1:0", "--dicom-listen", "127.0.0.1:0",
+                   "--data-dir", self.folder / "data", "--config", self.folder / "ventriform.toml"]
         log = open(self.folder / "log", "ab")
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, env=environment, text=True)
-        self.url = self.process.stdout.readline().split()[2]
+        words = self.process.stdout.readline().split()
+        self.url = next(word for word in words if word.startswith("http"))
+        self.dicom = int(words[-1].rsplit(":", 1)[1])
 
     def kill(self):
         self.process.kill()
@@ -240,14 +259,12 @@ def run(archive, service, folder):
                     else pydicom.dcmread(io.BytesIO(back)) == data)
             assert same, f"{name}/{kind}: the archive returns other bytes"
             (here / "out" / f"{kind}.dcm").write_bytes(back)
+            check_object(data)
         out = here / "out"
-        for file in ("mask.nii.gz", "mesh.json", "report.json"):
+        for file in ("mask.nii.gz", "mesh.json", "mesh.glb", "report.json"):
             (out / file).write_bytes(fetch(f"{service.url}{result}/{file}")[0])
         mask = np.asarray(nibabel.load(out / "mask.nii.gz").dataobj) > 0
-        seg = check_mask(out, mask, affine)
-        check_contours(out, mask, affine)
-        check_meshes(out, json.loads((out / "mesh.json").read_text()))
-        check_measurements(out, json.loads((out / "report.json").read_text()), seg)
+        check_results(out, mask, affine)
         print(f"{name}: fetched, delivered to {to}, {mask.sum()} voxels, 7 objects as they must be")
 
     known = pydicom.dcmread(plain[1] / "nm.dcm")
@@ -266,6 +283,64 @@ def run(archive, service, folder):
     assert again["last_outcome"] == "present", again
     assert archive.count() == len(scans) + wanted, "something is stored twice"
     print(f"{wanted} objects and {len(scans)} sources in the archive, each once")
+    perform(archive, service, known, again)
+    assert archive.count() == len(scans) + wanted, "something is stored twice"
+    receive(archive, service, scans)
+
+
+def perform(archive, service, source, delivery):
+    """A work item on the series is performed; its output is the object that is in the archive already."""
+    def text(vr, value):
+        return {"vr": vr, "Value": [value]}
+
+    code = {"00080100": text("SH", "LVMODEL"), "00080102": text("SH", "99CHECK"), "00080104": text("LO", "Model")}
+    series = {"0020000D": text("UI", source.StudyInstanceUID), "0020000E": text("UI", source.SeriesInstanceUID)}
+    item = {"00741000": text("CS", "SCHEDULED"), "00404041": text("CS", "READY"),
+            "00404018": {"vr": "SQ", "Value": [code]}, "00404021": {"vr": "SQ", "Value": [series]}}
+    _, headers = fetch(f"{service.url}/dicom-web/workitems", json.dumps([item]).encode(),
+                       {"Content-Type": "application/dicom+json"})
+    path = headers["Location"]
+
+    def completed():
+        state = service.json(path)[0]
+        assert state["00741000"]["Value"][0] != "CANCELED", state
+        return state if state["00741000"]["Value"][0] == "COMPLETED" else None
+
+    done = until("a work item", completed)
+    (output,) = done["00741216"]["Value"][0]["00404033"]["Value"]
+    instance = output["00081199"]["Value"][0]["00081155"]["Value"][0]
+    assert instance in archive.instances(source.StudyInstanceUID), delivery
+    print("work item: performed, its output is in the archive")
+
+
+def receive(archive, service, scans):
+    """Orthanc sends one scan by C-STORE and another by STOW-RS."""
+    archive.ask("PUT", "/modalities/ventriform",
+                {"AET": "VENTRIFORM", "Host": "127.0.0.1", "Port": service.dicom})
+    archive.ask("PUT", "/dicom-web/servers/ventriform", {"Url": f"{service.url}/dicom-web/"})
+    ways = [("c-store", "/modalities/ventriform/store", {"Synchronous": True}),
+            ("stow-rs", "/dicom-web/servers/ventriform/stow", {"Synchronous": True})]
+    for (protocol, path, order), (name, here, *_) in zip(ways, scans[1:]):
+        source = pydicom.dcmread(here / "nm.dcm")
+        (found,) = archive.ask("POST", "/tools/find", {
+            "Level": "Instance", "Query": {"SOPInstanceUID": source.SOPInstanceUID}})
+        archive.ask("POST", path, {"Resources": [found], **order})
+
+        def stored():
+            groups = service.json("/v1/intake")["intake"]
+            groups = [g for g in groups if g["series"] == source.SeriesInstanceUID]
+            return groups[0] if groups and groups[0]["state"] == "stored" else None
+
+        group = until(protocol, stored)
+        assert group["protocol"] == protocol and group["sender"], group
+        volume = service.json(group["links"]["volume"])
+        frames = source.pixel_array.reshape(-1, source.Rows, source.Columns)
+        # Of a gated scan the gates are summed.
+        gates = len(frames) // volume["shape"][2]
+        mean = frames.mean() * gates
+        assert abs(volume["intensity"]["mean"] / mean - 1) < 1e-6, (volume["intensity"], mean)
+        assert volume["dicom"]["study_uid"] == source.StudyInstanceUID
+        print(f"{protocol}: Orthanc has sent {name}")
 
 
 def main():

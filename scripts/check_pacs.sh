@@ -5,8 +5,8 @@
 #
 # scripts/check_pacs.py starts Orthanc and the service on loopback, stores NM files of one simulated scan
 # there, lets the service fetch them, compute and deliver, kills both in between, and compares what the
-# archive has. dciodvfy (dicom3tools) checks every delivered object. Takes about a minute. Exits with 1 if
-# anything is wrong.
+# archive has. Then it lets Orthanc send to the service. dciodvfy (dicom3tools) checks every delivered object.
+# Takes about a minute. Exits with 1 if anything is wrong.
 #
 # PYTHON: an interpreter that has numpy, nibabel, pydicom, highdicom and dcmqi. Without it the script installs
 # them under target/. Debian packages that are missing are installed.
