@@ -166,9 +166,7 @@ fn refusal(error: &Error) -> Trouble {
             "The archive and this service do not agree on TLS: check `dicom_ca_file`, the name \
                  in the archive's certificate, and whether it asks for a certificate of this service.",
         ),
-        Error::TlsNotSupported { .. } => {
-            Trouble::passing("The archive speaks TLS: set `dicom_ca_file`.")
-        }
+        Error::TlsNotSupported => Trouble::passing("The archive speaks TLS: set `dicom_ca_file`."),
         Error::Rejected { .. } => {
             Trouble::passing("The archive rejects the association: check both AE titles.")
         }

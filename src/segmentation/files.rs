@@ -192,10 +192,9 @@ impl SegmentedVolume {
         let report = self.report();
         let polar = made.polar.as_ref().map(polar::png);
         let placed = (&made.mask, &self.reading.volume.frame);
-        let cavity = match cavity(&report, &made.fit.mesh, placed, &Monitor::silent()) {
-            Ok(cavity) => cavity,
-            Err(Cancelled) => None,
-        };
+        // A silent monitor is never cancelled.
+        let cavity =
+            cavity(&report, &made.fit.mesh, placed, &Monitor::silent()).unwrap_or_default();
         let results = DicomResults::new(scan, structure, &made.mask, &made.fit.mesh, &report)
             .with_cavity(cavity.as_ref())
             .with_pictures(Some(&made.slices), polar.as_deref());
