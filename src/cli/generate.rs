@@ -57,8 +57,9 @@ pub fn run(args: &GenerateArgs) -> Result<()> {
     let made = pipeline::generate(&files, &parameters, &ReadLimits::default(), &monitor);
     bar.finish();
     let model = made.map_err(|error| anyhow::anyhow!(error.with_advice()))?;
+    let metadata = model.metadata_with_distance(&monitor)?;
     for (path, format) in args.output.iter().zip(formats) {
-        let bytes = export::encode(format, &model.mesh, &model.metadata())?;
+        let bytes = export::encode(format, &model.mesh, &metadata)?;
         write_file(path, &bytes)?;
     }
     for path in &args.report {

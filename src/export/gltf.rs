@@ -8,7 +8,8 @@
 //! X = L / 1000,   Y = S / 1000,   Z = -P / 1000
 //! ```
 //!
-//! The buffer contains positions (f32), normals (f32) and indices (u16 if they fit, otherwise u32).
+//! The buffer contains positions (f32), normals (f32) and indices (u16 if they fit, otherwise u32), then the
+//! uncertainty (f32) and the colours (u16, linear RGBA) of the vertices, where there are any.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -64,10 +65,18 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
     } else {
         &metadata.title
     };
-    let uncertainty = metadata.uncertainty_of(mesh);
-    let uncertainty_start = buffer.len();
-    let values = uncertainty.unwrap_or_default().iter().map(|x| *x as f32);
-    buffer.extend(values.flat_map(f32::to_le_bytes));
+    let more = more_attributes(mesh, metadata);
+    let mut more_starts = Vec::new();
+    for attribute in &more {
+        more_starts.push(buffer.len());
+        buffer.extend(&attribute.bytes);
+    }
+    // Colours of vertices are multiplied by that of the material.
+    let painted = more.iter().any(|attribute| attribute.name == COLOURS);
+    let base_colour = match painted {
+        true => [1.0; 4],
+        false => [0.64, 0.13, 0.11, 1.0],
+    };
 
     let vertex_bytes = 12 * positions.len();
     let (min, max) = extent(&positions);
@@ -96,7 +105,7 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
         "materials": [{
             "name": "myocardium",
             "pbrMetallicRoughness": {
-                "baseColorFactor": [0.64, 0.13, 0.11, 1.0],
+                "baseColorFactor": base_colour,
                 "metallicFactor": 0.0,
                 "roughnessFactor": 0.55,
             },
@@ -132,15 +141,16 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
         ],
         "buffers": [{ "byteLength": buffer.len() }],
     });
-    if uncertainty.is_some() {
-        document["meshes"][0]["primitives"][0]["attributes"]["_UNCERTAINTY"] = 3.into();
-        let accessor = json!({
-            "bufferView": 3, "componentType": FLOAT, "type": "SCALAR", "count": positions.len(),
-        });
+    for (attribute, start) in more.into_iter().zip(more_starts) {
         let view = json!({
             "buffer": 0, "target": ARRAY_BUFFER,
-            "byteOffset": uncertainty_start, "byteLength": buffer.len() - uncertainty_start,
+            "byteOffset": start, "byteLength": attribute.bytes.len(),
         });
+        let mut accessor = attribute.accessor;
+        accessor["bufferView"] = json_length(&document["bufferViews"]).into();
+        accessor["count"] = positions.len().into();
+        document["meshes"][0]["primitives"][0]["attributes"][attribute.name] =
+            json_length(&document["accessors"]).into();
         for (list, entry) in [("accessors", accessor), ("bufferViews", view)] {
             if let Some(list) = document[list].as_array_mut() {
                 list.push(entry);
@@ -148,6 +158,55 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
         }
     }
     Ok((document, buffer))
+}
+
+fn json_length(list: &Value) -> usize {
+    list.as_array().map_or(0, Vec::len)
+}
+
+/// What glTF calls the colours of vertices.
+const COLOURS: &str = "COLOR_0";
+
+/// An attribute of vertices that not every mesh has.
+struct MoreAttribute {
+    name: &'static str,
+    /// Its accessor, without view and count.
+    accessor: Value,
+    /// A multiple of 4 bytes for each vertex.
+    bytes: Vec<u8>,
+}
+
+/// The uncertainty of each vertex, and the colour that shows its figure.
+fn more_attributes(mesh: &TriMesh, metadata: &Metadata) -> Vec<MoreAttribute> {
+    let uncertainty = metadata.uncertainty_of(mesh).map(|values| MoreAttribute {
+        name: "_UNCERTAINTY",
+        accessor: json!({ "componentType": FLOAT, "type": "SCALAR" }),
+        bytes: values
+            .iter()
+            .flat_map(|x| (*x as f32).to_le_bytes())
+            .collect(),
+    });
+    let colours = metadata.field_of(mesh).map(|field| MoreAttribute {
+        name: COLOURS,
+        accessor: json!({
+            "componentType": UNSIGNED_SHORT, "type": "VEC4", "normalized": true,
+        }),
+        bytes: field.colours.iter().flat_map(linear_bytes).collect(),
+    });
+    uncertainty.into_iter().chain(colours).collect()
+}
+
+/// A colour as four u16 in the linear light that glTF counts in; `colour` is sRGB, 0..=1.
+fn linear_bytes(colour: &[f64; 3]) -> [u8; 8] {
+    let [red, green, blue] = colour.map(|c| match c.clamp(0.0, 1.0) {
+        low if low <= 0.04045 => low / 12.92,
+        high => ((high + 0.055) / 1.055).powf(2.4),
+    });
+    let mut bytes = [0; 8];
+    for (place, share) in bytes.chunks_exact_mut(2).zip([red, green, blue, 1.0]) {
+        place.copy_from_slice(&((65535.0 * share).round() as u16).to_le_bytes());
+    }
+    bytes
 }
 
 /// Positions, normals and indices; these are u16 if `narrow`, otherwise u32.

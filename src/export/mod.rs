@@ -19,6 +19,9 @@
 //! property `uncertainty` of PLY files, the array `Uncertainty` of VTP files and `uncertainty_mm` of
 //! JSON files, millimetres.
 //!
+//! GLB and glTF files show a figure of each vertex ([`VertexField`]) as vertex colours, VTP files hold it as an
+//! array of its name: the uptake of a fitted wall, the distance of a model to the surface it was made of.
+//!
 //! Guaranteed: the same mesh and metadata give the same bytes; vertices stay distinct in single
 //! precision (see `single.rs`). Not checked: whether the mesh is a manifold; see
 //! [`crate::mesh::topology`].
@@ -143,6 +146,19 @@ pub struct Metadata {
     /// Standard deviation of each vertex's distance from the true surface, mm; empty if it is not known.
     /// STL and OBJ files cannot hold it.
     pub uncertainty: Vec<f64>,
+    /// A figure of every vertex that GLB and glTF files show as colours and VTP files hold as an array.
+    pub field: Option<VertexField>,
+}
+
+/// A figure of every vertex and the colour that shows it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct VertexField {
+    /// Its name in VTP files: `Uptake` (per cent), `Distance` (mm).
+    pub name: &'static str,
+    /// Its values; NaN where it is not known.
+    pub values: Vec<f64>,
+    /// Red, green and blue of each vertex, sRGB, 0..=1.
+    pub colours: Vec<[f64; 3]>,
 }
 
 impl Metadata {
@@ -187,6 +203,14 @@ impl Metadata {
     fn uncertainty_of(&self, mesh: &TriMesh) -> Option<&[f64]> {
         (!mesh.vertices.is_empty() && self.uncertainty.len() == mesh.vertices.len())
             .then_some(&self.uncertainty)
+    }
+
+    /// The figure of each vertex of `mesh`, if there is one.
+    fn field_of(&self, mesh: &TriMesh) -> Option<&VertexField> {
+        let count = mesh.vertices.len();
+        let suits =
+            |field: &&VertexField| field.values.len() == count && field.colours.len() == count;
+        self.field.as_ref().filter(|_| count > 0).filter(suits)
     }
 
     /// The metadata as comment lines, in ASCII without control characters.

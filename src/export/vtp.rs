@@ -24,7 +24,7 @@ pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Vec<u8> {
 <Piece NumberOfPoints="{points}" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="{count}">
 <PointData Normals="Normals">
 <DataArray type="Float64" Name="Normals" NumberOfComponents="3" format="binary">{normals}</DataArray>
-{uncertainty}</PointData>
+{uncertainty}{field}</PointData>
 <CellData></CellData>
 <Points>
 <DataArray type="Float64" Name="Points" NumberOfComponents="3" format="binary">{positions}</DataArray>
@@ -42,7 +42,10 @@ pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Vec<u8> {
         normals = vectors(&mesh.vertex_normals()),
         uncertainty = metadata
             .uncertainty_of(mesh)
-            .map_or_else(String::new, uncertainty),
+            .map_or_else(String::new, |values| scalars("Uncertainty", values)),
+        field = metadata
+            .field_of(mesh)
+            .map_or_else(String::new, |field| scalars(field.name, &field.values)),
         positions = vectors(&mesh.vertices),
         connectivity = array(connectivity.flat_map(i64::to_le_bytes).collect()),
         offsets = array(offsets.flat_map(i64::to_le_bytes).collect()),
@@ -50,10 +53,10 @@ pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Vec<u8> {
     xml.into_bytes()
 }
 
-fn uncertainty(values: &[f64]) -> String {
+fn scalars(name: &str, values: &[f64]) -> String {
     let values = array(values.iter().flat_map(|x| x.to_le_bytes()).collect());
     format!(
-        "<DataArray type=\"Float64\" Name=\"Uncertainty\" NumberOfComponents=\"1\" \
+        "<DataArray type=\"Float64\" Name=\"{name}\" NumberOfComponents=\"1\" \
          format=\"binary\">{values}</DataArray>\n"
     )
 }

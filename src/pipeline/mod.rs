@@ -13,7 +13,7 @@
 
 pub mod starts;
 
-use crate::export::Metadata;
+use crate::export::{Metadata, VertexField};
 use crate::mesh::TriMesh;
 use crate::optimise::{OptimiseError, Reference};
 use crate::parameters::{ModelParameters, Parameters};
@@ -46,6 +46,22 @@ impl Model {
             quality: self.report.quality_summary(),
             ..Metadata::new("Left ventricle")
         }
+    }
+
+    /// The metadata with the distance of every vertex to the surface, which formats with colours show.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn metadata_with_distance(&self, monitor: &Monitor) -> Result<Metadata, Cancelled> {
+        let values = Closeness::of_vertices(&self.mesh, &self.reference, monitor)?;
+        Ok(Metadata {
+            field: Some(VertexField {
+                name: "Distance",
+                colours: report::vertex_colours(&values),
+                values,
+            }),
+            ..self.metadata()
+        })
     }
 
     /// Distances between the model and its surface at every vertex, by which the page is coloured.

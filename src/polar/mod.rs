@@ -41,7 +41,7 @@ mod picture;
 
 pub use json::json;
 pub use levels::{Level, Levels};
-pub use picture::{png, svg};
+pub use picture::{colour_of, png, svg};
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
@@ -230,6 +230,31 @@ impl PolarMap {
             _ => ("basal", 1, 6),
         };
         format!("{level}, {} of {count}", segment - first + 1)
+    }
+
+    /// The uptake of the wall at a point, per cent of the reference, linear between the rays of `wall`, by
+    /// which the map was made; NaN where no ray near it met the wall.
+    pub fn uptake_at(&self, wall: &VentricleWall, point: &Vec3) -> f64 {
+        let place = wall.place(point);
+        let row = place.row.clamp(0.0, ROWS as f64 - 1.0);
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for (r, of_row) in [(row.floor(), 1.0 - row.fract()), (row.ceil(), row.fract())] {
+            for (c, of_column) in [
+                (place.column.floor(), 1.0 - place.column.fract()),
+                (place.column.floor() + 1.0, place.column.fract()),
+            ] {
+                let pixel = self.pixels[r as usize * COLUMNS + c as usize % COLUMNS];
+                if let Some(pixel) = pixel {
+                    sum += of_row * of_column * pixel.max;
+                    weight += of_row * of_column;
+                }
+            }
+        }
+        if weight > 0.0 && self.reference > 0.0 {
+            100.0 * sum / weight / self.reference
+        } else {
+            f64::NAN
+        }
     }
 
     /// The segment of a pixel.
@@ -453,6 +478,18 @@ mod tests {
         let apical = [90.0, 180.0, 270.0, 0.0].map(|a| at(Level::Apical, a));
         assert_eq!(apical, [13, 14, 15, 16]);
         assert_eq!(at(Level::Apex, 123.0), 17);
+    }
+
+    #[test]
+    fn the_uptake_of_a_place_is_that_of_the_rays_beside_it() {
+        let (volume, wall) = scene();
+        let map = map(&volume, &wall, &wall, &PolarParameters::default());
+        let at = |x: f64| map.uptake_at(&wall, &Vec3::new(x, -25.0, 0.0));
+        // The left side has half the uptake of the right one.
+        assert!((at(-26.0) - 100.0).abs() < 8.0, "{}", at(-26.0));
+        assert!((at(26.0) - 50.0).abs() < 8.0, "{}", at(26.0));
+        assert_eq!(colour_of(f64::NAN), [128.0 / 255.0; 3]);
+        assert_ne!(colour_of(at(26.0)), colour_of(at(-26.0)));
     }
 
     #[test]

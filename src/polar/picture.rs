@@ -112,6 +112,16 @@ fn shade(map: &PolarMap, row: usize, column: usize) -> Rgb {
     }
 }
 
+/// The colour of an uptake in per cent of the reference, sRGB, 0..=1; grey where there is no wall (NaN).
+pub fn colour_of(percent: f64) -> [f64; 3] {
+    let rgb = if percent.is_nan() {
+        NO_WALL
+    } else {
+        colour(percent / 100.0)
+    };
+    rgb.map(|part| f64::from(part) / 255.0)
+}
+
 fn colour(share: f64) -> Rgb {
     let at = share.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
     let step = (at as usize).min(COLOURS.len() - 2);

@@ -47,6 +47,25 @@ impl Closeness {
         })
     }
 
+    /// The signed distance of every vertex of `mesh` to `reference`, mm; positive outside of it.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn of_vertices(
+        mesh: &TriMesh,
+        reference: &TriMesh,
+        monitor: &Monitor,
+    ) -> Result<Vec<f64>, Cancelled> {
+        let tree = Bvh::new(&reference.vertices, &reference.triangles);
+        mesh.vertices
+            .par_iter()
+            .map(|p| {
+                monitor.check()?;
+                Ok(f64::from(rounded(signed_distance(p, reference, &tree))))
+            })
+            .collect()
+    }
+
     /// Whether there are as many distances as a mesh of `triangles` triangles needs.
     pub fn suits(&self, triangles: usize) -> bool {
         (1..=MOST_PARTS).contains(&self.parts)

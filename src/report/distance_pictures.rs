@@ -62,6 +62,13 @@ fn diverging(x: f64) -> Colour {
     [0, 1, 2].map(|r| 0.95 + (end[r] - 0.95) * x)
 }
 
+/// The colours of vertices at these distances, mm: blue lies inside of the surface, red outside. They are full
+/// at a round number that nearly all distances keep below.
+pub fn vertex_colours(distances: &[f64]) -> Vec<Colour> {
+    let full = full_scale(distances.iter().map(|d| d.abs()).collect());
+    distances.iter().map(|d| diverging(d / full)).collect()
+}
+
 /// A round number, at least 0.1, that 98 % of the distances do not exceed.
 fn full_scale(mut distances: Vec<f64>) -> f64 {
     distances.sort_unstable_by(f64::total_cmp);

@@ -26,6 +26,7 @@ mod stage_facts;
 pub mod summary;
 
 pub use closeness::Closeness;
+pub use distance_pictures::vertex_colours;
 pub use input::input;
 pub use measure::{MeasureParameters, Measures, measure};
 pub use model_page::model_page;

@@ -125,7 +125,11 @@ fn verdict(report: &ModelReport) -> Markup {
     let checks = checks(report);
     let failed = checks.iter().filter(|(holds, _)| !holds).count();
     let (sign, headline) = match failed {
-        0 => (Sign::Good, "The model keeps every promise.".to_owned()),
+        0 => (
+            Sign::Good,
+            "The mesh keeps every promise. Whether it is the wall of the heart, slices show."
+                .to_owned(),
+        ),
         n => (
             Sign::Bad,
             format!("{n} of {} promises are broken.", checks.len()),

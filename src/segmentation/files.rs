@@ -5,8 +5,9 @@ use super::from_files::SegmentedVolume;
 use super::report::report_json;
 use crate::deform::WallEdge;
 use crate::export::dicom::{DicomError, DicomObject, DicomResults, Moment, SourceScan, Structure};
-use crate::export::{self, ExportError, Format, Metadata};
+use crate::export::{self, ExportError, Format, Metadata, VertexField};
 use crate::grid::voxelise::Mask;
+use crate::mesh::TriMesh;
 use crate::parameters::Parameters;
 use crate::polar;
 use crate::progress::{Cancelled, Monitor, Stage};
@@ -94,6 +95,7 @@ impl SegmentedVolume {
         for (name, mesh, uncertainty) in meshes {
             let metadata = Metadata {
                 uncertainty: uncertainty.to_vec(),
+                field: self.uptake(mesh),
                 ..metadata.clone()
             };
             for format in formats {
@@ -115,6 +117,19 @@ impl SegmentedVolume {
         files.extend(self.polar(monitor)?);
         monitor.report(Stage::Export, 1.0)?;
         Ok(files)
+    }
+
+    /// The uptake of the wall at every vertex of `mesh`; ventricles only.
+    fn uptake(&self, mesh: &TriMesh) -> Option<VertexField> {
+        let surfaces = self.segmentation.fit.surfaces.as_ref()?;
+        let map = self.segmentation.polar.as_ref()?;
+        let of = |p| map.uptake_at(&surfaces.apparent.wall, p);
+        let values: Vec<f64> = mesh.vertices.iter().map(of).collect();
+        Some(VertexField {
+            name: "Uptake",
+            colours: values.iter().map(|x| polar::colour_of(*x)).collect(),
+            values,
+        })
     }
 
     /// The report, with the parameters used, the facts of the input and warnings.

@@ -73,7 +73,7 @@ fn downloads(
     volume: &str,
     monitor: &Monitor<'_>,
 ) -> Result<Vec<OutputFile>, WorkError> {
-    let mut metadata = model.metadata();
+    let mut metadata = model.metadata_with_distance(monitor)?;
     metadata.volume_id = Some(volume.to_owned());
     let mut files = Vec::new();
     for (done, format) in Format::ALL.into_iter().enumerate() {

@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde_json::{Value, json};
-use ventriform::export::{ExportError, Format, Metadata, encode};
+use ventriform::export::{ExportError, Format, Metadata, VertexField, encode};
 use ventriform::geometry::Vec3;
 use ventriform::mesh::{TriMesh, shapes};
 
@@ -35,6 +35,25 @@ fn metadata() -> Metadata {
 
 fn bytes(format: Format) -> Vec<u8> {
     encode(format, &cup(), &metadata()).unwrap()
+}
+
+/// The same mesh with a figure of each vertex, which is not known of the first.
+fn painted(format: Format) -> Vec<u8> {
+    let mesh = cup();
+    let shares = (0..mesh.vertices.len()).map(|n| n as f64 / mesh.vertices.len() as f64);
+    let field = VertexField {
+        name: "Uptake",
+        values: shares
+            .clone()
+            .map(|x| if x == 0.0 { f64::NAN } else { 100.0 * x })
+            .collect(),
+        colours: shares.map(|x| [x, 0.5, 1.0 - x]).collect(),
+    };
+    let metadata = Metadata {
+        field: Some(field),
+        ..metadata()
+    };
+    encode(format, &mesh, &metadata).unwrap()
 }
 
 fn floats(bytes: &[u8]) -> Vec<f32> {
@@ -88,6 +107,8 @@ fn all_formats_are_written_for_the_other_readers() {
         let path = folder.join(format!("model.{}", format.extension()));
         std::fs::write(path, bytes(format)).unwrap();
         assert_eq!(bytes(format), bytes(format), "{format:?} varies");
+        let path = folder.join(format!("painted.{}", format.extension()));
+        std::fs::write(path, painted(format)).unwrap();
     }
 }
 
@@ -377,5 +398,43 @@ fn the_uncertainty_of_each_vertex_is_in_the_formats_that_can_hold_it() {
     for format in Format::ALL {
         assert_eq!(with(&[], format), bytes(format));
         assert_eq!(with(&uncertainty[1..], format), bytes(format));
+    }
+}
+
+#[test]
+fn a_figure_of_each_vertex_is_a_colour_in_glb_and_an_array_in_vtp() {
+    let count = cup().vertices.len();
+    let glb = painted(Format::Glb);
+    let (document, binary) = chunks(&glb);
+    let accessor = &document["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"];
+    let accessor = &document["accessors"][accessor.as_u64().unwrap() as usize];
+    assert_eq!(
+        [&accessor["type"], &accessor["count"]],
+        [&json!("VEC4"), &json!(count)]
+    );
+    assert_eq!(accessor["normalized"], true);
+    let view = &document["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
+    let start = view["byteOffset"].as_u64().unwrap() as usize;
+    let parts: Vec<u16> = binary[start..start + 8]
+        .chunks_exact(2)
+        .map(|word| u16::from_le_bytes(word.try_into().unwrap()))
+        .collect();
+    // Half of sRGB is 21.4 % of the light.
+    assert_eq!(
+        parts,
+        [0, (65535.0 * 0.214_041_14_f64).round() as u16, 65535, 65535]
+    );
+    let material = &document["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"];
+    assert_eq!(material, &json!([1.0, 1.0, 1.0, 1.0]));
+
+    let vtp = String::from_utf8(painted(Format::Vtp)).unwrap();
+    let array = vtp.split("Name=\"Uptake\"").nth(1).unwrap();
+    let array = array.split(['>', '<']).nth(1).unwrap();
+    let values = doubles(&decode_base64(array)[8..]);
+    assert!(values[0].is_nan() && values.len() == count);
+    assert_eq!(values[1], 100.0 / count as f64);
+
+    for format in [Format::Stl, Format::Ply, Format::Obj, Format::Json] {
+        assert_eq!(painted(format), bytes(format), "{format:?}");
     }
 }
