@@ -7,7 +7,7 @@ use super::elastic::Elastic;
 use super::evidence::{Edges, Evidence};
 use super::fit::Fit;
 use super::flags::Flag;
-use super::parameters::{DeformParameters, WallEdge};
+use super::parameters::DeformParameters;
 use super::rim;
 use super::sensors::{PER_TRIANGLE, SensorReading, SensorSettings};
 use super::setup::FitSetup;
@@ -101,7 +101,7 @@ impl Attempt {
         template: &Template,
         setup: &FitSetup,
         aligned: &TriMesh,
-        edge: WallEdge,
+        parameters: &DeformParameters,
         monitor: &Monitor,
     ) -> Result<Fit, Cancelled> {
         let orientation = setup.patient_orientation;
@@ -115,9 +115,13 @@ impl Attempt {
         };
         // The confidence is calibrated on the wall as the sensors left it, before its rim moves.
         let felt = wall_of(&self.moved.mesh)?;
-        let settled = cup
-            .filter(|_| orientation.source != OrientationSource::Unknown)
-            .and_then(|cup| rim::settled(&self.moved.mesh, &cup, &orientation.superior));
+        let superior = &orientation.superior;
+        let settled = match &parameters.base {
+            Some(base) => cup.and_then(|cup| rim::put(&self.moved.mesh, &cup, superior, base)),
+            None => cup
+                .filter(|_| orientation.source != OrientationSource::Unknown)
+                .and_then(|cup| rim::settled(&self.moved.mesh, &cup, superior)),
+        };
         let (mesh, wall) = match settled {
             Some(mesh) => {
                 let wall = wall_of(&mesh)?;
@@ -166,10 +170,11 @@ impl Attempt {
             fit.nodes = nodes_seen(&fit.mesh, wall, &self.moved.readings);
         }
         fit.confidence = match &fit.evidence {
-            Some(evidence) => confidence::of_agreement(evidence, edge),
+            Some(evidence) => confidence::of_agreement(evidence, parameters.edge),
             None => fit.place_confidence().min(0.5),
         };
-        fit.flags = doubts::flags(&fit, volume, template.organ == Organ::LeftVentricle, edge);
+        let ventricle = template.organ == Organ::LeftVentricle;
+        fit.flags = doubts::flags(&fit, volume, ventricle, parameters.edge);
         // The chance is calibrated on images of uptake.
         if fit.flags.iter().any(|f| matches!(f, Flag::LabelMap { .. })) {
             fit.confidence = fit.confidence.min(0.5);

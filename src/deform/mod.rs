@@ -143,7 +143,7 @@ fn fit_from(
     };
     monitor.report(Stage::Deform, 0.0)?;
     let attempt = Attempt::best(&aligned, template, setup, parameters, monitor)?;
-    Ok(attempt.into_fit(volume, template, setup, &aligned, parameters.edge, monitor)?)
+    Ok(attempt.into_fit(volume, template, setup, &aligned, parameters, monitor)?)
 }
 
 /// Most nodes of a model with support springs, whose number grows with the square of the nodes.

@@ -23,6 +23,9 @@ pub struct DeformParameters {
     /// Direction from the long axis to the anterior wall, LPS, any length. The wall is counted from
     /// it unless [`Superior::Stated`] tells more. Default `None`.
     pub anterior: Option<Vec3>,
+    /// A point of the base, LPS mm: the rim is put there, as far as the wall reaches or can be stretched, instead
+    /// of where image and anatomy put it. Ventricles only. Default `None`.
+    pub base: Option<Vec3>,
     /// Whether the model is aligned as a whole before it is deformed. Default true. If false, as
     /// for models that are placed by hand, the rest state is the posed template.
     pub align: bool,
@@ -53,6 +56,7 @@ impl Default for DeformParameters {
             roll: 0.0,
             superior: Superior::Body,
             anterior: None,
+            base: None,
             align: true,
             stiffness: Stiffness::default(),
             sensor: SensorKind::HalfMaximum,

@@ -89,6 +89,23 @@ pub fn extended(mesh: &TriMesh, cup: &Cup, superior: &Vec3, distance: f64) -> Tr
     }
 }
 
+/// `mesh` with its whole rim moved along the axis, so that its median height is that of `base`. It is moved less
+/// where the whole way is longer than [`FARTHEST`] or would make the surface intersect itself; `None` without a
+/// rim in every direction, and where it cannot be moved at all.
+pub fn put(mesh: &TriMesh, cup: &Cup, superior: &Vec3, base: &Vec3) -> Option<TriMesh> {
+    let frame = RimFrame::of(cup, superior);
+    let rim = frame.heights(mesh)?;
+    let distance = (median(&rim) - frame.along(base)).clamp(FARTHEST[0], FARTHEST[1]);
+    [1.0, 0.75, 0.5, 0.25]
+        .into_iter()
+        .map(|share| frame.stretched(mesh, &rim, &[share * distance; DIRECTIONS]))
+        .find(|moved| self_intersections(moved).is_empty())
+}
+
+/// How far a rim is moved at most, mm towards the base. Towards the apex, wall of the length [`REACH`] is pushed
+/// together, so it must stay below that.
+const FARTHEST: [f64; 2] = [-20.0, 40.0];
+
 /// The shape of a rim with these heights, mm, of a heart of this length.
 fn expected(rim: &[f64], length: f64) -> Option<Vec<f64>> {
     let basis = DMatrix::from_fn(DIRECTIONS, TERMS + 1, |direction, term| {
@@ -257,6 +274,28 @@ mod tests {
         let [whole, cut, settled] = heights;
         assert!(cut > whole + 9.0, "{heights:?}");
         assert!((settled - whole).abs() < 0.5 * (cut - whole), "{heights:?}");
+    }
+
+    #[test]
+    fn the_rim_is_put_at_a_stated_base_as_far_as_it_can() {
+        let (whole, cup) = heart(0.0);
+        let middle = median(&rim(&whole, &cup));
+        // Positive is towards the base, against the axis.
+        for (asked, moved) in [(8.0, 8.0), (-12.0, -12.0), (-60.0, -20.0), (90.0, 40.0)] {
+            let base = cup.axis * (middle - asked) + Vec3::x() * 11.0;
+            let put = put(&whole, &cup, &Vec3::y(), &base).unwrap();
+            let found = middle - median(&rim(&put, &cup));
+            assert!((found - moved).abs() < 0.5, "{asked}: {found}");
+            assert!(self_intersections(&put).is_empty());
+            // The apex stays.
+            let apex = |mesh: &TriMesh| {
+                mesh.vertices
+                    .iter()
+                    .map(|p| p.dot(&cup.axis))
+                    .fold(0.0, f64::max)
+            };
+            assert_eq!(apex(&put), apex(&whole));
+        }
     }
 
     #[test]

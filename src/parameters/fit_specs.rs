@@ -189,6 +189,19 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         },
         write: |p| json!(p.deform.anterior.map(|a| [a.x, a.y, a.z])),
     },
+    ParameterSpec {
+        name: "base",
+        kind: Kind::Numbers { count: 3 },
+        default: "",
+        summary: "A point of the ventricle's base, x,y,z in LPS millimetres: the rim of the wall is put there \
+                  (moved by at most 20 mm towards the apex or 40 mm away from it). Default: where image and \
+                  anatomy put it",
+        read: |d, v| {
+            d.deform.base = Some(point(v.numbers()));
+            Ok(())
+        },
+        write: |p| json!(p.deform.base.map(|b| [b.x, b.y, b.z])),
+    },
     choice!(
         "sensor",
         deform.sensor,
