@@ -58,7 +58,7 @@ use std::path::Path;
 use table::Evaluation;
 
 /// Evaluates `cohort` and writes everything to the folder `out`: `evaluation.html`,
-/// `evaluation.json`, `table1.csv`, `figure3.csv`, `fits.csv`, `models/` and `fits/`. `program`
+/// `evaluation.json`, `table1.csv`, `figure3.csv`, `fits.csv`, `models/`, `fits/` and `slices/`. `program`
 /// is any bytes that identify the program: fits of another program are made again.
 ///
 /// # Errors
@@ -99,6 +99,7 @@ pub fn evaluate(
         evaluation.reader = reader(cohort, parameters);
     }
     evaluation.settings = parameters.settings(cohort);
+    make_folder(&out.join(table::SLICES))?;
     write_results(out, &evaluation)?;
     Ok(evaluation)
 }
@@ -171,6 +172,9 @@ fn write_results(out: &Path, evaluation: &Evaluation) -> Result<(), EvaluateErro
         ),
     ] {
         write_whole(&out.join(name), &bytes)?;
+    }
+    for picture in &evaluation.pictures {
+        write_whole(&out.join(picture.file()), &picture.png)?;
     }
     Ok(())
 }

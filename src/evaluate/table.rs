@@ -54,6 +54,16 @@ pub struct Picture {
     pub png: Vec<u8>,
 }
 
+/// The folder of the pictures.
+pub const SLICES: &str = "slices";
+
+impl Picture {
+    /// Its path in the folder of results.
+    pub fn file(&self) -> String {
+        format!("{SLICES}/{}.png", self.case)
+    }
+}
+
 /// The value rounded to six places.
 pub fn rounded(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
@@ -258,8 +268,13 @@ pub fn to_json(evaluation: &Evaluation) -> Value {
         "means": means_json(&evaluation.rows),
         "leave_one_out": evaluation.leave_one_out.as_ref().map(leave_one_out_json),
         "reader": evaluation.reader.as_ref().map(reader_json),
+        "pictures": evaluation.pictures.iter().map(picture_json).collect::<Vec<_>>(),
         "fits": evaluation.rows.iter().map(row_json).collect::<Vec<_>>(),
     })
+}
+
+fn picture_json(picture: &Picture) -> Value {
+    json!({"case": picture.case, "caption": picture.caption, "file": picture.file()})
 }
 
 fn model_json(m: &ModelRow) -> Value {

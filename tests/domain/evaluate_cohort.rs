@@ -124,6 +124,12 @@ fn a_cohort_with_gaps_is_evaluated_resumed_and_reproduced() {
         assert!(gaps.contains(&row), "{case}: {gaps}");
     }
     assert_eq!(page.matches("data:image/png;base64,").count(), 2);
+    let listed: serde_json::Value = serde_json::from_slice(&whole["evaluation.json"]).unwrap();
+    let pictures = listed["pictures"].as_array().unwrap();
+    assert_eq!(pictures.len(), 2);
+    for picture in pictures {
+        assert!(whole[picture["file"].as_str().unwrap()].starts_with(b"\x89PNG"));
+    }
     assert!(page.contains("unreadable") && page.contains("no gold standard"));
     // No address: the policy's attribute is the only word with http in it.
     assert!(!page.replace("http-equiv=", "").contains("http"));
