@@ -24,7 +24,7 @@ use crate::jobs::{
     TagFilter, Tenant,
 };
 use axum::extract::{RawQuery, State};
-use axum::http::HeaderMap;
+use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use axum::routing::{delete, get};
 use axum::{Extension, Json};
 use serde::ser::SerializeMap;
@@ -148,11 +148,15 @@ pub async fn find<C: Collection>(app: &App, tenant: &Tenant, id: &str) -> Answer
     }
 }
 
+/// What one upload may hold (draft-ietf-httpbis-resumable-upload), so that clients need not send what will be
+/// refused.
+const UPLOAD_LIMIT: HeaderName = HeaderName::from_static("upload-limit");
+
 async fn list<C: Collection>(
     State(app): State<App>,
     caller: Caller,
     RawQuery(query): RawQuery,
-) -> Answer<Json<ListBody<C>>> {
+) -> Answer<(HeaderMap, Json<ListBody<C>>)> {
     let pairs = query_pairs(query.as_deref());
     let (tags, pairs) = match C::TAGGED {
         true => tags::take_filter(&app, pairs)?,
@@ -171,7 +175,13 @@ async fn list<C: Collection>(
         .into_iter()
         .map(|row| C::body(&app, caller.scope, row))
         .collect::<Result<_, _>>()?;
-    Ok(Json(ListBody { items, next_cursor }))
+    let mut headers = HeaderMap::new();
+    if C::RESOURCE == Resource::Volume {
+        let limit = HeaderValue::from(app.settings.body_limit.0);
+        let limit = [b"max-size=", limit.as_bytes()].concat();
+        headers.extend(HeaderValue::from_bytes(&limit).map(|limit| (UPLOAD_LIMIT, limit)));
+    }
+    Ok((headers, Json(ListBody { items, next_cursor })))
 }
 
 async fn show<C: Collection>(

@@ -147,6 +147,9 @@ async fn a_form_over_the_limit_is_too_large_and_a_broken_one_is_malformed() {
     let head = b"--B\r\ncontent-disposition: form-data; name=\"file\"; filename=\"x\"\r\n\r\n";
     let large = [head.as_slice(), &[b'x'; 300_000]].concat();
     problem(form(large).await.unwrap(), 413, "body-too-large").await;
+    // Clients can know before they send.
+    let list = app.get("/v1/volumes").send().await.unwrap();
+    assert_eq!(list.headers()["upload-limit"], "max-size=102400");
     problem(form(head.to_vec()).await.unwrap(), 400, "malformed-form").await;
     problem(
         form(b"--C\r\n".to_vec()).await.unwrap(),
