@@ -18,7 +18,7 @@ if ! cmp -s web/package-lock.json "$tools/installed"; then
   cp web/package-lock.json "$tools/installed"
 fi
 if [ "${1:-}" = --bundle ]; then
-  (cd "$tools" && rm -rf dist && npx tsc --noEmit && npx vite build --logLevel warn)
+  (cd "$tools" && rm -rf dist && npx tsc --noEmit && npm run --silent build)
   diff -r "$tools/dist" web/dist || { echo "web/dist is not what web/src gives: cd web && npm ci && npm run build"; exit 1; }
 fi
 rm -rf target/page && mkdir -p target/page

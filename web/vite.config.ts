@@ -1,12 +1,19 @@
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { defineConfig } from "vite";
+import { type BuildOptions, defineConfig } from "vite";
 import { brotliCompressSync, constants, gzipSync } from "node:zlib";
 
 // While developing: `SERVICE=http://127.0.0.1:8080 npm run dev`.
 const service = process.env["SERVICE"] ?? "http://127.0.0.1:8080";
 
-export default defineConfig({
+// The script of reports is built by `vite build --mode report` into one file, which the program writes into them.
+const report: BuildOptions = {
+  target: "es2022",
+  emptyOutDir: false,
+  lib: { entry: "src/report.ts", formats: ["iife"], name: "report", fileName: () => "report.js" },
+};
+
+export default defineConfig(({ mode }) => (mode === "report" ? { build: report } : {
   base: "/",
   esbuild: { jsx: "automatic", jsxImportSource: "preact", legalComments: "none" },
   server: { proxy: { "/v1": service, "/openapi.json": service, "/docs": service } },
@@ -34,4 +41,4 @@ export default defineConfig({
       },
     },
   ],
-});
+}));

@@ -13,7 +13,8 @@ use sha2::{Digest, Sha256};
 use super::text::leaves;
 
 const STYLE: &str = include_str!("document.css");
-const TURN: &str = include_str!("turn.js");
+/// Built from `web/src/report.ts`: turns the model by drag or arrow keys.
+const TURN: &str = include_str!("../../web/dist/report.js");
 
 /// A page.
 #[derive(Debug, Clone)]

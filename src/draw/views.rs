@@ -37,8 +37,7 @@ pub fn section(title: &str, mesh: &TriMesh, uncertainty: &[f64]) -> Markup {
                 .iter()
                 .map(|v| uncertainty[*v as usize])
                 .sum();
-            let share = (sum / 3.0 / UNSURE).clamp(0.0, 1.0);
-            [0, 1, 2].map(|c| MYOCARDIUM[c] + (UNSURE_COLOUR[c] - MYOCARDIUM[c]) * share)
+            colour_of(sum / 3.0)
         }
         false => MYOCARDIUM,
     };
@@ -62,10 +61,16 @@ pub fn section(title: &str, mesh: &TriMesh, uncertainty: &[f64]) -> Markup {
             }
             div.row.four {
                 (figures(&pictures(&facets, mesh, 0.34), "The model"))
-                @if mesh.triangles.len() <= MOST_TURNED { (turnable(mesh)) }
+                @if mesh.triangles.len() <= MOST_TURNED { (turnable(mesh, if known { uncertainty } else { &[] })) }
             }
         }
     }
+}
+
+/// The colour of a place with this uncertainty, mm.
+fn colour_of(uncertainty: f64) -> Colour {
+    let share = (uncertainty / UNSURE).clamp(0.0, 1.0);
+    [0, 1, 2].map(|c| MYOCARDIUM[c] + (UNSURE_COLOUR[c] - MYOCARDIUM[c]) * share)
 }
 
 /// `facets`, triangles of `mesh` or parts of them, from three sides; `ambient` as in [`Style`].
@@ -109,8 +114,9 @@ pub fn figures(pictures: &Pictures, what: &str) -> Markup {
     }
 }
 
-/// A canvas for the script, and the mesh about its centre, rounded to 0.01 mm.
-fn turnable(mesh: &TriMesh) -> Markup {
+/// A canvas for the script, and the mesh about its centre, rounded to 0.01 mm, with a colour for each vertex
+/// where its uncertainty is known.
+fn turnable(mesh: &TriMesh, uncertainty: &[f64]) -> Markup {
     let aabb = Aabb::of(&mesh.vertices);
     let centre = (aabb.min + aabb.max) / 2.0;
     let about = |v: &Vec3| ((v - centre) * 100.0).map(f64::round) / 100.0;
@@ -121,7 +127,12 @@ fn turnable(mesh: &TriMesh) -> Markup {
         .collect();
     let triangles: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
     // Numbers only: nothing in it can end the script element.
-    let data = json!({ "vertices": vertices, "triangles": triangles }).to_string();
+    let colours: Option<Vec<f64>> = (!uncertainty.is_empty()).then(|| {
+        let of = |x: &f64| colour_of(*x).map(|part| (part * 100.0).round() / 100.0);
+        uncertainty.iter().flat_map(of).collect()
+    });
+    let data = json!({ "vertices": vertices, "triangles": triangles, "colours": colours });
+    let data = data.to_string();
     html! {
         figure id="turnable" hidden {
             div.view {

@@ -101,6 +101,9 @@ export const wanted = new Watched<string>("");
 /** Whether the service answers. */
 export const reachable = new Watched<boolean>(true);
 
+/** Bytes that the service takes in one upload; null while that is not known. */
+export const uploadLimit = new Watched<number | null>(null);
+
 let waiting: (() => void)[] = [];
 
 export function signIn(text: string): void {
@@ -179,14 +182,21 @@ export async function post<T>(path: string, body: unknown): Promise<T> {
 /** One page of a list. */
 export async function page<T>(kind: string, query: Record<string, string | number> = {}): Promise<{ items: T[]; next: string | null }> {
   const words = new URLSearchParams(Object.entries(query).map(([name, value]) => [name, String(value)]));
-  const body = await get<Record<string, unknown>>(`/v1/${kind}?${words}`);
+  const answer = await call(`/v1/${kind}?${words}`);
+  const limit = /max-size=(\d+)/.exec(answer.headers.get("upload-limit") ?? "");
+  if (limit) uploadLimit.value = Number(limit[1]);
+  const body = (await answer.json()) as Record<string, unknown>;
   return { items: body[kind] as T[], next: (body["next_cursor"] as string | undefined) ?? null };
 }
 
+/** What is wrong and what to do; the names that the service puts between backticks stand for themselves. */
+export function sentences({ detail, fix }: Pick<Problem, "detail" | "fix">): [string, string] {
+  const plain = (text: string) => text.replaceAll("`", "");
+  return [plain(detail), plain(fix ?? "")];
+}
+
 export function words(error: unknown): string {
-  if (error instanceof ProblemError) {
-    return [error.problem.detail, error.problem.fix].filter(Boolean).join(" ");
-  }
+  if (error instanceof ProblemError) return sentences(error.problem).join(" ").trim();
   return error instanceof Error ? error.message : String(error);
 }
 

@@ -1,10 +1,17 @@
 // One job: its state while it lasts, and why it failed.
 
 import { useState } from "preact/hooks";
-import { type Job, words } from "./api";
+import { type Job, type Problem, sentences, words } from "./api";
 import { cancel, forget, isActive } from "./library";
 import { open } from "./route";
 import { ordinal, stage } from "./words";
+
+/** What is wrong, and what to do. */
+export function Trouble({ problem }: { problem: Problem | null | undefined }) {
+  if (!problem) return null;
+  const [detail, fix] = sentences(problem);
+  return <span class="error">{detail} {fix && <strong>{fix}</strong>}</span>;
+}
 
 export function JobLine({ job, onChange }: { job: Job; onChange?: ((job: Job) => void) | undefined }) {
   const [problem, setProblem] = useState("");
@@ -22,9 +29,7 @@ export function JobLine({ job, onChange }: { job: Job; onChange?: ((job: Job) =>
         </>
       )}
       {job.state === "failed" && (
-        <span class="error">
-          {job.error?.detail} {job.error?.fix && <strong>{job.error.fix}</strong>}
-        </span>
+        <Trouble problem={job.error} />
       )}
       {job.state === "cancelled" && <span>cancelled</span>}
       {problem && <span class="error">{problem}</span>}

@@ -11,6 +11,8 @@ export const jobs = new Watched<Job[]>([]);
 /** Where the list of volumes goes on; null at its end. */
 export const more = new Watched<string | null>(null);
 export const loaded = new Watched<boolean>(false);
+/** Whether there are more results than were read. */
+const partial = new Watched<boolean>(false);
 export const trouble = new Watched<string>("");
 
 const PAGE = 30;
@@ -31,6 +33,7 @@ export async function refresh(): Promise<void> {
     models.value = m.items;
     fits.value = s.items;
     templates.value = t.items;
+    partial.value = Boolean(m.next || s.next);
     trouble.value = "";
     loaded.value = true;
   } catch (error) {
@@ -61,6 +64,32 @@ export async function loadScan(id: string): Promise<Volume> {
   await Promise.all([...new Set(missing)].map(result => (result && !find(result) ? loadResult(result) : null)));
   return volume;
 }
+
+const complete = new Set<string>();
+
+/** Reads the results of a scan that are too old for the first pages, once. */
+export function loadResultsOf(id: string): void {
+  if (!partial.value || complete.has(id)) return;
+  complete.add(id);
+  void loadScan(id).catch(() => complete.delete(id));
+}
+
+/** Reads the results of all scans that were read, at most `MOST` of each kind. */
+export async function loadAllResults(): Promise<void> {
+  if (!partial.value) return;
+  partial.value = false;
+  for (const [kind, list] of [["segmentations", fits], ["models", models]] as const) {
+    let cursor: string | null = null;
+    do {
+      const next: { items: Result[]; next: string | null } = await page<Result>(kind, { limit: 100, ...(cursor ? { cursor } : {}) });
+      const known = new Set(list.value.map(result => result.id));
+      list.value = [...list.value, ...next.items.filter(result => !known.has(result.id))];
+      cursor = next.next;
+    } while (cursor && list.value.length < MOST);
+  }
+}
+
+const MOST = 2000;
 
 export function find(id: string): Result | undefined {
   return fits.value.find(fit => fit.id === id) ?? models.value.find(model => model.id === id);

@@ -12,7 +12,7 @@ import { WorkList } from "./worklist";
 const DOCS = location.pathname.startsWith("/docs");
 
 function Page() {
-  const { volume } = useWatched(route);
+  const { view, volume } = useWatched(route);
   const asked = useWatched(wanted);
   const answers = useWatched(reachable);
   const signedIn = useWatched(key);
@@ -28,7 +28,8 @@ function Page() {
           ventriform
         </a>
         <nav aria-label="Pages">
-          <a href="/#/" aria-current={volume || DOCS ? undefined : "page"}>Scans</a>
+          <a href="/#/" aria-current={view === "list" && !DOCS ? "page" : undefined}>Scans</a>
+          <a href="/#/evaluation" aria-current={view === "evaluation" && !DOCS ? "page" : undefined}>Evaluation</a>
           <a href="/docs" aria-current={DOCS ? "page" : undefined}>API</a>
         </nav>
         <span class="research">Research software, not a medical device</span>
@@ -42,7 +43,7 @@ function Page() {
       )}
       {asked && <SignIn reason={asked} />}
       <main id="main" tabIndex={-1}>
-        {DOCS ? <Chunk load={docs} name="documentation" /> : volume ? <Chunk key={volume} load={viewer} name="viewer" volume={volume} /> : <WorkList />}
+        {DOCS ? <Chunk load={docs} name="documentation" /> : volume ? <Chunk key={volume} load={viewer} name="viewer" volume={volume} /> : view === "evaluation" ? <Chunk key="evaluation" load={evaluation} name="evaluation" /> : <WorkList />}
       </main>
     </>
   );
@@ -67,6 +68,7 @@ function SignIn({ reason }: { reason: string }) {
 }
 
 const viewer = () => import("./viewer/viewer").then(module => module.Viewer as ComponentType<{ volume?: string }>);
+const evaluation = () => import("./evaluationview").then(module => module.EvaluationView as ComponentType<{ volume?: string }>);
 const docs = () => import("./docs").then(module => module.Docs as ComponentType<{ volume?: string }>);
 
 /** Viewer and documentation are fetched when they are opened first. */

@@ -83,7 +83,7 @@ const GROUPS: Record<Kind, [string, string[]][]> = {
     ["Triangles", ["fitness", "w1", "w2", "w3", "w4", "gain", "guard"]],
   ],
   segmentation: [
-    ["Where the heart is", ["organ", "center", "axis", "seed_point", "box", "roll", "superior", "anterior"]],
+    ["Where the heart is", ["organ", "center", "axis", "base", "seed_point", "box", "roll", "superior", "anterior"]],
     ["Edge of the wall", ["sensor", "blur", "reach", "last_reach", "narrowing", "margin", "resolution"]],
     ["Springs", ["spring_stiffness", "torsion_stiffness", "body_stiffness", "thickness_stiffness", "mass", "damping", "time_step", "tolerance", "max_iterations"]],
     ["Polar map", ["polar_*"]],
@@ -176,6 +176,7 @@ export function ParameterForm({ kind, volume, draft, onChange, problem }: FormPr
   );
   const changed = (list: Spec[]) => list.filter(spec => draft[spec.name]).length;
   const inMore = groups.flatMap(([, list]) => list);
+  // A field behind "more" is opened when something is wrong with it.
   const mustShow = inMore.some(spec => spec.name === problem?.field);
   return (
     <div class="parameters">
@@ -223,6 +224,7 @@ export function ParameterForm({ kind, volume, draft, onChange, problem }: FormPr
           <button type="button" class="plain" onClick={() => onChange({})}>All defaults</button>
         </div>
       </details>
+      {problem && !all.some(spec => spec.name === problem.field) && <p class="error" role="alert">{problem.text}</p>}
     </div>
   );
 }
@@ -234,6 +236,7 @@ const NAMES: Record<string, string> = {
   reader: "Drawn as by",
   edge: "Wall shown",
   center: "Centre",
+  base: "Base plane",
   w1: "Weight 1",
   w2: "Weight 2",
   w3: "Weight 3",
@@ -291,7 +294,7 @@ function Field({ spec, volume, text, onText, error }: FieldProps) {
         <span>{help}{range && ` (${range})`}</span>
       </details>
       <span id={`${id}-help`} class="hidden">{help} {range}</span>
-      {error && <p id={`${id}-error`} class="error">{error}</p>}
+      {error && <p id={`${id}-error`} class="error" role="alert">{error}</p>}
     </div>
   );
 }
@@ -330,7 +333,7 @@ function ExpertChoice({ common, text, onText, volume }: ChoiceProps) {
 }
 
 /** Readers' profiles: how a person draws the wall. */
-function ReaderChoice({ common, text, onText }: Omit<ChoiceProps, "volume">) {
+export function ReaderChoice({ common, text, onText }: Omit<ChoiceProps, "volume">) {
   const [readers, setReaders] = useState<{ id: string; name: string }[]>([]);
   useEffect(() => {
     void page<{ id: string; name: string }>("readers", { limit: 100 }).then(found => setReaders(found.items), () => undefined);

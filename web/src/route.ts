@@ -1,8 +1,9 @@
-// The address of the view: #/ is the list, #/scan/VOLUME/RESULT/OTHER a scan, what was made of it and what it is compared with.
+// The address of the view: #/ is the list, #/evaluation the results of an evaluation, #/scan/VOLUME/RESULT/OTHER a scan, what was made of it and what it is compared with.
 
 import { Watched } from "./state";
 
 export interface Route {
+  view: "list" | "scan" | "evaluation";
   volume: string | null;
   result: string | null;
   other: string | null;
@@ -10,8 +11,8 @@ export interface Route {
 
 function read(): Route {
   const [, view, volume, result, other] = location.hash.split("/");
-  if (view !== "scan" || !volume) return { volume: null, result: null, other: null };
-  return { volume, result: result || null, other: other || null };
+  if (view === "scan" && volume) return { view, volume, result: result || null, other: other || null };
+  return { view: view === "evaluation" ? view : "list", volume: null, result: null, other: null };
 }
 
 export const route = new Watched<Route>(read());

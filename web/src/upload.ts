@@ -1,7 +1,9 @@
 // Files chosen or dropped by a person: which of them make up one scan, and how far each has been sent.
 
-import { type Volume, type Problem, authorization, key, nextKey, problemOf, reachable } from "./api";
+import { type Problem, ProblemError, type Volume, authorization, key, nextKey, page, problemOf, uploadLimit } from "./api";
+import { pathOf } from "./drop";
 import { Watched } from "./state";
+import { bytes } from "./words";
 
 export interface Group {
   name: string;
@@ -60,7 +62,7 @@ export async function grouped(files: File[]): Promise<Group[]> {
 }
 
 function folderOf(file: File): string {
-  return (placed.get(file) ?? file.webkitRelativePath).split("/").slice(0, -1).join("/");
+  return pathOf(file).split("/").slice(0, -1).join("/");
 }
 
 /** The series of a DICOM file with one slice; null for other files. A file of many frames is a scan by itself. */
@@ -80,31 +82,6 @@ async function seriesOf(file: File): Promise<string | null> {
   };
   const frames = Number(text(0x0028, 0x0008) ?? "1");
   return frames > 1 ? null : text(0x0020, 0x000e);
-}
-
-const placed = new WeakMap<File, string>();
-
-/** Every file of what was dropped, also inside folders. */
-export async function dropped(transfer: DataTransfer): Promise<File[]> {
-  const entries = [...transfer.items].flatMap(item => item.webkitGetAsEntry?.() ?? []);
-  if (entries.length === 0) return [...transfer.files];
-  const files: File[] = [];
-  const walk = async (entry: FileSystemEntry): Promise<void> => {
-    if (entry.isFile) {
-      const file = await new Promise<File>((done, fail) => (entry as FileSystemFileEntry).file(done, fail));
-      placed.set(file, entry.fullPath.slice(1));
-      files.push(file);
-      return;
-    }
-    const reader = (entry as FileSystemDirectoryEntry).createReader();
-    for (;;) {
-      const some = await new Promise<FileSystemEntry[]>((done, fail) => reader.readEntries(done, fail));
-      if (some.length === 0) return;
-      for (const inner of some) await walk(inner);
-    }
-  };
-  for (const entry of entries) await walk(entry);
-  return files;
 }
 
 let count = 0;
@@ -144,7 +121,34 @@ async function work(): Promise<void> {
   }
 }
 
+/** A form is a little larger than its files. */
+const FORM = 4096;
+
+/** Why a scan is too large to be sent at all; null if it is not, as far as the page knows. */
+function tooLarge(upload: Upload): Problem | null {
+  const limit = uploadLimit.value;
+  if (limit === null || upload.bytes + FORM <= limit) return null;
+  return {
+    type: "about:blank",
+    title: "",
+    status: 413,
+    detail: `It was not sent: ${bytes(upload.bytes)} are more than ${bytes(limit)}, the limit of this service.`,
+    fix: "Send less (a volume may be gzipped: .nii.gz), or ask the operator to raise the limit.",
+  };
+}
+
 async function send(upload: Upload): Promise<void> {
+  change(upload.id, { state: "sending", sent: 0 });
+  // A small question first: an answer to it is read, while a service that refuses a large body may hang up unheard.
+  try {
+    await page("volumes", { limit: 1 });
+  } catch (error) {
+    if (error instanceof ProblemError) return change(upload.id, { state: "refused", problem: error.problem });
+    return change(upload.id, { state: "interrupted" });
+  }
+  if (uploads.value.find(other => other.id === upload.id)?.state !== "sending") return;
+  const problem = tooLarge(upload);
+  if (problem) return change(upload.id, { state: "refused", problem });
   for (;;) {
     const used = key.value;
     const answer = await attempt(upload);
@@ -177,8 +181,6 @@ function attempt(upload: Upload): Promise<{ status: number; text: string } | nul
     request.upload.onload = () => change(upload.id, { state: "reading", sent: upload.bytes });
     request.onload = () => resolve({ status: request.status, text: request.responseText });
     request.onerror = () => {
-      // A refusal may close the connection before the body is sent; then nobody can read the answer.
-      reachable.value = navigator.onLine && reachable.value;
       change(upload.id, { state: "interrupted" });
       resolve(null);
     };

@@ -68,7 +68,7 @@ export function isFit(id: string): boolean {
 /** What distinguishes a result from others of the same scan. */
 export function resultName(result: Result): string {
   if (isFit(result.id)) {
-    const changed = ["center", "axis", "roll"].filter(name => result.parameters[name] != null && result.parameters[name] !== 0);
+    const changed = ["center", "axis", "base", "roll"].filter(name => result.parameters[name] != null && result.parameters[name] !== 0);
     const model = result.parameters["model"];
     const by = typeof model === "string" && model !== "auto" ? ` of ${model.slice(0, 10)}…` : "";
     return changed.length ? `Corrected fit${by}` : `Fit${by}`;

@@ -1,14 +1,15 @@
 // The list of scans: what is being sent, what is stored, what was made of it.
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { type Job, type Result, type Volume, words } from "./api";
+import { type Job, type Result, type Volume, type Walls, words } from "./api";
 import { Confirm } from "./confirm";
-import { JobLine } from "./jobline";
-import { eraseVolume, fits, isActive, jobs, loadMore, loaded, models, more, put, refresh, trouble, volumes } from "./library";
+import { useDrop } from "./drop";
+import { JobLine, Trouble } from "./jobline";
+import { eraseVolume, fits, isActive, jobs, loadAllResults, loadMore, loadResultsOf, loaded, models, more, put, refresh, trouble, volumes } from "./library";
 import { Picture } from "./picture";
 import { open } from "./route";
 import { useWatched } from "./state";
-import { type Upload, add, again, dismiss, dropped, keepNames, onStored, stop, uploads } from "./upload";
+import { type Upload, add, again, dismiss, keepNames, onStored, stop, uploads } from "./upload";
 import { bytes, isFit, isLabelMap, moment, nameOf, number, resultName, shape, study } from "./words";
 import { file } from "./work";
 
@@ -46,34 +47,12 @@ export function WorkList() {
 }
 
 function Drop({ then, onThen }: { then: Then; onThen: (then: Then) => void }) {
-  const [over, setOver] = useState(false);
+  const over = useDrop(add);
   const chooser = useRef<HTMLInputElement>(null);
   const folder = useRef<HTMLInputElement>(null);
   const known = useWatched(volumes).length + useWatched(uploads).length;
   const isLoaded = useWatched(loaded);
   const named = useWatched(keepNames);
-  useEffect(() => {
-    const allow = (event: DragEvent) => {
-      if (!event.dataTransfer?.types.includes("Files")) return;
-      event.preventDefault();
-      setOver(true);
-    };
-    const leave = (event: DragEvent) => !event.relatedTarget && setOver(false);
-    const take = (event: DragEvent) => {
-      setOver(false);
-      if (!event.dataTransfer) return;
-      event.preventDefault();
-      void dropped(event.dataTransfer).then(add);
-    };
-    addEventListener("dragover", allow);
-    addEventListener("dragleave", leave);
-    addEventListener("drop", take);
-    return () => {
-      removeEventListener("dragover", allow);
-      removeEventListener("dragleave", leave);
-      removeEventListener("drop", take);
-    };
-  }, []);
   const chosen = (input: HTMLInputElement) => {
     void add([...(input.files ?? [])]);
     input.value = "";
@@ -110,7 +89,7 @@ const STATES: Record<Upload["state"], string> = {
   reading: "is being read",
   stored: "stored",
   refused: "refused",
-  interrupted: "The connection was lost, or the service refused the size. The file is still here: send it again.",
+  interrupted: "The connection broke before the service had everything. Nothing is lost: send it again.",
   cancelled: "cancelled",
 };
 
@@ -128,7 +107,7 @@ function Uploads() {
               <span class="quiet">{bytes(upload.bytes)}{upload.group.files.length > 1 && `, ${upload.group.files.length} files`}</span>
               {upload.state === "sending" && <progress value={upload.sent} max={upload.bytes || 1} aria-label={`Sending ${upload.group.name}`} />}
               <span role="status" class={upload.state === "refused" || upload.state === "interrupted" ? "error" : "state"}>
-                {upload.problem ? <>{upload.problem.detail} <strong>{upload.problem.fix}</strong></> : upload.existed ? "was stored before" : STATES[upload.state]}
+                {upload.problem ? <Trouble problem={upload.problem} /> : upload.existed ? "was stored before" : STATES[upload.state]}
               </span>
               <span class="end">
                 {underway && <button type="button" class="plain" onClick={() => stop(upload)}>Cancel</button>}
@@ -172,7 +151,9 @@ function Scans() {
   }, [all, allFits, allModels, allJobs]);
   // A search looks at everything stored, so the rest of the list is read first.
   useEffect(() => {
-    if ((search || order !== "newest" || show !== "all") && next && all.length < 2000) void loadMore(100);
+    if (!search && order === "newest" && show === "all") return;
+    void loadAllResults().catch(error => (trouble.value = words(error)));
+    if (next && all.length < 2000) void loadMore(100);
   }, [search, order, show, next, all.length]);
   const shown = rows.filter(row => matches(row, search) && passes(row, show)).sort(COMPARE[order]);
   useEffect(() => setAt(0), [search, show, order]);
@@ -259,8 +240,10 @@ const COMPARE: Record<Order, (a: Row, b: Row) => number> = {
 
 function ScanRow({ row: { volume, results, open: openJobs } }: { row: Row }) {
   const [problem, setProblem] = useState("");
+  const [state, setState] = useState("");
   const name = nameOf(volume);
   const labels = Object.entries(volume.labels).filter(([label]) => label !== "name");
+  useEffect(() => loadResultsOf(volume.id), [volume.id]);
   const start = (kind: "model" | "segmentation") => () => {
     setProblem("");
     file(kind, volume, {}).then(put, error => setProblem(words(error)));
@@ -289,10 +272,18 @@ function ScanRow({ row: { volume, results, open: openJobs } }: { row: Row }) {
         {results.length > 4 && <a class="result" href={`#/scan/${volume.id}`}>and {results.length - 4} more</a>}
         {results.length === 0 && !openJobs.some(isActive) && <span class="quiet">no result yet</span>}
         {problem && <span class="error">{problem}</span>}
+        {state && <span class="quiet" role="status">{state}</span>}
       </div>
       <div class="actions">
         <button type="button" onClick={start("segmentation")} aria-label={`Fit the ventricle of ${name}`}>Fit</button>
         <button type="button" onClick={start("model")} aria-label={`Make a model of ${name}`}>Model</button>
+        <button type="button" class="plain" aria-label={`Download all of ${name} as zip`} onClick={() => {
+          setProblem("");
+          void import("./bundle").then(bundle => bundle.saveScan(volume, setState)).catch((error: unknown) => {
+            setState("");
+            setProblem(words(error));
+          });
+        }}>Zip</button>
         <Confirm label={`Erase ${name}`} question="Erase the scan and all that was made of it?" act={() => eraseVolume(volume.id)}>Erase</Confirm>
       </div>
     </li>
@@ -302,7 +293,8 @@ function ScanRow({ row: { volume, results, open: openJobs } }: { row: Row }) {
 function figures(result: Result) {
   const { summary } = result;
   if (!isFit(result.id)) return <span>distance {number(summary["distance_mean_mm"], 2, "mm")}</span>;
-  const volumesMl = summary["volumes_ml"] as { wall: number; cavity: number } | undefined;
+  const given = summary["volumes_ml"] as (Walls & { anatomical?: Walls }) | undefined;
+  const volumesMl = given?.anatomical ?? given;
   const flags = (summary["flags"] as unknown[] | undefined)?.length ?? 0;
   return (
     <>

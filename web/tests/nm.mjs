@@ -1,4 +1,5 @@
-// A DICOM NM file (RECON TOMO, explicit little endian) of an axis-aligned 16-bit NIfTI-1 scan.
+// DICOM files (explicit little endian) of an axis-aligned 16-bit NIfTI-1 scan: one NM file of many frames (RECON TOMO), or a
+// PET series of one file for each slice.
 
 import { gunzipSync } from "node:zlib";
 
@@ -27,53 +28,38 @@ function item(...elements) {
   return Buffer.concat([head, body]);
 }
 
-export function nm(nifti, patient) {
+/** Voxels, and where they lie, of a packed NIfTI-1 file. */
+function scanOf(nifti) {
   const file = gunzipSync(nifti);
-  const [nx, ny, nz] = [42, 44, 46].map(at => file.readInt16LE(at));
+  const shape = [42, 44, 46].map(at => file.readInt16LE(at));
   const place = row => [0, 1, 2, 3].map(column => file.readFloatLE(280 + 16 * row + 4 * column));
   const [x, y, z] = [place(0), place(1), place(2)];
   const start = file.readFloatLE(108);
+  const pixels = Buffer.alloc(2 * shape[0] * shape[1] * shape[2]);
+  for (let n = 0; n < pixels.length / 2; n++) pixels.writeUInt16LE(file.readInt16LE(start + 2 * n) + 32768, 2 * n);
   // NIfTI counts to the right and to anterior, DICOM to the left and to posterior.
-  const steps = [-x[0], -y[1], z[2]];
-  const origin = [-x[3], -y[3], z[3]];
-  const pixels = Buffer.alloc(2 * nx * ny * nz);
-  for (let n = 0; n < nx * ny * nz; n++) pixels.writeUInt16LE(file.readInt16LE(start + 2 * n) + 32768, 2 * n);
-  const root = "1.2.826.0.1.3680043.10.998.7";
-  const kind = "1.2.840.10008.5.1.4.1.1.20";
+  return { shape, pixels, steps: [-x[0], -y[1], z[2]], origin: [-x[3], -y[3], z[3]] };
+}
+
+const ROOT = "1.2.826.0.1.3680043.10.998";
+const number = value => value.toFixed(6);
+
+/** The head of a file with one object. */
+function head(kind, instance) {
   const meta = [
     element(0x00020001, "OB", Buffer.from([0, 1])),
     element(0x00020002, "UI", kind),
-    element(0x00020003, "UI", `${root}.3`),
+    element(0x00020003, "UI", instance),
     element(0x00020010, "UI", "1.2.840.10008.1.2.1"),
-    element(0x00020012, "UI", `${root}.9`),
+    element(0x00020012, "UI", `${ROOT}.9`),
   ];
   const length = Buffer.alloc(4);
   length.writeUInt32LE(Buffer.concat(meta).length);
-  const number = value => value.toFixed(6);
-  const sides = [Math.sign(steps[0]), 0, 0, 0, Math.sign(steps[1]), 0];
-  return Buffer.concat([
-    Buffer.alloc(128),
-    Buffer.from("DICM"),
-    element(0x00020000, "UL", length),
-    ...meta,
-    element(0x00080005, "CS", "ISO_IR 192"),
-    element(0x00080008, "CS", ["DERIVED", "PRIMARY", "RECON TOMO", "EMISSION"]),
-    element(0x00080016, "UI", kind),
-    element(0x00080018, "UI", `${root}.3`),
-    element(0x00080020, "DA", "20250115"),
-    element(0x00080050, "SH", "ACC7"),
-    element(0x00080060, "CS", "NM"),
-    element(0x00100010, "PN", patient),
-    element(0x00100020, "LO", "PH7"),
-    element(0x00180050, "DS", number(Math.abs(steps[2]))),
-    element(0x00180088, "DS", number(steps[2] * Math.sign(steps[0] * steps[1]))),
-    element(0x0020000d, "UI", `${root}.1`),
-    element(0x0020000e, "UI", `${root}.2`),
-    element(0x00200052, "UI", `${root}.4`),
-    element(0x00280002, "US", 1),
-    element(0x00280004, "CS", "MONOCHROME2"),
-    element(0x00280008, "IS", nz),
-    element(0x00280009, "AT", 0x00540080),
+  return [Buffer.alloc(128), Buffer.from("DICM"), element(0x00020000, "UL", length), ...meta];
+}
+
+function image([nx, ny], steps) {
+  return [
     element(0x00280010, "US", ny),
     element(0x00280011, "US", nx),
     element(0x00280030, "DS", [number(Math.abs(steps[1])), number(Math.abs(steps[0]))]),
@@ -81,8 +67,78 @@ export function nm(nifti, patient) {
     element(0x00280101, "US", 16),
     element(0x00280102, "US", 15),
     element(0x00280103, "US", 0),
+  ];
+}
+
+export function nm(nifti, patient) {
+  const { shape, pixels, steps, origin } = scanOf(nifti);
+  const kind = "1.2.840.10008.5.1.4.1.1.20";
+  const sides = [Math.sign(steps[0]), 0, 0, 0, Math.sign(steps[1]), 0];
+  return Buffer.concat([
+    ...head(kind, `${ROOT}.7.3`),
+    element(0x00080005, "CS", "ISO_IR 192"),
+    element(0x00080008, "CS", ["DERIVED", "PRIMARY", "RECON TOMO", "EMISSION"]),
+    element(0x00080016, "UI", kind),
+    element(0x00080018, "UI", `${ROOT}.7.3`),
+    element(0x00080020, "DA", "20250115"),
+    element(0x00080050, "SH", "ACC7"),
+    element(0x00080060, "CS", "NM"),
+    element(0x00100010, "PN", patient),
+    element(0x00100020, "LO", "PH7"),
+    element(0x00180050, "DS", number(Math.abs(steps[2]))),
+    element(0x00180088, "DS", number(steps[2] * Math.sign(steps[0] * steps[1]))),
+    element(0x0020000d, "UI", `${ROOT}.7.1`),
+    element(0x0020000e, "UI", `${ROOT}.7.2`),
+    element(0x00200052, "UI", `${ROOT}.7.4`),
+    element(0x00280002, "US", 1),
+    element(0x00280004, "CS", "MONOCHROME2"),
+    element(0x00280008, "IS", shape[2]),
+    element(0x00280009, "AT", 0x00540080),
+    ...image(shape, steps),
     element(0x00540022, "SQ", item(element(0x00200032, "DS", origin.map(number)), element(0x00200037, "DS", sides.map(number)))),
-    element(0x00540080, "US", Array.from({ length: nz }, (_, n) => n + 1)),
+    element(0x00540080, "US", Array.from({ length: shape[2] }, (_, n) => n + 1)),
     element(0x7fe00010, "OW", pixels),
   ]);
+}
+
+/** One file for each slice. */
+export function series(nifti, patient) {
+  const { shape, pixels, steps, origin } = scanOf(nifti);
+  const kind = "1.2.840.10008.5.1.4.1.1.128";
+  const size = 2 * shape[0] * shape[1];
+  const sides = [Math.sign(steps[0]), 0, 0, 0, Math.sign(steps[1]), 0];
+  return Array.from({ length: shape[2] }, (_, n) => Buffer.concat([
+    ...head(kind, `${ROOT}.8.3.${n + 1}`),
+    element(0x00080005, "CS", "ISO_IR 192"),
+    element(0x00080008, "CS", ["ORIGINAL", "PRIMARY"]),
+    element(0x00080016, "UI", kind),
+    element(0x00080018, "UI", `${ROOT}.8.3.${n + 1}`),
+    element(0x00080020, "DA", "20250116"),
+    element(0x00080060, "CS", "PT"),
+    element(0x00100010, "PN", patient),
+    element(0x00100020, "LO", "PH8"),
+    element(0x00180050, "DS", number(Math.abs(steps[2]))),
+    element(0x0020000d, "UI", `${ROOT}.8.1`),
+    element(0x0020000e, "UI", `${ROOT}.8.2`),
+    element(0x00200013, "IS", n + 1),
+    element(0x00200032, "DS", [origin[0], origin[1], origin[2] + n * steps[2]].map(number)),
+    element(0x00200037, "DS", sides.map(number)),
+    element(0x00200052, "UI", `${ROOT}.8.4`),
+    element(0x00280002, "US", 1),
+    element(0x00280004, "CS", "MONOCHROME2"),
+    ...image(shape, steps),
+    element(0x00281052, "DS", 0),
+    element(0x00281053, "DS", 1),
+    element(0x7fe00010, "OW", pixels.subarray(n * size, (n + 1) * size)),
+  ]));
+}
+
+/** The same scan as a pair of a header and an image. */
+export function pair(nifti) {
+  const file = gunzipSync(nifti);
+  const header = Buffer.from(file.subarray(0, 348));
+  header.write("ni1\0", 344, "latin1");
+  const start = header.readFloatLE(108);
+  header.writeFloatLE(0, 108);
+  return { header, image: file.subarray(start) };
 }

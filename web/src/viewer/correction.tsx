@@ -2,14 +2,15 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { type ParameterValue, type Volume, fieldOf, words } from "../api";
-import { draftOf, parameterSpecs, valuesOf } from "../parameters";
+import { ReaderChoice, draftOf, parameterSpecs, valuesOf } from "../parameters";
 import { useWatched } from "../state";
 import { isFit } from "../words";
 import { file } from "../work";
 import type { Loaded } from "./loaded";
 import { frameOf } from "./plane";
+import { WallFrame } from "./polar";
 import type { Edit, Scene } from "./scene";
-import { type Vec, add, scale, sub, turned, unit } from "./vector";
+import { type Vec, add, dot, scale, sub, turned, unit } from "./vector";
 
 interface Props {
   scene: Scene;
@@ -25,7 +26,9 @@ function start(scene: Scene, shown: Loaded | null): Edit {
   const heart = shown?.heart;
   if (heart) {
     const center = shown.report?.localisation?.centre ?? shown.middle;
-    return { base: heart.base, apex: heart.apex, center, roll: 0, changed: new Set() };
+    // The plane of the base is that of the rim, as the service counts it.
+    const { base } = new WallFrame(shown.mesh, heart, 1, 1);
+    return { base, apex: heart.apex, center, roll: 0, changed: new Set() };
   }
   const center = scene.cursor.value;
   return { center, base: sub(center, scale(USUAL, HALF_LENGTH)), apex: add(center, scale(USUAL, HALF_LENGTH)), roll: 0, changed: new Set(["center"]) };
@@ -37,10 +40,12 @@ export function Correction({ scene, volume, shown }: Props) {
   const [problem, setProblem] = useState<{ field: string | null; text: string } | null>(null);
   const [sending, setSending] = useState(false);
   const [edge, setEdge] = useState("");
+  const [reader, setReader] = useState("");
   useEffect(() => {
     scene.edit.value = start(scene, shown);
     scene.tool.value = "correct";
     setProblem(null);
+    setReader(String(shown?.result.parameters["reader"] ?? ""));
     setEdge(String(shown?.result.parameters["edge"] ?? "apparent"));
   }, [scene, shown]);
   if (!edit) return null;
@@ -49,6 +54,11 @@ export function Correction({ scene, volume, shown }: Props) {
   const centreTo = (center: Vec) => {
     const way = sub(center, edit.center);
     scene.edit.value = { ...edit, center, base: add(edit.base, way), apex: add(edit.apex, way), changed: new Set(edit.changed).add("center") };
+  };
+  /** The base so far from the centre, along the axis. */
+  const baseTo = (distance: number) => {
+    if (!(distance > 5 && distance < 120)) return;
+    scene.edit.value = { ...edit, base: sub(edit.center, scale(axis, distance)), changed: new Set(edit.changed).add("base") };
   };
   const axisTo = (wanted: Vec) => {
     if (!(Math.hypot(...wanted) > 1e-6)) return;
@@ -70,13 +80,16 @@ export function Correction({ scene, volume, shown }: Props) {
         delete next["box"];
       }
       if (edit.changed.has("axis")) next["axis"] = axis.map(value => Math.round(value * 1e4) / 1e4);
+      if (edit.changed.has("base")) next["base"] = edit.base.map(value => Math.round(value * 100) / 100);
+      if (reader) next["reader"] = reader;
+      else delete next["reader"];
       if (edit.changed.has("roll") && scene.heart.value) {
         // The wall that now stands on top is anterior, so that is where superior lies across the axis.
         const { axis: way, anterior } = frameOf(scene.heart.value);
         next["superior"] = turned(anterior, way, (edit.roll * Math.PI) / 180).map(value => value.toFixed(4)).join(",");
         delete next["anterior"];
       }
-      const changed = [...edit.changed, ...(edge !== (shown?.result.parameters["edge"] ?? "apparent") ? ["edge"] : [])];
+      const changed = [...edit.changed, ...(reader !== (shown?.result.parameters["reader"] ?? "") ? ["reader"] : []), ...(edge !== (shown?.result.parameters["edge"] ?? "apparent") ? ["edge"] : [])];
       const labels: Record<string, string> = { changed: changed.join(" ") || "nothing" };
       if (shown && isFit(shown.result.id)) labels["parent"] = shown.result.id;
       await file("segmentation", volume, next, labels);
@@ -87,10 +100,14 @@ export function Correction({ scene, volume, shown }: Props) {
   };
   return (
     <div class="panel correction" role="group" aria-label="Correct by hand">
-      <p class="quiet">Drag <b>centre</b>, <b>apex</b> and <b>base</b> in the long-axis slices, and <b>turn</b> in the short axis so that it points to the anterior wall. The new fit is kept beside this one.</p>
+      <p class="quiet">Drag <b>centre</b>, <b>apex</b> and <b>base</b> in the long-axis slices, and <b>turn</b> in the short axis so that it points to the anterior wall. The new fit is kept beside this one and names it.</p>
       <Triple name="Centre, mm (L, P, S)" value={edit.center} digits={1} wrong={problem?.field === "center"} onValue={centreTo} />
       <button type="button" onClick={() => centreTo(cursor)}>Centre at the cursor</button>
       <Triple name="Axis, base to apex" value={axis} digits={3} wrong={problem?.field === "axis"} onValue={axisTo} />
+      <label class="field">
+        Base, mm from the centre
+        <input type="number" step={1} value={dot(sub(edit.center, edit.base), axis).toFixed(0)} aria-invalid={problem?.field === "base" || undefined} onChange={event => baseTo(Number(event.currentTarget.value))} />
+      </label>
       <label class="field">
         Turn about the axis, °
         <input type="number" step={5} value={edit.roll} onInput={event => (scene.edit.value = { ...edit, roll: Number(event.currentTarget.value) || 0, changed: new Set(edit.changed).add("roll") })} />
@@ -101,6 +118,10 @@ export function Correction({ scene, volume, shown }: Props) {
           <option value="apparent">apparent: as the image shows it</option>
           <option value="anatomical">anatomical: without blur</option>
         </select>
+      </label>
+      <label class="field">
+        Drawn as by
+        <ReaderChoice common={{ id: "correction-reader" }} text={reader} onText={setReader} />
       </label>
       {problem && <p class="error" role="alert">{problem.text}</p>}
       <div class="buttons">

@@ -164,7 +164,7 @@ export function drawSlice(element: HTMLCanvasElement, scene: Scene, plane: Plane
     }
     context.stroke();
   }
-  if (scene.edit.value && scene.tool.value === "correct") handles(context, scene, plane, flat);
+  if (style.cursor && scene.edit.value && scene.tool.value === "correct") handles(context, scene, plane, flat);
   context.restore();
   if (!style.letters) return;
   const [left, right, top, bottom] = plane.sides ?? [letters(scale(plane.right, -1)), letters(plane.right), letters(scale(plane.down, -1)), letters(plane.down)];
@@ -178,7 +178,7 @@ export function drawSlice(element: HTMLCanvasElement, scene: Scene, plane: Plane
     label(context, patient[1] ?? "", width - 8, height / 2 + 14, "right", 9);
   }
   label(context, width < 260 ? plane.short : plane.name, 8, 12, "left", 12);
-  const value = scene.voxels.at(scene.cursor.value);
+  const value = style.cursor ? scene.voxels.at(scene.cursor.value) : NaN;
   label(context, Number.isNaN(value) ? "" : value.toPrecision(3), width - 8, 12, "right", 12);
   // A bar of a round length, at most a third of the picture.
   const length = [100, 50, 20, 10, 5, 2, 1].find(mm => mm * factor < width / 3.2) ?? 1;
@@ -194,6 +194,9 @@ export function drawSlice(element: HTMLCanvasElement, scene: Scene, plane: Plane
   context.stroke();
   label(context, `${length} mm`, from, y - 11, "left", 11);
 }
+
+/** Half the length of the line that stands for the plane of the base, mm. */
+const HALF_BASE = 32;
 
 function handles(context: CanvasRenderingContext2D, scene: Scene, plane: Plane, flat: (place: Vec) => [number, number]): void {
   const edit = scene.edit.value;
@@ -225,6 +228,15 @@ function handles(context: CanvasRenderingContext2D, scene: Scene, plane: Plane, 
     line(center, flat(knob));
     dot_(flat(knob), "#ff8bd1", "turn");
   } else {
+    // The plane of the base, as it lies across this slice.
+    const axis = unit(sub(edit.apex, edit.base));
+    const along = [dot(axis, plane.right), dot(axis, plane.down)] as const;
+    const length = Math.hypot(...along);
+    if (length > 0.2) {
+      const half = HALF_BASE * (Math.hypot(apex[0] - base[0], apex[1] - base[1]) / length / Math.hypot(...sub(edit.apex, edit.base)));
+      const [x, y] = [(-along[1] / length) * half, (along[0] / length) * half];
+      line([base[0] - x, base[1] - y], [base[0] + x, base[1] + y]);
+    }
     dot_(base, "#ffe45c", "base");
     dot_(apex, "#ffe45c", "apex");
   }

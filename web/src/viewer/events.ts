@@ -1,4 +1,5 @@
-type Handlers = { [Name in keyof HTMLElementEventMap]?: (event: HTMLElementEventMap[Name]) => void };
+type Events = HTMLElementEventMap & { webglcontextlost: Event };
+type Handlers = { [Name in keyof Events]?: (event: Events[Name]) => void };
 
 /** Calls the handlers on the events of an element; the answer stops that. Every event can be prevented, the wheel's too. */
 export function handleEvents(element: HTMLElement, handlers: Handlers): () => void {

@@ -1,10 +1,10 @@
 // What was measured, beside what it is compared with; the reasons to doubt it; and every file of it.
 
 import { useState } from "preact/hooks";
-import { type Result, type Volume, call, key, save, saveBlob, words } from "../api";
-import { bytes, isFit, moment, nameOf, number, resultName } from "../words";
+import { type Result, type Volume, key, save, words } from "../api";
+import { fileNameOf, saveResult } from "../bundle";
+import { bytes, isFit, moment, number, resultName } from "../words";
 import type { FitReport, Loaded } from "./loaded";
-import { zip } from "./zip";
 
 type Row = [string, (loaded: Loaded) => number | null | undefined, number, string];
 
@@ -45,24 +45,35 @@ const MODEL: [string, Row[]][] = [
   ]],
 ];
 
-export function Figures({ shown, other }: { shown: Loaded; other: Loaded | null }) {
+/** The figures that are read first. */
+export function headlines(shown: Loaded): [string, string][] {
+  const rows = (isFit(shown.result.id) ? FIT : MODEL)[0]![1];
+  return rows.slice(0, 5).flatMap(([name, read, digits, unit]): [string, string][] => (typeof read(shown) === "number" ? [[name, number(read(shown), digits, unit)]] : []));
+}
+
+/** How likely the fit is good, and every reason to doubt it. */
+export function Verdict({ report }: { report: FitReport }) {
+  const { confidence } = report.fit;
+  return (
+    <div class={report.flags.length ? "verdict doubt" : "verdict"}>
+      {typeof confidence === "number" && (
+        <p>
+          <b>{confidence > 0.99 ? "> 99" : (100 * confidence).toFixed(0)} %</b> likely a good fit
+          <meter min={0} max={1} low={0.5} high={0.8} optimum={1} value={confidence} aria-label="Confidence" />
+        </p>
+      )}
+      {report.flags.length > 0 ? <ul>{report.flags.map(flag => <li key={flag.code}>{flag.reason}</li>)}</ul> : <p class="quiet">No reason to doubt it was found.</p>}
+    </div>
+  );
+}
+
+export function Figures({ shown, other, verdict = true }: { shown: Loaded; other: Loaded | null; verdict?: boolean }) {
   const sections = isFit(shown.result.id) ? FIT : MODEL;
   const { report } = shown;
-  const confidence = report?.fit.confidence;
   return (
     <section class="figures" aria-label="Figures">
-      {report && (
-        <div class={report.flags.length ? "verdict doubt" : "verdict"}>
-          {typeof confidence === "number" && (
-            <p>
-              <b>{(100 * confidence).toFixed(0)} %</b> likely a good fit
-              <meter min={0} max={1} low={0.5} high={0.8} optimum={1} value={confidence} aria-label="Confidence" />
-            </p>
-          )}
-          {report.flags.length > 0 ? <ul>{report.flags.map(flag => <li key={flag.code}>{flag.reason}</li>)}</ul> : <p class="quiet">No reason to doubt it was found.</p>}
-          {report.warnings.map(text => <p key={text} class="warning">{text}</p>)}
-        </div>
-      )}
+      {report && verdict && <Verdict report={report} />}
+      {verdict && report?.warnings.map(text => <p key={text} class="warning">{text}</p>)}
       <table>
         <caption class="hidden">Figures of the shown result{other && " and of the compared one"}</caption>
         <thead class={other ? "" : "hidden"}>
@@ -92,28 +103,16 @@ export function Figures({ shown, other }: { shown: Loaded; other: Loaded | null 
 
 export function Downloads({ result, volume }: { result: Result; volume: Volume }) {
   const [state, setState] = useState("");
-  const name = nameOf(volume).replace(/\.(nii|gz|hdr|img|dcm|zip)/gi, "").replace(/[^\w.-]+/g, "_") || "scan";
-  const whole = async () => {
-    try {
-      const files = [];
-      for (const [n, one] of result.files.entries()) {
-        setState(`File ${n + 1} of ${result.files.length} …`);
-        const answer = await call(one.href);
-        files.push({ name: `${name}_${result.id.slice(0, 12)}/${one.name}`, bytes: new Uint8Array(await answer.arrayBuffer()) });
-      }
-      saveBlob(zip(files), `${name}_${result.id.slice(0, 12)}.zip`);
-      setState("");
-    } catch (error) {
-      setState(words(error));
-    }
-  };
+  const name = fileNameOf(volume);
+  const failed = (error: unknown) => setState(words(error));
   const page = result.links["page"];
   return (
     <section class="downloads" aria-label="Downloads">
       <div class="buttons">
-        <button type="button" onClick={() => void whole()}>Everything as zip</button>
+        <button type="button" onClick={() => void saveResult(volume, result, setState).catch(failed)}>Everything as zip</button>
+        <button type="button" onClick={() => print()}>Print</button>
         {page && (key.value
-          ? <button type="button" onClick={() => void save(page, `${name}_report.html`).catch(error => setState(words(error)))}>Report</button>
+          ? <button type="button" onClick={() => void save(page, `${name}_report.html`).catch(failed)}>Report</button>
           : <a class="button" href={page} target="_blank" rel="noopener">Report</a>)}
       </div>
       <p role="status" class="quiet">{state}</p>
@@ -122,7 +121,7 @@ export function Downloads({ result, volume }: { result: Result; volume: Volume }
         <ul class="files">
           {result.files.map(one => (
             <li key={one.name}>
-              <button type="button" class="plain" onClick={() => void save(one.href, `${name}_${one.name}`).catch(error => setState(words(error)))}>{one.name}</button>
+              <button type="button" class="plain" onClick={() => void save(one.href, `${name}_${one.name}`).catch(failed)}>{one.name}</button>
               <span class="quiet">{bytes(one.bytes)}</span>
             </li>
           ))}

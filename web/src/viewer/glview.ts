@@ -1,7 +1,8 @@
 // Meshes in three dimensions, by WebGL: a coloured wall, another one as a wire, and the cursor.
 
+import { type Camera, type MeshPainter, rightOf, usualCamera } from "./camera";
 import type { Mesh } from "./mesh";
-import { type Vec, add, cross, dot, scale, sub, unit } from "./vector";
+import { type Vec, dot } from "./vector";
 
 const VERTEX = `
 attribute vec3 place; attribute vec3 normal; attribute vec3 colour;
@@ -14,9 +15,10 @@ precision mediump float;
 varying vec3 n; varying vec3 c;
 uniform vec3 toward; uniform vec3 up; uniform float flat_;
 void main() {
+  if (flat_ > 1.5 && distance(gl_PointCoord, vec2(0.5)) > 0.5) discard;
   float facing = abs(dot(normalize(n), toward));
   float top = 0.5 + 0.5 * dot(normalize(n), up);
-  float light = mix(0.35 + 0.55 * facing + 0.18 * top, 1.0, flat_);
+  float light = mix(0.35 + 0.55 * facing + 0.18 * top, 1.0, min(flat_, 1.0));
   gl_FragColor = vec4(c * light, 1.0);
 }`;
 
@@ -28,19 +30,11 @@ interface Part {
   colour: WebGLBuffer;
 }
 
-/** How the camera stands: it looks at `target` along `-toward`, with `up` at the top. */
-export interface Camera {
-  toward: Vec;
-  up: Vec;
-  target: Vec;
-  height: number;
-}
-
-export class MeshView {
+export class MeshView implements MeshPainter {
   private readonly gl: WebGLRenderingContext;
   private readonly program: WebGLProgram;
   private parts = new Map<string, Part>();
-  camera: Camera = { toward: [0, -1, 0], up: [0, 0, 1], target: [0, 0, 0], height: 130 };
+  camera: Camera = usualCamera();
 
   /** Throws if the browser has no WebGL. */
   constructor(readonly canvas: HTMLCanvasElement) {
@@ -60,23 +54,17 @@ export class MeshView {
     this.program = program;
   }
 
-  /** A mesh as a closed surface with a colour for every vertex. */
   setSurface(name: string, mesh: Mesh, colours: Float32Array): void {
     const corners = mesh.triangles.flat();
     const gather = (value: (at: number) => ArrayLike<number>) => Float32Array.from(corners.flatMap(at => Array.from(value(at))));
     this.put(name, "triangles", gather(at => mesh.vertices[at]!), gather(at => mesh.normals[at]!), gather(at => colours.subarray(3 * at, 3 * at + 3)));
   }
 
-  /** A mesh by its edges in one colour. */
   setWire(name: string, mesh: Mesh, colour: Vec): void {
     const ends = mesh.triangles.flatMap(([a, b, c]) => [a, b, b, c, c, a]);
     const places = Float32Array.from(ends.flatMap(at => [...mesh.vertices[at]!]));
     const count = ends.length;
     this.put(name, "lines", places, filled(count, [0, 0, 1]), filled(count, colour));
-  }
-
-  setLines(name: string, ends: Vec[], colour: Vec): void {
-    this.put(name, "lines", Float32Array.from(ends.flat()), filled(ends.length, [0, 0, 1]), filled(ends.length, colour));
   }
 
   setPoint(name: string, place: Vec, colour: Vec): void {
@@ -101,33 +89,10 @@ export class MeshView {
     this.parts.set(name, { mode, count: place.length / 3, place: buffer(place), normal: buffer(normal), colour: buffer(colour) });
   }
 
-  /** Turns the scene by a drag of so many pixels. */
-  turn(dx: number, dy: number): void {
-    const { toward, up } = this.camera;
-    const right = unit(cross(up, toward));
-    const about = (v: Vec, axis: Vec, angle: number): Vec => {
-      const [c, s] = [Math.cos(angle), Math.sin(angle)];
-      return add(add(scale(v, c), scale(cross(axis, v), s)), scale(axis, dot(axis, v) * (1 - c)));
-    };
-    let next = about(toward, up, -dx * 0.01);
-    next = about(next, right, -dy * 0.01);
-    this.camera.up = unit(about(up, right, -dy * 0.01));
-    this.camera.toward = unit(next);
-  }
-
-  /** The share of the picture's width and height at which a place appears. */
-  project(place: Vec): [number, number] {
-    const { toward, up, target, height } = this.camera;
-    const right = unit(cross(up, toward));
-    const r = sub(place, target);
-    const ratio = this.canvas.width / this.canvas.height;
-    return [0.5 + dot(r, right) / (height * ratio), 0.5 - dot(r, up) / height];
-  }
-
   draw(): void {
     const { gl, canvas } = this;
     const { toward, up, target, height } = this.camera;
-    const right = unit(cross(up, toward));
+    const right = rightOf(this.camera);
     const ratio = canvas.width / canvas.height;
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(0.035, 0.05, 0.06, 1);
@@ -147,7 +112,7 @@ export class MeshView {
     gl.uniform3fv(uniform("up"), up);
     gl.uniform1f(uniform("size"), 9 * devicePixelRatio);
     for (const part of this.parts.values()) {
-      gl.uniform1f(uniform("flat_"), part.mode === "triangles" ? 0 : 1);
+      gl.uniform1f(uniform("flat_"), part.mode === "triangles" ? 0 : part.mode === "lines" ? 1 : 2);
       for (const name of ["place", "normal", "colour"] as const) {
         const at = gl.getAttribLocation(this.program, name);
         gl.bindBuffer(gl.ARRAY_BUFFER, part[name]);

@@ -1,6 +1,6 @@
 // A result with all that the views draw of it.
 
-import { type FileOfResult, type Result, type Volume, get } from "../api";
+import { type FileOfResult, type Result, type Volume, type Walls, get } from "../api";
 import { isFit } from "../words";
 import { type Mesh, loadMesh } from "./mesh";
 import type { Axis } from "./plane";
@@ -28,11 +28,6 @@ export interface FitReport {
   polar?: { extent_percent: number; threshold_percent: number; orientation: string };
   flags: { code: string; reason: string }[];
   warnings: string[];
-}
-
-interface Walls {
-  wall: number;
-  cavity: number;
 }
 
 interface Spread {
@@ -139,6 +134,7 @@ export function layersOf(shown: Loaded | null, other: Loaded | null): Layer[] {
     const [own, second] = isApparent ? ["apparent wall", "anatomical wall"] : ["anatomical wall", "apparent wall"];
     layers.push({ name: shown.otherEdge ? own! : shown.report ? "wall" : "model", colour: "#3dffa8", shown: true, mesh: shown.mesh });
     if (shown.otherEdge) layers.push({ name: second!, colour: "#ffffff", shown: false, mesh: shown.otherEdge });
+    if (shown.mask) layers.push({ name: "mask", colour: "#ffd24d", shown: false, mask: shown.mask });
     if (shown.expert) layers.push({ name: "expert", colour: "#4db8ff", shown: true, mask: shown.expert });
   }
   if (other) layers.push({ name: "compared", colour: "#d6a6ff", dashed: true, shown: true, mesh: other.mesh });

@@ -8,6 +8,8 @@ export interface Mesh {
   vertices: Vec[];
   triangles: [number, number, number][];
   normals: Vec[];
+  /** Standard deviation of the distance of every vertex from the wall, mm, where it is known. */
+  uncertainty_mm?: number[];
 }
 
 export async function loadMesh(path: string): Promise<Mesh> {

@@ -106,6 +106,12 @@ export class WallFrame {
     this.focus = Math.max(this.rim, apex - radius);
   }
 
+  /** The middle of the rim. */
+  get base(): Vec {
+    const { axis, middle } = this.frame;
+    return add(middle, scale(axis, this.rim));
+  }
+
   private parts(place: Vec): [number, number, number] {
     const { axis, anterior, lateral, middle } = this.frame;
     const r = sub(place, middle);

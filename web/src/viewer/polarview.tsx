@@ -1,14 +1,14 @@
 // The polar map on the page: a click takes the cursor to that place of the wall.
 
-import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { useMemo, useState } from "preact/hooks";
 import { useWatched } from "../state";
 import { number } from "../words";
+import { useCanvas } from "./canvas";
 import { LUTS } from "./colours";
 import type { Mesh } from "./mesh";
 import { type PolarMap, WallFrame, drawPolar, placeOnMap, segmentAt, valueAt } from "./polar";
 import type { Axis } from "./plane";
 import type { Scene } from "./scene";
-import { fit } from "./slice";
 import { ColourBar } from "./wall";
 
 /** Where the browser keeps the choice of colours. */
@@ -23,7 +23,6 @@ interface Props {
 }
 
 export function PolarView({ scene, map, mesh, heart, title }: Props) {
-  const canvas = useRef<HTMLCanvasElement>(null);
   const lut = useWatched(scene.wallLut);
   const cursor = useWatched(scene.cursor);
   const [segments, setSegments] = useState(false);
@@ -32,19 +31,11 @@ export function PolarView({ scene, map, mesh, heart, title }: Props) {
   const frame = useMemo(() => new WallFrame(mesh, heart, map.rows, map.columns), [mesh, heart, map]);
   const [rows, columns] = frame.place(cursor);
   const onWall = rows >= 0 && rows <= map.rows + 1;
-  useEffect(() => {
-    const element = canvas.current;
-    if (!element) return;
-    const draw = () => {
-      fit(element);
-      const context = element.getContext("2d");
-      if (context) drawPolar(context, map, element.clientWidth, element.width / element.clientWidth, { lut, segments, threshold, territories, cursor: onWall ? [rows, columns] : null });
-    };
-    const sizes = new ResizeObserver(draw);
-    sizes.observe(element);
-    draw();
-    return () => sizes.disconnect();
-  });
+  const draw = (element: HTMLCanvasElement) => {
+    const context = element.getContext("2d");
+    if (context) drawPolar(context, map, element.clientWidth, element.width / element.clientWidth, { lut, segments, threshold, territories, cursor: onWall ? [rows, columns] : null });
+  };
+  const { canvas } = useCanvas(draw, () => () => undefined, map);
   const segment = onWall ? segmentAt(map, rows, columns) : undefined;
   const go = (x: number, y: number, size: number) => {
     const place = placeOnMap(map, x, y, size);

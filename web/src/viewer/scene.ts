@@ -31,7 +31,7 @@ export interface Edit {
   center: Vec;
   roll: number;
   /** Which of them were changed by hand. */
-  changed: Set<"center" | "axis" | "roll">;
+  changed: Set<"center" | "axis" | "base" | "roll">;
 }
 
 export interface Difference {

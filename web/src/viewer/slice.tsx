@@ -1,6 +1,7 @@
 // One slice: picture, contours, letters, scale bar and cursor on a canvas, moved by mouse, touch and keys.
 
 import { useEffect, useRef } from "preact/hooks";
+import { useCanvas } from "./canvas";
 import { type SliceStyle, drawSlice, rollKnob, sliceOrigin } from "./drawing";
 import { handleEvents } from "./events";
 import { type Plane, letters, point } from "./plane";
@@ -16,37 +17,14 @@ interface Props {
 type Handle = "base" | "apex" | "center" | "roll";
 
 export function Slice({ scene, plane, onBig }: Props) {
-  const canvas = useRef<HTMLCanvasElement>(null);
   const latest = useRef(plane);
   latest.current = plane;
-  const redraw = useRef(() => undefined as void);
-
-  useEffect(() => {
-    const element = canvas.current;
-    if (!element) return;
-    let asked = 0;
-    const draw = () => {
-      asked = 0;
-      fit(element);
-      drawSlice(element, scene, latest.current, style(element));
-      describe(element, scene, latest.current);
-    };
-    const ask = () => (asked ||= requestAnimationFrame(draw));
-    redraw.current = ask as () => void;
-    const sizes = new ResizeObserver(ask);
-    sizes.observe(element);
-    const end = scene.watch(ask);
-    const gestures = listen(element, scene, () => latest.current);
-    ask();
-    return () => {
-      cancelAnimationFrame(asked);
-      sizes.disconnect();
-      end();
-      gestures();
-    };
-  }, [scene]);
-  useEffect(() => redraw.current(), [plane]);
-
+  const draw = (element: HTMLCanvasElement) => {
+    drawSlice(element, scene, plane, style(element));
+    describe(element, scene, plane);
+  };
+  const { canvas } = useCanvas(draw, act => scene.watch(act), scene);
+  useEffect(() => (canvas.current ? listen(canvas.current, scene, () => latest.current) : undefined), [scene]);
   return (
     <figure class="slice">
       <canvas ref={canvas} tabIndex={0} role="slider" aria-label={`${plane.name} slice`} aria-valuenow={0} onDblClick={onBig} />
@@ -56,13 +34,6 @@ export function Slice({ scene, plane, onBig }: Props) {
 
 function style(element: HTMLCanvasElement): SliceStyle {
   return { width: element.clientWidth, height: element.clientHeight, ratio: element.width / Math.max(1, element.clientWidth), letters: true, cursor: true };
-}
-
-/** Gives a canvas as many pixels as it has on the screen. */
-export function fit(element: HTMLCanvasElement): void {
-  const ratio = Math.min(2, devicePixelRatio);
-  const [width, height] = [Math.round(element.clientWidth * ratio), Math.round(element.clientHeight * ratio)];
-  if (element.width !== width || element.height !== height) Object.assign(element, { width, height });
 }
 
 function describe(element: HTMLCanvasElement, scene: Scene, plane: Plane): void {
@@ -198,6 +169,9 @@ function handleAt(scene: Scene, plane: Plane, place: Vec, reach: number): Handle
   return near.sort((a, b) => a[1] - b[1])[0]?.[0] ?? null;
 }
 
+/** The cosine of the angle at which an axis counts as another one: 3 degrees. */
+const TILTED = 0.9986;
+
 function drag(scene: Scene, plane: Plane, handle: Handle, place: Vec): void {
   const edit = scene.edit.value;
   if (!edit) return;
@@ -224,8 +198,12 @@ function drag(scene: Scene, plane: Plane, handle: Handle, place: Vec): void {
     if (norm(sub(to, other)) < 20) return;
     next[handle] = to;
     const [base, apex] = handle === "apex" ? [other, to] : [to, other];
-    next.center = [0, 1, 2].map(n => base[n]! + 0.45 * (apex[n]! - base[n]!)) as unknown as Vec;
-    next.changed.add("axis").add("center");
+    if (handle === "base") next.changed.add("base");
+    // Along the axis, the base is only put elsewhere; aside, the axis is tilted with it.
+    if (handle === "apex" || dot(unit(sub(apex, base)), unit(sub(edit.apex, edit.base))) < TILTED) {
+      next.center = [0, 1, 2].map(n => base[n]! + 0.45 * (apex[n]! - base[n]!)) as unknown as Vec;
+      next.changed.add("axis").add("center");
+    }
   }
   scene.edit.value = next;
 }

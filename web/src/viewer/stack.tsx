@@ -1,10 +1,9 @@
 // The short axis from apex to base as a row of small slices; a click takes the cursor there.
 
-import { useEffect, useRef } from "preact/hooks";
-import { contours, label, paint } from "./drawing";
+import { useCanvas } from "./canvas";
+import { type SliceStyle, contours, label, paint } from "./drawing";
 import { type Plane, frameOf } from "./plane";
 import type { Scene } from "./scene";
-import { fit } from "./slice";
 import { type Vec, add, dot, scale, sub } from "./vector";
 
 interface Props {
@@ -25,36 +24,21 @@ function places(scene: Scene, width: number, height: number): Vec[] {
 }
 
 export function Stack({ scene, plane }: Props) {
-  const canvas = useRef<HTMLCanvasElement>(null);
-  const latest = useRef(plane);
-  latest.current = plane;
-  useEffect(() => {
-    const element = canvas.current;
-    if (!element) return;
-    let asked = 0;
-    const draw = () => {
-      asked = 0;
-      fit(element);
-      drawStack(element, scene, latest.current);
-    };
-    const ask = () => (asked ||= requestAnimationFrame(draw));
-    const sizes = new ResizeObserver(ask);
-    sizes.observe(element);
-    const end = scene.watch(ask);
-    ask();
-    return () => {
-      cancelAnimationFrame(asked);
-      sizes.disconnect();
-      end();
-    };
-  }, [scene, plane]);
+  const draw = (element: HTMLCanvasElement) => {
+    const [width, height] = [element.clientWidth, element.clientHeight];
+    const count = drawStack(element, scene, plane, { width, height, ratio: element.width / width, cursor: true });
+    element.setAttribute("aria-valuemin", "1");
+    element.setAttribute("aria-valuemax", String(count));
+    element.setAttribute("aria-valuenow", String(nearest(scene, places(scene, width, height), plane) + 1));
+  };
+  const { canvas } = useCanvas(draw, act => scene.watch(act), scene);
   const go = (by: number) => {
     const element = canvas.current;
     if (!element) return;
     const all = places(scene, element.clientWidth, element.clientHeight);
-    const now = nearest(scene, all, latest.current);
+    const now = nearest(scene, all, plane);
     const to = all[Math.max(0, Math.min(all.length - 1, now + by))];
-    if (to) moveTo(scene, to, latest.current);
+    if (to) moveTo(scene, to, plane);
   };
   return (
     <canvas
@@ -90,19 +74,18 @@ function nearest(scene: Scene, all: Vec[], plane: Plane): number {
   return all.reduce((best, place, n) => (distance(place) < distance(all[best]!) ? n : best), 0);
 }
 
-function drawStack(element: HTMLCanvasElement, scene: Scene, plane: Plane): void {
+/** Draws the row of slices; the answer is their number. */
+export function drawStack(element: HTMLCanvasElement, scene: Scene, plane: Plane, { width, height, ratio, cursor }: Omit<SliceStyle, "letters">): number {
   const context = element.getContext("2d");
-  const [width, height] = [element.clientWidth, element.clientHeight];
   const all = places(scene, width, height);
-  if (!context || all.length === 0) return;
-  const ratio = element.width / width;
+  if (!context || all.length === 0) return 0;
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.fillStyle = "#0a0e11";
   context.fillRect(0, 0, width, height);
   const cell = width / all.length;
   const size = Math.min(cell - 2, height);
   const factor = size / 110;
-  const now = nearest(scene, all, plane);
+  const now = cursor ? nearest(scene, all, plane) : -1;
   all.forEach((origin, n) => {
     const box = { x: n * cell + 1, y: 0, width: cell - 2, height };
     context.save();
@@ -121,7 +104,5 @@ function drawStack(element: HTMLCanvasElement, scene: Scene, plane: Plane): void
   });
   label(context, "Apex", 6, 10, "left", 11);
   label(context, "Base", width - 6, 10, "right", 11);
-  element.setAttribute("aria-valuemin", "1");
-  element.setAttribute("aria-valuemax", String(all.length));
-  element.setAttribute("aria-valuenow", String(now + 1));
+  return all.length;
 }

@@ -1,7 +1,7 @@
 // One scan: its slices, the wall, the polar map, what was measured, and what can be done about it.
 
 import { useCallback, useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { type Job, type Result, type Volume, fieldOf, get, words } from "../api";
+import { type Job, type Result, type Volume, fieldOf, get, sentences, words } from "../api";
 import { Confirm } from "../confirm";
 import { JobLine } from "../jobline";
 import { eraseResult, find, fits, isActive, jobs, loadResult, loadScan, models, resultsOf } from "../library";
@@ -17,6 +17,7 @@ import { HEART_WIDTH, type Loaded, layersOf, loadLoaded, voxelsOf } from "./load
 import { PATIENT, heartPlanes } from "./plane";
 import { PolarView, WALL_LUT } from "./polarview";
 import { type Layer, Scene, type Tool } from "./scene";
+import { type Printed, printsAs } from "./sheet";
 import { Slice } from "./slice";
 import { Stack } from "./stack";
 import { ColourBar, Wall, uptake } from "./wall";
@@ -101,6 +102,16 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
     take(otherId, setOther);
     return () => void (gone = true);
   }, [current, otherId]);
+
+  // What would be printed, whenever somebody prints.
+  const printed = useRef<Printed | null>(null);
+  const [changed, setChanged] = useState<[string, string][]>([]);
+  printed.current = scene && shown ? { scene, volume, shown, other, parameters: changed } : null;
+  useEffect(() => printsAs(() => printed.current), []);
+  useEffect(() => {
+    const result = shown?.result;
+    if (result) void parameterSpecs().then(specs => setChanged(Object.entries(draftOf(result.parameters, specs[isFit(result.id) ? "segmentation" : "model"]))), () => undefined);
+  }, [shown]);
 
   return (
     <div class="viewer">
@@ -301,7 +312,7 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
     if (!retry) return;
     void get<Job>(`/v1/jobs/${retry}`).then(job => {
       repeat(job);
-      if (job.error) setProblem({ field: job.error.field?.split(/[./]/).pop() ?? null, text: [job.error.detail, job.error.fix].filter(Boolean).join(" ") });
+      if (job.error) setProblem({ field: job.error.field?.split(/[./]/).pop() ?? null, text: sentences(job.error).join(" ").trim() });
     }, () => undefined);
   }, [retry]);
   const send = async (event: Event) => {
@@ -339,6 +350,7 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
               <button type="button" class="pick" aria-pressed={result.id === current} onClick={() => open(volume.id, result.id, otherId === result.id ? null : otherId)}>
                 <b>{resultName(result)}</b>
                 <span class="quiet">{moment(result.created_at)}</span>
+                <Origin result={result} jobs={own} results={results} />
               </button>
               {current && result.id !== current && (
                 <button type="button" class="plain" aria-pressed={result.id === otherId} aria-label={`Compare with ${resultName(result)} of ${moment(result.created_at)}`} onClick={() => open(volume.id, current, result.id === otherId ? null : result.id)}>{result.id === otherId ? "Stop comparing" : "Compare"}</button>
@@ -368,7 +380,6 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
             }}>Surface model</button>
           </span>
           <ParameterForm kind={kind} volume={volume} draft={draft} onChange={setDraft} problem={problem} />
-          {problem && <p class="error" role="alert">{problem.text}</p>}
           <button class="main" disabled={sending}>{kind === "segmentation" ? "Fit" : "Make the model"}</button>
           {shown && <button type="button" class="plain" onClick={() => repeat({ kind: isFit(shown.result.id) ? "segmentation" : "model", parameters: shown.result.parameters })}>Take the parameters of the shown result</button>}
         </form>
@@ -377,6 +388,16 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
       <p class="research foot">Research software, not a medical device. Measurements are no diagnosis.</p>
     </aside>
   );
+}
+
+/** Which result a corrected fit came from, and what was changed. */
+function Origin({ result, jobs: own, results }: { result: Result; jobs: Job[]; results: Result[] }) {
+  const labels = own.find(job => job.segmentation === result.id && job.labels["changed"])?.labels;
+  if (!labels) return null;
+  const parent = results.find(other => other.id === labels["parent"]);
+  const names: Record<string, string> = { center: "centre", edge: "wall shown" };
+  const changed = (labels["changed"] ?? "").split(" ").map(name => names[name] ?? name).join(", ");
+  return <span class="quiet">by hand: {changed}{labels["parent"] && `; from ${parent ? `the fit of ${moment(parent.created_at)}` : "a fit that was erased"}`}</span>;
 }
 
 function Facts({ scene, volume, shown, other }: { scene: Scene; volume: Volume; shown: Loaded; other: Loaded | null }) {

@@ -1,16 +1,18 @@
 // The wall in three dimensions with a colour for what the files offer, and its colour bar.
 
-import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
 import { useWatched } from "../state";
+import { type Camera, type MeshPainter, project, turn, usualCamera } from "./camera";
+import { useCanvas } from "./canvas";
 import { DIVERGING, LUTS, type Lut, colour, css } from "./colours";
 import { handleEvents } from "./events";
+import { FlatView } from "./flatview";
 import { MeshView } from "./glview";
 import { type Mesh, apart, thickness, triangleShape } from "./mesh";
 import { type Axis, frameOf, letters } from "./plane";
 import { type PolarMap, WallFrame, valueAt } from "./polar";
 import type { Scene } from "./scene";
-import { fit } from "./slice";
-import { type Vec, add, scale, sub, dot } from "./vector";
+import { type Vec, add, dot, scale, sub, unit } from "./vector";
 import type { Voxels } from "./volume";
 
 interface Paint {
@@ -59,25 +61,51 @@ function polarUptake(mesh: Mesh, polar: PolarMap, heart: Axis): Float32Array {
   });
 }
 
+/** The uptake at every vertex, per cent: of the polar map, or else of the voxels under it. */
+export function uptakeOf(scene: Scene, { mesh, polar, heart }: { mesh: Mesh; polar: PolarMap | null; heart: Axis | null }): Float32Array {
+  return polar && heart ? polarUptake(mesh, polar, heart) : percent(uptake(scene.voxels, mesh));
+}
+
 function paints({ scene, mesh, inner, other, polar, displacement, surface }: Props, lut: Lut, heart: Axis | null): Paint[] {
   const list: Paint[] = [];
   const viridis = LUTS["Viridis"]!;
-  if (polar && heart) list.push({ name: "Uptake", unit: "%", lut, range: [0, 100], values: () => polarUptake(mesh, polar, heart) });
-  else list.push({ name: "Uptake", unit: "%", lut, range: [0, 100], values: () => percent(uptake(scene.voxels, mesh)) });
+  list.push({ name: "Uptake", unit: "%", lut, range: [0, 100], values: () => uptakeOf(scene, { mesh, polar, heart }) });
   list.push({ name: "Thickness", unit: "mm", lut: viridis, range: [4, 20], values: () => thickness(mesh) });
   if (inner) list.push({ name: "Distance between the two walls", unit: "mm", lut: DIVERGING, range: [-6, 6], values: () => apart(mesh, inner) });
   if (other) list.push({ name: "Distance to the compared wall", unit: "mm", lut: DIVERGING, range: [-8, 8], values: () => apart(mesh, other) });
   if (displacement?.length === mesh.vertices.length) list.push({ name: "Moved by the fit", unit: "mm", lut: viridis, range: [0, 12], values: () => Float32Array.from(displacement) });
   if (surface) list.push({ name: "Distance to the surface", unit: "mm", lut: DIVERGING, range: [-2, 2], values: () => surface });
+  const sigma = mesh.uncertainty_mm;
+  if (sigma?.length === mesh.vertices.length) list.push({ name: "Uncertainty (1 σ)", unit: "mm", lut: viridis, range: [0, 6], values: () => Float32Array.from(sigma) });
   list.push({ name: "Triangle shape (2r/R)", unit: "", lut: viridis, range: [0.4, 1], values: () => triangleShape(mesh) });
   return list;
 }
 
+/** The colours of vertices with these values; grey where there is none. */
+export function coloursOf(values: Float32Array, { lut, range: [low, high] }: Pick<Paint, "lut" | "range">): Float32Array {
+  const colours = new Float32Array(3 * values.length);
+  values.forEach((value, at) => {
+    const rgb = Number.isNaN(value) ? [90, 96, 100] : colour(lut, (value - low) / (high - low));
+    colours.set(rgb.map(part => part / 255), 3 * at);
+  });
+  return colours;
+}
+
+/** A view of the anterior and lateral wall, apex down; without a known heart, from in front of the patient. */
+export function wallCamera(mesh: Mesh, heart: Axis | null, height = 135): Camera {
+  const all = mesh.vertices;
+  const target = scale(all.reduce((sum, vertex) => add(sum, vertex), [0, 0, 0] as Vec), 1 / all.length);
+  if (!heart) return { ...usualCamera(), target, height };
+  const { anterior, lateral, axis } = frameOf(heart);
+  const toward = unit(add(add(scale(lateral, 0.65), scale(anterior, 0.55)), scale(axis, 0.52)));
+  return { toward, up: unit(sub(scale(toward, dot(axis, toward)), axis)), target, height };
+}
+
 export function Wall(props: Props) {
   const { scene, mesh, other } = props;
-  const canvas = useRef<HTMLCanvasElement>(null);
-  const view = useRef<MeshView | null>(null);
-  const [off, setOff] = useState(false);
+  const view = useRef<MeshPainter | null>(null);
+  // Whether the browser has no WebGL, or lost it.
+  const [plain, setPlain] = useState(false);
   const [chosen, setChosen] = useState("Uptake");
   const [edges, setEdges] = useState(false);
   const lut = useWatched(scene.wallLut);
@@ -86,75 +114,56 @@ export function Wall(props: Props) {
   const paint = list.find(one => one.name === chosen) ?? list[0]!;
   const values = useMemo(() => paint.values(), [mesh, paint.name, props.polar, props.other, props.inner, heart]);
 
+  const draw = (element: HTMLCanvasElement) => {
+    const made = view.current;
+    if (!made) return;
+    made.setPoint("cursor", scene.cursor.value, [0.3, 0.89, 1]);
+    made.draw();
+    element.setAttribute("aria-valuetext", `seen from ${letters(made.camera.toward)}`);
+  };
+  const { canvas, ask } = useCanvas(draw, act => scene.cursor.watch(act), plain);
   useEffect(() => {
     const element = canvas.current;
     if (!element) return;
     try {
-      view.current = new MeshView(element);
+      view.current = plain ? new FlatView(element) : new MeshView(element);
     } catch {
-      setOff(true);
+      setPlain(true);
       return;
     }
     const made = view.current;
-    const draw = () => {
-      fit(element);
-      made.setPoint("cursor", scene.cursor.value, [0.3, 0.89, 1]);
-      made.draw();
-      const toward = made.camera.toward;
-      element.setAttribute("aria-valuetext", `seen from ${letters(toward)}`);
-    };
-    redraw.current = draw;
-    const sizes = new ResizeObserver(draw);
-    sizes.observe(element);
-    const ends = [scene.cursor.watch(draw), listen(element, made, draw, scene)];
+    const end = listen(element, made, ask, scene, () => setPlain(true));
     return () => {
-      sizes.disconnect();
-      ends.forEach(end => end());
+      end();
       made.end();
       view.current = null;
     };
-  }, [scene]);
-  const redraw = useRef(() => undefined as void);
+  }, [scene, plain]);
 
   // The camera starts where the anterior and lateral wall are seen, apex down to the left as in the patient.
   useEffect(() => {
     const made = view.current;
     if (!made) return;
-    const all = mesh.vertices;
-    const middle = scale(all.reduce((sum, vertex) => add(sum, vertex), [0, 0, 0] as Vec), 1 / all.length);
-    made.camera = { toward: [0.35, -0.9, 0.25], up: [0, 0, 1], target: middle, height: 135 };
-    if (heart) {
-      const { anterior, lateral, axis } = frameOf(heart);
-      const toward = add(add(scale(lateral, 0.65), scale(anterior, 0.55)), scale(axis, 0.52));
-      const up = sub(scale(axis, -1), scale(toward, -dot(axis, toward) / dot(toward, toward)));
-      made.camera.toward = scale(toward, 1 / Math.hypot(...toward));
-      made.camera.up = scale(up, 1 / Math.hypot(...up));
-    }
-    redraw.current();
-  }, [scene, mesh]);
+    made.camera = wallCamera(mesh, heart);
+    ask();
+  }, [scene, mesh, plain, heart === null]);
 
   useEffect(() => {
     const made = view.current;
     if (!made) return;
-    const [low, high] = paint.range;
-    const colours = new Float32Array(3 * values.length);
-    values.forEach((value, at) => {
-      const rgb = Number.isNaN(value) ? [90, 96, 100] : colour(paint.lut, (value - low) / (high - low));
-      colours.set(rgb.map(part => part / 255), 3 * at);
-    });
-    made.setSurface("wall", mesh, colours);
+    made.setSurface("wall", mesh, coloursOf(values, paint));
     if (edges) made.setWire("edges", mesh, [0.05, 0.07, 0.09]);
     else made.remove("edges");
     if (other) made.setWire("other", other, [0.78, 0.55, 1]);
     else made.remove("other");
-    redraw.current();
-  }, [scene, mesh, values, paint.lut, other, edges]);
+    ask();
+  }, [scene, mesh, values, paint.lut, other, edges, plain]);
 
-  if (off) return <p class="off">This browser offers no WebGL, so the three-dimensional view is off. Slices, contours and polar map work.</p>;
   const [low, high] = paint.range;
   return (
     <figure class="wall">
-      <canvas ref={canvas} tabIndex={0} role="slider" aria-label="The wall in three dimensions; arrow keys turn it" aria-valuenow={0} />
+      <canvas key={plain} ref={canvas} tabIndex={0} role="slider" aria-label="The wall in three dimensions; arrow keys turn it" aria-valuenow={0} />
+      {plain && <p class="off">This browser offers no WebGL: the wall is drawn plainly and turns more slowly. All else works.</p>}
       <figcaption>
         <select aria-label="Colour of the wall" value={paint.name} onChange={event => setChosen(event.currentTarget.value)}>
           {list.map(one => <option key={one.name}>{one.name}</option>)}
@@ -168,7 +177,8 @@ export function Wall(props: Props) {
 
 export function ColourBar({ lut, low, high }: { lut: Lut; low: string; high: string }) {
   const canvas = useRef<HTMLCanvasElement>(null);
-  useEffect(() => {
+  // Before the next frame, as paper has none.
+  useLayoutEffect(() => {
     const context = canvas.current?.getContext("2d");
     if (!context) return;
     for (let n = 0; n < 128; n++) {
@@ -185,7 +195,7 @@ export function ColourBar({ lut, low, high }: { lut: Lut; low: string; high: str
   );
 }
 
-function listen(element: HTMLCanvasElement, view: MeshView, draw: () => void, scene: Scene): () => void {
+function listen(element: HTMLCanvasElement, view: MeshPainter, draw: () => void, scene: Scene, lost: () => void): () => void {
   const pointers = new Map<number, PointerEvent>();
   let moved = 0;
   const down = (event: PointerEvent) => {
@@ -208,7 +218,7 @@ function listen(element: HTMLCanvasElement, view: MeshView, draw: () => void, sc
       const span = (e: PointerEvent) => Math.hypot(e.clientX - other.clientX, e.clientY - other.clientY) || 1;
       zoom(span(before) / span(event));
     } else {
-      view.turn(dx, dy);
+      turn(view.camera, dx, dy);
       draw();
     }
     pointers.set(event.pointerId, event);
@@ -224,7 +234,7 @@ function listen(element: HTMLCanvasElement, view: MeshView, draw: () => void, sc
     let [best, depth]: [Vec | null, number] = [null, -Infinity];
     for (const layer of scene.layers.value) {
       for (const vertex of layer.mesh?.vertices ?? []) {
-        const [u, v] = view.project(vertex);
+        const [u, v] = project(view.camera, vertex, box.width / box.height);
         if (Math.hypot((u - x) * box.width, (v - y) * box.height) > 16) continue;
         const toward = dot(vertex, view.camera.toward);
         if (toward > depth) [best, depth] = [vertex, toward];
@@ -237,14 +247,14 @@ function listen(element: HTMLCanvasElement, view: MeshView, draw: () => void, sc
     zoom(Math.exp(event.deltaY / 500));
   };
   const press = (event: KeyboardEvent) => {
-    const turn: Record<string, [number, number]> = { ArrowLeft: [-12, 0], ArrowRight: [12, 0], ArrowUp: [0, -12], ArrowDown: [0, 12] };
-    const by = turn[event.key];
-    if (by) view.turn(...by);
+    const ways: Record<string, [number, number]> = { ArrowLeft: [-12, 0], ArrowRight: [12, 0], ArrowUp: [0, -12], ArrowDown: [0, 12] };
+    const by = ways[event.key];
+    if (by) turn(view.camera, ...by);
     else if (event.key === "+" || event.key === "=") zoom(1 / 1.15);
     else if (event.key === "-") zoom(1.15);
     else return;
     event.preventDefault();
     draw();
   };
-  return handleEvents(element, { pointerdown: down, pointermove: move, pointerup: up, pointercancel: up, wheel, keydown: press });
+  return handleEvents(element, { pointerdown: down, pointermove: move, pointerup: up, pointercancel: up, wheel, keydown: press, webglcontextlost: lost });
 }
