@@ -7,6 +7,9 @@
 use std::f64::consts::TAU;
 use std::ops::Range;
 
+use nalgebra::Matrix3;
+
+use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::model::wall::{COLUMNS, ROWS, VentricleWall, WallRay};
 use crate::numeric::order;
@@ -42,6 +45,9 @@ pub struct Evidence {
     pub slenderness: f64,
     /// Distance of the septum from the axis over that of the free wall.
     pub septal_bulge: f64,
+    /// How far the septum lies outside the circles through the free wall, as a share of their radius.
+    /// It does not depend on the axis, which moves towards a septum that is fitted too far out.
+    pub septal_overshoot: f64,
     /// Share of the wall that takes up less than half as much as the bright wall does, 0..=1.
     pub dark: f64,
     /// Share of the wall beside which, 12 to 18 mm beyond its outer surface, something takes up more than
@@ -93,6 +99,7 @@ impl Evidence {
             offset: first_harmonic(&middle) / radius,
             slenderness: (wall.extent[1] - wall.extent[0]) / mean(&outer)?,
             septal_bulge: mean(&middles(wall, SEPTAL))? / mean(&free)?,
+            septal_overshoot: septal_overshoot(wall),
             dark: uptake.dark,
             beside: uptake.beside,
         })
@@ -152,6 +159,44 @@ impl WallUptake {
     }
 }
 
+/// [`Evidence::septal_overshoot`], the mean over the rows of the body; 0 where none shows enough of the
+/// septum and of the free wall.
+fn septal_overshoot(wall: &VentricleWall) -> f64 {
+    let of_row = |row: usize| {
+        let places = |columns: Range<usize>| {
+            columns.filter_map(move |column| {
+                let [enters, leaves] = wall.rays[row * COLUMNS + column].wall?;
+                let (sin, cos) = (TAU * (column as f64 + 0.5) / COLUMNS as f64).sin_cos();
+                let middle = f64::midpoint(enters, leaves);
+                Some([middle * cos, middle * sin])
+            })
+        };
+        let free: Vec<[f64; 2]> = places(0..FREE[0]).chain(places(FREE[1]..COLUMNS)).collect();
+        let septum: Vec<[f64; 2]> = places(SEPTAL).collect();
+        if 3 * free.len() < COLUMNS || 2 * septum.len() < SEPTAL.len() {
+            return None;
+        }
+        let ([x, y], radius) = circle(&free)?;
+        let outside = |p: &[f64; 2]| (p[0] - x).hypot(p[1] - y) / radius - 1.0;
+        mean(&septum.iter().map(outside).collect::<Vec<_>>())
+    };
+    mean(&BODY.filter_map(of_row).collect::<Vec<_>>()).unwrap_or(0.0)
+}
+
+/// Centre and radius of the circle through points in the sense of least squares (Kåsa 1976); `None` if
+/// they lie on a line.
+fn circle(points: &[[f64; 2]]) -> Option<([f64; 2], f64)> {
+    let (mut normal, mut right) = (Matrix3::zeros(), Vec3::zeros());
+    for [x, y] in points {
+        let row = Vec3::new(2.0 * x, 2.0 * y, 1.0);
+        normal += row * row.transpose();
+        right += row * (x * x + y * y);
+    }
+    let [x, y, rest] = (normal.try_inverse()? * right).into();
+    let radius = (rest + x * x + y * y).max(0.0).sqrt();
+    (radius > 0.0).then_some(([x, y], radius))
+}
+
 /// Where the rays of these columns, between the apical cap and the rim, enter and leave the wall.
 fn of_body(wall: &VentricleWall, columns: Range<usize>) -> impl Iterator<Item = [f64; 2]> {
     const { assert!(BODY.end <= ROWS) };
@@ -185,6 +230,18 @@ fn first_harmonic(around: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_circle_is_found_by_a_part_of_it() {
+        let at = |degrees: f64| {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            [3.0 + 20.0 * cos, 20.0 * sin - 5.0]
+        };
+        let points: Vec<[f64; 2]> = (0..20).map(|n| at(10.0 * f64::from(n))).collect();
+        let ([x, y], radius) = circle(&points).unwrap();
+        assert!((x - 3.0).abs() + (y + 5.0).abs() + (radius - 20.0).abs() < 1e-6);
+        assert!(circle(&[[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]).is_none());
+    }
 
     #[test]
     fn the_first_harmonic_is_the_shift_of_a_circle() {

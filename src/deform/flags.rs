@@ -6,7 +6,7 @@ use super::evidence::Evidence;
 /// A reason to doubt a fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Flag {
-    /// The confidence of the place is below 0.4.
+    /// The confidence of the place is below 0.6.
     #[error("the heart's place is uncertain: confidence {confidence:.2}")]
     UncertainPlace {
         /// The place's confidence, 0..=1.
@@ -47,15 +47,14 @@ pub enum Flag {
     /// The model bulges towards the right ventricle.
     #[error(
         "the right ventricle's wall may have been taken for the septum: the distance of the wall from \
-         the axis scatters by {:.0} % (round hearts: 9 %), and the septum lies {:.0} % farther out than \
-         the free wall",
-        100.0 * unroundness, 100.0 * (bulge - 1.0)
+         the axis scatters by {:.0} % (round hearts: 9 %), the septum lies {:+.0} % farther out than \
+         the free wall, and {:+.0} % outside the circle through it",
+        100.0 * evidence.unroundness, 100.0 * (evidence.septal_bulge - 1.0),
+        100.0 * evidence.septal_overshoot
     )]
     RightVentricle {
-        /// Standard deviation of the distance over its mean.
-        unroundness: f64,
-        /// Distance of the septum over that of the free wall.
-        bulge: f64,
+        /// The figures it comes from.
+        evidence: Evidence,
     },
     /// The volume holds so few different values that it is a label map, not an image of uptake.
     #[error(

@@ -105,7 +105,7 @@ pub fn fit_at(
         && let Some(blind) = setup.clone().without_septum()
     {
         let other = fit_from(&blind, volume, template, parameters, monitor)?;
-        if other.confidence > fit.confidence {
+        if doubts::is_clearer(&other, &fit) {
             (fit, setup) = (other, blind);
         }
     }

@@ -146,3 +146,19 @@ fn equal_voxels_give_equal_bytes_whatever_the_container() {
         }
     }
 }
+
+#[test]
+fn the_sign_of_a_zero_in_the_frame_leaves_no_trace_in_a_file() {
+    let parameters = PhantomParameters {
+        shape: [64; 3],
+        ..PhantomParameters::default()
+    };
+    let mut scan = phantom(&parameters, &Monitor::silent()).unwrap().volume;
+    let mut written = |zero: f64| {
+        let columns = [[4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, zero, -4.0]];
+        let linear = nalgebra::Matrix3::from_columns(&columns.map(Vec3::from));
+        scan.frame = VoxelToPatient::new(linear, Vec3::new(1.0, 2.0, 3.0)).unwrap();
+        nifti::write(&scan, StoredType::Float32, false).unwrap()
+    };
+    assert!(written(0.0) == written(-0.0));
+}

@@ -169,7 +169,8 @@ fn header(
     let [dx, dy, dz] = frame.spacing().map(|s| s as f32);
     let qfac = if frame.is_left_handed() { -1.0 } else { 1.0 };
     let ras = frame.to_ras();
-    let srow = |row: usize| [0, 1, 2, 3].map(|c| ras[(row, c)] as f32);
+    // Frames of other containers differ in the sign of zeros: -0 + 0 is 0.
+    let srow = |row: usize| [0, 1, 2, 3].map(|c| ras[(row, c)] as f32 + 0.0);
     let mut descrip = b"ventriform".to_vec();
     descrip.resize(80, 0);
     let mut header = NiftiHeader {
