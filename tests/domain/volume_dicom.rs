@@ -92,6 +92,12 @@ fn the_experts_mask_lies_on_the_heart() {
 /// with pydicom 3 and its decoders.
 const ODD: &[(&str, usize, f64, [f64; 3])] = &[
     ("D_CLUNIE_CT1_RLE_FRAGS.dcm", 1, -228_407_043.0, CT),
+    (
+        "GH177_D_CLUNIE_CT1_IVRLE_BigEndian_ELE_undefinded_length.dcm",
+        1,
+        -228_407_043.0,
+        CT,
+    ),
     ("GH184.dcm", 1, 3_228_937.134_038, PET),
     ("GH610.dcm", 1, 1.166_530_305_741_4, PET),
     ("CT_small.dcm", 1, -1_950_906.0, CT),
