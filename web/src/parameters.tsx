@@ -312,7 +312,7 @@ function ModelChoice({ common, text, onText, volume }: ChoiceProps) {
   const own = useWatched(fits).filter(fit => fit.volume === volume.id);
   return (
     <select {...common} value={text || "auto"} onChange={event => onText(event.currentTarget.value === "auto" ? "" : event.currentTarget.value)}>
-      <option value="auto">auto: the best of the library</option>
+      <option value="auto">auto: the best of the built-in hearts and the library</option>
       {library.length > 0 && <optgroup label="Library">{library.map(item => <option key={item.id} value={item.id}>{item.name ?? item.id}</option>)}</optgroup>}
       {known.length > 0 && <optgroup label="Models">{known.map(item => <option key={item.id} value={item.id}>{String(item.summary["vertices"])} points, {moment(item.created_at)}</option>)}</optgroup>}
       {own.length > 0 && <optgroup label="Fits of this scan">{own.map(item => <option key={item.id} value={item.id}>fit of {moment(item.created_at)}</option>)}</optgroup>}
