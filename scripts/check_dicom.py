@@ -1,8 +1,9 @@
 """Writes NM files of one scan, segments them with ventriform and reads the DICOM objects back.
 
-usage: check_dicom.py VENTRIFORM DIR
+usage: check_dicom.py VENTRIFORM DIR [--orientations]
 
-DIR/phantom/spect.nii.gz is the scan. For every case below the file's geometry is computed here, after PS3.3
+DIR/phantom/spect.nii.gz is the scan; with --orientations it is stored along the axes in each of the 48
+orders and directions instead of in the cases of cases(). For every case below the file's geometry is computed here, after PS3.3
 C.8.4.15, and the objects are compared with mask.nii.gz and mesh.json of the same run:
 
 - mask.dcm, read by highdicom and by dcmqi: every voxel of segment 1, by its place in the patient; segment 2, the
@@ -14,6 +15,7 @@ C.8.4.15, and the objects are compared with mask.nii.gz and mesh.json of the sam
   missing that it asks for (tables of highdicom); codes have the meaning of PS3.16 (tables of pydicom).
 """
 import glob
+import itertools
 import json
 import struct
 import subprocess
@@ -99,6 +101,21 @@ def cases(voxels, affine):
     swap = np.eye(4)[:, [1, 2, 0, 3]]
     yield "oblique", voxels.transpose(1, 2, 0), turn @ affine @ swap, 1
     yield "gated", voxels, affine, 2
+
+
+def orientations(voxels, affine):
+    """As cases(): rows, columns and slices along each axis of the grid in each direction, half of them with a
+    negative spacing."""
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1, -1), repeat=3):
+            stored = voxels.transpose(order)[tuple(slice(None, None, sign) for sign in signs)]
+            turn = np.eye(4)
+            turn[:3, :3] = 0
+            for column, (axis, sign) in enumerate(zip(order, signs)):
+                turn[axis, column] = sign
+                turn[axis, 3] = 0 if sign > 0 else voxels.shape[axis] - 1
+            name = "".join(f"{'+' if sign > 0 else '-'}{'ijk'[axis]}" for axis, sign in zip(order, signs))
+            yield name, stored, affine @ turn, 1
 
 
 def same_voxels(found, found_affine, mask, affine):
@@ -252,7 +269,8 @@ def main():
     program, folder = sys.argv[1], Path(sys.argv[2])
     image = nibabel.load(folder / "phantom/spect.nii.gz")
     voxels = np.asarray(image.dataobj).clip(0)
-    for number, (name, stored, affine, gates) in enumerate(cases(voxels, LPS @ image.affine)):
+    stored_as = orientations if "--orientations" in sys.argv else cases
+    for number, (name, stored, affine, gates) in enumerate(stored_as(voxels, LPS @ image.affine)):
         here = folder / name
         here.mkdir()
         nm(here / "nm.dcm", stored, affine, number, gates)

@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
 # Checks the DICOM objects of `ventriform segment --dicom` by other programs.
 #
-#   scripts/check_dicom.sh
+#   scripts/check_dicom.sh                    four ways to store the scan, about a minute
+#   scripts/check_dicom.sh --orientations     all 48 orders and directions of the axes
 #
 # scripts/check_dicom.py writes NM files of one simulated scan (both signs of Spacing Between Slices, oblique,
 # gated), segments them and reads the objects with pydicom, highdicom and dcmqi. dciodvfy (dicom3tools) checks
-# every object, dcmdump (dcmtk) reads it. Takes about a minute. Exits with 1 if anything is wrong.
+# every object, dcmdump (dcmtk) reads it. Exits with 1 if anything is wrong.
 #
 # PYTHON: an interpreter that has numpy, nibabel, pydicom, highdicom and dcmqi. Without it the script installs
 # them under target/. Debian packages that are missing are installed.
@@ -23,7 +24,7 @@ python_with "nibabel, highdicom"
 [ -x target/debug/ventriform ] || cargo build --quiet --bins --test layering
 
 target/debug/ventriform phantom -o "$out/phantom" --size 64 --spacing 6.4 --seed 2 2>/dev/null
-"$PYTHON" scripts/check_dicom.py target/debug/ventriform "$out"
+"$PYTHON" scripts/check_dicom.py target/debug/ventriform "$out" "$@"
 
 wrong=0
 for file in "$out"/*/out/*.dcm; do
