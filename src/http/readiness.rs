@@ -47,7 +47,9 @@ async fn check_storage(queue: &Queue) -> Result<(), StoreError> {
 fn why_unready(error: &StoreError) -> &'static str {
     match (error.cause(), error) {
         (StoreFault::Full, _) => "The disk is full, or nearly so.",
-        (StoreFault::Busy, _) => "Another program holds the database's lock.",
+        (StoreFault::Busy, _) => {
+            "The database was not free in time: the machine is overloaded, or another program holds it."
+        }
         (StoreFault::DamagedDatabase, _) => "The database is damaged.",
         (_, StoreError::Files(_)) => "Files cannot be written.",
         (_, StoreError::Database { .. }) => "The database does not answer.",

@@ -80,7 +80,7 @@ async fn a_locked_database_is_said_to_be_busy_and_recovers() {
     problem(job.send().await.unwrap(), 503, "storage-busy").await;
     let unready = problem(app.get("/readyz").send().await.unwrap(), 503, "not-ready").await;
     assert!(
-        unready["detail"].as_str().unwrap().contains("lock"),
+        unready["detail"].as_str().unwrap().contains("not free"),
         "{unready}"
     );
     app.json(&format!("/v1/volumes/{id}")).await;

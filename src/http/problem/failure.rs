@@ -74,7 +74,8 @@ impl From<StoreError> for Problem {
             StoreFault::Busy => later(problem(
                 StatusCode::SERVICE_UNAVAILABLE,
                 "storage-busy",
-                "Another program holds the service's database, so nothing was stored.",
+                "The service's database was not free in time, so nothing was stored: the machine is \
+                 overloaded, or another program holds the database.",
             ))
             .fix("Send the request again after the number of seconds in Retry-After."),
             StoreFault::Disk => later(problem(
