@@ -10,6 +10,7 @@ cd "$(dirname "$0")/.."
 out=$(mktemp -d)
 trap 'docker compose logs --tail 20 >&2 || true; docker compose down -v >/dev/null 2>&1 || true; rm -rf "$out"' EXIT
 url=http://127.0.0.1:8080
+# Not `grep -q` after a pipe: it ends at the first match, and whoever still writes then fails.
 
 started=$SECONDS
 docker compose build
@@ -27,7 +28,7 @@ ${IN_ENGINE:-} curl -fsS --data-binary @"$out/spect.nii.gz" -H 'Prefer: wait=60'
 docker compose restart
 docker compose up -d --wait
 # shellcheck disable=SC2086
-${IN_ENGINE:-} curl -fsS "$url/v1/models" | grep -q mdl_
+${IN_ENGINE:-} curl -fsS "$url/v1/models" | grep mdl_ >/dev/null
 
 id=$(docker compose ps -q ventriform)
 user=$(docker inspect -f '{{.Config.User}}' "$id")
@@ -35,7 +36,7 @@ readonly_root=$(docker inspect -f '{{.HostConfig.ReadonlyRootfs}}' "$id")
 [ "$user" = 10001:10001 ] && [ "$readonly_root" = true ]
 # Nothing but the volume and /tmp can be written.
 docker compose exec -T ventriform sh -c '! touch /usr/local/bin/x 2>/dev/null && touch /data/x && rm /data/x'
-docker compose exec -T ventriform cat /usr/share/doc/ventriform/ventriform.cdx.json | grep -q CycloneDX
+docker compose exec -T ventriform cat /usr/share/doc/ventriform/ventriform.cdx.json | grep CycloneDX >/dev/null
 
 # With keys, callers without one are refused, and the container is still healthy.
 key=$(docker compose exec -T ventriform ventriform keys create --name check --scope read 2>/dev/null)
@@ -44,6 +45,6 @@ VENTRIFORM_ALLOW_ANONYMOUS=false docker compose up -d --wait
 code=$(${IN_ENGINE:-} curl -sS -o /dev/null -w '%{http_code}' "$url/v1/models")
 [ "$code" = 401 ] || { echo "without a key: $code"; exit 1; }
 # shellcheck disable=SC2086
-${IN_ENGINE:-} curl -fsS -H "Authorization: Bearer $key" "$url/v1/models" | grep -q mdl_
+${IN_ENGINE:-} curl -fsS -H "Authorization: Bearer $key" "$url/v1/models" | grep mdl_ >/dev/null
 docker image ls ventriform
 echo "ok: image built, model made, restarted, non-root, read-only root, keys"
