@@ -149,6 +149,9 @@ pub mod jobs;
 pub mod access;
 
 #[cfg(feature = "service")]
+pub mod pem;
+
+#[cfg(feature = "service")]
 pub mod hooks;
 
 #[cfg(feature = "service")]

@@ -5,6 +5,7 @@ use super::trouble::Trouble;
 use super::web::{Stored, store_failure};
 use super::{ArchiveObject, DicomPeer, DicomTls};
 use crate::jobs::Fault;
+use crate::pem;
 use dicom_core::{PrimitiveValue, VR, dicom_value};
 use dicom_dictionary_std::{tags, uids};
 use dicom_encoding::TransferSyntaxIndex;
@@ -14,12 +15,9 @@ use dicom_transfer_syntax_registry::{TransferSyntaxRegistry, entries};
 use dicom_ul::association::client::{ClientAssociation, ClientAssociationOptions};
 use dicom_ul::association::{CloseSocket, Error};
 use dicom_ul::pdu::{PDataValue, PDataValueType, Pdu};
-use rustls::pki_types::pem::PemObject;
-use rustls::pki_types::{CertificateDer, PrivateKeyDer};
-use rustls::{ClientConfig, RootCertStore};
+use rustls::ClientConfig;
 use std::io::{Read, Write};
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Duration;
 
 /// Longest time to connect.
@@ -124,38 +122,25 @@ fn send<S: CloseSocket + Read + Write>(
 
 /// TLS with the files of the settings, which are read each time: they may have been renewed.
 fn client_config(files: &DicomTls) -> Result<ClientConfig, Trouble> {
-    let unusable = |key: &str, path: &Path, reason: &dyn std::fmt::Display| {
+    let unusable = |key: &str, path: &Path, reason: String| {
         let path = path.display();
         Trouble::passing(format!("`{key}` ({path}) cannot be used: {reason}."))
     };
-    let certificates = |key: &str, path: &Path| {
-        let all: Result<Vec<_>, _> =
-            CertificateDer::pem_file_iter(path).and_then(Iterator::collect);
-        match all {
-            Ok(found) if found.is_empty() => Err(unusable(key, path, &"it holds no certificate")),
-            Ok(found) => Ok(found),
-            Err(error) => Err(unusable(key, path, &error)),
-        }
-    };
-    let mut authorities = RootCertStore::empty();
-    for authority in certificates("dicom_ca_file", &files.ca_file)? {
-        let added = authorities.add(authority);
-        added.map_err(|error| unusable("dicom_ca_file", &files.ca_file, &error))?;
-    }
-    let provider = Arc::new(rustls::crypto::ring::default_provider());
-    let builder = ClientConfig::builder_with_provider(provider)
-        .with_protocol_versions(&[&rustls::version::TLS13, &rustls::version::TLS12])
+    let authorities = pem::authorities(&files.ca_file)
+        .map_err(|reason| unusable("dicom_ca_file", &files.ca_file, reason))?;
+    let builder = ClientConfig::builder_with_provider(pem::provider())
+        .with_protocol_versions(&pem::VERSIONS)
         .map_err(|error| Trouble::passing(format!("TLS cannot be used: {error}.")))?
         .with_root_certificates(authorities);
     let Some((certificate, key)) = &files.own else {
         return Ok(builder.with_no_client_auth());
     };
-    let chain = certificates("dicom_cert_file", certificate)?;
-    let secret = PrivateKeyDer::from_pem_file(key)
-        .map_err(|error| unusable("dicom_key_file", key, &error))?;
+    let chain = pem::certificates(certificate)
+        .map_err(|reason| unusable("dicom_cert_file", certificate, reason))?;
+    let secret = pem::private_key(key).map_err(|reason| unusable("dicom_key_file", key, reason))?;
     builder
         .with_client_auth_cert(chain, secret)
-        .map_err(|error| unusable("dicom_cert_file", certificate, &error))
+        .map_err(|error| unusable("dicom_cert_file", certificate, error.to_string()))
 }
 
 fn refusal(error: &Error) -> Trouble {

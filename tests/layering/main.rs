@@ -120,8 +120,9 @@ const USES: &[(&str, &[&str])] = &[
     ),
     ("jobs", &["progress"]),
     ("access", &["jobs"]),
+    ("pem", &[]),
     ("hooks", &["jobs"]),
-    ("archive", &["jobs", "hooks"]),
+    ("archive", &["jobs", "pem", "hooks"]),
     (
         "intake",
         &["progress", "volume", "export", "jobs", "access"],
@@ -166,6 +167,7 @@ const USES: &[(&str, &[&str])] = &[
             "parameters",
             "jobs",
             "access",
+            "pem",
             "hooks",
             "intake",
             "worklist",
@@ -233,8 +235,8 @@ const SERVICE_CRATES: &[&str] = &[
 
 /// The service: what stands here may name [`SERVICE_CRATES`].
 const SERVICE: &[&str] = &[
-    "jobs", "access", "hooks", "archive", "intake", "worklist", "work", "store", "config", "http",
-    "cli",
+    "jobs", "access", "pem", "hooks", "archive", "intake", "worklist", "work", "store", "config",
+    "http", "cli",
 ];
 
 /// Standard-library facilities that would make a result depend on more than its input.

@@ -16,10 +16,9 @@
 use super::stall::WatchedStream;
 use crate::config::{OptionalPath, Settings};
 use crate::jobs::hex;
-use rustls::pki_types::pem::PemObject;
-use rustls::pki_types::{CertificateDer, PrivateKeyDer};
+use crate::pem;
 use rustls::server::WebPkiClientVerifier;
-use rustls::{RootCertStore, ServerConfig, ServerConnection};
+use rustls::{ServerConfig, ServerConnection};
 use sha2::{Digest, Sha256};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -264,24 +263,20 @@ impl TlsFiles {
             path: path.to_owned(),
             reason,
         };
-        let chain = certificates(&self.certificate)
+        let chain = pem::certificates(&self.certificate)
             .map_err(|reason| unusable(self.names.certificate, &self.certificate, reason))?;
-        let key = PrivateKeyDer::from_pem_file(&self.key)
-            .map_err(|error| unusable(self.names.key, &self.key, error.to_string()))?;
+        let key = pem::private_key(&self.key)
+            .map_err(|reason| unusable(self.names.key, &self.key, reason))?;
         let pair = |error| TlsError::Pair(self.names.certificate, error);
-        let provider = Arc::new(rustls::crypto::ring::default_provider());
+        let provider = pem::provider();
         let builder = ServerConfig::builder_with_provider(provider.clone())
-            .with_protocol_versions(&[&rustls::version::TLS13, &rustls::version::TLS12])
+            .with_protocol_versions(&pem::VERSIONS)
             .map_err(pair)?;
         let builder = match &self.client_authorities {
             None => builder.with_no_client_auth(),
             Some(path) => {
                 let wrong = |reason| unusable(self.names.client_authorities, path, reason);
-                let mut authorities = RootCertStore::empty();
-                for certificate in certificates(path).map_err(wrong)? {
-                    let added = authorities.add(certificate);
-                    added.map_err(|error| wrong(error.to_string()))?;
-                }
+                let authorities = pem::authorities(path).map_err(wrong)?;
                 let mut verifier =
                     WebPkiClientVerifier::builder_with_provider(authorities.into(), provider);
                 if !self.dicom {
@@ -297,16 +292,6 @@ impl TlsFiles {
             config.alpn_protocols = vec![b"http/1.1".to_vec()];
         }
         Ok(config)
-    }
-}
-
-/// The certificates in a PEM file.
-fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, String> {
-    let all: Result<Vec<_>, _> = CertificateDer::pem_file_iter(path).and_then(Iterator::collect);
-    match all {
-        Ok(found) if found.is_empty() => Err("it holds no certificate".into()),
-        Ok(found) => Ok(found),
-        Err(error) => Err(error.to_string()),
     }
 }
 
