@@ -125,9 +125,9 @@ pub fn object(
         .map_err(|error| broken_result(&error))?;
     let pictures = [read(item, "slices.png")?, read(item, "polar.png")?];
     let [slices, polar] = pictures.each_ref().map(Option::as_deref);
-    let cavity = match Resource::of(&item.id) {
+    let cavity = match (object, Resource::of(&item.id)) {
         // A silent monitor is never cancelled.
-        Some(Resource::Segmentation) => {
+        (DicomObject::Mask, Some(Resource::Segmentation)) => {
             cavity(&report, &mesh, (&mask, &frame), &Monitor::silent()).unwrap_or_default()
         }
         _ => None,
