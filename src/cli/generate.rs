@@ -5,7 +5,7 @@ use super::{Bar, ModelArgs};
 use crate::export::{self, Format};
 use crate::pipeline::{self, Model};
 use crate::progress::{CancelToken, Monitor};
-use crate::report::ModelReport;
+use crate::report::{MeasuredSurface, ModelReport};
 use crate::volume::{ReadLimits, VolumeFile};
 use crate::work::problems::Explain;
 use anyhow::{Context, Result, bail};
@@ -57,13 +57,17 @@ pub fn run(args: &GenerateArgs) -> Result<()> {
     let made = pipeline::generate(&files, &parameters, &ReadLimits::default(), &monitor);
     bar.finish();
     let model = made.map_err(|error| anyhow::anyhow!(error.with_advice()))?;
-    let metadata = model.metadata_with_distance(&monitor)?;
+    let surface = model.measured_surface();
+    let metadata = model.metadata_with_distance(&surface, &monitor)?;
     for (path, format) in args.output.iter().zip(formats) {
         let bytes = export::encode(format, &model.mesh, &metadata)?;
         write_file(path, &bytes)?;
     }
     for path in &args.report {
-        write_file(path, report_text(path, &model, &monitor)?.as_bytes())?;
+        write_file(
+            path,
+            report_text(path, &model, &surface, &monitor)?.as_bytes(),
+        )?;
     }
     if !args.quiet {
         print_summary(&model.report);
@@ -98,9 +102,14 @@ fn check_report_names(reports: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-fn report_text(path: &Path, model: &Model, monitor: &Monitor) -> Result<String> {
+fn report_text(
+    path: &Path,
+    model: &Model,
+    surface: &MeasuredSurface<'_>,
+    monitor: &Monitor,
+) -> Result<String> {
     Ok(match extension(path).as_str() {
-        "html" => model.report_html(Some(&model.closeness(monitor)?)),
+        "html" => model.report_html(Some(&surface.closeness(&model.mesh, monitor)?)),
         _ => model.report.to_json_text(),
     })
 }

@@ -18,7 +18,7 @@ use crate::mesh::TriMesh;
 use crate::optimise::{OptimiseError, Reference};
 use crate::parameters::{ModelParameters, Parameters};
 use crate::progress::{Cancelled, Monitor, Stage};
-use crate::report::{self, Closeness, ModelReport, ReportInput};
+use crate::report::{self, Closeness, MeasuredSurface, ModelReport, ReportInput};
 use crate::retile::RetileError;
 use crate::surface::{self, SurfaceError};
 use crate::volume::{
@@ -48,12 +48,21 @@ impl Model {
         }
     }
 
-    /// The metadata with the distance of every vertex to the surface, which formats with colours show.
+    /// The surface that the model approximates, ready to measure distances from it.
+    pub fn measured_surface(&self) -> MeasuredSurface<'_> {
+        MeasuredSurface::new(&self.reference)
+    }
+
+    /// The metadata with the distance of every vertex to its `surface`, which formats with colours show.
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub fn metadata_with_distance(&self, monitor: &Monitor) -> Result<Metadata, Cancelled> {
-        let values = Closeness::of_vertices(&self.mesh, &self.reference, monitor)?;
+    pub fn metadata_with_distance(
+        &self,
+        surface: &MeasuredSurface<'_>,
+        monitor: &Monitor,
+    ) -> Result<Metadata, Cancelled> {
+        let values = surface.of_vertices(&self.mesh, monitor)?;
         Ok(Metadata {
             field: Some(VertexField {
                 name: "Distance",
@@ -64,12 +73,12 @@ impl Model {
         })
     }
 
-    /// Distances between the model and its surface at every vertex, by which the page is coloured.
+    /// Distances between the model and its surface, by which the page is coloured.
     ///
     /// # Errors
     /// [`Cancelled`].
     pub fn closeness(&self, monitor: &Monitor) -> Result<Closeness, Cancelled> {
-        Closeness::of(&self.mesh, &self.reference, monitor)
+        self.measured_surface().closeness(&self.mesh, monitor)
     }
 
     /// The report as a self-contained HTML page, coloured by `closeness` if given.

@@ -27,43 +27,63 @@ pub struct Closeness {
     pub distances_mm: Vec<f32>,
 }
 
-impl Closeness {
-    /// Measures `mesh` against `reference`.
+/// A surface from which distances are measured, with the tree that finds the closest points.
+pub struct MeasuredSurface<'a> {
+    surface: &'a TriMesh,
+    tree: Bvh,
+}
+
+impl<'a> MeasuredSurface<'a> {
+    /// Builds the tree of `surface`.
+    pub fn new(surface: &'a TriMesh) -> Self {
+        let tree = Bvh::new(&surface.vertices, &surface.triangles);
+        Self { surface, tree }
+    }
+
+    /// Measures the triangles of `mesh`.
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub fn of(mesh: &TriMesh, reference: &TriMesh, monitor: &Monitor) -> Result<Self, Cancelled> {
-        let tree = Bvh::new(&reference.vertices, &reference.triangles);
+    pub fn closeness(&self, mesh: &TriMesh, monitor: &Monitor) -> Result<Closeness, Cancelled> {
         let parts = subdivisions(mesh.triangles.len());
         let distances = (0..mesh.triangles.len()).into_par_iter().map(|t| {
             monitor.check()?;
             let centroids = cut(&mesh.corners(t), parts).map(|[a, b, c]| (a + b + c) / 3.0);
-            let distances = centroids.map(|p| signed_distance(&p, reference, &tree));
-            Ok(distances.map(rounded).collect::<Vec<f32>>())
+            Ok(centroids.map(|p| self.distance(&p)).collect::<Vec<f32>>())
         });
-        Ok(Self {
+        Ok(Closeness {
             parts,
             distances_mm: distances.collect::<Result<Vec<_>, _>>()?.concat(),
         })
     }
 
-    /// The signed distance of every vertex of `mesh` to `reference`, mm; positive outside of it.
+    /// The signed distance of every vertex of `mesh`, mm, rounded to 0.001; positive outside of the surface.
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub fn of_vertices(
-        mesh: &TriMesh,
-        reference: &TriMesh,
-        monitor: &Monitor,
-    ) -> Result<Vec<f64>, Cancelled> {
-        let tree = Bvh::new(&reference.vertices, &reference.triangles);
+    pub fn of_vertices(&self, mesh: &TriMesh, monitor: &Monitor) -> Result<Vec<f64>, Cancelled> {
         mesh.vertices
             .par_iter()
             .map(|p| {
                 monitor.check()?;
-                Ok(f64::from(rounded(signed_distance(p, reference, &tree))))
+                Ok(f64::from(self.distance(p)))
             })
             .collect()
+    }
+
+    /// Signed distance of a point, mm, rounded to 0.001.
+    fn distance(&self, p: &Vec3) -> f32 {
+        rounded(signed_distance(p, self.surface, &self.tree))
+    }
+}
+
+impl Closeness {
+    /// Measures `mesh` against `reference`; see [`MeasuredSurface`].
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn of(mesh: &TriMesh, reference: &TriMesh, monitor: &Monitor) -> Result<Self, Cancelled> {
+        MeasuredSurface::new(reference).closeness(mesh, monitor)
     }
 
     /// Whether there are as many distances as a mesh of `triangles` triangles needs.

@@ -25,7 +25,7 @@ mod segmentation_report;
 mod stage_facts;
 pub mod summary;
 
-pub use closeness::Closeness;
+pub use closeness::{Closeness, MeasuredSurface};
 pub use distance_pictures::vertex_colours;
 pub use input::input;
 pub use measure::{MeasureParameters, Measures, measure};

@@ -73,7 +73,8 @@ fn downloads(
     volume: &str,
     monitor: &Monitor<'_>,
 ) -> Result<Vec<OutputFile>, WorkError> {
-    let mut metadata = model.metadata_with_distance(monitor)?;
+    let surface = model.measured_surface();
+    let mut metadata = model.metadata_with_distance(&surface, monitor)?;
     metadata.volume_id = Some(volume.to_owned());
     let mut files = Vec::new();
     for (done, format) in Format::ALL.into_iter().enumerate() {
@@ -83,7 +84,7 @@ fn downloads(
     }
     let report = model.report.to_json_text().into_bytes();
     files.push(json_file("report.json", report));
-    let closeness = model.closeness(monitor)?;
+    let closeness = surface.closeness(&model.mesh, monitor)?;
     let distance = serde_json::to_vec(&closeness).expect("numbers always serialise");
     files.push(json_file("distance.json", distance));
     monitor.report(Stage::Export, 1.0)?;
