@@ -6,7 +6,6 @@ use super::parameters::{EvaluationParameters, ascending};
 use super::rows::{ModelKind, ModelRow, Variant, average};
 use crate::decimate::decimate;
 use crate::export::{self, Format, Metadata};
-use crate::geometry::triangle::radius_ratio;
 use crate::mesh::TriMesh;
 use crate::model::{Organ, Template};
 use crate::optimise::{self, Reference};
@@ -174,12 +173,7 @@ impl TemplateSurface<'_> {
     ) -> Result<CohortModel, ModelError> {
         let what = || format!("{} model of {points} points", variant.as_str());
         let fitness = optimise::assess(&mesh, &self.reference, [1.0; 4]).map_err(during(what))?;
-        let shapes: Vec<f64> = (0..mesh.triangles.len())
-            .map(|t| {
-                let [a, b, c] = mesh.corners(t);
-                radius_ratio(&a, &b, &c)
-            })
-            .collect();
+        let shapes: Vec<f64> = mesh.radius_ratios().collect();
         let kind = ModelKind { variant, points };
         let row = ModelRow {
             template: self.case.to_owned(),

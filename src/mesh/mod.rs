@@ -47,6 +47,14 @@ impl TriMesh {
         triangle::area_normal(&a, &b, &c)
     }
 
+    /// The radius ratio 2r/R of each triangle, 0..=1.
+    pub fn radius_ratios(&self) -> impl Iterator<Item = f64> + '_ {
+        (0..self.triangles.len()).map(|t| {
+            let [a, b, c] = self.corners(t);
+            triangle::radius_ratio(&a, &b, &c)
+        })
+    }
+
     /// Total area, mm².
     pub fn area(&self) -> f64 {
         (0..self.triangles.len())

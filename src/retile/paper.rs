@@ -18,7 +18,6 @@ use super::{
     RetileError, RetileFacts, RetileParameters, SurfacePoint, Tiled, placement, quotas, repulsion,
     sizing, too_few,
 };
-use crate::geometry::triangle;
 use crate::mesh::TriMesh;
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::surface::Surface;
@@ -141,12 +140,7 @@ fn repeat(
 }
 
 fn mean_radius_ratio(mesh: &TriMesh) -> f64 {
-    let count = mesh.triangles.len();
-    let ratio = |t| {
-        let [a, b, c] = mesh.corners(t);
-        triangle::radius_ratio(&a, &b, &c)
-    };
-    (0..count).map(ratio).sum::<f64>() / count as f64
+    mesh.radius_ratios().sum::<f64>() / mesh.triangles.len() as f64
 }
 
 /// What all seeds share.

@@ -3,8 +3,8 @@
 //! number of threads.
 
 use rand::RngExt;
+use ventriform::geometry::Vec3;
 use ventriform::geometry::random::{Purpose, stream};
-use ventriform::geometry::{Vec3, triangle};
 use ventriform::mesh::intersections::self_intersections;
 use ventriform::mesh::{TriMesh, shapes, topology};
 use ventriform::progress::Monitor;
@@ -39,11 +39,9 @@ fn check(surface: &Surface, points: usize, tiled: &Tiled) {
 }
 
 fn radius_ratios(mesh: &TriMesh) -> (f64, f64) {
-    let ratios = (0..mesh.triangles.len()).map(|t| {
-        let [a, b, c] = mesh.corners(t);
-        triangle::radius_ratio(&a, &b, &c)
-    });
-    let (sum, least) = ratios.fold((0.0, 1.0f64), |(s, m), r| (s + r, m.min(r)));
+    let (sum, least) = mesh
+        .radius_ratios()
+        .fold((0.0, 1.0f64), |(s, m), r| (s + r, m.min(r)));
     (sum / mesh.triangles.len() as f64, least)
 }
 

@@ -26,7 +26,7 @@ pub struct Fairing<'a> {
     /// Unit normal at each vertex.
     normals: Vec<Vec3>,
     /// How far each vertex should move along its normal, mm.
-    rises: Vec<f64>,
+    pub(super) rises: Vec<f64>,
     /// Weight of each vertex's term.
     weight: f64,
 }
@@ -60,12 +60,6 @@ impl<'a> Fairing<'a> {
             rises,
             weight,
         }
-    }
-
-    /// How far each vertex should move along its normal, mm.
-    #[cfg(test)]
-    pub fn rises(&self) -> &[f64] {
-        &self.rises
     }
 
     /// Adds the share of triangle `t` in the terms of its corners: each vertex's term is divided

@@ -167,12 +167,13 @@ mod tests {
 
     /// Mean radius ratio 2r/R.
     fn regularity(mesh: &TriMesh) -> f64 {
-        let ratio = |t| {
-            let [a, b, c] = mesh.corners(t);
-            crate::geometry::triangle::radius_ratio(&a, &b, &c)
-        };
-        let count = mesh.triangles.len();
-        (0..count).map(ratio).sum::<f64>() / count as f64
+        mesh.radius_ratios().sum::<f64>() / mesh.triangles.len() as f64
+    }
+
+    /// The regularity that a fit of the rough cup gives with these parameters.
+    fn regularity_with(parameters: &LeastSquaresParameters) -> f64 {
+        let (start, reference) = irregular();
+        regularity(&fitted_with(&start, &reference, parameters).mesh)
     }
 
     /// A rough cup, and a coarse one whose vertices were moved at random.
@@ -193,13 +194,11 @@ mod tests {
 
     #[test]
     fn the_weight_of_shape_makes_triangles_regular() {
-        let (start, reference) = irregular();
         let with = |shape_weight: f64| {
-            let parameters = LeastSquaresParameters {
+            regularity_with(&LeastSquaresParameters {
                 shape_weight,
                 ..LeastSquaresParameters::default()
-            };
-            regularity(&fitted_with(&start, &reference, &parameters).mesh)
+            })
         };
         let (none, usual) = (with(1e-6), with(0.06));
         assert!(usual > 0.94 && none < usual - 0.15, "{none} {usual}");
@@ -209,14 +208,12 @@ mod tests {
     /// farther with momentum.
     #[test]
     fn momentum_makes_triangles_regular_sooner() {
-        let (start, reference) = irregular();
         let with = |momentum: f64| {
-            let parameters = LeastSquaresParameters {
+            regularity_with(&LeastSquaresParameters {
                 momentum,
                 glide: 0,
                 ..LeastSquaresParameters::default()
-            };
-            regularity(&fitted_with(&start, &reference, &parameters).mesh)
+            })
         };
         let (without, usual) = (with(0.0), with(0.6));
         assert!(usual > without + 0.002, "{without} {usual}");
@@ -232,7 +229,7 @@ mod tests {
             let mut mesh = shapes::icosphere(30.0, 2);
             mesh.vertices[raised.index()] *= (30.0 + height) / 30.0;
             let state = state(&mesh, &reference, &parameters, &sizing);
-            let rises = fairing::Fairing::new(&state).rises().to_vec();
+            let rises = fairing::Fairing::new(&state).rises;
             // A twelfth of the height or so is lost to the curvature of the sphere and its facets.
             let own = rises[raised.index()] / -height;
             assert!((0.8..1.2).contains(&own), "{own}");
