@@ -52,10 +52,7 @@ impl DataSetJson {
 
     /// The first text of an element.
     pub fn text(&self, tag: &str) -> Option<&str> {
-        values(self.0.get(tag)?)
-            .first()?
-            .as_str()
-            .filter(|text| !text.is_empty())
+        text_in(&self.0, tag).filter(|text| !text.is_empty())
     }
 
     /// Whether an element has a value.
@@ -92,6 +89,11 @@ impl DataSetJson {
     pub fn replace(&mut self, by: Self) {
         self.0.extend(by.0);
     }
+}
+
+/// The first value of an element of `object`, if it is a text.
+pub(super) fn text_in<'a>(object: &'a Map<String, Value>, tag: &str) -> Option<&'a str> {
+    values(object.get(tag)?).first()?.as_str()
 }
 
 /// The values of an element.

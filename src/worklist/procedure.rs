@@ -1,6 +1,6 @@
 //! Which work items this service performs itself, as the operator configures it.
 
-use super::dataset::values;
+use super::dataset::text_in;
 use super::workitem::Workitem;
 use crate::jobs::Tenant;
 use serde::{Deserialize, Serialize};
@@ -44,13 +44,10 @@ pub struct Procedure {
 impl Procedure {
     /// Whether `item` is ready and asks for this work.
     pub fn is_asked_by(&self, item: &Workitem) -> bool {
-        let text = |code: &Map<String, Value>, tag: &str| {
-            let value = code.get(tag).map(values)?.first()?.as_str()?;
-            Some(value.trim().to_owned())
-        };
+        let text = |code, tag| text_in(code, tag).map(str::trim);
         let named = item.attributes.items(WORK).any(|code| {
-            text(code, CODE_VALUE).as_deref() == Some(self.code.as_str())
-                && text(code, CODE_SCHEME).as_deref() == Some(self.scheme.as_str())
+            text(code, CODE_VALUE) == Some(self.code.as_str())
+                && text(code, CODE_SCHEME) == Some(self.scheme.as_str())
         });
         named
             && item.tenant == self.tenant
@@ -70,8 +67,7 @@ impl Workitem {
         let mut found: Option<(String, String)> = None;
         for item in self.attributes.items(INPUT) {
             let uid = |tag: &str| {
-                let uid = item.get(tag).map(values)?.first()?.as_str()?;
-                let uid = uid.trim_matches(['\0', ' ']);
+                let uid = text_in(item, tag)?.trim_matches(['\0', ' ']);
                 (!uid.is_empty()).then(|| uid.to_owned())
             };
             let (Some(study), Some(series)) = (uid(STUDY), uid(SERIES)) else {
