@@ -213,9 +213,8 @@ async fn filed(store: &Store) -> String {
 async fn older_database(folder: &std::path::Path, count: usize) -> sqlx::SqlitePool {
     let older = folder.join("migrations");
     std::fs::create_dir(&older).unwrap();
-    let source = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/store/migrations");
-    for name in migrations().iter().take(count) {
-        std::fs::copy(source.join(name), older.join(name)).unwrap();
+    for file in migrations().iter().take(count) {
+        std::fs::copy(file, older.join(file.file_name().unwrap())).unwrap();
     }
     let options = sqlx::sqlite::SqliteConnectOptions::new()
         .filename(folder.join("ventriform.db"))
@@ -226,15 +225,13 @@ async fn older_database(folder: &std::path::Path, count: usize) -> sqlx::SqliteP
     pool
 }
 
-/// The names of the migrations, in the order in which they run.
-fn migrations() -> Vec<String> {
+/// The files of the migrations, in the order in which they run.
+fn migrations() -> Vec<std::path::PathBuf> {
     let source = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/store/migrations");
     let files = std::fs::read_dir(source).unwrap();
-    let mut names: Vec<String> = files
-        .map(|file| file.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.sort();
-    names
+    let mut files: Vec<_> = files.map(|file| file.unwrap().path()).collect();
+    files.sort();
+    files
 }
 
 /// What the database in `folder` consists of: kind, name and definition of each part.
