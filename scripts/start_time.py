@@ -9,25 +9,15 @@ and again, each time after SIGKILL, and measures the time from the start of the 
 of `/readyz`; then reads some of the volumes back and compares every byte. Loopback only; stops by itself;
 needs Python 3 and about 1 GB of disk for 100,000 volumes. The last line is a JSON object.
 """
-import argparse, hashlib, json, os, random, shutil, sqlite3, statistics, struct, tempfile
+import argparse, hashlib, json, os, random, shutil, sqlite3, statistics, tempfile
 
 from crash_rounds import Service
+from nifti import FLOAT32, nifti
 
 
-def nifti(number):
-    """A volume of 4^3 voxels that holds `number`; all are equally long."""
-    header = bytearray(352)
-    struct.pack_into("<i", header, 0, 348)
-    struct.pack_into("<8h", header, 40, 3, 4, 4, 4, 1, 1, 1, 1)
-    struct.pack_into("<2h", header, 70, 16, 32)
-    struct.pack_into("<8f", header, 76, 1, 4, 4, 4, 1, 1, 1, 1)
-    struct.pack_into("<f", header, 108, 352)
-    struct.pack_into("<f", header, 112, 1)
-    struct.pack_into("<hh", header, 252, 0, 1)
-    for axis in range(3):
-        struct.pack_into("<4f", header, 280 + 16 * axis, *[4.0 if i == axis else 0.0 for i in range(4)])
-    header[344:348] = b"n+1\0"
-    return bytes(header) + struct.pack("<64f", *[float(number + i) for i in range(64)])
+def numbered(number):
+    """A volume that holds `number`; all are equally long."""
+    return nifti(4, (float(number + i) for i in range(64)), FLOAT32)
 
 
 def fill(data, first, count):
@@ -45,7 +35,7 @@ def fill(data, first, count):
         rows[table] = list(zip(stored, database.execute(row, (first,)).fetchone()))
     written = {}
     for number in range(count):
-        body = nifti(number + 1)
+        body = numbered(number + 1)
         sha = hashlib.sha256(body).hexdigest()
         folder = os.path.join(shelf, "vol_" + sha[:32])
         os.mkdir(folder)
@@ -91,7 +81,7 @@ def main():
     data = os.path.join(work, "data")
     try:
         service = Service(options.program, data)
-        status, volume = service.json("POST", "/v1/volumes", nifti(0))
+        status, volume = service.json("POST", "/v1/volumes", numbered(0))
         assert status == 201, (status, volume)
         # Stopped in order: what follows changes the database from outside.
         service.stop()
