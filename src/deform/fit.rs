@@ -53,6 +53,16 @@ pub struct WallSurfaces {
     pub anatomical: WallSurface,
 }
 
+impl WallSurfaces {
+    /// The wall with this `edge`.
+    pub fn of(&self, edge: WallEdge) -> &WallSurface {
+        match edge {
+            WallEdge::Apparent => &self.apparent,
+            WallEdge::Anatomical => &self.anatomical,
+        }
+    }
+}
+
 /// A fitted model.
 #[derive(Debug, Clone)]
 pub struct Fit {
@@ -193,10 +203,7 @@ impl Fit {
                 uncertainty,
             },
         };
-        let shown = match parameters.edge {
-            WallEdge::Apparent => &surfaces.apparent,
-            WallEdge::Anatomical => &surfaces.anatomical,
-        };
+        let shown = surfaces.of(parameters.edge);
         Ok(Self {
             mesh: shown.mesh.clone(),
             wall: Some(shown.wall.clone()),
@@ -213,18 +220,14 @@ impl Fit {
 
     /// The uncertainty of the wall that a fit with this `edge` shows, mm; ventricles only.
     pub fn shown_uncertainty(&self, edge: WallEdge) -> Option<&[f64]> {
-        self.surfaces.as_ref().map(|surfaces| match edge {
-            WallEdge::Apparent => surfaces.apparent.uncertainty.as_slice(),
-            WallEdge::Anatomical => surfaces.anatomical.uncertainty.as_slice(),
-        })
+        let surfaces = self.surfaces.as_ref();
+        surfaces.map(|surfaces| surfaces.of(edge).uncertainty.as_slice())
     }
 
     /// The wall of a ventricle that a fit with this `edge` does not show.
     pub fn other_surface(&self, edge: WallEdge) -> Option<&WallSurface> {
-        self.surfaces.as_ref().map(|surfaces| match edge {
-            WallEdge::Apparent => &surfaces.anatomical,
-            WallEdge::Anatomical => &surfaces.apparent,
-        })
+        let surfaces = self.surfaces.as_ref();
+        surfaces.map(|surfaces| surfaces.of(edge.other()))
     }
 
     /// A figure to rank templates by: the share of area with edges, less strain, misfit and

@@ -80,6 +80,14 @@ pub enum WallEdge {
 }
 
 impl WallEdge {
+    /// The other one.
+    pub fn other(self) -> Self {
+        match self {
+            WallEdge::Apparent => WallEdge::Anatomical,
+            WallEdge::Anatomical => WallEdge::Apparent,
+        }
+    }
+
     /// Its name in parameters and reports.
     pub fn as_str(self) -> &'static str {
         match self {
