@@ -302,5 +302,28 @@ impl FolderLock {
 impl Drop for FolderLock {
     fn drop(&mut self) {
         self.release();
+        // Closing the file is not enough: a child process between fork and exec still has it open.
+        if let Err(error) = self.file.unlock() {
+            tracing::warn!(%error, "the data folder could not be unlocked");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dropped_lock_is_free_though_a_child_process_still_has_the_file_open() {
+        let folder = tempfile::tempdir().unwrap();
+        let lock = FolderLock::take(folder.path()).unwrap();
+        let inherited = lock.file.try_clone().unwrap();
+        assert!(matches!(
+            FolderLock::take(folder.path()),
+            Err(OpenError::InUse(_))
+        ));
+        drop(lock);
+        FolderLock::take(folder.path()).unwrap();
+        drop(inherited);
     }
 }
