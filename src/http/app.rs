@@ -5,15 +5,16 @@ use super::decoding::Decoding;
 use super::guard::state::Guard;
 use super::hooks::Hooks;
 use super::intake::Intake;
-use super::kept_answers::KeptAnswers;
+use super::kept::Kept;
 use super::metrics::Metrics;
 use super::readiness::Readiness;
 use super::spans::Spans;
 use super::streams::EventStreams;
+use super::validators::ValidatedJson;
 use super::wire::rfc3339;
 use crate::access::AccessStore;
 use crate::config::Settings;
-use crate::jobs::{FigureStore, Holding, Queue, Resource, RetentionAges};
+use crate::jobs::{FigureStore, Holding, Product, Queue, Resource, RetentionAges};
 use crate::work::Engine;
 use crate::worklist::Worklist;
 use std::sync::Arc;
@@ -55,7 +56,9 @@ pub struct Shared {
     /// Reads files outside of jobs.
     pub decoding: Decoding,
     /// Answers about items that are still current.
-    pub answers: KeptAnswers,
+    pub answers: Kept<ValidatedJson>,
+    /// Products that are still current.
+    pub products: Kept<Arc<Product>>,
     /// The open streams of events.
     pub streams: EventStreams,
     /// Telling other programs about jobs.
@@ -95,6 +98,7 @@ impl App {
         watching: Watching,
         closing: CancellationToken,
     ) -> Self {
+        let answer_memory = usize::try_from(settings.answer_memory.0).unwrap_or(usize::MAX);
         Self(Arc::new(Shared {
             queue,
             engine,
@@ -103,9 +107,8 @@ impl App {
             scheduled: Notify::new(),
             guard,
             decoding: Decoding::new(&settings, watching.metrics.requests.decoding_waits.clone()),
-            answers: KeptAnswers::new(
-                usize::try_from(settings.answer_memory.0).unwrap_or(usize::MAX),
-            ),
+            answers: Kept::new(answer_memory / 2),
+            products: Kept::new(answer_memory / 2),
             streams: EventStreams::new(&settings),
             settings,
             hooks,

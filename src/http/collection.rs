@@ -30,6 +30,7 @@ use axum::{Extension, Json};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 use std::borrow::Cow;
+use std::convert::Infallible;
 use std::ops::ControlFlow;
 use utoipa::openapi::path::HttpMethod;
 use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, Schema, SchemaType, Type};
@@ -202,9 +203,9 @@ async fn show<C: Collection>(
     };
     let catalogue = &*app.queue.catalogue;
     let asker = (&caller.tenant, scans::sees_patients(caller.scope));
-    app.answers
-        .answer(catalogue, asker, C::RESOURCE, &id, &headers, read)
-        .await
+    let kept = app.answers.get(catalogue, asker, C::RESOURCE, &id, read);
+    let ControlFlow::<Infallible, _>::Continue(answer) = kept.await?;
+    Ok(answer.answer(&headers))
 }
 
 async fn erase<C: Collection>(

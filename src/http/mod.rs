@@ -9,7 +9,7 @@
 //! | the paths, the layers around them | [`router`] |
 //! | uploads, jobs, results | [`volumes`], [`jobs`], [`models`], [`segmentations`], [`templates`] |
 //! | webhooks and what became of their deliveries | [`webhooks`], [`given_webhook`], [`hooks`] |
-//! | what several of them share | [`collection`] (list, show, erase), [`products`] (meshes, reports, files), [`files`] (ranges, validators), [`validators`] (of JSON), [`kept_answers`] |
+//! | what several of them share | [`collection`] (list, show, erase), [`products`] (meshes, reports, files), [`files`] (ranges, validators), [`validators`] (of JSON), [`kept`] |
 //! | who may do what, and the record of it | [`guard`] (before every handler), [`caller`], [`keys`], [`audit`] |
 //! | a tenant's names for its things, legal holds, receipts of erasures | [`tags`], [`legal_hold`], [`erasures`] |
 //! | whose scan a volume is | [`scans`] (in answers and searches), [`identities`] (stated, erased) |
@@ -53,7 +53,7 @@ mod identities;
 mod intake;
 mod job_watch;
 mod jobs;
-mod kept_answers;
+mod kept;
 mod keys;
 mod legal_hold;
 mod limits;

@@ -8,6 +8,7 @@ use super::caller::Caller;
 use super::collection::{Collection, find};
 use super::decoding::LITTLE_MEMORY;
 use super::files;
+use super::kept::Keep;
 use super::negotiate;
 use super::openapi::{
     ConditionalHeaders, DeidentifyParameter, DicomProblems, Documented, DownloadAnswers,
@@ -31,7 +32,10 @@ use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::routing::get;
 use serde::Serialize;
 use std::borrow::Cow;
+use std::convert::Infallible;
 use std::marker::PhantomData;
+use std::ops::ControlFlow;
+use std::sync::Arc;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::path::HttpMethod;
 use utoipa::openapi::schema::{ObjectBuilder, Schema, Type};
@@ -372,6 +376,32 @@ pub async fn find_any(app: &App, tenant: &Tenant, id: &str) -> Answer<Product> {
     }
 }
 
+impl Keep for Arc<Product> {
+    fn bytes(&self) -> usize {
+        /// Of a file's record, and of an item beside its maps.
+        const RECORD: usize = 400;
+        /// By how much a JSON object in memory is larger than its text.
+        const IN_MEMORY: usize = 4;
+        let text = |map| serde_json::to_string(map).map_or(0, |text: String| text.len());
+        IN_MEMORY * (text(&self.parameters) + text(&self.summary)) + RECORD * (self.files.len() + 1)
+    }
+}
+
+/// The tenant's product of that id, without asking the database again while nothing is written.
+async fn kept<P: ProductCollection>(app: &App, tenant: &Tenant, id: &str) -> Answer<Arc<Product>> {
+    let read = async || {
+        let product = find::<P>(app, tenant, id).await?.item;
+        Ok(ControlFlow::Continue(Arc::new(product)))
+    };
+    // What is used of it tells nobody whose scan it is.
+    let asker = (tenant, false);
+    let kept = app
+        .products
+        .get(&*app.queue.catalogue, asker, P::RESOURCE, id, read);
+    let ControlFlow::<Infallible, _>::Continue(product) = kept.await?;
+    Ok(product)
+}
+
 /// Answers with the offered file, under the media type by which it was offered.
 pub async fn send(app: &App, product: &Product, offer: &Offer, headers: &HeaderMap) -> Answer {
     let mut response = send_named(app, product, &offer.file, headers).await?;
@@ -413,7 +443,7 @@ async fn get_offered<P: ProductCollection>(
     offers: &[Offer],
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let product = find::<P>(&app, &caller.tenant, &id).await?.item;
+    let product = kept::<P>(&app, &caller.tenant, &id).await?;
     let mut response = send(&app, &product, choose(&headers, offers)?, &headers).await?;
     response
         .headers_mut()
@@ -439,7 +469,7 @@ async fn get_file<P: ProductCollection>(
     if !names.contains(&name) {
         return Err(no_such_file(P::RESOURCE, &name, &names));
     }
-    let product = find::<P>(&app, &caller.tenant, &id).await?.item;
+    let product = kept::<P>(&app, &caller.tenant, &id).await?;
     let Some(object) = object else {
         return send_named(&app, &product, &name, &headers).await;
     };
@@ -450,14 +480,14 @@ async fn get_file<P: ProductCollection>(
     if !deidentify {
         caller.require(Scope::Submit)?;
     }
-    send_object(&app, &caller.tenant, product, object, deidentify, &headers).await
+    send_object(&app, &caller.tenant, &product, object, deidentify, &headers).await
 }
 
 /// Answers with a DICOM object, which is made of the product's files and the scan of its volume.
 async fn send_object(
     app: &App,
     tenant: &Tenant,
-    product: Product,
+    product: &Product,
     object: DicomObject,
     deidentify: bool,
     headers: &HeaderMap,
@@ -481,7 +511,7 @@ async fn send_object(
         }
     })?;
     match made {
-        Some(file) => files::send_object(&product, file, headers).await,
+        Some(file) => files::send_object(product, file, headers).await,
         None => {
             let names: Vec<_> = product.files.iter().map(|file| file.name.clone()).collect();
             Err(no_such_file(product.resource(), object.file_name(), &names))

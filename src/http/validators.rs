@@ -1,6 +1,7 @@
 //! Validators: what `If-None-Match` names is not sent again (RFC 9110, sections 8.8.3 and 13.1.2).
 //! That of a JSON answer is strong: the SHA-256 of its bytes.
 
+use super::kept::Keep;
 use super::problem::{Answer, Problem};
 use crate::jobs::hex;
 use axum::body::Bytes;
@@ -44,9 +45,10 @@ impl ValidatedJson {
         ];
         (answer, self.body.clone()).into_response()
     }
+}
 
-    /// Memory that it takes.
-    pub fn bytes(&self) -> usize {
+impl Keep for ValidatedJson {
+    fn bytes(&self) -> usize {
         self.etag.len() + self.body.len()
     }
 }
