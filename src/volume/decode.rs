@@ -72,6 +72,19 @@ pub(super) struct VoxelFormat {
     pub scaling: Option<(f64, f64)>,
 }
 
+impl VoxelFormat {
+    /// Whether every voxel is a whole number, whatever is stored.
+    fn is_whole(&self) -> bool {
+        let real = matches!(self.data_type, DataType::F32 | DataType::F64);
+        !real && self.scaling.is_none()
+    }
+
+    /// Whether `f32` represents every voxel exactly, whatever is stored.
+    fn is_exact(&self) -> bool {
+        self.is_whole() && self.data_type.size() <= size_of::<u16>()
+    }
+}
+
 /// Reads the voxels of a file from front to back.
 pub(super) struct VoxelReader<'a> {
     decoder: Decoder,
@@ -312,10 +325,15 @@ impl Decoder {
         let start = out.len();
         decode(bytes, &self.format, out);
         let decoded = &mut out[start..];
-        let figures = &mut self.figures;
-        figures.odd.settle(bytes, &self.format, decoded, first)?;
+        let (format, figures) = (&self.format, &mut self.figures);
+        if !format.is_exact() {
+            figures.odd.settle(bytes, format, decoded, first)?;
+        }
         // Tallied here because the portion is still in the cache.
-        figures.tally.add_portion(decoded);
+        match format.is_whole() {
+            true => figures.tally.add_whole_portion(decoded),
+            false => figures.tally.add_portion(decoded),
+        }
         Ok(())
     }
 }

@@ -73,15 +73,20 @@ impl Default for Tally {
 impl Tally {
     /// Adds the voxels of the next portion.
     pub(super) fn add_portion(&mut self, portion: &[f32]) {
-        self.merge(&Tally::of(portion));
+        self.merge(&Tally::of(portion, Lanes::add_block));
     }
 
-    /// Figures over one portion, computed in lanes for the vector unit.
-    fn of(portion: &[f32]) -> Self {
+    /// As [`Tally::add_portion`], for voxels that are known to be whole and not missing.
+    pub(super) fn add_whole_portion(&mut self, portion: &[f32]) {
+        self.merge(&Tally::of(portion, Lanes::add_figures));
+    }
+
+    /// Figures over one portion, computed in lanes for the vector unit, block by block.
+    fn of(portion: &[f32], add: impl Fn(&mut Lanes, &[f32; BLOCK])) -> Self {
         let mut lanes = Lanes::new();
         let (blocks, rest) = portion.as_chunks::<BLOCK>();
         for block in blocks {
-            lanes.add_block(block);
+            add(&mut lanes, block);
         }
         // The last block is padded with missing voxels, which are subtracted below.
         let mut last = [f32::NAN; BLOCK];
@@ -173,14 +178,12 @@ impl Lanes {
     fn add_block(&mut self, block: &[f32; BLOCK]) {
         let missing = block.iter().map(|v| u64::from(v.is_nan())).sum::<u64>();
         self.missing += missing;
-        for group in block.as_chunks::<LANES>().0 {
-            for l in 0..LANES {
-                // Comparisons with NaN are false.
-                let (v, low, high) = (group[l], self.minimum[l], self.maximum[l]);
-                self.minimum[l] = if v < low { v } else { low };
-                self.maximum[l] = if v > high { v } else { high };
-                let counted = if missing > 0 && v.is_nan() { 0.0 } else { v };
-                self.sum[l] += f64::from(counted);
+        match missing {
+            0 => self.add_figures(block),
+            _ => {
+                self.add_extremes(block);
+                let counted = block.map(|v| if v.is_nan() { 0.0 } else { v });
+                self.add_sum(&counted);
             }
         }
         if !self.fractional {
@@ -190,6 +193,31 @@ impl Lanes {
                 let whole = (size + WHOLE) - WHOLE == size || size >= WHOLE;
                 any | !(whole | v.is_nan())
             });
+        }
+    }
+
+    /// Adds a block of which no value is missing to minimum, maximum and sum.
+    fn add_figures(&mut self, block: &[f32; BLOCK]) {
+        self.add_extremes(block);
+        self.add_sum(block);
+    }
+
+    fn add_extremes(&mut self, block: &[f32; BLOCK]) {
+        for group in block.as_chunks::<LANES>().0 {
+            for l in 0..LANES {
+                // Comparisons with NaN are false.
+                let (v, low, high) = (group[l], self.minimum[l], self.maximum[l]);
+                self.minimum[l] = if v < low { v } else { low };
+                self.maximum[l] = if v > high { v } else { high };
+            }
+        }
+    }
+
+    fn add_sum(&mut self, block: &[f32; BLOCK]) {
+        for group in block.as_chunks::<LANES>().0 {
+            for l in 0..LANES {
+                self.sum[l] += f64::from(group[l]);
+            }
         }
     }
 }
@@ -355,6 +383,23 @@ mod tests {
         let s = summarise(&voxels, 128);
         assert_eq!((s.sum, s.minimum, s.maximum), (sum, 0.0, 6.0));
         assert_eq!((s.finite, s.missing, s.integral), (n as u64, 0, true));
+    }
+
+    #[test]
+    fn whole_portions_have_the_same_figures() {
+        for n in [1, BLOCK, 2 * PORTION + 17] {
+            let voxels: Vec<f32> = (0..n).map(|i| (i * 37 % 4001) as f32 - 300.0).collect();
+            let (mut any, mut whole) = (Tally::default(), Tally::default());
+            for portion in voxels.chunks(PORTION) {
+                any.add_portion(portion);
+                whole.add_whole_portion(portion);
+            }
+            assert_eq!(
+                any.with_labels(&voxels, 128),
+                whole.with_labels(&voxels, 128)
+            );
+            assert!(whole.summary(None).integral);
+        }
     }
 
     #[test]
