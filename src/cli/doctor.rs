@@ -1,5 +1,8 @@
 //! `ventriform doctor` and `ventriform backup`: checking, repairing and copying a data folder.
 
+use super::serve::variable;
+use crate::config::{BlobPlace, Flags, Settings};
+use crate::http::{self, s3_location};
 use crate::jobs::Tenant;
 use crate::store::{self, Examination};
 use anyhow::{Result, bail};
@@ -13,6 +16,7 @@ use tokio::runtime::Runtime;
   ventriform doctor --data-dir data
   ventriform doctor --data-dir data --repair
   ventriform doctor --data-dir data --json
+  ventriform doctor --data-dir data --blobs s3://hearts/prod
 
 The status is 0 if nothing is wrong or everything was repaired, else 1. A repair deletes no content:
 what is broken or has no record is moved into the folder `quarantine`.")]
@@ -20,6 +24,10 @@ pub struct DoctorArgs {
     /// Folder of the service
     #[arg(long, value_name = "DIR")]
     data_dir: PathBuf,
+    /// Where the service keeps the files, if not in the folder: s3://BUCKET/PREFIX. Address and
+    /// credentials come from the environment, as for the service [env: VENTRIFORM_BLOBS]
+    #[arg(long, value_name = "URL")]
+    blobs: Option<BlobPlace>,
     /// Repair what can be repaired
     #[arg(long)]
     repair: bool,
@@ -52,7 +60,16 @@ pub struct BackupArgs {
 /// If the folder cannot be examined, or something is wrong that was not repaired.
 pub fn run(args: &DoctorArgs) -> Result<()> {
     let heirs = args.repair.then_some(&args.tenant);
-    let found = Runtime::new()?.block_on(store::examine(&args.data_dir, heirs))?;
+    let flags = Flags {
+        blobs: args.blobs.clone(),
+        ..Flags::default()
+    };
+    let mut settings = Settings::load(&flags, variable)?.0;
+    settings.read_aws(variable);
+    http::install_cryptography();
+    let s3 = s3_location(&settings);
+    let found = store::examine(&args.data_dir, s3.as_ref(), heirs);
+    let found = Runtime::new()?.block_on(found)?;
     match args.json {
         true => println!("{}", serde_json::to_string_pretty(&found)?),
         false => print(&found),

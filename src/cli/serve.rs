@@ -233,7 +233,7 @@ pub fn data_dir(given: Option<&PathBuf>) -> Result<PathBuf> {
     Ok(Settings::load(&flags, variable)?.0.data_dir)
 }
 
-fn variable(name: &str) -> Option<String> {
+pub(super) fn variable(name: &str) -> Option<String> {
     std::env::var(name).ok()
 }
 

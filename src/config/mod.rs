@@ -15,9 +15,9 @@ mod units;
 
 pub use tables::Tables;
 pub use units::{
-    Auto, AutoSize, Count, Keyword, Limit, LogFormat, MinFree, Networks, NoAddress, NoLimit, Off,
-    OptionalAddress, OptionalPath, OrKeyword, OtlpEndpoint, OwnRetention, Retention, Size, Span,
-    Words,
+    Auto, AutoSize, AwsVariables, BlobPlace, Count, Keyword, Limit, LogFormat, MinFree, Networks,
+    NoAddress, NoLimit, Off, OptionalAddress, OptionalPath, OrKeyword, OtlpEndpoint, OwnRetention,
+    Retention, Size, Span, Words,
 };
 
 use crate::archive::Archives;
@@ -183,6 +183,8 @@ macro_rules! settings {
             $($($(#[doc = $doc])+ pub $name: $kind,)+)+
             /// The archives that jobs may name; in the file only.
             pub archives: Archives,
+            /// The variables for an S3 store; in the environment only.
+            pub aws: AwsVariables,
         }
 
         /// The settings as flags of `ventriform serve`, all optional.
@@ -222,6 +224,7 @@ macro_rules! settings {
                         value
                     },)+)+
                     archives: layers.archives.clone(),
+                    aws: AwsVariables::default(),
                 };
                 Ok((settings, origins))
             }
@@ -239,6 +242,13 @@ settings! {
     listen: SocketAddr = "127.0.0.1:8080";
     /// Folder for the database and the files; created if missing, used by one process at a time
     data_dir: PathBuf = "ventriform-data";
+    /// Where the files are kept: `folder` is the data folder, `s3://BUCKET/PREFIX` an S3 store. Its
+    /// address and credentials come from the environment: AWS_ENDPOINT_URL, AWS_REGION,
+    /// AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and the others that the AWS tools read
+    blobs: BlobPlace = "folder";
+    /// Largest size of the copies of files in an S3 store, kept in the data folder. They can be
+    /// deleted at any time
+    blob_cache: Size = "2GiB";
     /// Space of the disk to keep free; with less, uploads and jobs are refused with status 507 while
     /// accepted jobs go on. `auto` is 256 MiB, or 5 % of a smaller disk; `0B` turns this off
     min_free: MinFree = "auto";
@@ -529,7 +539,7 @@ impl Settings {
         Ok((settings, Origins(origins)))
     }
 
-    /// Takes the credentials of the archives from the environment. Not part of
+    /// Takes the credentials of the archives and of an S3 store from the environment. Not part of
     /// [`Settings::load`]: commands beside the service need none.
     ///
     /// # Errors
@@ -546,7 +556,15 @@ impl Settings {
                     reason: fault.reason,
                 })?;
         }
+        self.read_aws(variable);
         Ok(())
+    }
+
+    /// Takes the variables for an S3 store from the environment, if the files are in one.
+    pub fn read_aws(&mut self, variable: impl Fn(&str) -> Option<String>) {
+        if self.blobs.bucket().is_some() {
+            self.aws = AwsVariables::read(variable);
+        }
     }
 
     /// The settings as TOML that reads back, with the origin of each as a comment.
@@ -673,6 +691,7 @@ macro_rules! shown_by_display {
 shown_by_display!(
     AeTitle,
     AllowList,
+    BlobPlace,
     OtlpEndpoint,
     SocketAddr,
     Count,

@@ -78,6 +78,111 @@ impl Size {
     }
 }
 
+/// Where files are kept: `folder`, or `s3://BUCKET/PREFIX`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum BlobPlace {
+    /// In the data folder.
+    Folder,
+    /// In a bucket.
+    S3 {
+        /// The bucket's name.
+        bucket: String,
+        /// What the keys of all files begin with, without a slash at its ends; may be empty.
+        prefix: String,
+    },
+}
+
+impl BlobPlace {
+    /// Bucket and prefix, if it is one.
+    pub fn bucket(&self) -> Option<(&str, &str)> {
+        match self {
+            Self::Folder => None,
+            Self::S3 { bucket, prefix } => Some((bucket, prefix)),
+        }
+    }
+}
+
+/// Whether a name is one that buckets and the parts of keys may have without being escaped.
+fn is_plain_part(part: &str) -> bool {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    !part.is_empty() && part != "." && part != ".." && part.chars().all(allowed)
+}
+
+impl FromStr for BlobPlace {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "folder" {
+            return Ok(Self::Folder);
+        }
+        let path = text
+            .strip_prefix("s3://")
+            .map(|path| path.trim_end_matches('/'));
+        let path = path.filter(|path| path.split('/').all(is_plain_part));
+        let path = path.ok_or(
+            "give `folder` or s3://BUCKET/PREFIX, with letters, digits, points, `-` and `_`",
+        )?;
+        let (bucket, prefix) = path.split_once('/').unwrap_or((path, ""));
+        Ok(Self::S3 {
+            bucket: bucket.to_owned(),
+            prefix: prefix.to_owned(),
+        })
+    }
+}
+
+impl fmt::Display for BlobPlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Folder => f.write_str("folder"),
+            Self::S3 { bucket, prefix } if prefix.is_empty() => write!(f, "s3://{bucket}"),
+            Self::S3 { bucket, prefix } => write!(f, "s3://{bucket}/{prefix}"),
+        }
+    }
+}
+
+/// Names and values of the variables that the AWS tools read. Secret: `Debug` shows the names only.
+#[derive(Clone, Default, PartialEq, Eq)]
+pub struct AwsVariables(pub Vec<(String, String)>);
+
+impl AwsVariables {
+    /// The variables that are read.
+    const NAMES: [&str; 14] = [
+        "AWS_ENDPOINT_URL",
+        "AWS_ENDPOINT_URL_S3",
+        "AWS_ENDPOINT_URL_STS",
+        "AWS_REGION",
+        "AWS_DEFAULT_REGION",
+        "AWS_ACCESS_KEY_ID",
+        "AWS_SECRET_ACCESS_KEY",
+        "AWS_SESSION_TOKEN",
+        "AWS_ROLE_ARN",
+        "AWS_ROLE_SESSION_NAME",
+        "AWS_WEB_IDENTITY_TOKEN_FILE",
+        "AWS_CONTAINER_CREDENTIALS_RELATIVE_URI",
+        "AWS_CONTAINER_CREDENTIALS_FULL_URI",
+        "AWS_CONTAINER_AUTHORIZATION_TOKEN_FILE",
+    ];
+
+    /// Those that are set and not empty.
+    pub fn read(variable: impl Fn(&str) -> Option<String>) -> Self {
+        let value = |name: &str| variable(name).filter(|value| !value.is_empty());
+        let names = Self::NAMES.into_iter();
+        Self(
+            names
+                .filter_map(|name| Some((name.to_owned(), value(name)?)))
+                .collect(),
+        )
+    }
+}
+
+impl fmt::Debug for AwsVariables {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list()
+            .entries(self.0.iter().map(|(name, _)| name))
+            .finish()
+    }
+}
+
 /// The word that stands for the absence of a value.
 pub trait Keyword {
     /// The word.
@@ -351,12 +456,38 @@ mod tests {
     use super::*;
 
     #[test]
+    fn places_of_files_that_are_none_are_refused() {
+        for text in [
+            "",
+            "hearts",
+            "s3://",
+            "s3:///p",
+            "s3://a//b",
+            "s3://a/../b",
+            "s3://a/b c",
+        ] {
+            assert!(text.parse::<BlobPlace>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_values_of_variables_are_not_shown() {
+        let variables = AwsVariables::read(|name| Some(format!("secret of {name}")));
+        let shown = format!("{variables:?}");
+        assert!(shown.contains("AWS_SECRET_ACCESS_KEY") && !shown.contains("secret of"));
+        assert!(AwsVariables::read(|_| Some(String::new())).0.is_empty());
+    }
+
+    #[test]
     fn values_read_back_as_printed() {
         for text in ["500ms", "30s", "90s", "10m", "7d", "0ms"] {
             assert_eq!(text.parse::<Span>().unwrap().to_string(), text);
         }
         for text in ["1000B", "256KiB", "3MiB", "2GiB"] {
             assert_eq!(text.parse::<Size>().unwrap().to_string(), text);
+        }
+        for text in ["folder", "s3://hearts", "s3://hearts/hospital-a/prod_1"] {
+            assert_eq!(text.parse::<BlobPlace>().unwrap().to_string(), text);
         }
         for text in ["off", "/etc/tls/cert.pem"] {
             assert_eq!(text.parse::<OptionalPath>().unwrap().to_string(), text);

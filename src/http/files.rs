@@ -92,6 +92,7 @@ async fn send_made(
         media_type: made.media_type.into_owned(),
         bytes: content.len() as u64,
         sha256: hex(&Sha256::digest(&content)),
+        place: None,
     };
     // The range lies within the content, whose length is a `usize`.
     let read =

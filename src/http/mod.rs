@@ -92,7 +92,7 @@ mod workitems;
 pub use app::App;
 pub use connections::tls::TlsError;
 pub use cryptography::install_cryptography;
-pub use server::{Running, ServeError, serve, start};
+pub use server::{Running, ServeError, s3_location, serve, start};
 pub use spans::OtlpError;
 
 /// The OpenAPI document, as committed under `openapi/`.

@@ -50,6 +50,7 @@ fn why_unready(error: &StoreError) -> &'static str {
         (StoreFault::Busy, _) => {
             "The database was not free in time: the machine is overloaded, or another program holds it."
         }
+        (StoreFault::Away, _) => "The S3 store of the files does not answer, or refuses.",
         (StoreFault::DamagedDatabase, _) => "The database is damaged.",
         (_, StoreError::Files(_)) => "Files cannot be written.",
         (_, StoreError::Database { .. }) => "The database does not answer.",

@@ -27,7 +27,7 @@ use crate::jobs::{
     Clock, Custodian, DeathLimit, Failure, Fault, Queue, QueueSettings, SteadyClock, StoreError,
     SystemClock, Upkeep, WorkerSettings, Workers, recover_after_crash,
 };
-use crate::store::{OpenError, Store, StoreSettings};
+use crate::store::{OpenError, S3Location, Store, StoreSettings};
 use crate::work::Engine;
 use std::io;
 use std::net::{SocketAddr, TcpListener};
@@ -342,7 +342,7 @@ fn serve_dicom(
 fn receiving(settings: &Settings, store: &Store, queue: &Queue, watching: &Watching) -> Intake {
     let receiver = Receiver::new(
         store.rows.clone(),
-        store.blobs.clone(),
+        store.received.clone(),
         queue.clock.clone(),
         Arc::new(watching.metrics.intake.clone()),
         intake::receiver_settings(settings),
@@ -351,7 +351,7 @@ fn receiving(settings: &Settings, store: &Store, queue: &Queue, watching: &Watch
         receiver: Arc::new(receiver),
         sessions: Sessions::new(intake::waits(settings)),
         store: store.rows.clone(),
-        files: store.blobs.clone(),
+        files: store.received.clone(),
     }
 }
 
@@ -371,10 +371,22 @@ fn gatherer(app: &App) -> Gatherer {
     }
 }
 
+/// Where the files are, if not in the data folder.
+pub fn s3_location(settings: &Settings) -> Option<S3Location> {
+    let (bucket, prefix) = settings.blobs.bucket()?;
+    Some(S3Location {
+        bucket: bucket.to_owned(),
+        prefix: prefix.to_owned(),
+        variables: settings.aws.0.clone(),
+    })
+}
+
 fn store_settings(settings: &Settings) -> StoreSettings {
     StoreSettings {
         min_free: settings.min_free.0.map(|size| size.0),
         write_wait: settings.write_wait.0,
+        s3: s3_location(settings),
+        cache: settings.blob_cache.0,
     }
 }
 

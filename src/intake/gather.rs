@@ -205,7 +205,7 @@ impl Gatherer {
         let mut files = Vec::with_capacity(objects.len());
         for object in objects {
             let found = match (object.file, &volume) {
-                (Some(name), _) => self.files.received(&name).await?,
+                (Some(name), _) => self.files.received(&name, &object.file_sha256).await?,
                 (None, Some(volume)) => {
                     let mut stored = volume.files.iter();
                     match stored.find(|file| file.sha256 == object.file_sha256) {

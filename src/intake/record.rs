@@ -285,8 +285,9 @@ pub trait ReceivedFiles: Send + Sync + 'static {
     /// disk is nearly full.
     async fn begin(&self) -> Result<Box<dyn IncomingFile>, BlobError>;
 
-    /// A kept file on the local disk; `None` if it does not exist.
-    async fn received(&self, name: &str) -> Result<Option<LocalFile>, BlobError>;
+    /// A kept file on the local disk; `None` if it does not exist. A store that keeps its files
+    /// elsewhere verifies its copy by the SHA-256.
+    async fn received(&self, name: &str, sha256: &str) -> Result<Option<LocalFile>, BlobError>;
 
     /// Deletes kept files; those that do not exist are none.
     async fn discard(&self, names: &[String]) -> Result<(), BlobError>;

@@ -76,8 +76,8 @@ pub use storage::{
     ErasureReason, Expiry, FigureStore, FileRecord, Held, Holding, Interrupted, ItemFilter,
     ItemRecord, JobFilter, JobOutcome, JobStore, Lease, LegalHold, ListPage, ListRequest,
     LocalFile, Product, ProductFile, QueueFigures, QueueLoad, Receipt, RecordPages, ScanFields,
-    ScanFilter, ScanIdentity, Scans, StagedFiles, StagedFor, StoreError, StoreFault, StoreResult,
-    StoredVolume, TagFilter, Tags, UnreadScan,
+    ScanFilter, ScanIdentity, Scans, Shelved, StagedFiles, StagedFor, StoreError, StoreFault,
+    StoreResult, StoredVolume, TagFilter, Tags, UnreadScan,
 };
 pub use tenant::{InvalidTenant, Tenant};
 pub use work::{

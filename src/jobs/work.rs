@@ -145,6 +145,15 @@ pub struct WorkInput {
     pub library: Vec<StoredItem>,
 }
 
+impl WorkInput {
+    /// All files that the work may read.
+    pub fn all_files(&self) -> Vec<LocalFile> {
+        let items = self.items.values().chain(&self.library);
+        let files = items.flat_map(|item| &item.files);
+        self.files.iter().chain(files).cloned().collect()
+    }
+}
+
 /// What a job made.
 #[derive(Debug, Clone, Default)]
 pub struct WorkOutput {

@@ -13,7 +13,7 @@ use super::blobs::{self, RECEIVED, RECORD, STAGING};
 use super::content;
 use super::doctor::{DoctorError, names};
 use super::sqlite::SqliteStore;
-use super::{CLOSED, DATABASE, DiskGauge, FolderLock, OpenError, StoreSettings};
+use super::{CLOSED, DATABASE, DiskGauge, FolderLock, OpenError, StoreSettings, check_place};
 use crate::jobs::{ItemRecord, RecordPages, Resource, StoreError};
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -39,6 +39,7 @@ pub struct Backup {
 /// # Errors
 /// If there is no database in `folder`, a service uses `target`, or the disk fails.
 pub async fn backup(folder: &Path, target: &Path) -> Result<Backup, DoctorError> {
+    check_place(folder, None)?;
     // If no service runs, closing the database moves its log into it.
     match FolderLock::take(folder) {
         Ok(lock) if lock.log_is_missing(folder) => {

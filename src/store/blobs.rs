@@ -8,17 +8,15 @@
 //! Nothing that has no row is deleted: it is set aside under `quarantine/`, in a folder named by
 //! the day.
 
-use super::content::{self, Stamp, Verified};
+use super::content::{self, Reading, Stamp, Verified};
 use super::space::DiskGauge;
 use crate::jobs::{
     BlobError, BlobStore, BlobStream, BlobWriter, DiskSpace, FileRecord, ItemRecord, LocalFile,
-    Resource, StagedFiles, StagedFor, StoreFault, Timestamp, random_id,
+    Resource, Shelved, StagedFiles, StagedFor, StoreFault, Timestamp, random_id,
 };
 use async_trait::async_trait;
-use bytes::Bytes;
-use futures::{StreamExt, stream};
 use std::fs::{self, File};
-use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
+use std::io::{self, ErrorKind};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::pin::Pin;
@@ -45,10 +43,7 @@ pub(super) const QUARANTINE: &str = "quarantine";
 const DAY: StaticFormatDescription = format_description!("[year]-[month]-[day]");
 
 /// What [`BlobStore::check`] writes: more than the free rest of a block.
-const CHECK: &[u8] = &[b'v'; 8192];
-
-/// Bytes of a file that are read at a time, and held in memory for each slow client.
-const CHUNK: u64 = 256 << 10;
+pub(super) const CHECK: &[u8] = &[b'v'; 8192];
 
 /// Files below one folder.
 pub struct FileBlobs {
@@ -137,27 +132,6 @@ fn open_verified(
 
 pub(super) fn is_absent(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory)
-}
-
-/// The rest of a verified file, chunk by chunk.
-struct Reading {
-    file: File,
-    stamp: Stamp,
-    left: u64,
-    path: String,
-}
-
-impl Reading {
-    /// The next chunk. With the last one, checks that the file was not changed meanwhile.
-    fn next(mut self) -> Result<(Bytes, Self), BlobError> {
-        let mut chunk = vec![0; self.left.min(CHUNK) as usize];
-        self.file.read_exact(&mut chunk)?;
-        self.left -= chunk.len() as u64;
-        if self.left == 0 && Stamp::of(&self.file.metadata()?) != self.stamp {
-            return Err(content::damaged(&self.path, "it changed while it was read"));
-        }
-        Ok((chunk.into(), self))
-    }
 }
 
 /// Bytes of an upload between two looks at the free space.
@@ -311,7 +285,7 @@ impl StagedFiles for StagingFolder {
         Ok(LocalFile::in_place(self.folder.join(name)))
     }
 
-    async fn settle(&self) -> Result<(), BlobError> {
+    async fn settle(&self, _id: &str) -> Result<(), BlobError> {
         let folder = self.folder.clone();
         tokio::task::spawn_blocking(move || sync_all(&folder))
             .await
@@ -351,29 +325,12 @@ impl BlobStore for FileBlobs {
         let (id, file) = (id.to_owned(), file.clone());
         let first = self.blocking(move |folder, verified| {
             let path = format!("{}/{}", shelf_path(&id), file.name);
-            let Some((mut file, stamp)) = open_verified(folder, verified, &id, &file)? else {
+            let Some((file, stamp)) = open_verified(folder, verified, &id, &file)? else {
                 return Err(content::damaged(&path, "it is missing"));
             };
-            file.seek(SeekFrom::Start(range.start))?;
-            let reading = Reading {
-                file,
-                stamp,
-                left: range.end.saturating_sub(range.start),
-                path,
-            };
-            reading.next()
+            Reading::begin(file, stamp, path, range)
         });
-        let (chunk, rest) = first.await?;
-        let rest = stream::try_unfold(rest, async |reading: Reading| {
-            if reading.left == 0 {
-                return Ok(None);
-            }
-            tokio::task::spawn_blocking(move || reading.next())
-                .await
-                .map_err(|e| BlobError::new(StoreFault::Other, e.to_string()))?
-                .map(Some)
-        });
-        Ok(stream::iter([Ok(chunk)]).chain(rest).boxed())
+        Ok(content::stream(first.await?))
     }
 
     async fn local(&self, id: &str, file: &FileRecord) -> Result<Option<LocalFile>, BlobError> {
@@ -386,7 +343,7 @@ impl BlobStore for FileBlobs {
         found.await
     }
 
-    async fn delete(&self, id: &str) -> Result<(), BlobError> {
+    async fn delete(&self, id: &str, _files: &[FileRecord]) -> Result<(), BlobError> {
         let id = id.to_owned();
         let deleted = self.blocking(move |folder, _| {
             let mut places = set_aside_of(folder, &id)?;
@@ -405,17 +362,18 @@ impl BlobStore for FileBlobs {
         deleted.await
     }
 
-    async fn set_aside(&self, id: &str, now: Timestamp) -> Result<(), BlobError> {
+    async fn set_aside(&self, id: &str, now: Timestamp) -> Result<bool, BlobError> {
         let id = id.to_owned();
         let moved = self.blocking(move |folder, _| Ok(set_aside(folder, &id, now)?));
         moved.await
     }
 
-    async fn ids(&self, kind: Resource) -> Result<Vec<String>, BlobError> {
+    async fn ids(&self, kind: Resource) -> Result<Vec<Shelved>, BlobError> {
         let listed = self.blocking(move |folder, _| {
             let mut ids = Vec::new();
             for entry in fs::read_dir(folder.join(kind.plural()))? {
-                ids.extend(entry?.file_name().into_string());
+                let name = entry?.file_name().into_string();
+                ids.extend(name.map(|id| Shelved { id, places: 1 }));
             }
             Ok(ids)
         });
@@ -439,8 +397,8 @@ impl BlobStore for FileBlobs {
         written.await
     }
 
-    async fn hash(&self, id: &str, name: &str) -> Result<FileRecord, BlobError> {
-        let (id, name) = (id.to_owned(), name.to_owned());
+    async fn hash(&self, id: &str, file: &FileRecord) -> Result<FileRecord, BlobError> {
+        let (id, name) = (id.to_owned(), file.name.clone());
         let hashed = self.blocking(move |folder, _| {
             let path = format!("{}/{name}", shelf_path(&id));
             let file = match File::open(folder.join(&path)) {
@@ -453,6 +411,7 @@ impl BlobStore for FileBlobs {
                 bytes: file.metadata()?.len(),
                 sha256: content::hash(&file)?,
                 name,
+                place: None,
             })
         });
         hashed.await
@@ -463,14 +422,16 @@ impl BlobStore for FileBlobs {
             for entry in fs::read_dir(folder.join(DISCARDED))? {
                 fs::remove_dir_all(entry?.path())?;
             }
-            let Some(first_kept) = set_aside_before.and_then(day) else {
+            let Some(first_kept) = set_aside_before else {
                 return Ok(());
             };
             for entry in fs::read_dir(folder.join(QUARANTINE))? {
                 let entry = entry?;
                 let name = entry.file_name();
-                let of = name.to_str().and_then(|name| Date::parse(name, &DAY).ok());
-                if of.is_some_and(|of| of < first_kept) {
+                if name
+                    .to_str()
+                    .is_some_and(|name| is_of_shelf_before(name, first_kept))
+                {
                     fs::remove_dir_all(entry.path())?;
                 }
             }
@@ -527,28 +488,38 @@ fn set_aside_of(folder: &Path, id: &str) -> io::Result<Vec<PathBuf>> {
     Ok(found)
 }
 
+/// The name of the quarantine of the day.
+pub(super) fn shelf_name(now: Timestamp) -> String {
+    let day = day(now).and_then(|day| day.format(&DAY).ok());
+    day.unwrap_or_else(|| "unknown".into())
+}
+
+/// Whether a folder in the quarantine is of an earlier day.
+pub(super) fn is_of_shelf_before(name: &str, first_kept: Timestamp) -> bool {
+    let of = Date::parse(name, &DAY).ok();
+    of.zip(day(first_kept)).is_some_and(|(of, kept)| of < kept)
+}
+
 /// The quarantine of the day, which is made if it does not exist.
 pub(super) fn quarantine_shelf(folder: &Path, now: Timestamp) -> io::Result<PathBuf> {
-    let day = day(now).and_then(|day| day.format(&DAY).ok());
-    let shelf = folder
-        .join(QUARANTINE)
-        .join(day.as_deref().unwrap_or("unknown"));
+    let shelf = folder.join(QUARANTINE).join(shelf_name(now));
     fs::create_dir_all(&shelf)?;
     Ok(shelf)
 }
 
-/// Moves the folder of an item into the quarantine of the day. Succeeds if there is none.
-pub(super) fn set_aside(folder: &Path, id: &str, now: Timestamp) -> io::Result<()> {
+/// Moves the folder of an item into the quarantine of the day. Returns whether there was one.
+pub(super) fn set_aside(folder: &Path, id: &str, now: Timestamp) -> io::Result<bool> {
     let shelf = quarantine_shelf(folder, now)?;
     let mut place = shelf.join(id);
     if fs::exists(&place)? {
         place = shelf.join(random_id(&format!("{id}.")));
     }
     match fs::rename(folder.join(shelf_path(id)), &place) {
-        Err(error) if is_absent(&error) => Ok(()),
+        Err(error) if is_absent(&error) => Ok(false),
         other => {
             other?;
-            sync(&shelf)
+            sync(&shelf)?;
+            Ok(true)
         }
     }
 }

@@ -8,15 +8,21 @@
 //! Not found: content that changes on the disk below the file system after it was verified. The
 //! slow check of all files ([`crate::jobs::Upkeep`]) reads every file anew.
 
-use crate::jobs::{BlobError, FileRecord, StoreFault, hex};
+use crate::jobs::{BlobError, BlobStream, FileRecord, StoreFault, hex};
+use bytes::Bytes;
+use futures::{StreamExt, stream};
 use sha2::{Digest, Sha256};
 use std::collections::HashMap;
 use std::fs::{File, Metadata};
-use std::io::Read;
+use std::io::{Read, Seek, SeekFrom};
+use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 /// Files remembered at most, twice: when there are more, the older half is forgotten.
 const REMEMBERED: usize = 8192;
+
+/// Bytes of a file that are read at a time for a client, and held in memory for each slow one.
+const SENT_CHUNK: u64 = 256 << 10;
 
 /// Bytes read at a time.
 const CHUNK: usize = 128 << 10;
@@ -127,4 +133,61 @@ pub(super) fn hash(mut file: &File) -> std::io::Result<String> {
             read => hash.update(&chunk[..read]),
         }
     }
+}
+
+/// The rest of a range of a verified file, chunk by chunk.
+pub(super) struct Reading {
+    file: File,
+    stamp: Stamp,
+    left: u64,
+    path: String,
+}
+
+impl Reading {
+    /// The first chunk of `range`, and the rest. Errors call the file `path`. To be called on a thread
+    /// that may block.
+    ///
+    /// # Errors
+    /// [`StoreFault::DamagedFile`] if the file has changed since its stamp was taken, or that of
+    /// reading.
+    pub fn begin(
+        mut file: File,
+        stamp: Stamp,
+        path: String,
+        range: Range<u64>,
+    ) -> Result<(Bytes, Self), BlobError> {
+        file.seek(SeekFrom::Start(range.start))?;
+        let reading = Self {
+            file,
+            stamp,
+            left: range.end.saturating_sub(range.start),
+            path,
+        };
+        reading.next()
+    }
+
+    /// The next chunk. With the last one, checks that the file was not changed meanwhile.
+    fn next(mut self) -> Result<(Bytes, Self), BlobError> {
+        let mut chunk = vec![0; self.left.min(SENT_CHUNK) as usize];
+        self.file.read_exact(&mut chunk)?;
+        self.left -= chunk.len() as u64;
+        if self.left == 0 && Stamp::of(&self.file.metadata()?) != self.stamp {
+            return Err(damaged(&self.path, "it changed while it was read"));
+        }
+        Ok((chunk.into(), self))
+    }
+}
+
+/// What [`Reading::begin`] has begun to read.
+pub(super) fn stream((chunk, rest): (Bytes, Reading)) -> BlobStream {
+    let rest = stream::try_unfold(rest, async |reading: Reading| {
+        if reading.left == 0 {
+            return Ok(None);
+        }
+        tokio::task::spawn_blocking(move || reading.next())
+            .await
+            .map_err(|e| BlobError::new(StoreFault::Other, e.to_string()))?
+            .map(Some)
+    });
+    stream::iter([Ok(chunk)]).chain(rest).boxed()
 }

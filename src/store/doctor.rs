@@ -15,20 +15,23 @@
 //!    were not erased by anybody.
 //! 6. Leftovers of writes and deletions: repair deletes them.
 //!
-//! Repair deletes no content that was ever published. Rows that it makes anew belong to the tenant
+//! If the files are in a bucket, steps 2 to 5 are done there ([`super::s3`]).
+//!
+//! Repair deletes no content that was ever published and not replaced. Rows that it makes anew belong to the tenant
 //! that the caller names, unless the database still says who holds the item: the record beside the
 //! files does not name tenants. Jobs, keys and receipts live in the database only.
 
 use super::blobs::{self, DISCARDED, QUARANTINE, RECEIVED, RECORD, STAGING};
 use super::content;
+use super::findings::Examination;
 use super::received;
+use super::s3::{BucketDoctor, S3Blobs, S3Location};
 use super::sqlite::SqliteStore;
-use super::{CLOSED, DATABASE, DiskGauge, FolderLock, OpenError, StoreSettings};
+use super::{CLOSED, DATABASE, DiskGauge, FolderLock, OpenError, StoreSettings, check_place};
 use crate::jobs::{
     Clock, Custody, FileRecord, ItemRecord, RecordPages, Resource, StoreError, SystemClock, Tenant,
     random_id, volume_id,
 };
-use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io;
@@ -36,71 +39,6 @@ use std::path::{Path, PathBuf};
 
 /// Rows read at a time.
 const PAGE: u32 = 200;
-
-/// Something that is not as it should be.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Finding {
-    /// A stable word for programs: `database-missing`, `damaged-item` ...
-    pub kind: &'static str,
-    /// The id or file concerned.
-    pub subject: String,
-    /// What was found, as a sentence.
-    pub detail: String,
-    /// Whether the service works without a repair.
-    pub harmless: bool,
-    /// What was done about it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub repair: Option<&'static str>,
-}
-
-/// The outcome of [`examine`].
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
-pub struct Examination {
-    /// Number of volumes and products with a row.
-    pub items: u64,
-    /// Number of files that were read and verified.
-    pub files: u64,
-    /// What was found.
-    pub findings: Vec<Finding>,
-}
-
-impl Examination {
-    /// Whether nothing is wrong, or everything was repaired.
-    pub fn is_healthy(&self) -> bool {
-        self.findings
-            .iter()
-            .all(|finding| finding.harmless || finding.repair.is_some())
-    }
-
-    fn note(
-        &mut self,
-        kind: &'static str,
-        subject: impl Into<String>,
-        detail: impl Into<String>,
-        repair: Option<&'static str>,
-    ) {
-        self.findings.push(Finding {
-            kind,
-            subject: subject.into(),
-            detail: detail.into(),
-            harmless: false,
-            repair,
-        });
-    }
-
-    fn remark(
-        &mut self,
-        kind: &'static str,
-        subject: impl Into<String>,
-        detail: impl Into<String>,
-        repair: Option<&'static str>,
-    ) {
-        self.note(kind, subject, detail, repair);
-        if let Some(last) = self.findings.last_mut() {
-            last.harmless = true;
-        }
-    }
-}
 
 /// Why a data folder cannot be examined.
 #[derive(Debug, thiserror::Error)]
@@ -116,12 +54,16 @@ pub enum DoctorError {
     Io(#[from] io::Error),
 }
 
-/// Checks the data folder. With `heirs`, also repairs it: rows of items whose holder is unknown go
-/// to that tenant.
+/// Checks the data folder, and the bucket if its files are in one. With `heirs`, also repairs it: rows
+/// of items whose holder is unknown go to that tenant.
 ///
 /// # Errors
 /// If a service uses the folder, or the folder cannot be read (or written, for a repair).
-pub async fn examine(folder: &Path, heirs: Option<&Tenant>) -> Result<Examination, DoctorError> {
+pub async fn examine(
+    folder: &Path,
+    s3: Option<&S3Location>,
+    heirs: Option<&Tenant>,
+) -> Result<Examination, DoctorError> {
     if !folder.is_dir() {
         return Err(OpenError::Unusable {
             path: folder.to_owned(),
@@ -129,15 +71,26 @@ pub async fn examine(folder: &Path, heirs: Option<&Tenant>) -> Result<Examinatio
         }
         .into());
     }
+    check_place(folder, s3)?;
     let mut lock = FolderLock::take(folder)?;
+    let bucket = match s3 {
+        Some(location) => {
+            let gauge = DiskGauge::new(folder, Some(0));
+            let cache = StoreSettings::default().cache;
+            let opened = S3Blobs::open(location, folder, gauge, cache).await;
+            Some(opened.map_err(OpenError::from)?)
+        }
+        None => None,
+    };
     let mut doctor = Doctor {
         folder,
+        bucket,
         heirs,
         found: Examination::default(),
     };
     let rows = doctor.database(&mut lock).await?;
     let Some(rows) = rows else {
-        doctor.shelves_without_rows()?;
+        doctor.shelves_without_rows().await?;
         return Ok(doctor.found);
     };
     let examined = doctor.items(&rows).await;
@@ -151,6 +104,7 @@ pub async fn examine(folder: &Path, heirs: Option<&Tenant>) -> Result<Examinatio
 
 struct Doctor<'a> {
     folder: &'a Path,
+    bucket: Option<S3Blobs>,
     heirs: Option<&'a Tenant>,
     found: Examination,
 }
@@ -238,8 +192,15 @@ impl Doctor<'_> {
     }
 
     /// Without a database and without a repair: how many items wait for one.
-    fn shelves_without_rows(&mut self) -> Result<(), DoctorError> {
-        for id in self.shelved()? {
+    async fn shelves_without_rows(&mut self) -> Result<(), DoctorError> {
+        let mut shelved = self.shelved()?;
+        if let Some(bucket) = &self.bucket {
+            for kind in Resource::WITH_FILES {
+                let items = bucket.publications(kind).await.map_err(StoreError::from)?;
+                shelved.extend(items.into_keys());
+            }
+        }
+        for id in shelved {
             self.found
                 .note("unknown-item", id, "It has files but no row.", None);
         }
@@ -256,6 +217,15 @@ impl Doctor<'_> {
     }
 
     async fn items(&mut self, rows: &SqliteStore) -> Result<(), DoctorError> {
+        if let Some(blobs) = &self.bucket {
+            let doctor = BucketDoctor {
+                blobs,
+                rows,
+                heirs: self.heirs,
+                found: &mut self.found,
+            };
+            return Ok(doctor.examine().await?);
+        }
         let known = self.rows(rows).await?;
         self.folders(rows, &known).await?;
         self.received(rows).await?;
@@ -364,6 +334,7 @@ impl Doctor<'_> {
                 name: name.clone(),
                 bytes,
                 sha256,
+                place: None,
             });
         }
         let is_volume = matches!(record, ItemRecord::Volume(_));

@@ -18,15 +18,22 @@
 //!
 //! A new database is made only in a folder without items: with an empty database, all of them
 //! would seem to be without a record.
+//!
+//! The files can be in a bucket of an S3 store instead ([`s3`]). Then the folder holds the database,
+//! local copies (`cache/`) and a file `blobs` that says where the files are, so that nobody takes the
+//! folder for one whose items are missing.
 
 mod backup;
 mod blobs;
+mod cache;
 mod content;
 mod doctor;
 mod erasure;
 mod faults;
+mod findings;
 mod received;
 mod rows;
+mod s3;
 mod space;
 mod sqlite;
 mod sqlite_access;
@@ -44,11 +51,14 @@ mod writer;
 
 pub use backup::{Backup, backup};
 pub use blobs::FileBlobs;
-pub use doctor::{DoctorError, Examination, Finding, examine};
+pub use doctor::{DoctorError, examine};
+pub use findings::{Examination, Finding};
+pub use s3::{S3Blobs, S3Location, S3Refusal};
 pub use space::DiskGauge;
 pub use sqlite::SqliteStore;
 
-use crate::jobs::Resource;
+use crate::intake::ReceivedFiles;
+use crate::jobs::{BlobError, BlobStore, Resource};
 use std::fs::{File, TryLockError};
 use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -56,12 +66,16 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// Limits of a store.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct StoreSettings {
     /// Bytes of the disk to keep free; `None` is 256 MiB, or 5 % of a smaller disk.
     pub min_free: Option<u64>,
     /// Longest time that a write to the database waits for its turn.
     pub write_wait: Duration,
+    /// The bucket for the files; `None` keeps them in the folder.
+    pub s3: Option<S3Location>,
+    /// Largest size of the local copies of files in a bucket, bytes.
+    pub cache: u64,
 }
 
 impl Default for StoreSettings {
@@ -69,16 +83,20 @@ impl Default for StoreSettings {
         Self {
             min_free: None,
             write_wait: Duration::from_secs(2),
+            s3: None,
+            cache: 2 << 30,
         }
     }
 }
 
-/// The database and the files of one data folder, which is locked while this exists.
+/// The database of one data folder, which is locked while this exists, and the files.
 pub struct Store {
     /// The database.
     pub rows: Arc<SqliteStore>,
-    /// The files.
-    pub blobs: Arc<FileBlobs>,
+    /// The files of items.
+    pub blobs: Arc<dyn BlobStore>,
+    /// The files of received objects.
+    pub received: Arc<dyn ReceivedFiles>,
     lock: FolderLock,
 }
 
@@ -108,6 +126,48 @@ pub enum OpenError {
         folder = .0.display(),
     )]
     LogMissing(PathBuf),
+    /// Its files are in a bucket, and another place was given.
+    #[error(
+        "the files of {folder} are in {blobs}: start the service with `--blobs {blobs}`, or on another \
+         folder. Commands that work on the files of a folder cannot be used on it",
+        folder = .folder.display(),
+    )]
+    FilesElsewhere {
+        /// The folder.
+        folder: PathBuf,
+        /// Where its files are.
+        blobs: String,
+    },
+    /// It holds the files of items, and a bucket was given.
+    #[error(
+        "{folder} holds the files of stored items, so they cannot be in {blobs}: start the service \
+         without `--blobs`, or on another folder",
+        folder = .folder.display(),
+    )]
+    FilesHere {
+        /// The folder.
+        folder: PathBuf,
+        /// The bucket that was given.
+        blobs: String,
+    },
+    /// The bucket holds items, but the database is missing or empty.
+    #[error(
+        "{blobs} holds stored items, but {database} is missing or empty. Restore it from a backup, or \
+         give another bucket or prefix",
+        database = .database.display(),
+    )]
+    RowsMissing {
+        /// The bucket.
+        blobs: String,
+        /// The database.
+        database: PathBuf,
+    },
+    /// The bucket cannot be used.
+    #[error(transparent)]
+    S3(#[from] S3Refusal),
+    /// The bucket cannot be read.
+    #[error(transparent)]
+    Blobs(#[from] BlobError),
     /// It cannot be created, read or written.
     #[error("{path}: {reason}")]
     Unusable {
@@ -130,34 +190,34 @@ impl Store {
     /// Opens the data folder, or creates it.
     ///
     /// # Errors
-    /// If another process uses the folder, or it cannot be written.
+    /// If another process uses the folder, or it cannot be written, or the bucket cannot be used.
     pub async fn open_with(folder: &Path, settings: StoreSettings) -> Result<Self, OpenError> {
-        let unusable = |path: &Path, reason: String| OpenError::Unusable {
-            path: path.to_owned(),
-            reason,
-        };
-        std::fs::create_dir_all(folder).map_err(|e| unusable(folder, e.to_string()))?;
-        let mut lock = FolderLock::take(folder)?;
+        let mut lock = locked(folder)?;
+        check_place(folder, settings.s3.as_ref())?;
         let gauge = DiskGauge::new(folder, settings.min_free);
-        let database = folder.join(DATABASE);
-        let empty = !has_items(folder).map_err(|e| unusable(folder, e.to_string()))?;
-        if lock.log_is_missing(folder) {
-            return Err(OpenError::LogMissing(folder.to_owned()));
-        }
-        if !empty && !SqliteStore::has_tables(&database).await {
-            return Err(OpenError::DatabaseMissing(folder.to_owned()));
-        }
-        let rows = SqliteStore::open(&database, settings.write_wait, gauge.clone())
-            .await
-            .map_err(|e| unusable(&database, e.to_string()))?;
-        let blobs = FileBlobs::open(folder, gauge).map_err(|e| unusable(folder, e.to_string()))?;
-        if log_of(folder).exists() {
-            lock.mark(OPEN)
-                .map_err(|e| unusable(folder, e.to_string()))?;
-        }
+        let (blobs, received): (Arc<dyn BlobStore>, Arc<dyn ReceivedFiles>) = match &settings.s3 {
+            None => {
+                let blobs = FileBlobs::open(folder, gauge.clone());
+                let blobs = Arc::new(blobs.map_err(|e| unusable(folder, &e))?);
+                (blobs.clone(), blobs)
+            }
+            Some(location) => {
+                let blobs = S3Blobs::open(location, folder, gauge.clone(), settings.cache).await?;
+                let database = folder.join(DATABASE);
+                if !SqliteStore::has_tables(&database).await && blobs.has_items().await? {
+                    let blobs = location.to_string();
+                    return Err(OpenError::RowsMissing { blobs, database });
+                }
+                note_place(folder, location).map_err(|e| unusable(folder, &e))?;
+                let blobs = Arc::new(blobs);
+                (blobs.clone(), blobs)
+            }
+        };
+        let rows = open_database(folder, &mut lock, settings.write_wait, gauge).await?;
         Ok(Self {
             rows: Arc::new(rows),
-            blobs: Arc::new(blobs),
+            blobs,
+            received,
             lock,
         })
     }
@@ -175,10 +235,15 @@ impl Store {
 /// # Errors
 /// If the folder cannot be used, or a service of another version runs on it.
 pub async fn open_rows(folder: &Path) -> Result<Arc<SqliteStore>, OpenError> {
-    match Store::open(folder).await {
-        Ok(store) => Ok(store.rows),
+    let wait = StoreSettings::default().write_wait;
+    let gauge = DiskGauge::new(folder, None);
+    match locked(folder) {
+        Ok(mut lock) => {
+            let rows = open_database(folder, &mut lock, wait, gauge).await?;
+            Ok(Arc::new(rows))
+        }
         Err(OpenError::InUse(_)) => {
-            let database = folder.join("ventriform.db");
+            let database = folder.join(DATABASE);
             let unusable = |reason: String| OpenError::Unusable {
                 path: database.clone(),
                 reason,
@@ -191,13 +256,87 @@ pub async fn open_rows(folder: &Path) -> Result<Arc<SqliteStore>, OpenError> {
                     "the service that runs on it has another version than this command".into(),
                 ));
             }
-            let gauge = DiskGauge::new(folder, None);
-            let rows =
-                SqliteStore::open(&database, StoreSettings::default().write_wait, gauge).await;
+            let rows = SqliteStore::open(&database, wait, gauge).await;
             rows.map(Arc::new).map_err(|e| unusable(e.to_string()))
         }
         Err(error) => Err(error),
     }
+}
+
+fn unusable(path: &Path, error: &dyn std::fmt::Display) -> OpenError {
+    OpenError::Unusable {
+        path: path.to_owned(),
+        reason: error.to_string(),
+    }
+}
+
+/// Makes the folder if it does not exist, and locks it.
+fn locked(folder: &Path) -> Result<FolderLock, OpenError> {
+    std::fs::create_dir_all(folder).map_err(|e| unusable(folder, &e))?;
+    let lock = FolderLock::take(folder)?;
+    match lock.log_is_missing(folder) {
+        true => Err(OpenError::LogMissing(folder.to_owned())),
+        false => Ok(lock),
+    }
+}
+
+/// Opens the database, or makes it in a folder without items.
+async fn open_database(
+    folder: &Path,
+    lock: &mut FolderLock,
+    write_wait: Duration,
+    gauge: DiskGauge,
+) -> Result<SqliteStore, OpenError> {
+    let database = folder.join(DATABASE);
+    let empty = !has_items(folder).map_err(|e| unusable(folder, &e))?;
+    if !empty && !SqliteStore::has_tables(&database).await {
+        return Err(OpenError::DatabaseMissing(folder.to_owned()));
+    }
+    let rows = SqliteStore::open(&database, write_wait, gauge).await;
+    let rows = rows.map_err(|e| unusable(&database, &e))?;
+    if log_of(folder).exists() {
+        lock.mark(OPEN).map_err(|e| unusable(folder, &e))?;
+    }
+    Ok(rows)
+}
+
+/// The file of a data folder that says where its files are, if not in the folder.
+const PLACE: &str = "blobs";
+
+/// Where the files of a data folder are, if not in the folder.
+fn noted_place(folder: &Path) -> Result<Option<String>, OpenError> {
+    match std::fs::read_to_string(folder.join(PLACE)) {
+        Ok(text) => Ok(Some(text.trim().to_owned())),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(unusable(&folder.join(PLACE), &error)),
+    }
+}
+
+/// Checks that the files of a data folder are where the settings say.
+fn check_place(folder: &Path, location: Option<&S3Location>) -> Result<(), OpenError> {
+    let folder = folder.to_owned();
+    let given = location.map(S3Location::to_string);
+    match (noted_place(&folder)?, given) {
+        (Some(blobs), given) if given.as_ref() != Some(&blobs) => {
+            Err(OpenError::FilesElsewhere { folder, blobs })
+        }
+        (None, Some(blobs)) => match has_items(&folder).map_err(|e| unusable(&folder, &e))? {
+            true => Err(OpenError::FilesHere { folder, blobs }),
+            false => Ok(()),
+        },
+        _ => Ok(()),
+    }
+}
+
+/// Notes where the files of a data folder are.
+fn note_place(folder: &Path, location: &S3Location) -> std::io::Result<()> {
+    let path = folder.join(PLACE);
+    if !path.exists() {
+        std::fs::write(&path, format!("{location}\n"))?;
+        blobs::sync(&path)?;
+        blobs::sync(folder)?;
+    }
+    Ok(())
 }
 
 /// Whether the tables have the version of this program. A service must not find them changed.

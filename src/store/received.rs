@@ -60,7 +60,7 @@ impl ReceivedFiles for FileBlobs {
         }))
     }
 
-    async fn received(&self, name: &str) -> Result<Option<LocalFile>, BlobError> {
+    async fn received(&self, name: &str, _sha256: &str) -> Result<Option<LocalFile>, BlobError> {
         let path = self.folder.join(RECEIVED).join(name);
         let there = tokio::fs::try_exists(&path).await?;
         Ok(there.then(|| LocalFile::in_place(path)))

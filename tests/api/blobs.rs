@@ -16,8 +16,8 @@ use std::time::Duration;
 use tokio::io::{AsyncWrite, AsyncWriteExt};
 use ventriform::jobs::{
     BlobError, BlobStore, BlobStream, BlobWriter, FileRecord, Filed, ItemRecord, JobState,
-    LocalFile, NewJob, Queue, QueueSettings, Resource, StagedFiles, StagedFor, StoredVolume,
-    SystemClock, Tags, Tenant, Timestamp, WorkerSettings, Workers,
+    LocalFile, NewJob, Queue, QueueSettings, Resource, Shelved, StagedFiles, StagedFor,
+    StoredVolume, SystemClock, Tags, Tenant, Timestamp, WorkerSettings, Workers,
 };
 use ventriform::store::Store;
 
@@ -95,7 +95,7 @@ impl StagedFiles for MemoryStaging {
         copy_to_disk(name, &self.files.lock().unwrap()[name])
     }
 
-    async fn settle(&self) -> Result<(), BlobError> {
+    async fn settle(&self, _: &str) -> Result<(), BlobError> {
         Ok(())
     }
 
@@ -135,23 +135,24 @@ impl BlobStore for MemoryBlobs {
         content.map(copy).transpose()
     }
 
-    async fn delete(&self, id: &str) -> Result<(), BlobError> {
+    async fn delete(&self, id: &str, _: &[FileRecord]) -> Result<(), BlobError> {
         self.items.lock().unwrap().remove(id);
         Ok(())
     }
 
-    async fn ids(&self, kind: Resource) -> Result<Vec<String>, BlobError> {
+    async fn ids(&self, kind: Resource) -> Result<Vec<Shelved>, BlobError> {
         let items = self.items.lock().unwrap();
         let of_kind = |id: &&String| Resource::of(id) == Some(kind);
-        Ok(items.keys().filter(of_kind).cloned().collect())
+        let ids = items.keys().filter(of_kind).cloned();
+        Ok(ids.map(|id| Shelved { id, places: 1 }).collect())
     }
 
-    async fn set_aside(&self, id: &str, _: Timestamp) -> Result<(), BlobError> {
-        self.delete(id).await
+    async fn set_aside(&self, id: &str, _: Timestamp) -> Result<bool, BlobError> {
+        Ok(self.items.lock().unwrap().remove(id).is_some())
     }
 
-    async fn hash(&self, id: &str, name: &str) -> Result<FileRecord, BlobError> {
-        panic!("nobody verifies {id}/{name}")
+    async fn hash(&self, id: &str, file: &FileRecord) -> Result<FileRecord, BlobError> {
+        panic!("nobody verifies {id}/{}", file.name)
     }
 
     async fn describe(&self, _: &ItemRecord) -> Result<(), BlobError> {
@@ -196,6 +197,7 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
             name: "volume.nii".into(),
             bytes: 13,
             sha256: String::new(),
+            place: None,
         }],
         facts: json!({}),
     };

@@ -44,20 +44,20 @@ async fn rows_are_made_anew_from_what_lies_beside_the_files() {
     let data = tempfile::tempdir().unwrap();
     let (service, paths) = filled(data.path()).await;
     service.kill();
-    let healthy = examine(data.path(), None).await.unwrap();
+    let healthy = examine(data.path(), None, None).await.unwrap();
     assert!(healthy.is_healthy(), "{healthy:?}");
     assert_eq!(healthy.items, 2);
     for end in ["", "-wal", "-shm"] {
         // The log may have been moved into the database by the examination.
         let _ = fs::remove_file(data.path().join(format!("ventriform.db{end}")));
     }
-    let lost = examine(data.path(), None).await.unwrap();
+    let lost = examine(data.path(), None, None).await.unwrap();
     assert_eq!(
         kinds(&lost),
         ["database-missing", "unknown-item", "unknown-item"]
     );
     assert!(!lost.is_healthy());
-    let repaired = examine(data.path(), Some(&Tenant::default()))
+    let repaired = examine(data.path(), None, Some(&Tenant::default()))
         .await
         .unwrap();
     assert!(repaired.is_healthy(), "{repaired:?}");
@@ -84,14 +84,14 @@ async fn readable_rows_of_a_damaged_database_are_kept_and_broken_items_set_aside
     let half = content.len() / 2;
     content[half..].fill(0xa5);
     fs::write(&database, content).unwrap();
-    let found = examine(data.path(), None).await.unwrap();
+    let found = examine(data.path(), None, None).await.unwrap();
     assert!(kinds(&found).contains(&"database-damaged"), "{found:?}");
-    let repaired = examine(data.path(), Some(&Tenant::default()))
+    let repaired = examine(data.path(), None, Some(&Tenant::default()))
         .await
         .unwrap();
     assert!(repaired.is_healthy(), "{repaired:?}");
     assert!(!shelf.exists());
-    let again = examine(data.path(), None).await.unwrap();
+    let again = examine(data.path(), None, None).await.unwrap();
     assert!(again.is_healthy() && again.items == 2, "{again:?}");
     serves(data.path(), &paths).await;
 }
@@ -116,7 +116,7 @@ async fn a_backup_made_while_the_service_runs_is_restored_with_everything() {
     assert_eq!((again.items, again.copied), (1, 0));
     service.kill();
     serves(&target, &paths).await;
-    let found = examine(&target, None).await.unwrap();
+    let found = examine(&target, None, None).await.unwrap();
     assert!(found.is_healthy() && found.items == 2, "{found:?}");
     serves(&folder.path().join("second"), &paths[1..]).await;
 }
@@ -158,7 +158,7 @@ async fn received_objects_are_backed_up_checked_and_set_aside() {
     let target = folder.path().join("backup");
     backup(data.path(), &target).await.unwrap();
     service.kill();
-    let found = examine(&target, None).await.unwrap();
+    let found = examine(&target, None, None).await.unwrap();
     assert!(found.is_healthy() && found.files == 3, "{found:?}");
     let restored = Service::start(&target, &AT_ONCE).await;
     assert_eq!(gathered(&restored).await["objects"], 3);
@@ -172,7 +172,7 @@ async fn received_objects_are_backed_up_checked_and_set_aside() {
     fs::write(&names[0], "other").unwrap();
     fs::remove_file(&names[1]).unwrap();
     fs::write(shelf.join("stray"), "x").unwrap();
-    let sick = examine(data.path(), None).await.unwrap();
+    let sick = examine(data.path(), None, None).await.unwrap();
     let mut found = kinds(&sick);
     found.sort_unstable();
     assert_eq!(
@@ -180,7 +180,7 @@ async fn received_objects_are_backed_up_checked_and_set_aside() {
         ["damaged-object", "damaged-object", "unknown-object"]
     );
     assert!(!sick.is_healthy());
-    let repaired = examine(data.path(), Some(&Tenant::default()))
+    let repaired = examine(data.path(), None, Some(&Tenant::default()))
         .await
         .unwrap();
     assert!(repaired.is_healthy(), "{repaired:?}");
@@ -192,7 +192,7 @@ async fn received_objects_are_backed_up_checked_and_set_aside() {
         }
     }
     assert_eq!(kept.len(), 2, "{kept:?}");
-    assert!(examine(data.path(), None).await.unwrap().is_healthy());
+    assert!(examine(data.path(), None, None).await.unwrap().is_healthy());
     let service = Service::start(data.path(), &AT_ONCE).await;
     for number in 1..=3 {
         send_slice(&service, number).await;

@@ -182,6 +182,7 @@ async fn filed(store: &Store) -> String {
             name: "volume.nii".into(),
             bytes: 1,
             sha256: String::new(),
+            place: None,
         }],
         facts: json!({}),
     };

@@ -213,7 +213,7 @@ async fn check(data: &Path, noted: &Acknowledged, when: &str) {
         );
     }
     service.kill();
-    let found = examine(data, None).await.unwrap();
+    let found = examine(data, None, None).await.unwrap();
     let unexpected = |kind| !["unknown-item", "quarantined-item", "leftover"].contains(&kind);
     let serious: Vec<_> = found
         .findings

@@ -1,5 +1,6 @@
 //! Starts a service for each test, with a fake computation.
 
+use crate::s3_server;
 use reqwest::header::{AUTHORIZATION, HeaderValue};
 use reqwest::{Client, RequestBuilder, Response, StatusCode};
 use serde_json::{Map, Value, json};
@@ -112,6 +113,9 @@ impl TestApp {
             threads: "1".parse().unwrap(),
             ..Settings::default()
         };
+        if std::env::var_os("VENTRIFORM_TEST_BLOBS").is_some_and(|place| place == "s3") {
+            s3_server::keep_files_in_bucket(&mut settings);
+        }
         change(&mut settings);
         let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         let running = start(settings, engine, listener).await.unwrap();

@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use tokio::io::AsyncWriteExt;
 use ventriform::jobs::{
-    BlobStore, Catalogue, Clock, Erased, ErasureAgent, ErasureOrder, ErasureReason, FileRecord,
-    Filed, JobState, JobStore, LegalHold, ListRequest, NewJob, Queue, QueueSettings, Resource,
+    Catalogue, Clock, Erased, ErasureAgent, ErasureOrder, ErasureReason, FileRecord, Filed,
+    JobState, JobStore, LegalHold, ListRequest, NewJob, Queue, QueueSettings, Resource,
     RetentionAges, StagedFiles, StagedFor, StoredVolume, Tags, Tenant, Timestamp, Upkeep,
     WorkerSettings, Workers,
 };
@@ -82,6 +82,7 @@ impl Bench {
                 name: "volume.nii".into(),
                 bytes: 12,
                 sha256: String::new(),
+                place: None,
             }],
             facts: json!({}),
         }

@@ -37,6 +37,8 @@ mod operations;
 mod readers;
 mod receiver;
 mod records;
+mod s3;
+mod s3_server;
 mod scans;
 mod scu;
 mod security;

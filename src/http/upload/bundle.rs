@@ -216,7 +216,7 @@ impl Bundle {
         };
         // The disk and the processor work at the same time.
         let inspected = async { Ok(app.decoding.run(INSPECTION_MEMORY, inspect).await??) };
-        let settled = async { Ok::<(), Problem>(staged.settle().await?) };
+        let settled = async { Ok::<(), Problem>(staged.settle(&id).await?) };
         let ((facts, scan), ()) = tokio::try_join!(inspected, settled)?;
         let volume = StoredVolume {
             sequence: 0,
@@ -255,6 +255,7 @@ impl Bundle {
                 name: name(number, file.kind),
                 bytes: file.bytes,
                 sha256: hex(&file.digest),
+                place: None,
             })
             .collect()
     }

@@ -11,6 +11,7 @@ use crate::jobs::{
     Deleted, Erased, ErasureAgent, ErasureOrder, ErasureReason, Expiry, Resource, StoreError,
     Tenant, Timestamp,
 };
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -119,15 +120,20 @@ impl Queue {
             return Ok(Erased::InUse);
         }
         // Unless erased and settled below, the upkeep looks at them.
+        let mut doomed = BTreeMap::new();
         for id in &ids {
-            self.items.unsettle(id);
+            let record = self.catalogue.record(id).await?;
+            let files = record.map_or_else(Vec::new, |record| record.files());
+            self.items.doom(id, files.clone());
+            doomed.insert(id.clone(), files);
         }
         let erased = self.catalogue.erase(order, &ids, self.clock.now()).await?;
         if let Erased::Done(receipt) = &erased {
             self.overwrite_due.store(true, Ordering::Relaxed);
             for item in &receipt.items {
+                let files = doomed.get(&item.id).map_or(&[][..], Vec::as_slice);
                 if item.files_erased
-                    && let Err(error) = self.blobs.delete(&item.id).await
+                    && let Err(error) = self.blobs.delete(&item.id, files).await
                 {
                     let id = &item.id;
                     tracing::warn!(id, %error, "files could not be deleted; the upkeep tries again");

@@ -13,7 +13,8 @@
 //! All of this lives in memory, in the one process that uses the store. What a crash leaves behind
 //! is found by the next start, by comparing files and records.
 
-use std::collections::{BTreeMap, BTreeSet};
+use crate::jobs::FileRecord;
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use tokio::sync::OwnedMutexGuard;
 
@@ -22,7 +23,8 @@ use tokio::sync::OwnedMutexGuard;
 pub(super) struct Items {
     locks: Mutex<BTreeMap<String, Weak<tokio::sync::Mutex<()>>>>,
     holds: Arc<Mutex<BTreeMap<String, usize>>>,
-    unsettled: Mutex<BTreeSet<String>>,
+    /// With the files that are to be deleted with the item.
+    unsettled: Mutex<BTreeMap<String, Vec<FileRecord>>>,
 }
 
 /// Keeps an item from being deleted until this is dropped.
@@ -84,7 +86,12 @@ impl Items {
 
     /// Notes that the item's files and record may disagree from now on.
     pub fn unsettle(&self, id: &str) {
-        entered(&self.unsettled).insert(id.to_owned());
+        self.doom(id, Vec::new());
+    }
+
+    /// The same, of an item that has those files as far as is known.
+    pub fn doom(&self, id: &str, files: Vec<FileRecord>) {
+        entered(&self.unsettled).insert(id.to_owned(), files);
     }
 
     /// Notes that they agree again.
@@ -94,12 +101,16 @@ impl Items {
 
     /// Whether the item's files and record may disagree.
     pub fn is_unsettled(&self, id: &str) -> bool {
-        entered(&self.unsettled).contains(id)
+        entered(&self.unsettled).contains_key(id)
     }
 
-    /// Every item whose files and record may disagree.
-    pub fn unsettled(&self) -> Vec<String> {
-        entered(&self.unsettled).iter().cloned().collect()
+    /// Every item whose files and record may disagree, with the files that are to be deleted.
+    pub fn unsettled(&self) -> Vec<(String, Vec<FileRecord>)> {
+        let unsettled = entered(&self.unsettled);
+        let items = unsettled.iter();
+        items
+            .map(|(id, files)| (id.clone(), files.clone()))
+            .collect()
     }
 }
 

@@ -5,8 +5,8 @@
 
 use super::Queue;
 use crate::jobs::{
-    BlobError, Failure, Fault, Held, ItemRecord, Job, JobOutcome, Lease, OutputFile, Product,
-    ProductFile, Resource, ScanFields, StagedFiles, StagedFor, StoreError, StoreFault,
+    BlobError, Failure, Fault, FileRecord, Held, ItemRecord, Job, JobOutcome, Lease, OutputFile,
+    Product, ProductFile, Resource, ScanFields, StagedFiles, StagedFor, StoreError, StoreFault,
     StoredVolume, Tags, Tenant, WorkOutput, content_id, hex,
 };
 use serde_json::{Map, Value};
@@ -23,7 +23,7 @@ impl Queue {
     /// If the files or the record cannot be written.
     pub async fn add_volume(
         self: &Arc<Self>,
-        volume: StoredVolume,
+        mut volume: StoredVolume,
         files: Box<dyn StagedFiles>,
         tenant: &Tenant,
         tags: &Tags,
@@ -33,9 +33,8 @@ impl Queue {
         to_its_end(async move {
             let _lock = queue.items.lock(&volume.id).await;
             queue.items.unsettle(&volume.id);
-            queue
-                .publish_unless_intact(&ItemRecord::Volume(volume.clone()), files)
-                .await?;
+            let record = ItemRecord::Volume(volume.clone());
+            volume.files = queue.publish_unless_intact(record, files).await?;
             let added = queue
                 .catalogue
                 .add_volume(&volume, &tenant, &tags, scan.as_ref());
@@ -114,7 +113,7 @@ impl Queue {
     /// Adds a product that no job made.
     async fn add_product(
         self: &Arc<Self>,
-        product: Product,
+        mut product: Product,
         source: TemplateSource<'_>,
         output: WorkOutput,
     ) -> Result<(Held<Product>, bool), StoreError> {
@@ -123,7 +122,7 @@ impl Queue {
         to_its_end(async move {
             let _lock = queue.items.lock(&product.id).await;
             queue.items.unsettle(&product.id);
-            queue.write_files(&product, &output).await?;
+            queue.write_files(&mut product, &output).await?;
             let new = queue
                 .catalogue
                 .add_product(&product, &tenant, volume.as_deref())
@@ -153,7 +152,7 @@ impl Queue {
     ) -> Result<Option<Job>, StoreError> {
         let parameters = Value::Object(job.parameters.clone()).to_string();
         let volume = job.volume.as_deref();
-        let product = self.product(
+        let mut product = self.product(
             (&job.tenant, made),
             &[volume.unwrap_or_default(), &parameters],
             volume,
@@ -163,7 +162,7 @@ impl Queue {
         let id = product.id.clone();
         let _lock = self.items.lock(&id).await;
         self.items.unsettle(&id);
-        let outcome = match self.write_files(&product, output).await {
+        let outcome = match self.write_files(&mut product, output).await {
             Ok(()) => JobOutcome::Succeeded(Box::new(product)),
             Err(error) if error.cause().may_pass() => return Err(error),
             Err(error) => {
@@ -185,7 +184,12 @@ impl Queue {
         Ok(ended)
     }
 
-    async fn write_files(&self, product: &Product, output: &WorkOutput) -> Result<(), StoreError> {
+    /// Publishes what was made, and notes in `product` where its files are.
+    async fn write_files(
+        &self,
+        product: &mut Product,
+        output: &WorkOutput,
+    ) -> Result<(), StoreError> {
         let staged = self.blobs.stage(StagedFor::Result).await?;
         for file in &output.files {
             let mut writer = staged.create(&file.name).await?;
@@ -195,29 +199,41 @@ impl Queue {
                 .map_err(BlobError::from)?;
             writer.shutdown().await.map_err(BlobError::from)?;
         }
-        self.publish_unless_intact(&ItemRecord::Product(product.clone()), staged)
-            .await
+        let record = ItemRecord::Product(product.clone());
+        let stored = self.publish_unless_intact(record, staged).await?;
+        for file in &mut product.files {
+            if let Some(stored) = stored.iter().find(|stored| stored.name == file.name) {
+                file.bytes = stored.bytes;
+                file.sha256.clone_from(&stored.sha256);
+                file.place.clone_from(&stored.place);
+            }
+        }
+        Ok(())
     }
 
     /// Publishes the files of an item, unless it has a row and its files are what the row says.
-    /// If it has a row and damaged files, these are replaced, and the row with them.
+    /// If it has a row and damaged files, these are replaced, and the row with them. Returns the files
+    /// that the item has now.
     async fn publish_unless_intact(
         &self,
-        record: &ItemRecord,
+        mut record: ItemRecord,
         files: Box<dyn StagedFiles>,
-    ) -> Result<(), StoreError> {
+    ) -> Result<Vec<FileRecord>, StoreError> {
         let known = self.catalogue.record(record.id()).await?;
         if let Some(known) = &known {
             if self.is_intact(known).await? {
-                return Ok(());
+                return Ok(known.files());
             }
             tracing::warn!(id = record.id(), "damaged files are replaced");
         }
-        files.publish(record).await?;
-        match known {
-            Some(_) => self.catalogue.amend(record).await,
-            None => Ok(()),
+        record.put_at(files.place());
+        // Without a row, the upkeep deletes these and no others.
+        self.items.doom(record.id(), record.files());
+        files.publish(&record).await?;
+        if known.is_some() {
+            self.catalogue.amend(&record).await?;
         }
+        Ok(record.files())
     }
 
     /// Whether every file of an item is there and holds what its row says.
@@ -319,5 +335,6 @@ fn described(file: &OutputFile) -> ProductFile {
         media_type: file.media_type.clone().into_owned(),
         bytes: file.bytes.len() as u64,
         sha256: hex(&Sha256::digest(&file.bytes)),
+        place: None,
     }
 }

@@ -87,9 +87,14 @@ impl Custodian {
         let mut swept = Swept::default();
         for kind in Resource::WITH_FILES {
             for batch in queue.blobs.ids(kind).await?.chunks(BATCH) {
-                let known = queue.catalogue.known(batch).await?;
-                for id in batch.iter().filter(|id| !known.contains(*id)) {
-                    self.remove(id, &mut swept).await?;
+                let ids: Vec<String> = batch.iter().map(|item| item.id.clone()).collect();
+                let known = queue.catalogue.known(&ids).await?;
+                for item in batch {
+                    if !known.contains(&item.id) {
+                        self.remove(&item.id, &mut swept).await?;
+                    } else if item.places > 1 {
+                        self.prune(&item.id).await?;
+                    }
                 }
                 tokio::time::sleep(PAUSE).await;
             }
@@ -118,11 +123,19 @@ impl Custodian {
             return Ok(());
         }
         if queue.catalogue.was_erased(id).await? {
-            queue.blobs.delete(id).await?;
+            queue.blobs.delete(id, &[]).await?;
             swept.erased += 1;
-        } else {
-            queue.blobs.set_aside(id, queue.clock.now()).await?;
+        } else if queue.blobs.set_aside(id, queue.clock.now()).await? {
             swept.set_aside += 1;
+        }
+        Ok(())
+    }
+
+    /// Deletes the publications of an item that its row does not name.
+    async fn prune(&self, id: &str) -> StoreResult<()> {
+        let _lock = self.queue.items.lock(id).await;
+        if let Some(record) = self.queue.catalogue.record(id).await? {
+            self.queue.blobs.prune(id, &record.files()).await?;
         }
         Ok(())
     }
@@ -170,7 +183,7 @@ impl Custodian {
         let id = record.id().to_owned();
         let mut found = Vec::new();
         for expected in record.files() {
-            let file = match queue.blobs.hash(&id, &expected.name).await {
+            let file = match queue.blobs.hash(&id, &expected).await {
                 Err(error) if error.cause == StoreFault::DamagedFile => {
                     return self.unless_erased(&id, error).await;
                 }

@@ -36,13 +36,13 @@ async fn has_record(queue: &Queue, id: &str) -> Result<bool, StoreError> {
 /// Deletes the files of items that were added or deleted by halves because the storage failed.
 /// Nobody was told that they are stored, or somebody was told that they are deleted.
 async fn settle_items(queue: &Queue) -> Result<(), StoreError> {
-    for id in queue.items.unsettled() {
+    for (id, files) in queue.items.unsettled() {
         let _lock = queue.items.lock(&id).await;
         if !queue.items.is_unsettled(&id) {
             continue;
         }
         if !has_record(queue, &id).await? {
-            queue.blobs.delete(&id).await?;
+            queue.blobs.delete(&id, &files).await?;
             tracing::info!(id, "deleted files that have no record");
         }
         queue.items.settle(&id);

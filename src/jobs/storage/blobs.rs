@@ -100,7 +100,8 @@ pub type BlobWriter = Pin<Box<dyn AsyncWrite + Send>>;
 /// A file on the local disk. It may be read for as long as this value exists; then the store may
 /// delete it if it was a temporary copy.
 ///
-/// The path ends in the file's name. The file can vanish at any time if its item is deleted.
+/// The path ends in the file's name. The file can vanish at any time if its item is deleted, or if
+/// somebody deletes the store's temporary copies.
 #[derive(Clone)]
 pub struct LocalFile {
     path: PathBuf,
@@ -160,16 +161,38 @@ pub trait StagedFiles: Send + Sync {
     /// A complete file on the local disk.
     async fn local(&self, name: &str) -> Result<LocalFile, BlobError>;
 
-    /// Forces the complete files to the disk. [`StagedFiles::publish`] does so for what is left;
-    /// calling this before allows other work meanwhile.
-    async fn settle(&self) -> Result<(), BlobError>;
+    /// Makes the complete files durable; they are to be published under `id`.
+    /// [`StagedFiles::publish`] does so for what is left; calling this before allows other work
+    /// meanwhile.
+    async fn settle(&self, id: &str) -> Result<(), BlobError>;
 
-    /// Makes the files visible under the id of `record`, all at once and durably, with a copy of
-    /// `record`. Files that the id had before are deleted.
+    /// Where [`StagedFiles::publish`] will put the files, if the store keeps every publication of an
+    /// item apart. Then the item's row must say so ([`FileRecord::place`]): the files are visible
+    /// once the row is, and those of other publications are never seen, nor harmed by what is done
+    /// to these.
+    fn place(&self) -> Option<&str> {
+        None
+    }
+
+    /// Publishes the files under the id of `record`, all at once and durably, with a copy of
+    /// `record`. Files that lay in the same place are deleted.
     async fn publish(self: Box<Self>, record: &ItemRecord) -> Result<(), BlobError>;
 }
 
+/// An item that has files.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Shelved {
+    /// Its id.
+    pub id: String,
+    /// Number of its publications; more than one if some were given up, or have been replaced.
+    pub places: usize,
+}
+
 /// Files by item id and file name. The files of an id become visible all at once.
+///
+/// A store that keeps publications apart cannot tell one that is going on from one that was given up,
+/// except by its age: with other files than those named, the methods that delete or move leave those
+/// alone that may still get their row.
 #[async_trait]
 pub trait BlobStore: Send + Sync + 'static {
     /// Starts an empty set of files.
@@ -192,24 +215,31 @@ pub trait BlobStore: Send + Sync + 'static {
     /// file is not what `file` says.
     async fn local(&self, id: &str, file: &FileRecord) -> Result<Option<LocalFile>, BlobError>;
 
-    /// Deletes every file of `id`, also what was set aside; succeeds if there is none.
-    async fn delete(&self, id: &str) -> Result<(), BlobError>;
+    /// Deletes every file of `id`, of which `files` are known, also what was set aside; succeeds if
+    /// there is none.
+    async fn delete(&self, id: &str, files: &[FileRecord]) -> Result<(), BlobError>;
 
-    /// Every id of that kind that has files.
-    async fn ids(&self, kind: Resource) -> Result<Vec<String>, BlobError>;
+    /// Deletes the publications of `id` other than that of `files`.
+    async fn prune(&self, _id: &str, _files: &[FileRecord]) -> Result<(), BlobError> {
+        Ok(())
+    }
 
-    /// Moves every file of `id` to where nobody sees it but the operator can restore it; succeeds
-    /// if there is none.
-    async fn set_aside(&self, id: &str, now: Timestamp) -> Result<(), BlobError>;
+    /// Every item of that kind that has files.
+    async fn ids(&self, kind: Resource) -> Result<Vec<Shelved>, BlobError>;
 
-    /// Reads one file from the disk, whatever is remembered of it. Fails with
+    /// Moves every file of `id` to where nobody sees it but the operator can restore it. Returns
+    /// whether there was any.
+    async fn set_aside(&self, id: &str, now: Timestamp) -> Result<bool, BlobError>;
+
+    /// Reads one file from where it is stored, whatever is remembered of it. Fails with
     /// [`StoreFault::DamagedFile`] if it does not exist.
-    async fn hash(&self, id: &str, name: &str) -> Result<FileRecord, BlobError>;
+    async fn hash(&self, id: &str, file: &FileRecord) -> Result<FileRecord, BlobError>;
 
     /// Writes a copy of the item's row beside its files, if there is none.
     async fn describe(&self, record: &ItemRecord) -> Result<(), BlobError>;
 
-    /// Deletes what was discarded, and what was set aside before `set_aside_before`.
+    /// Deletes what was discarded, and what was set aside before `set_aside_before`; never what has
+    /// a row.
     async fn tidy(&self, set_aside_before: Option<Timestamp>) -> Result<(), BlobError>;
 
     /// Checks, for readiness, that there is room and that a small file can be written, read and

@@ -18,7 +18,8 @@ mod scan;
 mod volume;
 
 pub use blobs::{
-    BlobError, BlobStore, BlobStream, BlobWriter, DiskSpace, LocalFile, StagedFiles, StagedFor,
+    BlobError, BlobStore, BlobStream, BlobWriter, DiskSpace, LocalFile, Shelved, StagedFiles,
+    StagedFor,
 };
 pub use catalogue::{Catalogue, Deleted};
 pub use custody::{Custody, RecordPages};
@@ -84,6 +85,8 @@ pub enum StoreFault {
     Busy,
     /// The disk does not read or write.
     Disk,
+    /// The store of files on another machine does not answer, or refuses to.
+    Away,
     /// The content of a file is not what was stored, or the file is gone. The same upload repairs
     /// it.
     DamagedFile,
@@ -96,6 +99,6 @@ pub enum StoreFault {
 impl StoreFault {
     /// Whether the same operation can succeed later.
     pub fn may_pass(self) -> bool {
-        matches!(self, Self::Full | Self::Busy | Self::Disk)
+        matches!(self, Self::Full | Self::Busy | Self::Disk | Self::Away)
     }
 }

@@ -37,6 +37,9 @@ pub struct ProductFile {
     pub bytes: u64,
     /// SHA-256 of its content, hexadecimal.
     pub sha256: String,
+    /// As of [`FileRecord::place`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub place: Option<String>,
 }
 
 impl ProductFile {
@@ -46,6 +49,7 @@ impl ProductFile {
             name: self.name.clone(),
             bytes: self.bytes,
             sha256: self.sha256.clone(),
+            place: self.place.clone(),
         }
     }
 }

@@ -31,6 +31,21 @@ impl ItemRecord {
         }
     }
 
+    /// Notes where the files were published.
+    pub fn put_at(&mut self, place: Option<&str>) {
+        let place = place.map(str::to_owned);
+        match self {
+            ItemRecord::Volume(volume) => {
+                let files = volume.files.iter_mut();
+                files.for_each(|file| file.place.clone_from(&place));
+            }
+            ItemRecord::Product(product) => {
+                let files = product.files.iter_mut();
+                files.for_each(|file| file.place.clone_from(&place));
+            }
+        }
+    }
+
     /// Its files and what they must contain.
     pub fn files(&self) -> Vec<FileRecord> {
         match self {

@@ -14,6 +14,10 @@ pub struct FileRecord {
     /// SHA-256 of its content, hexadecimal. Volumes stored by older versions have the first half
     /// of it, or (those of several files, until they are first verified) nothing and no length.
     pub sha256: String,
+    /// In a store that keeps every publication of an item apart, the one that this file is part of;
+    /// see [`StagedFiles::place`](super::StagedFiles::place).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub place: Option<String>,
 }
 
 /// One row of the volumes table.

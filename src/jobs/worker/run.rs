@@ -11,10 +11,11 @@ use super::WorkerSettings;
 use super::lease::{self, Renewal};
 use super::progress::{ProgressReport, ProgressSender, WriteLimiter};
 use crate::jobs::{
-    DeathLimit, Failure, Fault, Isolation, Job, JobOutcome, Lease, Queue, StoreError, WorkError,
-    WorkOutput, Works,
+    DeathLimit, Failure, Fault, Isolation, Job, JobOutcome, Lease, LocalFile, Queue, StoreError,
+    StoreFault, WorkError, WorkOutput, Works,
 };
 use crate::progress::{CancelToken, Monitor};
+use std::convert::Infallible;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Duration;
@@ -26,6 +27,9 @@ const STOP_LIMIT: Duration = Duration::from_secs(5);
 
 /// First and longest pause before the storage is tried again.
 const STORAGE_PAUSES: (Duration, Duration) = (Duration::from_secs(1), Duration::from_secs(30));
+
+/// Pause before a job waits again whose files cannot be had because their store is away.
+const AWAY_PAUSE: Duration = Duration::from_secs(10);
 
 /// What one worker needs to run jobs.
 pub(super) struct JobRunner {
@@ -64,6 +68,8 @@ impl From<Failure> for Ended {
 
 /// A computation that was started.
 struct Computation {
+    /// The files that it reads.
+    files: Vec<LocalFile>,
     result: oneshot::Receiver<Computed>,
     progress: mpsc::UnboundedReceiver<ProgressReport>,
 }
@@ -136,8 +142,16 @@ impl JobRunner {
         {
             cancel.cancel();
         }
-        let mut computation = match self.start(job, cancel).await {
+        let started = self.start(job, cancel);
+        let mut computation = match self.while_renewing(lease, started).await {
             Ok(computation) => computation,
+            Err(error) if error.cause() == StoreFault::Away => {
+                tracing::error!(job = %job.id, %error, "the job waits for the store of its files");
+                self.pause(AWAY_PAUSE).await;
+                let jobs = &self.queue.jobs;
+                let hand_back = || jobs.hand_back(lease, self.queue.clock.now());
+                return self.insist(lease, hand_back).await;
+            }
             Err(error) => {
                 tracing::error!(job = %job.id, %error, "the job's input could not be read");
                 self.pause(STORAGE_PAUSES.0).await;
@@ -152,6 +166,7 @@ impl JobRunner {
             }
         };
         let (computed, stop) = self.watch(lease, cancel, &mut computation).await;
+        let computed = without_files(computed, &computation.files);
         let abandoned = computed.is_none();
         self.queue.computed(job);
         if matches!(&computed, Some(Ok(Err(Ended::Interrupted)))) && stop.is_none() {
@@ -197,18 +212,24 @@ impl JobRunner {
                 }
             }
         };
-        let renewing = async {
-            let mut renewal = self.renewals();
-            loop {
-                renewal.tick().await;
-                // Whether the lease is still held is found out by the write, which names it.
-                lease::renew(&self.queue, &self.settings, lease).await;
-            }
-        };
+        self.while_renewing(lease, writing).await
+    }
+
+    /// Does something and renews the lease meanwhile. Whether the lease is still held is found out
+    /// by the next write, which names it.
+    async fn while_renewing<T>(&self, lease: &Lease, work: impl Future<Output = T>) -> T {
         tokio::select! {
             biased;
-            written = writing => written,
-            () = renewing => Ok(None),
+            done = work => done,
+            never = self.renew_for_ever(lease) => match never {},
+        }
+    }
+
+    async fn renew_for_ever(&self, lease: &Lease) -> Infallible {
+        let mut renewal = self.renewals();
+        loop {
+            renewal.tick().await;
+            lease::renew(&self.queue, &self.settings, lease).await;
         }
     }
 
@@ -251,6 +272,10 @@ impl JobRunner {
             }
             None => Err(unknown_kind()),
         };
+        let files = match &prepared {
+            Ok((_, input)) => input.all_files(),
+            Err(_) => Vec::new(),
+        };
         let (sender, result) = oneshot::channel();
         let (reports, progress) = mpsc::unbounded_channel();
         let cancel = cancel.clone();
@@ -269,7 +294,11 @@ impl JobRunner {
             // The receiver is gone only if the job was ended without the computation.
             let _ = sender.send(computed);
         });
-        Ok(Computation { result, progress })
+        Ok(Computation {
+            files,
+            result,
+            progress,
+        })
     }
 
     /// Renews the lease and writes progress until the computation ends, or has to be abandoned.
@@ -405,6 +434,21 @@ impl JobRunner {
     }
 }
 
+/// The outcome of a computation that read those files. If it failed and one of them is no longer
+/// there, it was not the job's fault: somebody has deleted local copies of files that are stored
+/// elsewhere.
+fn without_files(computed: Option<Computed>, files: &[LocalFile]) -> Option<Computed> {
+    match computed {
+        Some(Ok(Err(Ended::Work(WorkError::Failed(failure)))))
+            if files.iter().any(|file| !file.exists()) =>
+        {
+            tracing::error!(code = failure.code, "files of a running job were deleted");
+            Some(Ok(Err(Ended::Interrupted)))
+        }
+        computed => computed,
+    }
+}
+
 pub(super) fn panicked() -> Failure {
     Failure::new(
         Fault::Service,
@@ -438,4 +482,29 @@ fn unreadable(times: u32) -> Failure {
         format!("What the job needs could not be read; that was tried {times} times."),
     )
     .fix("Ask the operator to look at the log, then file the job again.")
+}
+
+#[cfg(test)]
+#[allow(
+    clippy::unwrap_used,
+    reason = "tests state their expectations by panicking"
+)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_job_is_not_at_fault_if_the_files_that_it_read_were_deleted() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("volume.nii");
+        std::fs::write(&path, "content").unwrap();
+        let files = [LocalFile::in_place(&path)];
+        let failed = || Some(Ok(Err(Ended::from(unknown_kind()))));
+        let ended = without_files(failed(), &files);
+        assert!(matches!(ended, Some(Ok(Err(Ended::Work(_))))));
+        std::fs::remove_file(&path).unwrap();
+        let ended = without_files(failed(), &files);
+        assert!(matches!(ended, Some(Ok(Err(Ended::Interrupted)))));
+        let succeeded = without_files(Some(Ok(Ok(WorkOutput::default()))), &files);
+        assert!(matches!(succeeded, Some(Ok(Ok(_)))));
+    }
 }

@@ -1,0 +1,361 @@
+//! The files of items in the bucket.
+
+use super::bucket::{Bucket, S3Location, says, text};
+use super::shared::{READY, Shared, owner, publication};
+use super::staged::StagedPublication;
+use super::{GRACE, S3Refusal};
+use crate::jobs::{
+    BlobError, BlobStore, BlobStream, DiskSpace, FileRecord, ItemRecord, LocalFile, Resource,
+    Shelved, StagedFiles, StagedFor, StoreFault, Timestamp, random_id,
+};
+use crate::store::blobs::{
+    CHECK, QUARANTINE, RECEIVED, RECORD, STAGING, is_of_shelf_before, shelf_name, shelf_path,
+};
+use crate::store::cache::{Found, LocalCache};
+use crate::store::content::{self, Reading};
+use crate::store::space::DiskGauge;
+use async_trait::async_trait;
+use bytes::Bytes;
+use object_store::{Error, ObjectMeta};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// The folder of local copies.
+const CACHE: &str = "cache";
+
+/// Longest time of a readiness check.
+const CHECK_LIMIT: Duration = Duration::from_secs(4);
+
+/// How long the start waits for a store that does not answer, and between two attempts.
+const START: (Duration, Duration) = (Duration::from_secs(20), Duration::from_secs(1));
+
+/// Files in a bucket.
+pub struct S3Blobs {
+    pub(super) shared: Arc<Shared>,
+    pub(super) gauge: DiskGauge,
+    folder: PathBuf,
+    grace: Duration,
+}
+
+fn refusal(location: &S3Location, error: &Error) -> S3Refusal {
+    let fix = if says(error, "NoSuchBucket") || matches!(error, Error::NotFound { .. }) {
+        "Create the bucket, or correct `blobs` (or AWS_ENDPOINT_URL, or AWS_REGION)"
+    } else if [
+        "InvalidAccessKeyId",
+        "SignatureDoesNotMatch",
+        "InvalidToken",
+        "ExpiredToken",
+    ]
+    .iter()
+    .any(|word| says(error, word))
+    {
+        "Correct AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY"
+    } else if matches!(
+        error,
+        Error::PermissionDenied { .. } | Error::Unauthenticated { .. }
+    ) {
+        "Allow these credentials s3:GetObject, s3:PutObject and s3:DeleteObject on the keys and \
+         s3:ListBucket on the bucket"
+    } else {
+        "See whether the store runs, and whether AWS_ENDPOINT_URL, AWS_REGION and the credentials \
+         are right"
+    };
+    S3Refusal {
+        location: location.to_string(),
+        reason: text(error),
+        fix,
+    }
+}
+
+/// Whether the store may answer otherwise in a while: it does not answer yet, or says 5xx.
+fn may_pass(error: &Error) -> bool {
+    matches!(error, Error::Generic { .. }) && !text(error).contains("status code: 4")
+}
+
+impl S3Blobs {
+    /// Opens the bucket: writes, reads and lists in it. Waits a while for a store that does not
+    /// answer. Staged files and at most `cache` bytes of copies lie in `folder`, on the disk of
+    /// `gauge`; what an earlier process has staged is deleted.
+    ///
+    /// # Errors
+    /// If the bucket cannot be used, or the folder cannot be written.
+    pub async fn open(
+        location: &S3Location,
+        folder: &Path,
+        gauge: DiskGauge,
+        cache: u64,
+    ) -> Result<Self, S3Refusal> {
+        let unusable = |error: std::io::Error| S3Refusal {
+            location: location.to_string(),
+            reason: format!("{}: {error}", folder.display()),
+            fix: "Give another `data_dir`",
+        };
+        let bucket = Bucket::new(location).map_err(|error| refusal(location, &error))?;
+        let content = Bytes::from_static(CHECK);
+        let begun = tokio::time::Instant::now();
+        loop {
+            match bucket.probe(READY, content.clone()).await {
+                Ok(_) => break,
+                Err(error) if may_pass(&error) && begun.elapsed() < START.0 => {
+                    tracing::warn!(error = text(&error), %location, "waiting for the S3 store");
+                    tokio::time::sleep(START.1).await;
+                }
+                Err(error) => return Err(refusal(location, &error)),
+            }
+        }
+        let staging = folder.join(STAGING);
+        match fs::remove_dir_all(&staging) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(unusable(error));
+            }
+            _ => {}
+        }
+        fs::create_dir_all(&staging).map_err(unusable)?;
+        let cache = LocalCache::open(&folder.join(CACHE), cache).map_err(unusable)?;
+        Ok(Self {
+            shared: Arc::new(Shared { bucket, cache }),
+            gauge,
+            folder: folder.to_owned(),
+            grace: GRACE,
+        })
+    }
+
+    /// The same store, with another age after which a publication without a row was given up.
+    #[must_use]
+    pub fn with_grace(self, grace: Duration) -> Self {
+        Self { grace, ..self }
+    }
+
+    /// Whether any item or received object has files.
+    ///
+    /// # Errors
+    /// If the store fails.
+    pub async fn has_items(&self) -> Result<bool, BlobError> {
+        let shelves = Resource::WITH_FILES.map(Resource::plural);
+        for shelf in shelves.into_iter().chain([RECEIVED]) {
+            if self.shared.bucket.has_files(shelf).await? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// A new path under `staging/`.
+    pub(super) fn new_staging_path(&self) -> PathBuf {
+        self.folder.join(STAGING).join(random_id(""))
+    }
+
+    /// Place and path of a file of an item. Files that were stored in a folder have none.
+    fn address(id: &str, file: &FileRecord) -> Option<(String, String)> {
+        let place = file.place.as_deref()?;
+        let path = format!("{}/{}", publication(id, place), file.name);
+        Some((Shared::cached(id, place), path))
+    }
+
+    async fn copy(&self, id: &str, file: &FileRecord) -> Result<Option<Found>, BlobError> {
+        let Some((place, path)) = Self::address(id, file) else {
+            return Ok(None);
+        };
+        self.shared.copy(&place, file, &path).await
+    }
+
+    /// The places of every item of a kind.
+    pub(in crate::store) async fn publications(
+        &self,
+        kind: Resource,
+    ) -> Result<BTreeMap<String, BTreeSet<String>>, BlobError> {
+        let add = |items: &mut BTreeMap<String, BTreeSet<String>>, path: &str, _: &ObjectMeta| {
+            if let Some((id, place)) = owner(path) {
+                let places = items.entry(id.to_owned()).or_default();
+                places.insert(place.to_owned());
+            }
+        };
+        self.shared.bucket.each(kind.plural(), add).await
+    }
+
+    /// Moves a publication into the quarantine of the day.
+    pub(super) async fn set_publication_aside(
+        &self,
+        id: &str,
+        place: &str,
+        now: Timestamp,
+    ) -> Result<(), BlobError> {
+        for path in self.shared.bucket.paths(&publication(id, place)).await? {
+            let to = format!("{QUARANTINE}/{}/{path}", shelf_name(now));
+            self.shared.bucket.shift(&path, &to).await?;
+        }
+        Ok(())
+    }
+
+    /// The publications of an item that were given up.
+    async fn given_up(&self, id: &str) -> Result<Vec<String>, BlobError> {
+        let places = self.shared.places(id).await?;
+        if places.is_empty() {
+            return Ok(Vec::new());
+        }
+        let limit = self.shared.before(self.grace).await?;
+        let old = places.into_iter().filter(|(_, written)| *written <= limit);
+        Ok(old.map(|(place, _)| place).collect())
+    }
+}
+
+fn places_of(files: &[FileRecord]) -> BTreeSet<&str> {
+    files.iter().filter_map(|f| f.place.as_deref()).collect()
+}
+
+#[async_trait]
+impl BlobStore for S3Blobs {
+    async fn stage(&self, _: StagedFor) -> Result<Box<dyn StagedFiles>, BlobError> {
+        let folder = self.new_staging_path();
+        tokio::fs::create_dir_all(&folder).await?;
+        let shared = self.shared.clone();
+        let staged = StagedPublication::new(shared, self.gauge.clone(), folder);
+        Ok(Box::new(staged))
+    }
+
+    async fn read(
+        &self,
+        id: &str,
+        file: &FileRecord,
+        range: Range<u64>,
+    ) -> Result<BlobStream, BlobError> {
+        let path = format!("{}/{}", shelf_path(id), file.name);
+        let Some(found) = self.copy(id, file).await? else {
+            return Err(content::damaged(&path, "it is missing"));
+        };
+        let begun = tokio::task::spawn_blocking(move || {
+            Reading::begin(found.file, found.stamp, path, range)
+        });
+        let begun = begun
+            .await
+            .map_err(|e| BlobError::new(StoreFault::Other, e.to_string()))?;
+        Ok(content::stream(begun?))
+    }
+
+    async fn local(&self, id: &str, file: &FileRecord) -> Result<Option<LocalFile>, BlobError> {
+        Ok(self.copy(id, file).await?.map(|found| found.local))
+    }
+
+    async fn delete(&self, id: &str, files: &[FileRecord]) -> Result<(), BlobError> {
+        for place in places_of(files) {
+            self.shared.delete_publication(id, place).await?;
+        }
+        for place in self.given_up(id).await? {
+            self.shared.delete_publication(id, &place).await?;
+        }
+        let of_item = format!("/{}/", shelf_path(id));
+        let add = |paths: &mut Vec<String>, path: &str, _: &ObjectMeta| {
+            if path.contains(&of_item) {
+                paths.push(path.to_owned());
+            }
+        };
+        let aside = self.shared.bucket.each(QUARANTINE, add).await?;
+        self.shared.bucket.delete(aside).await
+    }
+
+    async fn prune(&self, id: &str, files: &[FileRecord]) -> Result<(), BlobError> {
+        let kept = places_of(files);
+        for place in self.given_up(id).await? {
+            if !kept.contains(place.as_str()) {
+                tracing::info!(id, "a publication that no row names is deleted");
+                self.shared.delete_publication(id, &place).await?;
+            }
+        }
+        Ok(())
+    }
+
+    async fn ids(&self, kind: Resource) -> Result<Vec<Shelved>, BlobError> {
+        let items = self.publications(kind).await?;
+        // Another process may have erased what has a copy here.
+        self.shared.cache.forget(|cached| {
+            let Some((id, place)) = cached.split_once('.') else {
+                return false;
+            };
+            let there = items.get(id).is_some_and(|places| places.contains(place));
+            Resource::of(id) == Some(kind) && !there
+        })?;
+        let items = items.into_iter().map(|(id, places)| Shelved {
+            id,
+            places: places.len(),
+        });
+        Ok(items.collect())
+    }
+
+    async fn set_aside(&self, id: &str, now: Timestamp) -> Result<bool, BlobError> {
+        let given_up = self.given_up(id).await?;
+        for place in &given_up {
+            self.set_publication_aside(id, place, now).await?;
+        }
+        Ok(!given_up.is_empty())
+    }
+
+    async fn hash(&self, id: &str, file: &FileRecord) -> Result<FileRecord, BlobError> {
+        let content = match Self::address(id, file) {
+            Some((_, path)) => self.shared.bucket.fetch(&path, None).await?,
+            None => None,
+        };
+        let content = content.ok_or_else(|| {
+            let path = format!("{}/{}", shelf_path(id), file.name);
+            content::damaged(&path, "it is missing")
+        })?;
+        Ok(FileRecord {
+            name: file.name.clone(),
+            bytes: content.bytes,
+            sha256: content.sha256,
+            place: file.place.clone(),
+        })
+    }
+
+    async fn describe(&self, record: &ItemRecord) -> Result<(), BlobError> {
+        let text = serde_json::to_vec_pretty(record)
+            .map_err(|error| BlobError::new(StoreFault::Other, error.to_string()))?;
+        for place in places_of(&record.files()) {
+            let path = format!("{}/{RECORD}", publication(record.id(), place));
+            self.shared
+                .bucket
+                .put_new(&path, text.clone().into())
+                .await?;
+        }
+        Ok(())
+    }
+
+    async fn tidy(&self, set_aside_before: Option<Timestamp>) -> Result<(), BlobError> {
+        let Some(first_kept) = set_aside_before else {
+            return Ok(());
+        };
+        let old = |paths: &mut Vec<String>, path: &str, _: &ObjectMeta| {
+            let shelf = path.split('/').nth(1).unwrap_or_default();
+            if is_of_shelf_before(shelf, first_kept) {
+                paths.push(path.to_owned());
+            }
+        };
+        let old = self.shared.bucket.each(QUARANTINE, old).await?;
+        self.shared.bucket.delete(old).await
+    }
+
+    async fn check(&self) -> Result<(), BlobError> {
+        self.require_room(0)?;
+        let content = Bytes::from_static(CHECK);
+        let probe = self.shared.bucket.probe(READY, content);
+        match tokio::time::timeout(CHECK_LIMIT, probe).await {
+            Ok(Ok(true)) => Ok(()),
+            Ok(Ok(false)) => Err(BlobError::new(
+                StoreFault::Away,
+                "the S3 store gave back another content than it was given",
+            )),
+            Ok(Err(error)) => Err(self.shared.bucket.fault(READY, &error)),
+            Err(_) => Err(BlobError::new(
+                StoreFault::Away,
+                "the S3 store did not answer in time",
+            )),
+        }
+    }
+
+    fn space(&self) -> Option<DiskSpace> {
+        self.gauge.space()
+    }
+}
