@@ -125,6 +125,7 @@ if wait "${running[install]}"; then
   start dicom scripts/check_dicom.sh
   start intake scripts/check_intake.sh
   start pacs scripts/check_pacs.sh
+  start s3 scripts/check_s3.sh
   start dependencies "$PYTHON" scripts/dependencies.py check
   collect formats "formats read by trimesh, vtk and the glTF validator"
   collect geodesics "geodesics against pygeodesic"
@@ -135,6 +136,7 @@ if wait "${running[install]}"; then
   collect dicom "DICOM objects read by dciodvfy, highdicom and dcmqi"
   collect intake "images received from dcmtk, pynetdicom and dicomweb-client"
   collect pacs "series fetched from Orthanc, objects delivered to it"
+  collect s3 "files in S3 by moto"
   collect dependencies "licences, sources and bill of materials"
 else
   cat "$tools/install.log"
