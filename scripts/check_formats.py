@@ -5,6 +5,10 @@ usage: check_formats.py DIR
 Vertices must come back in the same order, equal to the last bit of the precision that format and
 reader keep. STL stores no shared vertices; there the distinct positions and the triangles over them
 are compared.
+
+Figures of vertices (`uncertainty_mm` and `fields` of the JSON) must be the point arrays of the VTP file,
+by their names, lengths and values, and no others; the uncertainty also the attribute `_UNCERTAINTY` of
+glTF files, whose vertices have a colour where there is a field.
 """
 import json
 import sys
@@ -83,6 +87,61 @@ def compare(name, reader, expected, got):
     return None
 
 
+def figures(document):
+    """Figures of the vertices by their names in VTP files; NaN where one is not known."""
+    named = dict(document.get("fields", {}))
+    if "uncertainty_mm" in document:
+        named["Uncertainty"] = document["uncertainty_mm"]
+    return {name: np.array(values, np.float64) for name, values in named.items()}
+
+
+def arrays_by_vtk(path, expected):
+    """The first difference of the point arrays of a VTP file, as text; None if there is none."""
+    reader = vtk.vtkXMLPolyDataReader()
+    reader.SetFileName(str(path))
+    reader.Update()
+    data = reader.GetOutput().GetPointData()
+    names = {data.GetArrayName(n) for n in range(data.GetNumberOfArrays())}
+    if names != {"Normals", *expected}:
+        return f"arrays {sorted(names)} instead of {sorted({'Normals', *expected})}"
+    for name, values in expected.items():
+        found = vtk_to_numpy(data.GetArray(name))
+        if found.shape != values.shape:
+            return f"{name} has {found.shape} values instead of {values.shape}"
+        if not np.array_equal(found, values, equal_nan=True):
+            return f"{name} differs"
+    return None
+
+
+def figures_by_trimesh(path, expected, painted):
+    """The same of the attributes of a glTF file."""
+    scene = trimesh.load(path, process=False)
+    (mesh,) = scene.geometry.values()
+    if "Uncertainty" in expected:
+        found = mesh.vertex_attributes.get("_UNCERTAINTY")
+        if found is None or not np.array_equal(np.ravel(found), expected["Uncertainty"].astype(np.float32)):
+            return "_UNCERTAINTY differs"
+    if not painted:
+        return None
+    # trimesh keeps them beside the material.
+    colours = np.asarray(mesh.visual.vertex_attributes.get("color", np.empty((0, 4))))
+    if colours.shape != (len(mesh.vertices), 4):
+        return f"{len(colours)} colours for {len(mesh.vertices)} vertices"
+    return None if len(np.unique(colours, axis=0)) > 9 else "all vertices have nearly the same colour"
+
+
+def check_figures(path, document):
+    expected = figures(document)
+    if path.suffix == ".vtp":
+        reader, difference = "vtk", arrays_by_vtk(path, expected)
+    elif path.suffix in (".glb", ".gltf"):
+        reader, difference = "trimesh", figures_by_trimesh(path, expected, "fields" in document)
+    else:
+        return True
+    print(f"{path.name}: {reader}: figures {sorted(expected)}: {difference or 'identical'}")
+    return difference is None
+
+
 def check(path, expected):
     ways = [("trimesh", by_trimesh)] if path.suffix != ".vtp" else []
     ways += [("vtk", by_vtk)] if path.suffix in READERS else []
@@ -104,7 +163,7 @@ def main(folder):
         expected = np.array(document["vertices"]), np.array(document["triangles"])
         for suffix in (".glb", ".gltf", ".stl", ".ply", ".obj", ".vtp"):
             path = original.with_suffix(suffix)
-            if path.exists() and check(path, expected):
+            if path.exists() and check(path, expected) and check_figures(path, document):
                 passed += 1
             elif path.exists():
                 failed += 1

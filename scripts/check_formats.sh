@@ -1,19 +1,19 @@
 #!/usr/bin/env bash
 # Reads exported meshes with other programs and compares the result.
 #
-#   scripts/check_formats.sh [DIR]      default: target/tmp/formats, where `cargo test` writes one
-#                                       file of each format
+#   scripts/check_formats.sh [DIR...]      default: target/tmp/formats, where `cargo test` writes one
+#                                          file of each format, and a fit and a model made here
 #
-# For every NAME.json in DIR, Khronos' glTF validator, trimesh and VTK read NAME.{glb,gltf,stl,ply,obj,vtp}
-# and the result is compared with NAME.json. Prints the number of files that passed and failed; exits with
-# 1 if any failed.
+# For every NAME.json in a folder, Khronos' glTF validator, trimesh and VTK read
+# NAME.{glb,gltf,stl,ply,obj,vtp} and the result is compared with NAME.json: the mesh, and the figures of
+# its vertices. Prints the number of files that passed and failed; exits with 1 if any failed.
 #
+# PROGRAM: the program that makes fit and model (default: target/debug/ventriform).
 # PYTHON: an interpreter that has numpy, trimesh and vtk. NODE_PATH: a folder that has gltf-validator.
 # Without these variables the script installs the packages under target/.
 set -euo pipefail
 
 root=$(cd "$(dirname "$0")/.." && pwd)
-folder=${1:-$root/target/tmp/formats}
 tools=$root/target/check-formats
 mkdir -p "$tools"
 
@@ -29,7 +29,23 @@ if [ -z "${NODE_PATH:-}" ]; then
         npm install --silent --no-fund --no-audit --prefix "$tools" gltf-validator
 fi
 
+if [ $# -eq 0 ]; then
+    program=${PROGRAM:-$root/target/debug/ventriform}
+    made=$tools/made
+    rm -rf "$made" && mkdir -p "$made/model"
+    formats="glb gltf stl ply obj vtp json"
+    "$program" phantom -o "$made/scan" --size 64 --spacing 5 >/dev/null
+    # shellcheck disable=SC2046 # each word is an argument
+    "$program" segment "$made/scan/spect.nii.gz" --model auto -o "$made/fit" \
+        $(printf -- '--format %s ' $formats) >/dev/null
+    # shellcheck disable=SC2046
+    "$program" generate "$made/scan/spect.nii.gz" --points 150 $(printf -- "-o $made/model/lv.%s " $formats) >/dev/null
+    set -- "$root/target/tmp/formats" "$made/fit" "$made/model"
+fi
+
 status=0
-node "$root/scripts/check_formats.js" "$folder" || status=1
-"$PYTHON" "$root/scripts/check_formats.py" "$folder" || status=1
+for folder; do
+    node "$root/scripts/check_formats.js" "$folder" || status=1
+    "$PYTHON" "$root/scripts/check_formats.py" "$folder" || status=1
+done
 exit $status

@@ -1,7 +1,7 @@
 //! Plain JSON, with every coordinate as the shortest decimal that gives the same number when read.
 
 use serde::Serialize;
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use super::Metadata;
 use crate::geometry::Vec3;
@@ -16,9 +16,13 @@ struct WrittenMesh<'a> {
     normals: Vec<[f64; 3]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     uncertainty_mm: Option<&'a [f64]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fields: Option<Value>,
 }
 
-/// A JSON file with `frame`, `unit`, the other metadata, `vertices`, `triangles` and `normals`.
+/// A JSON file with `frame`, `unit`, the other metadata, `vertices`, `triangles` and `normals`,
+/// and with what is known of each vertex: `uncertainty_mm`, and `fields` with an array by its name, in which
+/// `null` is an unknown value.
 pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Vec<u8> {
     let rows = |vectors: &[Vec3]| vectors.iter().map(|&v| v.into()).collect();
     let document = WrittenMesh {
@@ -27,6 +31,9 @@ pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Vec<u8> {
         triangles: &mesh.triangles,
         normals: rows(&mesh.vertex_normals()),
         uncertainty_mm: metadata.uncertainty_of(mesh),
+        fields: metadata
+            .field_of(mesh)
+            .map(|field| json!({ (field.name): field.values })),
     };
     serde_json::to_vec(&document).expect("numbers and text keys can always be serialised")
 }

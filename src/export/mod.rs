@@ -20,7 +20,7 @@
 //! JSON files, millimetres.
 //!
 //! GLB and glTF files show a figure of each vertex ([`VertexField`]) as vertex colours, VTP files hold it as an
-//! array of its name: the uptake of a fitted wall, the distance of a model to the surface it was made of.
+//! array of its name and JSON files as the entry of `fields` with that name: the uptake of a fitted wall, the distance of a model to the surface it was made of.
 //!
 //! Guaranteed: the same mesh and metadata give the same bytes; vertices stay distinct in single
 //! precision (see `single.rs`). Not checked: whether the mesh is a manifold; see
@@ -146,14 +146,14 @@ pub struct Metadata {
     /// Standard deviation of each vertex's distance from the true surface, mm; empty if it is not known.
     /// STL and OBJ files cannot hold it.
     pub uncertainty: Vec<f64>,
-    /// A figure of every vertex that GLB and glTF files show as colours and VTP files hold as an array.
+    /// A figure of every vertex that GLB and glTF files show as colours, VTP and JSON files hold as an array.
     pub field: Option<VertexField>,
 }
 
 /// A figure of every vertex and the colour that shows it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct VertexField {
-    /// Its name in VTP files: `Uptake` (per cent), `Distance` (mm).
+    /// Its name in VTP and JSON files: `Uptake` (per cent), `Distance` (mm).
     pub name: &'static str,
     /// Its values; NaN where it is not known.
     pub values: Vec<f64>,

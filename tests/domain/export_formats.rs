@@ -113,6 +113,18 @@ fn all_formats_are_written_for_the_other_readers() {
 }
 
 #[test]
+fn json_holds_the_figures_of_vertices_by_their_names() {
+    let plain: Value = serde_json::from_slice(&bytes(Format::Json)).unwrap();
+    assert!(plain.get("fields").is_none());
+    let painted: Value = serde_json::from_slice(&painted(Format::Json)).unwrap();
+    let uptake = painted["fields"]["Uptake"].as_array().unwrap();
+    let count = cup().vertices.len();
+    assert_eq!(uptake.len(), count);
+    assert!(uptake[0].is_null());
+    assert_eq!(uptake[1].as_f64(), Some(100.0 * (1.0 / count as f64)));
+}
+
+#[test]
 fn extensions_and_media_types_identify_the_format() {
     for format in Format::ALL {
         assert_eq!(Format::from_extension(format.extension()), Some(format));
@@ -434,7 +446,7 @@ fn a_figure_of_each_vertex_is_a_colour_in_glb_and_an_array_in_vtp() {
     assert!(values[0].is_nan() && values.len() == count);
     assert_eq!(values[1], 100.0 / count as f64);
 
-    for format in [Format::Stl, Format::Ply, Format::Obj, Format::Json] {
+    for format in [Format::Stl, Format::Ply, Format::Obj] {
         assert_eq!(painted(format), bytes(format), "{format:?}");
     }
 }

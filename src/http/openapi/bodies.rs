@@ -479,6 +479,20 @@ impl PartialSchema for MeshDocument {
                     .items(Object::with_type(Type::Number)),
             )
             .property(
+                "fields",
+                ObjectBuilder::new()
+                    .description(Some(
+                        "A figure of each point: `Uptake` (per cent) of a fitted wall, `Distance` (mm) of a \
+                         model to the surface that it was made of; null where it is not known",
+                    ))
+                    .additional_properties(Some(
+                        ArrayBuilder::new().items(
+                            ObjectBuilder::new()
+                                .schema_type(SchemaType::from_iter([Type::Number, Type::Null])),
+                        ),
+                    )),
+            )
+            .property(
                 "triangles",
                 triples(
                     Type::Integer,
