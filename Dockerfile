@@ -12,6 +12,7 @@ RUN mkdir src \
  && rm -rf src
 COPY src src
 COPY web/dist web/dist
+COPY web/uptake.json web/
 COPY README.md ./
 # cargo compares modification times: the sources must be newer than the placeholders above.
 RUN find src -exec touch {} + \

@@ -3,6 +3,10 @@
 #
 #   scripts/check_page.sh             against a service of its own
 #   scripts/check_page.sh --bundle    also builds web/dist anew and compares it with what is committed
+#   scripts/check_page.sh NAME        only the checks with NAME in their name
+#
+# The time from a correction to its new contours, with a program built for speed and nothing else running:
+#   PROGRAM=target/release/ventriform scripts/check_page.sh "fitted again"
 #
 # Screenshots of every view are kept in target/page. Needs node, npm and chromium.
 set -euo pipefail
@@ -10,7 +14,7 @@ cd "$(dirname "$0")/.."
 # The packages are laid under target/, so that the sources stay clean.
 tools=$PWD/target/test-tools/web
 mkdir -p "$tools"
-cp -r web/package.json web/package-lock.json web/tsconfig.json web/vite.config.ts web/index.html web/src web/tests "$tools/"
+cp -r web/package.json web/package-lock.json web/uptake.json web/tsconfig.json web/vite.config.ts web/index.html web/src web/tests "$tools/"
 # Not `npm ci`: it refuses a lock file without the packages for other systems, which npm leaves out where a
 # registry does not have them. What the lock file names is installed in that version.
 if ! cmp -s web/package-lock.json "$tools/installed"; then
@@ -19,10 +23,11 @@ if ! cmp -s web/package-lock.json "$tools/installed"; then
 fi
 if [ "${1:-}" = --bundle ]; then
   (cd "$tools" && rm -rf dist && npx tsc --noEmit && npm run --silent build)
+  shift
   diff -r "$tools/dist" web/dist || { echo "web/dist is not what web/src gives: cd web && npm ci && npm run build"; exit 1; }
 fi
 rm -rf target/page && mkdir -p target/page
-export PROGRAM=${PROGRAM:-$PWD/target/debug/ventriform} SCREENSHOTS=$PWD/target/page CHROMIUM=${CHROMIUM:-/usr/bin/chromium}
+export PROGRAM=$(realpath -m "${PROGRAM:-target/debug/ventriform}") SCREENSHOTS=$PWD/target/page CHROMIUM=${CHROMIUM:-/usr/bin/chromium}
 [ -x "$PROGRAM" ] || cargo build --quiet --bins --test layering
 "$PROGRAM" phantom -o "$SCREENSHOTS/phantom" >/dev/null
-node "$tools/tests/page.mjs"
+node "$tools/tests/page.mjs" "$@"

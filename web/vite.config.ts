@@ -6,16 +6,18 @@ import { brotliCompressSync, constants, gzipSync } from "node:zlib";
 // While developing: `SERVICE=http://127.0.0.1:8080 npm run dev`.
 const service = process.env["SERVICE"] ?? "http://127.0.0.1:8080";
 
-// The script of reports is built by `vite build --mode report` into one file, which the program writes into them.
+// Script and style of reports are built by `vite build --mode report` into one file each, which the program writes into them.
 const report: BuildOptions = {
   target: "es2022",
   emptyOutDir: false,
-  lib: { entry: "src/report.ts", formats: ["iife"], name: "report", fileName: () => "report.js" },
+  lib: { entry: "src/report.tsx", formats: ["iife"], name: "report", fileName: () => "report.js", cssFileName: "report" },
 };
 
-export default defineConfig(({ mode }) => (mode === "report" ? { build: report } : {
+const esbuild = { jsx: "automatic", jsxImportSource: "preact", legalComments: "none" } as const;
+
+export default defineConfig(({ mode }) => (mode === "report" ? { build: report, esbuild } : {
   base: "/",
-  esbuild: { jsx: "automatic", jsxImportSource: "preact", legalComments: "none" },
+  esbuild,
   server: { proxy: { "/v1": service, "/openapi.json": service, "/docs": service } },
   build: {
     target: "es2022",

@@ -2,7 +2,8 @@
 //!
 //! Style, pictures and a small script are inside of the page; nothing is fetched, not even a font.
 //! The page carries a Content-Security-Policy that allows just that style, that script and
-//! embedded pictures. Without scripts everything but the turning view works.
+//! embedded pictures. A page may embed data that the script draws in places that the page keeps for
+//! it ([`place`]); without scripts these stay empty and unseen.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -13,8 +14,10 @@ use sha2::{Digest, Sha256};
 use super::text::leaves;
 
 const STYLE: &str = include_str!("document.css");
-/// Built from `web/src/report.ts`: turns the model by drag or arrow keys.
-const TURN: &str = include_str!("../../web/dist/report.js");
+/// Built from `web/src/report.tsx`: draws the embedded data, to be touched.
+const SCRIPT: &str = include_str!("../../web/dist/report.js");
+/// The style of what it draws.
+const SCRIPT_STYLE: &str = include_str!("../../web/dist/report.css");
 
 /// A page.
 #[derive(Debug, Clone)]
@@ -25,8 +28,8 @@ pub struct HtmlDocument<'a> {
     pub subtitle: &'a str,
     /// Its sections.
     pub body: Markup,
-    /// Whether a section has a view to turn, which needs the script.
-    pub turning: bool,
+    /// What the script draws; without it the page has no script.
+    pub data: Option<Value>,
     /// The last line.
     pub footer: &'a str,
 }
@@ -40,10 +43,11 @@ impl HtmlDocument<'_> {
                 head {
                     meta charset="utf-8";
                     meta http-equiv="Content-Security-Policy"
-                        content=(content_security_policy(self.turning));
+                        content=(content_security_policy(self.data.is_some()));
                     meta name="viewport" content="width=device-width, initial-scale=1";
                     title { (self.title) }
                     style { (PreEscaped(STYLE)) }
+                    @if self.data.is_some() { style { (PreEscaped(SCRIPT_STYLE)) } }
                 }
                 body {
                     main {
@@ -54,7 +58,12 @@ impl HtmlDocument<'_> {
                         (self.body)
                         footer { (self.footer) }
                     }
-                    @if self.turning { script { (PreEscaped(TURN)) } }
+                    @if let Some(data) = &self.data {
+                        // Only inside of strings can JSON have this letter, which could end the element.
+                        @let data = data.to_string().replace('<', "\\u003c");
+                        script type="application/json" id="data" { (PreEscaped(data)) }
+                        script { (PreEscaped(SCRIPT)) }
+                    }
                 }
             }
         }
@@ -62,17 +71,24 @@ impl HtmlDocument<'_> {
     }
 }
 
+/// A place for what the script draws under that name.
+pub fn place(name: &str) -> Markup {
+    html! { div id=(name) hidden {} }
+}
+
 /// What a page needs to be allowed, as the value of a `Content-Security-Policy` header: its style,
-/// embedded pictures and, for a page with a view to turn, the script.
-pub fn content_security_policy(turning: bool) -> String {
-    let hash = |text: &str| STANDARD.encode(Sha256::digest(text.as_bytes()));
-    let script = match turning {
-        true => format!(" script-src 'sha256-{}';", hash(TURN)),
-        false => String::new(),
+/// embedded pictures and, for a page with data, the script and the style of what that draws.
+pub fn content_security_policy(scripted: bool) -> String {
+    let hash = |text: &str| format!("'sha256-{}'", STANDARD.encode(Sha256::digest(text)));
+    let (style, script) = match scripted {
+        true => (
+            format!("{} {}", hash(STYLE), hash(SCRIPT_STYLE)),
+            format!(" script-src {};", hash(SCRIPT)),
+        ),
+        false => (hash(STYLE), String::new()),
     };
     format!(
-        "default-src 'none'; img-src data:; style-src 'sha256-{}';{script} base-uri 'none'; form-action 'none'",
-        hash(STYLE),
+        "default-src 'none'; img-src data:; style-src {style};{script} base-uri 'none'; form-action 'none'"
     )
 }
 

@@ -1,15 +1,11 @@
-//! A triangle mesh for a page: shaded pictures from three sides, and a view to turn.
-//!
-//! The pictures are embedded PNGs and need no script. The view to turn is a canvas that the page's
-//! script fills; without scripts it stays hidden.
+//! A triangle mesh for a page: shaded pictures from three sides, embedded as PNGs.
 
-use maud::{Markup, PreEscaped, html};
+use maud::{Markup, html};
 use rayon::prelude::*;
-use serde_json::json;
 
+use super::document;
 use super::facets::{Colour, Facet, Style, View, picture};
 use super::text::data_uri;
-use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::mesh::TriMesh;
 
@@ -20,16 +16,13 @@ const MYOCARDIUM: Colour = [0.90, 0.42, 0.36];
 /// Uncertainty at which the colour is full, mm, and that colour.
 const UNSURE: f64 = 6.0;
 const UNSURE_COLOUR: Colour = [0.16, 0.27, 0.68];
-/// Most triangles that a browser turns smoothly.
-const MOST_TURNED: usize = 20_000;
 
 /// Three pictures as `data:` URIs, in the order of [`View::ALL`].
 pub type Pictures = Vec<String>;
 
-/// A section with the mesh from three sides and, up to [`MOST_TURNED`] triangles, one to turn
-/// ([`HtmlDocument::turning`](super::document::HtmlDocument::turning)).
+/// A section with the mesh from three sides and, if it is `touched`, the place `viewer` for one to turn.
 /// `uncertainty` of each vertex, mm, colours the pictures; without it they have the wall's colour.
-pub fn section(title: &str, mesh: &TriMesh, uncertainty: &[f64]) -> Markup {
+pub fn section(title: &str, mesh: &TriMesh, uncertainty: &[f64], touched: bool) -> Markup {
     let known = !uncertainty.is_empty() && uncertainty.len() == mesh.vertices.len();
     let colour = |t: usize| match known {
         true => {
@@ -59,10 +52,8 @@ pub fn section(title: &str, mesh: &TriMesh, uncertainty: &[f64]) -> Markup {
                     "deviation of its distance from the wall is " (UNSURE) " mm or more."
                 }
             }
-            div.row.four {
-                (figures(&pictures(&facets, mesh, 0.34), "The model"))
-                @if mesh.triangles.len() <= MOST_TURNED { (turnable(mesh, if known { uncertainty } else { &[] })) }
-            }
+            @if touched { (document::place("viewer")) }
+            div.row { (figures(&pictures(&facets, mesh, 0.34), "The model")) }
         }
     }
 }
@@ -111,36 +102,5 @@ pub fn figures(pictures: &Pictures, what: &str) -> Markup {
                 figcaption { (view.name) }
             }
         }
-    }
-}
-
-/// A canvas for the script, and the mesh about its centre, rounded to 0.01 mm, with a colour for each vertex
-/// where its uncertainty is known.
-fn turnable(mesh: &TriMesh, uncertainty: &[f64]) -> Markup {
-    let aabb = Aabb::of(&mesh.vertices);
-    let centre = (aabb.min + aabb.max) / 2.0;
-    let about = |v: &Vec3| ((v - centre) * 100.0).map(f64::round) / 100.0;
-    let vertices: Vec<f64> = mesh
-        .vertices
-        .iter()
-        .flat_map(|v| <[f64; 3]>::from(about(v)))
-        .collect();
-    let triangles: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
-    // Numbers only: nothing in it can end the script element.
-    let colours: Option<Vec<f64>> = (!uncertainty.is_empty()).then(|| {
-        let of = |x: &f64| colour_of(*x).map(|part| (part * 100.0).round() / 100.0);
-        uncertainty.iter().flat_map(of).collect()
-    });
-    let data = json!({ "vertices": vertices, "triangles": triangles, "colours": colours });
-    let data = data.to_string();
-    html! {
-        figure id="turnable" hidden {
-            div.view {
-                canvas id="turn" tabindex="0" role="img"
-                    aria-label="The model to turn by dragging or by the arrow keys" {}
-            }
-            figcaption { "Drag to turn" }
-        }
-        script type="application/json" id="mesh" { (PreEscaped(data)) }
     }
 }

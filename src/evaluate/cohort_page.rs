@@ -30,7 +30,7 @@ pub fn cohort_page(evaluation: &Evaluation) -> String {
             (reader(evaluation))
             (pictures(evaluation))
         },
-        turning: false,
+        data: None,
         footer: concat!(
             env!("CARGO_PKG_NAME"),
             " ",
@@ -202,7 +202,7 @@ fn table_by_template(rows: &[FitRow], gold: Gold) -> Markup {
                     @if template == "all" { "Mean over all templates" }
                     @else { "Models of " (template) }
                 }
-                div.scroll {
+                div.scroll tabindex="0" role="group" aria-label="Table, scrollable" {
                     table.agreement {
                         thead {
                             tr {

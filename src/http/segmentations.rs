@@ -30,14 +30,15 @@ impl ProductCollection for Segmentations {
         "report.json",
         files::PAGE,
         "slices.png",
+        "region.nii.gz",
         "polar.json",
         "polar.svg",
         "polar.png",
     ];
     const FILE_SCHEMA: &'static str = "SegmentationFileName";
     const FILE_HELP: &'static str = "`mask.nii.gz`, the mesh in each format, `report.json`, \
-        `report.html` (made on request) and `slices.png` (three slices with the contour of the \
-        fit); for a left ventricle also `polar.json`, `polar.svg` and `polar.png`, and mask and \
+        `report.html` (made on request), `slices.png` (three slices with the contour of the \
+        fit) and `region.nii.gz` (the scan about the organ, in 256 steps); for a left ventricle also `polar.json`, `polar.svg` and `polar.png`, and mask and \
         meshes of the wall that `edge` does not ask for: `mask_anatomical.nii.gz` and \
         `mesh_anatomical.*`, or `mask_apparent.nii.gz` and `mesh_apparent.*`. The `.dcm` files are \
         DICOM objects of the scan's patient and study, made on request; they need the scope \

@@ -2,10 +2,11 @@
 
 use serde_json::{Value, json};
 
+use super::picture::rings;
 use super::{COLUMNS, PolarMap, ROWS, territory};
 
 /// Segments, extents, and the pixels in per cent of the reference (`null` where there is no
-/// wall). Without orientation, no territories, and `null` for what depends on sides.
+/// wall), and where the picture has them. Without orientation, no territories, and `null` for what depends on sides.
 pub fn json(map: &PolarMap) -> Value {
     let round = |x: f64| (100.0 * x).round() / 100.0;
     let percent = |x: f64| {
@@ -42,6 +43,8 @@ pub fn json(map: &PolarMap) -> Value {
             })
         })
         .collect();
+    let rows_of_ends = |ends: &[f64; 4]| ends.map(|rows| (1e3 * rows).round() / 1e3);
+    let ends: Vec<[f64; 4]> = map.levels.ends().iter().map(rows_of_ends).collect();
     let numbers: Vec<Vec<usize>> = (0..ROWS)
         .map(|row| {
             (0..COLUMNS)
@@ -68,5 +71,7 @@ pub fn json(map: &PolarMap) -> Value {
         "direction": map.is_oriented().then_some("lateral, anterior, septal, inferior"),
         "values_percent": rows,
         "segment_of": numbers,
+        "level_ends": ends,
+        "rings": rings(map).map(|share| (1e4 * share).round() / 1e4),
     })
 }

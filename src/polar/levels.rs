@@ -57,6 +57,11 @@ impl Levels {
         }
     }
 
+    /// For every column, the distance from the apex in rows at which each of [`Level::ALL`] ends.
+    pub(super) fn ends(&self) -> &[[f64; 4]] {
+        &self.ends
+    }
+
     /// The level of a pixel, by the middle of its row. Beyond the plane of the rim it is basal.
     pub fn of_pixel(&self, row: usize, column: usize) -> Level {
         let middle = row as f64 + 0.5;

@@ -1,6 +1,9 @@
 //! The polar map as a picture, for SVG and PNG.
 
 use std::f64::consts::TAU;
+use std::sync::LazyLock;
+
+use serde::Deserialize;
 
 use super::{COLUMNS, Level, PolarMap, Projection, ROWS, territory};
 use crate::draw::vector::{Drawing, Point, Rgb, VectorShape};
@@ -15,21 +18,25 @@ const CENTRE: f64 = SIZE as f64 / 2.0;
 /// Height of a line of text.
 const TEXT: f64 = 18.0;
 
-/// Dark to bright, equal steps of lightness (a polyline through matplotlib's `inferno`).
-const COLOURS: [[f64; 3]; 6] = [
-    [0.0, 0.0, 4.0],
-    [66.0, 10.0, 104.0],
-    [147.0, 38.0, 103.0],
-    [221.0, 81.0, 58.0],
-    [252.0, 165.0, 10.0],
-    [252.0, 255.0, 164.0],
-];
-const NO_WALL: Rgb = [128; 3];
+/// The colours of maps, which the page (`web/src/viewer/colours.ts`) reads from the same file.
+#[derive(Deserialize)]
+struct Palette {
+    /// Dark to bright, equal steps of lightness (a polyline through matplotlib's `inferno`).
+    colours: [[f64; 3]; 6],
+    /// Outside of the wall.
+    no_wall: Rgb,
+    /// The line about the wall below the threshold.
+    threshold: Rgb,
+}
+
+static PALETTE: LazyLock<Palette> = LazyLock::new(|| {
+    serde_json::from_str(include_str!("../../web/uptake.json"))
+        .expect("the file holds what `Palette` names")
+});
+
 const BORDER: Rgb = [200; 3];
 /// Borders between the territories of two arteries.
 const TERRITORY_BORDER: Rgb = [255; 3];
-/// The line about the wall below the threshold.
-const THRESHOLD: Rgb = [0, 220, 255];
 const WHITE: Rgb = [255; 3];
 const BLACK: Rgb = [0; 3];
 
@@ -80,7 +87,7 @@ fn drawing(map: &PolarMap) -> Drawing {
 }
 
 /// The radii at which the levels end, as shares of the map's.
-fn rings(map: &PolarMap) -> [f64; 4] {
+pub(super) fn rings(map: &PolarMap) -> [f64; 4] {
     let standard = [0.25, 0.5, 0.75, 1.0];
     if map.projection == Projection::Standard {
         return standard;
@@ -108,14 +115,14 @@ fn rings(map: &PolarMap) -> [f64; 4] {
 fn shade(map: &PolarMap, row: usize, column: usize) -> Rgb {
     match map.pixels[row * COLUMNS + column] {
         Some(pixel) if map.reference > 0.0 => colour(pixel.max / map.reference),
-        _ => NO_WALL,
+        _ => PALETTE.no_wall,
     }
 }
 
 /// The colour of an uptake in per cent of the reference, sRGB, 0..=1; grey where there is no wall (NaN).
 pub fn colour_of(percent: f64) -> [f64; 3] {
     let rgb = if percent.is_nan() {
-        NO_WALL
+        PALETTE.no_wall
     } else {
         colour(percent / 100.0)
     };
@@ -123,11 +130,12 @@ pub fn colour_of(percent: f64) -> [f64; 3] {
 }
 
 fn colour(share: f64) -> Rgb {
-    let at = share.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
-    let step = (at as usize).min(COLOURS.len() - 2);
+    let colours = &PALETTE.colours;
+    let at = share.clamp(0.0, 1.0) * (colours.len() - 1) as f64;
+    let step = (at as usize).min(colours.len() - 2);
     let t = at - step as f64;
     std::array::from_fn(|c| {
-        (COLOURS[step][c] + t * (COLOURS[step + 1][c] - COLOURS[step][c])).round() as u8
+        (colours[step][c] + t * (colours[step + 1][c] - colours[step][c])).round() as u8
     })
 }
 
@@ -157,7 +165,7 @@ fn threshold_line(map: &PolarMap, rings: &[f64; 4]) -> Vec<VectorShape> {
     };
     let line = |ends: [Point; 2]| VectorShape::Line {
         ends,
-        stroke: THRESHOLD,
+        stroke: PALETTE.threshold,
         width: 2.5,
     };
     let mut lines = Vec::new();
@@ -288,7 +296,7 @@ fn colour_bar(map: &PolarMap) -> Vec<VectorShape> {
     let y = height(map.threshold.clamp(0.0, 1.0));
     shapes.push(VectorShape::Line {
         ends: [[left - 6.0, y], [right + 6.0, y]],
-        stroke: THRESHOLD,
+        stroke: PALETTE.threshold,
         width: 3.0,
     });
     shapes

@@ -15,6 +15,7 @@ pub mod closeness;
 pub mod distance;
 mod distance_pictures;
 pub mod elements;
+mod embedded;
 mod input;
 pub mod measure;
 mod model_page;

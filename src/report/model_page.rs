@@ -7,6 +7,7 @@ use super::closeness::Closeness;
 use super::distance::Direction;
 use super::distance_pictures;
 use super::elements::Shape;
+use super::embedded::Embedded;
 use super::model_report::ModelReport;
 use super::sections::{FitnessForms, FitnessTermsSection};
 use super::summary::{Histogram, Summary};
@@ -30,14 +31,23 @@ pub fn model_page(report: &ModelReport, mesh: &TriMesh, closeness: Option<&Close
             (verdict(report))
             (figures(report))
             (document::notes("Please note", report.warnings.iter().map(String::as_str)))
-            (views::section("The model", mesh, &[]))
+            (views::section("The model", mesh, &[], true))
             @if let Some(closeness) = closeness { (distances(report, mesh, closeness)) }
             (fitness(report))
             (distributions(report))
             (measures(report))
             (particulars(report))
         },
-        turning: true,
+        data: Embedded {
+            name: "Surface model",
+            mesh: (mesh, &[]),
+            other: None,
+            fit: None,
+            polar: None,
+            closeness,
+            region: None,
+        }
+        .json(),
         footer: &report.software.footer(),
     }
     .html()
@@ -216,7 +226,7 @@ fn distances(report: &ModelReport, mesh: &TriMesh, closeness: &Closeness) -> Mar
             }
             div.row { (views::figures(&pictures, "The model coloured by distance")) }
             (distance_pictures::scale(full))
-            div.scroll {
+            div.scroll tabindex="0" role="group" aria-label="Table, scrollable" {
                 table {
                     thead {
                         tr {
@@ -398,7 +408,7 @@ fn measures(report: &ModelReport) -> Markup {
     html! {
         section {
             h2 { "Shape and smoothness in figures" }
-            div.scroll {
+            div.scroll tabindex="0" role="group" aria-label="Table, scrollable" {
                 table {
                     thead {
                         tr {

@@ -1,8 +1,9 @@
 //! The page of a segmentation: doubts, figures, slices, polar map, agreement, the fitted model.
 
 use maud::{Markup, html};
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
+use super::embedded::Embedded;
 use super::sections::Program;
 use super::segmentation_report::{ReaderEntry, SegmentationReport};
 use crate::draw::document::{self, HeadlineFigure, HtmlDocument, Sign};
@@ -19,10 +20,16 @@ pub struct SegmentationPage<'a> {
     pub mesh: &'a TriMesh,
     /// Standard deviation of each vertex's distance from the wall, mm; empty if it is not known.
     pub uncertainty: &'a [f64],
+    /// Of a ventricle, the wall by the other edge and its uncertainty.
+    pub other: Option<(&'a TriMesh, &'a [f64])>,
     /// Slices of the volume with the contour of the fit: a PNG of three squares side by side.
     pub slices: Option<&'a [u8]>,
     /// The polar map as SVG.
     pub polar: Option<&'a [u8]>,
+    /// The polar map as JSON.
+    pub polar_map: Option<&'a Value>,
+    /// The scan about the organ, a packed NIfTI file.
+    pub region: Option<&'a [u8]>,
 }
 
 /// The page as HTML. What the report does not contain is left out.
@@ -37,17 +44,42 @@ pub fn segmentation_page(page: &SegmentationPage) -> String {
             (figures(report))
             (document::notes("Reasons to look closer", reasons))
             (document::notes("Please note", report.warnings.iter().map(String::as_str)))
-            @if let Some(png) = page.slices { (slices(report, png)) }
+            @if let Some(png) = page.slices { (slices(report, png, page.region.is_some())) }
             @if let Some(svg) = page.polar { (polar(report, svg)) }
             (agreement(report))
-            (views::section("The fitted model", page.mesh, page.uncertainty))
+            (views::section("The fitted model", page.mesh, page.uncertainty, !shows_scan(page)))
             (candidates(report))
             (particulars(report))
         },
-        turning: true,
+        data: embedded(page),
         footer: &Program::this().footer(),
     }
     .html()
+}
+
+/// Whether the script shows the wall beside the scan.
+fn shows_scan(page: &SegmentationPage) -> bool {
+    page.region.is_some() && page.slices.is_some()
+}
+
+/// What the script draws.
+fn embedded(page: &SegmentationPage) -> Option<Value> {
+    let report = page.report;
+    Embedded {
+        name: &format!("{}: segmentation", organ(report)),
+        mesh: (page.mesh, page.uncertainty),
+        other: page.other,
+        fit: Some(json!({
+            "edge": report.edge(),
+            "fit": { "long_axis": report.fit.get("long_axis") },
+            "posture": report.posture,
+            "polar": report.polar.as_ref().map(|polar| json!({ "orientation": polar.orientation })),
+        })),
+        polar: page.polar_map,
+        closeness: None,
+        region: page.region.filter(|_| page.slices.is_some()),
+    }
+    .json()
 }
 
 /// The organ's name as a heading begins.
@@ -291,7 +323,8 @@ fn size_rows(report: &SegmentationReport) -> Vec<(Option<f64>, usize, &'static s
     ]
 }
 
-fn slices(report: &SegmentationReport, png: &[u8]) -> Markup {
+/// The slices as a picture; `touched` if the script draws them with the scan, which is without the expert's mask.
+fn slices(report: &SegmentationReport, png: &[u8], touched: bool) -> Markup {
     let polar = report.polar.as_ref();
     let unknown = polar.is_some_and(|polar| polar.orientation == UNKNOWN);
     let (about, names) = match report.is_ventricle() {
@@ -314,12 +347,14 @@ fn slices(report: &SegmentationReport, png: &[u8]) -> Markup {
     html! {
         section {
             h2 { "Slices" }
-            p.hint { (about) }
-            p.legend {
+            @if touched { (document::place("viewer")) }
+            @let still = report.measures.is_none();
+            p.hint.still[still] { (about) }
+            p.legend.still[still] {
                 span.key-fit { "the fitted surface" }
                 @if report.measures.is_some() { span.key-expert { "the expert's mask" } }
             }
-            figure.slices {
+            figure.slices.still[still] {
                 img src=(data_uri("image/png", png))
                     alt="Three slices of the volume with the contour of the fit";
                 figcaption { @for name in names { span { (name) } } }
@@ -356,14 +391,17 @@ fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
                 "threshold; grey is outside of the wall."
             }
             div.row.beside {
-                figure.paper {
-                    img src=(data_uri("image/svg+xml", svg)) alt="Polar map of the wall's uptake";
+                div {
+                    (document::place("polar"))
+                    figure.paper.still {
+                        img src=(data_uri("image/svg+xml", svg)) alt="Polar map of the wall's uptake";
+                    }
                 }
-                div.scroll {
+                div.scroll tabindex="0" role="group" aria-label="Table, scrollable" {
                     table {
                         thead {
                             tr {
-                                th.n scope="col" {}
+                                th.n scope="col" { "No." }
                                 th scope="col" { "Segment" }
                                 th scope="col" { "Artery" }
                                 th.n scope="col" { "mean, %" }
@@ -374,8 +412,9 @@ fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
                         }
                         tbody {
                             @for segment in &figures.segments {
-                                tr {
-                                    td.n { (segment.number.unwrap_or(0)) }
+                                @let number = segment.number.unwrap_or(0);
+                                tr data-segment=(number) {
+                                    td.n { (number) }
                                     th scope="row" { (segment.name) }
                                     td { (segment.territory.as_deref().unwrap_or("–")) }
                                     td.n { (percent(segment.mean_percent, 1)) }
@@ -465,7 +504,7 @@ fn candidates(report: &SegmentationReport) -> Markup {
         section {
             h2 { "Models tried" }
             p.hint { (report.choice.clone().unwrap_or_default()) "." }
-            div.scroll {
+            div.scroll tabindex="0" role="group" aria-label="Table, scrollable" {
                 table {
                     thead {
                         tr {
@@ -529,8 +568,11 @@ mod tests {
             report: &serde_json::from_value(report).unwrap(),
             mesh: &shapes::tetrahedron(2.0),
             uncertainty: &[],
+            other: None,
             slices: None,
             polar: None,
+            polar_map: None,
+            region: None,
         })
     }
 
@@ -544,6 +586,8 @@ mod tests {
             "localisation": null,
             "a_later_version": 1,
         }));
+        // What the script may draw is no part of what this page says.
+        let page = page.split("<script").next().unwrap_or_default();
         assert!(page.contains("<h1>Organ: segmentation</h1>"));
         assert!(page.contains("12.2 ") && page.contains("volume of the organ"));
         for absent in [

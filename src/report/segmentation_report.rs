@@ -21,6 +21,8 @@ pub struct SegmentationReport {
     pub refused: Vec<RefusedTemplateEntry>,
     /// Where the organ was found.
     pub localisation: Option<Map<String, Value>>,
+    /// Which way is up in the patient.
+    pub posture: Option<Map<String, Value>>,
     /// How the fit went.
     pub fit: Map<String, Value>,
     /// Volumes of wall (or organ) and cavity.
@@ -236,6 +238,12 @@ impl SegmentationReport {
         let found = self.localisation.as_ref();
         let number = found.and_then(|found| found.get("confidence")?.as_f64());
         number.unwrap_or(f64::NAN)
+    }
+
+    /// Which of the two walls of a ventricle the fit shows.
+    pub fn edge(&self) -> &str {
+        let edge = self.parameters.get("edge").and_then(Value::as_str);
+        edge.unwrap_or("apparent")
     }
 
     /// A number of `fit`; NaN where there is none.

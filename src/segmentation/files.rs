@@ -2,6 +2,7 @@
 
 use super::cavity::cavity;
 use super::from_files::SegmentedVolume;
+use super::region::region;
 use super::report::report_json;
 use crate::deform::WallEdge;
 use crate::export::dicom::{DicomError, DicomObject, DicomResults, Moment, SourceScan, Structure};
@@ -13,7 +14,7 @@ use crate::polar;
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, SegmentationPage, SegmentationReport};
 use crate::volume::dicom::Provenance;
-use crate::volume::nifti::{self, MaskError};
+use crate::volume::nifti::{self, MaskError, StoredType};
 use crate::volume::{AffineSource, Reading};
 use serde_json::{Map, Value, json};
 
@@ -21,6 +22,8 @@ use serde_json::{Map, Value, json};
 const ANATOMICAL_MASK: &str = "mask_anatomical.nii.gz";
 /// The mask of the apparent wall, where `mask.nii.gz` shows the anatomical one.
 const APPARENT_MASK: &str = "mask_apparent.nii.gz";
+/// The scan about the organ, which the page shows.
+const REGION: &str = "region.nii.gz";
 
 /// One file of a segmentation.
 #[derive(Debug, Clone)]
@@ -53,8 +56,8 @@ pub enum SegmentationFilesError {
 }
 
 impl SegmentedVolume {
-    /// The mask on the input's grid, the mesh in `formats`, the report, slices and, of a
-    /// ventricle, the polar map. `volume_id` names the volume in the mesh files.
+    /// The mask on the input's grid, the mesh in `formats`, the report, slices, the scan about the organ
+    /// in 256 steps and, of a ventricle, the polar map. `volume_id` names the volume in the mesh files.
     ///
     /// # Errors
     /// See [`SegmentationFilesError`].
@@ -114,6 +117,13 @@ impl SegmentedVolume {
             media_type: "image/png",
             bytes: self.segmentation.slices.clone(),
         });
+        let region = region(&self.reading.volume, &fit.mesh, monitor)?;
+        let region = nifti::write(&region, StoredType::Scaled8, true);
+        files.push(NamedFile {
+            name: REGION.into(),
+            media_type: "application/gzip",
+            bytes: region.map_err(|error| other(REGION, &error))?,
+        });
         files.extend(self.polar(monitor)?);
         monitor.report(Stage::Export, 1.0)?;
         Ok(files)
@@ -154,13 +164,19 @@ impl SegmentedVolume {
         let report: SegmentationReport = serde_json::from_value(self.report())
             .expect("the page reads the fields of the report by the types it was written with");
         let edge = self.parameters.deform.edge;
-        let uncertainty = self.segmentation.fit.shown_uncertainty(edge);
+        let fit = &self.segmentation.fit;
+        let map = self.segmentation.polar.as_ref().map(polar::json);
         let page = report::segmentation_page(&SegmentationPage {
             report: &report,
-            mesh: &self.segmentation.fit.mesh,
-            uncertainty: uncertainty.unwrap_or_default(),
+            mesh: &fit.mesh,
+            uncertainty: fit.shown_uncertainty(edge).unwrap_or_default(),
+            other: fit
+                .other_surface(edge)
+                .map(|other| (&other.mesh, other.uncertainty.as_slice())),
             slices: bytes("slices.png"),
             polar: bytes("polar.svg"),
+            polar_map: map.as_ref(),
+            region: bytes(REGION),
         });
         NamedFile {
             name: "report.html".into(),

@@ -39,6 +39,7 @@ mod report;
 
 mod cavity;
 mod files;
+mod region;
 
 mod error;
 

@@ -229,8 +229,9 @@ fn rows(fit: &Fit) -> Vec<[f64; 3]> {
 fn summary(map: &polar::PolarMap) -> Value {
     let mut value = polar::json(map);
     if let Some(object) = value.as_object_mut() {
-        object.remove("values_percent");
-        object.remove("segment_of");
+        for pixels in ["values_percent", "segment_of", "level_ends", "rings"] {
+            object.remove(pixels);
+        }
     }
     value
 }

@@ -7,6 +7,7 @@
 
 use crate::export::read_json::{self, ReadMeshError};
 use crate::report::{self, Closeness, ModelReport, SegmentationPage, SegmentationReport};
+use serde_json::Value;
 use std::io;
 
 /// Why there is no page.
@@ -33,8 +34,19 @@ pub type ReadFile<'a> = dyn Fn(&str) -> io::Result<Option<Vec<u8>>> + 'a;
 pub(super) const MODEL_FILES: &[&str] = &["report.json", "mesh.json", "distance.json"];
 
 /// The files that [`segmentation_page`] reads.
-pub(super) const SEGMENTATION_FILES: &[&str] =
-    &["report.json", "mesh.json", "slices.png", "polar.svg"];
+pub(super) const SEGMENTATION_FILES: &[&str] = &[
+    "report.json",
+    "mesh.json",
+    OTHER_WALLS[0],
+    OTHER_WALLS[1],
+    "slices.png",
+    "polar.svg",
+    "polar.json",
+    "region.nii.gz",
+];
+
+/// The mesh of the wall by the other edge: one of these, of a ventricle.
+const OTHER_WALLS: [&str; 2] = ["mesh_anatomical.json", "mesh_apparent.json"];
 
 /// The page of a model, made of `report.json`, `mesh.json` and, if it exists, `distance.json`.
 ///
@@ -50,8 +62,8 @@ pub(super) fn model_page(read: &ReadFile<'_>) -> Result<String, PageError> {
     Ok(report::model_page(&report, &mesh, closeness.as_ref()))
 }
 
-/// The page of a segmentation, made of `report.json`, `mesh.json` and, if they exist,
-/// `slices.png` and `polar.svg`.
+/// The page of a segmentation, made of `report.json`, `mesh.json` and those of [`SEGMENTATION_FILES`] that
+/// exist. Segmentations of older versions have no `region.nii.gz`: their slices are a picture.
 ///
 /// # Errors
 /// [`PageError`].
@@ -59,14 +71,29 @@ pub(super) fn segmentation_page(read: &ReadFile<'_>) -> Result<String, PageError
     let report: SegmentationReport = from_json("report.json", &required(read, "report.json")?)?;
     let mesh_file = required(read, "mesh.json")?;
     let mesh = read_json::decode(&mesh_file)?;
+    let mut other = None;
+    for name in OTHER_WALLS {
+        if let Some(file) = optional(read, name)? {
+            other = Some((read_json::decode(&file)?, read_json::uncertainty(&file)));
+        }
+    }
     let slices = optional(read, "slices.png")?;
     let polar = optional(read, "polar.svg")?;
+    let polar_map: Option<Value> = optional(read, "polar.json")?
+        .map(|text| from_json("polar.json", &text))
+        .transpose()?;
+    let region = optional(read, "region.nii.gz")?;
     Ok(report::segmentation_page(&SegmentationPage {
         report: &report,
         mesh: &mesh,
         uncertainty: &read_json::uncertainty(&mesh_file),
+        other: other
+            .as_ref()
+            .map(|(mesh, uncertainty)| (mesh, uncertainty.as_slice())),
         slices: slices.as_deref(),
         polar: polar.as_deref(),
+        polar_map: polar_map.as_ref(),
+        region: region.as_deref(),
     }))
 }
 

@@ -87,6 +87,7 @@ fn a_model_of_a_scan_segments_it_with_stable_names() {
         "mesh.glb",
         "mesh.stl",
         "mesh.json",
+        "region.nii.gz",
         "polar.svg",
         "polar.png",
     ] {

@@ -1,5 +1,6 @@
 // Requests to the service, with the key of the caller and with problems as the service words them.
 
+import { saveBlob } from "./save";
 import { Watched } from "./state";
 
 export interface Problem {
@@ -210,13 +211,4 @@ export function fieldOf(error: unknown): string | null {
 export async function save(path: string, name: string): Promise<void> {
   const answer = await call(path);
   saveBlob(await answer.blob(), name);
-}
-
-export function saveBlob(blob: Blob, name: string): void {
-  const url = URL.createObjectURL(blob);
-  const link = document.createElement("a");
-  link.href = url;
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(url), 60_000);
 }

@@ -1,7 +1,8 @@
 // Everything of a scan, or of one result, as one zip.
 
-import { type Result, type Volume, call, saveBlob } from "./api";
+import { type Result, type Volume, call } from "./api";
 import { loadScan, resultsOf } from "./library";
+import { saveBlob } from "./save";
 import { isFit, nameOf } from "./words";
 import { zip } from "./zip";
 

@@ -12,6 +12,7 @@ import { join } from "node:path";
 import assert from "node:assert/strict";
 import { chromium } from "playwright-core";
 import { nm, pair, series } from "./nm.mjs";
+import { reports, samePolarMap } from "./report.mjs";
 
 const { PROGRAM, SCREENSHOTS, CHROMIUM } = process.env;
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
@@ -50,12 +51,14 @@ async function service(...flags) {
 }
 
 /** A tab that fails the check if anything is wrong behind the view. */
-async function tab(browser, address, { width = 1280, dark = false, expected = [], script } = {}) {
+async function tab(browser, address, { width = 1280, dark = false, expected = [], script, scripts = true, ratio = 1 } = {}) {
   const context = await browser.newContext({
     viewport: { width, height: width > 600 ? 800 : 850 },
     colorScheme: dark ? "dark" : "light",
     hasTouch: width < 600,
     acceptDownloads: true,
+    javaScriptEnabled: scripts,
+    deviceScaleFactor: ratio,
   });
   const page = await context.newPage();
   page.setDefaultTimeout(PATIENCE);
@@ -68,7 +71,7 @@ async function tab(browser, address, { width = 1280, dark = false, expected = []
   page.on("pageerror", error => faults.push(`error: ${error.stack}`));
   page.on("request", request => {
     const url = request.url();
-    if (!url.startsWith(new URL(address).origin) && !/^(blob|data):/.test(url)) faults.push(`leaves the host: ${url}`);
+    if (url !== address && !url.startsWith(new URL(address).origin) && !/^(blob|data):/.test(url)) faults.push(`leaves the host: ${url}`);
   });
   await page.addInitScript(() => document.addEventListener("securitypolicyviolation", event => console.error("policy", event.violatedDirective, event.blockedURI)));
   if (script) await page.addInitScript(script);
@@ -333,6 +336,42 @@ async function main() {
     await close();
   });
 
+  await check("two models are compared, figures and walls side by side", async () => {
+    const own = await service();
+    const { page, faults, close } = await tab(browser, own.address);
+    await page.waitForSelector(".welcome");
+    await page.getByLabel("then").selectOption("nothing");
+    await choose(page, SCAN);
+    await page.waitForSelector(".uploads .stored");
+    const volume = (await (await fetch(`${own.address}/v1/volumes`)).json()).volumes[0].id;
+    const made = [];
+    for (const points of [70, 140]) {
+      let job = await (await fetch(`${own.address}/v1/jobs`, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify({ kind: "model", volume, parameters: { points } }) })).json();
+      while (["queued", "running"].includes(job.state)) {
+        await page.waitForTimeout(100);
+        job = await (await fetch(`${own.address}/v1/jobs/${job.id}`)).json();
+      }
+      made.push(job.model);
+    }
+    await page.goto(`${own.address}/#/scan/${volume}/${made[0]}/${made[1]}`);
+    await page.waitForFunction(() => /compared/.test(document.querySelector(".figures thead")?.textContent ?? ""));
+    assert.match(await page.textContent(".figures tbody"), /Points70\s*140/);
+    await page.getByLabel("walls side by side").check();
+    await page.waitForFunction(() => document.querySelectorAll(".pair .wall canvas[role=slider]").length === 2);
+    await page.waitForTimeout(500);
+    const walls = page.locator(".pair .wall canvas[role=slider]");
+    const seen = n => walls.nth(n).getAttribute("aria-valuetext");
+    const before = await seen(0);
+    await walls.nth(0).focus();
+    for (let n = 0; n < 12; n++) await page.keyboard.press("ArrowLeft");
+    await page.waitForFunction(old => document.querySelector(".pair .wall canvas").getAttribute("aria-valuetext") !== old, before);
+    await page.waitForTimeout(300);
+    assert.equal(await seen(1), await seen(0), "both are seen from the same side");
+    await look(page, "two-models-1280");
+    assert.deepEqual(faults, []);
+    await close();
+  });
+
   await check("a DICOM NM file is read, named and fitted", async () => {
     const file = join(SCREENSHOTS, "spect.dcm");
     writeFileSync(file, nm(readFileSync(SCAN), "Phantom^Fritz"));
@@ -541,6 +580,105 @@ async function main() {
       assert.deepEqual(faults, []);
       await close();
     }
+  });
+
+  await check("a correction is fitted again", async () => {
+    // Counts the pictures that are painted.
+    const script = () => {
+      window.painted = 0;
+      const put = CanvasRenderingContext2D.prototype.putImageData;
+      CanvasRenderingContext2D.prototype.putImageData = function (...all) {
+        window.painted++;
+        return put.apply(this, all);
+      };
+    };
+    for (const [size, spacing] of [[64, 6.4], [128, 3.2]]) {
+      const folder = join(SCREENSHOTS, `refit-${size}`);
+      assert.equal(spawnSync(PROGRAM, ["phantom", "-o", folder, "--size", String(size), "--spacing", String(spacing)]).status, 0);
+      const { page, faults, close } = await tab(browser, address, { script });
+      await page.waitForSelector(".drop");
+      await choose(page, join(folder, "spect.nii.gz"));
+      await drawn(page);
+      await page.getByRole("button", { name: "Correct by hand" }).click();
+      const base = page.locator(".correction label", { hasText: "Base" }).locator("input");
+      const [times, painted] = [[], []];
+      for (let n = 0; n < 5; n++) {
+        await base.fill(String(Number(await base.inputValue()) + 2 - 4 * (n % 2)));
+        await base.press("Tab");
+        await page.waitForFunction(() => /Changed: base/.test(document.querySelector(".correction [role=status]").textContent));
+        // From the press to the second frame after the views were given the new fit: by then its contours are drawn.
+        const time = await page.evaluate(() => new Promise(done => {
+          const shown = () => document.querySelector(".downloads a.button")?.getAttribute("href");
+          const before = shown();
+          const start = performance.now();
+          window.painted = 0;
+          const frame = act => requestAnimationFrame(act);
+          const look = () => (shown() && shown() !== before ? frame(() => frame(() => done(performance.now() - start))) : frame(look));
+          [...document.querySelectorAll("button")].find(button => button.textContent === "Fit from here").click();
+          look();
+        }));
+        times.push(time);
+        painted.push(await page.evaluate(() => window.painted));
+        await page.waitForFunction(() => /Nothing changed/.test(document.querySelector(".correction [role=status]").textContent));
+      }
+      times.sort((a, b) => a - b);
+      console.log(`  ${size}^3: new contours ${times[2].toFixed(0)} ms after the press (median of 5; ${times[0].toFixed(0)} to ${times[4].toFixed(0)})`);
+      // Three slices, the row of slices and two maps a few times, however often the job tells of its progress.
+      console.log(`  pictures painted for each: ${painted.join(", ")}`);
+      assert.ok(Math.max(...painted) <= 180);
+      assert.deepEqual(faults, []);
+      await close();
+    }
+  });
+
+  await check("self-contained reports are touched, and are whole without a script", async () => {
+    const { fit, model } = reports(PROGRAM, join(SCREENSHOTS, "report"));
+    for (const [width, dark] of [[1280, false], [400, true]]) {
+      const name = `${width}-${dark ? "dark" : "light"}`;
+      const { page, faults, close } = await tab(browser, fit, { width, dark, ratio: 2 });
+      await page.waitForSelector("#polar canvas");
+      await page.waitForSelector("#viewer .stack");
+      await page.waitForTimeout(500);
+      if (width === 1280) await samePolarMap(page);
+      // Through the slices by wheel or keys.
+      const slice = page.locator(".slice canvas").first();
+      const before = await slice.getAttribute("aria-valuenow");
+      await slice.focus();
+      for (let n = 0; n < 3; n++) await page.keyboard.press("PageUp");
+      await page.waitForFunction(old => document.querySelector(".slice canvas").getAttribute("aria-valuenow") !== old, before);
+      // Table, polar map and slices show the same place.
+      await page.locator("tr[data-segment='7'] button").click();
+      await page.waitForFunction(() => /mid anterior/i.test(document.querySelector("#polar .at").textContent));
+      assert.equal(await page.locator("tr[aria-current]").getAttribute("data-segment"), "7");
+      const map = page.locator("#polar canvas").first();
+      const box = await map.boundingBox();
+      await map.click({ position: { x: box.width * 0.5, y: box.height * 0.84 } });
+      await page.waitForFunction(() => document.querySelector("tr[aria-current]")?.dataset.segment === "4");
+      await look(page, `report-${name}`);
+      if (width === 1280) assert.equal(await printed(page, `report-${name}`), 2, "pages on paper");
+      assert.deepEqual(faults, []);
+      await close();
+    }
+    for (const [address, name] of [[fit, "fit"], [model, "model"]]) {
+      const { page, faults, close } = await tab(browser, address, { scripts: false });
+      assert.ok(await page.locator(".verdict").isVisible());
+      for (const picture of await page.locator("img").all()) assert.ok(await picture.isVisible());
+      assert.equal(await page.locator("#viewer").isVisible(), false);
+      await page.screenshot({ path: join(SCREENSHOTS, `report-plain-${name}.png`), fullPage: true });
+      if (name === "fit") assert.equal(await printed(page, `report-plain-${name}`), 2, "pages on paper");
+      assert.deepEqual(faults, []);
+      await close();
+    }
+    const { page, faults, close } = await tab(browser, model);
+    const wall = page.locator("#viewer .wall canvas").first();
+    await wall.focus();
+    const seen = await wall.getAttribute("aria-valuetext");
+    for (let n = 0; n < 8; n++) await page.keyboard.press("ArrowLeft");
+    await page.waitForFunction(old => document.querySelector(".wall canvas").getAttribute("aria-valuetext") !== old, seen);
+    assert.equal(await page.locator("#viewer select").first().inputValue(), "Distance to the surface");
+    await look(page, "report-model-1280");
+    assert.deepEqual(faults, []);
+    await close();
   });
 
   await check("a key is asked for, and again when it has expired", async () => {

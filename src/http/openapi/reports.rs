@@ -983,7 +983,7 @@ schemas! {
         segments: Vec<PolarSegmentReport>,
         /// The walls of the three arteries; none if the orientation is unknown.
         territories: Vec<TerritoryReport>,
-        /// Rows of pixels, from base to apex.
+        /// Rows of pixels, from apex to base.
         rows: u64,
         /// Columns of pixels, around the axis.
         columns: u64,
@@ -1009,7 +1009,7 @@ schemas! {
         segments: Vec<PolarSegmentReport>,
         /// The walls of the three arteries; none if the orientation is unknown.
         territories: Vec<TerritoryReport>,
-        /// Rows of pixels, from base to apex.
+        /// Rows of pixels, from apex to base.
         rows: u64,
         /// Columns of pixels, around the axis.
         columns: u64,
@@ -1023,6 +1023,12 @@ schemas! {
         values_percent: Vec<Vec<Option<f64>>>,
         /// The number of the segment to which each pixel belongs.
         segment_of: Vec<Vec<u64>>,
+        /// For every column, the distances from the apex in rows at which apex, apical, mid and basal level
+        /// end; row n reaches from n to n + 1. Absent from maps of older versions.
+        level_ends: Option<Vec<Vec<f64>>>,
+        /// The radii at which these levels end on the drawn map, as shares of its own. Absent from maps of
+        /// older versions.
+        rings: Option<Vec<f64>>,
     }
 
     /// The wall that an artery usually feeds.

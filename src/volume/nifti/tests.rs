@@ -675,7 +675,12 @@ fn oblique() -> Volume {
 fn what_is_written_comes_back() {
     let volume = oblique();
     for gzip in [false, true] {
-        for stored in [StoredType::Float32, StoredType::Int16] {
+        // Half of a step: of the range of 500, a 64 000th or a 255th.
+        for (stored, most) in [
+            (StoredType::Float32, 0.0),
+            (StoredType::Int16, 0.004),
+            (StoredType::Scaled8, 0.99),
+        ] {
             let bytes = write(&volume, stored, gzip).unwrap();
             assert_eq!(bytes, write(&volume, stored, gzip).unwrap());
             let reading = read_bytes(&bytes).unwrap();
@@ -687,15 +692,7 @@ fn what_is_written_comes_back() {
             let off = |(a, b): (&f32, &f32)| (a - b).abs();
             let pairs = reading.volume.voxels.iter().zip(&volume.voxels);
             let worst = pairs.map(off).fold(0.0, f32::max);
-            // Half of a 64 000th of the range of 500.
-            assert!(
-                worst
-                    <= if stored == StoredType::Float32 {
-                        0.0
-                    } else {
-                        0.004
-                    }
-            );
+            assert!(worst <= most, "{stored:?}: {worst}");
             let apart = (reading.volume.frame.matrix() - volume.frame.matrix())
                 .abs()
                 .max();
@@ -714,8 +711,10 @@ fn masks_and_counts_are_written_exactly() {
         assert!(reading.volume.integral);
     }
     volume.voxels = vec![0.37; 60];
-    let constant = read_bytes(&write(&volume, StoredType::Int16, false).unwrap()).unwrap();
-    assert_eq!(constant.volume.voxels, volume.voxels);
+    for stored in [StoredType::Int16, StoredType::Scaled8] {
+        let constant = read_bytes(&write(&volume, stored, false).unwrap()).unwrap();
+        assert_eq!(constant.volume.voxels, volume.voxels);
+    }
 }
 
 #[test]

@@ -32,6 +32,8 @@ pub enum StoredType {
     /// Scaled to -32000..=32000 by slope and intercept, a quarter of the size after compression.
     /// Whole values in that range are stored exactly. NaN becomes the smallest value.
     Int16,
+    /// Scaled to 0..=255 by slope and intercept, for pictures to look at. NaN becomes the smallest value.
+    Scaled8,
     /// Rounded and clamped to 0..=255, for masks and label maps. NaN becomes 0.
     Uint8,
 }
@@ -41,7 +43,7 @@ impl StoredType {
         match self {
             StoredType::Float32 => NiftiType::Float32,
             StoredType::Int16 => NiftiType::Int16,
-            StoredType::Uint8 => NiftiType::Uint8,
+            StoredType::Scaled8 | StoredType::Uint8 => NiftiType::Uint8,
         }
     }
 }
@@ -95,6 +97,7 @@ pub fn write_mask(
 pub fn write(volume: &Volume, stored: StoredType, gzip: bool) -> Result<Vec<u8>, TooLong> {
     let scaling = match stored {
         StoredType::Int16 => scaling(&volume.voxels),
+        StoredType::Scaled8 => scaling_to_bytes(&volume.voxels),
         StoredType::Float32 | StoredType::Uint8 => Scaling::NONE,
     };
     let mut bytes = to_bytes(&header(volume.shape, &volume.frame, stored, scaling)?);
@@ -116,14 +119,35 @@ impl Scaling {
     };
 }
 
+/// The least and the greatest of the finite values; infinite where there is none.
+fn range(voxels: &[f32]) -> [f64; 2] {
+    let numbers = voxels.iter().filter(|v| v.is_finite());
+    numbers.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
+        [low.min(f64::from(*v)), high.max(f64::from(*v))]
+    })
+}
+
+/// The scaling that maps the range of `voxels` to 0..=255.
+fn scaling_to_bytes(voxels: &[f32]) -> Scaling {
+    match range(voxels) {
+        [low, high] if low < high => Scaling {
+            slope: ((high - low) / 255.0) as f32,
+            inter: low as f32,
+        },
+        [low, _] if low.is_finite() => Scaling {
+            slope: 1.0,
+            inter: low as f32,
+        },
+        _ => Scaling::NONE,
+    }
+}
+
 /// The scaling that maps the range of `voxels` to the range of the stored numbers.
 fn scaling(voxels: &[f32]) -> Scaling {
     const REACH: f64 = 32_000.0;
-    let numbers = || voxels.iter().copied().filter(|v| v.is_finite());
-    let (low, high) = numbers().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-        (l.min(f64::from(v)), h.max(f64::from(v)))
-    });
-    let whole = numbers().all(|v| v.trunc() == v);
+    let [low, high] = range(voxels);
+    let mut numbers = voxels.iter().filter(|v| v.is_finite());
+    let whole = numbers.all(|v| v.trunc() == *v);
     if !(low < high) || (whole && low >= -REACH && high <= REACH) {
         return match low.is_finite() && !whole {
             true => Scaling {
@@ -148,7 +172,10 @@ fn append_voxels(bytes: &mut Vec<u8>, voxels: &[f32], stored: StoredType, scalin
             let n = ((f64::from(v) - inter) / slope).round();
             (if n.is_nan() { -32_000 } else { n as i16 }).to_le_bytes()
         })),
-        StoredType::Uint8 => bytes.extend(voxels.iter().map(|v| v.round() as u8)),
+        StoredType::Scaled8 | StoredType::Uint8 => {
+            let stored = |v: &f32| ((f64::from(*v) - inter) / slope).round() as u8;
+            bytes.extend(voxels.iter().map(stored));
+        }
     }
 }
 

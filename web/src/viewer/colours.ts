@@ -1,5 +1,7 @@
 // Colour maps: 256 colours each, from a few anchors.
 
+import uptake from "../../uptake.json";
+
 export type Lut = Uint8Array;
 
 function ramp(anchors: [number, string][]): Lut {
@@ -26,12 +28,17 @@ function stepped(lut: Lut, steps: number): Lut {
   return out;
 }
 
+function hex(rgb: number[]): string {
+  return `#${rgb.map(part => part.toString(16).padStart(2, "0")).join("")}`;
+}
+
 const RAINBOW: [number, string][] = [[0, "#05051a"], [0.2, "#1b2a9c"], [0.4, "#0090d0"], [0.55, "#00b050"], [0.7, "#c8d400"], [0.82, "#ffb800"], [0.92, "#ff6a00"], [1, "#d80c00"]];
 
 export const LUTS: Record<string, Lut> = {
   "Hot iron": ramp([[0, "#000000"], [0.4, "#c01000"], [0.75, "#ffb000"], [1, "#ffffff"]]),
   "Perfusion": ramp(RAINBOW),
   "Perfusion, 10 steps": stepped(ramp(RAINBOW), 10),
+  "Inferno": ramp(uptake.colours.map((rgb, n): [number, string] => [n / (uptake.colours.length - 1), hex(rgb)])),
   "Grey": ramp([[0, "#000000"], [1, "#ffffff"]]),
   "Inverse grey": ramp([[0, "#ffffff"], [1, "#000000"]]),
   "Viridis": ramp([[0, "#440154"], [0.25, "#3b528b"], [0.5, "#21918c"], [0.75, "#5ec962"], [1, "#fde725"]]),
@@ -48,4 +55,29 @@ export function colour(lut: Lut, share: number): [number, number, number] {
 
 export function css(lut: Lut, share: number): string {
   return `rgb(${colour(lut, share).join(",")})`;
+}
+
+/** Where a polar map shows no wall, and the line about what lies below its threshold. */
+export const NO_WALL = uptake.no_wall as [number, number, number];
+const THRESHOLD = hex(uptake.threshold);
+
+/** The line that is seen on a map of these colours: the service's own has one for itself. */
+export function thresholdOn(lut: Lut): string {
+  return lut === LUTS["Inferno"] ? THRESHOLD : "#fff";
+}
+
+/** Where the browser keeps the colours that were chosen for slices, and for polar map and wall. */
+export const LUT = "ventriform.lut";
+export const WALL_LUT = "ventriform.wall-lut";
+
+export function kept(key: string, standard: string): Lut {
+  return LUTS[localStorage.getItem(key) ?? ""] ?? LUTS[standard]!;
+}
+
+export function keep(key: string, name: string): void {
+  try {
+    localStorage.setItem(key, name);
+  } catch {
+    // A report may be opened where nothing may be kept.
+  }
 }

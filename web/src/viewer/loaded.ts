@@ -1,26 +1,18 @@
 // A result with all that the views draw of it.
 
-import { type FileOfResult, type Result, type Volume, type Walls, get } from "../api";
+import { type FileOfResult, type Result, type Volume, type Walls, call, get } from "../api";
 import { isFit } from "../words";
-import { type Mesh, loadMesh } from "./mesh";
-import type { Axis } from "./plane";
+import type { Mesh } from "./mesh";
 import type { PolarMap } from "./polar";
-import type { Layer } from "./scene";
-import type { Vec } from "./vector";
-import { type Voxels, loadVoxels } from "./volume";
-
-/** Millimetres that slices show at first once the heart is known. */
-export const HEART_WIDTH = 140;
-
-type Triple = [number, number, number];
+import { type Placed, type Shown, type Triple, byVertex, heartOf, middleOf, wallNames } from "./shown";
+import { type Voxels, unpackNifti } from "./volume";
 
 /** What the page reads of a fit's report. */
-export interface FitReport {
+export interface FitReport extends Placed {
   template: string;
   choice: string;
   localisation?: { centre: Triple; axis: Triple; confidence: number };
-  posture?: { superior: Triple; source: string; confidence: number };
-  fit: { confidence: number | null; long_axis?: { base: Triple; apex: Triple }; displacement_mm?: number[] };
+  fit: Placed["fit"] & { confidence: number | null };
   volumes_ml: { wall: number; cavity: number | null; apparent?: Walls; anatomical?: Walls };
   mass_g?: number | null;
   thickness_mm?: { apparent: Spread; anatomical: Spread };
@@ -35,21 +27,17 @@ interface Spread {
   spread: number;
 }
 
-export interface Loaded {
+export interface Loaded extends Shown {
   result: Result;
   report: FitReport | null;
-  mesh: Mesh;
-  otherEdge: Mesh | null;
-  polar: PolarMap | null;
-  heart: Axis | null;
-  middle: Vec;
-  mask: Voxels | null;
-  expert: Voxels | null;
-  displacement: number[] | null;
-  surface: Float32Array | null;
 }
 
 const keptVoxels = new Map<string, Promise<Voxels>>();
+
+async function loadVoxels(path: string): Promise<Voxels> {
+  const answer = await call(path);
+  return unpackNifti(await answer.arrayBuffer());
+}
 
 function kept(path: string): Promise<Voxels> {
   let found = keptVoxels.get(path);
@@ -80,8 +68,8 @@ export async function loadLoaded(result: Result): Promise<Loaded> {
   const maskFile = file("mask.nii.gz");
   const expertId = result.parameters["expert"];
   const [mesh, inner, report, polar, mask, expert, distance] = await Promise.all([
-    loadMesh(meshFile.href),
-    otherEdge ? loadMesh(otherEdge.href) : null,
+    get<Mesh>(meshFile.href),
+    otherEdge ? get<Mesh>(otherEdge.href) : null,
     fit ? json<FitReport>("report.json") : null,
     json<PolarMap>("polar.json"),
     maskFile ? kept(maskFile.href) : null,
@@ -89,54 +77,19 @@ export async function loadLoaded(result: Result): Promise<Loaded> {
     typeof expertId === "string" ? voxelsOf({ id: expertId }, null).catch(() => null) : null,
     fit ? null : json<{ parts: number; distances_mm: number[] }>("distance.json"),
   ]);
-  const axis = report?.fit.long_axis;
-  const known = report?.polar?.orientation !== "unknown" && report?.posture;
-  const sum = mesh.vertices.reduce<Triple>((all, vertex) => [all[0] + vertex[0], all[1] + vertex[1], all[2] + vertex[2]], [0, 0, 0]);
-  const middle = axis
-    ? ([0, 1, 2].map(n => (axis.base[n]! + axis.apex[n]!) / 2) as Triple)
-    : (sum.map(value => value / mesh.vertices.length) as Triple);
+  const heart = report && heartOf(report);
   return {
     result,
     report,
     mesh,
     otherEdge: inner,
     polar,
-    heart: axis ? { ...axis, superior: known ? (report?.posture?.superior ?? null) : null, roll: 0 } : null,
-    middle,
+    heart,
+    middle: middleOf(mesh, heart),
+    names: wallNames(result.parameters["edge"], inner !== null, fit),
     mask,
     expert,
     displacement: report?.fit.displacement_mm ?? null,
     surface: distance ? byVertex(mesh, distance) : null,
   };
-}
-
-/** Distances are given for equal parts of each triangle; a vertex gets the mean of its triangles. */
-function byVertex(mesh: Mesh, { parts, distances_mm }: { parts: number; distances_mm: number[] }): Float32Array {
-  const each = parts * parts;
-  const sums = new Float32Array(mesh.vertices.length);
-  const counts = new Float32Array(mesh.vertices.length);
-  mesh.triangles.forEach((corners, n) => {
-    let sum = 0;
-    for (let part = 0; part < each; part++) sum += distances_mm[n * each + part] ?? 0;
-    for (const at of corners) {
-      sums[at] = sums[at]! + sum / each;
-      counts[at] = counts[at]! + 1;
-    }
-  });
-  return sums.map((sum, at) => sum / (counts[at] || 1));
-}
-
-/** The contours of a result, and of what it is compared with. */
-export function layersOf(shown: Loaded | null, other: Loaded | null): Layer[] {
-  const layers: Layer[] = [];
-  if (shown) {
-    const isApparent = shown.result.parameters["edge"] !== "anatomical";
-    const [own, second] = isApparent ? ["apparent wall", "anatomical wall"] : ["anatomical wall", "apparent wall"];
-    layers.push({ name: shown.otherEdge ? own! : shown.report ? "wall" : "model", colour: "#3dffa8", shown: true, mesh: shown.mesh });
-    if (shown.otherEdge) layers.push({ name: second!, colour: "#ffffff", shown: false, mesh: shown.otherEdge });
-    if (shown.mask) layers.push({ name: "mask", colour: "#ffd24d", shown: false, mask: shown.mask });
-    if (shown.expert) layers.push({ name: "expert", colour: "#4db8ff", shown: true, mask: shown.expert });
-  }
-  if (other) layers.push({ name: "compared", colour: "#d6a6ff", dashed: true, shown: true, mesh: other.mesh });
-  return layers;
 }

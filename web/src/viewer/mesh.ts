@@ -1,8 +1,7 @@
 // Triangle meshes: their outline in a plane, and figures for every vertex to colour them by.
 
-import { get } from "../api";
 import type { Plane } from "./plane";
-import { type Vec, cross, dot, norm, sub } from "./vector";
+import { type Vec, add, cross, dot, norm, sub, unit } from "./vector";
 
 export interface Mesh {
   vertices: Vec[];
@@ -12,8 +11,14 @@ export interface Mesh {
   uncertainty_mm?: number[];
 }
 
-export async function loadMesh(path: string): Promise<Mesh> {
-  return get<Mesh>(path);
+/** A mesh with the normals of its vertices: the mean of those of the triangles about each, by their areas. */
+export function withNormals(vertices: Vec[], triangles: Mesh["triangles"]): Mesh {
+  const normals = vertices.map((): Vec => [0, 0, 0]);
+  for (const [a, b, c] of triangles) {
+    const normal = cross(sub(vertices[b]!, vertices[a]!), sub(vertices[c]!, vertices[a]!));
+    for (const at of [a, b, c]) normals[at] = add(normals[at]!, normal);
+  }
+  return { vertices, triangles, normals: normals.map(unit) };
 }
 
 /** Where the mesh cuts the plane through `origin`: pairs of points in the plane's own millimetres. */

@@ -1,6 +1,6 @@
 // The polar map of the service, drawn, and the places of the wall that its pixels show.
 
-import { type Lut, colour } from "./colours";
+import { type Lut, NO_WALL, colour, thresholdOn } from "./colours";
 import type { Mesh } from "./mesh";
 import { type Axis, frameOf } from "./plane";
 import { type Vec, add, dot, scale, sub } from "./vector";
@@ -24,17 +24,26 @@ export interface PolarMap {
   orientation: string;
   values_percent: (number | null)[][];
   segment_of: number[][];
+  /** The rows at which the levels of every column end, and the shares of the radius at which they are drawn to end. */
+  level_ends?: number[][];
+  rings?: number[];
 }
 
-/** Rings of equal width: apex, apical, mid, basal. */
-const RINGS = 4;
+/** Apex, apical, mid and basal, in maps that do not say how wide they are. */
+const RINGS = [1 / 4, 2 / 4, 3 / 4, 1];
+
+function ringsOf(map: PolarMap): number[] {
+  return map.rings ?? RINGS;
+}
 
 function level(segment: number): number {
   return segment === 17 ? 0 : segment > 12 ? 1 : segment > 6 ? 2 : 3;
 }
 
-/** The rows at which the levels of a column end. */
+/** The rows at which the levels of a column end; as well as the segments tell it in maps of older versions. */
 function ends(map: PolarMap, column: number): number[] {
+  const known = map.level_ends?.[column];
+  if (known) return known;
   const out = [0, 0, 0, map.rows];
   for (let row = 0; row < map.rows; row++) {
     const at = level(map.segment_of[row]![column]!);
@@ -45,27 +54,34 @@ function ends(map: PolarMap, column: number): number[] {
 
 /** Share of the radius of a place `rows` from the apex. */
 export function radiusOf(map: PolarMap, rows: number, column: number): number {
-  let from = 0;
+  let [from, inner] = [0, 0];
   const all = ends(map, column);
-  for (let n = 0; n < RINGS; n++) {
+  for (const [n, outer] of ringsOf(map).entries()) {
     const to = all[n]!;
-    if (rows <= to) return (n + (rows - from) / Math.max(1e-6, to - from)) / RINGS;
-    from = to;
+    if (rows <= to) return inner + ((outer - inner) * (rows - from)) / Math.max(1e-6, to - from);
+    [from, inner] = [to, outer];
   }
   return 1;
 }
 
 function rowsAt(map: PolarMap, radius: number, column: number): number {
   const all = ends(map, column);
-  const n = Math.min(RINGS - 1, Math.floor(radius * RINGS));
-  const from = n === 0 ? 0 : all[n - 1]!;
-  return from + (radius * RINGS - n) * (all[n]! - from);
+  const rings = ringsOf(map);
+  const found = rings.findIndex(outer => radius < outer);
+  const n = found < 0 ? rings.length - 1 : found;
+  const [from, inner] = n === 0 ? [0, 0] : [all[n - 1]!, rings[n - 1]!];
+  return from + ((radius - inner) / (rings[n]! - inner)) * (all[n]! - from);
+}
+
+/** The column of a place so many columns from lateral; the ray of column n lies at n + 0.5, as that of row n does. */
+function columnAt(map: PolarMap, columns: number): number {
+  return ((Math.floor(columns) % map.columns) + map.columns) % map.columns;
 }
 
 /** The value between the rays, in per cent; NaN where there is no wall. */
 export function valueAt(map: PolarMap, rows: number, columns: number): number {
   const row = Math.max(0, Math.min(map.rows - 1, rows - 0.5));
-  const column = ((columns % map.columns) + map.columns) % map.columns;
+  const column = (((columns - 0.5) % map.columns) + map.columns) % map.columns;
   const [r, c] = [Math.floor(row), Math.floor(column)];
   const [fr, fc] = [row - r, column - c];
   let [sum, weight] = [0, 0];
@@ -164,12 +180,12 @@ export function placeOnMap(map: PolarMap, x: number, y: number, size: number): [
   const [radius, turns] = polarOf(x, y, size);
   if (radius > 1) return null;
   const columns = turns * map.columns;
-  return [rowsAt(map, radius, Math.round(columns) % map.columns), columns];
+  return [rowsAt(map, radius, columnAt(map, columns)), columns];
 }
 
 export function segmentAt(map: PolarMap, rows: number, columns: number): PolarSegment | undefined {
   const row = Math.max(0, Math.min(map.rows - 1, Math.floor(rows)));
-  const number = map.segment_of[row]![Math.round(columns) % map.columns];
+  const number = map.segment_of[row]![columnAt(map, columns)];
   return map.segments.find(segment => segment.number === number);
 }
 
@@ -194,12 +210,12 @@ export function drawPolar(context: CanvasRenderingContext2D, map: PolarMap, size
       const [radius, turns] = polarOf(x + 0.5, y + 0.5, pixels);
       if (radius > 1) continue;
       const columns = turns * map.columns;
-      const nearest = Math.round(columns) % map.columns;
+      const nearest = columnAt(map, columns);
       const rows = rowsAt(map, radius, nearest);
       const row = Math.min(map.rows - 1, Math.floor(rows));
       const value = style.segments ? (means.get(map.segment_of[row]![nearest]!) ?? NaN) : valueAt(map, rows, columns);
       const at = 4 * (y * pixels + x);
-      const rgb = Number.isNaN(value) ? [60, 60, 60] : colour(style.lut, value / 100);
+      const rgb = Number.isNaN(value) ? NO_WALL : colour(style.lut, value / 100);
       image.data.set([...rgb, 255], at);
     }
   }
@@ -213,14 +229,15 @@ export function drawPolar(context: CanvasRenderingContext2D, map: PolarMap, size
   const oriented = map.orientation !== "unknown";
   context.lineWidth = 1;
   context.strokeStyle = "rgba(255,255,255,.55)";
-  for (let ring = 1; ring <= RINGS; ring++) {
+  const rings = ringsOf(map);
+  for (const ring of rings) {
     context.beginPath();
-    context.arc(middle, middle, (full * ring) / RINGS, 0, 2 * Math.PI);
+    context.arc(middle, middle, full * ring, 0, 2 * Math.PI);
     context.stroke();
   }
   const spokes: [number, number, number[]][] = [
-    [1 / 4, 2 / 4, [1, 3, 5, 7].map(n => n / 8)],
-    [2 / 4, 1, [0, 1, 2, 3, 4, 5].map(n => n / 6)],
+    [rings[0]!, rings[1]!, [1, 3, 5, 7].map(n => n / 8)],
+    [rings[1]!, 1, [0, 1, 2, 3, 4, 5].map(n => n / 6)],
   ];
   for (const [from, to, turns] of spokes) {
     for (const turn of turns) {
@@ -231,23 +248,24 @@ export function drawPolar(context: CanvasRenderingContext2D, map: PolarMap, size
     }
   }
   if (style.threshold) {
-    // The border between pixels below and above the threshold.
-    context.strokeStyle = "#fff";
+    // The border between wall below and above the threshold.
+    context.strokeStyle = thresholdOn(style.lut);
     context.lineWidth = 2;
     const below = (row: number, column: number) => {
-      const value = map.values_percent[row]?.[((column % map.columns) + map.columns) % map.columns];
-      return value != null && value < map.threshold_percent;
+      const value = map.values_percent[row]?.[column % map.columns];
+      return value == null ? null : value < map.threshold_percent;
     };
+    const parts = (one: boolean | null, other: boolean | null) => one !== null && other !== null && one !== other;
     context.beginPath();
     for (let row = 0; row < map.rows; row++) {
       for (let column = 0; column < map.columns; column++) {
-        const [low, high] = [(column - 0.5) / map.columns, (column + 0.5) / map.columns];
-        if (row + 1 < map.rows && below(row, column) !== below(row + 1, column)) {
+        const [low, high] = [column / map.columns, (column + 1) / map.columns];
+        if (row + 1 < map.rows && parts(below(row, column), below(row + 1, column))) {
           const radius = radiusOf(map, row + 1, column);
           context.moveTo(...at(radius, low));
           context.lineTo(...at(radius, high));
         }
-        if (below(row, column) !== below(row, column + 1)) {
+        if (parts(below(row, column), below(row, column + 1))) {
           context.moveTo(...at(radiusOf(map, row, column), high));
           context.lineTo(...at(radiusOf(map, row + 1, column), high));
         }
@@ -265,8 +283,8 @@ export function drawPolar(context: CanvasRenderingContext2D, map: PolarMap, size
         if (!name || name === of(row, column + 1)) continue;
         context.strokeStyle = TERRITORY[name] ?? "#fff";
         context.beginPath();
-        context.moveTo(...at(radiusOf(map, row, column), (column + 0.5) / map.columns));
-        context.lineTo(...at(radiusOf(map, row + 1, column), (column + 0.5) / map.columns));
+        context.moveTo(...at(radiusOf(map, row, column), (column + 1) / map.columns));
+        context.lineTo(...at(radiusOf(map, row + 1, column), (column + 1) / map.columns));
         context.stroke();
       }
     }
@@ -284,7 +302,7 @@ export function drawPolar(context: CanvasRenderingContext2D, map: PolarMap, size
   };
   const text = Math.max(10, Math.min(14, size / 26));
   for (const { number, mean_percent } of map.segments) {
-    const [ring, turns] = labelPlace(number);
+    const [ring, turns] = labelPlace(map, number);
     const [x, y] = at(ring, turns);
     write(mean_percent == null ? "–" : mean_percent.toFixed(0), x, y, `600 ${text}px system-ui, sans-serif`);
   }
@@ -295,7 +313,7 @@ export function drawPolar(context: CanvasRenderingContext2D, map: PolarMap, size
   }
   if (style.cursor) {
     const [rows, columns] = style.cursor;
-    const [x, y] = at(Math.min(1, radiusOf(map, Math.max(0, rows), Math.round(columns) % map.columns)), columns / map.columns);
+    const [x, y] = at(Math.min(1, radiusOf(map, Math.max(0, rows), columnAt(map, columns))), columns / map.columns);
     for (const [width, stroke] of [[4, "#000"], [2, "#4de3ff"]] as const) {
       context.lineWidth = width;
       context.strokeStyle = stroke;
@@ -306,10 +324,19 @@ export function drawPolar(context: CanvasRenderingContext2D, map: PolarMap, size
   }
 }
 
-function labelPlace(number: number): [number, number] {
+/** The middle of a segment: rows from the apex, columns from lateral. */
+export function middleOfSegment(map: PolarMap, number: number): [number, number] {
+  const [radius, turns] = labelPlace(map, number);
+  const columns = turns * map.columns;
+  return [rowsAt(map, radius, columnAt(map, columns)), columns];
+}
+
+function labelPlace(map: PolarMap, number: number): [number, number] {
   if (number === 17) return [0, 0];
+  const rings = ringsOf(map);
+  const between = (n: number) => (rings[n - 1]! + rings[n]!) / 2;
   const turn = (first: number, of: number, from: number) => (first + (number - from) / of) % 1;
-  if (number <= 6) return [7 / 8, turn(0.25, 6, 1)];
-  if (number <= 12) return [5 / 8, turn(0.25, 6, 7)];
-  return [3 / 8, turn(0.25, 4, 13)];
+  if (number <= 6) return [between(3), turn(0.25, 6, 1)];
+  if (number <= 12) return [between(2), turn(0.25, 6, 7)];
+  return [between(1), turn(0.25, 4, 13)];
 }

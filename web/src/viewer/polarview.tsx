@@ -4,15 +4,12 @@ import { useMemo, useState } from "preact/hooks";
 import { useWatched } from "../state";
 import { number } from "../words";
 import { useCanvas } from "./canvas";
-import { LUTS } from "./colours";
+import { LUTS, WALL_LUT, keep } from "./colours";
 import type { Mesh } from "./mesh";
 import { type PolarMap, WallFrame, drawPolar, placeOnMap, segmentAt, valueAt } from "./polar";
 import type { Axis } from "./plane";
 import type { Scene } from "./scene";
 import { ColourBar } from "./wall";
-
-/** Where the browser keeps the choice of colours. */
-export const WALL_LUT = "ventriform.wall-lut";
 
 interface Props {
   scene: Scene;
@@ -69,7 +66,7 @@ export function PolarView({ scene, map, mesh, heart, title }: Props) {
           <ColourBar lut={lut} low="0" high="100 %" />
           <select aria-label="Colours of polar map and wall" value={Object.keys(LUTS).find(name => LUTS[name] === lut)} onChange={event => {
             scene.wallLut.value = LUTS[event.currentTarget.value]!;
-            localStorage.setItem(WALL_LUT, event.currentTarget.value);
+            keep(WALL_LUT, event.currentTarget.value);
           }}>
             {Object.keys(LUTS).map(name => <option key={name}>{name}</option>)}
           </select>

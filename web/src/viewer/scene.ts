@@ -1,6 +1,7 @@
 // What the views of one scan share: the place looked at, the window, the layers.
 
 import { Watched } from "../state";
+import type { Camera } from "./camera";
 import type { Lut } from "./colours";
 import type { Mesh } from "./mesh";
 import type { Axis } from "./plane";
@@ -59,6 +60,9 @@ export class Scene {
   readonly view = new Watched<View>({ width: 0, middle: null });
   readonly difference = new Watched<Difference | null>(null);
   readonly smooth = new Watched<boolean>(true);
+  /** From where the walls are seen, the same for all; `turned` counts its changes. */
+  camera: Camera | null = null;
+  readonly turned = new Watched<number>(0);
 
   constructor(readonly voxels: Voxels, lut: Lut, wallLut: Lut) {
     this.cursor = new Watched<Vec>(voxels.middle);

@@ -1,6 +1,6 @@
 // One picture of all views as they stand, with the name of the scan.
 
-import { saveBlob } from "../api";
+import { saveBlob } from "../save";
 import { label } from "./drawing";
 
 export function screenshot(stage: HTMLElement, name: string): void {

@@ -1,6 +1,5 @@
 // Voxels with their place in the patient. In go the bytes of a NIfTI-1 file as the service writes it.
 
-import { call } from "../api";
 import type { Vec } from "./vector";
 
 type Row = readonly [number, number, number, number];
@@ -136,12 +135,12 @@ const TYPES: Record<number, [number, Reader]> = {
 };
 
 /** Reads a NIfTI-1 file of one frame in little-endian order. */
-export function parseNifti(bytes: ArrayBuffer): Voxels {
+function parseNifti(bytes: ArrayBuffer): Voxels {
   const view = new DataView(bytes);
-  if (view.byteLength < 352 || view.getInt32(0, true) !== 348) throw new Error("The service sent no NIfTI-1 file.");
+  if (view.byteLength < 352 || view.getInt32(0, true) !== 348) throw new Error("The voxels are no NIfTI-1 file.");
   const shape = [1, 2, 3].map(axis => view.getInt16(40 + 2 * axis, true)) as [number, number, number];
   const type = TYPES[view.getInt16(70, true)];
-  if (!type) throw new Error("The service sent voxels of an unknown type.");
+  if (!type) throw new Error("The voxels are of an unknown type.");
   const [size, read] = type;
   const start = view.getFloat32(108, true);
   const slope = view.getFloat32(112, true) || 1;
@@ -153,9 +152,8 @@ export function parseNifti(bytes: ArrayBuffer): Voxels {
   return new Voxels(shape, [row(0), row(1), row(2)], values);
 }
 
-export async function loadVoxels(path: string): Promise<Voxels> {
-  const answer = await call(path);
-  const packed = await answer.arrayBuffer();
+/** Reads such a file, packed by gzip or not. */
+export async function unpackNifti(packed: ArrayBuffer): Promise<Voxels> {
   const head = new Uint8Array(packed, 0, 2);
   if (head[0] !== 0x1f || head[1] !== 0x8b) return parseNifti(packed);
   const unpacked = new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip")));

@@ -33,6 +33,10 @@ interface Props {
   displacement: number[] | null;
   /** Distance of a model to the surface it was made of, at every vertex, mm. */
   surface: Float32Array | null;
+  /** What is written over it, where there are two. */
+  title?: string;
+  /** Whether another wall says from where both are seen. */
+  follows?: boolean;
 }
 
 /** The largest value within a wall's depth behind every vertex. */
@@ -69,12 +73,13 @@ export function uptakeOf(scene: Scene, { mesh, polar, heart }: { mesh: Mesh; pol
 function paints({ scene, mesh, inner, other, polar, displacement, surface }: Props, lut: Lut, heart: Axis | null): Paint[] {
   const list: Paint[] = [];
   const viridis = LUTS["Viridis"]!;
-  list.push({ name: "Uptake", unit: "%", lut, range: [0, 100], values: () => uptakeOf(scene, { mesh, polar, heart }) });
+  const seen = polar && heart ? true : scene.voxels.highest > scene.voxels.lowest;
+  if (seen) list.push({ name: "Uptake", unit: "%", lut, range: [0, 100], values: () => uptakeOf(scene, { mesh, polar, heart }) });
+  if (surface) list.push({ name: "Distance to the surface", unit: "mm", lut: DIVERGING, range: [-2, 2], values: () => surface });
   list.push({ name: "Thickness", unit: "mm", lut: viridis, range: [4, 20], values: () => thickness(mesh) });
   if (inner) list.push({ name: "Distance between the two walls", unit: "mm", lut: DIVERGING, range: [-6, 6], values: () => apart(mesh, inner) });
   if (other) list.push({ name: "Distance to the compared wall", unit: "mm", lut: DIVERGING, range: [-8, 8], values: () => apart(mesh, other) });
   if (displacement?.length === mesh.vertices.length) list.push({ name: "Moved by the fit", unit: "mm", lut: viridis, range: [0, 12], values: () => Float32Array.from(displacement) });
-  if (surface) list.push({ name: "Distance to the surface", unit: "mm", lut: DIVERGING, range: [-2, 2], values: () => surface });
   const sigma = mesh.uncertainty_mm;
   if (sigma?.length === mesh.vertices.length) list.push({ name: "Uncertainty (1 σ)", unit: "mm", lut: viridis, range: [0, 6], values: () => Float32Array.from(sigma) });
   list.push({ name: "Triangle shape (2r/R)", unit: "", lut: viridis, range: [0.4, 1], values: () => triangleShape(mesh) });
@@ -102,7 +107,7 @@ export function wallCamera(mesh: Mesh, heart: Axis | null, height = 135): Camera
 }
 
 export function Wall(props: Props) {
-  const { scene, mesh, other } = props;
+  const { scene, mesh, other, title, follows } = props;
   const view = useRef<MeshPainter | null>(null);
   // Whether the browser has no WebGL, or lost it.
   const [plain, setPlain] = useState(false);
@@ -117,11 +122,16 @@ export function Wall(props: Props) {
   const draw = (element: HTMLCanvasElement) => {
     const made = view.current;
     if (!made) return;
+    if (scene.camera) made.camera = scene.camera;
     made.setPoint("cursor", scene.cursor.value, [0.3, 0.89, 1]);
     made.draw();
     element.setAttribute("aria-valuetext", `seen from ${letters(made.camera.toward)}`);
   };
-  const { canvas, ask } = useCanvas(draw, act => scene.cursor.watch(act), plain);
+  const watch = (act: () => void) => {
+    const ends = [scene.cursor.watch(act), scene.turned.watch(act)];
+    return () => ends.forEach(end => end());
+  };
+  const { canvas, ask } = useCanvas(draw, watch, plain);
   useEffect(() => {
     const element = canvas.current;
     if (!element) return;
@@ -132,7 +142,7 @@ export function Wall(props: Props) {
       return;
     }
     const made = view.current;
-    const end = listen(element, made, ask, scene, () => setPlain(true));
+    const end = listen(element, made, () => (scene.turned.value += 1), scene, () => setPlain(true));
     return () => {
       end();
       made.end();
@@ -142,11 +152,10 @@ export function Wall(props: Props) {
 
   // The camera starts where the anterior and lateral wall are seen, apex down to the left as in the patient.
   useEffect(() => {
-    const made = view.current;
-    if (!made) return;
-    made.camera = wallCamera(mesh, heart);
-    ask();
-  }, [scene, mesh, plain, heart === null]);
+    if (follows) return;
+    scene.camera = wallCamera(mesh, heart);
+    scene.turned.value += 1;
+  }, [scene, mesh, plain, heart === null, follows]);
 
   useEffect(() => {
     const made = view.current;
@@ -162,7 +171,8 @@ export function Wall(props: Props) {
   const [low, high] = paint.range;
   return (
     <figure class="wall">
-      <canvas key={plain} ref={canvas} tabIndex={0} role="slider" aria-label="The wall in three dimensions; arrow keys turn it" aria-valuenow={0} />
+      <canvas key={plain} ref={canvas} tabIndex={0} role="slider" aria-label={`The wall in three dimensions${title ? `, ${title}` : ""}; arrow keys turn it`} aria-valuenow={0} />
+      {title && <p class="tag">{title}</p>}
       {plain && <p class="off">This browser offers no WebGL: the wall is drawn plainly and turns more slowly. All else works.</p>}
       <figcaption>
         <select aria-label="Colour of the wall" value={paint.name} onChange={event => setChosen(event.currentTarget.value)}>
