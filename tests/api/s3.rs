@@ -386,6 +386,12 @@ async fn the_service_works_with_its_files_in_a_bucket() {
         }
     }
 
+    // Uploaded again by somebody who does not know whose scan it is: the stored file is read.
+    let identity = format!("/v1/volumes/{id}/identity");
+    let erased = app.delete(&identity).send().await.unwrap();
+    assert!(erased.status().is_success());
+    assert_eq!(app.volume("sphere").await, id);
+
     // Damaged in the bucket: found, and repaired by the same upload.
     let stored = server.keys(&format!("{prefix}/volumes/{id}")).await;
     let original = stored

@@ -195,8 +195,8 @@ impl Bundle {
         let id = self.volume_id();
         let records = self.records();
         let hold = app.queue.hold(&id).await;
-        if app.queue.has_intact_volume(&id).await? {
-            let scan = scans::to_note(app, tenant, &id, &records).await?;
+        if let Some(stored) = app.queue.intact_volume(&id).await? {
+            let scan = scans::to_note(app, tenant, &id, &stored).await?;
             let renewed = app.queue.renew_volume(tenant, &id, tags, scan.as_ref());
             if let Some((volume, new)) = renewed.await? {
                 return Ok(Stored { volume, new, hold });

@@ -249,14 +249,14 @@ impl Queue {
         Ok(true)
     }
 
-    /// Whether a volume is stored, whoever has it, and its files are not damaged.
+    /// The files of a volume, if it is stored, whoever has it, and they are not damaged.
     ///
     /// # Errors
     /// If the storage fails.
-    pub async fn has_intact_volume(&self, id: &str) -> Result<bool, StoreError> {
+    pub async fn intact_volume(&self, id: &str) -> Result<Option<Vec<FileRecord>>, StoreError> {
         match self.catalogue.record(id).await? {
-            Some(record) => Ok(self.is_intact(&record).await?),
-            None => Ok(false),
+            Some(record) if self.is_intact(&record).await? => Ok(Some(record.files())),
+            _ => Ok(None),
         }
     }
 
