@@ -90,6 +90,8 @@ library_alone() {
 }
 
 need cc build-essential
+# The tests start a server of their own; Debian keeps its programs off the path.
+ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || need no-such-command postgresql
 command -v cargo >/dev/null || { echo "cargo not found: install Rust 1.95 or newer"; failed=1; finish; }
 # Downloads take little processor time, so they run while the library compiles.
 [ "$quick" = --quick ] || start install install_external_tools

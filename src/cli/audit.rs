@@ -1,11 +1,10 @@
 //! `ventriform audit`: checks the audit trail of a data folder, also while the service runs on it.
 
+use super::data_args::DataArgs;
 use crate::access::{AccessStore, AuditFilter, fhir, verify};
 use crate::jobs::ListRequest;
-use crate::store::open_rows;
 use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
-use std::path::PathBuf;
 use tokio::runtime::Runtime;
 
 /// Check or print the audit trail, also while the service runs
@@ -24,16 +23,9 @@ pub struct AuditArgs {
 #[derive(Debug, Subcommand)]
 enum AuditCommand {
     /// Walk the chain of hashes and name the first break; fails if there is one
-    Verify(TrailArgs),
+    Verify(DataArgs),
     /// Print all events, newest first, one FHIR AuditEvent per line
-    Print(TrailArgs),
-}
-
-#[derive(Debug, Args)]
-struct TrailArgs {
-    /// Data folder of the service [env: VENTRIFORM_DATA_DIR] [default: ventriform-data]
-    #[arg(long, value_name = "DIR")]
-    data_dir: Option<PathBuf>,
+    Print(DataArgs),
 }
 
 /// Runs the command.
@@ -49,8 +41,8 @@ pub fn run(args: &AuditArgs) -> Result<()> {
     })
 }
 
-async fn check(args: &TrailArgs) -> Result<()> {
-    let store = open_rows(&super::serve::data_dir(args.data_dir.as_ref())?).await?;
+async fn check(args: &DataArgs) -> Result<()> {
+    let store = args.open().await?;
     let report = verify(&*store).await?;
     if let Some(broken) = report.broken {
         bail!(
@@ -65,8 +57,8 @@ async fn check(args: &TrailArgs) -> Result<()> {
     Ok(())
 }
 
-async fn print(args: &TrailArgs) -> Result<()> {
-    let store = open_rows(&super::serve::data_dir(args.data_dir.as_ref())?).await?;
+async fn print(args: &DataArgs) -> Result<()> {
+    let store = args.open().await?;
     let mut before = None;
     loop {
         let page = ListRequest {

@@ -1,13 +1,12 @@
 //! `ventriform keys`: makes, lists and revokes API keys in a data folder, also while the service
 //! runs on it.
 
+use super::data_args::DataArgs;
 use crate::access::{AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Quota, Scope};
 use crate::config::{Size, Span};
 use crate::jobs::{Clock, ListRequest, SystemClock, Tenant, Timestamp, rfc3339};
-use crate::store::open_rows;
 use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
-use std::path::PathBuf;
 use tokio::runtime::Runtime;
 
 /// Make, list and revoke API keys, also while the service runs
@@ -32,13 +31,6 @@ enum KeysCommand {
     List(DataArgs),
     /// Revoke a key; a running service refuses it within a second
     Revoke(RevokeArgs),
-}
-
-#[derive(Debug, Args)]
-struct DataArgs {
-    /// Data folder of the service [env: VENTRIFORM_DATA_DIR] [default: ventriform-data]
-    #[arg(long, value_name = "DIR")]
-    data_dir: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -108,7 +100,7 @@ async fn create(args: &CreateArgs) -> Result<()> {
         expires_at: args.expires.map(|s| now.saturating_add(span(s))),
     };
     let (key, text) = ApiKey::make(request, now)?;
-    let store = open_rows(&folder(&args.data)?).await?;
+    let store = args.data.open().await?;
     let event = event(Activity::KeyCreated, &key, now);
     store.add_key(&key, &event).await?;
     eprintln!(
@@ -120,7 +112,7 @@ async fn create(args: &CreateArgs) -> Result<()> {
 }
 
 async fn list(args: &DataArgs) -> Result<()> {
-    let store = open_rows(&folder(args)?).await?;
+    let store = args.open().await?;
     let now = SystemClock.now();
     let mut before = None;
     println!("id\tstate\tscope\ttenant\tcreated\texpires\tname");
@@ -146,7 +138,7 @@ async fn list(args: &DataArgs) -> Result<()> {
 }
 
 async fn revoke(args: &RevokeArgs) -> Result<()> {
-    let store = open_rows(&folder(&args.data)?).await?;
+    let store = args.data.open().await?;
     let Some(key) = store.key(&args.id).await? else {
         bail!(
             "there is no key {}; `ventriform keys list` shows all",
@@ -162,8 +154,4 @@ async fn revoke(args: &RevokeArgs) -> Result<()> {
 
 fn event(activity: Activity, key: &ApiKey, now: Timestamp) -> AuditEvent {
     AuditEvent::new(now, activity, key.tenant.clone(), AGENT.into()).on(&key.id)
-}
-
-fn folder(args: &DataArgs) -> Result<PathBuf> {
-    super::serve::data_dir(args.data_dir.as_ref())
 }

@@ -1,8 +1,9 @@
 //! `ventriform templates import`: adds models to the library in a service's data folder.
 
-use crate::config::Settings;
+use super::serve::settings_beside;
+use crate::config::{DatabaseUrl, Settings};
 use crate::jobs::{Queue, QueueSettings, SystemClock, TemplateSource, Tenant};
-use crate::store::Store;
+use crate::store::{Store, StoreSettings};
 use crate::volume::ReadLimits;
 use crate::work::Engine;
 use anyhow::{Context, Result, anyhow};
@@ -27,6 +28,10 @@ pub struct ImportArgs {
     /// Data folder of the service (created if missing)
     #[arg(long, value_name = "DIR")]
     data_dir: PathBuf,
+    /// Database of the service: `sqlite`, or the URL of a PostgreSQL database
+    /// [env: VENTRIFORM_DATABASE] [default: sqlite]
+    #[arg(long, value_name = "URL")]
+    database: Option<DatabaseUrl>,
     /// Fit the models in every job with `model=auto`, beside the built-in hearts; otherwise only jobs
     /// that name them do
     #[arg(long)]
@@ -42,7 +47,12 @@ pub struct ImportArgs {
 /// If a mesh cannot serve as a template, or the data folder is in use or cannot be written.
 pub fn import(args: &ImportArgs) -> Result<()> {
     Runtime::new()?.block_on(async {
-        let store = Store::open(&args.data_dir).await?;
+        let settings = settings_beside(Some(&args.data_dir), args.database.as_ref())?;
+        let database = StoreSettings {
+            database: settings.postgres(),
+            ..StoreSettings::default()
+        };
+        let store = Store::open_with(&settings.data_dir, database).await?;
         let queue = Arc::new(Queue::new(
             store.rows.clone(),
             store.rows.clone(),

@@ -4,6 +4,7 @@ mod audit;
 mod bar;
 mod calibrate;
 mod cohort_args;
+mod data_args;
 mod demo;
 mod dicom_args;
 mod doctor;

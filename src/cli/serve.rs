@@ -1,6 +1,6 @@
 //! `ventriform serve` and `ventriform healthcheck`: settings, log, listener, signals.
 
-use crate::config::{Flags, LogFormat, Settings};
+use crate::config::{DatabaseUrl, Flags, LogFormat, Settings};
 use crate::http::{self, Running};
 use crate::jobs::{Isolation, serve_isolated};
 use crate::volume::ReadLimits;
@@ -221,16 +221,20 @@ pub fn compute(args: &ComputeArgs) -> Result<()> {
     serve_isolated(&args.engine().works).context("standard input holds no job of a service")
 }
 
-/// The data folder of a command beside the service: the given one, or that of the settings.
+/// The settings of a command beside the service, with the given data folder and database.
 ///
 /// # Errors
 /// If a setting is invalid.
-pub fn data_dir(given: Option<&PathBuf>) -> Result<PathBuf> {
+pub fn settings_beside(
+    data_dir: Option<&PathBuf>,
+    database: Option<&DatabaseUrl>,
+) -> Result<Settings> {
     let flags = Flags {
-        data_dir: given.cloned(),
+        data_dir: data_dir.cloned(),
+        database: database.cloned(),
         ..Flags::default()
     };
-    Ok(Settings::load(&flags, variable)?.0.data_dir)
+    Ok(Settings::load(&flags, variable)?.0)
 }
 
 pub(super) fn variable(name: &str) -> Option<String> {

@@ -15,14 +15,15 @@ mod units;
 
 pub use tables::Tables;
 pub use units::{
-    Auto, AutoSize, AwsVariables, BlobPlace, Count, Keyword, Limit, LogFormat, MinFree, Networks,
-    NoAddress, NoLimit, Off, OptionalAddress, OptionalPath, OrKeyword, OtlpEndpoint, OwnRetention,
-    Retention, Size, Span, Words,
+    Auto, AutoSize, AwsVariables, BlobPlace, Count, DatabaseUrl, Keyword, Limit, LogFormat,
+    MinFree, Networks, NoAddress, NoLimit, Off, OptionalAddress, OptionalPath, OrKeyword,
+    OtlpEndpoint, OwnRetention, Retention, Size, Span, Words,
 };
 
 use crate::archive::Archives;
 use crate::hooks::AllowList;
 use crate::intake::{AeTitle, Rule, Sender};
+use crate::store::PostgresSettings;
 use crate::worklist::Procedure;
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -249,6 +250,13 @@ settings! {
     /// Largest size of the copies of files in an S3 store, kept in the data folder. They can be
     /// deleted at any time
     blob_cache: Size = "2GiB";
+    /// Where jobs and records are kept: `sqlite` is a file in data_dir; else the URL of a PostgreSQL
+    /// database, postgres://user:password@host:5432/name
+    database: DatabaseUrl = "sqlite";
+    /// How long a start waits for a database on a server
+    database_wait: Span = "60s";
+    /// Largest number of connections to a database on a server, from 2
+    database_connections: u32 = "16";
     /// Space of the disk to keep free; with less, uploads and jobs are refused with status 507 while
     /// accepted jobs go on. `auto` is 256 MiB, or 5 % of a smaller disk; `0B` turns this off
     min_free: MinFree = "auto";
@@ -567,6 +575,15 @@ impl Settings {
         }
     }
 
+    /// The database on a server, if the records are kept on one.
+    pub fn postgres(&self) -> Option<PostgresSettings> {
+        self.database.0.clone().map(|url| PostgresSettings {
+            url,
+            connections: self.database_connections.max(2),
+            patience: self.database_wait.0,
+        })
+    }
+
     /// The settings as TOML that reads back, with the origin of each as a comment.
     pub fn print(&self, origins: &Origins) -> String {
         let lines = Self::NAMES
@@ -619,7 +636,11 @@ impl Layers {
             Ok(value) => Ok((value, origin)),
             Err(error) => Err(ConfigError::BadValue {
                 setting,
-                value: text.to_owned(),
+                // It may hold a password.
+                value: match setting {
+                    "database" => "...".to_owned(),
+                    _ => text.to_owned(),
+                },
                 origin,
                 reason: error.to_string(),
             }),
@@ -692,6 +713,7 @@ shown_by_display!(
     AeTitle,
     AllowList,
     BlobPlace,
+    DatabaseUrl,
     OtlpEndpoint,
     SocketAddr,
     Count,

@@ -3,6 +3,7 @@
 //! Each value is printed exactly as it may be written, so `--print-config` reads back unchanged.
 //! (`humantime` and `bytesize` print 90 s as `1m 30s` and round sizes to one decimal.)
 
+use crate::store::PostgresUrl;
 use ipnet::IpNet;
 use std::fmt;
 use std::marker::PhantomData;
@@ -235,6 +236,19 @@ impl Keyword for AutoSize {
     const WORD: &'static str = "auto";
     const EXPECTED: &'static str = "a size such as 256MiB, or 0B for none";
 }
+
+/// The keyword `sqlite`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InFolder;
+
+impl Keyword for InFolder {
+    const WORD: &'static str = "sqlite";
+    const EXPECTED: &'static str = "a URL such as postgres://user@host:5432/name; characters such as @ : / in a user or password \
+         are written as %40 %3A %2F";
+}
+
+/// The URL of a database on a server, or `sqlite`: a file in the data folder.
+pub type DatabaseUrl = OrKeyword<PostgresUrl, InFolder>;
 
 /// A size from 0, or `auto`: what fits the disk.
 pub type MinFree = OrKeyword<Size, AutoSize>;

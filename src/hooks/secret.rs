@@ -4,10 +4,11 @@
 //! HMAC-SHA256 of `ID.TIMESTAMP.BODY`, written as `v1,` and base64. With two secrets, while one
 //! replaces the other, there are two signatures, separated by a space.
 
+use crate::jobs::random_key;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use hmac::{Hmac, KeyInit, Mac};
-use sha2::{Digest, Sha256};
+use sha2::Sha256;
 use std::fmt;
 use std::str::FromStr;
 
@@ -26,13 +27,9 @@ pub struct SigningSecret(Vec<u8>);
 pub struct InvalidSecret;
 
 impl SigningSecret {
-    /// A new secret of 32 bytes: the SHA-256 of three random UUIDs, 366 random bits.
+    /// A new secret of 32 bytes.
     pub fn random() -> Self {
-        let mut hash = Sha256::new();
-        for _ in 0..3 {
-            hash.update(uuid::Uuid::new_v4().as_bytes());
-        }
-        Self(hash.finalize().to_vec())
+        Self(random_key().to_vec())
     }
 
     /// The secret as it is given to receivers.

@@ -50,7 +50,12 @@ fn why_unready(error: &StoreError) -> &'static str {
         (StoreFault::Busy, _) => {
             "The database was not free in time: the machine is overloaded, or another program holds it."
         }
-        (StoreFault::Away, _) => "The S3 store of the files does not answer, or refuses.",
+        (StoreFault::Away, StoreError::Files(_)) => {
+            "The S3 store of the files does not answer, or refuses."
+        }
+        (StoreFault::Away, StoreError::Database { .. }) => {
+            "The database server (PostgreSQL) cannot be reached, or does not accept writes."
+        }
         (StoreFault::DamagedDatabase, _) => "The database is damaged.",
         (_, StoreError::Files(_)) => "Files cannot be written.",
         (_, StoreError::Database { .. }) => "The database does not answer.",

@@ -385,6 +385,7 @@ fn store_settings(settings: &Settings) -> StoreSettings {
     StoreSettings {
         min_free: settings.min_free.0.map(|size| size.0),
         write_wait: settings.write_wait.0,
+        database: settings.postgres(),
         s3: s3_location(settings),
         cache: settings.blob_cache.0,
     }

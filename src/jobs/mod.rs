@@ -61,7 +61,7 @@ mod worker;
 pub use clock::{Clock, SteadyClock, SystemClock, Timestamp, parse_rfc3339, rfc3339};
 pub use failure::{Failure, Fault};
 pub(crate) use ids::hex;
-pub use ids::{content_id, random_id, volume_id};
+pub use ids::{content_id, random_id, random_key, volume_id};
 pub use isolation::Isolation;
 pub use job::{Filed, Idempotency, Job, JobState, JobWebhook, NewJob, SendOrder, SeriesSource};
 pub use observer::JobObserver;

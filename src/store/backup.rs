@@ -11,9 +11,12 @@
 
 use super::blobs::{self, RECEIVED, RECORD, STAGING};
 use super::content;
+use super::database::SqlStore;
 use super::doctor::{DoctorError, names};
-use super::sqlite::SqliteStore;
-use super::{CLOSED, DATABASE, DiskGauge, FolderLock, OpenError, StoreSettings, check_place};
+use super::sqlite;
+use super::{
+    CLOSED, DATABASE, DiskGauge, FolderLock, OpenError, StoreSettings, check_place, require_file,
+};
 use crate::jobs::{ItemRecord, RecordPages, Resource, StoreError};
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -40,6 +43,7 @@ pub struct Backup {
 /// If there is no database in `folder`, a service uses `target`, or the disk fails.
 pub async fn backup(folder: &Path, target: &Path) -> Result<Backup, DoctorError> {
     check_place(folder, None)?;
+    require_file(folder)?;
     // If no service runs, closing the database moves its log into it.
     match FolderLock::take(folder) {
         Ok(lock) if lock.log_is_missing(folder) => {
@@ -50,7 +54,7 @@ pub async fn backup(folder: &Path, target: &Path) -> Result<Backup, DoctorError>
         Err(error) => return Err(error.into()),
     }
     let source = folder.join(DATABASE);
-    if !SqliteStore::has_tables(&source).await {
+    if !sqlite::has_tables(&source).await {
         return Err(OpenError::Unusable {
             path: source,
             reason: "there is no database to copy".into(),
@@ -67,9 +71,9 @@ pub async fn backup(folder: &Path, target: &Path) -> Result<Backup, DoctorError>
     fs::create_dir_all(target.join(STAGING))?;
 
     let snapshot = target.join(STAGING).join(DATABASE);
-    SqliteStore::snapshot(&source, &snapshot).await?;
+    SqlStore::snapshot(&source, &snapshot).await?;
     let gauge = DiskGauge::new(target, Some(0));
-    let rows = SqliteStore::open(&snapshot, StoreSettings::default().write_wait, gauge)
+    let rows = SqlStore::open(&snapshot, StoreSettings::default().write_wait, gauge)
         .await
         .map_err(StoreError::from)?;
     let received = copy_received(folder, target, &rows).await;
@@ -102,7 +106,7 @@ pub async fn backup(folder: &Path, target: &Path) -> Result<Backup, DoctorError>
 async fn copy_items(
     folder: &Path,
     target: &Path,
-    rows: &SqliteStore,
+    rows: &SqlStore,
 ) -> Result<(Backup, BTreeSet<String>), DoctorError> {
     let (mut done, mut kept) = (Backup::default(), BTreeSet::new());
     let mut pages = RecordPages::new(rows, PAGE);
@@ -134,7 +138,7 @@ async fn copy_items(
 async fn copy_received(
     folder: &Path,
     target: &Path,
-    rows: &SqliteStore,
+    rows: &SqlStore,
 ) -> Result<BTreeSet<String>, DoctorError> {
     let mut kept = BTreeSet::new();
     for (name, sha256) in rows.waiting_files().await? {

@@ -23,11 +23,14 @@
 
 use super::blobs::{self, DISCARDED, QUARANTINE, RECEIVED, RECORD, STAGING};
 use super::content;
+use super::database::SqlStore;
 use super::findings::Examination;
 use super::received;
 use super::s3::{BucketDoctor, S3Blobs, S3Location};
-use super::sqlite::SqliteStore;
-use super::{CLOSED, DATABASE, DiskGauge, FolderLock, OpenError, StoreSettings, check_place};
+use super::sqlite;
+use super::{
+    CLOSED, DATABASE, DiskGauge, FolderLock, OpenError, StoreSettings, check_place, require_file,
+};
 use crate::jobs::{
     Clock, Custody, FileRecord, ItemRecord, RecordPages, Resource, StoreError, SystemClock, Tenant,
     random_id, volume_id,
@@ -72,6 +75,7 @@ pub async fn examine(
         .into());
     }
     check_place(folder, s3)?;
+    require_file(folder)?;
     let mut lock = FolderLock::take(folder)?;
     let bucket = match s3 {
         Some(location) => {
@@ -115,10 +119,7 @@ impl Doctor<'_> {
     }
 
     /// Checks the database. `None` if there is none that can be read and none may be made.
-    async fn database(
-        &mut self,
-        lock: &mut FolderLock,
-    ) -> Result<Option<SqliteStore>, DoctorError> {
+    async fn database(&mut self, lock: &mut FolderLock) -> Result<Option<SqlStore>, DoctorError> {
         let path = self.folder.join(DATABASE);
         // Opening and closing the database moves the log into it.
         let log_missing = lock.log_is_missing(self.folder);
@@ -126,7 +127,7 @@ impl Doctor<'_> {
             lock.mark(CLOSED)?;
         }
         let made_anew = self.if_repairing("a new database was made");
-        if !SqliteStore::has_tables(&path).await {
+        if !sqlite::has_tables(&path).await {
             self.found.note(
                 "database-missing",
                 DATABASE,
@@ -164,14 +165,14 @@ impl Doctor<'_> {
         self.new_database(Some(path)).await
     }
 
-    async fn open_database(&self) -> Result<SqliteStore, sqlx::Error> {
+    async fn open_database(&self) -> Result<SqlStore, sqlx::Error> {
         let settings = StoreSettings::default();
         let gauge = DiskGauge::new(self.folder, Some(0));
-        SqliteStore::open(&self.folder.join(DATABASE), settings.write_wait, gauge).await
+        SqlStore::open(&self.folder.join(DATABASE), settings.write_wait, gauge).await
     }
 
     /// Makes a new database, with the rows of the old one that can be read.
-    async fn new_database(&self, old: Option<PathBuf>) -> Result<Option<SqliteStore>, DoctorError> {
+    async fn new_database(&self, old: Option<PathBuf>) -> Result<Option<SqlStore>, DoctorError> {
         if self.heirs.is_none() {
             return Ok(None);
         }
@@ -216,7 +217,7 @@ impl Doctor<'_> {
         Ok(ids)
     }
 
-    async fn items(&mut self, rows: &SqliteStore) -> Result<(), DoctorError> {
+    async fn items(&mut self, rows: &SqlStore) -> Result<(), DoctorError> {
         if let Some(blobs) = &self.bucket {
             let doctor = BucketDoctor {
                 blobs,
@@ -234,7 +235,7 @@ impl Doctor<'_> {
     }
 
     /// Checks the files of every row. Returns the ids that have a row.
-    async fn rows(&mut self, rows: &SqliteStore) -> Result<BTreeSet<String>, DoctorError> {
+    async fn rows(&mut self, rows: &SqlStore) -> Result<BTreeSet<String>, DoctorError> {
         let mut known = BTreeSet::new();
         let mut pages = RecordPages::new(rows, PAGE);
         while let Some(page) = pages.next().await? {
@@ -247,7 +248,7 @@ impl Doctor<'_> {
     }
 
     /// Checks the files of received objects against their rows.
-    async fn received(&mut self, rows: &SqliteStore) -> Result<(), DoctorError> {
+    async fn received(&mut self, rows: &SqlStore) -> Result<(), DoctorError> {
         let shelf = self.folder.join(RECEIVED);
         let mut known = BTreeSet::new();
         for (name, sha256) in rows.waiting_files().await? {
@@ -284,7 +285,7 @@ impl Doctor<'_> {
         Ok(())
     }
 
-    async fn row(&mut self, rows: &SqliteStore, record: &ItemRecord) -> Result<(), DoctorError> {
+    async fn row(&mut self, rows: &SqlStore, record: &ItemRecord) -> Result<(), DoctorError> {
         self.found.items += 1;
         let id = record.id();
         let place = self.folder.join(blobs::shelf_path(id));
@@ -347,7 +348,7 @@ impl Doctor<'_> {
     /// Checks that every folder of an item has a row.
     async fn folders(
         &mut self,
-        rows: &SqliteStore,
+        rows: &SqlStore,
         known: &BTreeSet<String>,
     ) -> Result<(), DoctorError> {
         for id in self.shelved()? {
@@ -390,7 +391,7 @@ impl Doctor<'_> {
     }
 
     /// Brings back what was set aside and is whole.
-    async fn quarantine(&mut self, rows: &SqliteStore) -> Result<(), DoctorError> {
+    async fn quarantine(&mut self, rows: &SqlStore) -> Result<(), DoctorError> {
         let shelf = self.folder.join(QUARANTINE);
         for day in names(&shelf)? {
             if day.starts_with("database-") {

@@ -1,9 +1,10 @@
-//! Storage of the service: SQLite for records, a folder for files.
+//! Storage of the service: SQLite or PostgreSQL for records, a folder for files.
 //!
 //! ```text
 //! DATA_DIR/
 //!   lock              held by the process that uses this folder; says whether it was closed
-//!   ventriform.db     jobs, volumes, products (WAL, synchronous=FULL)
+//!   ventriform.db     jobs, volumes, products (SQLite: WAL, synchronous=FULL)
+//!   database          instead of it, where they are on a server (PostgreSQL)
 //!   staging/          files not yet published; emptied at every start
 //!   discarded/        files that are being deleted
 //!   quarantine/DAY/   files that were found without a record
@@ -27,35 +28,28 @@ mod backup;
 mod blobs;
 mod cache;
 mod content;
+mod database;
 mod doctor;
-mod erasure;
 mod faults;
 mod findings;
+mod postgres;
+mod query;
 mod received;
-mod rows;
 mod s3;
 mod space;
 mod sqlite;
-mod sqlite_access;
-mod sqlite_archives;
-mod sqlite_catalogue;
-mod sqlite_custody;
-mod sqlite_figures;
-mod sqlite_hooks;
-mod sqlite_intake;
-mod sqlite_jobs;
 mod sqlite_repair;
-mod sqlite_scans;
-mod sqlite_worklist;
+mod tables;
 mod writer;
 
 pub use backup::{Backup, backup};
 pub use blobs::FileBlobs;
+pub use database::SqlStore;
 pub use doctor::{DoctorError, examine};
 pub use findings::{Examination, Finding};
+pub use postgres::{PostgresError, PostgresSettings, PostgresUrl};
 pub use s3::{S3Blobs, S3Location, S3Refusal};
 pub use space::DiskGauge;
-pub use sqlite::SqliteStore;
 
 use crate::intake::ReceivedFiles;
 use crate::jobs::{BlobError, BlobStore, Resource};
@@ -76,6 +70,8 @@ pub struct StoreSettings {
     pub s3: Option<S3Location>,
     /// Largest size of the local copies of files in a bucket, bytes.
     pub cache: u64,
+    /// The server of the database; `None` is a file in the data folder.
+    pub database: Option<PostgresSettings>,
 }
 
 impl Default for StoreSettings {
@@ -85,6 +81,7 @@ impl Default for StoreSettings {
             write_wait: Duration::from_secs(2),
             s3: None,
             cache: 2 << 30,
+            database: None,
         }
     }
 }
@@ -92,7 +89,7 @@ impl Default for StoreSettings {
 /// The database of one data folder, which is locked while this exists, and the files.
 pub struct Store {
     /// The database.
-    pub rows: Arc<SqliteStore>,
+    pub rows: Arc<SqlStore>,
     /// The files of items.
     pub blobs: Arc<dyn BlobStore>,
     /// The files of received objects.
@@ -168,6 +165,39 @@ pub enum OpenError {
     /// The bucket cannot be read.
     #[error(transparent)]
     Blobs(#[from] BlobError),
+    /// It holds items, but the database on the server has never held any.
+    #[error(
+        "{folder} holds stored items, but {url} is empty. Give the database that belongs to the folder, \
+         or another folder (data_dir)", folder = .folder.display(),
+    )]
+    DatabaseEmpty {
+        /// The folder.
+        folder: PathBuf,
+        /// The database.
+        url: PostgresUrl,
+    },
+    /// Its records are in a database on a server.
+    #[error(
+        "the records of {folder} are kept in {url}. Give that database by --database or \
+         VENTRIFORM_DATABASE; it is checked and copied by the tools of PostgreSQL, such as pg_dump. If \
+         the folder does not belong to it any more, delete {marker}",
+        folder = .folder.display(), marker = .folder.join(MARKER).display(),
+    )]
+    OnServer {
+        /// The folder.
+        folder: PathBuf,
+        /// Where its records are.
+        url: String,
+    },
+    /// Its records are in a file.
+    #[error(
+        "the records of {folder} are kept in its file {DATABASE}. Start without --database, or give \
+         another folder (data_dir)", folder = .0.display(),
+    )]
+    InFile(PathBuf),
+    /// The database on the server cannot be used.
+    #[error(transparent)]
+    Server(#[from] PostgresError),
     /// It cannot be created, read or written.
     #[error("{path}: {reason}")]
     Unusable {
@@ -195,25 +225,34 @@ impl Store {
         let mut lock = locked(folder)?;
         check_place(folder, settings.s3.as_ref())?;
         let gauge = DiskGauge::new(folder, settings.min_free);
-        let (blobs, received): (Arc<dyn BlobStore>, Arc<dyn ReceivedFiles>) = match &settings.s3 {
-            None => {
-                let blobs = FileBlobs::open(folder, gauge.clone());
-                let blobs = Arc::new(blobs.map_err(|e| unusable(folder, &e))?);
-                (blobs.clone(), blobs)
-            }
-            Some(location) => {
-                let blobs = S3Blobs::open(location, folder, gauge.clone(), settings.cache).await?;
-                let database = folder.join(DATABASE);
-                if !SqliteStore::has_tables(&database).await && blobs.has_items().await? {
-                    let blobs = location.to_string();
-                    return Err(OpenError::RowsMissing { blobs, database });
+        let (blobs, received, empty): (Arc<dyn BlobStore>, Arc<dyn ReceivedFiles>, bool) =
+            match &settings.s3 {
+                None => {
+                    let empty = !has_items(folder).map_err(|e| unusable(folder, &e))?;
+                    let blobs = FileBlobs::open(folder, gauge.clone());
+                    let blobs = Arc::new(blobs.map_err(|e| unusable(folder, &e))?);
+                    (blobs.clone(), blobs, empty)
                 }
-                note_place(folder, location).map_err(|e| unusable(folder, &e))?;
-                let blobs = Arc::new(blobs);
-                (blobs.clone(), blobs)
-            }
+                Some(location) => {
+                    let blobs =
+                        S3Blobs::open(location, folder, gauge.clone(), settings.cache).await?;
+                    let empty = !blobs.has_items().await?;
+                    let database = folder.join(DATABASE);
+                    let made = settings.database.is_some() || sqlite::has_tables(&database).await;
+                    if !made && !empty {
+                        let blobs = location.to_string();
+                        return Err(OpenError::RowsMissing { blobs, database });
+                    }
+                    note_place(folder, location).map_err(|e| unusable(folder, &e))?;
+                    let blobs = Arc::new(blobs);
+                    (blobs.clone(), blobs, empty)
+                }
+            };
+        let wait = settings.write_wait;
+        let rows = match &settings.database {
+            Some(server) => on_server(folder, empty, server, wait, gauge).await?,
+            None => in_file(folder, &mut lock, wait, gauge).await?,
         };
-        let rows = open_database(folder, &mut lock, settings.write_wait, gauge).await?;
         Ok(Self {
             rows: Arc::new(rows),
             blobs,
@@ -229,17 +268,70 @@ impl Store {
     }
 }
 
+/// Opens the database on a server; `empty` says whether there are no files of items.
+async fn on_server(
+    folder: &Path,
+    empty: bool,
+    server: &PostgresSettings,
+    write_wait: Duration,
+    gauge: DiskGauge,
+) -> Result<SqlStore, OpenError> {
+    let marker = folder.join(MARKER);
+    if folder.join(DATABASE).exists() {
+        return Err(OpenError::InFile(folder.to_owned()));
+    }
+    let rows = SqlStore::connect(server, write_wait, gauge).await?;
+    if !empty && rows.is_new().await.map_err(|e| unusable(folder, &e))? {
+        return Err(OpenError::DatabaseEmpty {
+            folder: folder.to_owned(),
+            url: server.url.clone(),
+        });
+    }
+    std::fs::write(&marker, format!("{}\n", server.url)).map_err(|e| unusable(&marker, &e))?;
+    Ok(rows)
+}
+
+/// Refuses a folder whose records are on a server.
+fn require_file(folder: &Path) -> Result<(), OpenError> {
+    match std::fs::read_to_string(folder.join(MARKER)) {
+        Ok(url) => Err(OpenError::OnServer {
+            folder: folder.to_owned(),
+            url: url.trim().to_owned(),
+        }),
+        Err(_) => Ok(()),
+    }
+}
+
+/// The database of the settings, for commands beside a service that may be running on it. Creates a
+/// folder and a file of SQLite if they are missing.
+///
+/// # Errors
+/// If it cannot be used, or a service of another version runs on it.
+pub async fn open_database(
+    folder: &Path,
+    database: Option<&PostgresSettings>,
+) -> Result<Arc<SqlStore>, OpenError> {
+    match database {
+        Some(server) => {
+            let wait = StoreSettings::default().write_wait;
+            let gauge = DiskGauge::new(folder, None);
+            Ok(Arc::new(SqlStore::connect(server, wait, gauge).await?))
+        }
+        None => open_rows(folder).await,
+    }
+}
+
 /// The database of a data folder, for commands beside a service that may be running on it. Creates
 /// folder and database if they are missing.
 ///
 /// # Errors
 /// If the folder cannot be used, or a service of another version runs on it.
-pub async fn open_rows(folder: &Path) -> Result<Arc<SqliteStore>, OpenError> {
+pub async fn open_rows(folder: &Path) -> Result<Arc<SqlStore>, OpenError> {
     let wait = StoreSettings::default().write_wait;
     let gauge = DiskGauge::new(folder, None);
     match locked(folder) {
         Ok(mut lock) => {
-            let rows = open_database(folder, &mut lock, wait, gauge).await?;
+            let rows = in_file(folder, &mut lock, wait, gauge).await?;
             Ok(Arc::new(rows))
         }
         Err(OpenError::InUse(_)) => {
@@ -256,7 +348,7 @@ pub async fn open_rows(folder: &Path) -> Result<Arc<SqliteStore>, OpenError> {
                     "the service that runs on it has another version than this command".into(),
                 ));
             }
-            let rows = SqliteStore::open(&database, wait, gauge).await;
+            let rows = SqlStore::open(&database, wait, gauge).await;
             rows.map(Arc::new).map_err(|e| unusable(e.to_string()))
         }
         Err(error) => Err(error),
@@ -280,19 +372,20 @@ fn locked(folder: &Path) -> Result<FolderLock, OpenError> {
     }
 }
 
-/// Opens the database, or makes it in a folder without items.
-async fn open_database(
+/// Opens the database in a folder, or makes it in a folder without items.
+async fn in_file(
     folder: &Path,
     lock: &mut FolderLock,
     write_wait: Duration,
     gauge: DiskGauge,
-) -> Result<SqliteStore, OpenError> {
+) -> Result<SqlStore, OpenError> {
     let database = folder.join(DATABASE);
+    require_file(folder)?;
     let empty = !has_items(folder).map_err(|e| unusable(folder, &e))?;
-    if !empty && !SqliteStore::has_tables(&database).await {
+    if !empty && !sqlite::has_tables(&database).await {
         return Err(OpenError::DatabaseMissing(folder.to_owned()));
     }
-    let rows = SqliteStore::open(&database, write_wait, gauge).await;
+    let rows = SqlStore::open(&database, write_wait, gauge).await;
     let rows = rows.map_err(|e| unusable(&database, &e))?;
     if log_of(folder).exists() {
         lock.mark(OPEN).map_err(|e| unusable(folder, &e))?;
@@ -370,6 +463,9 @@ fn has_items(folder: &Path) -> std::io::Result<bool> {
 
 /// The name of the database.
 const DATABASE: &str = "ventriform.db";
+
+/// The file that says which database on a server holds the records of the folder.
+const MARKER: &str = "database";
 
 /// The database's write-ahead log.
 fn log_of(folder: &Path) -> PathBuf {

@@ -1,24 +1,26 @@
 //! Repairing and copying the database; for [`super::doctor`] and [`backup()`](super::backup()).
 
-use super::rows::to_json;
-use super::sqlite::SqliteStore;
-use super::writer::Write;
+use super::database::SqlStore;
+use super::query::query;
+use super::tables::{insert_content, to_json};
 use crate::jobs::{ItemRecord, StoreResult, Tenant};
 use sqlx::sqlite::SqliteConnectOptions;
-use sqlx::{AssertSqlSafe, ConnectOptions, Connection, Row, SqliteConnection};
+use sqlx::{AssertSqlSafe, ConnectOptions, Connection, SqliteConnection};
 use std::path::Path;
 
-impl SqliteStore {
+impl SqlStore {
     /// What is wrong with the database's structure: `PRAGMA integrity_check` and
     /// `foreign_key_check`.
     pub(super) async fn all_defects(&self) -> StoreResult<Vec<String>> {
-        let checked = sqlx::query("PRAGMA integrity_check(20)");
-        let lines = checked.fetch_all(&self.readers).await?;
-        let lines = lines.into_iter().map(|row| row.get::<String, _>(0));
-        let mut defects: Vec<String> = lines.filter(|line| line != "ok").collect();
-        let keys = sqlx::query("PRAGMA foreign_key_check");
+        let checked = query("PRAGMA integrity_check(20)");
+        let mut defects = Vec::new();
+        for row in checked.fetch_all(&self.readers).await? {
+            let line: String = row.try_get(0)?;
+            defects.extend(Some(line).filter(|line| line != "ok"));
+        }
+        let keys = query("PRAGMA foreign_key_check");
         for row in keys.fetch_all(&self.readers).await? {
-            let table: String = row.get(0);
+            let table: String = row.try_get(0)?;
             defects.push(format!(
                 "a row of `{table}` names another that does not exist"
             ));
@@ -30,16 +32,13 @@ impl SqliteStore {
     pub(super) async fn forget(&self, id: &str) -> StoreResult<()> {
         let mut transaction = self.writer.begin().await?;
         for statement in [
-            "DELETE FROM volumes WHERE id = ?",
-            "DELETE FROM products WHERE id = ?",
-            "DELETE FROM sources WHERE id = ?",
-            "DELETE FROM scans WHERE volume = ?",
-            "DELETE FROM holdings WHERE id = ?",
+            "DELETE FROM volumes WHERE id = $1",
+            "DELETE FROM products WHERE id = $1",
+            "DELETE FROM sources WHERE id = $1",
+            "DELETE FROM scans WHERE volume = $1",
+            "DELETE FROM holdings WHERE id = $1",
         ] {
-            sqlx::query(statement)
-                .bind(id)
-                .execute(&mut *transaction)
-                .await?;
+            query(statement).bind(id).execute(&mut transaction).await?;
         }
         transaction.commit().await
     }
@@ -49,45 +48,45 @@ impl SqliteStore {
         let mut transaction = self.writer.begin().await?;
         let (id, kind, created_at) = match record {
             ItemRecord::Volume(volume) => {
-                sqlx::query(
+                query(
                     "INSERT OR REPLACE INTO volumes (id, created_at, bytes, files, facts)
-                     VALUES (?, ?, ?, ?, ?)",
+                     VALUES ($1, $2, $3, $4, $5)",
                 )
                 .bind(&volume.id)
                 .bind(volume.created_at)
                 .bind(i64::try_from(volume.bytes).unwrap_or(i64::MAX))
                 .bind(to_json(&volume.files)?)
                 .bind(to_json(&volume.facts)?)
-                .execute(&mut *transaction)
+                .execute(&mut transaction)
                 .await?;
                 (&volume.id, "volume", volume.created_at)
             }
             ItemRecord::Product(product) => {
-                super::sqlite_catalogue::insert_content(&mut transaction, product).await?;
+                insert_content(&mut transaction, product).await?;
                 (&product.id, product.resource().noun(), product.created_at)
             }
         };
-        sqlx::query(
+        query(
             "INSERT INTO holdings (tenant, id, kind, created_at, renewed_at)
-             SELECT ?1, ?2, ?3, ?4, ?4
-             WHERE NOT EXISTS (SELECT 1 FROM holdings WHERE id = ?2)",
+             SELECT $1, $2, $3, $4, $4
+             WHERE NOT EXISTS (SELECT 1 FROM holdings WHERE id = $2)",
         )
         .bind(heir.as_str())
         .bind(id)
         .bind(kind)
         .bind(created_at)
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
         if let ItemRecord::Product(product) = record
             && let Some(volume) = &product.volume
         {
-            sqlx::query(
+            query(
                 "INSERT OR IGNORE INTO sources (tenant, id, volume)
-                 SELECT tenant, id, ?2 FROM holdings WHERE id = ?1",
+                 SELECT tenant, id, $2 FROM holdings WHERE id = $1",
             )
             .bind(id)
             .bind(volume)
-            .execute(&mut *transaction)
+            .execute(&mut transaction)
             .await?;
         }
         transaction.commit().await
@@ -96,21 +95,22 @@ impl SqliteStore {
     /// Copies every row that can be read from the damaged database `old`; none, if it cannot even be
     /// opened.
     pub(super) async fn salvage(&self, old: &Path) -> StoreResult<()> {
-        let tables: Vec<String> = sqlx::query_scalar(
+        let tables = query(
             "SELECT name FROM sqlite_schema
              WHERE type = 'table' AND name NOT LIKE 'sqlite\\_%' ESCAPE '\\'
                AND name NOT IN ('_sqlx_migrations', 'probe')",
         )
         .fetch_all(&self.readers)
         .await?;
-        let mut connection = self.writer.connect().await?;
+        let mut connection = self.file()?.connect().await?;
         let attached = sqlx::query("ATTACH ? AS old")
             .bind(old.to_string_lossy())
             .execute(&mut connection)
             .await;
         match attached {
             Ok(_) => {
-                for table in tables {
+                for row in tables {
+                    let table: String = row.try_get(0)?;
                     if let Err(error) = salvage_table(&mut connection, &table).await {
                         tracing::warn!(table, %error, "no row of this table could be read");
                     }
@@ -125,7 +125,7 @@ impl SqliteStore {
             "DELETE FROM scans WHERE NOT EXISTS
              (SELECT 1 FROM holdings h WHERE h.tenant = scans.tenant AND h.id = scans.volume)",
         ] {
-            sqlx::query(orphans).write(&self.writer).await?;
+            query(orphans).write(&self.writer).await?;
         }
         Ok(())
     }

@@ -198,11 +198,6 @@ pub(super) trait Write: Sized {
     /// Runs it; returns the rows of its `RETURNING`.
     async fn write_all(self, writer: &Writer) -> StoreResult<Vec<SqliteRow>>;
 
-    /// Runs it; returns the first row of its `RETURNING`.
-    async fn write_optional(self, writer: &Writer) -> StoreResult<Option<SqliteRow>> {
-        Ok(self.write_all(writer).await?.into_iter().next())
-    }
-
     /// Runs it; returns the number of rows it changed.
     async fn write(self, writer: &Writer) -> StoreResult<u64>;
 }
@@ -285,10 +280,10 @@ mod tests {
         drop(transaction);
         assert_eq!(writer.version(), None, "its end is not known");
         let row = sqlx::query("INSERT INTO t VALUES (2) RETURNING x")
-            .write_optional(&writer)
+            .write_all(&writer)
             .await
             .unwrap();
-        assert_eq!(row.unwrap().get::<i64, _>(0), 2);
+        assert_eq!(row[0].get::<i64, _>(0), 2);
         let version = writer.version();
         assert!(version.is_some());
         let done = sqlx::query("DELETE FROM t WHERE x = 3").write(&writer);

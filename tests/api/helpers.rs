@@ -23,7 +23,7 @@ use ventriform::jobs::{
 use ventriform::mesh::TriMesh;
 use ventriform::mesh::shapes::icosphere;
 use ventriform::progress::{Monitor, Plan, Stage};
-use ventriform::store::open_rows;
+use ventriform::store::{open_database, open_rows};
 use ventriform::volume::ReadLimits;
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
@@ -65,6 +65,11 @@ impl Api {
     pub fn delete(&self, path: &str) -> RequestBuilder {
         self.client.delete(format!("{}{path}", self.url))
     }
+}
+
+/// Whether the tests of the service run on PostgreSQL: `VENTRIFORM_TEST_DATABASE=postgres`.
+fn on_postgres() -> bool {
+    std::env::var("VENTRIFORM_TEST_DATABASE").is_ok_and(|engine| engine == "postgres")
 }
 
 /// A running service and a client.
@@ -115,6 +120,9 @@ impl TestApp {
         };
         if std::env::var_os("VENTRIFORM_TEST_BLOBS").is_some_and(|place| place == "s3") {
             s3_server::keep_files_in_bucket(&mut settings);
+        }
+        if on_postgres() {
+            settings.database = super::postgres::database_of(data.path()).await;
         }
         change(&mut settings);
         let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
@@ -231,7 +239,14 @@ pub async fn key(data: &Path, scope: Scope, tenant: &str, quota: Quota) -> (Stri
         expires_at: None,
     };
     let (key, text) = ApiKey::make(request, now).unwrap();
-    let store = open_rows(data).await.unwrap();
+    let store = match on_postgres() {
+        true => {
+            let url = super::postgres::database_of(data).await.0.unwrap();
+            let settings = super::postgres::reached_at(url);
+            open_database(data, Some(&settings)).await.unwrap()
+        }
+        false => open_rows(data).await.unwrap(),
+    };
     let event = AuditEvent::new(now, Activity::KeyCreated, key.tenant.clone(), "test".into());
     store.add_key(&key, &event.on(&key.id)).await.unwrap();
     (key.id, text)
@@ -543,7 +558,12 @@ impl Service {
 
     /// The same, with environment variables.
     pub async fn start_with(data: &Path, arguments: &[&str], variables: &[(&str, String)]) -> Self {
+        let database = match on_postgres() {
+            true => Some(super::postgres::database_of(data).await.to_string()),
+            false => None,
+        };
         let mut process = Command::new(env!("CARGO_BIN_EXE_ventriform"))
+            .envs(database.map(|url| ("VENTRIFORM_DATABASE", url)))
             .args(["serve", "--listen", "127.0.0.1:0", "--data-dir"])
             .arg(data)
             .args(arguments)

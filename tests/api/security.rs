@@ -18,7 +18,7 @@ use ventriform::access::{AccessStore, Activity, AuditEvent, BrokenLink, Quota, S
 use ventriform::config::Settings;
 use ventriform::http::{ServeError, document_json, start};
 use ventriform::jobs::{Clock, SystemClock, Tenant};
-use ventriform::store::{SqliteStore, open_rows};
+use ventriform::store::{SqlStore, open_rows};
 
 async fn plain_key(app: &TestApp, scope: Scope) -> String {
     key(app.data.path(), scope, "default", Quota::default())
@@ -568,7 +568,7 @@ async fn tamper(folder: &Path, sql: &'static str) -> Result<(), sqlx::Error> {
     connection.close().await
 }
 
-async fn trail(rows: i64) -> (tempfile::TempDir, Arc<SqliteStore>) {
+async fn trail(rows: i64) -> (tempfile::TempDir, Arc<SqlStore>) {
     let folder = tempfile::tempdir().unwrap();
     let store = open_rows(folder.path()).await.unwrap();
     let events: Vec<_> = (1..=rows).map(event).collect();

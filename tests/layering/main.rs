@@ -156,7 +156,7 @@ const USES: &[(&str, &[&str])] = &[
     ),
     (
         "config",
-        &["jobs", "hooks", "archive", "intake", "worklist"],
+        &["jobs", "hooks", "archive", "intake", "worklist", "store"],
     ),
     (
         "http",

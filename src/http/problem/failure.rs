@@ -87,12 +87,20 @@ impl From<StoreError> for Problem {
                 "Send the request again after the number of seconds in Retry-After; if that does \
                  not help, ask the operator to check the disk.",
             ),
-            StoreFault::Away => later(problem(
-                StatusCode::SERVICE_UNAVAILABLE,
-                "storage-away",
-                "The store of the service's files does not answer, so nothing was stored or read.",
-            ))
-            .fix("Send the request again after the number of seconds in Retry-After."),
+            StoreFault::Away => {
+                let (code, detail) = match &error {
+                    StoreError::Files(_) => (
+                        "storage-away",
+                        "The store of the service's files does not answer, so nothing was stored or read.",
+                    ),
+                    StoreError::Database { .. } => (
+                        "database-away",
+                        "The service's database does not answer, so nothing was stored or read.",
+                    ),
+                };
+                later(problem(StatusCode::SERVICE_UNAVAILABLE, code, detail))
+                    .fix("Send the request again after the number of seconds in Retry-After.")
+            }
             StoreFault::DamagedFile => problem(
                 StatusCode::INTERNAL_SERVER_ERROR,
                 "damaged-file",

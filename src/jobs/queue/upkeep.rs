@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 use tokio_util::sync::CancellationToken;
 
 /// Makes the table consistent after the previous process ended at any moment: returns its running
-/// jobs to the queue. To be called before the first worker starts, by the only process on the
-/// store. With a `limit`, jobs that were running when that many processes died are failed; a
+/// jobs to the queue. To be called before the first worker starts. If other processes may use the store,
+/// only jobs whose leases have expired are returned. With a `limit`, jobs that were running when that many processes died are failed; a
 /// program that can compute them in a process of their own needs none. Files without a record are
 /// left to [`Custodian`](super::Custodian).
 ///
@@ -19,7 +19,8 @@ pub async fn recover_after_crash(
     limit: Option<&DeathLimit>,
 ) -> Result<(), StoreError> {
     let now = queue.clock.now();
-    let released = queue.jobs.release_dead(None, limit, now).await?;
+    let alive = Some(queue.run.as_str()).filter(|_| queue.jobs.is_shared());
+    let released = queue.jobs.release_dead(alive, limit, now).await?;
     if !released.is_empty() {
         tracing::warn!(
             released = released.len(),

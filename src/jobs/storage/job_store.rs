@@ -176,6 +176,9 @@ pub trait JobStore: Send + Sync + 'static {
     /// Cancels a waiting job; marks a running one for cancellation.
     async fn interrupt(&self, id: &str, now: Timestamp) -> StoreResult<Interrupted>;
 
+    /// Whether other processes may use the store too.
+    fn is_shared(&self) -> bool;
+
     /// Checks, for readiness, that the database answers and can be written. Takes no longer than
     /// a write may wait.
     async fn check(&self) -> StoreResult<()>;

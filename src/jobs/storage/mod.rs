@@ -2,7 +2,7 @@
 //!
 //! [`JobStore`] holds the queue's table, [`Catalogue`] the records of volumes and products, and
 //! [`BlobStore`] their files, and [`Scans`] whose scans the volumes are; [`Custody`] is what is needed to look
-//! after them. The module `store` implements them with SQLite and a folder.
+//! after them. The module `store` implements them with SQLite or PostgreSQL, and a folder.
 
 mod blobs;
 mod catalogue;
@@ -85,7 +85,8 @@ pub enum StoreFault {
     Busy,
     /// The disk does not read or write.
     Disk,
-    /// The store of files on another machine does not answer, or refuses to.
+    /// A server, of the database or of the files, is not reached, or refuses. It works again when the
+    /// server does.
     Away,
     /// The content of a file is not what was stored, or the file is gone. The same upload repairs
     /// it.

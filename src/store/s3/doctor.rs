@@ -13,8 +13,8 @@ use crate::jobs::{
     SystemClock, Tenant,
 };
 use crate::store::blobs::{QUARANTINE, RECEIVED, RECORD, is_plain, shelf_path};
+use crate::store::database::SqlStore;
 use crate::store::findings::Examination;
-use crate::store::sqlite::SqliteStore;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Rows read at a time.
@@ -23,7 +23,7 @@ const PAGE: u32 = 200;
 /// What a bucket is checked against.
 pub(in crate::store) struct BucketDoctor<'a> {
     pub blobs: &'a S3Blobs,
-    pub rows: &'a SqliteStore,
+    pub rows: &'a SqlStore,
     /// Who gets items whose holder is unknown; `None` repairs nothing.
     pub heirs: Option<&'a Tenant>,
     pub found: &'a mut Examination,

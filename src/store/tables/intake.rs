@@ -1,8 +1,6 @@
-//! The tables of received objects in SQLite.
+//! The tables of received objects.
 
 use super::rows;
-use super::sqlite::SqliteStore;
-use super::writer::Write;
 use crate::intake::{
     Added, GROUP_PREFIX, GroupState, IntakeGroup, IntakeRoom, IntakeStore, NewObject, Origin,
     Protocol, ReceivedObject,
@@ -10,20 +8,20 @@ use crate::intake::{
 use crate::jobs::{
     Failure, ListPage, ListRequest, StoreError, StoreResult, Tenant, Timestamp, random_id,
 };
+use crate::store::database::{SqlStore, Transaction};
+use crate::store::query::{DbRow, QueryBuilder, query};
 use async_trait::async_trait;
-use sqlx::sqlite::{SqliteConnection, SqliteRow};
-use sqlx::{QueryBuilder, Row};
 use std::collections::BTreeSet;
 
 /// The columns of a group, with what is counted of its objects.
 const GROUPS: &str = "SELECT g.*,
     (SELECT count(*) FROM intake_objects WHERE group_id = g.id) AS objects,
-    (SELECT coalesce(sum(bytes), 0) FROM intake_objects
-     WHERE group_id = g.id AND file IS NOT NULL) AS waiting_bytes
+    CAST((SELECT coalesce(sum(bytes), 0) FROM intake_objects
+     WHERE group_id = g.id AND file IS NOT NULL) AS BIGINT) AS waiting_bytes
     FROM intake_groups AS g";
 
 #[async_trait]
-impl IntakeStore for SqliteStore {
+impl IntakeStore for SqlStore {
     async fn add(
         &self,
         object: &NewObject,
@@ -40,10 +38,10 @@ impl IntakeStore for SqliteStore {
             }
             Some((_, false, None)) => return roll_back(transaction, Added::Conflict).await,
             Some((_, false, Some(file))) => {
-                sqlx::query("DELETE FROM intake_objects WHERE tenant = ? AND sop_instance = ?")
+                query("DELETE FROM intake_objects WHERE tenant = $1 AND sop_instance = $2")
                     .bind(tenant)
                     .bind(&header.sop_instance)
-                    .execute(&mut *transaction)
+                    .execute(&mut transaction)
                     .await?;
                 Some(file)
             }
@@ -53,10 +51,10 @@ impl IntakeStore for SqliteStore {
             return roll_back(transaction, Added::NoRoom).await;
         }
         let group = open_group(&mut transaction, object, now).await?;
-        sqlx::query(
+        query(
             "INSERT INTO intake_objects (tenant, sop_instance, group_id, data_sha256, file_sha256,
                                          file, bytes, received_at)
-             VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+             VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
         )
         .bind(tenant)
         .bind(&header.sop_instance)
@@ -66,7 +64,7 @@ impl IntakeStore for SqliteStore {
         .bind(&object.file)
         .bind(i64::try_from(object.bytes).unwrap_or(i64::MAX))
         .bind(now)
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
         transaction.commit().await?;
         Ok(Added::New(group, obsolete))
@@ -87,8 +85,8 @@ impl IntakeStore for SqliteStore {
     }
 
     async fn objects(&self, group: &str) -> StoreResult<Vec<ReceivedObject>> {
-        let rows = sqlx::query(
-            "SELECT file_sha256, file FROM intake_objects WHERE group_id = ? ORDER BY sop_instance",
+        let rows = query(
+            "SELECT file_sha256, file FROM intake_objects WHERE group_id = $1 ORDER BY sop_instance",
         )
         .bind(group)
         .fetch_all(&self.readers)
@@ -108,10 +106,10 @@ impl IntakeStore for SqliteStore {
         volume: &str,
         now: Timestamp,
     ) -> StoreResult<()> {
-        sqlx::query(
-            "UPDATE intake_groups SET volume = ?1, changed_at = ?2, failure = NULL,
-                    state = iif(revision = ?3, 'filing', state)
-             WHERE id = ?4",
+        query(
+            "UPDATE intake_groups SET volume = $1, changed_at = $2, failure = NULL,
+                    state = CASE revision WHEN $3 THEN 'filing' ELSE state END
+             WHERE id = $4",
         )
         .bind(volume)
         .bind(now)
@@ -130,17 +128,17 @@ impl IntakeStore for SqliteStore {
         now: Timestamp,
     ) -> StoreResult<Vec<String>> {
         let mut transaction = self.writer.begin().await?;
-        let stored = sqlx::query(
-            "UPDATE intake_groups SET job = ?1, failure = ?2, state = 'stored', changed_at = ?3
-             WHERE id = ?4 AND state = 'filing'",
+        let stored = query(
+            "UPDATE intake_groups SET job = $1, failure = $2, state = 'stored', changed_at = $3
+             WHERE id = $4 AND state = 'filing'",
         )
         .bind(job)
         .bind(failure.map(rows::to_json).transpose()?)
         .bind(now)
         .bind(group)
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
-        let files = match stored.rows_affected() {
+        let files = match stored {
             0 => Vec::new(),
             _ => files_of(&mut transaction, group).await?,
         };
@@ -155,9 +153,9 @@ impl IntakeStore for SqliteStore {
         failure: &Failure,
         now: Timestamp,
     ) -> StoreResult<()> {
-        sqlx::query(
-            "UPDATE intake_groups SET state = 'failed', failure = ?1, changed_at = ?2
-             WHERE id = ?3 AND revision = ?4",
+        query(
+            "UPDATE intake_groups SET state = 'failed', failure = $1, changed_at = $2
+             WHERE id = $3 AND revision = $4",
         )
         .bind(rows::to_json(failure)?)
         .bind(now)
@@ -171,25 +169,25 @@ impl IntakeStore for SqliteStore {
     async fn released(&self, files: &[String]) -> StoreResult<()> {
         let mut transaction = self.writer.begin().await?;
         for file in files {
-            sqlx::query(
-                "UPDATE intake_objects SET file = NULL WHERE file = ?1 AND EXISTS
+            query(
+                "UPDATE intake_objects SET file = NULL WHERE file = $1 AND EXISTS
                      (SELECT 1 FROM intake_groups WHERE id = group_id AND state = 'stored')",
             )
             .bind(file)
-            .execute(&mut *transaction)
+            .execute(&mut transaction)
             .await?;
         }
         transaction.commit().await
     }
 
     async fn releasable(&self) -> StoreResult<Vec<String>> {
-        let rows = sqlx::query(
+        let rows = query(
             "SELECT file FROM intake_objects JOIN intake_groups AS g ON g.id = group_id
              WHERE file IS NOT NULL AND state = 'stored'",
         )
         .fetch_all(&self.readers)
         .await?;
-        rows::all(rows, |row| Ok(row.try_get(0)?))
+        rows::all(rows, |row| row.try_get(0))
     }
 
     async fn groups(
@@ -214,26 +212,26 @@ impl IntakeStore for SqliteStore {
 
     async fn remove(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Vec<String>>> {
         let mut transaction = self.writer.begin().await?;
-        let known = sqlx::query("SELECT 1 FROM intake_groups WHERE id = ? AND tenant = ?")
+        let known = query("SELECT 1 FROM intake_groups WHERE id = $1 AND tenant = $2")
             .bind(id)
             .bind(tenant.as_str())
-            .fetch_optional(&mut *transaction)
+            .fetch_optional(&mut transaction)
             .await?;
         if known.is_none() {
             return roll_back(transaction, None).await;
         }
         let files = files_of(&mut transaction, id).await?;
-        sqlx::query("DELETE FROM intake_groups WHERE id = ?")
+        query("DELETE FROM intake_groups WHERE id = $1")
             .bind(id)
-            .execute(&mut *transaction)
+            .execute(&mut transaction)
             .await?;
         transaction.commit().await?;
         Ok(Some(files))
     }
 
     async fn failed_before(&self, before: Timestamp) -> StoreResult<Vec<(Tenant, String)>> {
-        let rows = sqlx::query(
-            "SELECT tenant, id FROM intake_groups WHERE state = 'failed' AND changed_at < ?",
+        let rows = query(
+            "SELECT tenant, id FROM intake_groups WHERE state = 'failed' AND changed_at < $1",
         )
         .bind(before)
         .fetch_all(&self.readers)
@@ -242,26 +240,30 @@ impl IntakeStore for SqliteStore {
     }
 
     async fn files(&self) -> StoreResult<BTreeSet<String>> {
-        let rows = sqlx::query("SELECT file FROM intake_objects WHERE file IS NOT NULL")
+        let rows = query("SELECT file FROM intake_objects WHERE file IS NOT NULL")
             .fetch_all(&self.readers)
             .await?;
-        rows.into_iter().map(|row| Ok(row.try_get(0)?)).collect()
+        rows.into_iter().map(|row| row.try_get(0)).collect()
     }
 
     async fn waiting(&self) -> StoreResult<(u64, u64)> {
-        let row = sqlx::query(
-            "SELECT count(*), coalesce(sum(bytes), 0) FROM intake_objects WHERE file IS NOT NULL",
+        let row = query(
+            "SELECT count(*), CAST(coalesce(sum(bytes), 0) AS BIGINT) FROM intake_objects
+             WHERE file IS NOT NULL",
         )
         .fetch_one(&self.readers)
         .await?;
-        Ok((unsigned(row.try_get(0)?), unsigned(row.try_get(1)?)))
+        Ok((
+            rows::unsigned(row.try_get(0)?),
+            rows::unsigned(row.try_get(1)?),
+        ))
     }
 }
 
-impl SqliteStore {
+impl SqlStore {
     /// Name and SHA-256 of every file of an object that waits.
-    pub(super) async fn waiting_files(&self) -> StoreResult<Vec<(String, String)>> {
-        let rows = sqlx::query(
+    pub(in crate::store) async fn waiting_files(&self) -> StoreResult<Vec<(String, String)>> {
+        let rows = query(
             "SELECT file, file_sha256 FROM intake_objects WHERE file IS NOT NULL ORDER BY file",
         )
         .fetch_all(&self.readers)
@@ -270,8 +272,8 @@ impl SqliteStore {
     }
 
     /// Removes the object that has this file.
-    pub(super) async fn forget_received(&self, file: &str) -> StoreResult<()> {
-        sqlx::query("DELETE FROM intake_objects WHERE file = ?")
+    pub(in crate::store) async fn forget_received(&self, file: &str) -> StoreResult<()> {
+        query("DELETE FROM intake_objects WHERE file = $1")
             .bind(file)
             .write(&self.writer)
             .await?;
@@ -280,10 +282,7 @@ impl SqliteStore {
 }
 
 /// Ends a transaction that has changed nothing.
-async fn roll_back<T>(
-    transaction: super::writer::WriteTransaction<'_>,
-    answer: T,
-) -> StoreResult<T> {
+async fn roll_back<T>(transaction: Transaction<'_>, answer: T) -> StoreResult<T> {
     // A commit keeps the connection; there is nothing to undo.
     transaction.commit().await?;
     Ok(answer)
@@ -292,14 +291,14 @@ async fn roll_back<T>(
 /// The group of an object with the same SOP Instance UID, whether it is the same object, and, if it
 /// may be replaced because its group failed, its file.
 async fn earlier(
-    to: &mut SqliteConnection,
+    to: &mut Transaction<'_>,
     object: &NewObject,
 ) -> StoreResult<Option<(String, bool, Option<String>)>> {
-    let row = sqlx::query(
-        "SELECT group_id, data_sha256 = ?1 AND study = ?2 AND series = ?3, file,
+    let row = query(
+        "SELECT group_id, data_sha256 = $1 AND study = $2 AND series = $3, file,
                 state = 'failed'
          FROM intake_objects AS o JOIN intake_groups AS g ON g.id = o.group_id
-         WHERE o.tenant = ?4 AND sop_instance = ?5",
+         WHERE o.tenant = $4 AND sop_instance = $5",
     )
     .bind(&object.data_sha256)
     .bind(&object.header.study)
@@ -319,10 +318,10 @@ async fn earlier(
 }
 
 /// A group that could not be read is read again when its objects are sent again.
-async fn reopen_failed(to: &mut SqliteConnection, group: &str, now: Timestamp) -> StoreResult<()> {
-    sqlx::query(
+async fn reopen_failed(to: &mut Transaction<'_>, group: &str, now: Timestamp) -> StoreResult<()> {
+    query(
         "UPDATE intake_groups SET state = 'gathering', failure = NULL, revision = revision + 1,
-                changed_at = ? WHERE id = ? AND state = 'failed'",
+                changed_at = $1 WHERE id = $2 AND state = 'failed'",
     )
     .bind(now)
     .bind(group)
@@ -332,30 +331,30 @@ async fn reopen_failed(to: &mut SqliteConnection, group: &str, now: Timestamp) -
 }
 
 async fn has_room(
-    to: &mut SqliteConnection,
+    to: &mut Transaction<'_>,
     object: &NewObject,
     room: IntakeRoom,
 ) -> StoreResult<bool> {
-    let row = sqlx::query(
-        "SELECT count(*), coalesce(sum(bytes), 0),
-                coalesce(sum(bytes) FILTER (WHERE tenant = ?1), 0)
+    let row = query(
+        "SELECT count(*), CAST(coalesce(sum(bytes), 0) AS BIGINT),
+                CAST(coalesce(sum(bytes) FILTER (WHERE tenant = $1), 0)
                 + (SELECT coalesce(sum(bytes), 0) FROM volumes WHERE id IN
-                      (SELECT id FROM holdings WHERE tenant = ?1 AND kind = 'volume'))
+                      (SELECT id FROM holdings WHERE tenant = $1 AND kind = 'volume')) AS BIGINT)
          FROM intake_objects WHERE file IS NOT NULL",
     )
     .bind(object.origin.tenant.as_str())
     .fetch_one(to)
     .await?;
     let [objects, bytes, of_tenant] = [0, 1, 2].map(|column| row.try_get::<i64, _>(column));
-    let fits = |used: i64, limit: u64| unsigned(used).saturating_add(object.bytes) <= limit;
-    Ok(unsigned(objects?) < room.objects
+    let fits = |used: i64, limit: u64| rows::unsigned(used).saturating_add(object.bytes) <= limit;
+    Ok(rows::unsigned(objects?) < room.objects
         && fits(bytes?, room.bytes)
         && fits(of_tenant?, room.tenant_bytes.unwrap_or(u64::MAX)))
 }
 
 /// Finds or makes the group of an object, and opens it. Returns its id.
 async fn open_group(
-    to: &mut SqliteConnection,
+    to: &mut Transaction<'_>,
     object: &NewObject,
     now: Timestamp,
 ) -> StoreResult<String> {
@@ -364,13 +363,14 @@ async fn open_group(
         true => "",
         false => header.sop_instance.as_str(),
     };
-    let row = sqlx::query(
+    let row = query(
         "INSERT INTO intake_groups (id, tenant, study, series, instance, modality, image_type,
              study_description, protocol, sender, address, state, revision, created_at, changed_at)
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, 'gathering', 1, ?12, ?12)
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, 'gathering', 1, $12, $12)
          ON CONFLICT (tenant, study, series, instance) DO UPDATE SET
              protocol = excluded.protocol, sender = excluded.sender, address = excluded.address,
-             state = 'gathering', revision = revision + 1, failure = NULL, changed_at = ?12
+             state = 'gathering', revision = intake_groups.revision + 1, failure = NULL,
+             changed_at = $12
          RETURNING id",
     )
     .bind(random_id(GROUP_PREFIX))
@@ -387,23 +387,18 @@ async fn open_group(
     .bind(now)
     .fetch_one(to)
     .await?;
-    Ok(row.try_get(0)?)
+    row.try_get(0)
 }
 
-async fn files_of(to: &mut SqliteConnection, group: &str) -> StoreResult<Vec<String>> {
-    let rows =
-        sqlx::query("SELECT file FROM intake_objects WHERE group_id = ? AND file IS NOT NULL")
-            .bind(group)
-            .fetch_all(to)
-            .await?;
-    rows::all(rows, |row| Ok(row.try_get(0)?))
+async fn files_of(to: &mut Transaction<'_>, group: &str) -> StoreResult<Vec<String>> {
+    let rows = query("SELECT file FROM intake_objects WHERE group_id = $1 AND file IS NOT NULL")
+        .bind(group)
+        .fetch_all(to)
+        .await?;
+    rows::all(rows, |row| row.try_get(0))
 }
 
-fn unsigned(number: i64) -> u64 {
-    u64::try_from(number).unwrap_or(0)
-}
-
-fn group(row: SqliteRow) -> StoreResult<IntakeGroup> {
+fn group(row: DbRow) -> StoreResult<IntakeGroup> {
     let damaged = |what: &str| StoreError::database(format!("damaged row: {what}"));
     let instance: String = row.try_get("instance")?;
     let failure: Option<&str> = row.try_get("failure")?;
@@ -431,8 +426,8 @@ fn group(row: SqliteRow) -> StoreResult<IntakeGroup> {
         volume: row.try_get("volume")?,
         job: row.try_get("job")?,
         failure: failure.map_err(|error| damaged(&error.to_string()))?,
-        objects: unsigned(row.try_get("objects")?),
-        waiting_bytes: unsigned(row.try_get("waiting_bytes")?),
+        objects: rows::unsigned(row.try_get("objects")?),
+        waiting_bytes: rows::unsigned(row.try_get("waiting_bytes")?),
         created_at: row.try_get("created_at")?,
         changed_at: row.try_get("changed_at")?,
     })

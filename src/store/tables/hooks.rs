@@ -1,16 +1,15 @@
-//! The tables of webhooks in SQLite. Deliveries are written by a trigger of the jobs table; see the
+//! The tables of webhooks. Deliveries are written by a trigger of the jobs table; see the
 //! migration.
 
 use super::rows;
-use super::sqlite::SqliteStore;
 use crate::hooks::{
     AttemptOutcome, Backlog, Delivery, DeliveryLimits, DeliveryState, DeliveryStore, DueDelivery,
     HookEndpoint, HookEvent, Settlement, SigningSecret,
 };
 use crate::jobs::{StoreResult, Tenant, Timestamp};
+use crate::store::database::{SqlStore, Transaction};
+use crate::store::query::{DbRow, query};
 use async_trait::async_trait;
-use sqlx::Row;
-use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
 /// `last_outcome` of deliveries that were given up without an attempt.
 const TOO_OLD: &str = "too-old";
@@ -18,10 +17,10 @@ const TOO_MANY: &str = "too-many";
 const ENDPOINT_REMOVED: &str = "endpoint-removed";
 
 #[async_trait]
-impl DeliveryStore for SqliteStore {
+impl DeliveryStore for SqlStore {
     async fn destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
         // Jumps through the index from destination to destination.
-        let rows = sqlx::query(
+        let rows = query(
             "WITH RECURSIVE found (name) AS (
                  SELECT min(destination) FROM deliveries WHERE state = 'pending'
                  UNION ALL
@@ -45,14 +44,14 @@ impl DeliveryStore for SqliteStore {
         now: Timestamp,
         limit: usize,
     ) -> StoreResult<Vec<DueDelivery>> {
-        let rows = sqlx::query(
+        let rows = query(
             "SELECT d.*, e.secret AS endpoint_secret, s.secret AS tenant_secret,
-                    CASE WHEN s.former_until > ?2 THEN s.former END AS former_secret
+                    CASE WHEN s.former_until > $2 THEN s.former END AS former_secret
              FROM deliveries AS d
              LEFT JOIN webhook_endpoints AS e ON e.id = d.endpoint
              LEFT JOIN webhook_secrets AS s ON s.tenant = d.tenant
-             WHERE d.state = 'pending' AND d.destination = ?1 AND d.next_attempt_at <= ?2
-             ORDER BY d.next_attempt_at LIMIT ?3",
+             WHERE d.state = 'pending' AND d.destination = $1 AND d.next_attempt_at <= $2
+             ORDER BY d.next_attempt_at LIMIT $3",
         )
         .bind(destination)
         .bind(now)
@@ -70,11 +69,11 @@ impl DeliveryStore for SqliteStore {
         };
         let ended = (state != DeliveryState::Pending).then_some(now);
         let mut transaction = self.writer.begin().await?;
-        sqlx::query(
-            "UPDATE deliveries SET state = ?1, attempts = attempts + 1, last_attempt_at = ?2,
-                    last_status = ?3, last_outcome = ?4, ended_at = ?5,
-                    next_attempt_at = coalesce(?6, next_attempt_at)
-             WHERE id = ?7 AND state = 'pending'",
+        query(
+            "UPDATE deliveries SET state = $1, attempts = attempts + 1, last_attempt_at = $2,
+                    last_status = $3, last_outcome = $4, ended_at = $5,
+                    next_attempt_at = coalesce($6, next_attempt_at)
+             WHERE id = $7 AND state = 'pending'",
         )
         .bind(state.as_str())
         .bind(now)
@@ -83,18 +82,19 @@ impl DeliveryStore for SqliteStore {
         .bind(ended)
         .bind(settled.again_at)
         .bind(id)
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
         if settled.outcome == AttemptOutcome::Gone {
-            let endpoint: Option<String> = sqlx::query(
-                "UPDATE webhook_endpoints SET gone_at = ?1
-                 WHERE id = (SELECT endpoint FROM deliveries WHERE id = ?2) RETURNING id",
+            let endpoint: Option<String> = query(
+                "UPDATE webhook_endpoints SET gone_at = $1
+                 WHERE id = (SELECT endpoint FROM deliveries WHERE id = $2) RETURNING id",
             )
             .bind(now)
             .bind(id)
-            .fetch_optional(&mut *transaction)
+            .fetch_optional(&mut transaction)
             .await?
-            .map(|row| row.get(0));
+            .map(|row| row.try_get(0))
+            .transpose()?;
             if let Some(endpoint) = endpoint {
                 give_up(&mut transaction, &endpoint, settled.outcome.as_str(), now).await?;
             }
@@ -105,54 +105,52 @@ impl DeliveryStore for SqliteStore {
 
     async fn expire(&self, limits: DeliveryLimits, now: Timestamp) -> StoreResult<u64> {
         let mut transaction = self.writer.begin().await?;
-        let old = sqlx::query(
-            "UPDATE deliveries SET state = 'dead', ended_at = ?1,
-                    last_outcome = coalesce(last_outcome, ?2)
-             WHERE state = 'pending' AND since < ?3",
+        let old = query(
+            "UPDATE deliveries SET state = 'dead', ended_at = $1,
+                    last_outcome = coalesce(last_outcome, $2)
+             WHERE state = 'pending' AND since < $3",
         )
         .bind(now)
         .bind(TOO_OLD)
         .bind(limits.pending_since)
-        .execute(&mut *transaction)
-        .await?
-        .rows_affected();
-        let many = sqlx::query(
-            "UPDATE deliveries SET state = 'dead', ended_at = ?1,
-                    last_outcome = coalesce(last_outcome, ?2)
+        .execute(&mut transaction)
+        .await?;
+        let many = query(
+            "UPDATE deliveries SET state = 'dead', ended_at = $1,
+                    last_outcome = coalesce(last_outcome, $2)
              WHERE sequence IN (
                  SELECT sequence FROM (
                      SELECT sequence, row_number() OVER
                          (PARTITION BY destination ORDER BY since DESC, sequence DESC) AS place
-                     FROM deliveries WHERE state = 'pending')
-                 WHERE place > ?3)",
+                     FROM deliveries WHERE state = 'pending') AS ranked
+                 WHERE place > $3)",
         )
         .bind(now)
         .bind(TOO_MANY)
         .bind(limits.backlog)
-        .execute(&mut *transaction)
-        .await?
-        .rows_affected();
-        sqlx::query("DELETE FROM deliveries WHERE state != 'pending' AND ended_at < ?")
+        .execute(&mut transaction)
+        .await?;
+        query("DELETE FROM deliveries WHERE state != 'pending' AND ended_at < $1")
             .bind(limits.ended_since)
-            .execute(&mut *transaction)
+            .execute(&mut transaction)
             .await?;
         transaction.commit().await?;
         Ok(old + many)
     }
 
     async fn backlog(&self) -> StoreResult<Backlog> {
-        let row = sqlx::query(
+        let row = query(
             "SELECT (SELECT count(*) FROM deliveries WHERE state = 'pending'),
                     (SELECT min(since) FROM deliveries WHERE state = 'pending'),
                     (SELECT count(*) FROM deliveries WHERE state = 'dead')",
         )
         .fetch_one(&self.readers)
         .await?;
-        let count = |column: usize| u64::try_from(row.get::<i64, _>(column)).unwrap_or(0);
+        let count = |column: usize| row.try_get(column).map(rows::unsigned);
         Ok(Backlog {
-            pending: count(0),
+            pending: count(0)?,
             oldest: row.try_get(1)?,
-            dead: count(2),
+            dead: count(2)?,
         })
     }
 
@@ -162,9 +160,9 @@ impl DeliveryStore for SqliteStore {
         job: &str,
         limit: u32,
     ) -> StoreResult<Vec<Delivery>> {
-        let rows = sqlx::query(
-            "SELECT * FROM deliveries WHERE job = ?1 AND tenant = ?2
-             ORDER BY sequence DESC LIMIT ?3",
+        let rows = query(
+            "SELECT * FROM deliveries WHERE job = $1 AND tenant = $2
+             ORDER BY sequence DESC LIMIT $3",
         )
         .bind(job)
         .bind(tenant.as_str())
@@ -182,22 +180,22 @@ impl DeliveryStore for SqliteStore {
         now: Timestamp,
     ) -> StoreResult<Option<Delivery>> {
         let mut transaction = self.writer.begin().await?;
-        sqlx::query(
-            "UPDATE deliveries SET state = 'pending', attempts = 0, since = ?1,
-                    next_attempt_at = ?1, ended_at = NULL
-             WHERE id = ?2 AND job = ?3 AND tenant = ?4 AND state != 'pending'",
+        query(
+            "UPDATE deliveries SET state = 'pending', attempts = 0, since = $1,
+                    next_attempt_at = $1, ended_at = NULL
+             WHERE id = $2 AND job = $3 AND tenant = $4 AND state != 'pending'",
         )
         .bind(now)
         .bind(id)
         .bind(job)
         .bind(tenant.as_str())
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
-        let row = sqlx::query("SELECT * FROM deliveries WHERE id = ? AND job = ? AND tenant = ?")
+        let row = query("SELECT * FROM deliveries WHERE id = $1 AND job = $2 AND tenant = $3")
             .bind(id)
             .bind(job)
             .bind(tenant.as_str())
-            .fetch_optional(&mut *transaction)
+            .fetch_optional(&mut transaction)
             .await?;
         transaction.commit().await?;
         row.map(delivery).transpose()
@@ -211,10 +209,10 @@ impl DeliveryStore for SqliteStore {
     ) -> StoreResult<bool> {
         let events: Vec<&str> = endpoint.events.iter().map(|e| e.as_str()).collect();
         let mut transaction = self.writer.begin().await?;
-        let done = sqlx::query(
+        let done = query(
             "INSERT INTO webhook_endpoints (id, tenant, created_at, url, destination, events, secret)
-             SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7
-             WHERE (SELECT count(*) FROM webhook_endpoints WHERE tenant = ?2) < ?8",
+             SELECT $1, $2, $3, $4, $5, $6, $7
+             WHERE (SELECT count(*) FROM webhook_endpoints WHERE tenant = $2) < $8",
         )
         .bind(&endpoint.id)
         .bind(endpoint.tenant.as_str())
@@ -224,18 +222,17 @@ impl DeliveryStore for SqliteStore {
         .bind(rows::to_json(&events)?)
         .bind(secret.reveal())
         .bind(limit)
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
         transaction.commit().await?;
-        Ok(done.rows_affected() > 0)
+        Ok(done > 0)
     }
 
     async fn endpoints(&self, tenant: &Tenant) -> StoreResult<Vec<HookEndpoint>> {
-        let rows =
-            sqlx::query("SELECT * FROM webhook_endpoints WHERE tenant = ? ORDER BY sequence")
-                .bind(tenant.as_str())
-                .fetch_all(&self.readers)
-                .await?;
+        let rows = query("SELECT * FROM webhook_endpoints WHERE tenant = $1 ORDER BY sequence")
+            .bind(tenant.as_str())
+            .fetch_all(&self.readers)
+            .await?;
         rows::all(rows, endpoint)
     }
 
@@ -246,12 +243,12 @@ impl DeliveryStore for SqliteStore {
         now: Timestamp,
     ) -> StoreResult<bool> {
         let mut transaction = self.writer.begin().await?;
-        let done = sqlx::query("DELETE FROM webhook_endpoints WHERE id = ? AND tenant = ?")
+        let done = query("DELETE FROM webhook_endpoints WHERE id = $1 AND tenant = $2")
             .bind(id)
             .bind(tenant.as_str())
-            .execute(&mut *transaction)
+            .execute(&mut transaction)
             .await?;
-        let removed = done.rows_affected() > 0;
+        let removed = done > 0;
         if removed {
             give_up(&mut transaction, id, ENDPOINT_REMOVED, now).await?;
         }
@@ -265,17 +262,17 @@ impl DeliveryStore for SqliteStore {
         fresh: &SigningSecret,
     ) -> StoreResult<SigningSecret> {
         let mut transaction = self.writer.begin().await?;
-        sqlx::query(
-            "INSERT INTO webhook_secrets (tenant, secret) VALUES (?, ?)
+        query(
+            "INSERT INTO webhook_secrets (tenant, secret) VALUES ($1, $2)
              ON CONFLICT (tenant) DO NOTHING",
         )
         .bind(tenant.as_str())
         .bind(fresh.reveal())
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
-        let row = sqlx::query("SELECT secret FROM webhook_secrets WHERE tenant = ?")
+        let row = query("SELECT secret FROM webhook_secrets WHERE tenant = $1")
             .bind(tenant.as_str())
-            .fetch_one(&mut *transaction)
+            .fetch_one(&mut transaction)
             .await?;
         transaction.commit().await?;
         let stored: &str = row.try_get(0)?;
@@ -289,14 +286,14 @@ impl DeliveryStore for SqliteStore {
         former_until: Timestamp,
     ) -> StoreResult<()> {
         let mut transaction = self.writer.begin().await?;
-        sqlx::query(
-            "INSERT INTO webhook_secrets (tenant, secret) VALUES (?1, ?2)
-             ON CONFLICT (tenant) DO UPDATE SET former = secret, former_until = ?3, secret = ?2",
+        query(
+            "INSERT INTO webhook_secrets (tenant, secret) VALUES ($1, $2)
+             ON CONFLICT (tenant) DO UPDATE SET former = webhook_secrets.secret, former_until = $3, secret = $2",
         )
         .bind(tenant.as_str())
         .bind(fresh.reveal())
         .bind(former_until)
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
         transaction.commit().await?;
         Ok(())
@@ -305,14 +302,14 @@ impl DeliveryStore for SqliteStore {
 
 /// Gives up what an endpoint has not been told.
 async fn give_up(
-    connection: &mut SqliteConnection,
+    connection: &mut Transaction<'_>,
     endpoint: &str,
     why: &str,
     now: Timestamp,
 ) -> StoreResult<()> {
-    sqlx::query(
-        "UPDATE deliveries SET state = 'dead', ended_at = ?, last_outcome = ?
-         WHERE endpoint = ? AND state = 'pending'",
+    query(
+        "UPDATE deliveries SET state = 'dead', ended_at = $1, last_outcome = $2
+         WHERE endpoint = $3 AND state = 'pending'",
     )
     .bind(now)
     .bind(why)
@@ -322,7 +319,7 @@ async fn give_up(
     Ok(())
 }
 
-fn due_delivery(row: SqliteRow) -> StoreResult<DueDelivery> {
+fn due_delivery(row: DbRow) -> StoreResult<DueDelivery> {
     let secret = |column: &str| -> StoreResult<Option<SigningSecret>> {
         let text: Option<&str> = row.try_get(column)?;
         Ok(text.and_then(|text| text.parse().ok()))
@@ -352,9 +349,10 @@ fn due_delivery(row: SqliteRow) -> StoreResult<DueDelivery> {
     })
 }
 
-fn delivery(row: SqliteRow) -> StoreResult<Delivery> {
+fn delivery(row: DbRow) -> StoreResult<Delivery> {
     let state = DeliveryState::parse(row.try_get("state")?).unwrap_or(DeliveryState::Dead);
     let next_attempt_at: Timestamp = row.try_get("next_attempt_at")?;
+    let last_status: Option<i64> = row.try_get("last_status")?;
     Ok(Delivery {
         id: row.try_get("id")?,
         job: row.try_get("job")?,
@@ -366,12 +364,12 @@ fn delivery(row: SqliteRow) -> StoreResult<Delivery> {
         occurred_at: row.try_get("occurred_at")?,
         next_attempt_at: (state == DeliveryState::Pending).then_some(next_attempt_at),
         last_attempt_at: row.try_get("last_attempt_at")?,
-        last_status: row.try_get("last_status")?,
+        last_status: last_status.and_then(|status| u16::try_from(status).ok()),
         last_outcome: row.try_get("last_outcome")?,
     })
 }
 
-fn endpoint(row: SqliteRow) -> StoreResult<HookEndpoint> {
+fn endpoint(row: DbRow) -> StoreResult<HookEndpoint> {
     let events: Vec<String> = rows::json(&row, "events")?;
     Ok(HookEndpoint {
         id: row.try_get("id")?,

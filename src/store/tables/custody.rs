@@ -1,11 +1,10 @@
-//! Looking after the rows of items in SQLite.
+//! Looking after the rows of items.
 
 use super::rows::{self, to_json};
-use super::sqlite::SqliteStore;
-use super::writer::Write;
 use crate::jobs::{Custody, ItemRecord, Resource, StoreResult};
+use crate::store::database::SqlStore;
+use crate::store::query::query;
 use async_trait::async_trait;
-use sqlx::Row;
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 
@@ -13,12 +12,12 @@ use std::sync::atomic::Ordering;
 const DEFECTS: &str = "PRAGMA quick_check(20)";
 
 #[async_trait]
-impl Custody for SqliteStore {
+impl Custody for SqlStore {
     async fn record(&self, id: &str) -> StoreResult<Option<ItemRecord>> {
         let volume = Resource::of(id) == Some(Resource::Volume);
-        let row = sqlx::query(match volume {
-            true => "SELECT * FROM volumes WHERE id = ?",
-            false => "SELECT * FROM products WHERE id = ?",
+        let row = query(match volume {
+            true => "SELECT * FROM volumes WHERE id = $1",
+            false => "SELECT * FROM products WHERE id = $1",
         })
         .bind(id)
         .fetch_optional(&self.readers)
@@ -31,14 +30,14 @@ impl Custody for SqliteStore {
     }
 
     async fn known(&self, ids: &[String]) -> StoreResult<BTreeSet<String>> {
-        let rows = sqlx::query(
-            "SELECT id FROM volumes WHERE id IN (SELECT value FROM json_each(?1))
-             UNION ALL SELECT id FROM products WHERE id IN (SELECT value FROM json_each(?1))",
+        let rows = query(
+            "SELECT id FROM volumes WHERE id IN (SELECT value FROM json_each($1))
+             UNION ALL SELECT id FROM products WHERE id IN (SELECT value FROM json_each($1))",
         )
         .bind(to_json(&ids)?)
         .fetch_all(&self.readers)
         .await?;
-        Ok(rows.into_iter().map(|row| row.get(0)).collect())
+        rows.into_iter().map(|row| row.try_get(0)).collect()
     }
 
     async fn records(
@@ -47,11 +46,11 @@ impl Custody for SqliteStore {
         after: i64,
         limit: u32,
     ) -> StoreResult<Vec<ItemRecord>> {
-        let rows = sqlx::query(match kind {
+        let rows = query(match kind {
             Resource::Volume => {
-                "SELECT * FROM volumes WHERE sequence > ? ORDER BY sequence LIMIT ?"
+                "SELECT * FROM volumes WHERE sequence > $1 ORDER BY sequence LIMIT $2"
             }
-            _ => "SELECT * FROM products WHERE sequence > ? ORDER BY sequence LIMIT ?",
+            _ => "SELECT * FROM products WHERE sequence > $1 ORDER BY sequence LIMIT $2",
         })
         .bind(after)
         .bind(limit)
@@ -69,7 +68,7 @@ impl Custody for SqliteStore {
     async fn amend(&self, record: &ItemRecord) -> StoreResult<()> {
         match record {
             ItemRecord::Volume(volume) => {
-                sqlx::query("UPDATE volumes SET files = ?, facts = ? WHERE id = ?")
+                query("UPDATE volumes SET files = $1, facts = $2 WHERE id = $3")
                     .bind(to_json(&volume.files)?)
                     .bind(to_json(&volume.facts)?)
                     .bind(&volume.id)
@@ -77,7 +76,7 @@ impl Custody for SqliteStore {
                     .await?
             }
             ItemRecord::Product(product) => {
-                sqlx::query("UPDATE products SET files = ?, summary = ?, software = ? WHERE id = ?")
+                query("UPDATE products SET files = $1, summary = $2, software = $3 WHERE id = $4")
                     .bind(to_json(&product.files)?)
                     .bind(to_json(&product.summary)?)
                     .bind(&product.software)
@@ -90,7 +89,7 @@ impl Custody for SqliteStore {
     }
 
     async fn was_erased(&self, id: &str) -> StoreResult<bool> {
-        let found = sqlx::query("SELECT 1 FROM erased WHERE id = ? LIMIT 1")
+        let found = query("SELECT 1 FROM erased WHERE id = $1 LIMIT 1")
             .bind(id)
             .fetch_optional(&self.readers)
             .await?;
@@ -98,9 +97,13 @@ impl Custody for SqliteStore {
     }
 
     async fn defects(&self) -> StoreResult<Vec<String>> {
-        let found = sqlx::query(DEFECTS).fetch_all(&self.readers).await?;
-        let lines = found.into_iter().map(|row| row.get::<String, _>(0));
-        let defects: Vec<String> = lines.filter(|line| line != "ok").collect();
+        // The server looks after its own files.
+        if self.on_server() {
+            return Ok(Vec::new());
+        }
+        let found = query(DEFECTS).fetch_all(&self.readers).await?;
+        let lines: Vec<String> = rows::all(found, |row| row.try_get(0))?;
+        let defects: Vec<String> = lines.into_iter().filter(|line| line != "ok").collect();
         self.damaged.store(!defects.is_empty(), Ordering::Relaxed);
         Ok(defects)
     }

@@ -1,49 +1,54 @@
-//! The jobs table in SQLite. Every change is a single statement, or a transaction that begins
-//! with a write: SQLite would not let two transactions that began by reading both write.
+//! The jobs table. Every change is a single statement, or a transaction that writes beside no other.
+//!
+//! Leases on SQLite, which one process uses, expire by the clock of that process. On PostgreSQL they
+//! expire by the clock of the server: clocks of several machines differ.
 
+use super::catalogue::{insert_product, push_page, push_tags};
 use super::erasure::record_deletion;
 use super::rows::{self, to_json};
-use super::sqlite::SqliteStore;
-use super::sqlite_catalogue::{insert_product, push_page, push_tags};
-use super::sqlite_scans::push_scan;
-use super::writer::Write;
+use super::scans::push_scan;
 use crate::jobs::{
     Claimant, DeathLimit, Deleted, Filed, Interrupted, Job, JobFilter, JobOutcome, JobState,
     JobStore, Lease, ListPage, ListRequest, NewJob, QueueLoad, Resource, StoreResult, Tenant,
     Timestamp, random_id,
 };
+use crate::store::database::{SqlStore, Transaction};
+use crate::store::query::{QueryBuilder, query};
 use async_trait::async_trait;
-use sqlx::{QueryBuilder, Row, SqliteConnection};
 use std::time::Duration;
 
 /// Number of last succeeded jobs whose durations are averaged.
 const JOBS_AVERAGED: i64 = 20;
 
-/// What every statement sets by which a job leaves its worker without an outcome: `?1` is now, `?2`
+/// What every statement sets by which a job leaves its worker without an outcome: `$1` is now, `$2`
 /// the reason for failing it, or null to return it to the queue.
 const LEFT_BY_WORKER: &str = "
     state = CASE WHEN cancel_requested THEN 'cancelled'
-                 WHEN ?2 IS NOT NULL THEN 'failed' ELSE 'queued' END,
-    failure = CASE WHEN cancel_requested THEN NULL ELSE ?2 END,
-    finished_at = CASE WHEN cancel_requested OR ?2 IS NOT NULL THEN ?1 END,
+                 WHEN $2 IS NOT NULL THEN 'failed' ELSE 'queued' END,
+    failure = CASE WHEN cancel_requested THEN NULL ELSE $2 END,
+    finished_at = CASE WHEN cancel_requested OR $2 IS NOT NULL THEN $1 END,
     stage = NULL, progress = 0, lease_token = NULL, lease_run = NULL, lease_expires_at = NULL,
     revision = revision + 1";
 
-fn expiry(now: Timestamp, length: Duration) -> Timestamp {
-    now.saturating_add(i64::try_from(length.as_millis()).unwrap_or(i64::MAX / 2))
+/// The time by which leases expire where several machines share the database; see the migration.
+const SERVER_CLOCK: &str = "database_now()";
+
+/// A length that can be added to any time.
+fn milliseconds(length: Duration) -> i64 {
+    i64::try_from(length.as_millis()).map_or(i64::MAX / 2, |length| length.min(i64::MAX / 2))
 }
 
 /// The age of the volumes that a job works on counts from now, for the tenant of the job.
 pub(super) async fn renew_volumes(
-    to: &mut SqliteConnection,
+    to: &mut Transaction<'_>,
     job: &Job,
     now: Timestamp,
 ) -> StoreResult<()> {
-    sqlx::query(
-        "UPDATE holdings SET renewed_at = max(renewed_at, ?1)
-         WHERE tenant = ?2 AND kind = 'volume' AND id IN (
-             SELECT ?3 UNION ALL
-             SELECT value FROM jobs, json_each(jobs.needs) WHERE jobs.id = ?4)",
+    query(
+        "UPDATE holdings SET renewed_at = CASE WHEN renewed_at > $1 THEN renewed_at ELSE $1 END
+         WHERE tenant = $2 AND kind = 'volume' AND id IN (
+             SELECT $3 UNION ALL
+             SELECT value FROM jobs, json_each(jobs.needs) WHERE jobs.id = $4)",
     )
     .bind(now)
     .bind(job.tenant.as_str())
@@ -55,7 +60,7 @@ pub(super) async fn renew_volumes(
 }
 
 #[async_trait]
-impl JobStore for SqliteStore {
+impl JobStore for SqlStore {
     async fn file(&self, job: &NewJob, queue_limit: usize, now: Timestamp) -> StoreResult<Filed> {
         if let Some(earlier) = self.earlier(job).await? {
             return Ok(earlier);
@@ -64,18 +69,18 @@ impl JobStore for SqliteStore {
         let id = random_id(Resource::Job.prefix());
         let key = job.idempotency.as_ref();
         let mut transaction = self.writer.begin().await?;
-        let inserted = sqlx::query(
+        let inserted = query(
             "INSERT INTO jobs (id, kind, volume, parameters, created_at, idempotency_key,
                                fingerprint, needs, tenant, external_id, labels, webhook,
                                trace_parent, source, send)
-             SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16
-             WHERE (SELECT count(*) FROM jobs WHERE state = 'queued') < ?8
-               AND (?15 IS NOT NULL
+             SELECT $1, $2, $3, $4, $5, $6, $7, $9, $10, $11, $12, $13, $14, $15, $16
+             WHERE (SELECT count(*) FROM jobs WHERE state = 'queued') < $8
+               AND ($15 IS NOT NULL
                     OR EXISTS (SELECT 1 FROM holdings
-                               WHERE tenant = ?10 AND id = ?3 AND kind = 'volume'))
+                               WHERE tenant = $10 AND id = $3 AND kind = 'volume'))
                AND NOT EXISTS
-                   (SELECT 1 FROM json_each(?9) AS need WHERE NOT EXISTS
-                        (SELECT 1 FROM holdings WHERE tenant = ?10 AND id = need.value))
+                   (SELECT 1 FROM json_each($9) AS need WHERE NOT EXISTS
+                        (SELECT 1 FROM holdings WHERE tenant = $10 AND id = need.value))
              ON CONFLICT (idempotency_key) DO NOTHING
              RETURNING *",
         )
@@ -95,7 +100,7 @@ impl JobStore for SqliteStore {
         .bind(&job.trace_parent)
         .bind(job.source.as_ref().map(to_json).transpose()?)
         .bind(job.send.as_ref().map(to_json).transpose()?)
-        .fetch_optional(&mut *transaction)
+        .fetch_optional(&mut transaction)
         .await?;
         if let Some(row) = inserted {
             let job = rows::job(row)?;
@@ -112,7 +117,7 @@ impl JobStore for SqliteStore {
     }
 
     async fn job(&self, id: &str) -> StoreResult<Option<Job>> {
-        let row = sqlx::query("SELECT * FROM jobs WHERE id = ?")
+        let row = query("SELECT * FROM jobs WHERE id = $1")
             .bind(id)
             .fetch_optional(&self.readers)
             .await?;
@@ -143,7 +148,7 @@ impl JobStore for SqliteStore {
     }
 
     async fn filed_under(&self, tenant: &Tenant, key: &str) -> StoreResult<Option<(Job, String)>> {
-        let row = sqlx::query("SELECT * FROM jobs WHERE idempotency_key = ?")
+        let row = query("SELECT * FROM jobs WHERE idempotency_key = $1")
             .bind(stored_key(tenant, key))
             .fetch_optional(&self.readers)
             .await?;
@@ -156,68 +161,71 @@ impl JobStore for SqliteStore {
 
     async fn ahead_of(&self, sequences: &[i64]) -> StoreResult<Vec<u64>> {
         // Each part of the queue is counted once, however many jobs are asked for.
-        let rows = sqlx::query(
+        let rows = query(
             "WITH asked AS
-                 (SELECT value AS upto, lag(value, 1, 0) OVER (ORDER BY value) AS since
-                  FROM json_each(?))
-             SELECT sum((SELECT count(*) FROM jobs WHERE state = 'queued'
+                 (SELECT upto, lag(upto, 1, 0) OVER (ORDER BY upto) AS since
+                  FROM (SELECT CAST(value AS BIGINT) AS upto FROM json_each($1)) AS places)
+             SELECT CAST(sum((SELECT count(*) FROM jobs WHERE state = 'queued'
                          AND sequence >= since AND sequence < upto)) OVER (ORDER BY upto)
+                    AS BIGINT)
              FROM asked ORDER BY upto",
         )
         .bind(to_json(&sequences)?)
         .fetch_all(&self.readers)
         .await?;
-        let count = |row: sqlx::sqlite::SqliteRow| u64::try_from(row.get::<i64, _>(0)).unwrap_or(0);
-        Ok(rows.into_iter().map(count).collect())
+        rows::all(rows, |row| Ok(rows::unsigned(row.try_get(0)?)))
     }
 
     async fn last_change(&self) -> StoreResult<Option<Timestamp>> {
-        let row = sqlx::query(
+        let row = query(
             "SELECT max(at) FROM (
                  SELECT (SELECT created_at FROM jobs ORDER BY sequence DESC LIMIT 1) AS at
                  UNION ALL SELECT (SELECT max(finished_at) FROM jobs WHERE finished_at IS NOT NULL)
-                 UNION ALL SELECT (SELECT max(renewed_at) FROM holdings WHERE kind = 'volume'))",
+                 UNION ALL SELECT (SELECT max(renewed_at) FROM holdings WHERE kind = 'volume')) AS moments",
         )
         .fetch_one(&self.readers)
         .await?;
-        Ok(row.get(0))
+        row.try_get(0)
     }
 
     async fn load(&self) -> StoreResult<QueueLoad> {
-        let row = sqlx::query(
+        let row = query(
             "SELECT (SELECT count(*) FROM jobs WHERE state = 'queued'),
                     (SELECT count(*) FROM jobs WHERE state = 'running'),
-                    (SELECT avg(finished_at - started_at) FROM
+                    (SELECT CAST(avg(finished_at - started_at) AS DOUBLE PRECISION) FROM
                         (SELECT finished_at, started_at FROM jobs WHERE state = 'succeeded'
-                         ORDER BY sequence DESC LIMIT ?))",
+                         ORDER BY sequence DESC LIMIT $1) AS last)",
         )
         .bind(JOBS_AVERAGED)
         .fetch_one(&self.readers)
         .await?;
-        let count = |column: usize| u64::try_from(row.get::<i64, _>(column)).unwrap_or(0);
         Ok(QueueLoad {
-            queued: count(0),
-            running: count(1),
-            mean_duration_ms: row.get(2),
+            queued: rows::unsigned(row.try_get(0)?),
+            running: rows::unsigned(row.try_get(1)?),
+            mean_duration_ms: row.try_get(2)?,
         })
     }
 
     async fn claim(&self, by: &Claimant, now: Timestamp) -> StoreResult<Option<Job>> {
-        let row = sqlx::query(
-            "UPDATE jobs SET state = 'running', attempts = attempts + 1, lease_token = ?1,
-                    lease_run = ?2, lease_expires_at = ?3, started_at = ?4, stage = NULL,
-                    progress = 0, revision = revision + 1
-             WHERE sequence = (
-                 SELECT sequence FROM jobs WHERE state = 'queued' AND volume != ''
-                 ORDER BY sequence LIMIT 1)
-             RETURNING *",
-        )
-        .bind(&by.token)
-        .bind(&by.run)
-        .bind(expiry(now, by.lease))
-        .bind(now)
-        .write_optional(&self.writer)
-        .await?;
+        let claim = |clock: &str, lock: &str| {
+            format!(
+                "UPDATE jobs SET state = 'running', attempts = attempts + 1, lease_token = $1,
+                        lease_run = $2, lease_expires_at = {clock} + $3, started_at = $4,
+                        stage = NULL, progress = 0, revision = revision + 1
+                 WHERE state = 'queued' AND sequence = (
+                     SELECT sequence FROM jobs WHERE state = 'queued' AND volume != ''
+                     ORDER BY sequence LIMIT 1 {lock})
+                 RETURNING *"
+            )
+        };
+        let row = query(claim("$4", ""))
+            .on_postgres(claim(SERVER_CLOCK, "FOR UPDATE SKIP LOCKED"))
+            .bind(&by.token)
+            .bind(&by.run)
+            .bind(milliseconds(by.lease))
+            .bind(now)
+            .write_beside(&self.writer)
+            .await?;
         row.map(rows::job).transpose()
     }
 
@@ -227,17 +235,23 @@ impl JobStore for SqliteStore {
         length: Duration,
         now: Timestamp,
     ) -> StoreResult<Option<bool>> {
-        let row = sqlx::query(
-            "UPDATE jobs SET lease_expires_at = ?
-             WHERE id = ? AND lease_token = ? AND state = 'running'
-             RETURNING cancel_requested",
-        )
-        .bind(expiry(now, length))
-        .bind(&lease.job)
-        .bind(&lease.token)
-        .write_optional(&self.writer)
-        .await?;
-        Ok(row.map(|row| row.get(0)))
+        let renew = |clock: &str| {
+            format!(
+                "UPDATE jobs SET lease_expires_at = {clock} + $2
+                 WHERE id = $3 AND lease_token = $4 AND state = 'running'
+                 RETURNING cancel_requested"
+            )
+        };
+        // PostgreSQL wants to be told the type of a placeholder that is not used.
+        let row = query(renew("$1"))
+            .on_postgres(format!("{} AND $1 IS NOT NULL", renew(SERVER_CLOCK)))
+            .bind(now)
+            .bind(milliseconds(length))
+            .bind(&lease.job)
+            .bind(&lease.token)
+            .write_beside(&self.writer)
+            .await?;
+        row.map(|row| row.try_get(0)).transpose()
     }
 
     async fn progress(
@@ -246,16 +260,17 @@ impl JobStore for SqliteStore {
         stage: &str,
         progress: f64,
     ) -> StoreResult<Option<Job>> {
-        let row = sqlx::query(
-            "UPDATE jobs SET stage = ?, progress = max(progress, ?), revision = revision + 1
-             WHERE id = ? AND lease_token = ? AND state = 'running'
+        let row = query(
+            "UPDATE jobs SET stage = $1, progress = CASE WHEN progress > $2 THEN progress ELSE $2 END,
+                     revision = revision + 1
+             WHERE id = $3 AND lease_token = $4 AND state = 'running'
              RETURNING *",
         )
         .bind(stage)
         .bind(progress)
         .bind(&lease.job)
         .bind(&lease.token)
-        .write_optional(&self.writer)
+        .write_beside(&self.writer)
         .await?;
         row.map(rows::job).transpose()
     }
@@ -272,12 +287,12 @@ impl JobStore for SqliteStore {
             JobOutcome::Cancelled => (JobState::Cancelled, None, None),
         };
         let mut transaction = self.writer.begin().await?;
-        let row = sqlx::query(
-            "UPDATE jobs SET state = ?1, failure = ?2, result = ?3, finished_at = ?4,
-                    progress = CASE ?1 WHEN 'succeeded' THEN 1 ELSE progress END,
+        let row = query(
+            "UPDATE jobs SET state = $1, failure = $2, result = $3, finished_at = $4,
+                    progress = CASE $1 WHEN 'succeeded' THEN 1 ELSE progress END,
                     lease_token = NULL, lease_run = NULL, lease_expires_at = NULL,
                     revision = revision + 1
-             WHERE id = ?5 AND lease_token = ?6 AND state = 'running'
+             WHERE id = $5 AND lease_token = $6 AND state = 'running'
              RETURNING *",
         )
         .bind(state.as_str())
@@ -286,7 +301,7 @@ impl JobStore for SqliteStore {
         .bind(now)
         .bind(&lease.job)
         .bind(&lease.token)
-        .fetch_optional(&mut *transaction)
+        .fetch_optional(&mut transaction)
         .await?;
         let Some(row) = row else {
             transaction.commit().await?;
@@ -304,9 +319,9 @@ impl JobStore for SqliteStore {
     async fn hand_back(&self, lease: &Lease, now: Timestamp) -> StoreResult<Option<Job>> {
         let given_back = format!(
             "UPDATE jobs SET attempts = attempts - 1, started_at = NULL, {LEFT_BY_WORKER}
-             WHERE id = ?3 AND lease_token = ?4 AND state = 'running' RETURNING *"
+             WHERE id = $3 AND lease_token = $4 AND state = 'running' RETURNING *"
         );
-        let row = sqlx::query(sqlx::AssertSqlSafe(given_back))
+        let row = query(given_back)
             .bind(now)
             .bind(None::<String>)
             .bind(&lease.job)
@@ -317,11 +332,11 @@ impl JobStore for SqliteStore {
     }
 
     async fn abandon(&self, token: &str) -> StoreResult<Option<Job>> {
-        let row = sqlx::query(
+        let row = query(
             "UPDATE jobs SET state = 'queued', attempts = attempts - 1, started_at = NULL,
                     lease_token = NULL, lease_run = NULL, lease_expires_at = NULL,
                     revision = revision + 1
-             WHERE state = 'running' AND lease_token = ? RETURNING *",
+             WHERE state = 'running' AND lease_token = $1 RETURNING *",
         )
         .bind(token)
         .write_optional(&self.writer)
@@ -335,15 +350,15 @@ impl JobStore for SqliteStore {
         limit: &DeathLimit,
         now: Timestamp,
     ) -> StoreResult<Option<Job>> {
-        // `?2` is the failure, if this death is the last one allowed.
+        // `$2` is the failure, if this death is the last one allowed.
         let counted = format!(
             "UPDATE jobs SET crashes = crashes + 1, {LEFT_BY_WORKER}
-             WHERE id = ?3 AND lease_token = ?4 AND state = 'running' AND (crashes + 1 >= ?5) = ?6
+             WHERE id = $3 AND lease_token = $4 AND state = 'running' AND (crashes + 1 >= $5) = $6
              RETURNING *"
         );
         let reason = to_json(&limit.reason)?;
         for at_limit in [false, true] {
-            let row = sqlx::query(sqlx::AssertSqlSafe(counted.clone()))
+            let row = query(counted.clone())
                 .bind(now)
                 .bind(at_limit.then_some(&reason))
                 .bind(&lease.job)
@@ -365,17 +380,21 @@ impl JobStore for SqliteStore {
         limit: Option<&DeathLimit>,
         now: Timestamp,
     ) -> StoreResult<Vec<Job>> {
-        let released = format!(
-            "UPDATE jobs SET interruptions = interruptions + 1, {LEFT_BY_WORKER}
-             WHERE state = 'running' AND (interruptions + 1 >= ?3) = ?4
-               AND (?5 IS NULL OR (lease_run IS NOT ?5 AND lease_expires_at <= ?1))
-             RETURNING *"
-        );
+        let released = |clock: &str| {
+            format!(
+                "UPDATE jobs SET interruptions = interruptions + 1, {LEFT_BY_WORKER}
+                 WHERE state = 'running' AND (interruptions + 1 >= $3) = $4
+                   AND ($5 IS NULL
+                        OR (lease_run IS DISTINCT FROM $5 AND lease_expires_at <= {clock}))
+                 RETURNING *"
+            )
+        };
         let reason = limit.map(|limit| to_json(&limit.reason)).transpose()?;
         let deaths = limit.map_or(i64::MAX, |limit| i64::from(limit.deaths));
         let mut jobs = Vec::new();
         for at_limit in [false, true] {
-            let rows = sqlx::query(sqlx::AssertSqlSafe(released.clone()))
+            let rows = query(released("$1"))
+                .on_postgres(released(SERVER_CLOCK))
                 .bind(now)
                 .bind(reason.as_ref().filter(|_| at_limit))
                 .bind(deaths)
@@ -389,11 +408,11 @@ impl JobStore for SqliteStore {
     }
 
     async fn interrupt(&self, id: &str, now: Timestamp) -> StoreResult<Interrupted> {
-        let row = sqlx::query(
-            "UPDATE jobs SET cancel_requested = 1, revision = revision + 1,
-                    finished_at = CASE state WHEN 'queued' THEN ?1 ELSE finished_at END,
+        let row = query(
+            "UPDATE jobs SET cancel_requested = TRUE, revision = revision + 1,
+                    finished_at = CASE state WHEN 'queued' THEN $1 ELSE finished_at END,
                     state = CASE state WHEN 'queued' THEN 'cancelled' ELSE state END
-             WHERE id = ?2 AND state IN ('queued', 'running')
+             WHERE id = $2 AND state IN ('queued', 'running')
              RETURNING *",
         )
         .bind(now)
@@ -413,18 +432,22 @@ impl JobStore for SqliteStore {
             .map_or(Interrupted::Unknown, Interrupted::Finished))
     }
 
+    fn is_shared(&self) -> bool {
+        self.on_server()
+    }
+
     async fn check(&self) -> StoreResult<()> {
         self.probe().await
     }
 
     async fn delete_job(&self, id: &str, now: Timestamp) -> StoreResult<Deleted> {
         let mut transaction = self.writer.begin().await?;
-        let row = sqlx::query(
-            "DELETE FROM jobs WHERE id = ? AND state NOT IN ('queued', 'running')
+        let row = query(
+            "DELETE FROM jobs WHERE id = $1 AND state NOT IN ('queued', 'running')
              RETURNING tenant",
         )
         .bind(id)
-        .fetch_optional(&mut *transaction)
+        .fetch_optional(&mut transaction)
         .await?;
         let Some(row) = row else {
             drop(transaction);
@@ -439,15 +462,15 @@ impl JobStore for SqliteStore {
     }
 }
 
-impl SqliteStore {
+impl SqlStore {
     /// The first item the job needs that does not exist.
     async fn missing(&self, job: &NewJob) -> StoreResult<Option<Filed>> {
         let volume = job.volume.iter().map(|id| ("volume", id));
         let others = job.needs.iter().map(|(field, id)| (field.as_str(), id));
         for (field, id) in volume.chain(others) {
-            let found = sqlx::query(
-                "SELECT 1 FROM holdings WHERE tenant = ?1 AND id = ?2
-                     AND (kind = 'volume' OR ?3 != 'volume')",
+            let found = query(
+                "SELECT 1 FROM holdings WHERE tenant = $1 AND id = $2
+                     AND (kind = 'volume' OR $3 != 'volume')",
             )
             .bind(job.tenant.as_str())
             .bind(id)

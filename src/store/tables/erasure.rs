@@ -7,35 +7,36 @@
 //! 4. Remember each id (410 from then on), append a row to the audit trail, and store the receipt,
 //!    which names that row.
 
+use super::access::append;
 use super::rows::{self, to_json};
-use super::sqlite_access::append;
 use crate::access::{Activity, AuditEvent};
 use crate::jobs::{
     AuditMark, Erased, ErasedFile, ErasedItem, ErasureOrder, Receipt, Resource, StoreResult,
     Tenant, Timestamp, random_id,
 };
-use sqlx::{Row, SqliteConnection};
+use crate::store::database::Transaction;
+use crate::store::query::{Target, query};
 
 /// The prefix of the ids of receipts.
 const PREFIX: &str = "ers_";
 
 /// What was made of a volume.
 pub(super) async fn made_of(
-    from: &mut SqliteConnection,
+    from: impl Into<Target<'_>> + Send,
     tenant: &Tenant,
     volume: &str,
 ) -> StoreResult<Vec<String>> {
-    let rows = sqlx::query("SELECT id FROM sources WHERE tenant = ? AND volume = ? ORDER BY id")
+    let rows = query("SELECT id FROM sources WHERE tenant = $1 AND volume = $2 ORDER BY id")
         .bind(tenant.as_str())
         .bind(volume)
         .fetch_all(from)
         .await?;
-    Ok(rows.into_iter().map(|row| row.get(0)).collect())
+    rows.into_iter().map(|row| row.try_get(0)).collect()
 }
 
 /// Erases what an order names. Changes nothing unless it returns [`Erased::Done`].
 pub(super) async fn erase(
-    to: &mut SqliteConnection,
+    to: &mut Transaction<'_>,
     order: &ErasureOrder,
     expected: &[String],
     now: Timestamp,
@@ -43,7 +44,7 @@ pub(super) async fn erase(
     let tenant = &order.tenant;
     let mut ids = vec![order.id.clone()];
     if order.cascade {
-        ids.extend(made_of(to, tenant, &order.id).await?);
+        ids.extend(made_of(&mut *to, tenant, &order.id).await?);
     }
     if ids.iter().any(|id| !expected.contains(id)) {
         return Ok(Erased::InUse);
@@ -90,9 +91,9 @@ pub(super) async fn erase(
         items,
         jobs,
     };
-    sqlx::query(
+    query(
         "INSERT INTO erasures (id, tenant, item, erased_at, erased_by, receipt)
-         VALUES (?, ?, ?, ?, ?, ?)",
+         VALUES ($1, $2, $3, $4, $5, $6)",
     )
     .bind(&receipt.id)
     .bind(tenant.as_str())
@@ -105,8 +106,8 @@ pub(super) async fn erase(
     Ok(Erased::Done(Box::new(receipt)))
 }
 
-async fn has(from: &mut SqliteConnection, tenant: &Tenant, id: &str) -> StoreResult<bool> {
-    let row = sqlx::query("SELECT 1 FROM holdings WHERE tenant = ? AND id = ?")
+async fn has(from: &mut Transaction<'_>, tenant: &Tenant, id: &str) -> StoreResult<bool> {
+    let row = query("SELECT 1 FROM holdings WHERE tenant = $1 AND id = $2")
         .bind(tenant.as_str())
         .bind(id)
         .fetch_optional(from)
@@ -116,28 +117,28 @@ async fn has(from: &mut SqliteConnection, tenant: &Tenant, id: &str) -> StoreRes
 
 /// The item on legal hold that keeps this one: itself, or a volume that it was made of.
 async fn legal_hold(
-    from: &mut SqliteConnection,
+    from: &mut Transaction<'_>,
     tenant: &Tenant,
     id: &str,
 ) -> StoreResult<Option<String>> {
-    let row = sqlx::query(
-        "SELECT id FROM holdings WHERE tenant = ?1 AND held_at IS NOT NULL AND
-             (id = ?2 OR id IN (SELECT volume FROM sources WHERE tenant = ?1 AND id = ?2))",
+    let row = query(
+        "SELECT id FROM holdings WHERE tenant = $1 AND held_at IS NOT NULL AND
+             (id = $2 OR id IN (SELECT volume FROM sources WHERE tenant = $1 AND id = $2))",
     )
     .bind(tenant.as_str())
     .bind(id)
     .fetch_optional(from)
     .await?;
-    Ok(row.map(|row| row.get(0)))
+    row.map(|row| row.try_get(0)).transpose()
 }
 
 /// Whether a job that has not ended needs the item.
-async fn is_needed(from: &mut SqliteConnection, tenant: &Tenant, id: &str) -> StoreResult<bool> {
-    let row = sqlx::query(
-        "SELECT 1 FROM jobs WHERE tenant = ?1 AND volume = ?2 AND state IN ('queued', 'running')
+async fn is_needed(from: &mut Transaction<'_>, tenant: &Tenant, id: &str) -> StoreResult<bool> {
+    let row = query(
+        "SELECT 1 FROM jobs WHERE tenant = $1 AND volume = $2 AND state IN ('queued', 'running')
          UNION ALL
          SELECT 1 FROM jobs WHERE needs != '{}' AND state IN ('queued', 'running')
-             AND tenant = ?1 AND EXISTS (SELECT 1 FROM json_each(jobs.needs) WHERE value = ?2)
+             AND tenant = $1 AND EXISTS (SELECT 1 FROM json_each(jobs.needs) WHERE value = $2)
          LIMIT 1",
     )
     .bind(tenant.as_str())
@@ -149,40 +150,40 @@ async fn is_needed(from: &mut SqliteConnection, tenant: &Tenant, id: &str) -> St
 
 /// Deletes a tenant's holding and, if it was the last one, the record of the content.
 async fn release(
-    to: &mut SqliteConnection,
+    to: &mut Transaction<'_>,
     tenant: &Tenant,
     id: &str,
     now: Timestamp,
 ) -> StoreResult<ErasedItem> {
     let files = files_of(to, id).await?;
-    sqlx::query("DELETE FROM holdings WHERE tenant = ? AND id = ?")
+    query("DELETE FROM holdings WHERE tenant = $1 AND id = $2")
         .bind(tenant.as_str())
         .bind(id)
         .execute(&mut *to)
         .await?;
     let delete = match Resource::of(id) {
         Some(Resource::Volume) => {
-            "DELETE FROM volumes WHERE id = ?1
-                 AND NOT EXISTS (SELECT 1 FROM holdings WHERE id = ?1)"
+            "DELETE FROM volumes WHERE id = $1
+                 AND NOT EXISTS (SELECT 1 FROM holdings WHERE id = $1)"
         }
         _ => {
-            "DELETE FROM products WHERE id = ?1
-                 AND NOT EXISTS (SELECT 1 FROM holdings WHERE id = ?1)"
+            "DELETE FROM products WHERE id = $1
+                 AND NOT EXISTS (SELECT 1 FROM holdings WHERE id = $1)"
         }
     };
-    let done = sqlx::query(delete).bind(id).execute(&mut *to).await?;
+    let done = query(delete).bind(id).execute(&mut *to).await?;
     record_deletion(to, tenant, id, now).await?;
     Ok(ErasedItem {
         id: id.to_owned(),
-        files_erased: done.rows_affected() == 1,
+        files_erased: done == 1,
         files,
     })
 }
 
 /// The files of an item as its record describes them.
-async fn files_of(from: &mut SqliteConnection, id: &str) -> StoreResult<Vec<ErasedFile>> {
-    let row = sqlx::query(
-        "SELECT files FROM volumes WHERE id = ?1 UNION ALL SELECT files FROM products WHERE id = ?1",
+async fn files_of(from: &mut Transaction<'_>, id: &str) -> StoreResult<Vec<ErasedFile>> {
+    let row = query(
+        "SELECT files FROM volumes WHERE id = $1 UNION ALL SELECT files FROM products WHERE id = $1",
     )
     .bind(id)
     .fetch_optional(from)
@@ -195,25 +196,25 @@ async fn files_of(from: &mut SqliteConnection, id: &str) -> StoreResult<Vec<Eras
 
 /// Deletes the records of the jobs on a volume, or that needed it.
 async fn delete_jobs(
-    to: &mut SqliteConnection,
+    to: &mut Transaction<'_>,
     tenant: &Tenant,
     volume: &str,
     now: Timestamp,
 ) -> StoreResult<Vec<String>> {
-    let rows = sqlx::query(
+    let rows = query(
         "DELETE FROM jobs WHERE state NOT IN ('queued', 'running') AND sequence IN (
-             SELECT sequence FROM jobs WHERE tenant = ?1 AND volume = ?2
+             SELECT sequence FROM jobs WHERE tenant = $1 AND volume = $2
              UNION ALL
              SELECT sequence FROM jobs
              WHERE needs != '{}' AND state IN ('succeeded', 'failed', 'cancelled')
-                 AND tenant = ?1 AND EXISTS (SELECT 1 FROM json_each(jobs.needs) WHERE value = ?2))
+                 AND tenant = $1 AND EXISTS (SELECT 1 FROM json_each(jobs.needs) WHERE value = $2))
          RETURNING id",
     )
     .bind(tenant.as_str())
     .bind(volume)
     .fetch_all(&mut *to)
     .await?;
-    let mut jobs: Vec<String> = rows.into_iter().map(|row| row.get(0)).collect();
+    let mut jobs: Vec<String> = rows::all(rows, |row| row.try_get(0))?;
     jobs.sort();
     for id in &jobs {
         record_deletion(to, tenant, id, now).await?;
@@ -223,16 +224,19 @@ async fn delete_jobs(
 
 /// Records that the item or job with that id was erased.
 pub(super) async fn record_deletion(
-    to: &mut SqliteConnection,
+    to: &mut Transaction<'_>,
     tenant: &Tenant,
     id: &str,
     now: Timestamp,
 ) -> StoreResult<()> {
-    sqlx::query("INSERT OR REPLACE INTO erased (tenant, id, erased_at) VALUES (?, ?, ?)")
-        .bind(tenant.as_str())
-        .bind(id)
-        .bind(now)
-        .execute(to)
-        .await?;
+    query(
+        "INSERT INTO erased (tenant, id, erased_at) VALUES ($1, $2, $3)
+         ON CONFLICT (tenant, id) DO UPDATE SET erased_at = excluded.erased_at",
+    )
+    .bind(tenant.as_str())
+    .bind(id)
+    .bind(now)
+    .execute(to)
+    .await?;
     Ok(())
 }

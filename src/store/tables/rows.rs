@@ -1,15 +1,14 @@
-//! From rows of SQLite to the records of `jobs`, and JSON columns both ways.
+//! From rows of the database to the records of `jobs`, and JSON columns both ways.
 
 use crate::jobs::{
     Held, Holding, Job, JobState, LegalHold, ListPage, ListRequest, Product, Receipt, ScanFields,
     ScanIdentity, StoreError, StoreResult, StoredVolume, Tags, Tenant, Timestamp,
 };
+use crate::store::query::DbRow;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use sqlx::Row;
-use sqlx::sqlite::SqliteRow;
 
-pub(super) fn job(row: SqliteRow) -> StoreResult<Job> {
+pub(super) fn job(row: DbRow) -> StoreResult<Job> {
     let state: &str = row.try_get("state")?;
     let failure: Option<&str> = row.try_get("failure")?;
     Ok(Job {
@@ -40,23 +39,28 @@ pub(super) fn job(row: SqliteRow) -> StoreResult<Job> {
     })
 }
 
+/// A number that is never negative, as the database holds it.
+pub(super) fn unsigned(number: i64) -> u64 {
+    u64::try_from(number).unwrap_or(0)
+}
+
 /// A count of a row.
-pub(super) fn count(row: &SqliteRow, column: &str) -> StoreResult<u32> {
+pub(super) fn count(row: &DbRow, column: &str) -> StoreResult<u32> {
     Ok(u32::try_from(row.try_get::<i64, _>(column)?).unwrap_or(u32::MAX))
 }
 
-pub(super) fn volume(row: SqliteRow) -> StoreResult<StoredVolume> {
+pub(super) fn volume(row: DbRow) -> StoreResult<StoredVolume> {
     Ok(StoredVolume {
         id: row.try_get("id")?,
         sequence: row.try_get("sequence")?,
         created_at: row.try_get("created_at")?,
-        bytes: u64::try_from(row.try_get::<i64, _>("bytes")?).unwrap_or(0),
+        bytes: unsigned(row.try_get("bytes")?),
         files: json(&row, "files")?,
         facts: json(&row, "facts")?,
     })
 }
 
-pub(super) fn product(row: SqliteRow) -> StoreResult<Product> {
+pub(super) fn product(row: DbRow) -> StoreResult<Product> {
     Ok(Product {
         id: row.try_get("id")?,
         sequence: row.try_get("sequence")?,
@@ -70,10 +74,7 @@ pub(super) fn product(row: SqliteRow) -> StoreResult<Product> {
 }
 
 /// An item as a tenant has it, from a row of the item's columns and its holding's.
-pub(super) fn held<T>(
-    row: SqliteRow,
-    record: fn(SqliteRow) -> StoreResult<T>,
-) -> StoreResult<Held<T>> {
+pub(super) fn held<T>(row: DbRow, record: fn(DbRow) -> StoreResult<T>) -> StoreResult<Held<T>> {
     let since: Option<Timestamp> = row.try_get("held_at")?;
     let legal_hold = match since {
         Some(since) => Some(LegalHold {
@@ -104,7 +105,7 @@ pub(super) const SCAN_COLUMNS: &str =
     "c.found AS scan_found, c.stated AS scan_stated, c.erased_at AS scan_erased_at";
 
 /// The identity in a row with [`SCAN_COLUMNS`].
-pub(super) fn scan(row: &SqliteRow) -> StoreResult<ScanIdentity> {
+pub(super) fn scan(row: &DbRow) -> StoreResult<ScanIdentity> {
     let fields = |column: &str| -> StoreResult<Option<ScanFields>> {
         let text: Option<&str> = row.try_get(column)?;
         match text {
@@ -120,11 +121,11 @@ pub(super) fn scan(row: &SqliteRow) -> StoreResult<ScanIdentity> {
 }
 
 /// A receipt and its sequence number.
-pub(super) fn receipt(row: SqliteRow) -> StoreResult<(Receipt, i64)> {
+pub(super) fn receipt(row: DbRow) -> StoreResult<(Receipt, i64)> {
     Ok((json(&row, "receipt")?, row.try_get("sequence")?))
 }
 
-fn tags(row: &SqliteRow) -> StoreResult<Tags> {
+fn tags(row: &DbRow) -> StoreResult<Tags> {
     Ok(Tags {
         external_id: row.try_get("external_id")?,
         labels: json(row, "labels")?,
@@ -132,46 +133,46 @@ fn tags(row: &SqliteRow) -> StoreResult<Tags> {
 }
 
 /// The tenant of a row.
-pub(super) fn tenant(row: &SqliteRow) -> StoreResult<Tenant> {
+pub(super) fn tenant(row: &DbRow) -> StoreResult<Tenant> {
     let name: String = row.try_get("tenant")?;
     Tenant::try_from(name).map_err(|e| StoreError::database(format!("damaged row: {e}")))
 }
 
 /// Converts the rows of a list by `record`.
 pub(super) fn all<T>(
-    rows: Vec<SqliteRow>,
-    record: impl Fn(SqliteRow) -> StoreResult<T>,
+    rows: Vec<DbRow>,
+    record: impl Fn(DbRow) -> StoreResult<T>,
 ) -> StoreResult<Vec<T>> {
     rows.into_iter().map(record).collect()
 }
 
 /// A page of a list, from rows queried with a limit of one more than requested.
 pub(super) fn page<T>(
-    rows: Vec<SqliteRow>,
+    rows: Vec<DbRow>,
     request: ListRequest,
-    record: impl Fn(SqliteRow) -> StoreResult<T>,
+    record: impl Fn(DbRow) -> StoreResult<T>,
     sequence: fn(&T) -> i64,
 ) -> StoreResult<ListPage<T>> {
     Ok(ListPage::cut(all(rows, record)?, request.limit, sequence))
 }
 
-pub(super) fn to_json(value: &impl Serialize) -> StoreResult<String> {
+pub(in crate::store) fn to_json(value: &impl Serialize) -> StoreResult<String> {
     serde_json::to_string(value).map_err(|e| StoreError::database(e.to_string()))
 }
 
 /// The value of a JSON column.
-pub(super) fn json<T: DeserializeOwned>(row: &SqliteRow, column: &str) -> StoreResult<T> {
+pub(super) fn json<T: DeserializeOwned>(row: &DbRow, column: &str) -> StoreResult<T> {
     from_json(row.try_get(column)?)
 }
 
 /// The value of a JSON column that may be null.
-fn optional_json<T: DeserializeOwned>(row: &SqliteRow, column: &str) -> StoreResult<Option<T>> {
+fn optional_json<T: DeserializeOwned>(row: &DbRow, column: &str) -> StoreResult<Option<T>> {
     let text: Option<&str> = row.try_get(column)?;
     text.map(from_json).transpose()
 }
 
 /// The value of a text column that has a parser of its own.
-pub(super) fn parsed<T>(row: &SqliteRow, column: &str) -> StoreResult<T>
+pub(super) fn parsed<T>(row: &DbRow, column: &str) -> StoreResult<T>
 where
     T: std::str::FromStr<Err: std::fmt::Display>,
 {

@@ -1,17 +1,16 @@
-//! The tables of volumes and products in SQLite, and the table of holdings that says which tenant
+//! The tables of volumes and products, and the table of holdings that says which tenant
 //! has which of them.
 
 use super::rows::{self, SCAN_COLUMNS, to_json};
-use super::sqlite::SqliteStore;
-use super::sqlite_scans::{note_upload, push_scan};
-use super::writer::Write;
+use super::scans::{note_upload, push_scan};
 use crate::jobs::{
     Catalogue, Erased, ErasureOrder, Expiry, Held, ItemFilter, LegalHold, ListPage, ListRequest,
     Product, Receipt, Resource, ScanFields, StoreResult, StoredVolume, TagFilter, Tags, Tenant,
     Timestamp,
 };
+use crate::store::database::{SqlStore, Transaction};
+use crate::store::query::{DbRow, QueryBuilder, query};
 use async_trait::async_trait;
-use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
 
 /// A volume with the columns of its holding. `sequence` and `created_at` are the holding's.
 const HELD_VOLUME: Select = Select {
@@ -38,7 +37,7 @@ struct Select {
 }
 
 impl Select {
-    fn query(&self) -> QueryBuilder<Sqlite> {
+    fn query(&self) -> QueryBuilder {
         let Self {
             columns,
             table,
@@ -56,7 +55,7 @@ impl Select {
 }
 
 #[async_trait]
-impl Catalogue for SqliteStore {
+impl Catalogue for SqlStore {
     async fn add_volume(
         &self,
         volume: &StoredVolume,
@@ -65,16 +64,16 @@ impl Catalogue for SqliteStore {
         scan: Option<&ScanFields>,
     ) -> StoreResult<bool> {
         let mut transaction = self.writer.begin().await?;
-        sqlx::query(
+        query(
             "INSERT INTO volumes (id, created_at, bytes, files, facts)
-             VALUES (?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING",
+             VALUES ($1, $2, $3, $4, $5) ON CONFLICT (id) DO NOTHING",
         )
         .bind(&volume.id)
         .bind(volume.created_at)
         .bind(i64::try_from(volume.bytes).unwrap_or(i64::MAX))
         .bind(to_json(&volume.files)?)
         .bind(to_json(&volume.facts)?)
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
         let now = volume.created_at;
         let new = hold(&mut transaction, tenant, &volume.id, tags, now).await?;
@@ -92,8 +91,8 @@ impl Catalogue for SqliteStore {
         now: Timestamp,
     ) -> StoreResult<Option<(Held<StoredVolume>, bool)>> {
         let mut transaction = self.writer.begin().await?;
-        let stored = sqlx::query("SELECT 1 FROM volumes WHERE id = ?").bind(id);
-        if stored.fetch_optional(&mut *transaction).await?.is_none() {
+        let stored = query("SELECT 1 FROM volumes WHERE id = $1").bind(id);
+        if stored.fetch_optional(&mut transaction).await?.is_none() {
             transaction.commit().await?;
             return Ok(None);
         }
@@ -167,12 +166,12 @@ impl Catalogue for SqliteStore {
     async fn set_tags(&self, tenant: &Tenant, id: &str, tags: &Tags) -> StoreResult<bool> {
         let statement = match Resource::of(id) {
             Some(Resource::Job) => {
-                "UPDATE jobs SET external_id = ?, labels = ?, revision = revision + 1
-                 WHERE tenant = ? AND id = ?"
+                "UPDATE jobs SET external_id = $1, labels = $2, revision = revision + 1
+                 WHERE tenant = $3 AND id = $4"
             }
-            _ => "UPDATE holdings SET external_id = ?, labels = ? WHERE tenant = ? AND id = ?",
+            _ => "UPDATE holdings SET external_id = $1, labels = $2 WHERE tenant = $3 AND id = $4",
         };
-        let changed = sqlx::query(statement)
+        let changed = query(statement)
             .bind(&tags.external_id)
             .bind(to_json(&tags.labels)?)
             .bind(tenant.as_str())
@@ -183,8 +182,8 @@ impl Catalogue for SqliteStore {
     }
 
     async fn set_library(&self, tenant: &Tenant, id: &str, library: bool) -> StoreResult<bool> {
-        let changed = sqlx::query(
-            "UPDATE holdings SET library = ? WHERE tenant = ? AND id = ? AND kind = 'template'",
+        let changed = query(
+            "UPDATE holdings SET library = $1 WHERE tenant = $2 AND id = $3 AND kind = 'template'",
         )
         .bind(library)
         .bind(tenant.as_str())
@@ -200,9 +199,9 @@ impl Catalogue for SqliteStore {
         id: &str,
         hold: Option<&LegalHold>,
     ) -> StoreResult<bool> {
-        let changed = sqlx::query(
-            "UPDATE holdings SET hold_reason = ?, held_at = ?, held_by = ?
-             WHERE tenant = ? AND id = ?",
+        let changed = query(
+            "UPDATE holdings SET hold_reason = $1, held_at = $2, held_by = $3
+             WHERE tenant = $4 AND id = $5",
         )
         .bind(hold.map(|hold| &hold.reason))
         .bind(hold.map(|hold| hold.since))
@@ -215,8 +214,7 @@ impl Catalogue for SqliteStore {
     }
 
     async fn made_of(&self, tenant: &Tenant, volume: &str) -> StoreResult<Vec<String>> {
-        let mut connection = self.readers.acquire().await?;
-        super::erasure::made_of(&mut connection, tenant, volume).await
+        super::erasure::made_of(&self.readers, tenant, volume).await
     }
 
     async fn erase(
@@ -233,16 +231,16 @@ impl Catalogue for SqliteStore {
     }
 
     async fn erased_at(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Timestamp>> {
-        let row = sqlx::query("SELECT erased_at FROM erased WHERE tenant = ? AND id = ?")
+        let row = query("SELECT erased_at FROM erased WHERE tenant = $1 AND id = $2")
             .bind(tenant.as_str())
             .bind(id)
             .fetch_optional(&self.readers)
             .await?;
-        Ok(row.map(|row| row.get(0)))
+        row.map(|row| row.try_get(0)).transpose()
     }
 
     async fn receipt(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Receipt>> {
-        let row = sqlx::query("SELECT sequence, receipt FROM erasures WHERE tenant = ? AND id = ?")
+        let row = query("SELECT sequence, receipt FROM erasures WHERE tenant = $1 AND id = $2")
             .bind(tenant.as_str())
             .bind(id)
             .fetch_optional(&self.readers)
@@ -272,14 +270,14 @@ impl Catalogue for SqliteStore {
 
     async fn expired(&self, expiry: &Expiry) -> StoreResult<Vec<(Tenant, String)>> {
         // A comparison with NULL finds nothing.
-        let rows = sqlx::query(
-            "SELECT tenant, id FROM jobs AS j WHERE finished_at < ?1 AND NOT EXISTS
+        let rows = query(
+            "SELECT tenant, id FROM jobs AS j WHERE finished_at < $1 AND NOT EXISTS
                  (SELECT 1 FROM holdings AS v
                   WHERE v.tenant = j.tenant AND v.id = j.volume AND v.held_at IS NOT NULL)
              UNION ALL
              SELECT tenant, id FROM holdings AS h
-             WHERE ((kind = 'volume' AND renewed_at < ?2)
-                    OR (kind IN ('model', 'segmentation') AND renewed_at < ?3))
+             WHERE ((kind = 'volume' AND renewed_at < $2)
+                    OR (kind IN ('model', 'segmentation') AND renewed_at < $3))
                AND held_at IS NULL AND NOT EXISTS
                    (SELECT 1 FROM sources JOIN holdings AS s
                         ON s.tenant = sources.tenant AND s.id = sources.volume
@@ -291,7 +289,7 @@ impl Catalogue for SqliteStore {
         .bind(expiry.results)
         .fetch_all(&self.readers)
         .await?;
-        let owned = |row: sqlx::sqlite::SqliteRow| Ok((rows::tenant(&row)?, row.try_get("id")?));
+        let owned = |row: DbRow| Ok((rows::tenant(&row)?, row.try_get("id")?));
         rows.into_iter().map(owned).collect()
     }
 
@@ -300,12 +298,12 @@ impl Catalogue for SqliteStore {
     }
 
     async fn overwrite_erased(&self) -> StoreResult<bool> {
-        self.writer.truncate_log().await
+        self.writer.overwrite_deleted().await
     }
 }
 
 /// The row of one item that a tenant has.
-fn one(select: &Select, tenant: &Tenant, id: &str) -> QueryBuilder<Sqlite> {
+fn one(select: &Select, tenant: &Tenant, id: &str) -> QueryBuilder {
     let mut query = select.query();
     query
         .push(" WHERE h.tenant = ")
@@ -321,7 +319,7 @@ fn listed(
     kind: Resource,
     filter: &ItemFilter,
     page: ListRequest,
-) -> QueryBuilder<Sqlite> {
+) -> QueryBuilder {
     let mut query = select.query();
     query
         .push(" WHERE h.tenant = ")
@@ -342,7 +340,7 @@ fn listed(
 
 /// Adds the conditions of a filter to a query whose columns have that prefix.
 pub(super) fn push_tags(
-    query: &mut QueryBuilder<Sqlite>,
+    query: &mut QueryBuilder,
     prefix: &str,
     tenant: &Tenant,
     kind: Resource,
@@ -366,7 +364,7 @@ pub(super) fn push_tags(
 }
 
 /// Adds the end of a query for a page, newest first, by the column of the sequence number.
-pub(super) fn push_page(query: &mut QueryBuilder<Sqlite>, sequence: &str, page: ListRequest) {
+pub(super) fn push_page(query: &mut QueryBuilder, sequence: &str, page: ListRequest) {
     if let Some(before) = page.before {
         query.push(" AND ").push(sequence).push(" < ");
         query.push_bind(before);
@@ -377,25 +375,27 @@ pub(super) fn push_page(query: &mut QueryBuilder<Sqlite>, sequence: &str, page: 
 
 /// Gives an item to a tenant, or renews its holding. Returns whether it is new for the tenant.
 async fn hold(
-    to: &mut SqliteConnection,
+    to: &mut Transaction<'_>,
     tenant: &Tenant,
     id: &str,
     tags: &Tags,
     now: Timestamp,
 ) -> StoreResult<bool> {
     let kind = Resource::of(id).unwrap_or(Resource::Volume);
-    let known = sqlx::query("SELECT 1 FROM holdings WHERE tenant = ? AND id = ?")
+    let known = query("SELECT 1 FROM holdings WHERE tenant = $1 AND id = $2")
         .bind(tenant.as_str())
         .bind(id)
         .fetch_optional(&mut *to)
         .await?;
-    sqlx::query(
+    query(
         "INSERT INTO holdings (tenant, id, kind, created_at, renewed_at, external_id, labels)
-         VALUES (?1, ?2, ?3, ?4, ?4, ?5, ?6)
+         VALUES ($1, $2, $3, $4, $4, $5, $6)
          ON CONFLICT (tenant, id) DO UPDATE SET
-             renewed_at = max(renewed_at, excluded.renewed_at),
-             external_id = coalesce(excluded.external_id, external_id),
-             labels = iif(excluded.labels = '{}', labels, excluded.labels)",
+             renewed_at = CASE WHEN holdings.renewed_at > excluded.renewed_at
+                          THEN holdings.renewed_at ELSE excluded.renewed_at END,
+             external_id = coalesce(excluded.external_id, holdings.external_id),
+             labels = CASE excluded.labels WHEN '{}' THEN holdings.labels
+                      ELSE excluded.labels END",
     )
     .bind(tenant.as_str())
     .bind(id)
@@ -406,7 +406,7 @@ async fn hold(
     .execute(&mut *to)
     .await?;
     // It exists again.
-    sqlx::query("DELETE FROM erased WHERE tenant = ? AND id = ?")
+    query("DELETE FROM erased WHERE tenant = $1 AND id = $2")
         .bind(tenant.as_str())
         .bind(id)
         .execute(to)
@@ -415,14 +415,14 @@ async fn hold(
 }
 
 /// Adds the record of a product's content, unless it is stored already.
-pub(super) async fn insert_content(
-    to: &mut SqliteConnection,
+pub(in crate::store) async fn insert_content(
+    to: &mut Transaction<'_>,
     product: &Product,
 ) -> StoreResult<()> {
-    sqlx::query(
+    query(
         "INSERT INTO products
              (id, kind, created_at, volume, parameters, summary, software, files)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING",
+         VALUES ($1, $2, $3, $4, $5, $6, $7, $8) ON CONFLICT (id) DO NOTHING",
     )
     .bind(&product.id)
     .bind(product.resource().noun())
@@ -440,7 +440,7 @@ pub(super) async fn insert_content(
 /// Adds a product within a transaction, unless it is stored already, and gives it to a tenant.
 /// Returns whether it is new for the tenant.
 pub(super) async fn insert_product(
-    to: &mut SqliteConnection,
+    to: &mut Transaction<'_>,
     product: &Product,
     tenant: &Tenant,
 ) -> StoreResult<bool> {
@@ -457,12 +457,12 @@ pub(super) async fn insert_product(
 
 /// Notes that an item was made of a volume.
 async fn add_source(
-    to: &mut SqliteConnection,
+    to: &mut Transaction<'_>,
     tenant: &Tenant,
     id: &str,
     volume: &str,
 ) -> StoreResult<()> {
-    sqlx::query("INSERT OR IGNORE INTO sources (tenant, id, volume) VALUES (?, ?, ?)")
+    query("INSERT INTO sources (tenant, id, volume) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING")
         .bind(tenant.as_str())
         .bind(id)
         .bind(volume)

@@ -1,18 +1,18 @@
-//! The table of scans in SQLite: whose scan each volume is.
+//! The table of scans: whose scan each volume is.
 
 use super::rows::{self, SCAN_COLUMNS, to_json};
-use super::sqlite::SqliteStore;
-use super::writer::Write;
 use crate::jobs::{
     ScanFields, ScanFilter, ScanIdentity, Scans, StoreResult, Tenant, Timestamp, UnreadScan,
+    random_key,
 };
+use crate::store::database::{SqlStore, Transaction};
+use crate::store::query::{QueryBuilder, query};
 use async_trait::async_trait;
-use sqlx::{QueryBuilder, Row, Sqlite, SqliteConnection};
 
 #[async_trait]
-impl Scans for SqliteStore {
+impl Scans for SqlStore {
     async fn scan(&self, tenant: &Tenant, volume: &str) -> StoreResult<Option<ScanIdentity>> {
-        let row = QueryBuilder::<Sqlite>::new("SELECT ")
+        let row = QueryBuilder::new("SELECT ")
             .push(SCAN_COLUMNS)
             .push(" FROM scans AS c WHERE c.tenant = ")
             .push_bind(tenant.to_string())
@@ -30,9 +30,9 @@ impl Scans for SqliteStore {
         volume: &str,
         found: Option<&ScanFields>,
     ) -> StoreResult<()> {
-        sqlx::query(
+        query(
             "INSERT INTO scans (tenant, volume, found)
-             SELECT tenant, id, ?3 FROM holdings WHERE tenant = ?1 AND id = ?2
+             SELECT tenant, id, $3 FROM holdings WHERE tenant = $1 AND id = $2
              ON CONFLICT (tenant, volume) DO NOTHING",
         )
         .bind(tenant.as_str())
@@ -49,10 +49,10 @@ impl Scans for SqliteStore {
         volume: &str,
         stated: &ScanFields,
     ) -> StoreResult<bool> {
-        let changed = sqlx::query(
+        let changed = query(
             "INSERT INTO scans (tenant, volume, stated)
-             SELECT tenant, id, ?3 FROM holdings
-             WHERE tenant = ?1 AND id = ?2 AND kind = 'volume'
+             SELECT tenant, id, $3 FROM holdings
+             WHERE tenant = $1 AND id = $2 AND kind = 'volume'
              ON CONFLICT (tenant, volume) DO UPDATE SET stated = excluded.stated",
         )
         .bind(tenant.as_str())
@@ -64,12 +64,12 @@ impl Scans for SqliteStore {
     }
 
     async fn erase_scan(&self, tenant: &Tenant, volume: &str, now: Timestamp) -> StoreResult<bool> {
-        let changed = sqlx::query(
+        let changed = query(
             "INSERT INTO scans (tenant, volume, erased_at)
-             SELECT tenant, id, ?3 FROM holdings
-             WHERE tenant = ?1 AND id = ?2 AND kind = 'volume' AND held_at IS NULL
+             SELECT tenant, id, $3 FROM holdings
+             WHERE tenant = $1 AND id = $2 AND kind = 'volume' AND held_at IS NULL
              ON CONFLICT (tenant, volume) DO UPDATE SET
-                 found = NULL, stated = NULL, erased_at = coalesce(erased_at, excluded.erased_at)",
+                 found = NULL, stated = NULL, erased_at = coalesce(scans.erased_at, excluded.erased_at)",
         )
         .bind(tenant.as_str())
         .bind(volume)
@@ -80,11 +80,11 @@ impl Scans for SqliteStore {
     }
 
     async fn unread_scans(&self, after: i64, limit: u32) -> StoreResult<Vec<UnreadScan>> {
-        let rows = sqlx::query(
+        let rows = query(
             "SELECT h.sequence, h.tenant, h.id, v.files
              FROM holdings AS h JOIN volumes AS v ON v.id = h.id
              LEFT JOIN scans AS c ON c.tenant = h.tenant AND c.volume = h.id
-             WHERE c.volume IS NULL AND h.sequence > ? ORDER BY h.sequence LIMIT ?",
+             WHERE c.volume IS NULL AND h.sequence > $1 ORDER BY h.sequence LIMIT $2",
         )
         .bind(after)
         .bind(limit)
@@ -102,34 +102,38 @@ impl Scans for SqliteStore {
 
     async fn deidentification_secret(&self, tenant: &Tenant) -> StoreResult<Vec<u8>> {
         let known = async || {
-            let row = sqlx::query("SELECT secret FROM deidentification_secrets WHERE tenant = ?")
+            let row = query("SELECT secret FROM deidentification_secrets WHERE tenant = $1")
                 .bind(tenant.as_str())
                 .fetch_optional(&self.readers)
                 .await?;
-            StoreResult::Ok(row.map(|row| row.get::<Vec<u8>, _>(0)))
+            row.map(|row| row.try_get::<Vec<u8>, _>(0)).transpose()
         };
         if let Some(secret) = known().await? {
             return Ok(secret);
         }
-        sqlx::query("INSERT OR IGNORE INTO deidentification_secrets VALUES (?, randomblob(32))")
-            .bind(tenant.as_str())
-            .write(&self.writer)
-            .await?;
+        query(
+            "INSERT INTO deidentification_secrets (tenant, secret) VALUES ($1, $2)
+             ON CONFLICT DO NOTHING",
+        )
+        .bind(tenant.as_str())
+        .bind(&random_key()[..])
+        .write(&self.writer)
+        .await?;
         Ok(known().await?.unwrap_or_default())
     }
 }
 
 /// Notes what the file of a volume says that the tenant just uploaded: this ends an erasure.
 pub(super) async fn note_upload(
-    to: &mut SqliteConnection,
+    to: &mut Transaction<'_>,
     tenant: &Tenant,
     volume: &str,
     found: Option<&ScanFields>,
 ) -> StoreResult<()> {
-    sqlx::query(
-        "INSERT INTO scans (tenant, volume, found) VALUES (?, ?, ?)
+    query(
+        "INSERT INTO scans (tenant, volume, found) VALUES ($1, $2, $3)
          ON CONFLICT (tenant, volume) DO UPDATE SET found = excluded.found, erased_at = NULL
-         WHERE erased_at IS NOT NULL",
+         WHERE scans.erased_at IS NOT NULL",
     )
     .bind(tenant.as_str())
     .bind(volume)
@@ -142,7 +146,7 @@ pub(super) async fn note_upload(
 /// Adds the conditions of a filter to a query whose column `sequence` has that prefix. `listed`
 /// joins the table that is listed, as `x`, to the scans `c`.
 pub(super) fn push_scan(
-    query: &mut QueryBuilder<Sqlite>,
+    query: &mut QueryBuilder,
     (prefix, listed): (&str, &str),
     tenant: &Tenant,
     filter: &ScanFilter,

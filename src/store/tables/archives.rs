@@ -1,22 +1,20 @@
-//! The tables of archives in SQLite. Triggers of the jobs table write their rows; see the migration.
+//! The tables of archives. Triggers of the jobs table write their rows; see the migration.
 
+use super::jobs::renew_volumes;
 use super::rows::{self, to_json};
-use super::sqlite::SqliteStore;
-use super::sqlite_jobs::renew_volumes;
-use super::writer::Write;
 use crate::archive::{
     ArchiveBacklog, ArchiveStore, DuePull, DueSend, HeldSeries, ObjectDelivery, Pull,
     SendSettlement, SeriesKey,
 };
 use crate::hooks::{Backlog, DeliveryState};
 use crate::jobs::{Failure, Job, StoreResult, Tenant, Timestamp};
+use crate::store::database::SqlStore;
+use crate::store::query::{DbRow, query};
 use async_trait::async_trait;
-use sqlx::Row;
-use sqlx::sqlite::SqliteRow;
 use std::collections::BTreeMap;
 
 #[async_trait]
-impl ArchiveStore for SqliteStore {
+impl ArchiveStore for SqlStore {
     async fn pull_destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
         self.due_destinations(
             "SELECT destination, min(next_attempt_at) FROM pulls WHERE state = 'pending'
@@ -31,10 +29,10 @@ impl ArchiveStore for SqliteStore {
         now: Timestamp,
         limit: usize,
     ) -> StoreResult<Vec<DuePull>> {
-        let rows = sqlx::query(
+        let rows = query(
             "SELECT p.*, j.tenant, j.source FROM pulls AS p JOIN jobs AS j ON j.id = p.job
-             WHERE p.state = 'pending' AND p.destination = ?1 AND p.next_attempt_at <= ?2
-             ORDER BY p.next_attempt_at, p.job LIMIT ?3",
+             WHERE p.state = 'pending' AND p.destination = $1 AND p.next_attempt_at <= $2
+             ORDER BY p.next_attempt_at, p.job LIMIT $3",
         )
         .bind(destination)
         .bind(now)
@@ -54,23 +52,23 @@ impl ArchiveStore for SqliteStore {
 
     async fn pulled(&self, job: &str, volume: &str, now: Timestamp) -> StoreResult<Option<Job>> {
         let mut transaction = self.writer.begin().await?;
-        let row = sqlx::query(
-            "UPDATE jobs SET volume = ?1, revision = revision + 1
-             WHERE id = ?2 AND state = 'queued' AND volume = '' RETURNING *",
+        let row = query(
+            "UPDATE jobs SET volume = $1, revision = revision + 1
+             WHERE id = $2 AND state = 'queued' AND volume = '' RETURNING *",
         )
         .bind(volume)
         .bind(job)
-        .fetch_optional(&mut *transaction)
+        .fetch_optional(&mut transaction)
         .await?;
         let job = row.map(rows::job).transpose()?;
         if let Some(job) = &job {
-            sqlx::query(
-                "UPDATE pulls SET state = 'done', attempts = attempts + 1, last_attempt_at = ?1,
-                        last_error = NULL WHERE job = ?2",
+            query(
+                "UPDATE pulls SET state = 'done', attempts = attempts + 1, last_attempt_at = $1,
+                        last_error = NULL WHERE job = $2",
             )
             .bind(now)
             .bind(&job.id)
-            .execute(&mut *transaction)
+            .execute(&mut transaction)
             .await?;
             renew_volumes(&mut transaction, job, now).await?;
         }
@@ -85,10 +83,10 @@ impl ArchiveStore for SqliteStore {
         again_at: Timestamp,
         now: Timestamp,
     ) -> StoreResult<()> {
-        sqlx::query(
-            "UPDATE pulls SET attempts = attempts + 1, last_attempt_at = ?1, last_error = ?2,
-                    next_attempt_at = ?3
-             WHERE job = ?4 AND state = 'pending' RETURNING job",
+        query(
+            "UPDATE pulls SET attempts = attempts + 1, last_attempt_at = $1, last_error = $2,
+                    next_attempt_at = $3
+             WHERE job = $4 AND state = 'pending' RETURNING job",
         )
         .bind(now)
         .bind(error)
@@ -106,31 +104,31 @@ impl ArchiveStore for SqliteStore {
         now: Timestamp,
     ) -> StoreResult<Option<Job>> {
         let mut transaction = self.writer.begin().await?;
-        let row = sqlx::query(
-            "UPDATE jobs SET state = 'failed', failure = ?1, finished_at = ?2,
+        let row = query(
+            "UPDATE jobs SET state = 'failed', failure = $1, finished_at = $2,
                     revision = revision + 1
-             WHERE id = ?3 AND state = 'queued' AND volume = '' RETURNING *",
+             WHERE id = $3 AND state = 'queued' AND volume = '' RETURNING *",
         )
         .bind(to_json(failure)?)
         .bind(now)
         .bind(job)
-        .fetch_optional(&mut *transaction)
+        .fetch_optional(&mut transaction)
         .await?;
-        sqlx::query(
-            "UPDATE pulls SET attempts = attempts + 1, last_attempt_at = ?1, last_error = ?2
-             WHERE job = ?3",
+        query(
+            "UPDATE pulls SET attempts = attempts + 1, last_attempt_at = $1, last_error = $2
+             WHERE job = $3",
         )
         .bind(now)
         .bind(&failure.detail)
         .bind(job)
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
         transaction.commit().await?;
         row.map(rows::job).transpose()
     }
 
     async fn pulls(&self, jobs: &[&str]) -> StoreResult<BTreeMap<String, Pull>> {
-        let rows = sqlx::query("SELECT * FROM pulls WHERE job IN (SELECT value FROM json_each(?))")
+        let rows = query("SELECT * FROM pulls WHERE job IN (SELECT value FROM json_each($1))")
             .bind(to_json(&jobs)?)
             .fetch_all(&self.readers)
             .await?;
@@ -153,9 +151,9 @@ impl ArchiveStore for SqliteStore {
     }
 
     async fn held_series(&self, key: SeriesKey<'_>) -> StoreResult<Option<HeldSeries>> {
-        let row = sqlx::query(
+        let row = query(
             "SELECT instances, volume FROM pulled_series
-             WHERE tenant = ? AND base = ? AND study = ? AND series = ?",
+             WHERE tenant = $1 AND base = $2 AND study = $3 AND series = $4",
         )
         .bind(key.tenant.as_str())
         .bind(key.base)
@@ -173,12 +171,12 @@ impl ArchiveStore for SqliteStore {
     }
 
     async fn note_series(&self, key: SeriesKey<'_>, held: &HeldSeries) -> StoreResult<()> {
-        sqlx::query(
+        query(
             "INSERT INTO pulled_series (tenant, base, study, series, instances, volume)
-             SELECT ?1, ?2, ?3, ?4, ?5, ?6
-             WHERE EXISTS (SELECT 1 FROM holdings WHERE tenant = ?1 AND id = ?6)
+             SELECT $1, $2, $3, $4, $5, $6
+             WHERE EXISTS (SELECT 1 FROM holdings WHERE tenant = $1 AND id = $6)
              ON CONFLICT (tenant, base, study, series)
-             DO UPDATE SET instances = ?5, volume = ?6 RETURNING volume",
+             DO UPDATE SET instances = $5, volume = $6 RETURNING volume",
         )
         .bind(key.tenant.as_str())
         .bind(key.base)
@@ -205,10 +203,10 @@ impl ArchiveStore for SqliteStore {
         now: Timestamp,
         limit: usize,
     ) -> StoreResult<Vec<DueSend>> {
-        let rows = sqlx::query(
+        let rows = query(
             "SELECT * FROM sends
-             WHERE state = 'pending' AND destination = ?1 AND next_attempt_at <= ?2
-             ORDER BY next_attempt_at, sequence LIMIT ?3",
+             WHERE state = 'pending' AND destination = $1 AND next_attempt_at <= $2
+             ORDER BY next_attempt_at, sequence LIMIT $3",
         )
         .bind(destination)
         .bind(now)
@@ -237,11 +235,11 @@ impl ArchiveStore for SqliteStore {
     ) -> StoreResult<()> {
         let ended = (settled.state != DeliveryState::Pending).then_some(now);
         let mut transaction = self.writer.begin().await?;
-        sqlx::query(
-            "UPDATE sends SET state = ?1, attempts = attempts + 1, last_attempt_at = ?2,
-                    last_outcome = ?3, last_error = ?4, ended_at = ?5,
-                    next_attempt_at = coalesce(?6, next_attempt_at)
-             WHERE id = ?7 AND state = 'pending'",
+        query(
+            "UPDATE sends SET state = $1, attempts = attempts + 1, last_attempt_at = $2,
+                    last_outcome = $3, last_error = $4, ended_at = $5,
+                    next_attempt_at = coalesce($6, next_attempt_at)
+             WHERE id = $7 AND state = 'pending'",
         )
         .bind(settled.state.as_str())
         .bind(now)
@@ -250,23 +248,23 @@ impl ArchiveStore for SqliteStore {
         .bind(ended)
         .bind(settled.again_at)
         .bind(id)
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
         // Nobody can ask about the deliveries of a job that was erased.
-        sqlx::query(
-            "DELETE FROM sends WHERE id = ? AND state != 'pending'
+        query(
+            "DELETE FROM sends WHERE id = $1 AND state != 'pending'
                  AND NOT EXISTS (SELECT 1 FROM jobs WHERE jobs.id = sends.job)",
         )
         .bind(id)
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
         transaction.commit().await?;
         Ok(())
     }
 
     async fn sends(&self, jobs: &[&str]) -> StoreResult<BTreeMap<String, Vec<ObjectDelivery>>> {
-        let rows = sqlx::query(
-            "SELECT * FROM sends WHERE job IN (SELECT value FROM json_each(?))
+        let rows = query(
+            "SELECT * FROM sends WHERE job IN (SELECT value FROM json_each($1))
              ORDER BY sequence",
         )
         .bind(to_json(&jobs)?)
@@ -290,30 +288,30 @@ impl ArchiveStore for SqliteStore {
         now: Timestamp,
     ) -> StoreResult<Option<ObjectDelivery>> {
         let mut transaction = self.writer.begin().await?;
-        sqlx::query(
-            "UPDATE sends SET state = 'pending', attempts = 0, since = ?1, next_attempt_at = ?1,
+        query(
+            "UPDATE sends SET state = 'pending', attempts = 0, since = $1, next_attempt_at = $1,
                     ended_at = NULL
-             WHERE id = ?2 AND job = ?3 AND tenant = ?4 AND state != 'pending'
-               AND last_outcome IS NOT 'erased'",
+             WHERE id = $2 AND job = $3 AND tenant = $4 AND state != 'pending'
+               AND last_outcome IS DISTINCT FROM 'erased'",
         )
         .bind(now)
         .bind(id)
         .bind(job)
         .bind(tenant.as_str())
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
-        let row = sqlx::query("SELECT * FROM sends WHERE id = ? AND job = ? AND tenant = ?")
+        let row = query("SELECT * FROM sends WHERE id = $1 AND job = $2 AND tenant = $3")
             .bind(id)
             .bind(job)
             .bind(tenant.as_str())
-            .fetch_optional(&mut *transaction)
+            .fetch_optional(&mut transaction)
             .await?;
         transaction.commit().await?;
         row.as_ref().map(delivery).transpose()
     }
 
     async fn archive_backlog(&self) -> StoreResult<ArchiveBacklog> {
-        let row = sqlx::query(
+        let row = query(
             "SELECT (SELECT count(*) FROM pulls WHERE state = 'pending'),
                     (SELECT count(*) FROM sends WHERE state = 'pending'),
                     (SELECT min(since) FROM sends WHERE state = 'pending'),
@@ -321,34 +319,34 @@ impl ArchiveStore for SqliteStore {
         )
         .fetch_one(&self.readers)
         .await?;
-        let count = |column: usize| u64::try_from(row.get::<i64, _>(column)).unwrap_or(0);
+        let count = |column: usize| row.try_get(column).map(rows::unsigned);
         Ok(ArchiveBacklog {
-            pulls: count(0),
+            pulls: count(0)?,
             sends: Backlog {
-                pending: count(1),
+                pending: count(1)?,
                 oldest: row.try_get(2)?,
-                dead: count(3),
+                dead: count(3)?,
             },
         })
     }
 }
 
-impl SqliteStore {
+impl SqlStore {
     /// The rows of a query for destinations, each with the time when its first errand is due.
-    async fn due_destinations(&self, query: &'static str) -> StoreResult<Vec<(String, Timestamp)>> {
-        let rows = sqlx::query(query).fetch_all(&self.readers).await?;
+    async fn due_destinations(&self, text: &'static str) -> StoreResult<Vec<(String, Timestamp)>> {
+        let rows = query(text).fetch_all(&self.readers).await?;
         rows.iter()
             .map(|row| Ok((row.try_get(0)?, row.try_get(1)?)))
             .collect()
     }
 }
 
-fn next_attempt(row: &SqliteRow, state: DeliveryState) -> StoreResult<Option<Timestamp>> {
+fn next_attempt(row: &DbRow, state: DeliveryState) -> StoreResult<Option<Timestamp>> {
     let at: Timestamp = row.try_get("next_attempt_at")?;
     Ok((state == DeliveryState::Pending).then_some(at))
 }
 
-fn delivery(row: &SqliteRow) -> StoreResult<ObjectDelivery> {
+fn delivery(row: &DbRow) -> StoreResult<ObjectDelivery> {
     let state = DeliveryState::parse(row.try_get("state")?).unwrap_or(DeliveryState::Dead);
     Ok(ObjectDelivery {
         id: row.try_get("id")?,

@@ -1,22 +1,20 @@
-//! The table of work items in SQLite.
+//! The table of work items.
 
 use super::rows::{self, to_json};
-use super::sqlite::SqliteStore;
-use super::writer::Write;
 use crate::jobs::{StoreError, StoreResult, Tenant, Timestamp};
+use crate::store::database::SqlStore;
+use crate::store::query::{DbRow, query};
 use crate::worklist::{AddedWorkitem, DataSetJson, Workitem, WorkitemState, Worklist};
 use async_trait::async_trait;
-use sqlx::Row;
-use sqlx::sqlite::SqliteRow;
 
 #[async_trait]
-impl Worklist for SqliteStore {
+impl Worklist for SqlStore {
     async fn add_workitem(&self, item: &Workitem, limit: u64) -> StoreResult<AddedWorkitem> {
         self.require_room()?;
-        let added = sqlx::query(
+        let added = query(
             "INSERT INTO workitems (tenant, uid, state, attributes, changed_at)
-             SELECT ?1, ?2, ?3, ?4, ?5
-             WHERE (SELECT count(*) FROM workitems WHERE tenant = ?1) < ?6
+             SELECT $1, $2, $3, $4, $5
+             WHERE (SELECT count(*) FROM workitems WHERE tenant = $1) < $6
              ON CONFLICT (tenant, uid) DO NOTHING",
         )
         .bind(item.tenant.as_str())
@@ -37,7 +35,7 @@ impl Worklist for SqliteStore {
     }
 
     async fn workitem(&self, tenant: &Tenant, uid: &str) -> StoreResult<Option<Workitem>> {
-        let row = sqlx::query("SELECT * FROM workitems WHERE tenant = ? AND uid = ?")
+        let row = query("SELECT * FROM workitems WHERE tenant = $1 AND uid = $2")
             .bind(tenant.as_str())
             .bind(uid)
             .fetch_optional(&self.readers)
@@ -46,10 +44,10 @@ impl Worklist for SqliteStore {
     }
 
     async fn change_workitem(&self, item: &Workitem) -> StoreResult<bool> {
-        let changed = sqlx::query(
-            "UPDATE workitems SET state = ?, transaction_uid = ?, performer = ?, attributes = ?,
-                 changed_at = ?, revision = revision + 1
-             WHERE tenant = ? AND uid = ? AND revision = ?",
+        let changed = query(
+            "UPDATE workitems SET state = $1, transaction_uid = $2, performer = $3, attributes = $4,
+                 changed_at = $5, revision = revision + 1
+             WHERE tenant = $6 AND uid = $7 AND revision = $8",
         )
         .bind(item.state.as_str())
         .bind(&item.transaction)
@@ -71,10 +69,10 @@ impl Worklist for SqliteStore {
         after: i64,
         limit: u32,
     ) -> StoreResult<Vec<Workitem>> {
-        let rows = sqlx::query(
+        let rows = query(
             "SELECT * FROM workitems
-             WHERE tenant = ?1 AND (?2 IS NULL OR state = ?2) AND sequence > ?3
-             ORDER BY sequence LIMIT ?4",
+             WHERE tenant = $1 AND ($2 IS NULL OR state = $2) AND sequence > $3
+             ORDER BY sequence LIMIT $4",
         )
         .bind(tenant.as_str())
         .bind(state.map(WorkitemState::as_str))
@@ -86,9 +84,9 @@ impl Worklist for SqliteStore {
     }
 
     async fn scheduled_workitems(&self, after: i64, limit: u32) -> StoreResult<Vec<Workitem>> {
-        let rows = sqlx::query(
-            "SELECT * FROM workitems WHERE state = 'SCHEDULED' AND sequence > ?
-             ORDER BY sequence LIMIT ?",
+        let rows = query(
+            "SELECT * FROM workitems WHERE state = 'SCHEDULED' AND sequence > $1
+             ORDER BY sequence LIMIT $2",
         )
         .bind(after)
         .bind(limit)
@@ -98,7 +96,7 @@ impl Worklist for SqliteStore {
     }
 
     async fn performed_workitems(&self) -> StoreResult<Vec<Workitem>> {
-        let rows = sqlx::query(
+        let rows = query(
             "SELECT * FROM workitems WHERE state = 'IN PROGRESS' AND performer IS NOT NULL
              ORDER BY sequence",
         )
@@ -108,9 +106,9 @@ impl Worklist for SqliteStore {
     }
 
     async fn delete_ended_workitems(&self, before: Timestamp) -> StoreResult<u64> {
-        sqlx::query(
+        query(
             "DELETE FROM workitems
-             WHERE state IN ('COMPLETED', 'CANCELED') AND changed_at < ?",
+             WHERE state IN ('COMPLETED', 'CANCELED') AND changed_at < $1",
         )
         .bind(before)
         .write(&self.writer)
@@ -118,7 +116,7 @@ impl Worklist for SqliteStore {
     }
 }
 
-fn item_of(row: SqliteRow) -> StoreResult<Workitem> {
+fn item_of(row: DbRow) -> StoreResult<Workitem> {
     let damaged = |what: String| StoreError::database(format!("damaged row: {what}"));
     let state: &str = row.try_get("state")?;
     let attributes = DataSetJson::of(rows::json(&row, "attributes")?);

@@ -1,24 +1,23 @@
-//! The tables of keys and of the audit trail in SQLite.
+//! The tables of keys and of the audit trail.
 
 use super::rows::{self, to_json};
-use super::sqlite::SqliteStore;
 use crate::access::{
     AccessStore, Activity, Anchor, ApiKey, AuditEvent, AuditFilter, AuditLink, AuditRecord,
     NO_HASH, Quota, Usage, chain_hash,
 };
 use crate::jobs::{ListPage, ListRequest, StoreResult, Tenant, Timestamp};
+use crate::store::database::{SqlStore, Transaction};
+use crate::store::query::{DbRow, query};
 use async_trait::async_trait;
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row, SqliteConnection};
 
 #[async_trait]
-impl AccessStore for SqliteStore {
+impl AccessStore for SqlStore {
     async fn add_key(&self, key: &ApiKey, event: &AuditEvent) -> StoreResult<()> {
         let mut transaction = self.writer.begin().await?;
-        sqlx::query(
+        query(
             "INSERT INTO api_keys (id, name, tenant, scope, requests, bytes, jobs, created_at,
                                    expires_at, revoked_at, digest)
-             VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+             VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11)",
         )
         .bind(&key.id)
         .bind(&key.name)
@@ -31,7 +30,7 @@ impl AccessStore for SqliteStore {
         .bind(key.expires_at)
         .bind(key.revoked_at)
         .bind(&key.digest)
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
         append(&mut transaction, std::slice::from_ref(event)).await?;
         transaction.commit().await?;
@@ -39,7 +38,7 @@ impl AccessStore for SqliteStore {
     }
 
     async fn key(&self, id: &str) -> StoreResult<Option<ApiKey>> {
-        let row = sqlx::query("SELECT * FROM api_keys WHERE id = ?")
+        let row = query("SELECT * FROM api_keys WHERE id = $1")
             .bind(id)
             .fetch_optional(&self.readers)
             .await?;
@@ -51,10 +50,10 @@ impl AccessStore for SqliteStore {
         tenant: Option<&Tenant>,
         page: ListRequest,
     ) -> StoreResult<ListPage<ApiKey>> {
-        let rows = sqlx::query(
+        let rows = query(
             "SELECT * FROM api_keys
-             WHERE (?1 IS NULL OR tenant = ?1) AND (?2 IS NULL OR sequence < ?2)
-             ORDER BY sequence DESC LIMIT ?3",
+             WHERE ($1 IS NULL OR tenant = $1) AND ($2 IS NULL OR sequence < $2)
+             ORDER BY sequence DESC LIMIT $3",
         )
         .bind(tenant.map(Tenant::as_str))
         .bind(page.before)
@@ -65,7 +64,7 @@ impl AccessStore for SqliteStore {
     }
 
     async fn any_key(&self) -> StoreResult<bool> {
-        let row = sqlx::query("SELECT EXISTS (SELECT 1 FROM api_keys)")
+        let row = query("SELECT EXISTS (SELECT 1 FROM api_keys)")
             .fetch_one(&self.readers)
             .await?;
         Ok(row.try_get(0)?)
@@ -74,37 +73,37 @@ impl AccessStore for SqliteStore {
     async fn revoke_key(&self, id: &str, now: Timestamp, event: &AuditEvent) -> StoreResult<bool> {
         let mut transaction = self.writer.begin().await?;
         let done =
-            sqlx::query("UPDATE api_keys SET revoked_at = ? WHERE id = ? AND revoked_at IS NULL")
+            query("UPDATE api_keys SET revoked_at = $1 WHERE id = $2 AND revoked_at IS NULL")
                 .bind(now)
                 .bind(id)
-                .execute(&mut *transaction)
+                .execute(&mut transaction)
                 .await?;
-        if done.rows_affected() > 0 {
+        if done > 0 {
             append(&mut transaction, std::slice::from_ref(event)).await?;
         }
         transaction.commit().await?;
-        Ok(done.rows_affected() > 0 || self.key(id).await?.is_some())
+        Ok(done > 0 || self.key(id).await?.is_some())
     }
 
     async fn usage(&self, tenant: &Tenant) -> StoreResult<Usage> {
-        let row = sqlx::query(
-            "SELECT (SELECT coalesce(sum(bytes), 0) FROM volumes WHERE id IN
-                        (SELECT id FROM holdings WHERE tenant = ?1 AND kind = 'volume'))
+        let row = query(
+            "SELECT CAST((SELECT coalesce(sum(bytes), 0) FROM volumes WHERE id IN
+                        (SELECT id FROM holdings WHERE tenant = $1 AND kind = 'volume'))
                     + (SELECT coalesce(sum(bytes), 0) FROM intake_objects
-                       WHERE tenant = ?1 AND file IS NOT NULL),
-                    (SELECT count(*) FROM jobs WHERE tenant = ?1 AND state = 'queued')",
+                       WHERE tenant = $1 AND file IS NOT NULL) AS BIGINT),
+                    (SELECT count(*) FROM jobs WHERE tenant = $1 AND state = 'queued')",
         )
         .bind(tenant.as_str())
         .fetch_one(&self.readers)
         .await?;
         Ok(Usage {
-            bytes: unsigned(row.try_get(0)?),
-            jobs: unsigned(row.try_get(1)?),
+            bytes: rows::unsigned(row.try_get(0)?),
+            jobs: rows::unsigned(row.try_get(1)?),
         })
     }
 
     async fn is_filed(&self, tenant: &Tenant, key: &str) -> StoreResult<bool> {
-        let row = sqlx::query("SELECT EXISTS (SELECT 1 FROM jobs WHERE idempotency_key = ?)")
+        let row = query("SELECT EXISTS (SELECT 1 FROM jobs WHERE idempotency_key = $1)")
             .bind(format!("{tenant}/{key}"))
             .fetch_one(&self.readers)
             .await?;
@@ -123,12 +122,12 @@ impl AccessStore for SqliteStore {
         filter: &AuditFilter,
         page: ListRequest,
     ) -> StoreResult<ListPage<AuditRecord>> {
-        let rows = sqlx::query(
+        let rows = query(
             "SELECT sequence, event, hash FROM audit
-             WHERE (?1 IS NULL OR tenant = ?1) AND (?2 IS NULL OR agent = ?2)
-               AND (?3 IS NULL OR object = ?3) AND (?4 IS NULL OR recorded >= ?4)
-               AND (?5 IS NULL OR recorded < ?5) AND (?6 IS NULL OR sequence < ?6)
-             ORDER BY sequence DESC LIMIT ?7",
+             WHERE ($1 IS NULL OR tenant = $1) AND ($2 IS NULL OR agent = $2)
+               AND ($3 IS NULL OR object = $3) AND ($4 IS NULL OR recorded >= $4)
+               AND ($5 IS NULL OR recorded < $5) AND ($6 IS NULL OR sequence < $6)
+             ORDER BY sequence DESC LIMIT $7",
         )
         .bind(filter.tenant.as_ref().map(Tenant::as_str))
         .bind(&filter.agent)
@@ -143,8 +142,8 @@ impl AccessStore for SqliteStore {
     }
 
     async fn links(&self, after: i64, limit: u32) -> StoreResult<Vec<AuditLink>> {
-        let rows = sqlx::query(
-            "SELECT sequence, event, hash FROM audit WHERE sequence > ? ORDER BY sequence LIMIT ?",
+        let rows = query(
+            "SELECT sequence, event, hash FROM audit WHERE sequence > $1 ORDER BY sequence LIMIT $2",
         )
         .bind(after)
         .bind(i64::from(limit))
@@ -160,66 +159,63 @@ impl AccessStore for SqliteStore {
     }
 
     async fn anchor(&self) -> StoreResult<Option<Anchor>> {
-        let row =
-            sqlx::query("SELECT sequence, hash FROM audit_anchors ORDER BY sequence DESC LIMIT 1")
-                .fetch_optional(&self.readers)
-                .await?;
+        let row = query("SELECT sequence, hash FROM audit_anchors ORDER BY sequence DESC LIMIT 1")
+            .fetch_optional(&self.readers)
+            .await?;
         row.map(read_anchor).transpose()
     }
 
     async fn greatest_sequence(&self) -> StoreResult<i64> {
-        let row = sqlx::query("SELECT seq FROM sqlite_sequence WHERE name = 'audit'")
+        let row = query("SELECT seq FROM sqlite_sequence WHERE name = 'audit'")
+            .on_postgres("SELECT sequence FROM audit_greatest")
             .fetch_optional(&self.readers)
             .await?;
-        row.map_or(Ok(0), |row| Ok(row.try_get(0)?))
+        row.map_or(Ok(0), |row| row.try_get(0))
     }
 
     async fn prune(&self, before: Timestamp, now: Timestamp) -> StoreResult<u64> {
         let mut transaction = self.writer.begin().await?;
         // The event that records the removal remains, so the chain is never empty.
-        let last = sqlx::query(
+        let last = query(
             "SELECT sequence, hash FROM audit
-             WHERE sequence < coalesce((SELECT min(sequence) FROM audit WHERE recorded >= ?),
+             WHERE sequence < coalesce((SELECT min(sequence) FROM audit WHERE recorded >= $1),
                                        9223372036854775807)
              ORDER BY sequence DESC LIMIT 1",
         )
         .bind(before)
-        .fetch_optional(&mut *transaction)
+        .fetch_optional(&mut transaction)
         .await?;
         let Some(last) = last.map(read_anchor).transpose()? else {
             transaction.commit().await?;
             return Ok(0);
         };
-        sqlx::query("INSERT INTO audit_anchors (sequence, hash, pruned_at) VALUES (?, ?, ?)")
+        query("INSERT INTO audit_anchors (sequence, hash, pruned_at) VALUES ($1, $2, $3)")
             .bind(last.sequence)
             .bind(&last.hash)
             .bind(now)
-            .execute(&mut *transaction)
+            .execute(&mut transaction)
             .await?;
-        let done = sqlx::query("DELETE FROM audit WHERE sequence <= ?")
+        let done = query("DELETE FROM audit WHERE sequence <= $1")
             .bind(last.sequence)
-            .execute(&mut *transaction)
+            .execute(&mut transaction)
             .await?;
         let agent = "ventriform".to_owned();
         let event = AuditEvent {
-            count: done.rows_affected(),
+            count: done,
             ..AuditEvent::new(now, Activity::AuditPruned, Tenant::default(), agent)
         };
         append(&mut transaction, &[event.on(last.name())]).await?;
         transaction.commit().await?;
-        Ok(done.rows_affected())
+        Ok(done)
     }
 }
 
 /// Appends events to the chain, within a transaction that holds the database's write lock. Returns
 /// the end of the chain.
-pub(super) async fn append(
-    to: &mut SqliteConnection,
-    events: &[AuditEvent],
-) -> StoreResult<Anchor> {
-    let head = sqlx::query(
+pub(super) async fn append(to: &mut Transaction<'_>, events: &[AuditEvent]) -> StoreResult<Anchor> {
+    let head = query(
         "SELECT sequence, hash FROM (SELECT sequence, hash FROM audit
-                                     UNION ALL SELECT sequence, hash FROM audit_anchors)
+                                     UNION ALL SELECT sequence, hash FROM audit_anchors) AS ends
          ORDER BY sequence DESC LIMIT 1",
     )
     .fetch_optional(&mut *to)
@@ -232,7 +228,7 @@ pub(super) async fn append(
         let event = to_json(event)?;
         sequence += 1;
         hash = chain_hash(&hash, sequence, &event);
-        sqlx::query("INSERT INTO audit (sequence, event, hash) VALUES (?, ?, ?)")
+        query("INSERT INTO audit (sequence, event, hash) VALUES ($1, $2, $3)")
             .bind(sequence)
             .bind(event)
             .bind(&hash)
@@ -242,9 +238,9 @@ pub(super) async fn append(
     Ok(Anchor { sequence, hash })
 }
 
-fn read_key(row: SqliteRow) -> StoreResult<ApiKey> {
+fn read_key(row: DbRow) -> StoreResult<ApiKey> {
     let limit = |column: &str| -> StoreResult<Option<u64>> {
-        Ok(row.try_get::<Option<i64>, _>(column)?.map(unsigned))
+        Ok(row.try_get::<Option<i64>, _>(column)?.map(rows::unsigned))
     };
     Ok(ApiKey {
         quota: Quota {
@@ -264,7 +260,7 @@ fn read_key(row: SqliteRow) -> StoreResult<ApiKey> {
     })
 }
 
-fn read_record(row: SqliteRow) -> StoreResult<AuditRecord> {
+fn read_record(row: DbRow) -> StoreResult<AuditRecord> {
     Ok(AuditRecord {
         sequence: row.try_get("sequence")?,
         event: rows::json(&row, "event")?,
@@ -272,7 +268,7 @@ fn read_record(row: SqliteRow) -> StoreResult<AuditRecord> {
     })
 }
 
-fn read_anchor(row: SqliteRow) -> StoreResult<Anchor> {
+fn read_anchor(row: DbRow) -> StoreResult<Anchor> {
     Ok(Anchor {
         sequence: row.try_get("sequence")?,
         hash: row.try_get("hash")?,
@@ -281,8 +277,4 @@ fn read_anchor(row: SqliteRow) -> StoreResult<Anchor> {
 
 fn signed(value: u64) -> i64 {
     i64::try_from(value).unwrap_or(i64::MAX)
-}
-
-fn unsigned(value: i64) -> u64 {
-    u64::try_from(value).unwrap_or(0)
 }

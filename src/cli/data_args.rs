@@ -1,0 +1,31 @@
+//! The arguments of commands beside the service that use its database.
+
+use super::serve::settings_beside;
+use crate::config::DatabaseUrl;
+use crate::store::{SqlStore, open_database};
+use anyhow::Result;
+use clap::Args;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+#[derive(Debug, Args)]
+pub struct DataArgs {
+    /// Data folder of the service [env: VENTRIFORM_DATA_DIR] [default: ventriform-data]
+    #[arg(long, value_name = "DIR")]
+    data_dir: Option<PathBuf>,
+    /// Database of the service: `sqlite`, or the URL of a PostgreSQL database
+    /// [env: VENTRIFORM_DATABASE] [default: sqlite]
+    #[arg(long, value_name = "URL")]
+    database: Option<DatabaseUrl>,
+}
+
+impl DataArgs {
+    /// Opens the database.
+    ///
+    /// # Errors
+    /// If a setting is invalid, or the database cannot be used.
+    pub async fn open(&self) -> Result<Arc<SqlStore>> {
+        let settings = settings_beside(self.data_dir.as_ref(), self.database.as_ref())?;
+        Ok(open_database(&settings.data_dir, settings.postgres().as_ref()).await?)
+    }
+}

@@ -1,0 +1,451 @@
+//! The database on a server: PostgreSQL.
+//!
+//! **One writer.** A transaction that reads before it writes takes an advisory lock first, so it runs as
+//! if alone, as on SQLite. It reads under READ COMMITTED: each statement sees what was committed before
+//! it began, so the statements after the lock see all that its last holder wrote. Waiting for the lock
+//! is limited (`write_wait`); whoever holds it and does nothing is cut off by the server.
+//!
+//! **How a failed write ends.** As in [`super::writer`]: a transaction that does not end by a successful
+//! commit closes its connection, so nothing can fall into it later. The commit asks the server whether
+//! the transaction is still whole, as `COMMIT` alone reports success for one that failed.
+//!
+//! **The server is away.** At the start, the program waits for it for a limited time. Later, operations
+//! fail with [`StoreFault::Away`] until it is back; a connection that was lost is noticed before it is used,
+//! and a read whose connection breaks is done again.
+
+use super::faults;
+use super::query::jitter;
+use crate::jobs::{StoreError, StoreFault, StoreResult};
+use sqlx::migrate::{MigrateError, Migrator};
+use sqlx::pool::PoolConnection;
+use sqlx::postgres::{PgConnectOptions, PgConnection, PgPool, PgPoolOptions};
+use sqlx::{ConnectOptions, Connection, Postgres, Row};
+use std::ops::{Deref, DerefMut};
+use std::time::{Duration, Instant};
+
+static MIGRATIONS: Migrator = sqlx::migrate!("src/store/migrations_postgres");
+
+/// Pause between two attempts to reach the server at the start.
+const AGAIN: Duration = Duration::from_secs(1);
+/// Longest time of one attempt to reach the server.
+const CONNECT: Duration = Duration::from_secs(5);
+/// Longest time of one statement.
+const STATEMENT: Duration = Duration::from_secs(30);
+/// Oldest version of the server that is tested.
+const OLDEST: i32 = 150_000;
+
+/// The key of the lock for writing, in any schema of its own.
+const BEGIN: &str = "BEGIN; SELECT pg_advisory_xact_lock(hashtextextended('ventriform writes ' || current_schema(), 0))";
+
+/// How to reach a server.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PostgresSettings {
+    /// Where it is, and who connects.
+    pub url: PostgresUrl,
+    /// Largest number of connections.
+    pub connections: u32,
+    /// How long the start waits for the server.
+    pub patience: Duration,
+}
+
+/// The URL of a database: `postgres://user:password@host:port/name`. Printed without the password.
+#[derive(Clone, PartialEq, Eq)]
+pub struct PostgresUrl(String);
+
+impl std::str::FromStr for PostgresUrl {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let known = ["postgres://", "postgresql://"];
+        if !known.iter().any(|scheme| text.starts_with(scheme)) {
+            return Err("give a URL such as postgres://user@host:5432/database".into());
+        }
+        if text.contains("password=") {
+            return Err("write the password before the @, or give it as PGPASSWORD".into());
+        }
+        let url = Self(text.to_owned());
+        match url.options() {
+            // The driver's message may show parts of the URL.
+            Err(_) => Err(
+                "it is not a valid URL of PostgreSQL; characters such as @ : / in a name or \
+                           password are written as %40 %3A %2F"
+                    .into(),
+            ),
+            Ok(options) if options.get_database().is_none_or(str::is_empty) => {
+                Err("name the database: postgres://user@host:5432/database".into())
+            }
+            Ok(_) => Ok(url),
+        }
+    }
+}
+
+impl PostgresUrl {
+    fn options(&self) -> Result<PgConnectOptions, sqlx::Error> {
+        self.0.parse()
+    }
+}
+
+impl std::fmt::Display for PostgresUrl {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let start = self.0.find("://").map_or(0, |colon| colon + 3);
+        let (scheme, rest) = self.0.split_at(start);
+        let authority = rest.split(['/', '?', '#']).next().unwrap_or_default();
+        let (user, place) = match authority.rfind('@') {
+            Some(at) => (authority.split([':', '@']).next(), &rest[at..]),
+            None => (None, rest),
+        };
+        write!(f, "{scheme}{}{place}", user.unwrap_or_default())
+    }
+}
+
+impl std::fmt::Debug for PostgresUrl {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        std::fmt::Display::fmt(self, f)
+    }
+}
+
+/// Why a database on a server cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum PostgresError {
+    /// It was not reached in the time set.
+    #[error(
+        "{url} was not reached within {waited:?} (database_wait): {reason}. Check host and port, and \
+         that PostgreSQL runs and accepts connections from this machine"
+    )]
+    Unreachable {
+        /// The database.
+        url: PostgresUrl,
+        /// How long it was tried.
+        waited: Duration,
+        /// The last message.
+        reason: String,
+    },
+    /// It refuses this user, or lacks something.
+    #[error("{url}: {reason}. {fix}")]
+    Refused {
+        /// The database.
+        url: PostgresUrl,
+        /// The message of the server.
+        reason: String,
+        /// What to do.
+        fix: &'static str,
+    },
+    /// A newer program has changed its tables.
+    #[error(
+        "{0}: its tables were made by a newer version of ventriform than this one ({version}). Start \
+         that version, or restore a dump of the database from before it",
+        version = env!("CARGO_PKG_VERSION")
+    )]
+    Newer(PostgresUrl),
+    /// The last change of the tables did not end, or the tables are not those of this program.
+    #[error(
+        "{url}: its tables cannot be brought to this version: {reason}. Use an empty database, or one \
+         that only ventriform has written to"
+    )]
+    Tables {
+        /// The database.
+        url: PostgresUrl,
+        /// What failed.
+        reason: String,
+    },
+}
+
+/// Waits for the server, brings its tables to the current version, and makes a pool of connections. `wait`
+/// is the longest time that an operation waits for a connection or a lock.
+pub(super) async fn open(
+    settings: &PostgresSettings,
+    wait: Duration,
+) -> Result<(PgWriter, PgPool), PostgresError> {
+    let url = &settings.url;
+    let refused = |error: sqlx::Error| refusal(url, &error);
+    let options = url.options().map_err(refused)?;
+    let options = options
+        .application_name("ventriform")
+        .options([("client_min_messages", "warning")]);
+    let mut connection = reach(settings, &options).await?;
+    let made = async {
+        check_server(url, &mut connection).await?;
+        MIGRATIONS
+            .run(&mut connection)
+            .await
+            .map_err(|error| migration_failure(url, error))
+    };
+    made.await?;
+    let _ = connection.close().await;
+    let pool = PgPoolOptions::new()
+        .max_connections(settings.connections)
+        .acquire_timeout(wait)
+        .after_connect(|connection, _| Box::pin(keep_promises(connection)))
+        .connect_lazy_with(options.options(session_limits(wait)));
+    let writer = PgWriter { pool: pool.clone() };
+    Ok((writer, pool))
+}
+
+/// What the server limits of a session, so that a process that stands still or is cut off holds no lock
+/// for long.
+fn session_limits(wait: Duration) -> [(&'static str, String); 7] {
+    let ms = |time: Duration| time.as_millis().to_string();
+    [
+        ("lock_timeout", ms(wait.max(Duration::from_millis(1)))),
+        ("statement_timeout", ms(STATEMENT)),
+        (
+            "idle_in_transaction_session_timeout",
+            ms(wait.max(Duration::from_secs(5))),
+        ),
+        ("tcp_keepalives_idle", "10".into()),
+        ("tcp_keepalives_interval", "5".into()),
+        ("tcp_keepalives_count", "3".into()),
+        ("default_transaction_isolation", "read committed".into()),
+    ]
+}
+
+/// What was acknowledged is on disk, whatever the default of the server.
+async fn keep_promises(connection: &mut PgConnection) -> Result<(), sqlx::Error> {
+    sqlx::query(
+        "SELECT set_config('synchronous_commit', 'on', false)
+         WHERE current_setting('synchronous_commit') = 'off'",
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Connects as soon as the server answers.
+async fn reach(
+    settings: &PostgresSettings,
+    options: &PgConnectOptions,
+) -> Result<PgConnection, PostgresError> {
+    let url = &settings.url;
+    let started = Instant::now();
+    let mut said = false;
+    loop {
+        let reason = match tokio::time::timeout(CONNECT, options.connect()).await {
+            Ok(Ok(connection)) => return Ok(connection),
+            Ok(Err(error)) if faults::connection_was_lost(&error) => error.to_string(),
+            Ok(Err(error)) => return Err(refusal(url, &error)),
+            Err(_) => "it does not answer".to_owned(),
+        };
+        if started.elapsed() >= settings.patience {
+            return Err(PostgresError::Unreachable {
+                url: url.clone(),
+                waited: settings.patience,
+                reason,
+            });
+        }
+        if !said {
+            tracing::warn!(database = %url, reason, "waiting for the database");
+            said = true;
+        }
+        let left = settings.patience.saturating_sub(started.elapsed());
+        tokio::time::sleep(jitter(AGAIN).min(left)).await;
+    }
+}
+
+/// Checks that the server keeps what this program relies on.
+async fn check_server(
+    url: &PostgresUrl,
+    connection: &mut PgConnection,
+) -> Result<(), PostgresError> {
+    let row = sqlx::query(
+        "SELECT current_setting('server_version_num')::int, current_setting('server_encoding'),
+                current_setting('fsync'), pg_is_in_recovery(), current_schema() IS NOT NULL",
+    )
+    .fetch_one(connection)
+    .await
+    .map_err(|error| refusal(url, &error))?;
+    let refused = |reason: String, fix| {
+        let url = url.clone();
+        Err(PostgresError::Refused { url, reason, fix })
+    };
+    let version: i32 = row.get(0);
+    let encoding: String = row.get(1);
+    let fsync: String = row.get(2);
+    let (standby, schema): (bool, bool) = (row.get(3), row.get(4));
+    if version < OLDEST {
+        let reason = format!("the server has version {}", version / 10_000);
+        return refused(reason, "ventriform needs PostgreSQL 15 or newer");
+    }
+    if encoding != "UTF8" {
+        let reason = format!("the database has the encoding {encoding}");
+        return refused(
+            reason,
+            "Make it by CREATE DATABASE ... ENCODING 'UTF8' TEMPLATE template0",
+        );
+    }
+    if standby {
+        return refused(
+            "the server is a standby, which cannot be written".into(),
+            "Give the address of the primary",
+        );
+    }
+    if !schema {
+        return refused(
+            "no schema of the search path exists".into(),
+            "Make the schema, or correct `search_path` in the options of the URL",
+        );
+    }
+    if fsync == "off" {
+        tracing::warn!(
+            "the server runs with fsync = off: a power cut can destroy what was acknowledged"
+        );
+    }
+    Ok(())
+}
+
+/// Why the server refuses a connection or a statement at the start, and what to do.
+fn refusal(url: &PostgresUrl, error: &sqlx::Error) -> PostgresError {
+    let fix = match faults::sqlstate(error).as_deref() {
+        Some("28P01" | "28000") => {
+            "Correct user and password in the URL (or PGPASSWORD), or let the user in by pg_hba.conf"
+        }
+        Some("3D000") => "Make the database first: CREATE DATABASE name OWNER user",
+        Some("42501" | "3F000") => {
+            "Give the user the right to make tables: GRANT CREATE ON SCHEMA public TO user"
+        }
+        _ => "Correct the setting `database`",
+    };
+    PostgresError::Refused {
+        url: url.clone(),
+        reason: error.to_string(),
+        fix,
+    }
+}
+
+fn migration_failure(url: &PostgresUrl, error: MigrateError) -> PostgresError {
+    match error {
+        MigrateError::VersionMissing(_) | MigrateError::VersionTooNew(..) => {
+            PostgresError::Newer(url.clone())
+        }
+        MigrateError::Execute(error) | MigrateError::ExecuteMigration(error, _)
+            if faults::sqlstate(&error).as_deref() == Some("42501") =>
+        {
+            refusal(url, &error)
+        }
+        error => PostgresError::Tables {
+            url: url.clone(),
+            reason: error.to_string(),
+        },
+    }
+}
+
+/// Connections that write.
+pub(super) struct PgWriter {
+    pool: PgPool,
+}
+
+impl PgWriter {
+    /// A connection for single statements.
+    pub async fn acquire(&self) -> StoreResult<PoolConnection<Postgres>> {
+        let connection = self.pool.acquire().await;
+        connection.map_err(|error| faults::of_pool(&self.pool, error))
+    }
+
+    /// Starts a transaction that holds the lock for writing.
+    pub async fn begin(&self) -> StoreResult<PgTransaction> {
+        let mut transaction = PgTransaction {
+            connection: self.acquire().await?,
+            ended: false,
+        };
+        sqlx::raw_sql(BEGIN)
+            .execute(&mut *transaction)
+            .await
+            .map_err(faults::of_postgres)?;
+        Ok(transaction)
+    }
+
+    /// Checks that the server answers and can be written.
+    pub async fn check(&self) -> StoreResult<()> {
+        let mut connection = self.acquire().await?;
+        let row = sqlx::query(
+            "SELECT pg_is_in_recovery() OR current_setting('transaction_read_only') = 'on'",
+        )
+        .fetch_one(&mut *connection)
+        .await
+        .map_err(faults::of_postgres)?;
+        match row.get(0) {
+            true => Err(StoreError::Database {
+                cause: StoreFault::Away,
+                message: "the server cannot be written".into(),
+            }),
+            false => Ok(()),
+        }
+    }
+}
+
+/// A transaction. Dropping it without [`PgTransaction::commit`] closes its connection, which rolls it
+/// back.
+pub(super) struct PgTransaction {
+    connection: PoolConnection<Postgres>,
+    ended: bool,
+}
+
+impl PgTransaction {
+    /// Makes the changes durable.
+    ///
+    /// # Errors
+    /// If they may not be.
+    pub async fn commit(mut self) -> StoreResult<()> {
+        // The first statement fails if an earlier one did.
+        sqlx::raw_sql("SELECT; COMMIT")
+            .execute(&mut *self.connection)
+            .await
+            .map_err(faults::of_postgres)?;
+        self.ended = true;
+        Ok(())
+    }
+}
+
+impl Drop for PgTransaction {
+    fn drop(&mut self) {
+        if !self.ended {
+            self.connection.close_on_drop();
+        }
+    }
+}
+
+impl Deref for PgTransaction {
+    type Target = PgConnection;
+
+    fn deref(&self) -> &PgConnection {
+        &self.connection
+    }
+}
+
+impl DerefMut for PgTransaction {
+    fn deref_mut(&mut self) -> &mut PgConnection {
+        &mut self.connection
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_url_is_checked_and_printed_without_its_password() {
+        let url: PostgresUrl = "postgres://me:s3cret@db.example:5433/heart"
+            .parse()
+            .unwrap();
+        assert_eq!(url.to_string(), "postgres://me@db.example:5433/heart");
+        assert!(!format!("{url:?}").contains("s3cret"));
+        for text in [
+            "postgresql://db/heart",
+            "postgres:///heart?host=/run/postgresql&user=me",
+            "postgres://me@[::1]/heart?sslmode=verify-full&options=-csearch_path%3Dheart",
+        ] {
+            assert_eq!(text.parse::<PostgresUrl>().unwrap().to_string(), text);
+        }
+        for bad in [
+            "",
+            "heart",
+            "mysql://a/b",
+            "postgres://me@host:5432",
+            "postgres://me@host:99999/x",
+            "postgres://host/heart?password=s3cret",
+        ] {
+            let refused = bad.parse::<PostgresUrl>();
+            assert!(refused.is_err(), "{bad}");
+            assert!(!refused.unwrap_err().contains("99999"));
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! Figures for operators, counted in the database.
+
+use super::rows;
+use crate::jobs::{FigureStore, QueueFigures, Resource, StoreResult};
+use crate::store::database::SqlStore;
+use crate::store::query::query;
+use async_trait::async_trait;
+
+#[async_trait]
+impl FigureStore for SqlStore {
+    async fn queue_figures(&self) -> StoreResult<QueueFigures> {
+        let oldest =
+            query("SELECT created_at FROM jobs WHERE state = 'queued' ORDER BY sequence LIMIT 1")
+                .fetch_optional(&self.readers)
+                .await?;
+        let found = query(
+            "SELECT 'volume', count(*) FROM volumes
+             UNION ALL SELECT kind, count(*) FROM products GROUP BY kind",
+        )
+        .fetch_all(&self.readers)
+        .await?;
+        let counts: Vec<(String, u64)> = rows::all(found, |row| {
+            Ok((row.try_get(0)?, rows::unsigned(row.try_get(1)?)))
+        })?;
+        let counted = |resource: Resource| {
+            let row = counts.iter().find(|(kind, _)| kind == resource.noun());
+            (resource, row.map_or(0, |(_, count)| *count))
+        };
+        Ok(QueueFigures {
+            oldest_queued_at: oldest.map(|row| row.try_get(0)).transpose()?,
+            items: Resource::WITH_FILES.map(counted).to_vec(),
+        })
+    }
+}

@@ -1,0 +1,17 @@
+//! The statements, one file for each table or trait, for both engines.
+
+mod access;
+mod archives;
+mod catalogue;
+mod custody;
+mod erasure;
+mod figures;
+mod hooks;
+mod intake;
+mod jobs;
+mod rows;
+mod scans;
+mod worklist;
+
+pub(super) use catalogue::insert_content;
+pub(super) use rows::to_json;

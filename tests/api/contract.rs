@@ -1,0 +1,1670 @@
+//! What the queue and the service rely on of a database, checked on SQLite and on PostgreSQL.
+//!
+//! On PostgreSQL, `a` and `b` are two processes on one database; on SQLite, which one process uses, they
+//! are the same.
+
+use super::postgres::{Server, reached, server};
+use serde_json::{Map, Value, json};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::Duration;
+use tempfile::TempDir;
+use ventriform::access::{
+    AccessStore, Activity, ApiKey, AuditEvent, AuditFilter, KeyRequest, Quota, Scope, verify,
+};
+use ventriform::archive::{ArchiveStore, HeldSeries, SendSettlement, SeriesKey};
+use ventriform::hooks::{
+    AttemptOutcome, DeliveryLimits, DeliveryState, DeliveryStore, HookEndpoint, HookEvent,
+    Settlement, SigningSecret,
+};
+use ventriform::intake::{Added, GroupState, IntakeRoom, IntakeStore, NewObject, Origin, Protocol};
+use ventriform::jobs::{
+    Catalogue, Claimant, Clock, Custody, DeathLimit, Deleted, Erased, ErasureAgent, ErasureOrder,
+    ErasureReason, Expiry, Failure, Fault, FigureStore, FileRecord, Filed, Idempotency,
+    Interrupted, ItemFilter, ItemRecord, Job, JobFilter, JobOutcome, JobState, JobStore,
+    JobWebhook, Lease, LegalHold, ListRequest, NewJob, Product, ProductFile, Resource, ScanFields,
+    ScanFilter, Scans, SendOrder, SeriesSource, StoreFault, StoredVolume, SystemClock, TagFilter,
+    Tags, Tenant, Timestamp, random_id,
+};
+use ventriform::store::{DiskGauge, PostgresError, SqlStore, Store, StoreSettings};
+use ventriform::volume::dicom::DicomHeader;
+use ventriform::worklist::{AddedWorkitem, DataSetJson, Workitem, WorkitemState, Worklist};
+
+const WAIT: Duration = Duration::from_secs(5);
+/// How long an operation waits for a server that is away.
+const SHORT: Duration = Duration::from_millis(500);
+const LEASE: Duration = Duration::from_millis(150);
+const ALL: ListRequest = ListRequest {
+    before: None,
+    limit: 1000,
+};
+
+/// Two users of one database.
+struct Stores {
+    a: Arc<SqlStore>,
+    b: Arc<SqlStore>,
+    /// The database on the server; `None` for SQLite.
+    url: Option<String>,
+    folder: TempDir,
+}
+
+impl Stores {
+    async fn sqlite() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let gauge = DiskGauge::new(folder.path(), Some(0));
+        let a = SqlStore::open(&folder.path().join("contract.db"), WAIT, gauge).await;
+        let a = Arc::new(a.unwrap());
+        let (b, url) = (a.clone(), None);
+        Self { a, b, url, folder }
+    }
+
+    async fn postgres() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let url = server().database().await;
+        // Both start at once, and both want to make the tables.
+        let settings = reached(&url);
+        let open = || async {
+            let gauge = DiskGauge::new(folder.path(), Some(0));
+            Arc::new(SqlStore::connect(&settings, WAIT, gauge).await.unwrap())
+        };
+        let (a, b) = tokio::join!(open(), open());
+        let url = Some(url);
+        Self { a, b, url, folder }
+    }
+
+    /// Runs SQL as somebody who can write to the database. Returns whether that was accepted.
+    async fn tamper(&self, sql: &'static str) -> bool {
+        use sqlx::{ConnectOptions, Connection, Executor};
+        match &self.url {
+            Some(url) => {
+                let mut connection = sqlx::PgConnection::connect(url).await.unwrap();
+                connection.execute(sqlx::raw_sql(sql)).await.is_ok()
+            }
+            None => {
+                let file = self.folder.path().join("contract.db");
+                let options = sqlx::sqlite::SqliteConnectOptions::new().filename(file);
+                let mut connection = options.connect().await.unwrap();
+                connection.execute(sqlx::raw_sql(sql)).await.is_ok()
+            }
+        }
+    }
+
+    /// A volume of that tenant.
+    async fn volume(&self, tenant: &Tenant) -> String {
+        let id = random_id(Resource::Volume.prefix());
+        let volume = stored_volume(&id, 1_000);
+        let tags = Tags::default();
+        assert!(
+            self.a
+                .add_volume(&volume, tenant, &tags, None)
+                .await
+                .unwrap()
+        );
+        id
+    }
+
+    async fn file(&self, job: &NewJob) -> Job {
+        match self.a.file(job, 1000, now()).await.unwrap() {
+            Filed::New(job) => job,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    async fn claim(&self) -> Option<(Job, Lease)> {
+        claim(&self.b, "run_b").await
+    }
+}
+
+async fn claim(store: &SqlStore, run: &str) -> Option<(Job, Lease)> {
+    let by = Claimant {
+        token: random_id(""),
+        run: run.into(),
+        lease: LEASE,
+    };
+    let job = store.claim(&by, now()).await.unwrap()?;
+    let lease = Lease {
+        job: job.id.clone(),
+        token: by.token,
+    };
+    Some((job, lease))
+}
+
+fn now() -> Timestamp {
+    SystemClock.now()
+}
+
+fn tenant() -> Tenant {
+    Tenant::default()
+}
+
+fn other() -> Tenant {
+    "other".parse().unwrap()
+}
+
+fn stored_volume(id: &str, bytes: u64) -> StoredVolume {
+    StoredVolume {
+        id: id.into(),
+        sequence: 0,
+        created_at: now(),
+        bytes,
+        files: vec![FileRecord {
+            name: "volume.nii".into(),
+            bytes,
+            sha256: "ab".repeat(32),
+            place: None,
+        }],
+        facts: json!({"shape": [4, 4, 4]}),
+    }
+}
+
+fn new_job(volume: &str) -> NewJob {
+    NewJob {
+        kind: "model".into(),
+        volume: Some(volume.into()),
+        ..NewJob::default()
+    }
+}
+
+fn product(id: String, volume: Option<&str>) -> Product {
+    Product {
+        id,
+        sequence: 0,
+        created_at: now(),
+        volume: volume.map(str::to_owned),
+        parameters: Map::new(),
+        summary: object(json!({"points": 12})),
+        software: "test".into(),
+        files: vec![ProductFile {
+            name: "mesh.json".into(),
+            media_type: "application/json".into(),
+            bytes: 2,
+            sha256: "cd".repeat(32),
+            place: None,
+        }],
+    }
+}
+
+fn model(volume: &str) -> Product {
+    product(random_id(Resource::Model.prefix()), Some(volume))
+}
+
+fn object(value: Value) -> Map<String, Value> {
+    value.as_object().unwrap().clone()
+}
+
+fn failure(code: &str) -> Failure {
+    Failure::new(Fault::Content, code, "It failed.")
+}
+
+fn erasure(id: &str, cascade: bool) -> ErasureOrder {
+    ErasureOrder {
+        tenant: tenant(),
+        id: id.into(),
+        cascade,
+        by: ErasureAgent {
+            name: "somebody".into(),
+            ..ErasureAgent::default()
+        },
+        reason: ErasureReason::Request,
+    }
+}
+
+fn succeeded(product: &Product) -> JobOutcome {
+    JobOutcome::Succeeded(Box::new(product.clone()))
+}
+
+/// Makes a test of each contract on each engine.
+macro_rules! contracts {
+    ($($name:ident),+ $(,)?) => {
+        mod on_sqlite {
+            $(#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+            async fn $name() {
+                super::$name(&super::Stores::sqlite().await).await;
+            })+
+        }
+        mod on_postgres {
+            $(#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+            async fn $name() {
+                super::$name(&super::Stores::postgres().await).await;
+            })+
+        }
+    };
+}
+
+contracts!(
+    a_lost_lease_writes_nothing,
+    a_failed_commit_leaves_nothing,
+    each_job_is_claimed_once_in_order,
+    one_key_files_one_job,
+    the_queue_is_never_longer_than_its_limit,
+    no_job_is_filed_on_what_is_erased,
+    jobs_end_in_every_way,
+    holds_keep_what_they_name,
+    erasures_leave_receipts,
+    old_things_expire,
+    lists_find_by_tags_and_scans,
+    identities_are_kept_and_erased,
+    items_are_shared_by_tenants,
+    the_audit_trail_is_one_chain,
+    keys_are_kept,
+    ends_of_jobs_are_told,
+    series_are_fetched_and_results_sent,
+    received_objects_become_volumes,
+    work_items_change_once,
+    figures_are_counted,
+);
+
+async fn a_lost_lease_writes_nothing(on: &Stores) {
+    let volume = on.volume(&tenant()).await;
+    let job = on.file(&new_job(&volume)).await;
+    let (_, lost) = claim(&on.a, "run_a").await.unwrap();
+    assert!(claim(&on.b, "run_b").await.is_none(), "it is claimed");
+    // A run that lives keeps its leases.
+    let (alive, limit) = (Some("run_a"), None);
+    tokio::time::sleep(2 * LEASE).await;
+    assert!(
+        on.b.release_dead(alive, limit, now())
+            .await
+            .unwrap()
+            .is_empty()
+    );
+    let released =
+        on.b.release_dead(Some("run_b"), limit, now())
+            .await
+            .unwrap();
+    assert_eq!(released.len(), 1);
+    assert_eq!(
+        (released[0].state, released[0].interruptions),
+        (JobState::Queued, 1)
+    );
+    let (again, lease) = on.claim().await.unwrap();
+    assert_eq!((&again.id, again.attempts), (&job.id, 2));
+    let first = model(&volume);
+    assert!(
+        on.a.renew_lease(&lost, LEASE, now())
+            .await
+            .unwrap()
+            .is_none()
+    );
+    assert!(
+        on.a.progress(&lost, "surface", 0.5)
+            .await
+            .unwrap()
+            .is_none()
+    );
+    assert!(on.a.hand_back(&lost, now()).await.unwrap().is_none());
+    assert!(
+        on.a.finish(&lost, &succeeded(&first), now())
+            .await
+            .unwrap()
+            .is_none()
+    );
+    assert!(
+        on.a.record(&first.id).await.unwrap().is_none(),
+        "no part of a result"
+    );
+    // A lease that is renewed does not expire for others.
+    tokio::time::sleep(LEASE).await;
+    assert_eq!(
+        on.b.renew_lease(&lease, WAIT, now()).await.unwrap(),
+        Some(false)
+    );
+    tokio::time::sleep(LEASE).await;
+    assert!(
+        on.a.release_dead(Some("run_a"), limit, now())
+            .await
+            .unwrap()
+            .is_empty()
+    );
+    let second = model(&volume);
+    let done =
+        on.b.finish(&lease, &succeeded(&second), now())
+            .await
+            .unwrap()
+            .unwrap();
+    assert_eq!(
+        (done.state, done.result.as_ref()),
+        (JobState::Succeeded, Some(&second.id))
+    );
+    assert!(on.a.product(&tenant(), &second.id).await.unwrap().is_some());
+    assert!(
+        on.b.finish(&lease, &succeeded(&second), now())
+            .await
+            .unwrap()
+            .is_none()
+    );
+}
+
+async fn a_failed_commit_leaves_nothing(on: &Stores) {
+    let volume = on.volume(&tenant()).await;
+    on.file(&NewJob {
+        send: Some(SendOrder {
+            names: vec!["mask.dcm".into()],
+            to: "pacs".into(),
+        }),
+        ..new_job(&volume)
+    })
+    .await;
+    let (job, lease) = on.claim().await.unwrap();
+    // The kind of this id is none of a product, which the table refuses after the job was changed.
+    let broken = product(random_id(Resource::Job.prefix()), Some(&volume));
+    assert!(
+        on.b.finish(&lease, &succeeded(&broken), now())
+            .await
+            .is_err()
+    );
+    let job = on.a.job(&job.id).await.unwrap().unwrap();
+    assert_eq!(
+        (job.state, job.result, job.revision),
+        (JobState::Running, None, job.revision)
+    );
+    assert!(on.a.sends(&[&job.id]).await.unwrap().is_empty());
+    assert!(on.a.record(&broken.id).await.unwrap().is_none());
+    // The same writer goes on.
+    let result = model(&volume);
+    assert!(
+        on.b.finish(&lease, &succeeded(&result), now())
+            .await
+            .unwrap()
+            .is_some()
+    );
+    assert_eq!(on.a.sends(&[&job.id]).await.unwrap()[&job.id].len(), 1);
+}
+
+async fn each_job_is_claimed_once_in_order(on: &Stores) {
+    let volume = on.volume(&tenant()).await;
+    let mut filed = Vec::new();
+    for _ in 0..40 {
+        filed.push(on.file(&new_job(&volume)).await.sequence);
+    }
+    assert_eq!(on.b.ahead_of(&[filed[0], filed[7]]).await.unwrap(), [0, 7]);
+    let claimants = (0..4).map(|number| {
+        let store = if number % 2 == 0 { &on.a } else { &on.b }.clone();
+        tokio::spawn(async move {
+            let mut own = Vec::new();
+            while let Some((job, _)) = claim(&store, &format!("run_{number}")).await {
+                own.push(job.sequence);
+            }
+            own
+        })
+    });
+    let mut claimed = Vec::new();
+    for own in futures::future::join_all(claimants).await {
+        let own = own.unwrap();
+        assert!(own.is_sorted(), "{own:?}");
+        claimed.extend(own);
+    }
+    claimed.sort_unstable();
+    assert_eq!(claimed, filed);
+    let load = on.a.load().await.unwrap();
+    assert_eq!(
+        (load.queued, load.running, load.mean_duration_ms),
+        (0, 40, None)
+    );
+}
+
+async fn one_key_files_one_job(on: &Stores) {
+    let volume = on.volume(&tenant()).await;
+    let keyed = |fingerprint: &str| NewJob {
+        idempotency: Some(Idempotency {
+            key: "k".into(),
+            fingerprint: fingerprint.into(),
+        }),
+        ..new_job(&volume)
+    };
+    let job = keyed("one");
+    let filing = (0..8).map(|n| {
+        let store = if n % 2 == 0 { &on.a } else { &on.b };
+        store.file(&job, 1000, now())
+    });
+    let mut ids = BTreeSet::new();
+    let mut new = 0;
+    for filed in futures::future::join_all(filing).await {
+        match filed.unwrap() {
+            Filed::New(job) => {
+                new += 1;
+                ids.insert(job.id);
+            }
+            Filed::Same(job) => {
+                ids.insert(job.id);
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+    assert_eq!((ids.len(), new), (1, 1));
+    let filed = on.b.file(&keyed("two"), 1000, now()).await.unwrap();
+    assert!(matches!(filed, Filed::KeyReused), "{filed:?}");
+    assert!(on.b.is_filed(&tenant(), "k").await.unwrap());
+    assert!(!on.b.is_filed(&other(), "k").await.unwrap());
+    let (_, fingerprint) = on.b.filed_under(&tenant(), "k").await.unwrap().unwrap();
+    assert_eq!(fingerprint, "one");
+}
+
+async fn the_queue_is_never_longer_than_its_limit(on: &Stores) {
+    let volume = on.volume(&tenant()).await;
+    let job = new_job(&volume);
+    let filing = (0..24).map(|n| {
+        let store = if n % 2 == 0 { &on.a } else { &on.b };
+        store.file(&job, 10, now())
+    });
+    let filed = futures::future::join_all(filing).await;
+    let new = filed
+        .iter()
+        .filter(|f| matches!(f, Ok(Filed::New(_))))
+        .count();
+    let full = filed
+        .iter()
+        .filter(|f| matches!(f, Ok(Filed::QueueFull)))
+        .count();
+    assert_eq!((new, full), (10, 14));
+    let missing =
+        on.b.file(&new_job("vol_missing"), 1000, now())
+            .await
+            .unwrap();
+    assert!(matches!(missing, Filed::Missing { field, .. } if field == "volume"));
+    let needs = [("model".to_owned(), "mdl_missing".to_owned())].into();
+    let job = NewJob {
+        needs,
+        ..new_job(&volume)
+    };
+    let missing = on.b.file(&job, 1000, now()).await.unwrap();
+    assert!(matches!(missing, Filed::Missing { field, .. } if field == "model"));
+}
+
+async fn no_job_is_filed_on_what_is_erased(on: &Stores) {
+    let mut both = [0, 0];
+    for _ in 0..12 {
+        let volume = on.volume(&tenant()).await;
+        let (job, order) = (new_job(&volume), erasure(&volume, false));
+        let expected = [volume.clone()];
+        let (filed, erased) = tokio::join!(
+            on.a.file(&job, 1000, now()),
+            on.b.erase(&order, &expected, now())
+        );
+        match (filed.unwrap(), erased.unwrap()) {
+            (Filed::New(_), Erased::InUse) => both[0] += 1,
+            (Filed::Missing { .. }, Erased::Done(_)) => both[1] += 1,
+            other => panic!("{other:?}"),
+        }
+    }
+    assert_eq!(both[0] + both[1], 12);
+}
+
+async fn jobs_end_in_every_way(on: &Stores) {
+    let volume = on.volume(&tenant()).await;
+    let limit = DeathLimit {
+        deaths: 2,
+        reason: failure("attempt-limit"),
+    };
+    // Cancelled while it waits; asked while it runs.
+    let waiting = on.file(&new_job(&volume)).await;
+    let cancelled = on.b.interrupt(&waiting.id, now()).await.unwrap();
+    assert!(matches!(cancelled, Interrupted::Cancelled(job) if job.finished_at.is_some()));
+    on.file(&new_job(&volume)).await;
+    let (job, lease) = on.claim().await.unwrap();
+    let told =
+        on.b.progress(&lease, "surface", 0.5)
+            .await
+            .unwrap()
+            .unwrap();
+    let told = (told.stage.as_deref(), told.progress);
+    assert_eq!(told, (Some("surface"), 0.5));
+    let back =
+        on.b.progress(&lease, "retile", 0.25)
+            .await
+            .unwrap()
+            .unwrap();
+    assert_eq!(back.progress, 0.5, "progress never goes back");
+    assert_eq!(
+        on.a.delete_job(&job.id, now()).await.unwrap(),
+        Deleted::InUse
+    );
+    let asked = on.a.interrupt(&job.id, now()).await.unwrap();
+    assert!(matches!(asked, Interrupted::Asked(job) if job.cancel_requested));
+    assert_eq!(
+        on.b.renew_lease(&lease, LEASE, now()).await.unwrap(),
+        Some(true)
+    );
+    let ended = on.b.hand_back(&lease, now()).await.unwrap().unwrap();
+    assert_eq!(ended.state, JobState::Cancelled);
+    let late = on.a.interrupt(&job.id, now()).await.unwrap();
+    assert!(matches!(late, Interrupted::Finished(_)));
+    assert!(matches!(
+        on.a.interrupt("job_x", now()).await.unwrap(),
+        Interrupted::Unknown
+    ));
+    // Crashed up to the limit.
+    let job = on.file(&new_job(&volume)).await;
+    for state in [JobState::Queued, JobState::Failed] {
+        let (_, lease) = on.claim().await.unwrap();
+        let left = on.b.crashed(&lease, &limit, now()).await.unwrap().unwrap();
+        assert_eq!(left.state, state);
+    }
+    let failed = on.a.job(&job.id).await.unwrap().unwrap();
+    assert_eq!(
+        (failed.crashes, failed.failure.unwrap().code),
+        (2, "attempt-limit".into())
+    );
+    // Handed back, and abandoned by a worker that does not know what it claimed.
+    let job = on.file(&new_job(&volume)).await;
+    let (_, lease) = on.claim().await.unwrap();
+    let back = on.b.hand_back(&lease, now()).await.unwrap().unwrap();
+    assert_eq!(
+        (back.state, back.attempts, back.started_at),
+        (JobState::Queued, 0, None)
+    );
+    let (_, lease) = on.claim().await.unwrap();
+    assert_eq!(
+        on.b.abandon(&lease.token).await.unwrap().unwrap().attempts,
+        0
+    );
+    assert!(on.b.abandon(&lease.token).await.unwrap().is_none());
+    // Failed, and deleted.
+    let (_, lease) = on.claim().await.unwrap();
+    let outcome = JobOutcome::Failed(failure("no-heart").at("volume"));
+    on.b.finish(&lease, &outcome, now()).await.unwrap().unwrap();
+    assert_eq!(
+        on.a.delete_job(&job.id, now()).await.unwrap(),
+        Deleted::Done
+    );
+    assert_eq!(
+        on.a.delete_job(&job.id, now()).await.unwrap(),
+        Deleted::Unknown
+    );
+    assert!(on.b.erased_at(&tenant(), &job.id).await.unwrap().is_some());
+    // Interrupted by the death of the service up to the limit.
+    on.file(&new_job(&volume)).await;
+    for state in [JobState::Queued, JobState::Failed] {
+        on.claim().await.unwrap();
+        let released = on.a.release_dead(None, Some(&limit), now()).await.unwrap();
+        assert_eq!(released[0].state, state);
+    }
+    assert!(on.claim().await.is_none());
+    on.a.check().await.unwrap();
+    assert_eq!(on.a.is_shared(), on.url.is_some());
+}
+
+async fn holds_keep_what_they_name(on: &Stores) {
+    let volume = on.volume(&tenant()).await;
+    let result = model(&volume);
+    assert!(
+        on.a.add_product(&result, &tenant(), Some(&volume))
+            .await
+            .unwrap()
+    );
+    let hold = LegalHold {
+        reason: "a trial".into(),
+        since: now(),
+        by: "somebody".into(),
+    };
+    assert!(
+        on.a.set_legal_hold(&tenant(), &volume, Some(&hold))
+            .await
+            .unwrap()
+    );
+    assert!(
+        !on.a
+            .set_legal_hold(&other(), &volume, Some(&hold))
+            .await
+            .unwrap()
+    );
+    let held = on.b.volume(&tenant(), &volume).await.unwrap().unwrap();
+    assert_eq!(held.holding.legal_hold, Some(hold));
+    let made = on.b.product(&tenant(), &result.id).await.unwrap().unwrap();
+    assert!(made.holding.source_on_hold);
+    for id in [&volume, &result.id] {
+        let expected = [id.clone()];
+        let erased =
+            on.b.erase(&erasure(id, false), &expected, now())
+                .await
+                .unwrap();
+        assert_eq!(erased, Erased::OnHold { id: volume.clone() });
+    }
+    assert!(!on.b.erase_scan(&tenant(), &volume, now()).await.unwrap());
+    let expiry = Expiry {
+        volumes: Some(i64::MAX),
+        results: Some(i64::MAX),
+        jobs: Some(i64::MAX),
+    };
+    assert!(on.b.expired(&expiry).await.unwrap().is_empty());
+    assert!(on.a.set_legal_hold(&tenant(), &volume, None).await.unwrap());
+    let expected = [volume.clone()];
+    let unexpected =
+        on.b.erase(&erasure(&volume, true), &expected, now())
+            .await
+            .unwrap();
+    assert_eq!(
+        unexpected,
+        Erased::InUse,
+        "something goes that nobody has locked"
+    );
+    assert_eq!(
+        on.b.made_of(&tenant(), &volume).await.unwrap(),
+        std::slice::from_ref(&result.id)
+    );
+}
+
+async fn erasures_leave_receipts(on: &Stores) {
+    let volume = on.volume(&tenant()).await;
+    on.file(&new_job(&volume)).await;
+    let (job, lease) = on.claim().await.unwrap();
+    let result = model(&volume);
+    on.b.finish(&lease, &succeeded(&result), now())
+        .await
+        .unwrap()
+        .unwrap();
+    let fit = NewJob {
+        needs: [("expert".to_owned(), volume.clone())].into(),
+        ..new_job(&on.volume(&tenant()).await)
+    };
+    let needing = on.file(&fit).await;
+    let expected = [volume.clone(), result.id.clone()];
+    let needed =
+        on.a.erase(&erasure(&volume, true), &expected, now())
+            .await
+            .unwrap();
+    assert_eq!(needed, Erased::InUse);
+    on.a.interrupt(&needing.id, now()).await.unwrap();
+    let erased =
+        on.a.erase(&erasure(&volume, true), &expected, now())
+            .await
+            .unwrap();
+    let Erased::Done(receipt) = erased else {
+        panic!("{erased:?}")
+    };
+    assert!(receipt.items.iter().all(|item| item.files_erased));
+    assert_eq!(receipt.items.len(), 2);
+    let mut jobs = [job.id.clone(), needing.id];
+    jobs.sort();
+    assert_eq!(receipt.jobs, jobs);
+    for id in [&volume, &result.id, &job.id] {
+        assert!(on.b.erased_at(&tenant(), id).await.unwrap().is_some());
+        assert!(on.b.erased_at(&other(), id).await.unwrap().is_none());
+        assert!(on.b.was_erased(id).await.unwrap());
+    }
+    assert_eq!(
+        on.b.receipt(&tenant(), &receipt.id).await.unwrap().as_ref(),
+        Some(&*receipt)
+    );
+    let listed = on.b.receipts(&tenant(), Some(&volume), ALL).await.unwrap();
+    assert_eq!(listed.items, [*receipt]);
+    assert!(verify(&*on.a).await.unwrap().broken.is_none());
+    let again =
+        on.a.erase(&erasure(&volume, false), &expected, now())
+            .await
+            .unwrap();
+    assert_eq!(again, Erased::Unknown);
+    // It can come back.
+    let (tags, scan) = (Tags::default(), None);
+    assert!(
+        on.a.renew_volume(&tenant(), &volume, &tags, scan, now())
+            .await
+            .unwrap()
+            .is_none()
+    );
+    let back = stored_volume(&volume, 7);
+    assert!(
+        on.a.add_volume(&back, &tenant(), &tags, scan)
+            .await
+            .unwrap()
+    );
+    assert!(on.b.erased_at(&tenant(), &volume).await.unwrap().is_none());
+    assert!(on.a.overwrite_erased().await.is_ok());
+}
+
+async fn old_things_expire(on: &Stores) {
+    let volume = on.volume(&tenant()).await;
+    on.file(&new_job(&volume)).await;
+    let (job, lease) = on.claim().await.unwrap();
+    let result = model(&volume);
+    on.b.finish(&lease, &succeeded(&result), now())
+        .await
+        .unwrap()
+        .unwrap();
+    let expired = async |volumes, results, jobs| {
+        let expiry = Expiry {
+            volumes,
+            results,
+            jobs,
+        };
+        let mut ids: Vec<String> =
+            on.a.expired(&expiry)
+                .await
+                .unwrap()
+                .into_iter()
+                .map(|e| e.1)
+                .collect();
+        ids.sort();
+        ids
+    };
+    let (never, past, future) = (None, Some(now() - 60_000), Some(now() + 60_000));
+    assert!(expired(never, never, never).await.is_empty());
+    assert!(expired(past, past, past).await.is_empty());
+    assert_eq!(expired(future, never, never).await, [volume.as_str()]);
+    assert_eq!(expired(never, future, never).await, [result.id.as_str()]);
+    assert_eq!(expired(never, never, future).await, [job.id.as_str()]);
+    assert!(
+        on.a.last_change()
+            .await
+            .unwrap()
+            .is_some_and(|at| at <= now())
+    );
+    let load = on.a.load().await.unwrap();
+    assert!(load.mean_duration_ms.is_some_and(|mean| mean >= 0.0));
+}
+
+async fn lists_find_by_tags_and_scans(on: &Stores) {
+    let tags = |name: &str| Tags {
+        external_id: Some(name.into()),
+        labels: [("ward".to_owned(), name.to_owned())].into(),
+    };
+    let scan = |study: &str| ScanFields(object(json!({"study_uid": study, "series_uid": "1.2.9"})));
+    let mut ids = Vec::new();
+    for name in ["é", "b", "c"] {
+        let id = random_id(Resource::Volume.prefix());
+        let volume = stored_volume(&id, 1);
+        let scan = scan(&format!("1.2.{name}"));
+        on.a.add_volume(&volume, &tenant(), &tags(name), Some(&scan))
+            .await
+            .unwrap();
+        on.file(&NewJob {
+            tags: tags(name),
+            ..new_job(&id)
+        })
+        .await;
+        ids.push(id);
+    }
+    let page = |before| ListRequest { before, limit: 2 };
+    let filter = ItemFilter::default();
+    let first = on.b.volumes(&tenant(), &filter, page(None)).await.unwrap();
+    let second =
+        on.b.volumes(&tenant(), &filter, page(first.next))
+            .await
+            .unwrap();
+    let listed: Vec<_> = first
+        .items
+        .iter()
+        .chain(&second.items)
+        .map(|v| &v.id)
+        .collect();
+    assert_eq!(listed, ids.iter().rev().collect::<Vec<_>>());
+    assert_eq!(second.next, None);
+    let tag_filter = |name: &str| TagFilter {
+        external_id: Some(name.into()),
+        labels: [("ward".to_owned(), name.to_owned())].into(),
+    };
+    let scan_filter = |study: &str| ScanFilter {
+        study: Some(study.into()),
+        series: Some("1.2.9".into()),
+        accession: None,
+    };
+    let both = ItemFilter {
+        tags: tag_filter("é"),
+        scan: scan_filter("1.2.é"),
+    };
+    let found = on.b.volumes(&tenant(), &both, ALL).await.unwrap();
+    assert_eq!(found.items.len(), 1);
+    assert_eq!(found.items[0].id, ids[0]);
+    assert!(
+        on.b.volumes(&other(), &both, ALL)
+            .await
+            .unwrap()
+            .items
+            .is_empty()
+    );
+    let jobs = JobFilter {
+        state: Some(JobState::Queued),
+        kind: Some("model".into()),
+        volume: Some(ids[1].clone()),
+        tags: tag_filter("b"),
+        scan: scan_filter("1.2.b"),
+        created_after: Some(0),
+        ..JobFilter::default()
+    };
+    let found = on.b.jobs(&jobs, ALL).await.unwrap();
+    assert_eq!(found.items.len(), 1);
+    assert_eq!(found.items[0].tags, tags("b"));
+    // New tags replace the old ones.
+    let job = &found.items[0].id;
+    for id in [&ids[0], job] {
+        assert!(on.a.set_tags(&tenant(), id, &tags("new")).await.unwrap());
+    }
+    assert!(
+        !on.a
+            .set_tags(&other(), &ids[0], &tags("new"))
+            .await
+            .unwrap()
+    );
+    assert!(
+        on.b.volumes(&tenant(), &both, ALL)
+            .await
+            .unwrap()
+            .items
+            .is_empty()
+    );
+    let new = ItemFilter {
+        tags: tag_filter("new"),
+        ..ItemFilter::default()
+    };
+    assert_eq!(
+        on.b.volumes(&tenant(), &new, ALL)
+            .await
+            .unwrap()
+            .items
+            .len(),
+        1
+    );
+    let template = product(random_id(Resource::Template.prefix()), None);
+    on.a.add_product(&template, &tenant(), Some(&ids[0]))
+        .await
+        .unwrap();
+    assert!(
+        on.a.set_library(&tenant(), &template.id, true)
+            .await
+            .unwrap()
+    );
+    assert!(!on.a.set_library(&tenant(), &ids[0], true).await.unwrap());
+    let listed =
+        on.b.products(&tenant(), Resource::Template, &filter, ALL)
+            .await
+            .unwrap();
+    assert!(listed.items[0].holding.library);
+    let of_scan = ItemFilter {
+        scan: scan_filter("1.2.é"),
+        ..ItemFilter::default()
+    };
+    let listed =
+        on.b.products(&tenant(), Resource::Template, &of_scan, ALL)
+            .await
+            .unwrap();
+    assert_eq!(
+        listed.items.len(),
+        1,
+        "it was made of a volume of that scan"
+    );
+}
+
+async fn identities_are_kept_and_erased(on: &Stores) {
+    let volume = on.volume(&tenant()).await;
+    let fields = |value: Value| ScanFields(object(value));
+    let found = fields(json!({"study_uid": "1.2.\u{0}3", "patient_name": "A\u{0}B"}));
+    let unread = on.volume(&other()).await;
+    let stated = fields(json!({"accession_number": "77"}));
+    assert!(on.a.state_scan(&tenant(), &volume, &stated).await.unwrap());
+    assert!(!on.a.state_scan(&other(), &volume, &stated).await.unwrap());
+    let tags = Tags::default();
+    assert!(on.a.erase_scan(&tenant(), &volume, now()).await.unwrap());
+    let scan = on.b.scan(&tenant(), &volume).await.unwrap().unwrap();
+    assert!(scan.is_empty() && scan.erased_at.is_some());
+    // Another upload ends the erasure.
+    let scan = Some(&found);
+    let renewed =
+        on.a.renew_volume(&tenant(), &volume, &tags, scan, now())
+            .await;
+    let (held, new) = renewed.unwrap().unwrap();
+    assert!(!new && held.holding.scan.erased_at.is_none());
+    assert_eq!(held.holding.scan.found, Some(found.clone()));
+    on.a.note_scan(&other(), &unread, Some(&found))
+        .await
+        .unwrap();
+    let scan = on.b.scan(&other(), &unread).await.unwrap().unwrap();
+    assert_eq!(
+        scan.found, None,
+        "the upload noted that its file says nothing"
+    );
+    let secret = on.a.deidentification_secret(&tenant()).await.unwrap();
+    assert_eq!(secret.len(), 32);
+    assert_eq!(
+        on.b.deidentification_secret(&tenant()).await.unwrap(),
+        secret
+    );
+    assert_ne!(
+        on.b.deidentification_secret(&other()).await.unwrap(),
+        secret
+    );
+}
+
+async fn items_are_shared_by_tenants(on: &Stores) {
+    let volume = on.volume(&tenant()).await;
+    let (tags, scan) = (Tags::default(), None);
+    let (_, new) =
+        on.a.renew_volume(&other(), &volume, &tags, scan, now())
+            .await
+            .unwrap()
+            .unwrap();
+    assert!(new);
+    let expected = [volume.clone()];
+    let erased =
+        on.b.erase(&erasure(&volume, false), &expected, now())
+            .await
+            .unwrap();
+    let Erased::Done(receipt) = erased else {
+        panic!("{erased:?}")
+    };
+    assert!(!receipt.items[0].files_erased, "the other tenant has it");
+    assert!(on.b.volume(&tenant(), &volume).await.unwrap().is_none());
+    assert!(on.b.volume(&other(), &volume).await.unwrap().is_some());
+    let record = on.b.record(&volume).await.unwrap().unwrap();
+    let ItemRecord::Volume(mut amended) = record else {
+        panic!("{record:?}")
+    };
+    amended.facts = json!({"amended": true});
+    on.a.amend(&ItemRecord::Volume(amended.clone()))
+        .await
+        .unwrap();
+    let page = on.b.records(Resource::Volume, 0, 10).await.unwrap();
+    assert_eq!(page, [ItemRecord::Volume(amended)]);
+    let template = product(random_id(Resource::Template.prefix()), None);
+    on.a.add_product(&template, &tenant(), None).await.unwrap();
+    on.a.amend(&ItemRecord::Product(template.clone()))
+        .await
+        .unwrap();
+    assert_eq!(on.b.records(Resource::Model, 0, 10).await.unwrap().len(), 1);
+    let asked = [volume.clone(), template.id.clone(), "mdl_no".into()];
+    let known = on.b.known(&asked).await.unwrap();
+    assert_eq!(known, BTreeSet::from([volume, template.id]));
+    assert!(on.a.defects().await.unwrap().is_empty());
+    assert_eq!(on.a.version().is_some(), on.url.is_none());
+}
+
+async fn the_audit_trail_is_one_chain(on: &Stores) {
+    let event = |n: i64| {
+        AuditEvent::new(n, Activity::Read, tenant(), "somebody".into()).on(format!("vol_{n}"))
+    };
+    let appending = (0..20).map(|n| {
+        let store = if n % 2 == 0 { &on.a } else { &on.b };
+        async move { store.append(&[event(2 * n), event(2 * n + 1)]).await }
+    });
+    for appended in futures::future::join_all(appending).await {
+        appended.unwrap();
+    }
+    let report = verify(&*on.b).await.unwrap();
+    assert_eq!((report.rows, report.broken), (40, None));
+    let filter = AuditFilter {
+        tenant: Some(tenant()),
+        agent: Some("somebody".into()),
+        object: Some("vol_7".into()),
+        since: Some(7),
+        until: Some(8),
+    };
+    assert_eq!(on.b.audit(&filter, ALL).await.unwrap().items.len(), 1);
+    for forbidden in [
+        "UPDATE audit SET event = '{}'",
+        "DELETE FROM audit",
+        "INSERT INTO audit_anchors (sequence, hash, pruned_at) VALUES (1, 'x', 0)",
+    ] {
+        assert!(!on.tamper(forbidden).await, "{forbidden}");
+    }
+    assert!(on.a.prune(20, 30).await.unwrap() > 0);
+    assert!(verify(&*on.b).await.unwrap().broken.is_none());
+    assert!(!on.tamper("DELETE FROM audit_anchors").await);
+    assert!(!on.tamper("UPDATE audit_anchors SET pruned_at = 0").await);
+    // Rows cut off the end are missed.
+    let cut = match on.url {
+        Some(_) => {
+            "DROP TRIGGER audit_is_removed_up_to_an_anchor ON audit;
+             DELETE FROM audit WHERE sequence = (SELECT max(sequence) FROM audit)"
+        }
+        None => {
+            "DROP TRIGGER audit_is_removed_up_to_an_anchor;
+             DELETE FROM audit WHERE sequence = (SELECT max(sequence) FROM audit)"
+        }
+    };
+    assert!(on.tamper(cut).await);
+    assert!(verify(&*on.b).await.unwrap().broken.is_some());
+}
+
+async fn keys_are_kept(on: &Stores) {
+    assert!(!on.a.any_key().await.unwrap());
+    let request = KeyRequest {
+        name: "ward".into(),
+        tenant: other(),
+        scope: Scope::Submit,
+        quota: Quota {
+            requests: Some(5),
+            bytes: None,
+            jobs: Some(1),
+        },
+        expires_at: Some(i64::MAX),
+    };
+    let (key, _) = ApiKey::make(request, now()).unwrap();
+    let event = AuditEvent::new(now(), Activity::KeyCreated, other(), "somebody".into());
+    on.a.add_key(&key, &event).await.unwrap();
+    assert!(on.b.any_key().await.unwrap());
+    let stored = on.b.key(&key.id).await.unwrap().unwrap();
+    assert_eq!(
+        (stored.digest, stored.quota),
+        (key.digest.clone(), key.quota)
+    );
+    assert_eq!(on.b.keys(Some(&other()), ALL).await.unwrap().items.len(), 1);
+    assert_eq!(
+        on.b.keys(Some(&tenant()), ALL).await.unwrap().items.len(),
+        0
+    );
+    assert_eq!(on.b.keys(None, ALL).await.unwrap().items.len(), 1);
+    for _ in 0..2 {
+        assert!(on.b.revoke_key(&key.id, now(), &event).await.unwrap());
+    }
+    assert!(!on.b.revoke_key("none", now(), &event).await.unwrap());
+    assert!(
+        on.a.key(&key.id)
+            .await
+            .unwrap()
+            .unwrap()
+            .revoked_at
+            .is_some()
+    );
+    assert_eq!(verify(&*on.a).await.unwrap().rows, 2);
+    let volume = on.volume(&other()).await;
+    on.file(&NewJob {
+        tenant: other(),
+        ..new_job(&volume)
+    })
+    .await;
+    let usage = on.b.usage(&other()).await.unwrap();
+    assert_eq!((usage.bytes, usage.jobs), (1000, 1));
+}
+
+async fn ends_of_jobs_are_told(on: &Stores) {
+    let volume = on.volume(&tenant()).await;
+    let endpoint = |id: &str, events: &[HookEvent]| HookEndpoint {
+        id: id.into(),
+        tenant: tenant(),
+        created_at: now(),
+        url: "https://ward.example/hook".into(),
+        destination: "https://ward.example:443".into(),
+        events: events.to_vec(),
+        gone_at: None,
+    };
+    let secret = SigningSecret::random();
+    let all = endpoint("whk_1", &HookEvent::ALL);
+    assert!(on.a.add_endpoint(&all, &secret, 2).await.unwrap());
+    let ends = endpoint("whk_2", &HookEvent::ENDS);
+    assert!(on.a.add_endpoint(&ends, &secret, 2).await.unwrap());
+    assert!(
+        !on.a
+            .add_endpoint(&endpoint("whk_3", &[]), &secret, 2)
+            .await
+            .unwrap()
+    );
+    assert_eq!(on.b.endpoints(&tenant()).await.unwrap(), [all, ends]);
+    let own = JobWebhook {
+        url: "https://own.example/".into(),
+        destination: "https://own.example:443".into(),
+        events: vec!["failed".into()],
+        secret: None,
+    };
+    let job = on
+        .file(&NewJob {
+            webhook: Some(own),
+            ..new_job(&volume)
+        })
+        .await;
+    let (_, lease) = on.claim().await.unwrap();
+    let outcome = JobOutcome::Failed(failure("no-heart"));
+    on.b.finish(&lease, &outcome, now()).await.unwrap().unwrap();
+    let told = on.a.deliveries(&tenant(), &job.id, 10).await.unwrap();
+    let told: Vec<_> = told
+        .iter()
+        .map(|d| (d.endpoint.as_deref(), d.event))
+        .collect();
+    assert_eq!(told.len(), 4);
+    assert!(told.contains(&(Some("whk_1"), HookEvent::Started)));
+    assert!(told.contains(&(None, HookEvent::Failed)));
+    let places = on.b.destinations().await.unwrap();
+    let names: Vec<_> = places.iter().map(|place| place.0.as_str()).collect();
+    assert_eq!(
+        names,
+        ["https://own.example:443", "https://ward.example:443"]
+    );
+    let tenants = on.a.signing_secret(&tenant(), &secret).await.unwrap();
+    assert_eq!(
+        on.b.signing_secret(&tenant(), &SigningSecret::random())
+            .await
+            .unwrap(),
+        tenants
+    );
+    on.a.replace_secret(&tenant(), &SigningSecret::random(), i64::MAX)
+        .await
+        .unwrap();
+    let due =
+        on.b.due("https://own.example:443", now(), 10)
+            .await
+            .unwrap();
+    assert_eq!(due.len(), 1);
+    assert_eq!(
+        (due[0].secrets.len(), due[0].cause.as_deref()),
+        (2, Some("no-heart"))
+    );
+    // An attempt that fails is repeated, one that is taken is not.
+    let settle = |outcome, again_at| Settlement { outcome, again_at };
+    let again = settle(AttemptOutcome::Rejected(500), Some(now() + 60_000));
+    on.a.settle(&due[0].id, again, now()).await.unwrap();
+    assert!(
+        on.b.due("https://own.example:443", now(), 10)
+            .await
+            .unwrap()
+            .is_empty()
+    );
+    on.a.settle(
+        &due[0].id,
+        settle(AttemptOutcome::Delivered(204), None),
+        now(),
+    )
+    .await
+    .unwrap();
+    let settled = &on.b.deliveries(&tenant(), &job.id, 10).await.unwrap();
+    let settled = settled.iter().find(|d| d.id == due[0].id).unwrap();
+    assert_eq!(
+        (settled.state, settled.attempts, settled.last_status),
+        (DeliveryState::Delivered, 2, Some(204))
+    );
+    let once_more =
+        on.b.redeliver(&tenant(), &job.id, &due[0].id, now())
+            .await
+            .unwrap()
+            .unwrap();
+    assert_eq!(
+        (once_more.state, once_more.attempts),
+        (DeliveryState::Pending, 0)
+    );
+    // 410 ends the endpoint, and what it was to be told.
+    let due =
+        on.b.due("https://ward.example:443", now(), 10)
+            .await
+            .unwrap();
+    let first = due.iter().find(|d| d.event == HookEvent::Started).unwrap();
+    on.a.settle(&first.id, settle(AttemptOutcome::Gone, None), now())
+        .await
+        .unwrap();
+    assert!(
+        on.b.endpoints(&tenant()).await.unwrap()[0]
+            .gone_at
+            .is_some()
+    );
+    assert!(
+        on.b.remove_endpoint(&tenant(), "whk_2", now())
+            .await
+            .unwrap()
+    );
+    assert!(
+        !on.b
+            .remove_endpoint(&tenant(), "whk_2", now())
+            .await
+            .unwrap()
+    );
+    let left = on.b.backlog().await.unwrap();
+    assert_eq!((left.pending, left.dead), (1, 3));
+    let limits = |pending_since, backlog| DeliveryLimits {
+        pending_since,
+        ended_since: 0,
+        backlog,
+    };
+    assert_eq!(on.a.expire(limits(0, 1), now()).await.unwrap(), 0);
+    assert_eq!(on.a.expire(limits(0, 0), now()).await.unwrap(), 1);
+    assert_eq!(on.a.expire(limits(i64::MAX, 0), now()).await.unwrap(), 0);
+    // What was told about an erased job goes with it.
+    on.a.delete_job(&job.id, now()).await.unwrap();
+    assert!(
+        on.b.deliveries(&tenant(), &job.id, 10)
+            .await
+            .unwrap()
+            .is_empty()
+    );
+}
+
+async fn series_are_fetched_and_results_sent(on: &Stores) {
+    let source = SeriesSource {
+        archive: Some("pacs".into()),
+        dicomweb: None,
+        study: "1.2".into(),
+        series: "1.2.3".into(),
+    };
+    let sourced = NewJob {
+        kind: "model".into(),
+        source: Some(source.clone()),
+        send: Some(SendOrder {
+            names: vec!["mesh.dcm".into(), "report.dcm".into()],
+            to: "pacs".into(),
+        }),
+        ..NewJob::default()
+    };
+    let (job, lost) = (on.file(&sourced).await, on.file(&sourced).await);
+    assert!(on.claim().await.is_none(), "they have no volume yet");
+    assert_eq!(on.b.pull_destinations().await.unwrap()[0].0, "pacs");
+    let due = on.b.due_pulls("pacs", now(), 10).await.unwrap();
+    assert_eq!(due.len(), 2);
+    assert_eq!(due[0].source, source);
+    on.a.pull_failed(&job.id, "away", now() + 60_000, now())
+        .await
+        .unwrap();
+    assert_eq!(on.b.due_pulls("pacs", now(), 10).await.unwrap().len(), 1);
+    let given_up =
+        on.a.pull_given_up(&lost.id, &failure("no-series"), now())
+            .await
+            .unwrap()
+            .unwrap();
+    assert_eq!(given_up.state, JobState::Failed);
+    let volume = on.volume(&tenant()).await;
+    assert!(
+        on.a.pulled(&lost.id, &volume, now())
+            .await
+            .unwrap()
+            .is_none()
+    );
+    let supplied = on.a.pulled(&job.id, &volume, now()).await.unwrap().unwrap();
+    assert_eq!(supplied.volume.as_ref(), Some(&volume));
+    let pulls = on.b.pulls(&[&job.id, &lost.id]).await.unwrap();
+    assert_eq!(
+        (pulls[&job.id].state, pulls[&job.id].attempts),
+        (DeliveryState::Delivered, 2)
+    );
+    assert_eq!(pulls[&lost.id].state, DeliveryState::Dead);
+    let tenant = tenant();
+    let key = SeriesKey {
+        tenant: &tenant,
+        base: "http://pacs",
+        study: "1.2",
+        series: "1.2.3",
+    };
+    let held = HeldSeries {
+        instances: "ab".into(),
+        volume: volume.clone(),
+    };
+    for _ in 0..2 {
+        on.a.note_series(key, &held).await.unwrap();
+    }
+    assert_eq!(on.b.held_series(key).await.unwrap(), Some(held));
+    let (_, lease) = on.claim().await.unwrap();
+    let result = model(&volume);
+    on.b.finish(&lease, &succeeded(&result), now())
+        .await
+        .unwrap()
+        .unwrap();
+    let sends = &on.a.sends(&[&job.id]).await.unwrap()[&job.id];
+    let names: Vec<_> = sends.iter().map(|send| send.name.as_str()).collect();
+    assert_eq!(names, ["mesh.dcm", "report.dcm"]);
+    assert_eq!(on.b.send_destinations().await.unwrap()[0].0, "pacs");
+    let due = on.b.due_sends("pacs", now(), 10).await.unwrap();
+    let stored = SendSettlement {
+        state: DeliveryState::Delivered,
+        outcome: "stored",
+        error: None,
+        again_at: None,
+    };
+    on.a.settle_send(&due[0].id, &stored, now()).await.unwrap();
+    let backlog = on.b.archive_backlog().await.unwrap();
+    assert_eq!(
+        (backlog.pulls, backlog.sends.pending, backlog.sends.dead),
+        (0, 1, 0)
+    );
+    // What is erased is not sent any more, and its series is fetched anew.
+    let expected = [volume.clone(), result.id.clone()];
+    let order = ErasureOrder {
+        cascade: false,
+        ..erasure(&result.id, false)
+    };
+    assert!(matches!(
+        on.a.erase(&order, &expected, now()).await.unwrap(),
+        Erased::Done(_)
+    ));
+    let sends = &on.b.sends(&[&job.id]).await.unwrap()[&job.id];
+    assert_eq!(sends[1].last_outcome.as_deref(), Some("erased"));
+    let again =
+        on.b.redeliver_object(&tenant, &job.id, &sends[1].id, now())
+            .await
+            .unwrap();
+    assert_eq!(again.unwrap().state, DeliveryState::Dead);
+    let again =
+        on.b.redeliver_object(&tenant, &job.id, &sends[0].id, now())
+            .await
+            .unwrap();
+    assert_eq!(again.unwrap().state, DeliveryState::Pending);
+    let order = erasure(&volume, false);
+    assert!(matches!(
+        on.a.erase(&order, &expected, now()).await.unwrap(),
+        Erased::Done(_)
+    ));
+    assert_eq!(on.b.held_series(key).await.unwrap(), None);
+    let job = on.b.job(&job.id).await.unwrap().unwrap();
+    assert_eq!(
+        job.source.unwrap().series,
+        "",
+        "the UIDs go with the volume"
+    );
+}
+
+async fn received_objects_become_volumes(on: &Stores) {
+    let received = |instance: &str, data: &str| NewObject {
+        origin: Origin {
+            tenant: tenant(),
+            protocol: Protocol::CStore,
+            sender: "CAMERA".into(),
+            address: "10.0.0.1".into(),
+        },
+        header: DicomHeader {
+            sop_class: "1.2.840.10008.5.1.4.1.1.20".into(),
+            sop_instance: instance.into(),
+            study: "1.2".into(),
+            series: "1.2.3".into(),
+            is_slice: true,
+            modality: Some("NM".into()),
+            image_type: vec!["ORIGINAL".into()],
+            study_description: None,
+            data_set: 0,
+        },
+        data_sha256: data.into(),
+        file_sha256: data.into(),
+        file: format!("file-{instance}-{data}"),
+        bytes: 10,
+    };
+    let room = IntakeRoom {
+        objects: 2,
+        bytes: 1000,
+        tenant_bytes: None,
+    };
+    let add = async |instance: &str, data: &str| {
+        let added = on.a.add(&received(instance, data), room, now()).await;
+        added.unwrap()
+    };
+    let Added::New(group, None) = add("1", "aa").await else {
+        panic!("it is new")
+    };
+    assert_eq!(add("1", "aa").await, Added::Known(group.clone()));
+    assert_eq!(add("1", "bb").await, Added::Conflict);
+    assert_eq!(add("2", "aa").await, Added::New(group.clone(), None));
+    assert_eq!(add("3", "aa").await, Added::NoRoom);
+    assert_eq!(on.b.waiting().await.unwrap(), (2, 20));
+    let state = on.b.group(&group).await.unwrap().unwrap();
+    assert_eq!(
+        (state.objects, state.waiting_bytes, state.revision),
+        (2, 20, 2)
+    );
+    assert_eq!(on.b.unfinished().await.unwrap().len(), 1);
+    assert_eq!(on.b.objects(&group).await.unwrap().len(), 2);
+    assert_eq!(on.b.files().await.unwrap().len(), 2);
+    // It cannot be read; an object that is sent again replaces the other.
+    on.a.failed(&group, 2, &failure("not-a-volume"), now())
+        .await
+        .unwrap();
+    assert_eq!(on.b.failed_before(now() + 1000).await.unwrap().len(), 1);
+    let Added::New(_, obsolete) = add("1", "bb").await else {
+        panic!("it replaces the other")
+    };
+    assert_eq!(obsolete.as_deref(), Some("file-1-aa"));
+    let volume = on.volume(&tenant()).await;
+    on.a.made(&group, 1, &volume, now()).await.unwrap();
+    let state = on.b.group(&group).await.unwrap().unwrap();
+    assert_eq!(state.state, GroupState::Gathering, "more has come since");
+    on.a.made(&group, state.revision, &volume, now())
+        .await
+        .unwrap();
+    let files =
+        on.a.filed(&group, Some("job_1"), None, now())
+            .await
+            .unwrap();
+    assert_eq!(files.len(), 2);
+    assert_eq!(on.b.releasable().await.unwrap().len(), 2);
+    on.a.released(&files).await.unwrap();
+    assert!(on.b.releasable().await.unwrap().is_empty());
+    let listed =
+        on.b.groups(&tenant(), Some(GroupState::Stored), ALL)
+            .await
+            .unwrap();
+    assert_eq!(listed.items[0].job.as_deref(), Some("job_1"));
+    // Who erases the volume erases what is known of its objects.
+    let expected = [volume.clone()];
+    on.a.erase(&erasure(&volume, false), &expected, now())
+        .await
+        .unwrap();
+    assert!(on.b.group(&group).await.unwrap().is_none());
+    let Added::New(group, None) = add("1", "aa").await else {
+        panic!("it is new again")
+    };
+    assert_eq!(on.b.remove(&other(), &group).await.unwrap(), None);
+    assert_eq!(
+        on.b.remove(&tenant(), &group).await.unwrap().unwrap(),
+        ["file-1-aa"]
+    );
+    assert_eq!(on.b.waiting().await.unwrap(), (0, 0));
+}
+
+async fn work_items_change_once(on: &Stores) {
+    let item = |uid: &str| Workitem {
+        tenant: tenant(),
+        uid: uid.into(),
+        sequence: 0,
+        revision: 0,
+        state: WorkitemState::Scheduled,
+        transaction: None,
+        performer: None,
+        attributes: DataSetJson::of(object(json!({
+            "00741000": {"vr": "CS", "Value": ["SCHEDULED"]}
+        })))
+        .unwrap(),
+        changed_at: now(),
+    };
+    let (first, second) = (item("1.2.1"), item("1.2.2"));
+    assert_eq!(
+        on.a.add_workitem(&first, 2).await.unwrap(),
+        AddedWorkitem::Done
+    );
+    assert_eq!(
+        on.b.add_workitem(&first, 2).await.unwrap(),
+        AddedWorkitem::Exists
+    );
+    assert_eq!(
+        on.a.add_workitem(&second, 2).await.unwrap(),
+        AddedWorkitem::Done
+    );
+    assert_eq!(
+        on.a.add_workitem(&item("1.2.3"), 2).await.unwrap(),
+        AddedWorkitem::Full
+    );
+    assert_eq!(on.b.scheduled_workitems(0, 10).await.unwrap().len(), 2);
+    let mut mine = on.b.workitem(&tenant(), "1.2.1").await.unwrap().unwrap();
+    mine.state = WorkitemState::InProgress;
+    (mine.transaction, mine.performer) = (Some("1.9".into()), Some(String::new()));
+    let changed = tokio::join!(on.a.change_workitem(&mine), on.b.change_workitem(&mine));
+    assert!(
+        changed.0.unwrap() != changed.1.unwrap(),
+        "one of two claims it"
+    );
+    assert_eq!(on.b.performed_workitems().await.unwrap().len(), 1);
+    let listed =
+        on.b.workitems(&tenant(), Some(WorkitemState::Scheduled), 0, 10)
+            .await
+            .unwrap();
+    assert_eq!(listed.len(), 1);
+    assert_eq!(
+        on.b.workitems(&tenant(), None, 0, 10).await.unwrap().len(),
+        2
+    );
+    let mut ended = on.a.workitem(&tenant(), "1.2.1").await.unwrap().unwrap();
+    ended.state = WorkitemState::Completed;
+    assert!(on.a.change_workitem(&ended).await.unwrap());
+    assert_eq!(on.b.delete_ended_workitems(now() + 1000).await.unwrap(), 1);
+}
+
+async fn figures_are_counted(on: &Stores) {
+    let volume = on.volume(&tenant()).await;
+    let job = on.file(&new_job(&volume)).await;
+    on.a.add_product(&model(&volume), &tenant(), Some(&volume))
+        .await
+        .unwrap();
+    let figures = on.b.queue_figures().await.unwrap();
+    assert_eq!(figures.oldest_queued_at, Some(job.created_at));
+    let counted: BTreeMap<_, _> = figures
+        .items
+        .iter()
+        .map(|(kind, n)| (kind.noun(), *n))
+        .collect();
+    assert_eq!(
+        (counted["volume"], counted["model"], counted["template"]),
+        (1, 1, 0)
+    );
+}
+
+// ------------------------------------------------------------------------------ PostgreSQL alone
+
+/// Tables and columns of a schema, without those of the engine and of the migrations.
+fn columns(rows: Vec<(String, String)>) -> BTreeSet<(String, String)> {
+    let own = |table: &str| !table.starts_with("sqlite_") && !table.starts_with("_sqlx");
+    rows.into_iter().filter(|(table, _)| own(table)).collect()
+}
+
+#[tokio::test]
+async fn both_engines_have_the_same_tables() {
+    use sqlx::{ConnectOptions, Connection};
+    let (file, on_server) = (Stores::sqlite().await, Stores::postgres().await);
+    let options = sqlx::sqlite::SqliteConnectOptions::new();
+    let path = file.folder.path().join("contract.db");
+    let mut connection = options.filename(path).connect().await.unwrap();
+    let sqlite = sqlx::query_as(
+        "SELECT t.name, c.name FROM sqlite_schema AS t, pragma_table_xinfo(t.name) AS c
+         WHERE t.type = 'table'",
+    );
+    let sqlite = columns(sqlite.fetch_all(&mut connection).await.unwrap());
+    let mut connection = sqlx::PgConnection::connect(&on_server.url.unwrap())
+        .await
+        .unwrap();
+    let postgres = sqlx::query_as(
+        "SELECT table_name::text, column_name::text FROM information_schema.columns
+         WHERE table_schema = 'public'",
+    );
+    let mut postgres = columns(postgres.fetch_all(&mut connection).await.unwrap());
+    // SQLite keeps it in its own table of sequences.
+    postgres.retain(|(table, _)| table != "audit_greatest");
+    assert_eq!(sqlite, postgres);
+    assert!(sqlite.len() > 150, "{}", sqlite.len());
+}
+
+async fn connect(url: &str) -> Result<SqlStore, PostgresError> {
+    let gauge = DiskGauge::new(std::path::Path::new("/tmp"), Some(0));
+    SqlStore::connect(&reached(url), WAIT, gauge).await
+}
+
+#[tokio::test]
+async fn a_database_that_cannot_be_used_is_refused_with_advice() {
+    let refused = async |url: &str| connect(url).await.err().unwrap().to_string();
+    let url = server().url("there_is_none");
+    assert!(refused(&url).await.contains("CREATE DATABASE"));
+    // No rights.
+    let url = server().database().await;
+    let name = url.rsplit('/').next().unwrap();
+    let setup = "CREATE ROLE guest_of_tests LOGIN";
+    let _ = tokio::spawn(async move { server().run("postgres", setup).await }).await;
+    let as_guest = url.replace("tests@", "guest_of_tests@");
+    assert!(refused(&as_guest).await.contains("GRANT CREATE"));
+    // Somebody else's tables.
+    server().run(name, "CREATE TABLE jobs (id int)").await;
+    assert!(refused(&url).await.contains("empty database"));
+    // Tables of a newer version.
+    let url = server().database().await;
+    let name = url.rsplit('/').next().unwrap();
+    connect(&url).await.unwrap().close().await;
+    let newer =
+        "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
+                 VALUES (9999, 'newer', true, '', 0)";
+    server().run(name, newer).await;
+    assert!(refused(&url).await.contains("newer version"));
+    // Another encoding.
+    let latin = "CREATE DATABASE latin_of_tests ENCODING 'LATIN1' TEMPLATE template0";
+    server().run("postgres", latin).await;
+    assert!(
+        refused(&server().url("latin_of_tests"))
+            .await
+            .contains("UTF8")
+    );
+}
+
+#[tokio::test]
+async fn a_folder_and_a_database_that_do_not_belong_together_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let on = async |database: Option<&str>| {
+        let settings = StoreSettings {
+            database: database.map(reached),
+            ..StoreSettings::default()
+        };
+        Store::open_with(folder.path(), settings).await
+    };
+    let (url, wrong) = (server().database().await, server().database().await);
+    let mut store = on(Some(&url)).await.unwrap();
+    store.close().await;
+    drop(store);
+    std::fs::create_dir_all(folder.path().join("volumes/vol_1")).unwrap();
+    let error = on(Some(&wrong)).await.err().unwrap().to_string();
+    assert!(error.contains("is empty"), "{error}");
+    let error = on(None).await.err().unwrap().to_string();
+    assert!(error.contains("--database"), "{error}");
+    let error = ventriform::store::examine(folder.path(), None, None)
+        .await
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("pg_dump"), "{error}");
+    std::fs::remove_file(folder.path().join("database")).unwrap();
+    std::fs::write(folder.path().join("ventriform.db"), "").unwrap();
+    let error = on(Some(&url)).await.err().unwrap().to_string();
+    assert!(error.contains("Start without --database"), "{error}");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_server_that_is_away_is_waited_for_and_never_answered_for() {
+    let server = Arc::new(tokio::task::spawn_blocking(Server::new).await.unwrap());
+    let again = |word: Option<&'static str>| {
+        let server = server.clone();
+        tokio::task::spawn_blocking(move || match word {
+            Some(word) => server.end(word),
+            None => server.start(),
+        })
+    };
+    let url = server.database().await;
+    // Away at the start: it is waited for.
+    again(Some("stop")).await.unwrap();
+    let mut impatient = reached(&url);
+    impatient.patience = Duration::from_millis(300);
+    let gauge = || DiskGauge::new(std::path::Path::new("/tmp"), Some(0));
+    let error = SqlStore::connect(&impatient, WAIT, gauge())
+        .await
+        .err()
+        .unwrap();
+    assert!(
+        matches!(error, PostgresError::Unreachable { .. }),
+        "{error}"
+    );
+    let patient = reached(&url);
+    let started = tokio::join!(SqlStore::connect(&patient, SHORT, gauge()), async {
+        tokio::time::sleep(Duration::from_millis(500)).await;
+        again(None).await.unwrap();
+    });
+    let store = started.0.unwrap();
+    let volume = stored_volume("vol_1", 1);
+    let tags = Tags::default();
+    store
+        .add_volume(&volume, &tenant(), &tags, None)
+        .await
+        .unwrap();
+    for word in ["crash", "stop"] {
+        again(Some(word)).await.unwrap();
+        let short = tokio::time::timeout(WAIT, async {
+            let read = store.volume(&tenant(), "vol_1").await.unwrap_err();
+            let written = store
+                .add_volume(&volume, &tenant(), &tags, None)
+                .await
+                .unwrap_err();
+            let checked = store.check().await.unwrap_err();
+            [read.cause(), written.cause(), checked.cause()]
+        });
+        assert_eq!(short.await.unwrap(), [StoreFault::Away; 3]);
+        again(None).await.unwrap();
+        // Back again, with all that was acknowledged, and without another start.
+        assert!(store.volume(&tenant(), "vol_1").await.unwrap().is_some());
+        assert!(
+            !store
+                .add_volume(&volume, &tenant(), &tags, None)
+                .await
+                .unwrap()
+        );
+        store.check().await.unwrap();
+    }
+}
