@@ -30,7 +30,8 @@ use ventriform::store::{DiskGauge, PostgresError, SqlStore, Store, StoreSettings
 use ventriform::volume::dicom::DicomHeader;
 use ventriform::worklist::{AddedWorkitem, DataSetJson, Workitem, WorkitemState, Worklist};
 
-const WAIT: Duration = Duration::from_secs(5);
+/// Longer than a busy machine keeps anybody waiting.
+const WAIT: Duration = Duration::from_secs(30);
 /// How long an operation waits for a server that is away.
 const SHORT: Duration = Duration::from_millis(500);
 const LEASE: Duration = Duration::from_millis(150);

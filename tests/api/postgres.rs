@@ -18,6 +18,7 @@ const DEBIAN: &str = "/usr/lib/postgresql";
 /// Runs the server $1/postgres on the folder $2 and port $3 until standard input ends; `crash` stops it as
 /// a power cut would.
 const WATCH: &str = r#"
+trap : TERM INT HUP
 "$1/postgres" -D "$2" -p "$3" -k "$2" >>"$2/log" 2>&1 </dev/null &
 server=$!
 read -r word
