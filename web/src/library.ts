@@ -2,6 +2,7 @@
 
 import { type Job, type Result, type Volume, authorization, call, get, page, reachable, words } from "./api";
 import { Watched } from "./state";
+import { newest } from "./words";
 
 export const volumes = new Watched<Volume[]>([]);
 export const models = new Watched<Result[]>([]);
@@ -19,19 +20,21 @@ const PAGE = 30;
 
 /** Reads the newest of everything. */
 export async function refresh(): Promise<void> {
+  const known = { volumes: volumes.value, jobs: jobs.value, models: models.value, fits: fits.value };
   try {
-    const [v, j, m, s, t] = await Promise.all([
+    // The jobs first: the results of those that had ended are then in the lists, which are read after them.
+    const j = await page<Job>("jobs", { limit: 100 });
+    const [v, m, s, t] = await Promise.all([
       page<Volume>("volumes", { limit: Math.max(PAGE, Math.min(100, volumes.value.length)) }),
-      page<Job>("jobs", { limit: 100 }),
       page<Result>("models", { limit: 100 }),
       page<Result>("segmentations", { limit: 100 }),
       page<Result>("templates", { limit: 100 }),
     ]);
-    volumes.value = v.items;
+    volumes.value = renewed(known.volumes, volumes.value, v.items);
     more.value = v.next;
-    jobs.value = j.items;
-    models.value = m.items;
-    fits.value = s.items;
+    jobs.value = renewed(known.jobs, jobs.value, j.items).map(latest(jobs.value));
+    models.value = renewed(known.models, models.value, m.items);
+    fits.value = renewed(known.fits, fits.value, s.items);
     templates.value = t.items;
     partial.value = Boolean(m.next || s.next);
     trouble.value = "";
@@ -40,6 +43,19 @@ export async function refresh(): Promise<void> {
     trouble.value = words(error);
   }
   watchActive();
+}
+
+/** The list `read`, with what this page added and without what it erased while the answer was on its way. */
+function renewed<T extends { id: string }>(before: T[], now: T[], read: T[]): T[] {
+  const ids = (list: T[]) => new Set(list.map(item => item.id));
+  const [old, kept, answered] = [ids(before), ids(now), ids(read)];
+  const added = now.filter(item => !old.has(item.id) && !answered.has(item.id));
+  return [...added, ...read.filter(item => kept.has(item.id) || !old.has(item.id))];
+}
+
+/** The newer state of a job: its events may have overtaken the list. */
+function latest(now: Job[]): (job: Job) => Job {
+  return job => now.find(other => other.id === job.id && other.revision > job.revision) ?? job;
 }
 
 export async function loadMore(limit = PAGE): Promise<void> {
@@ -108,7 +124,7 @@ export async function loadResult(id: string): Promise<Result | undefined> {
 
 export function resultsOf(volume: string): Result[] {
   const own = [...fits.value, ...models.value].filter(result => result.volume === volume);
-  return own.sort((a, b) => b.created_at.localeCompare(a.created_at));
+  return own.sort(newest);
 }
 
 export function isActive(job: Job): boolean {

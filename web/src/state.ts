@@ -1,6 +1,6 @@
 // Values that components watch.
 
-import { useEffect, useState } from "preact/hooks";
+import { useLayoutEffect, useState } from "preact/hooks";
 
 export class Watched<T> {
   private watchers = new Set<() => void>();
@@ -25,6 +25,7 @@ export class Watched<T> {
 /** The value of `watched`; the component is drawn again when it changes. */
 export function useWatched<T>(watched: Watched<T>): T {
   const [, draw] = useState(0);
-  useEffect(() => watched.watch(() => draw(n => n + 1)), [watched]);
+  // Not `useEffect`: it runs after the view was painted, and what changes until then would not be seen.
+  useLayoutEffect(() => watched.watch(() => draw(n => n + 1)), [watched]);
   return watched.value;
 }

@@ -10,7 +10,7 @@ import { Picture } from "./picture";
 import { open } from "./route";
 import { useWatched } from "./state";
 import { type Upload, add, again, dismiss, keepNames, onStored, stop, uploads } from "./upload";
-import { bytes, isFit, isLabelMap, moment, nameOf, number, resultName, shape, study } from "./words";
+import { bytes, isFit, isLabelMap, moment, nameOf, newest, number, resultName, shape, study } from "./words";
 import { file } from "./work";
 
 type Then = "fit" | "model" | "nothing";
@@ -142,7 +142,7 @@ function Scans() {
   const [order, setOrder] = useState<Order>("newest");
   const [at, setAt] = useState(0);
   const rows = useMemo((): Row[] => {
-    const results = [...allFits, ...allModels].sort((a, b) => b.created_at.localeCompare(a.created_at));
+    const results = [...allFits, ...allModels].sort(newest);
     return all.map(volume => ({
       volume,
       results: results.filter(result => result.volume === volume.id),
@@ -201,13 +201,13 @@ function Scans() {
       {shown.length === 0 && <p class="quiet pad">Nothing matches.</p>}
       {(at > 0 || shown.length > at + SHOWN || next) && (
         <nav class="paging" aria-label="Pages of the list">
-          <button type="button" disabled={at === 0} onClick={() => setAt(Math.max(0, at - SHOWN))}>Newer</button>
+          <button type="button" disabled={at === 0} onClick={() => setAt(Math.max(0, at - SHOWN))}>Previous</button>
           <span>{at + 1} to {at + part.length}</span>
           <button type="button" disabled={shown.length <= at + SHOWN && !next} onClick={() => {
             const go = () => setAt(at + SHOWN);
             if (shown.length <= at + SHOWN) void loadMore().then(go);
             else go();
-          }}>Older</button>
+          }}>Next</button>
         </nav>
       )}
     </section>
@@ -233,7 +233,7 @@ function passes(row: Row, show: Show): boolean {
 }
 
 const COMPARE: Record<Order, (a: Row, b: Row) => number> = {
-  newest: (a, b) => b.volume.created_at.localeCompare(a.volume.created_at),
+  newest: (a, b) => newest(a.volume, b.volume),
   name: (a, b) => nameOf(a.volume).localeCompare(nameOf(b.volume), undefined, { numeric: true }),
   largest: (a, b) => b.volume.bytes - a.volume.bytes,
 };

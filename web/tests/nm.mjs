@@ -1,5 +1,5 @@
 // DICOM files (explicit little endian) of an axis-aligned 16-bit NIfTI-1 scan: one NM file of many frames (RECON TOMO), or a
-// PET series of one file for each slice.
+// PET series of one file for each slice. The same scan as header and image, and small volumes for a long list.
 
 import { gunzipSync } from "node:zlib";
 
@@ -141,4 +141,19 @@ export function pair(nifti) {
   const start = header.readFloatLE(108);
   header.writeFloatLE(0, 108);
   return { header, image: file.subarray(start) };
+}
+
+/** A NIfTI-1 volume of 8 x 8 x (7 + n) voxels of 1 mm, which count up from n. */
+export function small(n) {
+  const shape = [8, 8, 7 + n];
+  const file = Buffer.alloc(352 + 2 * 64 * shape[2]);
+  file.writeInt32LE(348, 0);
+  [3, ...shape, 1, 1, 1, 1].forEach((size, at) => file.writeInt16LE(size, 40 + 2 * at));
+  file.writeInt16LE(4, 70); // 16-bit whole numbers
+  file.writeInt16LE(16, 72);
+  for (let at = 76; at < 92; at += 4) file.writeFloatLE(1, at);
+  file.writeFloatLE(352, 108);
+  file.write("n+1\0", 344, "latin1");
+  for (let at = 0; at < 64 * shape[2]; at++) file.writeInt16LE(n + at, 352 + 2 * at);
+  return file;
 }

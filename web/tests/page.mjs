@@ -11,7 +11,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import assert from "node:assert/strict";
 import { chromium } from "playwright-core";
-import { nm, pair, series } from "./nm.mjs";
+import { nm, pair, series, small } from "./nm.mjs";
 import { reports, samePolarMap } from "./report.mjs";
 
 const { PROGRAM, SCREENSHOTS, CHROMIUM } = process.env;
@@ -22,6 +22,8 @@ const PATIENCE = 120_000;
 
 let [passed, failed] = [0, 0];
 const ends = [];
+/** The open tabs, and what went wrong behind each. */
+const tabs = new Map();
 
 /** Starts a service with a data folder of its own; returns its address and folder. */
 async function service(...flags) {
@@ -76,7 +78,23 @@ async function tab(browser, address, { width = 1280, dark = false, expected = []
   await page.addInitScript(() => document.addEventListener("securitypolicyviolation", event => console.error("policy", event.violatedDirective, event.blockedURI)));
   if (script) await page.addInitScript(script);
   await page.goto(address);
-  return { page, faults, close: () => context.close() };
+  tabs.set(page, faults);
+  const close = async () => {
+    tabs.delete(page);
+    await context.close();
+  };
+  return { page, faults, close };
+}
+
+/** Says what the tabs of a failed check show, keeps pictures of them, and closes them. */
+async function examine(name) {
+  for (const [page, faults] of tabs) {
+    const text = await page.evaluate(() => `${location.href}\n${document.body.innerText}`).catch(error => error.message);
+    console.log(`the tab shows: ${text.slice(0, 2000)}\n${faults.join("\n")}`);
+    await page.screenshot({ path: join(SCREENSHOTS, `failed ${name}.png`), timeout: 10_000 }).catch(error => console.log(error.message));
+    await page.context().close();
+  }
+  tabs.clear();
 }
 
 /** axe finds nothing, nothing sticks out to the right; the picture is kept. */
@@ -111,6 +129,7 @@ async function check(name, act) {
   } catch (error) {
     failed++;
     console.log(`FAILED: ${name}\n${error.stack}`);
+    await examine(name);
   }
 }
 
@@ -441,6 +460,101 @@ async function main() {
     line.mend();
     await page.getByRole("button", { name: "Send again" }).click();
     await drawn(page);
+    await close();
+  });
+
+  await check("an upload is cancelled and sent again", async () => {
+    const own = await service();
+    const { page, faults, close } = await tab(browser, own.address);
+    await page.waitForSelector(".welcome");
+    const session = await page.context().newCDPSession(page);
+    const sendAt = uploadThroughput => session.send("Network.emulateNetworkConditions", { offline: false, latency: 0, downloadThroughput: -1, uploadThroughput });
+    await session.send("Network.enable");
+    await sendAt(50_000);
+    await choose(page, SCAN, TRUTH);
+    await page.waitForFunction(() => document.querySelector(".uploads .sending progress")?.value > 0);
+    await look(page, "sending-1280");
+    // What waits is cancelled as what is sent.
+    const stored = async () => (await (await fetch(`${own.address}/v1/volumes`)).json()).volumes.length;
+    await page.locator(".uploads .waiting").getByRole("button", { name: "Cancel" }).click();
+    await page.locator(".uploads .sending").getByRole("button", { name: "Cancel" }).click();
+    await page.waitForFunction(() => document.querySelectorAll(".uploads .cancelled").length === 2);
+    assert.equal(await stored(), 0);
+    await sendAt(-1);
+    await page.locator(".uploads .cancelled", { hasText: "spect" }).getByRole("button", { name: "Send again" }).click();
+    await page.waitForSelector(".uploads .stored");
+    assert.equal(await stored(), 1);
+    await page.getByRole("button", { name: "Take lv_truth.nii.gz off this list" }).click();
+    await page.waitForFunction(() => document.querySelectorAll(".uploads .cancelled").length === 0);
+    assert.deepEqual(faults, []);
+    await close();
+  });
+
+  await check("the list has pages and is sorted", async () => {
+    const own = await service();
+    const count = 33;
+    const form = n => {
+      const sent = new FormData();
+      sent.append("volume", new Blob([small(n)]), "small.nii");
+      return sent;
+    };
+    // Names and sizes ascend, the time of arrival descends.
+    for (let n = count; n > 0; n--) {
+      const answer = await fetch(`${own.address}/v1/volumes?labels=name:scan%20${n}`, { method: "POST", body: form(n) });
+      assert.equal(answer.status, 201, await answer.text());
+    }
+    const { page, faults, close } = await tab(browser, own.address);
+    const shown = () => page.locator(".scan .name").allTextContents();
+    const awaited = (first, length) => page.waitForFunction(([first, length]) => {
+      const names = [...document.querySelectorAll(".scan .name")].map(name => name.textContent);
+      return names[0] === first && names.length === length;
+    }, [first, length]);
+    const scans = (...from) => from.map(n => `scan ${n}`);
+    const ascending = Array.from({ length: count }, (_, n) => n + 1);
+    await awaited("scan 1", 30);
+    assert.deepEqual(await shown(), scans(...ascending.slice(0, 30)));
+    await page.getByRole("button", { name: "Next", exact: true }).click();
+    await awaited("scan 31", 3);
+    assert.match(await page.textContent(".paging"), /31 to 33/);
+    assert.ok(await page.getByRole("button", { name: "Next", exact: true }).isDisabled());
+    await look(page, "pages-1280");
+    await page.getByRole("button", { name: "Previous", exact: true }).click();
+    await awaited("scan 1", 30);
+    await page.getByLabel("Sort").selectOption("largest");
+    await awaited("scan 33", 30);
+    assert.deepEqual(await shown(), scans(...ascending.toReversed().slice(0, 30)));
+    // By name, numbers in the order of their values; a new order starts at its first page.
+    await page.getByRole("button", { name: "Next", exact: true }).click();
+    await awaited("scan 3", 3);
+    await page.getByLabel("Sort").selectOption("name");
+    await awaited("scan 1", 30);
+    assert.deepEqual(await shown(), scans(...ascending.slice(0, 30)));
+    await page.fill("input[type=search]", "scan 32");
+    await awaited("scan 32", 1);
+    assert.deepEqual(faults, []);
+    await close();
+  });
+
+  await check("a list that is slow to come keeps what happened meanwhile", async () => {
+    const own = await service();
+    const { page, faults, close } = await tab(browser, own.address);
+    await page.waitForSelector(".welcome");
+    let go;
+    const told = new Promise(resolve => (go = resolve));
+    await page.route(/\/v1\/(volumes|segmentations)\?limit=(30|100)$/, async route => {
+      const response = await route.fetch();
+      await told;
+      await route.fulfill({ response });
+    }, { times: 2 });
+    await page.reload();
+    await page.waitForSelector(".drop");
+    await choose(page, SCAN);
+    await drawn(page);
+    await page.goto(`${own.address}/#/`);
+    await page.waitForFunction(() => /Reading the list/.test(document.body.textContent));
+    go();
+    await page.waitForSelector(".scan .result");
+    assert.deepEqual(faults, []);
     await close();
   });
 
