@@ -76,7 +76,7 @@ pub async fn examine(
     }
     check_place(folder, s3)?;
     require_file(folder)?;
-    let mut lock = FolderLock::take(folder)?;
+    let mut lock = FolderLock::wait_for(|| FolderLock::take(folder)).await?;
     let bucket = match s3 {
         Some(location) => {
             let gauge = DiskGauge::new(folder, Some(0));

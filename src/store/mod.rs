@@ -57,7 +57,7 @@ use std::fs::{File, TryLockError};
 use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Limits of a store.
 #[derive(Debug, Clone)]
@@ -222,7 +222,7 @@ impl Store {
     /// # Errors
     /// If another process uses the folder, or it cannot be written, or the bucket cannot be used.
     pub async fn open_with(folder: &Path, settings: StoreSettings) -> Result<Self, OpenError> {
-        let mut lock = locked(folder)?;
+        let mut lock = FolderLock::wait_for(|| locked(folder)).await?;
         check_place(folder, settings.s3.as_ref())?;
         let gauge = DiskGauge::new(folder, settings.min_free);
         let (blobs, received, empty): (Arc<dyn BlobStore>, Arc<dyn ReceivedFiles>, bool) =
@@ -487,7 +487,24 @@ struct FolderLock {
     marked: bool,
 }
 
+/// How long the lock of a process that was just killed may outlast it: children that it was starting have
+/// the file open until they run their own program.
+const LOCK_WAIT: Duration = Duration::from_secs(1);
+
 impl FolderLock {
+    /// Tries to take the lock until no process that ended can hold it any more.
+    async fn wait_for(take: impl Fn() -> Result<Self, OpenError>) -> Result<Self, OpenError> {
+        let deadline = Instant::now() + LOCK_WAIT;
+        loop {
+            match take() {
+                Err(OpenError::InUse(_)) if Instant::now() < deadline => {
+                    tokio::time::sleep(LOCK_WAIT / 100).await;
+                }
+                taken => return taken,
+            }
+        }
+    }
+
     fn take(folder: &Path) -> Result<Self, OpenError> {
         let path = folder.join("lock");
         let unusable = |error: std::io::Error| OpenError::Unusable {
@@ -560,5 +577,17 @@ mod tests {
         drop(lock);
         FolderLock::take(folder.path()).unwrap();
         drop(inherited);
+    }
+
+    #[tokio::test]
+    async fn a_lock_that_a_starting_child_of_a_killed_process_holds_is_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().to_owned();
+        let left_over = FolderLock::take(&path).unwrap();
+        let waiting = tokio::spawn(async move { FolderLock::wait_for(|| locked(&path)).await });
+        tokio::time::sleep(LOCK_WAIT / 10).await;
+        assert!(!waiting.is_finished());
+        drop(left_over);
+        waiting.await.unwrap().unwrap();
     }
 }
