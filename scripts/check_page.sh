@@ -14,6 +14,7 @@ cd "$(dirname "$0")/.."
 # The packages are laid under target/, so that the sources stay clean.
 tools=$PWD/target/test-tools/web
 mkdir -p "$tools"
+rm -rf "$tools/src" "$tools/tests"
 cp -r web/package.json web/package-lock.json web/uptake.json web/tsconfig.json web/vite.config.ts web/index.html web/src web/tests "$tools/"
 # Not `npm ci`: it refuses a lock file without the packages for other systems, which npm leaves out where a
 # registry does not have them. What the lock file names is installed in that version.

@@ -8,8 +8,8 @@ export interface Camera {
   toward: Vec;
   up: Vec;
   target: Vec;
-  /** Millimetres from the lower to the upper edge of the picture. */
-  height: number;
+  /** Millimetres along the shorter side of the picture. */
+  span: number;
 }
 
 /** What draws meshes on a canvas. */
@@ -27,7 +27,7 @@ export interface MeshPainter {
 
 /** From in front of the patient, a little to the left and above. */
 export function usualCamera(): Camera {
-  return { toward: unit([0.35, -0.9, 0.25]), up: [0, 0, 1], target: [0, 0, 0], height: 135 };
+  return { toward: unit([0.35, -0.9, 0.25]), up: [0, 0, 1], target: [0, 0, 0], span: 135 };
 }
 
 /** The direction to the right of the picture. */
@@ -43,10 +43,16 @@ export function turn(camera: Camera, dx: number, dy: number): void {
   camera.toward = unit(toward);
 }
 
+/** Millimetres from the lower to the upper edge of a picture; `ratio` is width by height. */
+export function heightOf({ span }: Camera, ratio: number): number {
+  return span / Math.min(ratio, 1);
+}
+
 /** The share of the picture's width and height at which a place appears; `ratio` is width by height. */
 export function project(camera: Camera, place: Vec, ratio: number): [number, number] {
   const r = sub(place, camera.target);
-  return [0.5 + dot(r, rightOf(camera)) / (camera.height * ratio), 0.5 - dot(r, camera.up) / camera.height];
+  const height = heightOf(camera, ratio);
+  return [0.5 + dot(r, rightOf(camera)) / (height * ratio), 0.5 - dot(r, camera.up) / height];
 }
 
 /** The share of its colour that a surface with this unit normal shows. The program of `glview.ts` counts the same. */

@@ -1,7 +1,7 @@
 // Meshes in three dimensions on a plain canvas, for browsers without WebGL, for paper and for the self-contained report:
 // triangles are drawn from the farthest to the nearest.
 
-import { type Camera, type MeshPainter, light, rightOf, usualCamera } from "./camera";
+import { type Camera, type MeshPainter, heightOf, light, rightOf, usualCamera } from "./camera";
 import type { Mesh } from "./mesh";
 import { type Vec, add, cross, dot, mix, scale, sub, unit } from "./vector";
 
@@ -56,7 +56,7 @@ export class FlatView implements MeshPainter {
     if (!context || canvas.width < 2) return;
     const { width, height } = canvas;
     const right = rightOf(camera);
-    const factor = height / camera.height;
+    const factor = height / heightOf(camera, width / height);
     const flat = (place: Vec): [number, number] => {
       const r = sub(place, camera.target);
       return [width / 2 + dot(r, right) * factor, height / 2 - dot(r, camera.up) * factor];

@@ -1,6 +1,6 @@
 // Meshes in three dimensions, by WebGL: a coloured wall, another one as a wire, and the cursor.
 
-import { type Camera, type MeshPainter, rightOf, usualCamera } from "./camera";
+import { type Camera, type MeshPainter, heightOf, rightOf, usualCamera } from "./camera";
 import type { Mesh } from "./mesh";
 import { type Vec, dot } from "./vector";
 
@@ -91,9 +91,10 @@ export class MeshView implements MeshPainter {
 
   draw(): void {
     const { gl, canvas } = this;
-    const { toward, up, target, height } = this.camera;
+    const { toward, up, target } = this.camera;
     const right = rightOf(this.camera);
     const ratio = canvas.width / canvas.height;
+    const height = heightOf(this.camera, ratio);
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(0.035, 0.05, 0.06, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);

@@ -3,7 +3,7 @@
 import { type ComponentChildren, render } from "preact";
 import type { Volume } from "../api";
 import { isFit, moment, nameOf, number, resultName, shape, study } from "../words";
-import { type Camera, boundsOf } from "./camera";
+import { type Camera } from "./camera";
 import { DIVERGING, LUTS } from "./colours";
 import { drawSlice } from "./drawing";
 import { Figures, Verdict, headlines } from "./figures";
@@ -157,8 +157,7 @@ function Walls({ scene, shown }: { scene: Scene; shown: Loaded }) {
     ? { lut: DIVERGING, range: [-2, 2] as [number, number] }
     : { lut: scene.wallLut.value ?? LUTS["Perfusion"]!, range: [0, 100] as [number, number] };
   const colours = coloursOf(shown.surface ?? uptakeOf(scene, shown), paint);
-  const { middle, reach } = boundsOf(shown.mesh);
-  const near = { ...wallCamera(shown.mesh, heart), target: middle, height: 2 * reach };
+  const near = wallCamera(shown.mesh, heart);
   const far = { ...near, toward: scale(near.toward, -1) };
   if (heart) {
     const { anterior, lateral, axis } = frameOf(heart);

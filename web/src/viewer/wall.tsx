@@ -2,7 +2,7 @@
 
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
 import { useWatched } from "../state";
-import { type Camera, type MeshPainter, project, turn, usualCamera } from "./camera";
+import { type Camera, type MeshPainter, boundsOf, project, turn, usualCamera } from "./camera";
 import { useCanvas } from "./canvas";
 import { DIVERGING, LUTS, type Lut, colour, css } from "./colours";
 import { handleEvents } from "./events";
@@ -96,14 +96,17 @@ export function coloursOf(values: Float32Array, { lut, range: [low, high] }: Pic
   return colours;
 }
 
+/** The side of the picture by the diameter of the sphere that holds the wall. */
+const MARGIN = 1.05;
+
 /** A view of the anterior and lateral wall, apex down; without a known heart, from in front of the patient. */
-export function wallCamera(mesh: Mesh, heart: Axis | null, height = 135): Camera {
-  const all = mesh.vertices;
-  const target = scale(all.reduce((sum, vertex) => add(sum, vertex), [0, 0, 0] as Vec), 1 / all.length);
-  if (!heart) return { ...usualCamera(), target, height };
+export function wallCamera(mesh: Mesh, heart: Axis | null): Camera {
+  const { middle: target, reach } = boundsOf(mesh);
+  const span = 2 * reach * MARGIN;
+  if (!heart) return { ...usualCamera(), target, span };
   const { anterior, lateral, axis } = frameOf(heart);
   const toward = unit(add(add(scale(lateral, 0.65), scale(anterior, 0.55)), scale(axis, 0.52)));
-  return { toward, up: unit(sub(scale(toward, dot(axis, toward)), axis)), target, height };
+  return { toward, up: unit(sub(scale(toward, dot(axis, toward)), axis)), target, span };
 }
 
 export function Wall(props: Props) {
@@ -215,7 +218,7 @@ function listen(element: HTMLCanvasElement, view: MeshPainter, draw: () => void,
     moved = 0;
   };
   const zoom = (by: number) => {
-    view.camera.height = Math.max(30, Math.min(500, view.camera.height * by));
+    view.camera.span = Math.max(30, Math.min(500, view.camera.span * by));
     draw();
   };
   const move = (event: PointerEvent) => {
