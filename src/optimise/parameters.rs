@@ -48,7 +48,8 @@ pub struct LeastSquaresParameters {
     /// fitness. 0..=10, default 0.02.
     pub peak_weight: f64,
     /// Weight of evenly changing dihedral angles relative to squared distance, for triangles
-    /// about the size of a voxel; larger ones follow less noise and count proportionally less.
+    /// about the size of a voxel; larger ones follow fewer facets of voxels and count proportionally
+    /// less. Noise measured in the volume adds to it: as much for every 1/20 of an edge length.
     /// It lowers the largest distance and the dihedral angles at the same mean distance.
     /// 0..=10, default 0.07.
     pub bend_weight: f64,

@@ -17,6 +17,8 @@ pub struct Reference {
     pub bvh: Bvh,
     /// Smallest voxel spacing of the volume that S was extracted from, mm.
     pub spacing: f64,
+    /// Standard deviation of the noise that was taken off S, mm.
+    pub noise: f64,
 }
 
 impl Reference {
@@ -32,6 +34,7 @@ impl Reference {
             normals,
             bvh,
             spacing: surface.spacing,
+            noise: surface.facts.noise.map_or(0.0, |noise| noise.offset_mm),
         }
     }
 

@@ -4,7 +4,7 @@ use super::ParameterError;
 use super::table::Parameters;
 use crate::optimise::{FitnessForm, Gain, OptimiseParameters};
 use crate::retile::{Method, RetileParameters};
-use crate::surface::{Isolate, SurfaceParameters};
+use crate::surface::{Denoise, Isolate, SurfaceParameters};
 use serde_json::{Map, Value};
 
 /// Everything that determines the model of a volume, apart from the volume.
@@ -38,6 +38,7 @@ pub struct ModelDraft {
     pub(super) optimise: OptimiseParameters,
     isolate_words: Vec<&'static str>,
     pub(super) starts: Option<usize>,
+    pub(super) denoise: Option<Denoise>,
     pub(super) adaptive: Option<f64>,
     pub(super) fit_rounds: Option<usize>,
     pub(super) fitness: Option<FitnessForm>,
@@ -53,7 +54,7 @@ impl ModelDraft {
 }
 
 impl ModelParameters {
-    /// Fills in the defaults of `starts`, `adaptive`, `fit_rounds`, `fitness`, `gain` and `guard`, which
+    /// Fills in the defaults of `starts`, `denoise`, `adaptive`, `fit_rounds`, `fitness`, `gain` and `guard`, which
     /// depend on method and number of points.
     ///
     /// # Errors
@@ -73,18 +74,20 @@ impl ModelParameters {
                 fix: "Give at least one of w1, w2, w3, w4 a value above 0.".into(),
             });
         }
-        // The paper's method spreads the points evenly, leaves them on the surface and flips by its raw
-        // form. Varying density, fit, further starts and the guard belong to the refined method.
+        // The paper's method takes the surface as it is, spreads the points evenly, leaves them on it and
+        // flips by its raw form. Denoising, varying density, fit, further starts and the guard belong to the refined method.
         let optimise = &mut draft.optimise;
         let mut usual_starts = usual_starts(draft.retile.points);
         if draft.retile.method == Method::Paper {
             usual_starts = 1;
+            draft.surface.denoise = Denoise::Off;
             draft.retile.adaptive = 0.0;
             optimise.fit.rounds = 0;
             optimise.fitness = FitnessForm::Raw;
             optimise.gain = Gain::Local;
             optimise.guard = 0.0;
         }
+        draft.surface.denoise = draft.denoise.unwrap_or(draft.surface.denoise);
         draft.retile.adaptive = draft.adaptive.unwrap_or(draft.retile.adaptive);
         optimise.fit.rounds = draft.fit_rounds.unwrap_or(optimise.fit.rounds);
         optimise.fitness = draft.fitness.unwrap_or(optimise.fitness);

@@ -5,7 +5,7 @@ use super::table::{choice, integer, number, optional, optional_choice};
 use super::{Kind, ModelParameters, ParameterError, ParameterSpec, Parameters};
 use crate::optimise::{FitnessForm, Gain};
 use crate::retile::{Geodesics, Method};
-use crate::surface::{IsoLevel, Isolate, TopologyMode};
+use crate::surface::{Denoise, IsoLevel, Isolate, TopologyMode};
 use serde_json::{Value, json};
 
 impl Parameters for ModelParameters {
@@ -160,6 +160,14 @@ pub const SPECS: &[ParameterSpec<ModelParameters>] = &[
         0.0..=3.0,
         "0.8",
         "Sigma in voxels of the Gaussian that smooths label maps before the surface is extracted"
+    ),
+    optional_choice!(
+        "denoise",
+        denoise => surface.denoise,
+        "auto measures the noise of the scan and takes that much off its surface; off leaves the \
+         surface at the iso-value of the voxels (default for refined: auto, for paper: off)",
+        "auto" => Denoise::Auto,
+        "off" => Denoise::Off,
     ),
     choice!(
         "method",

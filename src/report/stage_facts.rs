@@ -53,6 +53,12 @@ fn surface_facts(facts: &SurfaceFacts) -> Map<String, Value> {
         },
         "label": facts.label,
         "ventricle_score": facts.ventricle_score,
+        "noise": facts.noise.map(|noise| json!({
+            "intensity": noise.intensity,
+            "offset_mm": noise.offset_mm,
+            "correlation_mm": noise.correlation_mm,
+            "moved_mm": noise.moved_mm,
+        })),
         "region_ml": facts.region_ml,
         "touches_border": facts.touches_border,
         "not_finite_voxels": facts.not_finite,

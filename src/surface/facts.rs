@@ -1,5 +1,7 @@
 //! Facts about a volume and the changes made on the way to its surface.
 
+use super::denoise::SurfaceNoise;
+
 /// What the volume holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum VolumeKind {
@@ -55,6 +57,8 @@ pub struct SurfaceFacts {
     pub touches_border: bool,
     /// Voxels that are NaN or infinite, taken as outside.
     pub not_finite: usize,
+    /// The noise, measured and taken off the surface; `None` for masks and if that is off.
+    pub noise: Option<SurfaceNoise>,
     /// Euler characteristic of the mesh.
     pub euler_characteristic: i64,
     /// Components of the mesh.

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
 use crate::grid::labels::Labels;
 use crate::volume::Volume;
@@ -27,5 +28,37 @@ impl<'a> Object<'a> {
             iso,
             is_mask: false,
         }
+    }
+
+    /// The value at a point of the patient, LPS mm, interpolated trilinearly. Beyond the border the value
+    /// at the border continues; values that are not finite count as 0.
+    pub fn at(&self, p: &Vec3) -> f64 {
+        let index = self.frame.to_voxel(p);
+        let mut corner = [0; 3];
+        let mut share = [0.0; 3];
+        for r in 0..3 {
+            let place = index[r].clamp(0.0, (self.shape[r] - 1) as f64);
+            corner[r] = (place as usize).min(self.shape[r].saturating_sub(2));
+            share[r] = place - corner[r] as f64;
+        }
+        let mut sum = 0.0;
+        for n in 0..8 {
+            let side = [n & 1, n >> 1 & 1, n >> 2];
+            let weight: f64 = (0..3)
+                .map(|r| {
+                    if side[r] == 1 {
+                        share[r]
+                    } else {
+                        1.0 - share[r]
+                    }
+                })
+                .product();
+            let [i, j, k] = [0, 1, 2].map(|r| (corner[r] + side[r]).min(self.shape[r] - 1));
+            let value = self.values[i + self.shape[0] * (j + self.shape[1] * k)];
+            if value.is_finite() {
+                sum += weight * f64::from(value);
+            }
+        }
+        sum
     }
 }

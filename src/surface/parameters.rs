@@ -43,6 +43,15 @@ pub enum TopologyMode {
     Keep,
 }
 
+/// What is done about the noise of intensities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Denoise {
+    /// It is measured and taken off the surface.
+    Auto,
+    /// It stays: the surface lies at the iso-value of the voxels.
+    Off,
+}
+
 /// Parameters of [`extract`](super::extract).
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceParameters {
@@ -57,6 +66,8 @@ pub struct SurfaceParameters {
     /// Gaussian sigma in voxels that smooths binary masks before surfacing, 0..=3. Default
     /// 0.8 (measured best of the range on a known surface).
     pub mask_smoothing: f64,
+    /// Default [`Denoise::Auto`].
+    pub denoise: Denoise,
 }
 
 impl Default for SurfaceParameters {
@@ -67,6 +78,7 @@ impl Default for SurfaceParameters {
             hints: Hints::default(),
             topology: TopologyMode::Genus0,
             mask_smoothing: 0.8,
+            denoise: Denoise::Auto,
         }
     }
 }

@@ -30,6 +30,7 @@ mod edges;
 mod hot_neighbours;
 mod orientation;
 mod pipeline;
+mod quality;
 mod segment;
 
 mod reader;

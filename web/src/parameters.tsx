@@ -77,7 +77,7 @@ const FEW: Record<Kind, string[]> = {
 const GROUPS: Record<Kind, [string, string[]][]> = {
   model: [
     ["Repeat and choose", ["seed", "starts", "frame"]],
-    ["Object", ["isolate", "box", "seed_point", "label", "topology", "mask_smoothing"]],
+    ["Object", ["isolate", "box", "seed_point", "label", "topology", "mask_smoothing", "denoise"]],
     ["Points", ["adaptive", "adaptive_from", "repulsion_iterations", "repulsion_strength", "geodesics", "relaxation_iterations"]],
     ["Fit to the surface", ["fit_*"]],
     ["Triangles", ["fitness", "w1", "w2", "w3", "w4", "gain", "guard"]],

@@ -205,6 +205,18 @@ schemas! {
         voxels: u64,
     }
 
+    /// The noise of a scan where its surface lies.
+    SurfaceNoiseSchema as SurfaceNoise {
+        /// Standard deviation of the intensities.
+        intensity: f64,
+        /// Standard deviation of the surface's place, mm.
+        offset_mm: f64,
+        /// Full width at half maximum of the noise's correlation, mm; 0 without noise.
+        correlation_mm: f64,
+        /// Root mean square of the distances by which the surface's vertices were moved, mm.
+        moved_mm: f64,
+    }
+
     /// Figures of the iso-surface.
     SurfaceReport as SurfaceReport {
         /// The iso-value, in the volume's units.
@@ -241,6 +253,8 @@ schemas! {
         label: Option<i64>,
         /// How much the object looks like a left ventricle.
         ventricle_score: Option<f64>,
+        /// The noise that was measured and taken off the surface; null for masks and with denoise=off.
+        noise: Option<SurfaceNoiseSchema>,
         /// Volume of the object's voxels, millilitres.
         region_ml: f64,
         /// Whether the object touches the volume's border.

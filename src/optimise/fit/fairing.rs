@@ -15,10 +15,23 @@ use super::equations::Element;
 use crate::geometry::Vec3;
 use crate::mesh::half_edges::HalfEdges;
 use crate::mesh::{FaceId, VertexId, vertex_normals};
+use crate::optimise::{LeastSquaresParameters, Lengths};
 
 /// The rise that corrects a unit difference of heights. Raising one vertex of valence 6 by 1
 /// lowers its own height by 1 and raises that of each neighbour by a sixth.
 const RISE_PER_HEIGHT: f64 = 6.0 / 7.0;
+
+/// Weight of the fairing, as a multiple of the bend weight, per noise over edge length. Larger ones take
+/// off more noise, but also more of the shape.
+const PER_NOISE: f64 = 20.0;
+
+/// The weight of even heights relative to squared distances. The smaller the triangles, the more of what
+/// they can follow is facets of the voxels; and part of the noise is left on S, the more the noisier the
+/// scan, and can be followed only by triangles that are small against it.
+pub fn weight(parameters: &LeastSquaresParameters, lengths: &Lengths, noise: f64) -> f64 {
+    let facets = (lengths.voxel / lengths.edge).min(1.0);
+    parameters.bend_weight * (facets + PER_NOISE * noise / lengths.edge)
+}
 
 /// The fairing terms of one round.
 pub struct Fairing<'a> {
@@ -53,7 +66,7 @@ impl<'a> Fairing<'a> {
                 RISE_PER_HEIGHT * (heights[v.index()] - sum / valence(v))
             })
             .collect();
-        let weight = state.parameters.bend_weight * state.fineness / vertices.len() as f64;
+        let weight = state.fairness / vertices.len() as f64;
         Self {
             half_edges,
             normals,

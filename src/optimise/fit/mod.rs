@@ -54,9 +54,8 @@ struct FitState<'a> {
     reference: &'a Reference,
     /// Volume enclosed by S, mm³.
     volume: f64,
-    /// Voxel spacing over the model's edge length, at most 1: the smaller the triangles, the
-    /// more of what they can follow is noise and voxel facets.
-    fineness: f64,
+    /// Weight of the fairing, [`fairing::weight`].
+    fairness: f64,
     parameters: &'a LeastSquaresParameters,
 }
 
@@ -96,7 +95,7 @@ pub fn fit(
         sizing,
         reference,
         volume: reference.mesh.volume(),
-        fineness: (lengths.voxel / lengths.edge).min(1.0),
+        fairness: fairing::weight(parameters, &lengths, reference.noise),
         parameters,
     };
     find_partners(&mut state);
@@ -332,7 +331,7 @@ mod tests {
             sizing,
             reference,
             volume: reference.mesh.volume(),
-            fineness: 0.2,
+            fairness: 0.014,
             parameters,
         };
         find_partners(&mut state);
