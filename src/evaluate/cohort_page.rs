@@ -103,8 +103,8 @@ fn class(variant: Variant) -> &'static str {
     match variant {
         Variant::Auto => "faint",
         Variant::Reference => "red",
-        Variant::Retiled => "orange",
-        Variant::Optimised => "blue",
+        Variant::Retiled | Variant::Flipped => "orange",
+        Variant::Fitted | Variant::Optimised => "blue",
     }
 }
 
@@ -129,7 +129,7 @@ fn figure3(models: &[ModelRow]) -> Markup {
                 Series {
                     label: variant.title().into(),
                     class: class(*variant),
-                    thin: false,
+                    thin: matches!(variant, Variant::Flipped | Variant::Fitted),
                     points: points.collect(),
                 }
             })
@@ -140,7 +140,10 @@ fn figure3(models: &[ModelRow]) -> Markup {
             h2 { "Figure 3: mean fitness of the models (" (OF_MODELS.as_str()) ")" }
             p {
                 "Over the templates; higher is better. The paper gives neither units nor floors, "
-                "so only the shapes of the curves can be compared with its figure. The reciprocals "
+                "so only the shapes of the curves can be compared with its figure. Thin lines: what the "
+                "flips (raw form, gain of the pair, no guard, as in the paper) and the least-squares fit "
+                "(whose own flips only even out triangles) do to the re-tiled model, each without "
+                "the other. The reciprocals "
                 "of the raw form reward nearly flat pairs of triangles without limit: judge the "
                 "models by the triangles' shape as well."
             }

@@ -120,7 +120,7 @@ fn summarise(
         .iter()
         .flat_map(|p| p.problems.iter().map(|text| (p.case.clone(), text.clone())));
     let problems = cohort.problems.iter().cloned();
-    let figure3: Vec<_> = models.iter().map(|m| m.row.clone()).collect();
+    let figure3: Vec<_> = models.iter().flat_map(|m| m.rows.clone()).collect();
     Ok(Evaluation {
         settings: Vec::new(),
         templates: cohort

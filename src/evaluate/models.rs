@@ -1,5 +1,5 @@
 //! The models of a cohort's templates: ours at every number of points, before and after fit
-//! and flips, and the reference model.
+//! and flips, and the reference model. For Figure 3, flips and fit are also judged each without the other.
 
 use super::cohort::{Cohort, read_volume};
 use super::parameters::{EvaluationParameters, ascending};
@@ -8,7 +8,9 @@ use crate::decimate::decimate;
 use crate::export::{self, Format, Metadata};
 use crate::mesh::TriMesh;
 use crate::model::{Organ, Template};
-use crate::optimise::{self, Reference};
+use crate::optimise::{
+    self, FitnessForm, Gain, LeastSquaresParameters, OptimiseParameters, Reference,
+};
 use crate::parameters::{ModelParameters, ParameterError};
 use crate::pipeline::starts;
 use crate::progress::Monitor;
@@ -23,8 +25,8 @@ pub struct CohortModel {
     pub template: String,
     /// Its kind.
     pub kind: ModelKind,
-    /// Its figures for Figure 3.
-    pub row: ModelRow,
+    /// Its figures for Figure 3, after those of the single steps that led to it.
+    pub rows: Vec<ModelRow>,
     /// The model prepared for fitting.
     pub ready: Template,
     /// The model as a JSON file.
@@ -158,10 +160,42 @@ impl TemplateSurface<'_> {
         let tiled = starts::tile(&self.surface, parameters, &monitor).map_err(during(what))?;
         let best = starts::best(tiled, &self.reference, parameters, &monitor, |_| {})
             .map_err(during(what))?;
-        Ok([
-            self.finish(best.tiled.mesh, Variant::Retiled, points)?,
-            self.finish(best.optimised.mesh, Variant::Optimised, points)?,
-        ])
+        let papers = OptimiseParameters {
+            fitness: FitnessForm::Raw,
+            gain: Gain::Local,
+            guard: 0.0,
+            fit: LeastSquaresParameters {
+                rounds: 0,
+                ..LeastSquaresParameters::default()
+            },
+            ..OptimiseParameters::default()
+        };
+        let flipped = optimise::optimise(&best.tiled, &self.reference, &papers, &monitor)
+            .map_err(during(what))?;
+        let mut steps = vec![self.row(&flipped.mesh, Variant::Flipped, points)?];
+        if parameters.optimise.fit.rounds > 0 {
+            steps.push(self.row(&best.optimised.fitted_mesh, Variant::Fitted, points)?);
+        }
+        let retiled = self.finish(best.tiled.mesh, Variant::Retiled, points)?;
+        let mut optimised = self.finish(best.optimised.mesh, Variant::Optimised, points)?;
+        optimised.rows.splice(0..0, steps);
+        Ok([retiled, optimised])
+    }
+
+    /// The figures of `mesh` for Figure 3.
+    fn row(&self, mesh: &TriMesh, variant: Variant, points: usize) -> Result<ModelRow, ModelError> {
+        let what = || format!("{} model of {points} points", variant.as_str());
+        let fitness = optimise::assess(mesh, &self.reference, [1.0; 4]).map_err(during(what))?;
+        let shapes: Vec<f64> = mesh.radius_ratios().collect();
+        Ok(ModelRow {
+            template: self.case.to_owned(),
+            kind: ModelKind { variant, points },
+            raw: fitness.raw,
+            normalised: fitness.normalised,
+            robust: fitness.robust,
+            shape: average(&shapes).unwrap_or(0.0),
+            worst_shape: shapes.iter().copied().fold(1.0, f64::min),
+        })
     }
 
     /// Measures `mesh` and prepares it for fitting.
@@ -172,18 +206,7 @@ impl TemplateSurface<'_> {
         points: usize,
     ) -> Result<CohortModel, ModelError> {
         let what = || format!("{} model of {points} points", variant.as_str());
-        let fitness = optimise::assess(&mesh, &self.reference, [1.0; 4]).map_err(during(what))?;
-        let shapes: Vec<f64> = mesh.radius_ratios().collect();
-        let kind = ModelKind { variant, points };
-        let row = ModelRow {
-            template: self.case.to_owned(),
-            kind,
-            raw: fitness.raw,
-            normalised: fitness.normalised,
-            robust: fitness.robust,
-            shape: average(&shapes).unwrap_or(0.0),
-            worst_shape: shapes.iter().copied().fold(1.0, f64::min),
-        };
+        let row = self.row(&mesh, variant, points)?;
         let title = format!("{}, {} of {points} points", self.case, variant.title());
         let json =
             export::encode(Format::Json, &mesh, &Metadata::new(title)).map_err(during(what))?;
@@ -191,8 +214,8 @@ impl TemplateSurface<'_> {
             Template::new(mesh, Organ::LeftVentricle, &Monitor::silent()).map_err(during(what))?;
         Ok(CohortModel {
             template: self.case.to_owned(),
-            kind,
-            row,
+            kind: row.kind,
+            rows: vec![row],
             ready,
             json,
         })

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// Which kind of model was fitted.
+/// Which kind of model it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Variant {
     /// What `auto` keeps of the built-in hearts, whatever the cohort's templates.
@@ -18,16 +18,22 @@ pub enum Variant {
     Reference,
     /// Ours after re-tiling, before fit and flips.
     Retiled,
+    /// Ours after re-tiling and the paper's flips, without the fit. Only in Figure 3.
+    Flipped,
+    /// Ours after re-tiling and the fit, before the flips. Only in Figure 3.
+    Fitted,
     /// Ours, finished.
     Optimised,
 }
 
 impl Variant {
     /// All of them, in the order of tables.
-    pub const ALL: [Variant; 4] = [
+    pub const ALL: [Variant; 6] = [
         Variant::Auto,
         Variant::Reference,
         Variant::Retiled,
+        Variant::Flipped,
+        Variant::Fitted,
         Variant::Optimised,
     ];
 
@@ -37,6 +43,8 @@ impl Variant {
             Variant::Auto => "auto",
             Variant::Reference => "reference",
             Variant::Retiled => "retiled",
+            Variant::Flipped => "flipped",
+            Variant::Fitted => "fitted",
             Variant::Optimised => "optimised",
         }
     }
@@ -47,6 +55,8 @@ impl Variant {
             Variant::Auto => "auto: the best of the built-in hearts",
             Variant::Reference => "reference model",
             Variant::Retiled => "after re-tiling",
+            Variant::Flipped => "after the paper's flips alone",
+            Variant::Fitted => "after the fit alone",
             Variant::Optimised => "after fit and flips",
         }
     }

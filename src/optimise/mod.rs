@@ -49,6 +49,8 @@ pub use reference::Reference;
 pub struct Optimised {
     /// As many vertices as before, the same topology.
     pub mesh: TriMesh,
+    /// The mesh after the fit and before the flips.
+    pub fitted_mesh: TriMesh,
     /// Fitness of the re-tiled mesh.
     pub retiled: FitnessSummary,
     /// Fitness after the fit and before the flips; equals `retiled` if there was no fit.
@@ -158,7 +160,7 @@ pub fn optimise(
     facts.sweeps = flipped.sweeps;
     facts.ended = flipped.ended;
     let mesh = TriMesh {
-        vertices: moved.vertices,
+        vertices: moved.vertices.clone(),
         triangles: flipped.triangles,
     };
     let optimised = configurations(&mesh, reference)?.summary(parameters.weights);
@@ -166,6 +168,7 @@ pub fn optimise(
     monitor.report(Stage::Optimise, 1.0)?;
     Ok(Optimised {
         mesh,
+        fitted_mesh: moved,
         retiled,
         fitted,
         optimised,

@@ -54,6 +54,7 @@ fn report(model: &TriMesh) -> ModelReport {
     };
     let optimised = Optimised {
         mesh: model.clone(),
+        fitted_mesh: model.clone(),
         retiled: fitness(0.5),
         fitted: fitness(0.6),
         optimised: fitness(0.625),
