@@ -64,8 +64,9 @@ fn every_model_keeps_the_promises() {
 fn a_model_stands_for_the_volume_of_its_surface() {
     let model = generate(&[("points", "300")]).unwrap();
     let error = model.mesh.volume() / model.reference.volume() - 1.0;
-    assert!(error.abs() < 0.005, "{error}");
-    assert!(model.report.distance.mean_mm < model.report.surface.voxel_mm / 4.0);
+    assert!(error.abs() < 0.0005, "{error}");
+    let distance = model.report.distance.mean_mm / model.report.surface.voxel_mm;
+    assert!(distance < 0.04, "{distance} voxels");
 }
 
 #[test]

@@ -97,10 +97,11 @@ fn a_model_of_a_scan_segments_it_with_stable_names() {
     let report: Value = serde_json::from_slice(&report).unwrap();
     assert_eq!(report["fit"]["reason"], "converged");
     assert!(number(&report["fit"]["confidence"]) > 0.8);
-    assert!(number(&report["measures"]["jaccard"]) > 0.55);
-    assert!(number(&report["measures"]["contour_distance_voxels"]) < 1.5);
-    assert!(number(&report["volumes_ml"]["wall"]) > 80.0);
-    assert!(number(&report["volumes_ml"]["cavity"]) > 20.0);
+    // Blur moves the apparent edge outward: the wall itself has 125 ml.
+    assert!(number(&report["measures"]["jaccard"]) > 0.75);
+    assert!(number(&report["measures"]["contour_distance_voxels"]) < 0.6);
+    assert!((140.0..165.0).contains(&number(&report["volumes_ml"]["wall"])));
+    assert!((61.0..75.0).contains(&number(&report["volumes_ml"]["cavity"])));
     assert!(report["flags"].is_array());
 
     let measured = succeeds(here, "measure out/mask.nii.gz truth.nii.gz");

@@ -195,3 +195,40 @@ fn weigh_by_width(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of edges alike in all but width, one much wider than usual hardly counts, however narrow or wide
+    /// the usual ones are; the rim's edge is moved instead.
+    #[test]
+    fn an_edge_of_unusual_width_counts_little() {
+        let reading = SensorReading {
+            place: Vec3::zeros(),
+            normal: Vec3::z(),
+            offset: 0.0,
+            weight: 1.0,
+            share: 1.0,
+        };
+        for usual in [2.0, 5.0] {
+            for side in [WallSide::Inner, WallSide::Outer, WallSide::Rim] {
+                let mut readings = vec![reading; 5];
+                let mut widths = vec![(side, Some(usual)); 5];
+                widths[4].1 = Some(usual + 2.0 * ODD_WIDTH);
+                weigh_by_width(&mut readings, &widths, side);
+                assert!(
+                    readings[..4]
+                        .iter()
+                        .all(|r| r.weight == 1.0 && r.offset == 0.0)
+                );
+                let odd = readings[4];
+                if side == WallSide::Rim {
+                    assert_eq!((odd.weight, odd.offset), (1.0, 2.0 * ODD_WIDTH * RIM_WIDTH));
+                } else {
+                    assert!(odd.weight < 0.2 && odd.offset == 0.0, "{}", odd.weight);
+                }
+            }
+        }
+    }
+}
