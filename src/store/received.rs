@@ -2,6 +2,7 @@
 //! moved to its place.
 
 use super::blobs::{FileBlobs, RECEIVED, UploadFile, is_absent, quarantine_shelf, sync};
+use super::space::DiskGauge;
 use crate::intake::{IncomingFile, ReceivedFiles};
 use crate::jobs::{BlobError, BlobWriter, LocalFile, Timestamp, random_id};
 use async_trait::async_trait;
@@ -10,35 +11,55 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// A file under `staging/`; deleted on drop.
-struct Incoming {
-    path: PathBuf,
-    root: PathBuf,
-    writer: BlobWriter,
+/// A file on the local disk into which an object is received; deleted on drop.
+pub(super) struct Receiving {
+    pub path: PathBuf,
+    pub writer: BlobWriter,
 }
 
-impl Drop for Incoming {
+impl Receiving {
+    /// A new file at `path`, on the disk of `gauge`.
+    ///
+    /// # Errors
+    /// If there is no room, or the file cannot be made.
+    pub async fn begin(path: PathBuf, gauge: &DiskGauge) -> Result<Self, BlobError> {
+        if let Some(space) = gauge.space() {
+            space.require_room(0)?;
+        }
+        let file = tokio::fs::File::create(&path).await?;
+        let writer = Box::pin(UploadFile::new(file, gauge.clone()));
+        Ok(Self { path, writer })
+    }
+}
+
+impl Drop for Receiving {
     fn drop(&mut self) {
         // Fails after it was moved to its place.
         let _ = fs::remove_file(&self.path);
     }
 }
 
+/// A file under `staging/`.
+struct Incoming {
+    file: Receiving,
+    root: PathBuf,
+}
+
 #[async_trait]
 impl IncomingFile for Incoming {
     fn writer(&mut self) -> &mut BlobWriter {
-        &mut self.writer
+        &mut self.file.writer
     }
 
     fn local(&self) -> LocalFile {
-        LocalFile::in_place(&self.path)
+        LocalFile::in_place(&self.file.path)
     }
 
     async fn keep(self: Box<Self>, name: &str) -> Result<(), BlobError> {
         let place = self.root.join(RECEIVED).join(name);
         let kept = tokio::task::spawn_blocking(move || {
-            sync(&self.path)?;
-            fs::rename(&self.path, &place)?;
+            sync(&self.file.path)?;
+            fs::rename(&self.file.path, &place)?;
             sync(&self.root.join(RECEIVED))
         });
         Ok(kept.await.map_err(io::Error::other)??)
@@ -48,15 +69,9 @@ impl IncomingFile for Incoming {
 #[async_trait]
 impl ReceivedFiles for FileBlobs {
     async fn begin(&self) -> Result<Box<dyn IncomingFile>, BlobError> {
-        if let Some(space) = self.gauge.space() {
-            space.require_room(0)?;
-        }
-        let path = self.new_staging_folder();
-        let file = tokio::fs::File::create(&path).await?;
         Ok(Box::new(Incoming {
-            path,
+            file: Receiving::begin(self.new_staging_folder(), &self.gauge).await?,
             root: self.folder.clone(),
-            writer: Box::pin(UploadFile::new(file, self.gauge.clone())),
         }))
     }
 

@@ -4,40 +4,32 @@ use super::files::S3Blobs;
 use super::shared::Shared;
 use crate::intake::{IncomingFile, ReceivedFiles};
 use crate::jobs::{BlobError, BlobWriter, FileRecord, LocalFile, Timestamp};
-use crate::store::blobs::{QUARANTINE, RECEIVED, UploadFile, shelf_name};
+use crate::store::blobs::{QUARANTINE, RECEIVED, shelf_name};
+use crate::store::received::Receiving;
 use async_trait::async_trait;
 use object_store::ObjectMeta;
-use std::fs;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A file on the local disk; deleted on drop.
+/// A file on its way to the bucket.
 struct Incoming {
-    path: PathBuf,
+    file: Receiving,
     shared: Arc<Shared>,
-    writer: BlobWriter,
-}
-
-impl Drop for Incoming {
-    fn drop(&mut self) {
-        let _ = fs::remove_file(&self.path);
-    }
 }
 
 #[async_trait]
 impl IncomingFile for Incoming {
     fn writer(&mut self) -> &mut BlobWriter {
-        &mut self.writer
+        &mut self.file.writer
     }
 
     fn local(&self) -> LocalFile {
-        LocalFile::in_place(&self.path)
+        LocalFile::in_place(&self.file.path)
     }
 
     async fn keep(self: Box<Self>, name: &str) -> Result<(), BlobError> {
         let path = format!("{RECEIVED}/{name}");
-        self.shared.bucket.put_file(&path, &self.path).await?;
+        self.shared.bucket.put_file(&path, &self.file.path).await?;
         Ok(())
     }
 }
@@ -45,15 +37,9 @@ impl IncomingFile for Incoming {
 #[async_trait]
 impl ReceivedFiles for S3Blobs {
     async fn begin(&self) -> Result<Box<dyn IncomingFile>, BlobError> {
-        if let Some(space) = self.gauge.space() {
-            space.require_room(0)?;
-        }
-        let path = self.new_staging_path();
-        let file = tokio::fs::File::create(&path).await?;
         Ok(Box::new(Incoming {
-            path,
+            file: Receiving::begin(self.new_staging_path(), &self.gauge).await?,
             shared: self.shared.clone(),
-            writer: Box::pin(UploadFile::new(file, self.gauge.clone())),
         }))
     }
 
