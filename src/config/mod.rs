@@ -17,7 +17,7 @@ pub use tables::Tables;
 pub use units::{
     Auto, AutoSize, AwsVariables, BlobPlace, Count, DatabaseUrl, Keyword, Limit, LogFormat,
     MinFree, Networks, NoAddress, NoLimit, Off, OptionalAddress, OptionalPath, OrKeyword,
-    OtlpEndpoint, OwnRetention, Retention, Size, Span, Words,
+    OtlpEndpoint, OwnRetention, Retention, Role, Size, Span, Words,
 };
 
 use crate::archive::Archives;
@@ -241,6 +241,9 @@ settings! {
     ["Service"]
     /// Address and port to listen on; port 0 takes any free one
     listen: SocketAddr = "127.0.0.1:8080";
+    /// What this process does: `all`; or, of several on one PostgreSQL database and one S3 store, `api`
+    /// answers requests and receives images, `worker` computes jobs and does what is done in the background
+    role: Role = "all";
     /// Folder for the database and the files; created if missing, used by one process at a time
     data_dir: PathBuf = "ventriform-data";
     /// Where the files are kept: `folder` is the data folder, `s3://BUCKET/PREFIX` an S3 store. Its
@@ -710,6 +713,7 @@ macro_rules! shown_by_display {
 }
 
 shown_by_display!(
+    Role,
     AeTitle,
     AllowList,
     BlobPlace,

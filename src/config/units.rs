@@ -342,6 +342,52 @@ impl fmt::Display for LogFormat {
     }
 }
 
+/// What a process does of the service.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// Everything.
+    All,
+    /// It answers requests and receives images.
+    Api,
+    /// It computes jobs, and does what is done in the background.
+    Worker,
+}
+
+impl Role {
+    /// Whether it answers requests.
+    pub fn serves(self) -> bool {
+        self != Self::Worker
+    }
+
+    /// Whether it computes jobs.
+    pub fn works(self) -> bool {
+        self != Self::Api
+    }
+}
+
+impl FromStr for Role {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "all" => Ok(Role::All),
+            "api" => Ok(Role::Api),
+            "worker" => Ok(Role::Worker),
+            _ => Err("give `all`, `api` or `worker`".into()),
+        }
+    }
+}
+
+impl fmt::Display for Role {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Role::All => "all",
+            Role::Api => "api",
+            Role::Worker => "worker",
+        })
+    }
+}
+
 /// The path of a file, or `off`.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct OptionalPath(pub Option<PathBuf>);

@@ -182,6 +182,7 @@ pub async fn erase(
     headers: &HeaderMap,
 ) -> Answer {
     let order = ErasureOrder {
+        renewed_before: None,
         tenant: caller.tenant.clone(),
         id: id.clone(),
         cascade,

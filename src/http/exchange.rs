@@ -114,7 +114,7 @@ impl ExchangeHost for App {
     }
 
     async fn held(&self, tenant: &Tenant, volume: &str) -> Result<Option<StoredSeries>, Trouble> {
-        let hold = self.queue.hold(volume).await;
+        let hold = self.queue.hold(volume).await?;
         let intact = self.queue.intact_volume(volume).await?.is_some();
         let held = intact && self.queue.catalogue.volume(tenant, volume).await?.is_some();
         Ok(held.then(|| StoredSeries {

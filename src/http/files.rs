@@ -58,7 +58,7 @@ pub async fn send(app: &App, product: &Product, file: &ProductFile, headers: &He
 /// Answers with a stored file, or the part of it that `Range` asks for, or 304.
 pub async fn send_file(app: &App, file: &Download<'_>, headers: &HeaderMap) -> Answer {
     let read = async |span| {
-        let content = app.queue.blobs.read(file.id, &file.record, span).await?;
+        let content = app.queue.read(file.id, &file.record, span).await?;
         Ok(Body::from_stream(content))
     };
     respond(file, headers, CACHE_CONTROL, read).await

@@ -497,7 +497,9 @@ impl Gauges {
             self.disk_size.set(signed(space.total));
             self.disk_free.set(signed(space.free));
         }
-        self.database.set(size_of(&folder.join("ventriform.db")));
+        let database = figures.database_bytes.map(signed);
+        self.database
+            .set(database.unwrap_or_else(|| size_of(&folder.join("ventriform.db"))));
         self.write_ahead_log
             .set(size_of(&folder.join("ventriform.db-wal")));
         for (outcome, count) in reading.sent.attempts() {

@@ -22,6 +22,7 @@
 //! | log, traces, metrics | [`observe`], [`spans`], [`metrics`], [`job_watch`] |
 //! | the published document | [`openapi`], [`document`] |
 //! | streams of events | [`streams`] |
+//! | what goes on in the background | [`duties`] |
 //!
 //! Guarantees: every error is a problem object (RFC 9457) with a stable `type`, and with `field`
 //! and `fix` where they apply; every body and list has a limit; uploads are streamed to the disk
@@ -40,6 +41,7 @@ mod connections;
 mod cryptography;
 mod decoding;
 mod document;
+mod duties;
 mod erasures;
 mod exchange;
 mod files;

@@ -50,7 +50,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         products::routes::<Templates>(),
         products::routes::<Readers>(),
     ];
-    let of_one_kind: [UtoipaMethodRouter<App>; 41] = [
+    let of_one_kind: [UtoipaMethodRouter<App>; 38] = [
         routes!(volumes::create_volume).layer(upload()),
         routes!(volumes::preview_volume),
         routes!(voxels::download_voxels),
@@ -91,14 +91,31 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
             .layer(json(settings.json_limit)),
         routes!(workitems::change_workitem_state).layer(json(settings.json_limit)),
         routes!(workitems::cancel_workitem).layer(json(settings.json_limit)),
-        routes!(health::alive),
-        routes!(health::ready),
-        routes!(health::metrics),
     ];
-    of_every_kind.into_iter().flatten().chain(of_one_kind).fold(
-        OpenApiRouter::with_openapi(DocumentFrame::openapi()),
-        OpenApiRouter::routes,
-    )
+    of_every_kind
+        .into_iter()
+        .flatten()
+        .chain(of_one_kind)
+        .fold(
+            OpenApiRouter::with_openapi(DocumentFrame::openapi()),
+            OpenApiRouter::routes,
+        )
+        .merge(operations())
+}
+
+/// The documented routes and the pages.
+fn public(settings: &Settings) -> Router<App> {
+    let (api, collected) = routes(settings).split_for_parts();
+    let document = PublishedDocument::new(&openapi::publish(collected));
+    api.route("/", get(front_page::welcome))
+        .route(
+            "/openapi.json",
+            get(move |headers: HeaderMap| async move { document.answer(&headers) }),
+        )
+        .route("/docs", get(front_page::documentation))
+        .route("/docs/", get(front_page::documentation))
+        .route("/assets/{name}", get(front_page::asset))
+        .route("/favicon.ico", get(front_page::icon))
 }
 
 /// The document as it is published at `/openapi.json` and committed under `openapi/`.
@@ -106,10 +123,20 @@ pub fn document() -> serde_json::Value {
     openapi::publish(routes(&Settings::default()).split_for_parts().1)
 }
 
-/// The whole service.
+/// What operators ask for, which every process answers.
+fn operations() -> OpenApiRouter<App> {
+    OpenApiRouter::new()
+        .routes(routes!(health::alive))
+        .routes(routes!(health::ready))
+        .routes(routes!(health::metrics))
+}
+
+/// The whole service, or what a worker serves of it.
 pub fn router(app: App) -> Router {
-    let (api, collected) = routes(&app.settings).split_for_parts();
-    let document = PublishedDocument::new(&openapi::publish(collected));
+    let api = match app.settings.role.serves() {
+        true => public(&app.settings),
+        false => operations().split_for_parts().0,
+    };
     // A request passes the layers from top to bottom, its answer from bottom to top.
     let layers = ServiceBuilder::new()
         .layer(SetSensitiveRequestHeadersLayer::new([
@@ -150,15 +177,6 @@ pub fn router(app: App) -> Router {
         // The routes that take a body have limits of their own.
         .layer(DefaultBodyLimit::disable());
     let api = api
-        .route("/", get(front_page::welcome))
-        .route(
-            "/openapi.json",
-            get(move |headers: HeaderMap| async move { document.answer(&headers) }),
-        )
-        .route("/docs", get(front_page::documentation))
-        .route("/docs/", get(front_page::documentation))
-        .route("/assets/{name}", get(front_page::asset))
-        .route("/favicon.ico", get(front_page::icon))
         .fallback(no_such_path)
         .method_not_allowed_fallback(method_not_allowed)
         .layer(middleware::from_fn_with_state(app.clone(), guard::guard));

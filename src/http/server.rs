@@ -1,30 +1,26 @@
 //! Starting the service from its settings, and shutting it down.
 
-use super::app::{App, Watching, retention_ages};
+use super::app::{App, Watching};
 use super::archives::ArchiveDesk;
 use super::connections::tls::{Tls, TlsError};
 use super::connections::{self, ConnectionLimits};
 use super::cryptography::install_cryptography;
-use super::exchange;
+use super::duties::{self, UPKEEP_EVERY};
 use super::guard::hosts::HostPolicy;
 use super::guard::state::Guard;
 use super::hooks::Hooks;
 use super::intake::{self, Intake};
 use super::job_watch::JobWatch;
 use super::metrics::Metrics;
-use super::performer;
 use super::router::router;
-use super::scans;
 use super::spans::{OtlpError, Spans};
 use super::volume_maker::check_rules;
 use crate::access::{AccessStore, Gate, Issuer, IssuerError, IssuerSettings, Recorder, Scope};
-use crate::config::Settings;
+use crate::config::{Role, Settings};
 use crate::hooks::{Dispatcher, HookSettings, RetrySchedule, UrlGuard};
-use crate::intake::{
-    GatherSettings, Gatherer, Listener, Receiver, ScpSettings, Sessions, TlsConfiguration,
-};
+use crate::intake::{Listener, Receiver, ScpSettings, Sessions, TlsConfiguration};
 use crate::jobs::{
-    Clock, Custodian, DeathLimit, Failure, Fault, Queue, QueueSettings, SteadyClock, StoreError,
+    DeathLimit, Failure, Fault, Queue, QueueSettings, RetentionAges, SteadyClock, StoreError,
     SystemClock, Upkeep, WorkerSettings, Workers, recover_after_crash,
 };
 use crate::store::{OpenError, S3Location, Store, StoreSettings};
@@ -36,9 +32,6 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
-
-/// How often the upkeep looks for expired things and for jobs beyond their attempt limit.
-const UPKEEP_EVERY: Duration = Duration::from_secs(30);
 
 /// Why the service did not start, or ended without being asked.
 #[derive(Debug, thiserror::Error)]
@@ -83,6 +76,17 @@ pub enum ServeError {
     /// Traces cannot be sent as the settings ask for it.
     #[error(transparent)]
     Traces(#[from] OtlpError),
+    /// The role needs other processes, which could not reach what this one stores.
+    #[error(
+        "role = {role} is for several processes on one store, but {lacking}. Give every process the same \
+         `--database postgres://...` and `--blobs s3://...`, or leave the role at `all`"
+    )]
+    Role {
+        /// The role.
+        role: Role,
+        /// What only this process can reach.
+        lacking: &'static str,
+    },
     /// The system refused threads or sockets.
     #[error("{0}")]
     System(#[from] io::Error),
@@ -97,8 +101,8 @@ pub struct Running {
     dicom: Option<JoinHandle<()>>,
     dicom_address: Option<SocketAddr>,
     workers: Workers,
-    dispatcher: JoinHandle<()>,
-    exchange: JoinHandle<()>,
+    duties: Option<JoinHandle<()>>,
+    alive: JoinHandle<()>,
     spans: Spans,
     closing: CancellationToken,
     grace: Duration,
@@ -132,12 +136,13 @@ pub async fn start(
     listener: TcpListener,
 ) -> Result<Running, ServeError> {
     install_cryptography();
+    check_role(&settings)?;
     let dicom = dicom_listener(&settings)?;
     let tls = Tls::of(&settings)?;
     let dicom_tls = Tls::of_dicom(&settings)?;
     let workers = worker_settings(&settings);
     let store = Store::open_with(&settings.data_dir, store_settings(&settings)).await?;
-    let queue = Arc::new(Queue::new(
+    let queue = Queue::new(
         store.rows.clone(),
         store.rows.clone(),
         store.blobs.clone(),
@@ -146,7 +151,9 @@ pub async fn start(
             limit: settings.queue_limit,
             workers: workers.workers,
         },
-    ));
+    );
+    let queue = Arc::new(queue.among(store.peers.clone()));
+    queue.join().await?;
     let limit = death_limit(&settings);
     let limit = Some(&limit).filter(|_| engine.works.isolation().is_none());
     recover_after_crash(&queue, limit).await?;
@@ -157,11 +164,6 @@ pub async fn start(
     let watching = watching(&settings, &store, &queue)?;
     let spans = watching.spans.clone();
     let hooks = hooks(&settings, &store, &queue);
-    let dispatcher = tokio::spawn(hooks.dispatcher.clone().run(
-        queue.changes(),
-        closing.clone(),
-        settings.shutdown_grace.0,
-    ));
     let intake = receiving(&settings, &store, &queue, &watching);
     let app = App::new(
         queue.clone(),
@@ -193,31 +195,27 @@ pub async fn start(
     let router = router(app.clone());
     let server = connections::serve(listener, router, tls, limits, open, closing.clone());
     let server = tokio::spawn(server);
-    let upkeep = Upkeep {
-        queue: queue.clone(),
-        retention: retention_ages(&settings),
-        every: UPKEEP_EVERY,
+    let alive = tokio::spawn(queue.clone().stay());
+    let scheduled = {
+        let app = app.clone();
+        move || app.scheduled.notify_one()
     };
-    tokio::spawn(upkeep.run(closing.clone()));
-    tokio::spawn(scans::read_old(app.clone(), closing.clone()));
-    if let Some(age) = retention_ages(&settings).jobs {
-        tokio::spawn(prune_workitems(app.clone(), age, closing.clone()));
+    tokio::spawn(queue.clone().follow_peers(scheduled, closing.clone()));
+    if queue.is_shared() {
+        // Each process looks after its own items, and finds the dead as soon as their leases expire.
+        let upkeep = Upkeep {
+            queue: queue.clone(),
+            retention: RetentionAges::default(),
+            every: UPKEEP_EVERY.min(settings.lease.0),
+        };
+        tokio::spawn(upkeep.run(closing.clone()));
     }
-    if let Some(age) = settings.audit_retention.0 {
-        tokio::spawn(prune_audit(store.rows.clone(), age.0, closing.clone()));
-    }
-    let custodian = Custodian {
-        queue: queue.clone(),
-        quarantine_keep: settings.quarantine_keep.0.map(|span| span.0),
-        scrub_rate: settings.scrub_rate.0,
-    };
-    tokio::spawn(custodian.run(closing.clone()));
-    tokio::spawn(gatherer(&app).run(closing.clone()));
-    tokio::spawn(performer::run(app.clone(), closing.clone()));
+    tokio::spawn(duties::gatherer(&app).run(closing.clone()));
+    let works = settings.role.works();
+    let duties = works.then(|| tokio::spawn(duties::run(app.clone(), closing.clone())));
     let dicom_address = dicom.as_ref().map(|dicom| dicom.address);
     let dicom = dicom.map(|dicom| serve_dicom(&app, dicom, dicom_tls));
     let dicom = dicom.transpose()?;
-    let exchange = tokio::spawn(exchange::run(app.clone(), closing.clone()));
     let workers = Workers::start(&queue, &engine.works, workers)?;
     tracing::info!(%address, "listening");
     Ok(Running {
@@ -228,8 +226,8 @@ pub async fn start(
         dicom,
         dicom_address,
         workers,
-        dispatcher,
-        exchange,
+        duties,
+        alive,
         spans,
         closing,
         grace: settings.shutdown_grace.0,
@@ -260,29 +258,41 @@ impl Running {
     pub async fn stop(mut self) -> Result<(), ServeError> {
         tracing::info!("shutting down");
         self.closing.cancel();
-        let dicom = async {
-            match self.dicom {
-                Some(dicom) => dicom.await,
+        let ended = |task: Option<JoinHandle<()>>| async move {
+            match task {
+                Some(task) => task.await,
                 None => Ok(()),
             }
         };
-        let (server, dicom, (), dispatcher, exchange) = tokio::join!(
+        let (server, dicom, (), duties) = tokio::join!(
             self.server,
-            dicom,
+            ended(self.dicom),
             self.workers.stop(self.grace),
-            self.dispatcher,
-            self.exchange
+            ended(self.duties),
         );
         self.app.guard.recorder.flush().await;
         self.spans.flush().await;
+        self.alive.abort();
+        self.queue.leave_peers().await;
         self.store.close().await;
-        server
-            .and(dicom)
-            .and(dispatcher)
-            .and(exchange)
-            .map_err(io::Error::other)?;
+        server.and(dicom).and(duties).map_err(io::Error::other)?;
         Ok(())
     }
+}
+
+/// Refuses a role that needs other processes, if these cannot share what this one stores.
+fn check_role(settings: &Settings) -> Result<(), ServeError> {
+    let role = settings.role;
+    let lacking = if role == Role::All {
+        return Ok(());
+    } else if settings.postgres().is_none() {
+        "the database is a file in the data folder, which one process uses"
+    } else if settings.blobs.bucket().is_none() {
+        "the files are in the data folder, which one process uses"
+    } else {
+        return Ok(());
+    };
+    Err(ServeError::Role { role, lacking })
 }
 
 /// Where objects are received by DICOM, and from whom.
@@ -297,7 +307,8 @@ struct DicomListener {
 /// # Errors
 /// If the address cannot be used, or strangers could send and the settings do not say that they may.
 fn dicom_listener(settings: &Settings) -> Result<Option<DicomListener>, ServeError> {
-    let Some(address) = settings.dicom_listen.0 else {
+    let address = settings.dicom_listen.0;
+    let Some(address) = address.filter(|_| settings.role.serves()) else {
         return Ok(None);
     };
     let unusable = |reason| ServeError::Dicom { address, reason };
@@ -355,22 +366,6 @@ fn receiving(settings: &Settings, store: &Store, queue: &Queue, watching: &Watch
     }
 }
 
-/// What makes volumes of received objects.
-fn gatherer(app: &App) -> Gatherer {
-    Gatherer {
-        store: app.intake.store.clone(),
-        files: app.intake.files.clone(),
-        queue: app.queue.clone(),
-        maker: Arc::new(app.clone()),
-        observer: Arc::new(app.metrics.intake.clone()),
-        sessions: app.intake.sessions.clone(),
-        settings: GatherSettings {
-            rules: app.settings.rules.0.clone(),
-            keep_failed: app.settings.intake_keep.0.map(|age| age.0),
-        },
-    }
-}
-
 /// Where the files are, if not in the data folder.
 pub fn s3_location(settings: &Settings) -> Option<S3Location> {
     let (bucket, prefix) = settings.blobs.bucket()?;
@@ -390,9 +385,6 @@ fn store_settings(settings: &Settings) -> StoreSettings {
         cache: settings.blob_cache.0,
     }
 }
-
-/// How often old rows of the audit trail are removed.
-const PRUNE_EVERY: Duration = Duration::from_secs(3600);
 
 /// Tells callers as the settings say.
 ///
@@ -443,29 +435,6 @@ async fn guard(
         open,
     };
     Ok(Guard::new(gate, recorder, hosts, settings, !loopback))
-}
-
-async fn prune_audit(store: Arc<dyn AccessStore>, age: Duration, end: CancellationToken) {
-    let mut round = tokio::time::interval(PRUNE_EVERY);
-    let age = i64::try_from(age.as_millis()).unwrap_or(i64::MAX);
-    while end.run_until_cancelled(round.tick()).await.is_some() {
-        let now = SystemClock.now();
-        if let Err(error) = store.prune(now.saturating_sub(age), now).await {
-            tracing::error!(%error, "old rows of the audit trail could not be removed");
-        }
-    }
-}
-
-/// Deletes work items that ended as long ago as jobs are kept.
-async fn prune_workitems(app: App, age: Duration, end: CancellationToken) {
-    let mut round = tokio::time::interval(PRUNE_EVERY);
-    let age = i64::try_from(age.as_millis()).unwrap_or(i64::MAX);
-    while end.run_until_cancelled(round.tick()).await.is_some() {
-        let before = app.queue.clock.now().saturating_sub(age);
-        if let Err(error) = app.worklist.delete_ended_workitems(before).await {
-            tracing::error!(%error, "ended work items could not be deleted");
-        }
-    }
 }
 
 /// Metrics and traces, which from now on follow the queue's jobs.
@@ -521,7 +490,10 @@ fn death_limit(settings: &Settings) -> DeathLimit {
 fn worker_settings(settings: &Settings) -> WorkerSettings {
     let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
     WorkerSettings {
-        workers: settings.workers.or(cores),
+        workers: match settings.role.works() {
+            true => settings.workers.or(cores),
+            false => 0,
+        },
         threads: settings.threads.or(1),
         lease: settings.lease.0,
         attempt_limit: settings.attempt_limit,

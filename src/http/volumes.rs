@@ -380,11 +380,12 @@ pub async fn preview_volume(
 /// If one of them is missing or the store fails.
 pub async fn files_of(app: &App, volume: &StoredVolume) -> Answer<Vec<LocalFile>> {
     let id = &volume.id;
-    let files = app.queue.volume_files(id, &volume.files).await?;
-    Ok(files.ok_or_else(|| {
-        BlobError::new(
-            StoreFault::DamagedFile,
-            format!("a file of {id} is missing"),
-        )
-    })?)
+    if let Some(files) = app.queue.volume_files(id, &volume.files).await? {
+        return Ok(files);
+    }
+    let missing = BlobError::new(
+        StoreFault::DamagedFile,
+        format!("a file of {id} is missing"),
+    );
+    Err(app.queue.unless_erased(id, missing).await.into())
 }

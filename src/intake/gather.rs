@@ -18,6 +18,9 @@ use tokio_util::sync::CancellationToken;
 
 /// Pause after a failure that may pass.
 const RETRY: Duration = Duration::from_secs(10);
+/// How often a process looks for groups that others have left, and how long these are late then.
+const ADOPT_EVERY: Duration = Duration::from_secs(10);
+const LATE: Duration = Duration::from_secs(30);
 /// Time between two sweeps.
 const SWEEP_EVERY: Duration = Duration::from_secs(600);
 /// A file without a row that was written this long ago will not get one.
@@ -101,14 +104,51 @@ pub struct Gatherer {
 }
 
 impl Gatherer {
-    /// Runs until `end` is cancelled.
+    /// Runs until `end` is cancelled, in every process that receives objects. A process that shares its
+    /// store leaves it to [`Gatherer::keep_house`] what earlier ones have left.
     pub async fn run(self, end: CancellationToken) {
-        let work = async { tokio::join!(self.gather_for_ever(), self.sweep_for_ever()) };
+        end.run_until_cancelled(self.gather_for_ever()).await;
+    }
+
+    /// Sweeps until `end` is cancelled, in one process at a time; of several, it also takes on what
+    /// those that received it do not finish.
+    pub async fn keep_house(self, end: CancellationToken) {
+        let work = async { tokio::join!(self.adopt_for_ever(), self.sweep_for_ever()) };
         end.run_until_cancelled(work).await;
     }
 
+    async fn adopt_for_ever(&self) {
+        if !self.queue.is_shared() {
+            return;
+        }
+        let mut round = tokio::time::interval(ADOPT_EVERY);
+        loop {
+            round.tick().await;
+            if let Err(error) = self.adopt().await {
+                tracing::error!(%error, "unfinished series could not be listed; tried again");
+            }
+        }
+    }
+
+    /// Takes on the groups that their process should have finished a while ago: it has ended.
+    async fn adopt(&self) -> StoreResult<()> {
+        let files = self.store.releasable().await?;
+        self.release(&files).await?;
+        let late = self.sessions.patience() + LATE;
+        let late = Timestamp::try_from(late.as_millis()).unwrap_or(Timestamp::MAX);
+        let before = self.queue.clock.now().saturating_sub(late);
+        for group in self.store.unfinished().await? {
+            if group.changed_at < before && !self.sessions.watches(&group.id) {
+                self.sessions.resume(&group.id, true);
+            }
+        }
+        Ok(())
+    }
+
     async fn gather_for_ever(&self) {
-        while let Err(error) = self.resume().await {
+        while !self.queue.is_shared()
+            && let Err(error) = self.resume().await
+        {
             tracing::error!(%error, "what was received before the start could not be listed");
             tokio::time::sleep(RETRY).await;
         }

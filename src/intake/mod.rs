@@ -19,6 +19,9 @@
 //! buffers of one file, and no more time than set; a series that cannot be read is kept for a set time
 //! and shown with the reason.
 //!
+//! Several processes that share a store each watch the groups that they receive; what a process that has
+//! ended leaves is taken on by one of the others.
+//!
 //! Not guaranteed: that a series is complete. A sender that stops in the middle and comes back after the
 //! set time makes a second volume, of all slices.
 //!

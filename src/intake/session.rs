@@ -67,6 +67,16 @@ impl Sessions {
         self.change(group, whole, |watched| watched.broken = true);
     }
 
+    /// Whether a group is on the list.
+    pub(super) fn watches(&self, group: &str) -> bool {
+        self.groups().contains_key(group)
+    }
+
+    /// The longest time that a group waits.
+    pub(super) fn patience(&self) -> Duration {
+        self.waits.patience.max(self.waits.quiet)
+    }
+
     /// Looks at a group again after `pause`.
     pub fn retry(&self, group: &str, pause: Duration) {
         let again = Instant::now() + pause;

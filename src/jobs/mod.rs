@@ -75,9 +75,9 @@ pub use storage::{
     DeathLimit, Deleted, DiskSpace, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder,
     ErasureReason, Expiry, FigureStore, FileRecord, Held, Holding, Interrupted, ItemFilter,
     ItemRecord, JobFilter, JobOutcome, JobStore, Lease, LegalHold, ListPage, ListRequest,
-    LocalFile, Product, ProductFile, QueueFigures, QueueLoad, Receipt, RecordPages, ScanFields,
-    ScanFilter, ScanIdentity, Scans, Shelved, StagedFiles, StagedFor, StoreError, StoreFault,
-    StoreResult, StoredVolume, TagFilter, Tags, UnreadScan,
+    LocalFile, News, NewsFeed, Peers, Product, ProductFile, QueueFigures, QueueLoad, Receipt,
+    RecordPages, ScanFields, ScanFilter, ScanIdentity, Scans, Shelved, StagedFiles, StagedFor,
+    StoreError, StoreFault, StoreResult, StoredVolume, TagFilter, Tags, UnreadScan,
 };
 pub use tenant::{InvalidTenant, Tenant};
 pub use work::{

@@ -327,6 +327,16 @@ impl LocalCache {
         Ok(in_use)
     }
 
+    /// The places that have copies.
+    pub fn places(&self) -> BTreeSet<String> {
+        let copies = entered(&self.copies);
+        let places = copies
+            .by_path
+            .keys()
+            .filter_map(|path| path.split('/').next());
+        places.map(str::to_owned).collect()
+    }
+
     /// Deletes the copies of every place that `which` names.
     ///
     /// # Errors

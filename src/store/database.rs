@@ -11,7 +11,7 @@ use super::query::{DbRow, Query, Target, query};
 use super::space::DiskGauge;
 use super::sqlite;
 use super::writer::{Write, WriteTransaction, Writer};
-use crate::jobs::{StoreError, StoreFault, StoreResult};
+use crate::jobs::{StoreError, StoreFault, StoreResult, random_id};
 use sqlx::postgres::PgPool;
 use sqlx::sqlite::SqlitePool;
 use std::path::Path;
@@ -146,11 +146,16 @@ impl Query {
     }
 }
 
+/// The prefix of the names of runs.
+const RUN: &str = "run_";
+
 /// The database. Implements [`crate::jobs::JobStore`] and [`crate::jobs::Catalogue`], and the traits
 /// of `access`, `hooks`, `archive`, `intake` and `worklist`.
 pub struct SqlStore {
     pub(super) writer: Writing,
     pub(super) readers: Readers,
+    /// Names this process among those on the same database.
+    pub(super) run: String,
     gauge: DiskGauge,
     /// Whether the last check of the structure found defects.
     pub(super) damaged: AtomicBool,
@@ -168,6 +173,7 @@ impl SqlStore {
         Ok(Self {
             writer: Writing::Sqlite(Box::new(writer)),
             readers: Readers::Sqlite(readers),
+            run: random_id(RUN),
             gauge,
             damaged: AtomicBool::new(false),
         })
@@ -182,10 +188,12 @@ impl SqlStore {
         wait: Duration,
         gauge: DiskGauge,
     ) -> Result<Self, postgres::PostgresError> {
-        let (writer, readers) = postgres::open(settings, wait).await?;
+        let run = random_id(RUN);
+        let (writer, readers) = postgres::open(settings, wait, &run).await?;
         Ok(Self {
             writer: Writing::Postgres(writer),
             readers: Readers::Postgres(readers),
+            run,
             gauge,
             damaged: AtomicBool::new(false),
         })

@@ -52,7 +52,7 @@ pub use s3::{S3Blobs, S3Location, S3Refusal};
 pub use space::DiskGauge;
 
 use crate::intake::ReceivedFiles;
-use crate::jobs::{BlobError, BlobStore, Resource};
+use crate::jobs::{BlobError, BlobStore, Peers, Resource, random_id};
 use std::fs::{File, TryLockError};
 use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -94,6 +94,8 @@ pub struct Store {
     pub blobs: Arc<dyn BlobStore>,
     /// The files of received objects.
     pub received: Arc<dyn ReceivedFiles>,
+    /// The other processes on the database and the files, if there can be any.
+    pub peers: Option<Arc<dyn Peers>>,
     lock: FolderLock,
 }
 
@@ -176,6 +178,20 @@ pub enum OpenError {
         /// The database.
         url: PostgresUrl,
     },
+    /// The files of the records in the database are elsewhere.
+    #[error(
+        "the files of the records in {url} are in {place}, not in {own}. Give every process on a database \
+         the same `blobs`; a database whose files are in a folder is used with that folder alone. If the \
+         files were moved, say so in the database: UPDATE store_place SET place = '...'"
+    )]
+    OtherFiles {
+        /// The database.
+        url: PostgresUrl,
+        /// Where they are.
+        place: String,
+        /// Where this process would keep them.
+        own: String,
+    },
     /// Its records are in a database on a server.
     #[error(
         "the records of {folder} are kept in {url}. Give that database by --database or \
@@ -250,11 +266,17 @@ impl Store {
             };
         let wait = settings.write_wait;
         let rows = match &settings.database {
-            Some(server) => on_server(folder, empty, server, wait, gauge).await?,
+            Some(server) => {
+                let bucket = settings.s3.as_ref();
+                on_server(folder, (bucket, empty), server, wait, gauge).await?
+            }
             None => in_file(folder, &mut lock, wait, gauge).await?,
         };
+        let rows = Arc::new(rows);
         Ok(Self {
-            rows: Arc::new(rows),
+            // A folder is used by one process.
+            peers: settings.s3.and_then(|_| rows.peers()),
+            rows,
             blobs,
             received,
             lock,
@@ -268,10 +290,11 @@ impl Store {
     }
 }
 
-/// Opens the database on a server; `empty` says whether there are no files of items.
+/// Opens the database on a server for the files in a bucket, or in the folder; `empty` says whether
+/// there are none.
 async fn on_server(
     folder: &Path,
-    empty: bool,
+    (bucket, empty): (Option<&S3Location>, bool),
     server: &PostgresSettings,
     write_wait: Duration,
     gauge: DiskGauge,
@@ -287,8 +310,32 @@ async fn on_server(
             url: server.url.clone(),
         });
     }
-    std::fs::write(&marker, format!("{}\n", server.url)).map_err(|e| unusable(&marker, &e))?;
+    let own = match bucket {
+        Some(bucket) => bucket.to_string(),
+        None => name_of(&marker).unwrap_or_else(|| random_id("folder ")),
+    };
+    let place = rows.note_place(&own).await;
+    let place = place.map_err(|e| unusable(folder, &e))?;
+    if place != own {
+        return Err(OpenError::OtherFiles {
+            url: server.url.clone(),
+            place,
+            own: match bucket {
+                Some(_) => own,
+                None => folder.display().to_string(),
+            },
+        });
+    }
+    let text = format!("{}\n{own}\n", server.url);
+    std::fs::write(&marker, text).map_err(|e| unusable(&marker, &e))?;
     Ok(rows)
+}
+
+/// The name by which the database knows this folder, if the folder has one.
+fn name_of(marker: &Path) -> Option<String> {
+    let text = std::fs::read_to_string(marker).ok()?;
+    let name = text.lines().nth(1)?;
+    name.starts_with("folder ").then(|| name.to_owned())
 }
 
 /// Refuses a folder whose records are on a server.
@@ -296,7 +343,7 @@ fn require_file(folder: &Path) -> Result<(), OpenError> {
     match std::fs::read_to_string(folder.join(MARKER)) {
         Ok(url) => Err(OpenError::OnServer {
             folder: folder.to_owned(),
-            url: url.trim().to_owned(),
+            url: url.lines().next().unwrap_or_default().to_owned(),
         }),
         Err(_) => Ok(()),
     }

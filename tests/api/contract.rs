@@ -199,6 +199,7 @@ fn failure(code: &str) -> Failure {
 
 fn erasure(id: &str, cascade: bool) -> ErasureOrder {
     ErasureOrder {
+        renewed_before: None,
         tenant: tenant(),
         id: id.into(),
         cascade,
@@ -1302,6 +1303,7 @@ async fn series_are_fetched_and_results_sent(on: &Stores) {
     // What is erased is not sent any more, and its series is fetched anew.
     let expected = [volume.clone(), result.id.clone()];
     let order = ErasureOrder {
+        renewed_before: None,
         cascade: false,
         ..erasure(&result.id, false)
     };
@@ -1536,6 +1538,9 @@ async fn both_engines_have_the_same_tables() {
     let mut postgres = columns(postgres.fetch_all(&mut connection).await.unwrap());
     // SQLite keeps it in its own table of sequences.
     postgres.retain(|(table, _)| table != "audit_greatest");
+    // One process uses a file.
+    let of_processes = ["runs", "holds", "duties", "store_place", "given_up_places"];
+    postgres.retain(|(table, _)| !of_processes.contains(&table.as_str()));
     assert_eq!(sqlite, postgres);
     assert!(sqlite.len() > 150, "{}", sqlite.len());
 }

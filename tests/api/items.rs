@@ -192,6 +192,7 @@ async fn an_item_on_hold_is_deleted_neither_by_request_nor_by_age() {
     bench.clock.set(10_000);
     let upkeep = bench.upkeep(Some(Duration::from_secs(1)));
     let order = ErasureOrder {
+        renewed_before: None,
         tenant: Tenant::default(),
         id: "vol_1".into(),
         cascade: false,

@@ -40,6 +40,7 @@ mod postgres;
 mod readers;
 mod receiver;
 mod records;
+mod replicas;
 mod s3;
 mod s3_server;
 mod scans;

@@ -318,7 +318,7 @@ async fn files_go_and_come_over_a_failing_network() {
 }
 
 /// The settings for a service whose files are in a bucket.
-fn in_bucket(url: &str, prefix: &str) -> impl FnOnce(&mut Settings) + use<> {
+pub fn in_bucket(url: &str, prefix: &str) -> impl FnOnce(&mut Settings) + use<> {
     let place = format!("s3://{BUCKET}/{prefix}").parse().unwrap();
     let aws = AwsVariables(S3Server::location_at(url, prefix).variables);
     move |settings| {

@@ -119,6 +119,9 @@ impl Follower {
     /// The next state that is newer than the last one sent; `None` if the job is gone or the
     /// service shuts down.
     async fn newer(&mut self) -> Option<Job> {
+        let queue = self.app.queue.clone();
+        let look = queue.time_to_look();
+        tokio::pin!(look);
         loop {
             if let Some(job) = self.next.take()
                 && job.revision > self.seen
@@ -133,6 +136,10 @@ impl Follower {
                     Err(RecvError::Lagged(_)) => Some(self.look().await?),
                     Err(RecvError::Closed) => return None,
                 },
+                () = &mut look => {
+                    look.set(queue.time_to_look());
+                    Some(self.look().await?)
+                }
                 () = self.app.closing.cancelled() => return None,
             };
         }

@@ -109,6 +109,12 @@ impl From<StoreError> for Problem {
             .fix(
                 "Upload the volume again, which repairs it; of a result, start the same job again.",
             ),
+            StoreFault::Erased => Self::new(
+                StatusCode::GONE,
+                "gone",
+                "It was erased while it was read.",
+            )
+            .fix("Upload the same volume again, or start the same job again; ids stay the same."),
             StoreFault::DamagedDatabase => problem(
                 StatusCode::INTERNAL_SERVER_ERROR,
                 "damaged-database",

@@ -194,7 +194,7 @@ impl Bundle {
     pub async fn store(mut self, app: &App, tenant: &Tenant, tags: &Tags) -> Answer<Stored> {
         let id = self.volume_id();
         let records = self.records();
-        let hold = app.queue.hold(&id).await;
+        let hold = app.queue.hold(&id).await?;
         if let Some(stored) = app.queue.intact_volume(&id).await? {
             let scan = scans::to_note(app, tenant, &id, &stored).await?;
             let renewed = app.queue.renew_volume(tenant, &id, tags, scan.as_ref());

@@ -112,6 +112,7 @@ impl Queue {
         // Whoever takes several locks takes them in the order of ids.
         ids.sort();
         ids.dedup();
+        self.wait_for_holds(&ids).await?;
         let mut locks = Vec::with_capacity(ids.len());
         for id in &ids {
             locks.push(self.items.lock(id).await);
@@ -156,7 +157,11 @@ impl Queue {
                 self.delete_job(&id).await?;
                 continue;
             }
-            let order = by_retention(tenant, id);
+            let before = match Resource::of(&id) {
+                Some(Resource::Volume) => expiry.volumes,
+                _ => expiry.results,
+            };
+            let order = by_retention(tenant, id, before);
             self.erase_item(&order).await?;
         }
         Ok(())
@@ -173,11 +178,12 @@ impl Queue {
     }
 }
 
-fn by_retention(tenant: Tenant, id: String) -> ErasureOrder {
+fn by_retention(tenant: Tenant, id: String, before: Option<Timestamp>) -> ErasureOrder {
     ErasureOrder {
         tenant,
         id,
         cascade: false,
+        renewed_before: before,
         by: ErasureAgent {
             name: BY_RETENTION.into(),
             ..ErasureAgent::default()

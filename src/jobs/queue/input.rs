@@ -2,11 +2,13 @@
 
 use super::Queue;
 use crate::jobs::{
-    BlobError, Failure, Fault, FileRecord, ItemFilter, Job, ListRequest, LocalFile, Needs, Product,
-    Resource, StoreError, StoreFault, StoredItem, StoredResult, Tenant, Work, WorkInput,
+    BlobError, BlobStream, Failure, Fault, FileRecord, ItemFilter, Job, ListRequest, LocalFile,
+    Needs, Product, Resource, StoreError, StoreFault, StoredItem, StoredResult, Tenant, Work,
+    WorkInput,
 };
 use serde_json::Map;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Templates read from the catalogue at a time.
 const LIBRARY_PAGE: u32 = 100;
@@ -105,6 +107,33 @@ impl Queue {
             }
         }
         Ok(Some(files))
+    }
+
+    /// A range of bytes of a file; see [`BlobStore::read`](crate::jobs::BlobStore::read).
+    ///
+    /// # Errors
+    /// If the storage fails; [`StoreFault::Erased`] if the item was erased since its row was read.
+    pub async fn read(
+        &self,
+        id: &str,
+        file: &FileRecord,
+        range: Range<u64>,
+    ) -> Result<BlobStream, StoreError> {
+        match self.blobs.read(id, file, range).await {
+            Err(error) if error.cause == StoreFault::DamagedFile => {
+                Err(self.unless_erased(id, error).await)
+            }
+            read => Ok(read?),
+        }
+    }
+
+    /// The reason why a file could not be read: `error`, unless its item was erased meanwhile.
+    pub async fn unless_erased(&self, id: &str, error: BlobError) -> StoreError {
+        match self.catalogue.record(id).await {
+            Ok(None) => BlobError::new(StoreFault::Erased, error.message).into(),
+            Ok(Some(_)) => error.into(),
+            Err(error) => error,
+        }
     }
 
     /// A product with those of its files that are `wanted` and exist.

@@ -10,12 +10,17 @@
 //!   and from before its record is deleted until its files are. What stays in that list after the
 //!   lock is free was left by a failure; the upkeep deletes its files if it has no record.
 //!
-//! All of this lives in memory, in the one process that uses the store. What a crash leaves behind
-//! is found by the next start, by comparing files and records.
+//! All of this lives in memory. What a crash leaves behind is found by the next start, by comparing files
+//! and records. Where several processes share a store, its files lie in places of their own, so that
+//! - a lock is needed within a process only: each publication has other files, and no row can name files
+//!   that were erased meanwhile (the database refuses it, and the publication is done again);
+//! - a hold is also a row of the database, which an erasure by another process reads;
+//! - what one process leaves unsettled are its own files.
 
-use crate::jobs::FileRecord;
+use crate::jobs::{FileRecord, Peers, StoreError, random_id};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::time::Duration;
 use tokio::sync::OwnedMutexGuard;
 
 /// Locks, holds and unsettled items, by id.
@@ -32,6 +37,29 @@ pub(super) struct Items {
 pub struct Hold {
     id: String,
     holds: Arc<Mutex<BTreeMap<String, usize>>>,
+    /// The other processes, and the token by which they see the hold.
+    elsewhere: Option<(Arc<dyn Peers>, String)>,
+}
+
+/// Pause before the release of a hold is tried again.
+const RELEASE_AGAIN: Duration = Duration::from_secs(5);
+
+impl Hold {
+    /// The same, which the other processes see too.
+    pub(super) async fn among(mut self, peers: &Arc<dyn Peers>) -> Result<Self, StoreError> {
+        let token = random_id("");
+        // Released also if it is not known whether it was written.
+        self.elsewhere = Some((peers.clone(), token.clone()));
+        peers.hold(&token, &self.id).await?;
+        Ok(self)
+    }
+}
+
+async fn release(peers: Arc<dyn Peers>, token: String) {
+    while let Err(error) = peers.release(&token).await {
+        tracing::warn!(%error, "other processes still see a hold; tried again");
+        tokio::time::sleep(RELEASE_AGAIN).await;
+    }
 }
 
 impl Drop for Hold {
@@ -42,6 +70,12 @@ impl Drop for Hold {
             if *count == 0 {
                 holds.remove(&self.id);
             }
+        }
+        drop(holds);
+        if let Some((peers, token)) = self.elsewhere.take()
+            && let Ok(runtime) = tokio::runtime::Handle::try_current()
+        {
+            runtime.spawn(release(peers, token));
         }
     }
 }
@@ -76,6 +110,7 @@ impl Items {
         Hold {
             id: id.to_owned(),
             holds: self.holds.clone(),
+            elsewhere: None,
         }
     }
 

@@ -3,6 +3,7 @@
 mod erase;
 mod input;
 mod items;
+mod peers;
 mod publish;
 mod sweep;
 mod upkeep;
@@ -15,7 +16,7 @@ pub use upkeep::{Upkeep, recover_after_crash};
 
 use super::{
     BlobStore, Catalogue, Clock, Filed, Interrupted, Job, JobObserver, JobState, JobStore, Lease,
-    NewJob, QueueLoad, StoreError, random_id,
+    NewJob, Peers, QueueLoad, StoreError, random_id,
 };
 use crate::progress::CancelToken;
 use items::Items;
@@ -69,6 +70,8 @@ pub struct Queue {
     observer: OnceLock<Arc<dyn JobObserver>>,
     /// Names this run of the service in the leases of its workers.
     pub(super) run: String,
+    /// The other processes on the store, if it can be shared.
+    peers: Option<Arc<dyn Peers>>,
 }
 
 impl Queue {
@@ -94,6 +97,7 @@ impl Queue {
             running: Mutex::default(),
             observer: OnceLock::new(),
             run: random_id("run_"),
+            peers: None,
         }
     }
 
@@ -128,8 +132,15 @@ impl Queue {
 
     /// Keeps an item from being deleted, by request or by age, until the hold is dropped. The item
     /// need not exist yet. To be taken before the item is looked for or added.
-    pub async fn hold(&self, id: &str) -> Hold {
-        self.items.hold(id).await
+    ///
+    /// # Errors
+    /// If other processes share the store, and the database fails.
+    pub async fn hold(&self, id: &str) -> Result<Hold, StoreError> {
+        let hold = self.items.hold(id).await;
+        match &self.peers {
+            Some(peers) => hold.among(peers).await,
+            None => Ok(hold),
+        }
     }
 
     /// Cancels a waiting job; asks a running one to stop.
@@ -143,9 +154,7 @@ impl Queue {
             Interrupted::Asked(job) => {
                 // A worker that has claimed the job but is not in the list yet reads the request
                 // from the table, after it has entered the list.
-                for (_, token) in self.running().values().filter(|(job, _)| job == id) {
-                    token.cancel();
-                }
+                self.stop_computing(id);
                 self.announce(job);
             }
             Interrupted::Finished(_) | Interrupted::Unknown => {}
@@ -153,7 +162,15 @@ impl Queue {
         Ok(outcome)
     }
 
-    /// Subscribes to the changes of all jobs.
+    /// Cancels the computation of a job, if it runs in this process.
+    fn stop_computing(&self, id: &str) {
+        for (_, token) in self.running().values().filter(|(job, _)| job == id) {
+            token.cancel();
+        }
+    }
+
+    /// Subscribes to the changes of all jobs. Some of another process may be missed; see
+    /// [`Queue::time_to_look`].
     pub fn changes(&self) -> broadcast::Receiver<Arc<Job>> {
         self.changes.subscribe()
     }
@@ -170,10 +187,16 @@ impl Queue {
                     Some(job) if !job.state.is_final() => {}
                     other => return Ok(other),
                 }
-                while let Ok(job) = changes.recv().await {
-                    if job.id == id && job.state.is_final() {
-                        break;
+                let ended = async {
+                    while let Ok(job) = changes.recv().await {
+                        if job.id == id && job.state.is_final() {
+                            break;
+                        }
                     }
+                };
+                tokio::select! {
+                    () = ended => {}
+                    () = self.time_to_look() => {}
                 }
             }
         };
@@ -204,7 +227,7 @@ impl Queue {
             mean_duration_ms,
             ..
         } = self.jobs.load().await?;
-        let workers = self.settings.workers as f64;
+        let workers = self.all_workers().await? as f64;
         // Running jobs are half done on average, and the workers share what is ahead.
         let position = |ahead: u64| {
             let work_ahead = (ahead as f64 + running as f64 / 2.0) / workers;

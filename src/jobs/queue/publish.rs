@@ -15,6 +15,9 @@ use std::sync::Arc;
 use tokio::io::AsyncWriteExt;
 use tracing::Instrument;
 
+/// How often an item is added anew that other processes erase at the same time.
+const ROUNDS: u32 = 3;
+
 impl Queue {
     /// Adds an uploaded volume durably, with what its file says of the scan. Returns the record, and
     /// whether it is new for the tenant.
@@ -34,11 +37,22 @@ impl Queue {
             let _lock = queue.items.lock(&volume.id).await;
             queue.items.unsettle(&volume.id);
             let record = ItemRecord::Volume(volume.clone());
-            volume.files = queue.publish_unless_intact(record, files).await?;
-            let added = queue
-                .catalogue
-                .add_volume(&volume, &tenant, &tags, scan.as_ref());
-            let new = added.await?;
+            let mut files = Some(files);
+            let mut again = ROUNDS;
+            let new = loop {
+                volume.files = queue
+                    .publish_unless_intact(record.clone(), &mut files)
+                    .await?;
+                let added = queue
+                    .catalogue
+                    .add_volume(&volume, &tenant, &tags, scan.as_ref());
+                match added.await {
+                    Err(error) if again > 0 && queue.was_erased_meanwhile(&error, &files) => {
+                        again -= 1;
+                    }
+                    added => break added?,
+                }
+            };
             queue.items.settle(&volume.id);
             let stored = queue.catalogue.volume(&tenant, &volume.id).await?;
             Ok((stored.ok_or_else(vanished)?, new))
@@ -122,11 +136,19 @@ impl Queue {
         to_its_end(async move {
             let _lock = queue.items.lock(&product.id).await;
             queue.items.unsettle(&product.id);
-            queue.write_files(&mut product, &output).await?;
-            let new = queue
-                .catalogue
-                .add_product(&product, &tenant, volume.as_deref())
-                .await?;
+            let mut again = ROUNDS;
+            let new = loop {
+                let unused = queue.write_files(&mut product, &output).await?;
+                let added = queue
+                    .catalogue
+                    .add_product(&product, &tenant, volume.as_deref());
+                match added.await {
+                    Err(error) if again > 0 && queue.was_erased_meanwhile(&error, &unused) => {
+                        again -= 1;
+                    }
+                    added => break added?,
+                }
+            };
             if let Some(library) = library {
                 let catalogue = &queue.catalogue;
                 catalogue.set_library(&tenant, &product.id, library).await?;
@@ -163,7 +185,7 @@ impl Queue {
         let _lock = self.items.lock(&id).await;
         self.items.unsettle(&id);
         let outcome = match self.write_files(&mut product, output).await {
-            Ok(()) => JobOutcome::Succeeded(Box::new(product)),
+            Ok(_) => JobOutcome::Succeeded(Box::new(product)),
             Err(error) if error.cause().may_pass() => return Err(error),
             Err(error) => {
                 tracing::error!(job = %job.id, %error, "the result could not be stored");
@@ -184,12 +206,13 @@ impl Queue {
         Ok(ended)
     }
 
-    /// Publishes what was made, and notes in `product` where its files are.
+    /// Publishes what was made, and notes in `product` where its files are. Returns the files that
+    /// were not needed because the product is stored already.
     async fn write_files(
         &self,
         product: &mut Product,
         output: &WorkOutput,
-    ) -> Result<(), StoreError> {
+    ) -> Result<Option<Box<dyn StagedFiles>>, StoreError> {
         let staged = self.blobs.stage(StagedFor::Result).await?;
         for file in &output.files {
             let mut writer = staged.create(&file.name).await?;
@@ -200,7 +223,8 @@ impl Queue {
             writer.shutdown().await.map_err(BlobError::from)?;
         }
         let record = ItemRecord::Product(product.clone());
-        let stored = self.publish_unless_intact(record, staged).await?;
+        let mut staged = Some(staged);
+        let stored = self.publish_unless_intact(record, &mut staged).await?;
         for file in &mut product.files {
             if let Some(stored) = stored.iter().find(|stored| stored.name == file.name) {
                 file.bytes = stored.bytes;
@@ -208,16 +232,26 @@ impl Queue {
                 file.place.clone_from(&stored.place);
             }
         }
-        Ok(())
+        Ok(staged)
+    }
+
+    /// Whether a row was refused because another process has erased the item since it was found
+    /// intact, so that its files, which are at hand, have to be published after all.
+    fn was_erased_meanwhile(
+        &self,
+        error: &StoreError,
+        unused: &Option<Box<dyn StagedFiles>>,
+    ) -> bool {
+        self.is_shared() && unused.is_some() && error.cause() == StoreFault::Busy
     }
 
     /// Publishes the files of an item, unless it has a row and its files are what the row says.
     /// If it has a row and damaged files, these are replaced, and the row with them. Returns the files
-    /// that the item has now.
+    /// that the item has now; those that were published are taken.
     async fn publish_unless_intact(
         &self,
         mut record: ItemRecord,
-        files: Box<dyn StagedFiles>,
+        staged: &mut Option<Box<dyn StagedFiles>>,
     ) -> Result<Vec<FileRecord>, StoreError> {
         let known = self.catalogue.record(record.id()).await?;
         if let Some(known) = &known {
@@ -226,6 +260,7 @@ impl Queue {
             }
             tracing::warn!(id = record.id(), "damaged files are replaced");
         }
+        let files = staged.take().ok_or_else(vanished)?;
         record.put_at(files.place());
         // Without a row, the upkeep deletes these and no others.
         self.items.doom(record.id(), record.files());

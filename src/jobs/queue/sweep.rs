@@ -105,6 +105,9 @@ impl Custodian {
             queue.clock.now().saturating_sub(age)
         });
         queue.blobs.tidy(before).await?;
+        if let Some(peers) = &queue.peers {
+            peers.tidy().await?;
+        }
         if swept.set_aside > 0 {
             tracing::error!(
                 items = swept.set_aside,

@@ -12,6 +12,7 @@ use async_trait::async_trait;
 use bytes::Bytes;
 use futures::stream::BoxStream;
 use std::any::Any;
+use std::collections::BTreeSet;
 use std::fmt;
 use std::io::ErrorKind;
 use std::ops::{Deref, Range};
@@ -226,6 +227,16 @@ pub trait BlobStore: Send + Sync + 'static {
 
     /// Every item of that kind that has files.
     async fn ids(&self, kind: Resource) -> Result<Vec<Shelved>, BlobError>;
+
+    /// The items of whose files there are copies on the local disk, if they are stored elsewhere.
+    fn copied(&self) -> BTreeSet<String> {
+        BTreeSet::new()
+    }
+
+    /// Deletes the copies of the files of these items.
+    fn forget(&self, _ids: &BTreeSet<String>) -> Result<(), BlobError> {
+        Ok(())
+    }
 
     /// Moves every file of `id` to where nobody sees it but the operator can restore it. Returns
     /// whether there was any.

@@ -12,6 +12,8 @@ pub struct ErasureOrder {
     pub id: String,
     /// Whether to erase also what was made of it, and the jobs that worked on it.
     pub cascade: bool,
+    /// Nothing is erased unless the item was last renewed before then.
+    pub renewed_before: Option<Timestamp>,
     /// Who asks.
     pub by: ErasureAgent,
     /// Why it is erased.

@@ -11,6 +11,8 @@ pub struct QueueFigures {
     pub oldest_queued_at: Option<Timestamp>,
     /// The number of stored items of each kind that has files.
     pub items: Vec<(Resource, u64)>,
+    /// Size of the database; `None` if it is a file, whose size everybody sees.
+    pub database_bytes: Option<u64>,
 }
 
 /// Counts what is stored.

@@ -2,7 +2,7 @@
 //!
 //! [`JobStore`] holds the queue's table, [`Catalogue`] the records of volumes and products, and
 //! [`BlobStore`] their files, and [`Scans`] whose scans the volumes are; [`Custody`] is what is needed to look
-//! after them. The module `store` implements them with SQLite or PostgreSQL, and a folder.
+//! after them, and [`Peers`] what processes on one store know of each other. The module `store` implements them with SQLite or PostgreSQL, and a folder.
 
 mod blobs;
 mod catalogue;
@@ -12,6 +12,7 @@ mod figures;
 mod holding;
 mod job_store;
 mod listing;
+mod peers;
 mod product;
 mod record;
 mod scan;
@@ -33,6 +34,7 @@ pub use job_store::{
     Claimant, DeathLimit, Interrupted, JobFilter, JobOutcome, JobStore, Lease, QueueLoad,
 };
 pub use listing::{ListPage, ListRequest};
+pub use peers::{News, NewsFeed, Peers};
 pub use product::{Product, ProductFile};
 pub use record::ItemRecord;
 pub use scan::{ScanFields, ScanFilter, ScanIdentity, Scans, UnreadScan};
@@ -91,6 +93,8 @@ pub enum StoreFault {
     /// The content of a file is not what was stored, or the file is gone. The same upload repairs
     /// it.
     DamagedFile,
+    /// The item was erased while it was read.
+    Erased,
     /// The database file is damaged.
     DamagedDatabase,
     /// Anything else, such as a defect of this program.

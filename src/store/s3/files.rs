@@ -285,6 +285,21 @@ impl BlobStore for S3Blobs {
         Ok(items.collect())
     }
 
+    fn copied(&self) -> BTreeSet<String> {
+        let places = self.shared.cache.places();
+        let ids = places.iter().filter_map(|cached| cached.split_once('.'));
+        ids.map(|(id, _)| id.to_owned()).collect()
+    }
+
+    fn forget(&self, ids: &BTreeSet<String>) -> Result<(), BlobError> {
+        let of_them = |cached: &str| {
+            cached
+                .split_once('.')
+                .is_some_and(|(id, _)| ids.contains(id))
+        };
+        Ok(self.shared.cache.forget(of_them)?)
+    }
+
     async fn set_aside(&self, id: &str, now: Timestamp) -> Result<bool, BlobError> {
         let given_up = self.given_up(id).await?;
         for place in &given_up {

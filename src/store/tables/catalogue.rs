@@ -224,7 +224,10 @@ impl Catalogue for SqlStore {
         now: Timestamp,
     ) -> StoreResult<Erased> {
         let mut transaction = self.writer.begin().await?;
-        let erased = super::erasure::erase(&mut transaction, order, expected, now).await?;
+        let erased = match self.is_held_elsewhere(&mut transaction, expected).await? {
+            true => Erased::InUse,
+            false => super::erasure::erase(&mut transaction, order, expected, now).await?,
+        };
         // Committed also if nothing was erased, which keeps the connection.
         transaction.commit().await?;
         Ok(erased)

@@ -49,7 +49,7 @@ pub(super) async fn erase(
     if ids.iter().any(|id| !expected.contains(id)) {
         return Ok(Erased::InUse);
     }
-    if !has(to, tenant, &order.id).await? {
+    if !has(to, tenant, &order.id, order.renewed_before).await? {
         return Ok(Erased::Unknown);
     }
     for id in &ids {
@@ -106,10 +106,16 @@ pub(super) async fn erase(
     Ok(Erased::Done(Box::new(receipt)))
 }
 
-async fn has(from: &mut Transaction<'_>, tenant: &Tenant, id: &str) -> StoreResult<bool> {
-    let row = query("SELECT 1 FROM holdings WHERE tenant = $1 AND id = $2")
+async fn has(
+    from: &mut Transaction<'_>,
+    tenant: &Tenant,
+    id: &str,
+    renewed_before: Option<Timestamp>,
+) -> StoreResult<bool> {
+    let row = query("SELECT 1 FROM holdings WHERE tenant = $1 AND id = $2 AND renewed_at < $3")
         .bind(tenant.as_str())
         .bind(id)
+        .bind(renewed_before.unwrap_or(Timestamp::MAX))
         .fetch_optional(from)
         .await?;
     Ok(row.is_some())

@@ -26,7 +26,16 @@ impl FigureStore for SqlStore {
             let row = counts.iter().find(|(kind, _)| kind == resource.noun());
             (resource, row.map_or(0, |(_, count)| *count))
         };
+        let database_bytes = match self.on_server() {
+            true => {
+                let size = query("SELECT pg_database_size(current_database())");
+                let row = size.fetch_one(&self.readers).await?;
+                Some(rows::unsigned(row.try_get(0)?))
+            }
+            false => None,
+        };
         Ok(QueueFigures {
+            database_bytes,
             oldest_queued_at: oldest.map(|row| row.try_get(0)).transpose()?,
             items: Resource::WITH_FILES.map(counted).to_vec(),
         })

@@ -155,7 +155,7 @@ impl IntakeStore for SqlStore {
     ) -> StoreResult<()> {
         query(
             "UPDATE intake_groups SET state = 'failed', failure = $1, changed_at = $2
-             WHERE id = $3 AND revision = $4",
+             WHERE id = $3 AND revision = $4 AND state = 'gathering'",
         )
         .bind(rows::to_json(failure)?)
         .bind(now)

@@ -9,6 +9,7 @@ mod figures;
 mod hooks;
 mod intake;
 mod jobs;
+mod peers;
 mod rows;
 mod scans;
 mod worklist;
