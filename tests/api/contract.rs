@@ -237,6 +237,7 @@ contracts!(
     a_lost_lease_writes_nothing,
     a_failed_commit_leaves_nothing,
     each_job_is_claimed_once_in_order,
+    tenants_take_turns,
     one_key_files_one_job,
     the_queue_is_never_longer_than_its_limit,
     no_job_is_filed_on_what_is_erased,
@@ -373,13 +374,84 @@ async fn a_failed_commit_leaves_nothing(on: &Stores) {
     assert_eq!(on.a.sends(&[&job.id]).await.unwrap()[&job.id].len(), 1);
 }
 
+/// Random filing, claiming and ending, beside a queue that is written as plainly as possible.
+async fn tenants_take_turns(on: &Stores) {
+    let tenants = ["default", "b", "c"].map(|name| name.parse::<Tenant>().unwrap());
+    let mut orders = Vec::new();
+    for tenant in &tenants {
+        let job = new_job(&on.volume(tenant).await);
+        orders.push(NewJob {
+            tenant: tenant.clone(),
+            ..job
+        });
+    }
+    // (turn, number of filing, tenant, id)
+    let mut waiting: Vec<(i64, usize, usize, String)> = Vec::new();
+    let mut running: Vec<((i64, usize, usize, String), Lease)> = Vec::new();
+    let mut random = 7_u64;
+    for number in 0..150 {
+        random = random
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        match random >> 60 {
+            chance @ 0..=7 => {
+                // The first tenant files most of the jobs.
+                let tenant = [0, 0, 0, 0, 0, 1, 1, 2][chance as usize];
+                let job = on.file(&orders[tenant]).await;
+                let of = |all: &mut dyn Iterator<Item = i64>| all.max().map(|turn| turn + 1);
+                let current = waiting.iter().map(|job| job.0).min();
+                let current = current.or(of(&mut running.iter().map(|(job, _)| job.0)));
+                let unfinished = waiting.iter().chain(running.iter().map(|(job, _)| job));
+                let own = of(&mut unfinished.filter(|job| job.2 == tenant).map(|job| job.0));
+                let turn = current.unwrap_or(0).max(own.unwrap_or(0));
+                waiting.push((turn, number, tenant, job.id));
+            }
+            8..=11 => {
+                waiting.sort();
+                let claimed = on.claim().await;
+                assert_eq!(claimed.is_some(), !waiting.is_empty());
+                if let Some((job, lease)) = claimed {
+                    let next = waiting.remove(0);
+                    assert_eq!(job.id, next.3, "{next:?} before {waiting:?}");
+                    running.push((next, lease));
+                }
+            }
+            _ if running.is_empty() => {}
+            _ => {
+                let (_, lease) = running.remove(0);
+                let outcome = JobOutcome::Failed(failure("no-surface"));
+                assert!(
+                    on.a.finish(&lease, &outcome, now())
+                        .await
+                        .unwrap()
+                        .is_some()
+                );
+            }
+        }
+    }
+    while on.claim().await.is_some() {}
+    // However much one tenant has filed, another's only job waits for one of these at most.
+    for _ in 0..30 {
+        on.file(&orders[0]).await;
+    }
+    on.claim().await.unwrap();
+    let only = on.file(&orders[1]).await;
+    let ahead = on.b.ahead_of(&[only.sequence]).await.unwrap();
+    assert_eq!(ahead, [(only.sequence, 1)].into());
+    assert_eq!(on.claim().await.unwrap().0.tenant, tenants[0]);
+    assert_eq!(on.claim().await.unwrap().0.id, only.id);
+}
+
 async fn each_job_is_claimed_once_in_order(on: &Stores) {
     let volume = on.volume(&tenant()).await;
     let mut filed = Vec::new();
     for _ in 0..40 {
         filed.push(on.file(&new_job(&volume)).await.sequence);
     }
-    assert_eq!(on.b.ahead_of(&[filed[0], filed[7]]).await.unwrap(), [0, 7]);
+    assert_eq!(
+        on.b.ahead_of(&[filed[7], filed[0]]).await.unwrap(),
+        [(filed[0], 0), (filed[7], 7)].into()
+    );
     let claimants = (0..4).map(|number| {
         let store = if number % 2 == 0 { &on.a } else { &on.b }.clone();
         tokio::spawn(async move {

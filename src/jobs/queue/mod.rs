@@ -216,11 +216,10 @@ impl Queue {
         jobs: &[Job],
     ) -> Result<BTreeMap<i64, QueuePosition>, StoreError> {
         let waiting = jobs.iter().filter(|job| job.state == JobState::Queued);
-        let mut sequences: Vec<i64> = waiting.map(|job| job.sequence).collect();
+        let sequences: Vec<i64> = waiting.map(|job| job.sequence).collect();
         if sequences.is_empty() {
             return Ok(BTreeMap::new());
         }
-        sequences.sort_unstable();
         let ahead = self.jobs.ahead_of(&sequences).await?;
         let QueueLoad {
             running,
@@ -236,10 +235,8 @@ impl Queue {
                 starts_in_ms: mean_duration_ms.map(|mean| mean.max(0.0) * work_ahead),
             }
         };
-        Ok(sequences
-            .into_iter()
-            .zip(ahead.into_iter().map(position))
-            .collect())
+        let ahead = ahead.into_iter();
+        Ok(ahead.map(|(job, ahead)| (job, position(ahead))).collect())
     }
 
     /// Told when a job is filed whose volume is to be fetched from its source.

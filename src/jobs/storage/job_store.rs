@@ -3,6 +3,7 @@
 use super::{Deleted, ListPage, ListRequest, Product, ScanFilter, StoreResult, TagFilter};
 use crate::jobs::{Failure, Filed, Job, JobState, NewJob, Tenant, Timestamp};
 use async_trait::async_trait;
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// A worker's temporary claim on a job.
@@ -106,9 +107,9 @@ pub trait JobStore: Send + Sync + 'static {
     /// the fingerprint of that request.
     async fn filed_under(&self, tenant: &Tenant, key: &str) -> StoreResult<Option<(Job, String)>>;
 
-    /// For each position in the order of filing, the number of jobs that wait before it; `sequences`
-    /// are in rising order.
-    async fn ahead_of(&self, sequences: &[i64]) -> StoreResult<Vec<u64>>;
+    /// For each of these jobs, by its place in the order of filing, the number of jobs that will start
+    /// before it.
+    async fn ahead_of(&self, sequences: &[i64]) -> StoreResult<BTreeMap<i64, u64>>;
 
     /// When a job was last filed or ended, or a volume last used; `None` if there are none.
     async fn last_change(&self) -> StoreResult<Option<Timestamp>>;
@@ -116,7 +117,8 @@ pub trait JobStore: Send + Sync + 'static {
     /// How busy the queue is.
     async fn load(&self) -> StoreResult<QueueLoad>;
 
-    /// Claims the oldest waiting job: counts the attempt and sets a lease.
+    /// Claims the next waiting job: counts the attempt and sets a lease. Tenants take turns; jobs of one
+    /// tenant start in the order of their filing.
     ///
     /// `now` is the time of this process, by which only the stamps of the job are set. A store that
     /// several machines share must let leases expire by the clock of its database.

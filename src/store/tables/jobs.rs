@@ -1,5 +1,11 @@
 //! The jobs table. Every change is a single statement, or a transaction that writes beside no other.
 //!
+//! **Turns.** Waiting jobs start in the order of their turns, and within a turn in that in which they were
+//! filed. A job gets the turn that is current, that of the next job to start, or the one after the last turn
+//! in which its tenant has an unfinished job, whichever is later. So each tenant has one job in each turn:
+//! however many jobs one tenant has filed, at most one of them starts between the filing of another
+//! tenant's only job and its start.
+//!
 //! Leases on SQLite, which one process uses, expire by the clock of that process. On PostgreSQL they
 //! expire by the clock of the server: clocks of several machines differ.
 
@@ -15,10 +21,18 @@ use crate::jobs::{
 use crate::store::database::{SqlStore, Transaction};
 use crate::store::query::{QueryBuilder, query};
 use async_trait::async_trait;
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// Number of last succeeded jobs whose durations are averaged.
 const JOBS_AVERAGED: i64 = 20;
+
+/// The turn of a job that tenant `$10` files now.
+const TURN: &str = "(SELECT CASE WHEN here > own THEN here ELSE own END FROM (SELECT
+    coalesce((SELECT min(turn) FROM jobs WHERE state = 'queued' AND volume != ''),
+             (SELECT max(turn) + 1 FROM jobs WHERE state = 'running'), 0) AS here,
+    coalesce((SELECT max(turn) + 1 FROM jobs
+              WHERE tenant = $10 AND state IN ('queued', 'running')), 0) AS own) AS turns)";
 
 /// What every statement sets by which a job leaves its worker without an outcome: `$1` is now, `$2`
 /// the reason for failing it, or null to return it to the queue.
@@ -69,11 +83,11 @@ impl JobStore for SqlStore {
         let id = random_id(Resource::Job.prefix());
         let key = job.idempotency.as_ref();
         let mut transaction = self.writer.begin().await?;
-        let inserted = query(
+        let inserted = query(format!(
             "INSERT INTO jobs (id, kind, volume, parameters, created_at, idempotency_key,
                                fingerprint, needs, tenant, external_id, labels, webhook,
-                               trace_parent, source, send)
-             SELECT $1, $2, $3, $4, $5, $6, $7, $9, $10, $11, $12, $13, $14, $15, $16
+                               trace_parent, source, send, turn)
+             SELECT $1, $2, $3, $4, $5, $6, $7, $9, $10, $11, $12, $13, $14, $15, $16, {TURN}
              WHERE (SELECT count(*) FROM jobs WHERE state = 'queued') < $8
                AND ($15 IS NOT NULL
                     OR EXISTS (SELECT 1 FROM holdings
@@ -83,7 +97,7 @@ impl JobStore for SqlStore {
                         (SELECT 1 FROM holdings WHERE tenant = $10 AND id = need.value))
              ON CONFLICT (idempotency_key) DO NOTHING
              RETURNING *",
-        )
+        ))
         .bind(&id)
         .bind(&job.kind)
         .bind(job.volume.as_deref().unwrap_or_default())
@@ -159,21 +173,29 @@ impl JobStore for SqlStore {
         .transpose()
     }
 
-    async fn ahead_of(&self, sequences: &[i64]) -> StoreResult<Vec<u64>> {
+    async fn ahead_of(&self, sequences: &[i64]) -> StoreResult<BTreeMap<i64, u64>> {
         // Each part of the queue is counted once, however many jobs are asked for.
         let rows = query(
             "WITH asked AS
-                 (SELECT upto, lag(upto, 1, 0) OVER (ORDER BY upto) AS since
-                  FROM (SELECT CAST(value AS BIGINT) AS upto FROM json_each($1)) AS places)
-             SELECT CAST(sum((SELECT count(*) FROM jobs WHERE state = 'queued'
-                         AND sequence >= since AND sequence < upto)) OVER (ORDER BY upto)
-                    AS BIGINT)
-             FROM asked ORDER BY upto",
+                 (SELECT sequence, turn, lag(turn, 1, -1) OVER (ORDER BY turn, sequence) AS turn_before,
+                         lag(sequence, 1, -1) OVER (ORDER BY turn, sequence) AS sequence_before
+                  FROM jobs
+                  WHERE sequence IN (SELECT CAST(value AS BIGINT) FROM json_each($1)))
+             SELECT sequence,
+                    CAST(sum((SELECT count(*) FROM jobs AS queue
+                              WHERE queue.state = 'queued' AND queue.volume != ''
+                                AND (queue.turn, queue.sequence) >= (turn_before, sequence_before)
+                                AND (queue.turn, queue.sequence) < (asked.turn, asked.sequence)))
+                         OVER (ORDER BY turn, sequence) AS BIGINT)
+             FROM asked",
         )
         .bind(to_json(&sequences)?)
         .fetch_all(&self.readers)
         .await?;
-        rows::all(rows, |row| Ok(rows::unsigned(row.try_get(0)?)))
+        let ahead = rows::all(rows, |row| {
+            Ok((row.try_get(0)?, rows::unsigned(row.try_get(1)?)))
+        })?;
+        Ok(ahead.into_iter().collect())
     }
 
     async fn last_change(&self) -> StoreResult<Option<Timestamp>> {
@@ -214,7 +236,7 @@ impl JobStore for SqlStore {
                         stage = NULL, progress = 0, revision = revision + 1
                  WHERE state = 'queued' AND sequence = (
                      SELECT sequence FROM jobs WHERE state = 'queued' AND volume != ''
-                     ORDER BY sequence LIMIT 1 {lock})
+                     ORDER BY turn, sequence LIMIT 1 {lock})
                  RETURNING *"
             )
         };
