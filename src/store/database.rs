@@ -215,11 +215,13 @@ impl SqlStore {
         }
     }
 
-    /// Whether nothing was ever stored.
+    /// Whether nothing was ever stored, and no process has ever noted here where its files are: the files of
+    /// a first upload lie there before their row does. To be asked of a database on a server.
     pub(super) async fn is_new(&self) -> StoreResult<bool> {
         let row = query(
             "SELECT EXISTS (SELECT 1 FROM holdings) OR EXISTS (SELECT 1 FROM erased)
-                 OR EXISTS (SELECT 1 FROM jobs) OR EXISTS (SELECT 1 FROM intake_groups)",
+                 OR EXISTS (SELECT 1 FROM jobs) OR EXISTS (SELECT 1 FROM intake_groups)
+                 OR EXISTS (SELECT 1 FROM store_place)",
         )
         .fetch_one(&self.readers)
         .await?;

@@ -15,7 +15,7 @@ use ventriform::jobs::{
     Catalogue, Erased, ErasureAgent, ErasureOrder, ErasureReason, FileRecord, News, Resource,
     StoreFault, StoredVolume, Tags, Tenant, random_id,
 };
-use ventriform::store::{Store, StoreSettings};
+use ventriform::store::{OpenError, Store, StoreSettings};
 
 /// Longest time until another process knows of a change. Their own looks come later.
 const SOON: Duration = Duration::from_secs(8);
@@ -54,6 +54,10 @@ impl Shared {
 
     /// The store of a process without a service, which has a data folder of its own.
     async fn store(&self) -> (Store, TempDir) {
+        self.opened().await.unwrap()
+    }
+
+    async fn opened(&self) -> Result<(Store, TempDir), OpenError> {
         let folder = tempfile::tempdir().unwrap();
         let settings = StoreSettings {
             min_free: Some(0),
@@ -61,8 +65,8 @@ impl Shared {
             database: Some(reached(&self.database)),
             ..StoreSettings::default()
         };
-        let store = Store::open_with(folder.path(), settings).await.unwrap();
-        (store, folder)
+        let store = Store::open_with(folder.path(), settings).await?;
+        Ok((store, folder))
     }
 }
 
@@ -351,6 +355,24 @@ async fn one_process_has_the_duty_and_all_hear_the_news() {
     stored.files[0].place = Some("second".into());
     assert!(add(&stored).await.unwrap());
     assert!(second.blobs.copied().is_empty());
+}
+
+#[tokio::test]
+async fn a_process_that_starts_while_the_first_upload_is_on_its_way_is_not_refused() {
+    let shared = Shared::new().await;
+    let first = shared.store().await;
+    // The files of an upload come before its row.
+    let key = format!("{}/volumes/vol_1/0/scan.nii", shared.prefix);
+    shared.s3.write(&key, b"voxels").await;
+    let second = shared.store().await;
+    drop((first, second));
+    // With a database that never saw these files, it is.
+    let other = Shared {
+        database: server().database().await,
+        ..shared
+    };
+    let error = other.opened().await.err().unwrap().to_string();
+    assert!(error.contains("is empty"), "{error}");
 }
 
 #[tokio::test]
