@@ -1,7 +1,7 @@
 // The folder of an evaluation: its tables, figures and pictures.
 
-export type Variant = "reference" | "retiled" | "optimised" | "auto";
-export const VARIANTS: Variant[] = ["reference", "retiled", "optimised", "auto"];
+export type Variant = "reference" | "retiled" | "flipped" | "fitted" | "optimised" | "auto";
+export const VARIANTS: Variant[] = ["reference", "retiled", "flipped", "fitted", "optimised", "auto"];
 
 interface Agreed {
   jaccard: number | null;

@@ -140,7 +140,7 @@ function Table1({ table, shown, onShow }: { table: Line[]; shown: string | null;
   );
 }
 
-const NAMES: Record<Variant, string> = { reference: "reference", retiled: "re-tiled", optimised: "finished", auto: "auto" };
+const NAMES: Record<Variant, string> = { reference: "reference", retiled: "re-tiled", flipped: "flips alone", fitted: "fit alone", optimised: "finished", auto: "auto" };
 
 interface PatientProps {
   opened: Opened;
