@@ -20,13 +20,13 @@ SHELVES = ("volumes", "models", "segmentations", "templates", "readers")
 class Service:
     """The program on a data folder and a free port."""
 
-    def __init__(self, program, data, *arguments, wait=True):
+    def __init__(self, program, data, *arguments, wait=True, prefix=()):
         with socket.socket() as s:
             s.bind(("127.0.0.1", 0))
             self.port = s.getsockname()[1]
         started = time.perf_counter()
         self.log = open(data + ".log", "ab")
-        command = [program, "serve", "--listen", f"127.0.0.1:{self.port}", "--data-dir", data, *arguments]
+        command = [*prefix, program, "serve", "--listen", f"127.0.0.1:{self.port}", "--data-dir", data, *arguments]
         self.process = subprocess.Popen(command, stdout=self.log, stderr=self.log)
         while wait:
             if self.process.poll() is not None:
