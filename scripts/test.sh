@@ -70,6 +70,8 @@ install_external_tools() {
   need npm npm
   need dciodvfy dicom3tools dcmtk
   need chromium chromium fonts-dejavu-core
+  need ip iproute2
+  need kubectl kubernetes-client
   python3 -c 'import ensurepip, venv' 2>/dev/null || need no-such-command python3 python3-venv python3-pip
   if ! cmp -s scripts/requirements.txt "$tools/python.done"; then
     python3 -m venv "$tools/python" &&
@@ -128,6 +130,8 @@ if wait "${running[install]}"; then
   start intake scripts/check_intake.sh
   start pacs scripts/check_pacs.sh
   start s3 scripts/check_s3.sh
+  start chaos "$PYTHON" scripts/chaos.py --program target/debug/ventriform --rounds 10
+  start kubernetes scripts/check_kubernetes.sh
   start dependencies "$PYTHON" scripts/dependencies.py check
   collect formats "formats read by trimesh, vtk and the glTF validator"
   collect geodesics "geodesics against pygeodesic"
@@ -139,6 +143,8 @@ if wait "${running[install]}"; then
   collect intake "images received from dcmtk, pynetdicom and dicomweb-client"
   collect pacs "series fetched from Orthanc, objects delivered to it"
   collect s3 "files in S3 by moto"
+  collect chaos "ten faults of replicas, database and store"
+  collect kubernetes "manifests against the schemas of Kubernetes"
   collect dependencies "licences, sources and bill of materials"
 else
   cat "$tools/install.log"
