@@ -687,7 +687,8 @@ async function main() {
       assert.match(await page.textContent(".patient"), /Patient p2/);
       await page.getByRole("button", { name: "Next" }).click();
       await page.waitForFunction(() => /Patient p1/.test(document.querySelector(".patient").textContent));
-      assert.equal(await page.locator(".chart polyline").count(), 3);
+      // The reference, re-tiled, flips alone, fit alone, finished.
+      assert.equal(await page.locator(".chart polyline").count(), 5);
       await page.waitForTimeout(300);
       await look(page, `evaluation-${width}`);
       assert.deepEqual(asked.filter(one => !/GET .*\/v1\/jobs/.test(one)), []);
