@@ -120,7 +120,14 @@ class Bench:
 
     def full_tables(self):
         self.lists("few jobs")
+        count = "SELECT xact_commit, pg_current_wal_lsn() - '0/0' FROM pg_stat_database WHERE datname = 'ventriform'"
+        time.sleep(1)
+        start = [float(part) for part in self.postgres.query(count)[0]]
         before = self.jobs_per_second(2, 101)
+        time.sleep(1)
+        end = [float(part) for part in self.postgres.query(count)[0]]
+        print(f"a job: {(end[0] - start[0]) / self.options.jobs:.1f} transactions (idle polls among them), "
+              f"{(end[1] - start[1]) / self.options.jobs / 1024:.1f} KiB of write-ahead log", flush=True)
         self.copies("succeeded", self.options.rows)
         table, indexes, rows = map(int, self.postgres.query("SELECT pg_table_size('jobs'), pg_indexes_size('jobs'), count(*) FROM jobs")[0])
         print(f"{rows} jobs: {table / rows:.0f} bytes a row, {indexes / rows:.0f} bytes of indexes", flush=True)
