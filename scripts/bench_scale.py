@@ -9,9 +9,9 @@ One replica that answers requests, over PostgreSQL and an S3 store (moto).
 3. Lists, figures and jobs per second with few jobs and with ROWS ended ones in the table, and its size.
 Prints medians; quiet machines only. Needs what scripts/chaos.py needs.
 """
-import argparse, gzip, http.client, json, os, shutil, statistics, subprocess, sys, tempfile, time
+import argparse, gzip, http.client, json, os, shutil, statistics, tempfile, time
 
-from chaos import Postgres, free_port, run
+from chaos import Postgres, run, s3_server
 from crash_rounds import ROOT, Service
 
 
@@ -22,13 +22,7 @@ class Bench:
         with open(f"{folder}/spect.nii.gz", "rb") as file:
             self.scan = gzip.decompress(file.read())
         self.postgres = Postgres(folder, ["127.0.0.1"])
-        self.store_port = free_port()
-        self.store = subprocess.Popen([sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(self.store_port)],
-                                      stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        for _ in range(300):
-            if subprocess.run(["curl", "-fs", "-X", "PUT", f"http://127.0.0.1:{self.store_port}/hearts"], capture_output=True).returncode == 0:
-                break
-            time.sleep(0.1)
+        self.store, self.store_port = s3_server()
         os.environ |= {"AWS_ACCESS_KEY_ID": "bench", "AWS_SECRET_ACCESS_KEY": "bench", "AWS_REGION": "us-east-1",
                        "AWS_ENDPOINT_URL": f"http://127.0.0.1:{self.store_port}"}
         self.count = 0

@@ -35,6 +35,19 @@ def run(*command, **options):
     return subprocess.run(command, check=True, capture_output=True, text=True, **options).stdout
 
 
+def s3_server():
+    """Starts moto with the bucket `hearts`; the process and its port."""
+    port = free_port()
+    process = subprocess.Popen([sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)],
+                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    for _ in range(300):
+        if subprocess.run(["curl", "-fs", "-X", "PUT", f"http://127.0.0.1:{port}/hearts"], capture_output=True).returncode == 0:
+            return process, port
+        time.sleep(0.1)
+    process.kill()
+    raise SystemExit("moto does not start")
+
+
 class Postgres:
     """A database server of its own, on loopback and on the address that the other namespace sees."""
 
@@ -161,13 +174,7 @@ class Chaos:
             self.kinds = [kind for kind in self.kinds if kind != "partition"]
         near = self.far_address()
         self.postgres = Postgres(self.folder, ["127.0.0.1", *near])
-        port = free_port()
-        self.store = subprocess.Popen([sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)],
-                                      stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        for _ in range(300):
-            if subprocess.run(["curl", "-fs", "-X", "PUT", f"http://127.0.0.1:{port}/hearts"], capture_output=True).returncode == 0:
-                break
-            time.sleep(0.1)
+        self.store, port = s3_server()
         self.proxy = Proxy(port, near)
         os.environ |= {"AWS_ACCESS_KEY_ID": "chaos", "AWS_SECRET_ACCESS_KEY": "chaos", "AWS_REGION": "us-east-1"}
         for name in ("api-0", "api-1", "worker-0", "worker-1"):

@@ -63,7 +63,7 @@ def check_container(item, pod, container):
         if source["configMapRef"]["name"] not in maps:
             say(item, f"there is no map {source['configMapRef']['name']}")
     # The program reads the flags and the variables, or says which one it does not know.
-    variables = {name: value for name, value in settings.items()}
+    variables = dict(settings)
     for variable in container.get("env", []):
         variables[variable["name"]] = "postgres://user@db/ventriform" if variable["name"] == "VENTRIFORM_DATABASE" else "some"
     unknown = [name for name in variables if name.startswith("VENTRIFORM_") and not known(name)]
