@@ -127,6 +127,10 @@ struct Node {
     count: u32,
 }
 
+/// A leaf of a tree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Leaf(u32);
+
 /// The tree. It has its own copy of the corners, in the order of the leaves, which are therefore
 /// close together in memory.
 #[derive(Debug, Clone)]
@@ -138,6 +142,8 @@ pub struct Bvh {
     slots: Vec<u32>,
     /// The corners of the triangles, in the order of the leaves.
     corners: Vec<[Vec3; 3]>,
+    /// The boxes of the triangles, in the same order.
+    boxes: Vec<Aabb>,
 }
 
 impl Bvh {
@@ -151,12 +157,14 @@ impl Bvh {
             .map(|t| t.map(|v| vertices[v as usize]))
             .collect();
         let centroids: Vec<Vec3> = corners.iter().map(|[a, b, c]| (a + b + c) / 3.0).collect();
+        let boxes: Vec<Aabb> = corners.iter().map(Aabb::of).collect();
         let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
         let mut nodes = Vec::with_capacity(triangles.len().max(1));
         if !order.is_empty() {
-            build(&mut nodes, &mut order, 0, &corners, &centroids);
+            build(&mut nodes, &mut order, 0, &boxes, &centroids);
         }
         let corners = order.iter().map(|&t| corners[t as usize]).collect();
+        let boxes = order.iter().map(|&t| boxes[t as usize]).collect();
         let mut slots = vec![0; order.len()];
         for (slot, &t) in (0..).zip(&order) {
             slots[t as usize] = slot;
@@ -166,6 +174,7 @@ impl Bvh {
             order,
             slots,
             corners,
+            boxes,
         }
     }
 
@@ -241,13 +250,12 @@ impl Bvh {
         admits: &impl Fn(u32) -> bool,
         best: &mut Option<Closest>,
     ) {
-        let first = leaf.first_or_right as usize;
-        for slot in first..first + leaf.count as usize {
+        for slot in self.slots_of(leaf) {
             let triangle = self.order[slot];
             let bound = best.map_or(f64::INFINITY, |found| found.squared_distance);
             // The triangle's own box is faster to test than its closest point, and rules out most
             // triangles.
-            if Aabb::of(&self.corners[slot]).squared_distance(p) > bound || !admits(triangle) {
+            if self.boxes[slot].squared_distance(p) > bound || !admits(triangle) {
                 continue;
             }
             let found = self.closest_in(slot, p);
@@ -275,10 +283,59 @@ impl Bvh {
         }
     }
 
-    /// Calls `visit` with every triangle whose bounding box overlaps `aabb`, in the order of the
-    /// tree.
-    pub fn for_each_overlapping(&self, aabb: &Aabb, mut visit: impl FnMut(u32)) {
-        self.for_each_where(|other| other.overlaps(aabb), &mut visit);
+    /// The leaves, in the order of the tree.
+    pub fn leaves(&self) -> Vec<Leaf> {
+        (0..self.nodes.len() as u32)
+            .filter(|&n| self.nodes[n as usize].count > 0)
+            .map(Leaf)
+            .collect()
+    }
+
+    /// Calls `visit` with the pairs of triangles, lower index first, whose bounding boxes overlap and of which
+    /// one is in `leaf` and the other in it, too, or in a later leaf. Over all leaves that is every such
+    /// pair once. One search for all triangles of a leaf is several times as fast as one for each.
+    pub fn for_each_pair_from(&self, leaf: Leaf, mut visit: impl FnMut(u32, u32)) {
+        let Leaf(own) = leaf;
+        let slots = self.slots_of(&self.nodes[own as usize]);
+        let aabb = self.nodes[own as usize].aabb;
+        let mut stack = [0u32; 64];
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            let index = stack[height];
+            let node = &self.nodes[index as usize];
+            if !node.aabb.overlaps(&aabb) {
+                continue;
+            }
+            if node.count == 0 {
+                stack[height] = node.first_or_right;
+                height += 1;
+                // The left half ends before the right one begins: earlier leaves have had their turn.
+                if node.first_or_right > own {
+                    stack[height] = index + 1;
+                    height += 1;
+                }
+                continue;
+            }
+            for other in self.slots_of(node) {
+                let other_box = &self.boxes[other];
+                if !other_box.overlaps(&aabb) {
+                    continue;
+                }
+                for slot in slots.clone() {
+                    if slot < other && self.boxes[slot].overlaps(other_box) {
+                        let (s, t) = (self.order[slot], self.order[other]);
+                        visit(s.min(t), s.max(t));
+                    }
+                }
+            }
+        }
+    }
+
+    /// The places of a leaf's triangles in `order`.
+    fn slots_of(&self, leaf: &Node) -> std::ops::Range<usize> {
+        let first = leaf.first_or_right as usize;
+        first..first + leaf.count as usize
     }
 
     /// Calls `visit` with every triangle whose bounding box the ray from `start` in `direction`
@@ -288,19 +345,13 @@ impl Bvh {
             start: *start,
             inverse: direction.map(|x| 1.0 / x),
         };
-        self.for_each_where(|aabb| ray.meets(aabb), &mut visit);
-    }
-
-    /// Calls `visit` with every triangle for whose bounding box `admits` is true, in the order of
-    /// the tree.
-    fn for_each_where(&self, admits: impl Fn(&Aabb) -> bool, visit: &mut impl FnMut(u32)) {
         let mut stack = [0u32; 64];
         let mut height = usize::from(!self.nodes.is_empty());
         while height > 0 {
             height -= 1;
             let index = stack[height];
             let node = &self.nodes[index as usize];
-            if !admits(&node.aabb) {
+            if !ray.meets(&node.aabb) {
                 continue;
             }
             if node.count == 0 {
@@ -309,9 +360,8 @@ impl Bvh {
                 height += 2;
                 continue;
             }
-            let first = node.first_or_right as usize;
-            for slot in first..first + node.count as usize {
-                if admits(&Aabb::of(&self.corners[slot])) {
+            for slot in self.slots_of(node) {
+                if ray.meets(&self.boxes[slot]) {
                     visit(self.order[slot]);
                 }
             }
@@ -324,19 +374,18 @@ fn build(
     nodes: &mut Vec<Node>,
     order: &mut [u32],
     offset: usize,
-    corners: &[[Vec3; 3]],
+    boxes: &[Aabb],
     centroids: &[Vec3],
 ) {
-    let aabb = order.iter().fold(Aabb::empty(), |aabb, &t| {
-        aabb.union(&Aabb::of(&corners[t as usize]))
-    });
     let index = nodes.len();
     nodes.push(Node {
-        aabb,
+        aabb: Aabb::empty(),
         first_or_right: offset as u32,
         count: order.len() as u32,
     });
     if order.len() <= LEAF_SIZE {
+        let all = order.iter().map(|&t| &boxes[t as usize]);
+        nodes[index].aabb = all.fold(Aabb::empty(), |aabb, other| aabb.union(other));
         return;
     }
     let spread = Aabb::of(order.iter().map(|&t| &centroids[t as usize]));
@@ -350,13 +399,13 @@ fn build(
     let (left, right) = order.split_at_mut(middle);
     let right_index;
     if middle < PARALLEL_SIZE {
-        build(nodes, left, offset, corners, centroids);
+        build(nodes, left, offset, boxes, centroids);
         right_index = nodes.len();
-        build(nodes, right, offset + middle, corners, centroids);
+        build(nodes, right, offset + middle, boxes, centroids);
     } else {
         let build_apart = |order, offset| {
             let mut nodes = Vec::new();
-            build(&mut nodes, order, offset, corners, centroids);
+            build(&mut nodes, order, offset, boxes, centroids);
             nodes
         };
         let (left, right) = rayon::join(
@@ -367,8 +416,11 @@ fn build(
         right_index = nodes.len();
         append(nodes, right);
     }
-    nodes[index].first_or_right = right_index as u32;
-    nodes[index].count = 0;
+    nodes[index] = Node {
+        aabb: nodes[index + 1].aabb.union(&nodes[right_index].aabb),
+        first_or_right: right_index as u32,
+        count: 0,
+    };
 }
 
 /// Appends a subtree that was built separately.
@@ -409,6 +461,26 @@ mod tests {
                 assert_eq!(bvh.closest_from(&p, Some(guess), |_| true), Some(found));
             }
         }
+    }
+
+    #[test]
+    fn the_pairs_from_all_leaves_are_the_boxes_that_touch() {
+        let mesh = shapes::torus(9.0, 3.0, 40, 17);
+        let bvh = Bvh::new(&mesh.vertices, &mesh.triangles);
+        let mut found = Vec::new();
+        for leaf in bvh.leaves() {
+            bvh.for_each_pair_from(leaf, |s, t| found.push((s, t)));
+        }
+        found.sort_unstable();
+        let aabb = |t: u32| Aabb::of(&mesh.corners(t as usize));
+        let all = 0..mesh.triangles.len() as u32;
+        let expected: Vec<(u32, u32)> = (all.clone())
+            .flat_map(|s| all.clone().map(move |t| (s, t)))
+            .filter(|&(s, t)| s < t && aabb(s).overlaps(&aabb(t)))
+            .collect();
+        assert!(expected.len() > mesh.triangles.len());
+        assert_eq!(found, expected);
+        assert!(Bvh::new(&[], &[]).leaves().is_empty());
     }
 
     #[test]
@@ -457,25 +529,5 @@ mod tests {
         }
         assert!(met > 80, "{met}");
         assert!(asked < 300 * mesh.triangles.len() / 20, "{asked}");
-    }
-
-    #[test]
-    fn overlap_finds_exactly_the_boxes_that_touch() {
-        let mesh = shapes::icosphere(5.0, 3);
-        let bvh = Bvh::new(&mesh.vertices, &mesh.triangles);
-        let window = Aabb {
-            min: Vec3::new(1.0, 1.0, -9.0),
-            max: Vec3::new(3.0, 4.0, 9.0),
-        };
-        let mut found = Vec::new();
-        bvh.for_each_overlapping(&window, |t| found.push(t));
-        found.sort_unstable();
-        let expected: Vec<u32> = (0..mesh.triangles.len() as u32)
-            .filter(|&t| {
-                Aabb::of(&mesh.triangles[t as usize].map(|v| mesh.vertices[v as usize]))
-                    .overlaps(&window)
-            })
-            .collect();
-        assert_eq!(found, expected);
     }
 }

@@ -14,10 +14,13 @@ mod pair;
 use rayon::prelude::*;
 
 use super::{FaceId, TriMesh};
-use crate::geometry::bvh::{Aabb, Bvh};
+use crate::geometry::bvh::Bvh;
 
 pub use index::IntersectionIndex;
 pub use pair::triangles_intersect;
+
+/// Fewest leaves of the tree per parallel task.
+const LEAVES_PER_TASK: usize = 32;
 
 /// The pairs of triangles that intersect in more than shared vertices and edges: each pair
 /// ascending, the list sorted. Touching and coplanar overlap count.
@@ -26,26 +29,23 @@ pub use pair::triangles_intersect;
 /// Positions must be finite.
 pub fn self_intersections(mesh: &TriMesh) -> Vec<[FaceId; 2]> {
     let bvh = Bvh::new(&mesh.vertices, &mesh.triangles);
-    (0..mesh.triangles.len() as u32)
-        .into_par_iter()
-        .with_min_len(64)
-        .flat_map_iter(|s| {
-            let s = FaceId(s);
-            let (ids, corners) = (mesh.corner_ids(s), mesh.corners(s.index()));
+    let corners = |t: FaceId| (mesh.corner_ids(t), mesh.corners(t.index()));
+    let mut found: Vec<[FaceId; 2]> = (bvh.leaves().into_par_iter())
+        .with_min_len(LEAVES_PER_TASK)
+        .flat_map_iter(|leaf| {
             let mut found = Vec::new();
-            bvh.for_each_overlapping(&Aabb::of(&corners), |t| {
-                let t = FaceId(t);
-                let others = || (mesh.corner_ids(t), mesh.corners(t.index()));
-                let intersect =
-                    |(t_ids, t): ([_; 3], _)| triangles_intersect(ids, &corners, t_ids, &t);
-                if s < t && intersect(others()) {
+            bvh.for_each_pair_from(leaf, |s, t| {
+                let (s, t) = (FaceId(s), FaceId(t));
+                let ((s_ids, s_corners), (t_ids, t_corners)) = (corners(s), corners(t));
+                if triangles_intersect(s_ids, &s_corners, t_ids, &t_corners) {
                     found.push([s, t]);
                 }
             });
-            found.sort_unstable();
             found
         })
-        .collect()
+        .collect();
+    found.sort_unstable();
+    found
 }
 
 #[cfg(test)]

@@ -72,10 +72,26 @@ fn meet_beyond_vertex(s: &[Vec3; 3], t: &[Vec3; 3]) -> bool {
         let first = side(s, &t[1]);
         first != 0 && side(s, &t[2]) == first
     };
-    if apart(s, t) || apart(t, s) {
+    if plainly_apart(s, t) || apart(s, t) || apart(t, s) {
         return false;
     }
     opposite_edge_meets(s, t) || opposite_edge_meets(t, s)
+}
+
+/// Whether a plane through the shared first corner has one triangle on either side, by so much that
+/// rounding cannot matter. So it is for most neighbours on a surface, and quicker to see than by
+/// exact predicates.
+fn plainly_apart(s: &[Vec3; 3], t: &[Vec3; 3]) -> bool {
+    let from_vertex = |t: &[Vec3; 3]| [t[1] - t[0], t[2] - t[0]];
+    let ([a, b], [c, d]) = (from_vertex(s), from_vertex(t));
+    let (towards_s, towards_t) = (a + b, c + d);
+    let normal = towards_s * towards_t.norm() - towards_t * towards_s.norm();
+    // Rounding of the differences and of the product is less than 1e-15 of the lengths.
+    let beyond = |v: Vec3| {
+        let height = normal.dot(&v);
+        height * height.abs() > 1e-20 * normal.norm_squared() * v.norm_squared()
+    };
+    beyond(a) && beyond(b) && beyond(-c) && beyond(-d)
 }
 
 fn opposite_edge_meets(s: &[Vec3; 3], t: &[Vec3; 3]) -> bool {
