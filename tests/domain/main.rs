@@ -1,10 +1,10 @@
 //! The stages on real and simulated volumes, one file per stage or promise.
 //!
-//! One binary: linking the library once instead of nineteen times takes minutes off a build.
-
-#![cfg(feature = "service")]
+//! One binary: linking the library once instead of nineteen times takes minutes off a build. What calls
+//! the program or the service's advice needs the feature; the rest tests the library alone, too.
 
 mod volume_dicom;
+#[cfg(feature = "service")]
 mod volume_odd_nifti;
 
 mod surface_cohort;
@@ -26,14 +26,18 @@ mod deform_varied;
 mod doubt;
 
 mod containers;
+#[cfg(feature = "service")]
 mod edges;
 mod hot_neighbours;
 mod orientation;
+#[cfg(feature = "service")]
 mod pipeline;
 mod quality;
+#[cfg(feature = "service")]
 mod segment;
 
 mod reader;
 
+#[cfg(feature = "service")]
 mod evaluate_cohort;
 mod evaluate_reference;
