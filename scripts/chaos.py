@@ -456,6 +456,21 @@ class Chaos:
         subprocess.run(["ip", "netns", "del", self.space], capture_output=True)
 
 
+def simulated_scan(program, folder):
+    """A simulated scan, as the bytes of a NIfTI file."""
+    run(program, "phantom", "--size", "64", "--spacing", "6.4", "-o", folder)
+    with open(f"{folder}/spect.nii.gz", "rb") as file:
+        return gzip.decompress(file.read())
+
+
+def status(figures, folder):
+    """The exit status: 1 if a promise was broken, which keeps the folder to look at."""
+    found = any(figures[fault] for fault in ("lost", "corrupt", "failed", "twice", "differs"))
+    if not found:
+        shutil.rmtree(folder, ignore_errors=True)
+    return int(found)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default=os.path.join(ROOT, "target/release/ventriform"))
@@ -467,9 +482,7 @@ def main():
     signal.signal(signal.SIGTERM, lambda *_: sys.exit("stopped"))
     folder = tempfile.mkdtemp(prefix="ventriform-chaos-")
     os.chmod(folder, 0o755)
-    run(options.program, "phantom", "--size", "64", "--spacing", "6.4", "-o", folder)
-    with open(f"{folder}/spect.nii.gz", "rb") as file:
-        scan = gzip.decompress(file.read())
+    scan = simulated_scan(options.program, folder)
     chaos = Chaos(options, folder, scan)
     started = time.time()
     try:
@@ -485,10 +498,7 @@ def main():
     finally:
         chaos.tear_down()
     print(json.dumps(chaos.figures | {"faults": chaos.faults}))
-    found = any(chaos.figures[fault] for fault in ("lost", "corrupt", "failed", "twice", "differs"))
-    if not found:
-        shutil.rmtree(folder, ignore_errors=True)
-    return int(found)
+    return status(chaos.figures, folder)
 
 
 if __name__ == "__main__":

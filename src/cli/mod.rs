@@ -14,6 +14,7 @@ mod inspect;
 mod keys;
 mod library;
 mod measure;
+mod migrate;
 mod output;
 mod parameter_args;
 mod phantom;
@@ -62,6 +63,7 @@ enum Command {
     Compute(serve::ComputeArgs),
     Doctor(doctor::DoctorArgs),
     Backup(doctor::BackupArgs),
+    Migrate(migrate::MigrateArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Example: ventriform completions bash > ventriform.bash")]
     Completions {
@@ -90,6 +92,7 @@ pub fn main() -> ExitCode {
         Command::Healthcheck(args) => serve::check_health(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::Backup(args) => doctor::back_up(&args),
+        Command::Migrate(args) => migrate::run(&args),
         Command::Completions { shell } => {
             clap_complete::generate(
                 shell,

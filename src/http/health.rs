@@ -3,12 +3,13 @@
 use super::app::App;
 use super::metrics::MetricReadings;
 use super::openapi::ListProblems;
-use super::problem::{Answer, Problem};
+use super::problem::{Answer, MEDIA_TYPE, Problem, ProblemBody};
+use super::readiness::{Check, why_unready};
 use super::request::{query_pairs, refuse_unknown};
 use axum::Json;
 use axum::extract::{RawQuery, State};
 use axum::http::{StatusCode, header};
-use axum::response::IntoResponse;
+use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -20,6 +21,60 @@ pub struct Health {
     status: String,
     /// The program's version.
     version: String,
+}
+
+/// Whether the service can accept work.
+#[derive(Serialize, ToSchema)]
+pub struct Ready {
+    /// Always `ok`.
+    #[schema(example = "ok")]
+    status: String,
+    /// The program's version.
+    version: String,
+    /// What the service depends on.
+    checks: Vec<Dependency>,
+}
+
+/// Why the service cannot accept work.
+#[derive(Serialize, ToSchema)]
+pub struct NotReady {
+    /// The problem.
+    #[serde(flatten)]
+    problem: ProblemBody,
+    /// What the service depends on; absent while it shuts down.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(required = false)]
+    checks: Vec<Dependency>,
+}
+
+/// Something that the service depends on.
+#[derive(Serialize, ToSchema)]
+pub struct Dependency {
+    /// `database`, `files`, `disk`, or `workers`: processes that compute jobs.
+    #[schema(example = "database")]
+    name: &'static str,
+    /// `ok` or `failing`.
+    #[schema(example = "ok")]
+    status: &'static str,
+    /// Whether no work can be accepted without it.
+    required: bool,
+    /// What is wrong with it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    detail: Option<&'static str>,
+}
+
+impl From<&Check> for Dependency {
+    fn from(check: &Check) -> Self {
+        Self {
+            name: check.name,
+            status: match check.fault {
+                None => "ok",
+                Some(_) => "failing",
+            },
+            required: check.required,
+            detail: check.fault,
+        }
+    }
 }
 
 fn healthy() -> Health {
@@ -38,22 +93,41 @@ pub async fn alive(RawQuery(query): RawQuery) -> Answer<Json<Health>> {
 }
 
 /// Check that the service can accept work
+///
+/// Names everything that the service depends on, with its own status. 503 if something is failing without which
+/// no work can be accepted; jobs are accepted while no worker runs.
 #[utoipa::path(get, path = "/readyz", tag = "operations",
-    responses((status = 200, description = "It can", body = Health),
-        (status = 503, description = "It cannot", body = super::problem::ProblemBody,
+    responses((status = 200, description = "It can", body = Ready),
+        (status = 503, description = "It cannot", body = NotReady,
             content_type = "application/problem+json"),
         ListProblems))]
-pub async fn ready(State(app): State<App>, RawQuery(query): RawQuery) -> Answer<Json<Health>> {
+pub async fn ready(State(app): State<App>, RawQuery(query): RawQuery) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let unready = |why: &str| {
-        Problem::new(StatusCode::SERVICE_UNAVAILABLE, "not-ready", why)
-            .header(header::RETRY_AFTER, "5")
-    };
     if app.closing.is_cancelled() {
-        return Err(unready("The service is shutting down."));
+        return Ok(unready("The service is shutting down.", Vec::new()));
     }
-    app.readiness.check(&app.queue).await.map_err(unready)?;
-    Ok(Json(healthy()))
+    let found = app.readiness.check(&app.queue).await;
+    let checks = found.iter().map(Dependency::from).collect();
+    if let Some(why) = why_unready(&found) {
+        return Ok(unready(why, checks));
+    }
+    let Health { status, version } = healthy();
+    let ready = Ready {
+        status,
+        version,
+        checks,
+    };
+    Ok(Json(ready).into_response())
+}
+
+fn unready(why: &str, checks: Vec<Dependency>) -> Response {
+    let problem = Problem::new(StatusCode::SERVICE_UNAVAILABLE, "not-ready", why).into_body();
+    let headers = [
+        (header::CONTENT_TYPE, MEDIA_TYPE),
+        (header::RETRY_AFTER, "5"),
+    ];
+    let body = Json(NotReady { problem, checks });
+    (StatusCode::SERVICE_UNAVAILABLE, headers, body).into_response()
 }
 
 /// Read the metrics
@@ -69,7 +143,7 @@ pub async fn metrics(State(app): State<App>, RawQuery(query): RawQuery) -> Answe
         backlog: app.hooks.store.backlog().await?,
         sent: app.hooks.dispatcher.counts(),
         archives: app.archives.read().await?,
-        ready: app.readiness.check(&app.queue).await.is_ok(),
+        ready: app.readiness.is_ready(&app.queue).await,
         space: app.queue.blobs.space(),
         settings: &app.settings,
         now: app.queue.clock.now(),

@@ -85,7 +85,8 @@ impl ModelLinks {
         (openapi::UploadForm = "multipart/form-data"),
         (Vec<u8> = "multipart/related"),
     )),
-    params(openapi::ModelQuery, openapi::TagParameters, openapi::IdempotencyHeader,
+    params(openapi::ModelQuery, openapi::TagParameters, openapi::PriorityParameter,
+        openapi::IdempotencyHeader,
         openapi::PreferHeader, openapi::WebhookInputs),
     responses(openapi::MeshAnswer, WaitAnswers, FileProblems, UploadProblems))]
 pub async fn create_model(

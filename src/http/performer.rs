@@ -145,6 +145,7 @@ async fn file(app: &App, mut item: Workitem) -> Result<(), StoreError> {
         by: "procedure",
         tenant: &procedure.tenant,
         kind: &procedure.kind,
+        priority: item.priority(),
         parameters: &procedure.parameters,
         volume: None,
         order,

@@ -131,7 +131,8 @@ fn offers() -> Vec<Offer> {
         (openapi::SegmentationForm = "multipart/form-data"),
         (Vec<u8> = "multipart/related"),
     )),
-    params(openapi::SegmentationQuery, openapi::TagParameters, openapi::IdempotencyHeader,
+    params(openapi::SegmentationQuery, openapi::TagParameters, openapi::PriorityParameter,
+        openapi::IdempotencyHeader,
         openapi::PreferHeader, openapi::WebhookInputs),
     responses(openapi::SegmentationAnswer, WaitAnswers, FileProblems, UploadProblems))]
 pub async fn create_segmentation(

@@ -7,7 +7,7 @@ use super::jobs::filing::new_job;
 use super::problem::Problem;
 use super::upload::Bundle;
 use crate::intake::{IntakeGroup, MakeError, Rule, VolumeMaker};
-use crate::jobs::{Failure, Fault, Filed, LocalFile, Tags, Tenant};
+use crate::jobs::{Failure, Fault, Filed, LocalFile, Priority, Tags, Tenant};
 use async_trait::async_trait;
 use futures::TryStreamExt;
 use serde_json::{Map, Value};
@@ -51,6 +51,7 @@ impl VolumeMaker for App {
             by: "rule",
             tenant: &group.origin.tenant,
             kind: &rule.kind,
+            priority: Priority::default(),
             parameters: &rule.parameters,
             volume: Some(volume),
             order: order(&rule.send, rule.to.as_deref()),
@@ -68,6 +69,8 @@ pub struct UnattendedJob<'a> {
     pub tenant: &'a Tenant,
     /// Its kind.
     pub kind: &'a str,
+    /// How urgent it is.
+    pub priority: Priority,
     /// Its parameters.
     pub parameters: &'a Map<String, Value>,
     /// Its volume, unless `order` names a source.
@@ -99,6 +102,7 @@ pub async fn file_unattended(app: &App, job: UnattendedJob<'_>) -> Result<String
     let filing = Filing {
         tenant: tenant.clone(),
         tags: Tags::default(),
+        priority: job.priority,
         key: Some(key.clone()),
         webhook: None,
         source,

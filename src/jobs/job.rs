@@ -1,7 +1,7 @@
 //! A job and its states: `queued -> running -> succeeded | failed | cancelled`, and from
 //! `running` back to `queued` when its worker was lost.
 
-use super::{Failure, Tags, Tenant, Timestamp};
+use super::{Failure, Priority, Tags, Tenant, Timestamp};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -67,6 +67,8 @@ pub struct Job {
     pub tags: Tags,
     /// The kind of work: `model`, `segmentation`.
     pub kind: String,
+    /// How urgent it is.
+    pub priority: Priority,
     /// Id of the volume to work on; `None` until it has come from [`Job::source`].
     pub volume: Option<String>,
     /// The series in an archive that the volume comes from.
@@ -145,6 +147,8 @@ pub struct NewJob {
     pub tags: Tags,
     /// See [`Job::kind`].
     pub kind: String,
+    /// See [`Job::priority`].
+    pub priority: Priority,
     /// See [`Job::volume`]; `None` if there is a source.
     pub volume: Option<String>,
     /// See [`Job::source`].

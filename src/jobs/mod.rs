@@ -51,6 +51,7 @@ mod ids;
 mod isolation;
 mod job;
 mod observer;
+mod priority;
 mod queue;
 mod resource;
 mod storage;
@@ -65,6 +66,7 @@ pub use ids::{content_id, random_id, random_key, volume_id};
 pub use isolation::Isolation;
 pub use job::{Filed, Idempotency, Job, JobState, JobWebhook, NewJob, SendOrder, SeriesSource};
 pub use observer::JobObserver;
+pub use priority::Priority;
 pub use queue::{
     Custodian, Hold, Queue, QueuePosition, QueueSettings, RetentionAges, Swept, TemplateSource,
     Upkeep, recover_after_crash,

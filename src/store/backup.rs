@@ -11,6 +11,7 @@
 
 use super::blobs::{self, RECEIVED, RECORD, STAGING};
 use super::content;
+use super::copied::Copied;
 use super::database::SqlStore;
 use super::doctor::{DoctorError, names};
 use super::sqlite;
@@ -87,19 +88,27 @@ pub async fn backup(folder: &Path, target: &Path) -> Result<Backup, DoctorError>
     }
     fs::rename(&snapshot, target.join(DATABASE))?;
     blobs::sync(target)?;
+    keep_only(target, |name| {
+        kept.contains(name) || received.contains(name)
+    })?;
+    Ok(done)
+}
+
+/// Deletes the files of other items, and other received objects, than those to be kept.
+pub(super) fn keep_only(target: &Path, is_kept: impl Fn(&str) -> bool) -> io::Result<()> {
     for kind in Resource::WITH_FILES {
         for id in names(&target.join(kind.plural()))? {
-            if !kept.contains(&id) {
+            if !is_kept(&id) {
                 fs::remove_dir_all(target.join(kind.plural()).join(id))?;
             }
         }
     }
     for name in names(&target.join(RECEIVED))? {
-        if !received.contains(&name) {
+        if !is_kept(&name) {
             fs::remove_file(target.join(RECEIVED).join(name))?;
         }
     }
-    Ok(done)
+    Ok(())
 }
 
 /// Copies the files of every row. Returns the ids of the items that the target has.
@@ -142,38 +151,52 @@ async fn copy_received(
 ) -> Result<BTreeSet<String>, DoctorError> {
     let mut kept = BTreeSet::new();
     for (name, sha256) in rows.waiting_files().await? {
-        let place = target.join(RECEIVED).join(&name);
-        if !place.exists() {
-            let draft = target.join(STAGING).join(&name);
-            match fs::copy(folder.join(RECEIVED).join(&name), &draft) {
-                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-                other => {
-                    other?;
-                    blobs::sync(&draft)?;
-                    fs::rename(&draft, &place)?;
-                }
-            }
-        }
-        let hash = File::open(&place).and_then(|file| content::hash(&file));
-        match hash.is_ok_and(|hash| hash == sha256) {
-            true => {
+        match copy_object(folder, target, &name, &sha256)? {
+            // It became part of a volume meanwhile, or is damaged.
+            Copied::Not(_) => rows.forget_received(&name).await?,
+            Copied::Now | Copied::Before => {
                 kept.insert(name);
             }
-            // It became part of a volume meanwhile, or is damaged.
-            false => rows.forget_received(&name).await?,
         }
     }
     blobs::sync(&target.join(RECEIVED))?;
     Ok(kept)
 }
 
-enum Copied {
-    Now,
-    Before,
-    Not(String),
+/// Copies a received object, unless the target has it.
+pub(super) fn copy_object(
+    folder: &Path,
+    target: &Path,
+    name: &str,
+    sha256: &str,
+) -> io::Result<Copied> {
+    let is_whole = |place: &Path| {
+        let hash = File::open(place).and_then(|file| content::hash(&file));
+        hash.is_ok_and(|hash| hash == sha256)
+    };
+    let place = target.join(RECEIVED).join(name);
+    if is_whole(&place) {
+        return Ok(Copied::Before);
+    }
+    let draft = target.join(STAGING).join(name);
+    match fs::copy(folder.join(RECEIVED).join(name), &draft) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            return Ok(Copied::Not("it is missing".into()));
+        }
+        other => other?,
+    };
+    if !is_whole(&draft) {
+        return Ok(Copied::Not(
+            "it has another content than was received".into(),
+        ));
+    }
+    blobs::sync(&draft)?;
+    fs::rename(&draft, &place)?;
+    Ok(Copied::Now)
 }
 
-fn copy_item(folder: &Path, target: &Path, record: &ItemRecord) -> io::Result<Copied> {
+/// Copies the files of an item, unless the target has them.
+pub(super) fn copy_item(folder: &Path, target: &Path, record: &ItemRecord) -> io::Result<Copied> {
     let shelf = blobs::shelf_path(record.id());
     let (from, to) = (folder.join(&shelf), target.join(&shelf));
     if is_whole(&to, record) {

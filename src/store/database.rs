@@ -139,8 +139,7 @@ impl Query {
             Writing::Sqlite(_) => self.write_optional(writing).await,
             Writing::Postgres(writer) => {
                 let mut connection = writer.acquire().await?;
-                let target = Target::Postgres(&mut connection);
-                Ok(self.fetch_all(target).await?.into_iter().next())
+                Ok(self.fetch_alone(&mut connection).await?.into_iter().next())
             }
         }
     }

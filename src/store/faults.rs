@@ -45,6 +45,7 @@ fn cause(error: &sqlx::Error) -> StoreFault {
 pub(super) fn of_postgres(error: sqlx::Error) -> StoreError {
     let cause = match &error {
         _ if connection_was_lost(&error) => StoreFault::Away,
+        _ if plan_is_stale(&error) => StoreFault::Busy,
         _ => sqlstate(&error).map_or(StoreFault::Other, |code| cause_of(&code)),
     };
     StoreError::Database {
@@ -91,6 +92,12 @@ fn cause_of(code: &str) -> StoreFault {
 pub(super) fn sqlstate(error: &sqlx::Error) -> Option<String> {
     let code = error.as_database_error()?.code()?;
     Some(code.into_owned())
+}
+
+/// Whether the columns of a table have changed since the server prepared the statement. It has done nothing.
+pub(super) fn plan_is_stale(error: &sqlx::Error) -> bool {
+    // feature_not_supported, which stands for much else.
+    sqlstate(error).is_some_and(|code| code == "0A000") && error.to_string().contains("cached plan")
 }
 
 /// Whether the connection is gone, or none could be made for a reason that may pass: the server is not

@@ -28,10 +28,12 @@ mod backup;
 mod blobs;
 mod cache;
 mod content;
+mod copied;
 mod database;
 mod doctor;
 mod faults;
 mod findings;
+mod migrate;
 mod postgres;
 mod query;
 mod received;
@@ -47,6 +49,7 @@ pub use blobs::FileBlobs;
 pub use database::SqlStore;
 pub use doctor::{DoctorError, examine};
 pub use findings::{Examination, Finding};
+pub use migrate::{Destination, MigrateError, Migrated, Progress, TableCount, migrate};
 pub use postgres::{PostgresError, PostgresSettings, PostgresUrl};
 pub use s3::{S3Blobs, S3Location, S3Refusal};
 pub use space::DiskGauge;
@@ -205,6 +208,17 @@ pub enum OpenError {
         /// Where its records are.
         url: String,
     },
+    /// A migration to it was begun and did not end.
+    #[error(
+        "{place} is the target of a {note}, which has not ended: give the same `ventriform migrate` again, \
+         which goes on where it stopped"
+    )]
+    Unfinished {
+        /// The folder or the database.
+        place: String,
+        /// Where the migration comes from.
+        note: String,
+    },
     /// Its records are in a file.
     #[error(
         "the records of {folder} are kept in its file {DATABASE}. Start without --database, or give \
@@ -300,6 +314,7 @@ async fn on_server(
     gauge: DiskGauge,
 ) -> Result<SqlStore, OpenError> {
     let marker = folder.join(MARKER);
+    require_finished(folder)?;
     if folder.join(DATABASE).exists() {
         return Err(OpenError::InFile(folder.to_owned()));
     }
@@ -316,6 +331,12 @@ async fn on_server(
     };
     let place = rows.note_place(&own).await;
     let place = place.map_err(|e| unusable(folder, &e))?;
+    if place.starts_with(MIGRATION) {
+        return Err(OpenError::Unfinished {
+            place: server.url.to_string(),
+            note: place,
+        });
+    }
     if place != own {
         return Err(OpenError::OtherFiles {
             url: server.url.clone(),
@@ -338,8 +359,20 @@ fn name_of(marker: &Path) -> Option<String> {
     name.starts_with("folder ").then(|| name.to_owned())
 }
 
+/// Refuses a folder to which another one is being moved.
+fn require_finished(folder: &Path) -> Result<(), OpenError> {
+    match std::fs::read_to_string(folder.join(UNFINISHED)) {
+        Ok(note) => Err(OpenError::Unfinished {
+            place: folder.display().to_string(),
+            note,
+        }),
+        Err(_) => Ok(()),
+    }
+}
+
 /// Refuses a folder whose records are on a server.
 fn require_file(folder: &Path) -> Result<(), OpenError> {
+    require_finished(folder)?;
     match std::fs::read_to_string(folder.join(MARKER)) {
         Ok(url) => Err(OpenError::OnServer {
             folder: folder.to_owned(),
@@ -513,6 +546,12 @@ const DATABASE: &str = "ventriform.db";
 
 /// The file that says which database on a server holds the records of the folder.
 const MARKER: &str = "database";
+
+/// The file that says that another folder is being moved to this one, and which.
+const UNFINISHED: &str = "migration";
+
+/// What the note of an unfinished migration begins with.
+const MIGRATION: &str = "migration from ";
 
 /// The database's write-ahead log.
 fn log_of(folder: &Path) -> PathBuf {

@@ -9,6 +9,11 @@
 //! commit closes its connection, so nothing can fall into it later. The commit asks the server whether
 //! the transaction is still whole, as `COMMIT` alone reports success for one that failed.
 //!
+//! **The tables change.** During a rolling upgrade a process of the next version adds columns and tables while this
+//! one runs. A statement that the server has prepared before is refused then, once on each connection, before it
+//! has done anything ([`faults::plan_is_stale`]): outside a transaction it is prepared anew, inside of one the
+//! transaction ends as if the database had been busy.
+//!
 //! **The server is away.** At the start, the program waits for it for a limited time. Later, operations
 //! fail with [`StoreFault::Away`] until it is back; a connection that was lost is noticed before it is used,
 //! and a read whose connection breaks is done again.
@@ -17,14 +22,12 @@ use super::faults;
 use super::query::jitter;
 use crate::jobs::{News, NewsFeed, StoreError, StoreFault, StoreResult};
 use async_trait::async_trait;
-use sqlx::migrate::{MigrateError, Migrator};
+use sqlx::migrate::MigrateError;
 use sqlx::pool::PoolConnection;
 use sqlx::postgres::{PgConnectOptions, PgConnection, PgListener, PgPool, PgPoolOptions};
 use sqlx::{ConnectOptions, Connection, Postgres, Row};
 use std::ops::{Deref, DerefMut};
 use std::time::{Duration, Instant};
-
-static MIGRATIONS: Migrator = sqlx::migrate!("src/store/migrations_postgres");
 
 /// Pause between two attempts to reach the server at the start.
 const AGAIN: Duration = Duration::from_secs(1);
@@ -36,7 +39,7 @@ const STATEMENT: Duration = Duration::from_secs(30);
 const OLDEST: i32 = 150_000;
 
 /// The key of the lock for writing, in any schema of its own.
-const BEGIN: &str = "BEGIN; SELECT pg_advisory_xact_lock(hashtextextended('ventriform writes ' || current_schema(), 0))";
+pub(super) const BEGIN: &str = "BEGIN; SELECT pg_advisory_xact_lock(hashtextextended('ventriform writes ' || current_schema(), 0))";
 
 /// The channel of the notifications of migration 2.
 const CHANNEL: &str = "SELECT 'ventriform_' || md5(current_schema())";
@@ -171,8 +174,7 @@ pub(super) async fn open(
     let mut connection = reach(settings, &options).await?;
     let made = async {
         check_server(url, &mut connection).await?;
-        MIGRATIONS
-            .run(&mut connection)
+        bring_up(&mut connection)
             .await
             .map_err(|error| migration_failure(url, error))
     };
@@ -185,6 +187,33 @@ pub(super) async fn open(
         .connect_lazy_with(options.options(session_limits(wait)));
     let writer = PgWriter { pool: pool.clone() };
     Ok((writer, pool))
+}
+
+/// Brings the tables to the current version. Newer ones are left as they are if they say that this version works on
+/// them: then another process is already of the next version, and this one is started once more beside it.
+async fn bring_up(connection: &mut PgConnection) -> Result<(), MigrateError> {
+    let mut migrations = sqlx::migrate!("src/store/migrations_postgres");
+    let own = migrations.iter().map(|migration| migration.version).max();
+    let noted = sqlx::query_scalar("SELECT to_regclass('oldest_program') IS NOT NULL");
+    if noted.fetch_one(&mut *connection).await? {
+        let oldest = sqlx::query_scalar("SELECT version FROM oldest_program");
+        let oldest: i64 = oldest.fetch_one(&mut *connection).await?;
+        migrations.set_ignore_missing(own.is_some_and(|own| oldest <= own));
+    }
+    migrations.run(connection).await
+}
+
+/// A connection whose statements may take any time, to tables that [`open`] has made.
+pub(super) async fn connect_unlimited(
+    settings: &PostgresSettings,
+) -> Result<PgConnection, sqlx::Error> {
+    let options = settings.url.options()?.application_name("ventriform");
+    let mut connection = options
+        .options([("statement_timeout", "0")])
+        .connect()
+        .await?;
+    keep_promises(&mut connection).await?;
+    Ok(connection)
 }
 
 /// What the server limits of a session, so that a process that stands still or is cut off holds no lock

@@ -96,6 +96,8 @@ pub(super) struct Query {
     text: Cow<'static, str>,
     postgres: Option<Cow<'static, str>>,
     values: Vec<Value>,
+    /// Whether PostgreSQL is to prepare it anew.
+    anew: bool,
 }
 
 /// A statement of that text.
@@ -104,6 +106,7 @@ pub(super) fn query(text: impl Into<Cow<'static, str>>) -> Query {
         text: text.into(),
         postgres: None,
         values: Vec::new(),
+        anew: false,
     }
 }
 
@@ -134,8 +137,12 @@ impl Query {
 
     /// The statement for PostgreSQL's driver.
     pub fn postgres(self) -> sqlx::query::Query<'static, Postgres, PgArguments> {
-        let text = self.postgres.unwrap_or(self.text);
-        let query = sqlx::query(AssertSqlSafe(text));
+        let mut text = self.postgres.unwrap_or(self.text);
+        if self.anew {
+            // The driver knows prepared statements by their text.
+            text.to_mut().push(' ');
+        }
+        let query = sqlx::query(AssertSqlSafe(text)).persistent(!self.anew);
         self.values.into_iter().fold(query, |query, v| match v {
             // PostgreSQL has no NUL in a text.
             Value::Text(value) => query.bind(value.map(|text| match text.contains('\0') {
@@ -154,14 +161,22 @@ impl Query {
         Ok(match target.into() {
             Target::SqlitePool(pool) => sqlite_rows(self.sqlite().fetch_all(pool).await?),
             Target::Sqlite(connection) => sqlite_rows(self.sqlite().fetch_all(connection).await?),
-            Target::PgPool(pool) => {
-                pg_rows(again(pool, || self.clone().postgres().fetch_all(pool)).await?)
-            }
+            Target::PgPool(pool) => pg_rows(again(pool, self, |q| q.fetch_all(pool)).await?),
             Target::Postgres(connection) => {
                 let rows = self.postgres().fetch_all(connection).await;
                 pg_rows(rows.map_err(faults::of_postgres)?)
             }
         })
+    }
+
+    /// Runs it outside a transaction; returns all rows. Prepared anew if it has to be.
+    pub async fn fetch_alone(mut self, connection: &mut PgConnection) -> StoreResult<Vec<DbRow>> {
+        let mut rows = self.clone().postgres().fetch_all(&mut *connection).await;
+        if rows.as_ref().is_err_and(faults::plan_is_stale) {
+            self.anew = true;
+            rows = self.postgres().fetch_all(connection).await;
+        }
+        Ok(pg_rows(rows.map_err(faults::of_postgres)?))
     }
 
     /// Runs it; returns the first row.
@@ -177,7 +192,7 @@ impl Query {
                 let row = self.sqlite().fetch_optional(connection).await?;
                 row.map(DbRow::Sqlite)
             }
-            Target::PgPool(pool) => again(pool, || self.clone().postgres().fetch_optional(pool))
+            Target::PgPool(pool) => again(pool, self, |q| q.fetch_optional(pool))
                 .await?
                 .map(DbRow::Postgres),
             Target::Postgres(connection) => {
@@ -211,15 +226,20 @@ impl Query {
     }
 }
 
-/// Reads; again if the connection was lost, as all are when the server is started anew.
-async fn again<T, F>(pool: &PgPool, read: impl Fn() -> F) -> StoreResult<T>
+/// A statement for PostgreSQL's driver.
+type PgQuery = sqlx::query::Query<'static, Postgres, PgArguments>;
+
+/// Reads; again if the connection was lost, as all are when the server is started anew, or if the server has to
+/// prepare the statement anew.
+async fn again<T, F>(pool: &PgPool, mut query: Query, read: impl Fn(PgQuery) -> F) -> StoreResult<T>
 where
     F: Future<Output = Result<T, sqlx::Error>>,
 {
     let mut tries = 0;
     loop {
-        match read().await {
+        match read(query.clone().postgres()).await {
             Ok(read) => return Ok(read),
+            Err(error) if !query.anew && faults::plan_is_stale(&error) => query.anew = true,
             Err(error) if tries < READ_RETRIES && faults::connection_was_lost(&error) => {
                 tries += 1;
                 tokio::time::sleep(jitter(Duration::from_millis(50) * tries)).await;
@@ -299,6 +319,7 @@ impl QueryBuilder {
             text: std::mem::take(&mut self.text).into(),
             postgres: None,
             values: std::mem::take(&mut self.values),
+            anew: false,
         }
     }
 }

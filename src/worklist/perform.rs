@@ -2,8 +2,8 @@
 
 use super::dataset::DataSetJson;
 use super::procedure::WORK;
-use super::workitem::{PERFORMED, PROGRESS, Refusal, Workitem, WorkitemState};
-use crate::jobs::Timestamp;
+use super::workitem::{PERFORMED, PRIORITY, PROGRESS, Refusal, Workitem, WorkitemState};
+use crate::jobs::{Priority, Timestamp};
 use serde_json::{Map, Value, json};
 
 const STEP_PROGRESS: &str = "00741004";
@@ -36,6 +36,15 @@ impl Workitem {
         self.change_state(Some(transaction), WorkitemState::InProgress, now)?;
         self.performer = Some(String::new());
         Ok(())
+    }
+
+    /// How urgent its job is, by its Scheduled Procedure Step Priority.
+    pub fn priority(&self) -> Priority {
+        match self.attributes.text(PRIORITY) {
+            Some("HIGH") => Priority::Urgent,
+            Some("LOW") => Priority::Bulk,
+            _ => Priority::Routine,
+        }
     }
 
     /// Whether somebody has asked to cancel it since it was claimed.

@@ -743,6 +743,7 @@ async fn scheduled(app: &TestApp, code: &str, series: &str) -> String {
     let text = |vr: &str, value: &str| json!({"vr": vr, "Value": [value]});
     let body = json!([{
         "00741000": text("CS", "SCHEDULED"),
+        "00741200": text("CS", "HIGH"),
         "00404041": text("CS", "READY"),
         "00404018": {"vr": "SQ", "Value": [{
             "00080100": text("SH", code),
@@ -854,5 +855,6 @@ async fn a_work_item_is_performed_once_across_a_restart() {
     becomes(&app, &path, "COMPLETED").await;
     let jobs = app.json("/v1/jobs").await;
     assert_eq!(jobs["jobs"].as_array().unwrap().len(), 1, "{jobs}");
+    assert_eq!(jobs["jobs"][0]["priority"], "urgent");
     assert_eq!(fake.stored().1, 2);
 }

@@ -22,9 +22,9 @@ use ventriform::jobs::{
     Catalogue, Claimant, Clock, Custody, DeathLimit, Deleted, Erased, ErasureAgent, ErasureOrder,
     ErasureReason, Expiry, Failure, Fault, FigureStore, FileRecord, Filed, Idempotency,
     Interrupted, ItemFilter, ItemRecord, Job, JobFilter, JobOutcome, JobState, JobStore,
-    JobWebhook, Lease, LegalHold, ListRequest, NewJob, Product, ProductFile, Resource, ScanFields,
-    ScanFilter, Scans, SendOrder, SeriesSource, StoreFault, StoredVolume, SystemClock, TagFilter,
-    Tags, Tenant, Timestamp, random_id,
+    JobWebhook, Lease, LegalHold, ListRequest, NewJob, Priority, Product, ProductFile, Resource,
+    ScanFields, ScanFilter, Scans, SendOrder, SeriesSource, StoreFault, StoredVolume, SystemClock,
+    TagFilter, Tags, Tenant, Timestamp, random_id,
 };
 use ventriform::store::{DiskGauge, PostgresError, SqlStore, Store, StoreSettings};
 use ventriform::volume::dicom::DicomHeader;
@@ -385,11 +385,12 @@ async fn tenants_take_turns(on: &Stores) {
             ..job
         });
     }
-    // (turn, number of filing, tenant, id)
-    let mut waiting: Vec<(i64, usize, usize, String)> = Vec::new();
-    let mut running: Vec<((i64, usize, usize, String), Lease)> = Vec::new();
+    // (rank of the priority, turn, number of filing, tenant, sequence and id)
+    type Waiting = (i64, i64, usize, usize, (i64, String));
+    let mut waiting: Vec<Waiting> = Vec::new();
+    let mut running: Vec<(Waiting, Lease)> = Vec::new();
     let mut random = 7_u64;
-    for number in 0..150 {
+    for number in 0..250 {
         random = random
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1);
@@ -397,14 +398,31 @@ async fn tenants_take_turns(on: &Stores) {
             chance @ 0..=7 => {
                 // The first tenant files most of the jobs.
                 let tenant = [0, 0, 0, 0, 0, 1, 1, 2][chance as usize];
-                let job = on.file(&orders[tenant]).await;
+                let rank = [1, 1, 0, 2][(random >> 50 & 3) as usize];
+                let order = NewJob {
+                    priority: Priority::of_rank(rank).unwrap(),
+                    ..orders[tenant].clone()
+                };
+                let job = on.file(&order).await;
                 let of = |all: &mut dyn Iterator<Item = i64>| all.max().map(|turn| turn + 1);
-                let current = waiting.iter().map(|job| job.0).min();
-                let current = current.or(of(&mut running.iter().map(|(job, _)| job.0)));
-                let unfinished = waiting.iter().chain(running.iter().map(|(job, _)| job));
-                let own = of(&mut unfinished.filter(|job| job.2 == tenant).map(|job| job.0));
+                // Each priority is a queue of its own.
+                let waits = || waiting.iter().filter(|job| job.0 == rank);
+                let runs = || {
+                    running
+                        .iter()
+                        .map(|(job, _)| job)
+                        .filter(|job| job.0 == rank)
+                };
+                let current = waits().map(|job| job.1).min();
+                let current = current.or(of(&mut runs().map(|job| job.1)));
+                let unfinished = waits().chain(runs());
+                let own = of(&mut unfinished.filter(|job| job.3 == tenant).map(|job| job.1));
                 let turn = current.unwrap_or(0).max(own.unwrap_or(0));
-                waiting.push((turn, number, tenant, job.id));
+                waiting.push((rank, turn, number, tenant, (job.sequence, job.id)));
+                waiting.sort();
+                let asked: Vec<i64> = waiting.iter().map(|job| job.4.0).collect();
+                let places: BTreeMap<i64, u64> = asked.iter().copied().zip(0..).collect();
+                assert_eq!(on.b.ahead_of(&asked).await.unwrap(), places);
             }
             8..=11 => {
                 waiting.sort();
@@ -412,7 +430,7 @@ async fn tenants_take_turns(on: &Stores) {
                 assert_eq!(claimed.is_some(), !waiting.is_empty());
                 if let Some((job, lease)) = claimed {
                     let next = waiting.remove(0);
-                    assert_eq!(job.id, next.3, "{next:?} before {waiting:?}");
+                    assert_eq!(job.id, next.4.1, "{next:?} before {waiting:?}");
                     running.push((next, lease));
                 }
             }
@@ -430,6 +448,39 @@ async fn tenants_take_turns(on: &Stores) {
         }
     }
     while on.claim().await.is_some() {}
+    let urgent = NewJob {
+        priority: Priority::Urgent,
+        ..orders[2].clone()
+    };
+    let bulk = NewJob {
+        priority: Priority::Bulk,
+        ..orders[2].clone()
+    };
+    let (last, first) = (on.file(&bulk).await, on.file(&urgent).await);
+    let places = on.a.ahead_of(&[last.sequence, first.sequence]).await;
+    assert_eq!(
+        places.unwrap(),
+        [(last.sequence, 1), (first.sequence, 0)].into()
+    );
+    for (priority, job) in [(Priority::Urgent, first), (Priority::Bulk, last)] {
+        let filter = JobFilter {
+            tenant: tenants[2].clone(),
+            state: Some(JobState::Queued),
+            priority: Some(priority),
+            ..JobFilter::default()
+        };
+        let page = ListRequest {
+            before: None,
+            limit: 10,
+        };
+        let found = on.a.jobs(&filter, page).await.unwrap().items;
+        assert_eq!(
+            found.iter().map(|job| &job.id).collect::<Vec<_>>(),
+            [&job.id]
+        );
+        assert_eq!(found[0].priority, priority);
+        assert_eq!(on.claim().await.unwrap().0.id, job.id);
+    }
     // However much one tenant has filed, another's only job waits for one of these at most.
     for _ in 0..30 {
         on.file(&orders[0]).await;
@@ -1611,7 +1662,14 @@ async fn both_engines_have_the_same_tables() {
     // SQLite keeps it in its own table of sequences.
     postgres.retain(|(table, _)| table != "audit_greatest");
     // One process uses a file.
-    let of_processes = ["runs", "holds", "duties", "store_place", "given_up_places"];
+    let of_processes = [
+        "runs",
+        "holds",
+        "duties",
+        "store_place",
+        "given_up_places",
+        "oldest_program",
+    ];
     postgres.retain(|(table, _)| !of_processes.contains(&table.as_str()));
     assert_eq!(sqlite, postgres);
     assert!(sqlite.len() > 150, "{}", sqlite.len());
@@ -1620,6 +1678,58 @@ async fn both_engines_have_the_same_tables() {
 async fn connect(url: &str) -> Result<SqlStore, PostgresError> {
     let gauge = DiskGauge::new(std::path::Path::new("/tmp"), Some(0));
     SqlStore::connect(&reached(url), WAIT, gauge).await
+}
+
+/// The first half of a rolling upgrade: the next version adds to the tables while this one runs, and this one is
+/// started once more.
+#[tokio::test]
+async fn a_process_goes_on_while_the_next_version_adds_to_the_tables() {
+    let on = Stores::postgres().await;
+    let url = on.url.clone().unwrap();
+    let name = url.rsplit('/').next().unwrap();
+    let volume = on.volume(&tenant()).await;
+    let mut filed = Vec::new();
+    for round in 0..4 {
+        // Each connection has prepared each statement several times over.
+        for _ in 0..10 {
+            // A transaction that meets the change is told to come again, and nothing of it stays.
+            let job = loop {
+                match on.a.file(&new_job(&volume), 1000, now()).await {
+                    Ok(Filed::New(job)) => break job,
+                    Err(error) if error.cause() == StoreFault::Busy && round > 0 => {}
+                    other => panic!("{other:?}"),
+                }
+            };
+            filed.push(job.id.clone());
+            assert_eq!(on.a.job(&job.id).await.unwrap().unwrap().id, job.id);
+            let listed = on.a.jobs(&JobFilter::default(), ALL).await.unwrap();
+            assert_eq!(listed.items.len(), filed.len());
+            let (claimed, lease) = claim(&on.a, "run_a").await.unwrap();
+            assert_eq!(claimed.id, job.id);
+            on.a.progress(&lease, "surface", 0.5)
+                .await
+                .unwrap()
+                .unwrap();
+            let ended = JobOutcome::Failed(failure("no-surface"));
+            loop {
+                match on.a.finish(&lease, &ended, now()).await {
+                    Ok(job) => break assert!(job.is_some()),
+                    Err(error) => assert_eq!(error.cause(), StoreFault::Busy, "{error}"),
+                }
+            }
+        }
+        let added = format!(
+            "ALTER TABLE jobs ADD COLUMN added_{round} BIGINT NOT NULL DEFAULT 0;
+             ALTER TABLE volumes ADD COLUMN added_{round} TEXT;
+             CREATE TABLE added_{round} (id BIGINT);
+             INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
+             VALUES (1000 + {round}, 'newer', true, '', 0)"
+        );
+        server().run(name, &added).await;
+    }
+    let again = connect(&url).await.unwrap();
+    assert_eq!(again.job(&filed[0]).await.unwrap().unwrap().id, filed[0]);
+    again.close().await;
 }
 
 #[tokio::test]
@@ -1637,7 +1747,7 @@ async fn a_database_that_cannot_be_used_is_refused_with_advice() {
     // Somebody else's tables.
     server().run(name, "CREATE TABLE jobs (id int)").await;
     assert!(refused(&url).await.contains("empty database"));
-    // Tables of a newer version.
+    // Tables of a newer version, on which this one does not work.
     let url = server().database().await;
     let name = url.rsplit('/').next().unwrap();
     connect(&url).await.unwrap().close().await;
@@ -1645,6 +1755,9 @@ async fn a_database_that_cannot_be_used_is_refused_with_advice() {
         "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
                  VALUES (9999, 'newer', true, '', 0)";
     server().run(name, newer).await;
+    server()
+        .run(name, "UPDATE oldest_program SET version = 9999")
+        .await;
     assert!(refused(&url).await.contains("newer version"));
     // Another encoding.
     let latin = "CREATE DATABASE latin_of_tests ENCODING 'LATIN1' TEMPLATE template0";

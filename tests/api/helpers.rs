@@ -143,6 +143,12 @@ impl TestApp {
         }
     }
 
+    /// The same as the caller of this, and the owner of the service.
+    pub fn running_as(mut self, mut owner: Self) -> Self {
+        self.running = owner.running.take();
+        self
+    }
+
     /// Shuts the service down in order and returns its data folder.
     pub async fn stop(mut self) -> Arc<TempDir> {
         self.running.take().unwrap().stop().await.unwrap();

@@ -427,3 +427,51 @@ async fn a_commit_that_takes_longer_than_the_lease_is_not_a_second_attempt() {
     assert_eq!(done["state"], "succeeded", "{done}");
     assert_eq!(done["attempts"], 1);
 }
+
+#[tokio::test]
+async fn urgent_jobs_start_before_routine_ones_and_these_before_bulk() {
+    let app = TestApp::with(|settings| settings.workers = "1".parse().unwrap()).await;
+    let running = app.file("slow").await;
+    app.until(&running, &["running"]).await;
+    let volume_id = app.volume("sphere").await;
+    let upload = |priority: &str| app.post(&format!("/v1/models?priority={priority}"));
+    let bulk = upload("bulk").body(volume("sphere 1")).send().await;
+    let bulk: Value = bulk.unwrap().json().await.unwrap();
+    let routine = app.file("sphere 2").await;
+    let order = json!({"volume": volume_id, "priority": "urgent"});
+    let urgent = app.post("/v1/jobs").json(&order).send().await;
+    let urgent: Value = urgent.unwrap().json().await.unwrap();
+    for (place, (job, priority)) in [(&urgent, "urgent"), (&routine, "routine"), (&bulk, "bulk")]
+        .into_iter()
+        .enumerate()
+    {
+        let shown = app.json(&text(&job["links"]["self"])).await;
+        assert_eq!(
+            (&shown["priority"], &shown["queue_position"]),
+            (&json!(priority), &json!(place + 1))
+        );
+        let found = app
+            .json(&format!("/v1/jobs?priority={priority}&state=queued"))
+            .await;
+        assert_eq!(found["jobs"].as_array().unwrap().len(), 1);
+        assert_eq!(found["jobs"][0]["id"], job["id"]);
+    }
+    let wrong = upload("soon").body(volume("sphere 1")).send().await;
+    problem(wrong.unwrap(), 422, "invalid-field").await;
+    for value in [json!("URGENT"), json!(1)] {
+        let order = json!({"volume": volume_id, "priority": value});
+        let wrong = app.post("/v1/jobs").json(&order).send().await;
+        let said = problem(wrong.unwrap(), 422, "invalid-field").await;
+        assert_eq!(said["field"], "priority");
+    }
+    let wrong = app.get("/v1/jobs?priority=soon").send().await.unwrap();
+    assert_eq!(wrong.status(), StatusCode::BAD_REQUEST);
+    let cancelled = app.delete(&text(&running["links"]["self"])).send().await;
+    assert!(cancelled.unwrap().status().is_success());
+    let mut starts = Vec::new();
+    for job in [&urgent, &routine, &bulk] {
+        let done = app.until(job, &["succeeded"]).await;
+        starts.push(text(&done["started_at"]));
+    }
+    assert!(starts.is_sorted(), "{starts:?}");
+}

@@ -94,6 +94,16 @@ async fn a_database_that_is_away_is_answered_with_503_and_named() {
     let ready = app.get("/readyz").send().await.unwrap();
     let said = problem(ready, 503, "not-ready").await;
     assert!(text(&said["detail"]).contains("PostgreSQL"), "{said}");
+    let failing = |name: &str| {
+        let checks = said["checks"].as_array().unwrap();
+        let check = checks.iter().find(|check| check["name"] == name).unwrap();
+        check["status"] == "failing"
+    };
+    assert!(
+        failing("database") && !failing("files") && !failing("disk"),
+        "{said}"
+    );
+    assert!(!said.to_string().contains("127.0.0.1"), "{said}");
     assert_eq!(app.get("/healthz").send().await.unwrap().status(), 200);
     let started = own.clone();
     tokio::task::spawn_blocking(move || started.start())

@@ -8,7 +8,17 @@ use reqwest::header::ACCEPT;
 async fn health_readiness_and_metrics_are_served() {
     let app = TestApp::start().await;
     assert_eq!(app.json("/healthz").await["status"], "ok");
-    assert_eq!(app.json("/readyz").await["status"], "ok");
+    let ready = app.json("/readyz").await;
+    assert_eq!(ready["status"], "ok");
+    let names = ["database", "files", "disk", "workers"];
+    for (check, name) in ready["checks"].as_array().unwrap().iter().zip(names) {
+        assert_eq!(
+            (&check["name"], &check["status"]),
+            (&name.into(), &"ok".into())
+        );
+        assert_eq!(check["required"], name != "workers");
+    }
+    assert_eq!(ready["checks"].as_array().unwrap().len(), names.len());
     app.finished("sphere").await;
     let metrics = app.metrics().await;
     assert!(

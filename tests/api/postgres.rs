@@ -157,6 +157,11 @@ impl Server {
         self.url(&name)
     }
 
+    /// One of the programs of PostgreSQL, such as `pg_dump`.
+    pub fn program(&self, name: &str) -> Command {
+        Command::new(self.programs.join(name))
+    }
+
     /// Runs statements in a database.
     pub async fn run(&self, database: &str, statements: &str) {
         let mut connection = PgConnection::connect(&self.url(database)).await.unwrap();

@@ -117,6 +117,18 @@ impl S3Server {
             .collect()
     }
 
+    /// Copies every key below a prefix to below another one.
+    pub async fn copy_all(&self, from: &str, to: &str) {
+        let store = client(&self.location(""));
+        for key in self.keys(from).await {
+            let below = key.strip_prefix(from).unwrap();
+            let content = store.get(&Key::from(key.as_str())).await.unwrap();
+            let content = content.bytes().await.unwrap();
+            let target = Key::from(format!("{to}{below}"));
+            store.put(&target, content.into()).await.unwrap();
+        }
+    }
+
     /// Writes to a key.
     pub async fn write(&self, key: &str, content: &'static [u8]) {
         let store = client(&self.location(""));

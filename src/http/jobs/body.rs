@@ -1,5 +1,6 @@
 //! A job as JSON.
 
+use super::priority::PriorityName;
 use crate::archive::{ObjectDelivery, Pull};
 use crate::hooks::DeliveryState;
 use crate::http::app::App;
@@ -27,6 +28,8 @@ pub struct JobBody {
     /// The kind of work.
     #[schema(example = "model")]
     kind: String,
+    /// How urgent it is.
+    priority: PriorityName,
     /// The volume it works on; `null` until it has been fetched from `source`.
     volume: Option<String>,
     /// The series in an archive that the volume comes from.
@@ -341,6 +344,7 @@ fn body(job: Job, context: &Context) -> JobBody {
         external_id: job.tags.external_id,
         labels: job.tags.labels,
         kind: job.kind,
+        priority: job.priority.into(),
         volume: job.volume,
         source,
         deliveries,

@@ -3,7 +3,7 @@
 //! `POST /v1/jobs` names a stored volume; [`file_upload`] takes a request that carries the volume
 //! itself, and may wait for the result (`Prefer: wait`).
 
-use super::describe;
+use super::{describe, priority};
 use crate::http::app::App;
 use crate::http::caller::Caller;
 use crate::http::given_webhook::GivenWebhook;
@@ -15,7 +15,8 @@ use crate::http::upload::{self, Upload};
 use crate::http::wire::path_of;
 use crate::http::{idempotency, negotiate, observe, tags};
 use crate::jobs::{
-    Filed, Job, JobState, JobWebhook, NewJob, Resource, SendOrder, SeriesSource, Tags, Tenant, Work,
+    Filed, Job, JobState, JobWebhook, NewJob, Priority, Resource, SendOrder, SeriesSource, Tags,
+    Tenant, Work,
 };
 use axum::Json;
 use axum::extract::Request;
@@ -65,11 +66,13 @@ pub async fn file_upload(
         None => None,
     };
     let mut given = pairs.clone();
+    let priority = priority::take(&mut pairs)?;
     let (tags, mut pairs) = tags::take(app, pairs)?;
     let tenant = &caller.tenant;
     let mut filing = Filing {
         tenant: tenant.clone(),
         tags,
+        priority,
         key,
         webhook,
         source: None,
@@ -88,6 +91,7 @@ pub async fn file_upload(
     let fields = !upload.fields.is_empty();
     if fields {
         given.append(&mut upload.fields);
+        filing.priority = priority::take(&mut given)?;
         (filing.tags, pairs) = tags::take(app, given)?;
     }
     if let Some(filed) = filed_earlier(app, &**work, &pairs, &mut upload, &filing).await? {
@@ -136,6 +140,8 @@ pub struct Filing {
     pub tenant: Tenant,
     /// The tenant's names for the job.
     pub tags: Tags,
+    /// How urgent it is.
+    pub priority: Priority,
     /// Its idempotency key.
     pub key: Option<String>,
     /// Where the job is told about.
@@ -198,11 +204,14 @@ pub fn new_job(
         filing.webhook.as_ref().map(|webhook| json!(webhook)),
         filing.source.as_ref().map(|source| json!(source)),
         filing.send.as_ref().map(|send| json!(send)),
+        (filing.priority != Priority::default())
+            .then(|| json!({priority::FIELD: filing.priority.as_str()})),
     ];
     let others: Vec<Value> = others.into_iter().flatten().collect();
     NewJob {
         tenant: filing.tenant,
         kind: kind.into(),
+        priority: filing.priority,
         idempotency: idempotency::promise(
             filing.key,
             kind,

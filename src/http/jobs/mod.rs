@@ -5,9 +5,11 @@ pub mod events;
 pub mod filing;
 
 mod body;
+mod priority;
 
 pub use body::{JobBody, ObjectDeliveryBody, describe, describe_all};
 pub use filing::Filing;
+pub use priority::PriorityName;
 
 use super::app::App;
 use super::caller::Caller;
@@ -73,6 +75,7 @@ pub async fn create_job(
     let filing = Filing {
         tenant: caller.tenant,
         tags: tags::of_object(&app, &object)?,
+        priority: priority::of_object(&object)?,
         key,
         webhook: None,
         source: None,
@@ -84,8 +87,9 @@ pub async fn create_job(
     filing::accepted(&app, job).await
 }
 
-const FIELDS: [&str; 9] = [
+const FIELDS: [&str; 10] = [
     "kind",
+    priority::FIELD,
     "volume",
     "source",
     "parameters",
@@ -145,6 +149,7 @@ async fn read_job(app: &App, object: &Map<String, Value>, mut filing: Filing) ->
     params(openapi::PageParameters, openapi::TagParameters, openapi::ScanParameters,
         ("state" = Option<JobStateName>, Query, description = "Only jobs in this state"),
         ("kind" = Option<String>, Query, description = "Only jobs of this kind: model, segmentation"),
+        ("priority" = Option<PriorityName>, Query, description = "Only jobs of this priority"),
         ("volume" = Option<String>, Query, description = "Only jobs on this volume"),
         ("created_after" = Option<String>, Query, format = DateTime,
             description = "Only jobs filed after this moment (RFC 3339)")),
@@ -156,12 +161,14 @@ pub async fn list_jobs(
 ) -> Answer<Json<JobList>> {
     let (tags, pairs) = tags::take_filter(&app, query_pairs(query.as_deref()))?;
     let (scan, pairs) = scans::take_filter(pairs)?;
-    let own = ["state", "kind", "volume", "created_after"];
-    let (page, [state, kind, volume, created_after]) = page_of(pairs, own)?;
+    let own = ["state", "kind", priority::FIELD, "volume", "created_after"];
+    let (page, [state, kind, priority, volume, created_after]) = page_of(pairs, own)?;
+    let priority = priority.map(|name| priority::parse(&name).map_err(Problem::of_search));
     let filter = JobFilter {
         tenant: caller.tenant,
         state: state.map(|name| parse_state(&name)).transpose()?,
         kind,
+        priority: priority.transpose()?,
         volume,
         tags,
         scan,

@@ -1,6 +1,6 @@
 //! Request bodies that the handlers read piece by piece, so that no Rust type describes them.
 
-use super::inputs::{ModelParametersObject, SegmentationParametersObject};
+use super::inputs::{ModelParametersObject, SegmentationParametersObject, priority_field};
 use crate::export::dicom::DicomObject;
 use crate::hooks::HookEvent;
 use crate::http::tags;
@@ -76,6 +76,7 @@ fn job_request(input: &str, schema: RefOr<Schema>) -> RefOr<Schema> {
         .property("external_id", external_id)
         .property("labels", labels)
         .property("kind", Schema::from(kind))
+        .property("priority", priority_field())
         .property(input, schema)
         .property("parameters", Ref::from_schema_name(JobParameters::name()))
         .property("webhook", Ref::from_schema_name(WebhookRequest::name()))

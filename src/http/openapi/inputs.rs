@@ -1,5 +1,6 @@
 //! Parameters that several handlers share, and those that come from the tables of parameters.
 
+use crate::jobs::Priority;
 use crate::parameters::{
     FIT_SPECS, FitParameters, Kind, ModelParameters, ParameterSpec, Parameters,
 };
@@ -218,6 +219,28 @@ impl IntoParams for TagParameters {
             .explode(Some(true))
             .build(),
         ]
+    }
+}
+
+/// `priority` of a request for a job.
+pub(super) fn priority_field() -> Schema {
+    let field = ObjectBuilder::new()
+        .schema_type(Type::String)
+        .description(Some(
+            "How urgent the job is: every waiting job of a higher priority starts before it",
+        ))
+        .enum_values(Some(Priority::ALL.map(Priority::as_str)))
+        .default(Some(json!(Priority::default().as_str())));
+    Schema::from(field)
+}
+
+/// `priority` of a job that is filed with an upload.
+pub struct PriorityParameter;
+
+impl IntoParams for PriorityParameter {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let parameter = query("priority", "How urgent the job is").schema(Some(priority_field()));
+        vec![parameter.build()]
     }
 }
 

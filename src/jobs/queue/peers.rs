@@ -86,13 +86,20 @@ impl Queue {
         }
     }
 
-    /// Number of jobs that all processes compute at the same time; at least 1.
+    /// Number of jobs that all processes that live compute at the same time.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn workers(&self) -> Result<u64, StoreError> {
+        match &self.peers {
+            Some(peers) => peers.workers().await,
+            None => Ok(self.settings.workers as u64),
+        }
+    }
+
+    /// The same, at least 1.
     pub(super) async fn all_workers(&self) -> Result<u64, StoreError> {
-        let workers = match &self.peers {
-            Some(peers) => peers.workers().await?,
-            None => self.settings.workers as u64,
-        };
-        Ok(workers.max(1))
+        Ok(self.workers().await?.max(1))
     }
 
     /// Ends when it is time to look for what another process may have done. Never for a process that

@@ -1,7 +1,7 @@
 //! The interface to the jobs table.
 
 use super::{Deleted, ListPage, ListRequest, Product, ScanFilter, StoreResult, TagFilter};
-use crate::jobs::{Failure, Filed, Job, JobState, NewJob, Tenant, Timestamp};
+use crate::jobs::{Failure, Filed, Job, JobState, NewJob, Priority, Tenant, Timestamp};
 use async_trait::async_trait;
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -80,6 +80,8 @@ pub struct JobFilter {
     pub state: Option<JobState>,
     /// Only those of this kind of work.
     pub kind: Option<String>,
+    /// Only those of this priority.
+    pub priority: Option<Priority>,
     /// Only those on this volume.
     pub volume: Option<String>,
     /// Only those with these tags.

@@ -1,18 +1,19 @@
 //! The files of items in the bucket.
 
-use super::bucket::{Bucket, S3Location, says, text};
+use super::bucket::{Bucket, Content, S3Location, says, text};
 use super::shared::{READY, Shared, owner, publication};
 use super::staged::StagedPublication;
 use super::{GRACE, S3Refusal};
 use crate::jobs::{
     BlobError, BlobStore, BlobStream, DiskSpace, FileRecord, ItemRecord, LocalFile, Resource,
-    Shelved, StagedFiles, StagedFor, StoreFault, Timestamp, random_id,
+    Shelved, StagedFiles, StagedFor, StoreFault, Timestamp, random_id, volume_id,
 };
 use crate::store::blobs::{
     CHECK, QUARANTINE, RECEIVED, RECORD, STAGING, is_of_shelf_before, shelf_name, shelf_path,
 };
 use crate::store::cache::{Found, LocalCache};
 use crate::store::content::{self, Reading};
+use crate::store::copied::Copied;
 use crate::store::space::DiskGauge;
 use async_trait::async_trait;
 use bytes::Bytes;
@@ -32,6 +33,14 @@ const CHECK_LIMIT: Duration = Duration::from_secs(4);
 
 /// How long the start waits for a store that does not answer, and between two attempts.
 const START: (Duration, Duration) = (Duration::from_secs(20), Duration::from_secs(1));
+
+/// What became of a file that was sent.
+enum Sent {
+    /// The store has it.
+    Whole(Content),
+    /// It is not what was expected: how.
+    Not(&'static str),
+}
 
 /// Files in a bucket.
 pub struct S3Blobs {
@@ -161,6 +170,109 @@ impl S3Blobs {
             return Ok(None);
         };
         self.shared.copy(&place, file, &path).await
+    }
+
+    /// Takes in the files of an item, which lie in the folder `from`, at the place that `record` names. Each
+    /// is hashed as it is sent and as the store gives it back; the record is written last.
+    pub(in crate::store) async fn take_in(
+        &self,
+        record: &ItemRecord,
+        from: &Path,
+    ) -> Result<Copied, BlobError> {
+        let id = record.id();
+        let place = record.files().into_iter().find_map(|file| file.place);
+        let target = publication(id, &place.unwrap_or_default());
+        let text = serde_json::to_vec_pretty(record)
+            .map_err(|error| BlobError::new(StoreFault::Other, error.to_string()))?;
+        let noted = format!("{target}/{RECORD}");
+        if self.shared.bucket.read(&noted).await?.as_deref() == Some(&text) {
+            return Ok(Copied::Before);
+        }
+        let mut found = Vec::new();
+        for file in record.files() {
+            let to = format!("{target}/{}", file.name);
+            match self.send(&to, &from.join(&file.name), &file).await? {
+                Sent::Whole(content) => found.push(FileRecord {
+                    bytes: content.bytes,
+                    sha256: content.sha256,
+                    ..file
+                }),
+                Sent::Not(defect) => return Ok(Copied::Not(format!("{} {defect}", file.name))),
+            }
+        }
+        if matches!(record, ItemRecord::Volume(_)) && volume_id(&found) != id {
+            let defect = "the content is not what the id was made of";
+            return Ok(Copied::Not(defect.into()));
+        }
+        self.shared.bucket.put(&noted, text.into()).await?;
+        Ok(Copied::Now)
+    }
+
+    /// Takes in a received object.
+    pub(in crate::store) async fn take_in_received(
+        &self,
+        name: &str,
+        sha256: &str,
+        from: &Path,
+    ) -> Result<Copied, BlobError> {
+        let path = format!("{RECEIVED}/{name}");
+        let there = self.shared.bucket.fetch(&path, None).await?;
+        if there.is_some_and(|content| content.sha256 == sha256) {
+            return Ok(Copied::Before);
+        }
+        let expected = FileRecord {
+            name: name.to_owned(),
+            bytes: fs::metadata(from).map_or(0, |file| file.len()),
+            sha256: sha256.to_owned(),
+            place: None,
+        };
+        Ok(match self.send(&path, from, &expected).await? {
+            Sent::Whole(_) => Copied::Now,
+            Sent::Not(defect) => Copied::Not(format!("it {defect}")),
+        })
+    }
+
+    /// Sends one file and reads it back. What is not as expected is deleted again.
+    async fn send(&self, to: &str, from: &Path, expected: &FileRecord) -> Result<Sent, BlobError> {
+        if !from.exists() {
+            return Ok(Sent::Not("is missing"));
+        }
+        let bucket = &self.shared.bucket;
+        let content = bucket.put_file(to, from).await?;
+        let known = !expected.sha256.is_empty();
+        if known && content.bytes != expected.bytes || !content.sha256.starts_with(&expected.sha256)
+        {
+            bucket.delete([to.to_owned()]).await?;
+            return Ok(Sent::Not("has another content than was stored"));
+        }
+        match bucket.fetch(to, None).await? {
+            Some(back) if back == content => Ok(Sent::Whole(content)),
+            _ => Err(content::damaged(to, "the store gives back another content")),
+        }
+    }
+
+    /// Deletes the files of other items, and other received objects, than those in `kept`.
+    pub(in crate::store) async fn keep_only(
+        &self,
+        kept: &BTreeSet<String>,
+    ) -> Result<(), BlobError> {
+        for kind in Resource::WITH_FILES {
+            for (id, places) in self.publications(kind).await? {
+                if kept.contains(&id) {
+                    continue;
+                }
+                for place in places {
+                    self.shared.delete_publication(&id, &place).await?;
+                }
+            }
+        }
+        let received = self.shared.bucket.paths(RECEIVED).await?;
+        let others = received.into_iter().filter(|path| {
+            path.rsplit('/')
+                .next()
+                .is_none_or(|name| !kept.contains(name))
+        });
+        self.shared.bucket.delete(others).await
     }
 
     /// The places of every item of a kind.

@@ -1,12 +1,13 @@
 //! The tables of archives. Triggers of the jobs table write their rows; see the migration.
 
+use super::errands::{self, Errands};
 use super::jobs::renew_volumes;
 use super::rows::{self, to_json};
 use crate::archive::{
     ArchiveBacklog, ArchiveStore, DuePull, DueSend, HeldSeries, ObjectDelivery, Pull,
     SendSettlement, SeriesKey,
 };
-use crate::hooks::{Backlog, DeliveryState};
+use crate::hooks::DeliveryState;
 use crate::jobs::{Failure, Job, StoreResult, Tenant, Timestamp};
 use crate::store::database::SqlStore;
 use crate::store::query::{DbRow, query};
@@ -16,11 +17,7 @@ use std::collections::BTreeMap;
 #[async_trait]
 impl ArchiveStore for SqlStore {
     async fn pull_destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
-        self.due_destinations(
-            "SELECT destination, min(next_attempt_at) FROM pulls WHERE state = 'pending'
-             GROUP BY destination",
-        )
-        .await
+        self.due_destinations(Errands::Pulls).await
     }
 
     async fn due_pulls(
@@ -142,7 +139,7 @@ impl ArchiveStore for SqlStore {
                 let pull = Pull {
                     state,
                     attempts: rows::count(row, "attempts")?,
-                    next_attempt_at: next_attempt(row, state)?,
+                    next_attempt_at: errands::next_attempt(row, state)?,
                     last_error: row.try_get("last_error")?,
                 };
                 Ok((row.try_get("job")?, pull))
@@ -190,11 +187,7 @@ impl ArchiveStore for SqlStore {
     }
 
     async fn send_destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
-        self.due_destinations(
-            "SELECT destination, min(next_attempt_at) FROM sends WHERE state = 'pending'
-             GROUP BY destination",
-        )
-        .await
+        self.due_destinations(Errands::Sends).await
     }
 
     async fn due_sends(
@@ -287,74 +280,32 @@ impl ArchiveStore for SqlStore {
         id: &str,
         now: Timestamp,
     ) -> StoreResult<Option<ObjectDelivery>> {
-        let mut transaction = self.writer.begin().await?;
-        query(
-            "UPDATE sends SET state = 'pending', attempts = 0, since = $1, next_attempt_at = $1,
-                    ended_at = NULL
-             WHERE id = $2 AND job = $3 AND tenant = $4 AND state != 'pending'
-               AND last_outcome IS DISTINCT FROM 'erased'",
-        )
-        .bind(now)
-        .bind(id)
-        .bind(job)
-        .bind(tenant.as_str())
-        .execute(&mut transaction)
-        .await?;
-        let row = query("SELECT * FROM sends WHERE id = $1 AND job = $2 AND tenant = $3")
-            .bind(id)
-            .bind(job)
-            .bind(tenant.as_str())
-            .fetch_optional(&mut transaction)
+        let row = self
+            .run_again(Errands::Sends, (tenant, job, id), now)
             .await?;
-        transaction.commit().await?;
         row.as_ref().map(delivery).transpose()
     }
 
     async fn archive_backlog(&self) -> StoreResult<ArchiveBacklog> {
-        let row = query(
-            "SELECT (SELECT count(*) FROM pulls WHERE state = 'pending'),
-                    (SELECT count(*) FROM sends WHERE state = 'pending'),
-                    (SELECT min(since) FROM sends WHERE state = 'pending'),
-                    (SELECT count(*) FROM sends WHERE state = 'dead')",
-        )
-        .fetch_one(&self.readers)
-        .await?;
-        let count = |column: usize| row.try_get(column).map(rows::unsigned);
+        let pulls = query("SELECT count(*) FROM pulls WHERE state = 'pending'")
+            .fetch_one(&self.readers)
+            .await?;
         Ok(ArchiveBacklog {
-            pulls: count(0)?,
-            sends: Backlog {
-                pending: count(1)?,
-                oldest: row.try_get(2)?,
-                dead: count(3)?,
-            },
+            pulls: rows::unsigned(pulls.try_get(0)?),
+            sends: self.backlog_of(Errands::Sends).await?,
         })
     }
 }
 
-impl SqlStore {
-    /// The rows of a query for destinations, each with the time when its first errand is due.
-    async fn due_destinations(&self, text: &'static str) -> StoreResult<Vec<(String, Timestamp)>> {
-        let rows = query(text).fetch_all(&self.readers).await?;
-        rows.iter()
-            .map(|row| Ok((row.try_get(0)?, row.try_get(1)?)))
-            .collect()
-    }
-}
-
-fn next_attempt(row: &DbRow, state: DeliveryState) -> StoreResult<Option<Timestamp>> {
-    let at: Timestamp = row.try_get("next_attempt_at")?;
-    Ok((state == DeliveryState::Pending).then_some(at))
-}
-
 fn delivery(row: &DbRow) -> StoreResult<ObjectDelivery> {
-    let state = DeliveryState::parse(row.try_get("state")?).unwrap_or(DeliveryState::Dead);
+    let state = errands::state(row)?;
     Ok(ObjectDelivery {
         id: row.try_get("id")?,
         name: row.try_get("name")?,
         to: row.try_get("destination")?,
         state,
         attempts: rows::count(row, "attempts")?,
-        next_attempt_at: next_attempt(row, state)?,
+        next_attempt_at: errands::next_attempt(row, state)?,
         last_attempt_at: row.try_get("last_attempt_at")?,
         last_outcome: row.try_get("last_outcome")?,
         last_error: row.try_get("last_error")?,

@@ -1,6 +1,7 @@
 //! The tables of webhooks. Deliveries are written by a trigger of the jobs table; see the
 //! migration.
 
+use super::errands::{self, Errands};
 use super::rows;
 use crate::hooks::{
     AttemptOutcome, Backlog, Delivery, DeliveryLimits, DeliveryState, DeliveryStore, DueDelivery,
@@ -19,23 +20,7 @@ const ENDPOINT_REMOVED: &str = "endpoint-removed";
 #[async_trait]
 impl DeliveryStore for SqlStore {
     async fn destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
-        // Jumps through the index from destination to destination.
-        let rows = query(
-            "WITH RECURSIVE found (name) AS (
-                 SELECT min(destination) FROM deliveries WHERE state = 'pending'
-                 UNION ALL
-                 SELECT (SELECT min(destination) FROM deliveries
-                         WHERE state = 'pending' AND destination > found.name)
-                 FROM found WHERE found.name IS NOT NULL)
-             SELECT name, (SELECT min(next_attempt_at) FROM deliveries
-                           WHERE state = 'pending' AND destination = name)
-             FROM found WHERE name IS NOT NULL",
-        )
-        .fetch_all(&self.readers)
-        .await?;
-        rows.iter()
-            .map(|row| Ok((row.try_get(0)?, row.try_get(1)?)))
-            .collect()
+        self.due_destinations(Errands::Deliveries).await
     }
 
     async fn due(
@@ -139,19 +124,7 @@ impl DeliveryStore for SqlStore {
     }
 
     async fn backlog(&self) -> StoreResult<Backlog> {
-        let row = query(
-            "SELECT (SELECT count(*) FROM deliveries WHERE state = 'pending'),
-                    (SELECT min(since) FROM deliveries WHERE state = 'pending'),
-                    (SELECT count(*) FROM deliveries WHERE state = 'dead')",
-        )
-        .fetch_one(&self.readers)
-        .await?;
-        let count = |column: usize| row.try_get(column).map(rows::unsigned);
-        Ok(Backlog {
-            pending: count(0)?,
-            oldest: row.try_get(1)?,
-            dead: count(2)?,
-        })
+        self.backlog_of(Errands::Deliveries).await
     }
 
     async fn deliveries(
@@ -179,25 +152,9 @@ impl DeliveryStore for SqlStore {
         id: &str,
         now: Timestamp,
     ) -> StoreResult<Option<Delivery>> {
-        let mut transaction = self.writer.begin().await?;
-        query(
-            "UPDATE deliveries SET state = 'pending', attempts = 0, since = $1,
-                    next_attempt_at = $1, ended_at = NULL
-             WHERE id = $2 AND job = $3 AND tenant = $4 AND state != 'pending'",
-        )
-        .bind(now)
-        .bind(id)
-        .bind(job)
-        .bind(tenant.as_str())
-        .execute(&mut transaction)
-        .await?;
-        let row = query("SELECT * FROM deliveries WHERE id = $1 AND job = $2 AND tenant = $3")
-            .bind(id)
-            .bind(job)
-            .bind(tenant.as_str())
-            .fetch_optional(&mut transaction)
+        let row = self
+            .run_again(Errands::Deliveries, (tenant, job, id), now)
             .await?;
-        transaction.commit().await?;
         row.map(delivery).transpose()
     }
 
@@ -350,8 +307,7 @@ fn due_delivery(row: DbRow) -> StoreResult<DueDelivery> {
 }
 
 fn delivery(row: DbRow) -> StoreResult<Delivery> {
-    let state = DeliveryState::parse(row.try_get("state")?).unwrap_or(DeliveryState::Dead);
-    let next_attempt_at: Timestamp = row.try_get("next_attempt_at")?;
+    let state = errands::state(&row)?;
     let last_status: Option<i64> = row.try_get("last_status")?;
     Ok(Delivery {
         id: row.try_get("id")?,
@@ -362,7 +318,7 @@ fn delivery(row: DbRow) -> StoreResult<Delivery> {
         state,
         attempts: rows::count(&row, "attempts")?,
         occurred_at: row.try_get("occurred_at")?,
-        next_attempt_at: (state == DeliveryState::Pending).then_some(next_attempt_at),
+        next_attempt_at: errands::next_attempt(&row, state)?,
         last_attempt_at: row.try_get("last_attempt_at")?,
         last_status: last_status.and_then(|status| u16::try_from(status).ok()),
         last_outcome: row.try_get("last_outcome")?,

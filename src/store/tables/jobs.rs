@@ -1,10 +1,13 @@
 //! The jobs table. Every change is a single statement, or a transaction that writes beside no other.
 //!
-//! **Turns.** Waiting jobs start in the order of their turns, and within a turn in that in which they were
-//! filed. A job gets the turn that is current, that of the next job to start, or the one after the last turn
-//! in which its tenant has an unfinished job, whichever is later. So each tenant has one job in each turn:
-//! however many jobs one tenant has filed, at most one of them starts between the filing of another
-//! tenant's only job and its start.
+//! **Priorities.** Every waiting job of a higher priority starts before any of a lower one. Each priority is a
+//! queue of its own.
+//!
+//! **Turns.** Waiting jobs of one priority start in the order of their turns, and within a turn in that in which
+//! they were filed. A job gets the turn that is current, that of the next job of its priority to start, or the one
+//! after the last turn in which its tenant has an unfinished job of that priority, whichever is later. So each
+//! tenant has one job in each turn: however many jobs one tenant has filed, at most one of them starts between
+//! the filing of another tenant's only job of the same priority and its start.
 //!
 //! Leases on SQLite, which one process uses, expire by the clock of that process. On PostgreSQL they
 //! expire by the clock of the server: clocks of several machines differ.
@@ -27,12 +30,36 @@ use std::time::Duration;
 /// Number of last succeeded jobs whose durations are averaged.
 const JOBS_AVERAGED: i64 = 20;
 
-/// The turn of a job that tenant `$10` files now.
+/// The turn of a job of priority `$17` that tenant `$10` files now.
 const TURN: &str = "(SELECT CASE WHEN here > own THEN here ELSE own END FROM (SELECT
-    coalesce((SELECT min(turn) FROM jobs WHERE state = 'queued' AND volume != ''),
-             (SELECT max(turn) + 1 FROM jobs WHERE state = 'running'), 0) AS here,
+    coalesce((SELECT min(turn) FROM jobs WHERE state = 'queued' AND volume != '' AND priority = $17),
+             (SELECT max(turn) + 1 FROM jobs WHERE state = 'running' AND priority = $17), 0) AS here,
     coalesce((SELECT max(turn) + 1 FROM jobs
-              WHERE tenant = $10 AND state IN ('queued', 'running')), 0) AS own) AS turns)";
+              WHERE tenant = $10 AND priority = $17 AND state IN ('queued', 'running')), 0) AS own) AS turns)";
+
+/// The number of waiting jobs before each of the jobs `$1`. Each part of the queue is counted once, however
+/// many jobs are asked for: within a priority from one of them to the next, and all higher priorities at
+/// the first of each.
+const PLACES: &str = "
+    WITH asked AS
+        (SELECT sequence, priority, turn, lag(turn, 1, -1) OVER place AS turn_before,
+                lag(sequence, 1, -1) OVER place AS sequence_before
+         FROM jobs
+         WHERE sequence IN (SELECT CAST(value AS BIGINT) FROM json_each($1))
+         WINDOW place AS (PARTITION BY priority ORDER BY turn, sequence))
+    SELECT sequence,
+           CAST(sum((SELECT count(*) FROM jobs AS queue
+                     WHERE queue.state = 'queued' AND queue.volume != ''
+                       AND queue.priority = asked.priority
+                       AND (queue.turn, queue.sequence) >= (turn_before, sequence_before)
+                       AND (queue.turn, queue.sequence) < (asked.turn, asked.sequence))
+                    + CASE WHEN sequence_before < 0
+                      THEN (SELECT count(*) FROM jobs AS higher
+                            WHERE higher.state = 'queued' AND higher.volume != ''
+                              AND higher.priority < asked.priority)
+                      ELSE 0 END)
+                OVER (PARTITION BY priority ORDER BY turn, sequence) AS BIGINT)
+    FROM asked";
 
 /// What every statement sets by which a job leaves its worker without an outcome: `$1` is now, `$2`
 /// the reason for failing it, or null to return it to the queue.
@@ -86,8 +113,8 @@ impl JobStore for SqlStore {
         let inserted = query(format!(
             "INSERT INTO jobs (id, kind, volume, parameters, created_at, idempotency_key,
                                fingerprint, needs, tenant, external_id, labels, webhook,
-                               trace_parent, source, send, turn)
-             SELECT $1, $2, $3, $4, $5, $6, $7, $9, $10, $11, $12, $13, $14, $15, $16, {TURN}
+                               trace_parent, source, send, priority, turn)
+             SELECT $1, $2, $3, $4, $5, $6, $7, $9, $10, $11, $12, $13, $14, $15, $16, $17, {TURN}
              WHERE (SELECT count(*) FROM jobs WHERE state = 'queued') < $8
                AND ($15 IS NOT NULL
                     OR EXISTS (SELECT 1 FROM holdings
@@ -114,6 +141,7 @@ impl JobStore for SqlStore {
         .bind(&job.trace_parent)
         .bind(job.source.as_ref().map(to_json).transpose()?)
         .bind(job.send.as_ref().map(to_json).transpose()?)
+        .bind(job.priority.rank())
         .fetch_optional(&mut transaction)
         .await?;
         if let Some(row) = inserted {
@@ -143,6 +171,9 @@ impl JobStore for SqlStore {
         query.push_bind(filter.tenant.to_string());
         if let Some(state) = filter.state {
             query.push(" AND state = ").push_bind(state.as_str());
+        }
+        if let Some(priority) = filter.priority {
+            query.push(" AND priority = ").push_bind(priority.rank());
         }
         for (column, value) in [("volume", &filter.volume), ("kind", &filter.kind)] {
             if let Some(value) = value {
@@ -174,24 +205,10 @@ impl JobStore for SqlStore {
     }
 
     async fn ahead_of(&self, sequences: &[i64]) -> StoreResult<BTreeMap<i64, u64>> {
-        // Each part of the queue is counted once, however many jobs are asked for.
-        let rows = query(
-            "WITH asked AS
-                 (SELECT sequence, turn, lag(turn, 1, -1) OVER (ORDER BY turn, sequence) AS turn_before,
-                         lag(sequence, 1, -1) OVER (ORDER BY turn, sequence) AS sequence_before
-                  FROM jobs
-                  WHERE sequence IN (SELECT CAST(value AS BIGINT) FROM json_each($1)))
-             SELECT sequence,
-                    CAST(sum((SELECT count(*) FROM jobs AS queue
-                              WHERE queue.state = 'queued' AND queue.volume != ''
-                                AND (queue.turn, queue.sequence) >= (turn_before, sequence_before)
-                                AND (queue.turn, queue.sequence) < (asked.turn, asked.sequence)))
-                         OVER (ORDER BY turn, sequence) AS BIGINT)
-             FROM asked",
-        )
-        .bind(to_json(&sequences)?)
-        .fetch_all(&self.readers)
-        .await?;
+        let rows = query(PLACES)
+            .bind(to_json(&sequences)?)
+            .fetch_all(&self.readers)
+            .await?;
         let ahead = rows::all(rows, |row| {
             Ok((row.try_get(0)?, rows::unsigned(row.try_get(1)?)))
         })?;
@@ -236,7 +253,7 @@ impl JobStore for SqlStore {
                         stage = NULL, progress = 0, revision = revision + 1
                  WHERE state = 'queued' AND sequence = (
                      SELECT sequence FROM jobs WHERE state = 'queued' AND volume != ''
-                     ORDER BY turn, sequence LIMIT 1 {lock})
+                     ORDER BY priority, turn, sequence LIMIT 1 {lock})
                  RETURNING *"
             )
         };
@@ -520,4 +537,43 @@ impl SqlStore {
 /// A key as the table holds it: unique among all tenants, as no tenant's name contains a slash.
 fn stored_key(tenant: &Tenant, key: &str) -> String {
     format!("{tenant}/{key}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::space::DiskGauge;
+
+    /// The steps of SQLite's plan for a statement.
+    async fn plan(store: &SqlStore, statement: &str) -> Vec<String> {
+        let rows = query(format!("EXPLAIN QUERY PLAN {statement}"))
+            .fetch_all(&store.readers)
+            .await
+            .unwrap();
+        rows::all(rows, |row| row.try_get("detail")).unwrap()
+    }
+
+    #[tokio::test]
+    async fn places_and_turns_are_read_from_an_index_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let gauge = DiskGauge::new(folder.path(), None);
+        let path = folder.path().join("jobs.db");
+        let store = SqlStore::open(&path, Duration::from_secs(1), gauge).await;
+        let store = store.unwrap();
+        let places = plan(&store, PLACES).await;
+        for step in [
+            "SEARCH queue USING COVERING INDEX jobs_ready (state=? AND priority=? AND turn>? AND turn<?)",
+            "SEARCH higher USING COVERING INDEX jobs_ready (state=? AND priority<?)",
+        ] {
+            assert!(places.iter().any(|found| found == step), "{places:#?}");
+        }
+        let turn = plan(&store, &format!("SELECT {TURN}")).await;
+        for step in [
+            "SEARCH jobs USING COVERING INDEX jobs_ready (state=? AND priority=?)",
+            "SEARCH jobs USING INDEX jobs_in_turn (tenant=? AND priority=?)",
+        ] {
+            assert!(turn.iter().any(|found| found == step), "{turn:#?}");
+        }
+        store.close().await;
+    }
 }

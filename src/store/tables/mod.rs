@@ -5,6 +5,7 @@ mod archives;
 mod catalogue;
 mod custody;
 mod erasure;
+mod errands;
 mod figures;
 mod hooks;
 mod intake;

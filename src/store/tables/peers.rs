@@ -166,6 +166,14 @@ impl SqlStore {
         Ok(row.is_some())
     }
 
+    /// Where the files of the records are, if that was noted.
+    pub(in crate::store) async fn place(&self) -> StoreResult<Option<String>> {
+        let row = query("SELECT place FROM store_place")
+            .fetch_optional(&self.readers)
+            .await?;
+        row.map(|row| row.try_get(0)).transpose()
+    }
+
     /// Where the files of the records are: `place`, unless another place was noted before.
     pub(in crate::store) async fn note_place(&self, place: &str) -> StoreResult<String> {
         let mut transaction = self.writer.begin().await?;

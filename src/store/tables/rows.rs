@@ -1,8 +1,8 @@
 //! From rows of the database to the records of `jobs`, and JSON columns both ways.
 
 use crate::jobs::{
-    Held, Holding, Job, JobState, LegalHold, ListPage, ListRequest, Product, Receipt, ScanFields,
-    ScanIdentity, StoreError, StoreResult, StoredVolume, Tags, Tenant, Timestamp,
+    Held, Holding, Job, JobState, LegalHold, ListPage, ListRequest, Priority, Product, Receipt,
+    ScanFields, ScanIdentity, StoreError, StoreResult, StoredVolume, Tags, Tenant, Timestamp,
 };
 use crate::store::query::DbRow;
 use serde::Serialize;
@@ -17,6 +17,7 @@ pub(super) fn job(row: DbRow) -> StoreResult<Job> {
         tags: tags(&row)?,
         sequence: row.try_get("sequence")?,
         kind: row.try_get("kind")?,
+        priority: priority(&row)?,
         volume: Some(row.try_get("volume")?).filter(|volume: &String| !volume.is_empty()),
         source: optional_json(&row, "source")?,
         send: optional_json(&row, "send")?,
@@ -37,6 +38,12 @@ pub(super) fn job(row: DbRow) -> StoreResult<Job> {
         result: row.try_get("result")?,
         trace_parent: row.try_get("trace_parent")?,
     })
+}
+
+fn priority(row: &DbRow) -> StoreResult<Priority> {
+    let rank = row.try_get("priority")?;
+    Priority::of_rank(rank)
+        .ok_or_else(|| StoreError::database(format!("unknown priority {rank} of a job")))
 }
 
 /// A number that is never negative, as the database holds it.

@@ -1,0 +1,138 @@
+//! `ventriform migrate`: moving a data folder to PostgreSQL and an S3 store.
+
+use super::serve::variable;
+use crate::access::verify;
+use crate::config::{BlobPlace, DatabaseUrl, Flags, Settings};
+use crate::http::{self, s3_location};
+use crate::store::{self, Destination, Migrated, Progress, open_database};
+use anyhow::{Result, bail};
+use clap::Args;
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+use tokio::runtime::Runtime;
+
+/// Time between two lines about the progress.
+const TOLD_EVERY: Duration = Duration::from_secs(2);
+
+/// Copy a data folder to PostgreSQL, to an S3 store, or to both (stop the service first)
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  ventriform migrate --from data --to postgres://ventriform@db/ventriform,s3://hearts/prod
+  ventriform migrate --from data --to postgres://ventriform@db/ventriform,new-data
+  ventriform migrate --from data --to s3://hearts/prod,new-data
+
+Every file is hashed on both sides, every row is read back. The folder stays as it is. If it is stopped or
+fails, give the same command again: it goes on where it stopped, and no service starts on what is
+unfinished. Passwords and credentials come from the environment, as for the service.")]
+pub struct MigrateArgs {
+    /// Data folder of the service, with its records in `ventriform.db` and its files beside it
+    #[arg(long, value_name = "DIR")]
+    from: PathBuf,
+    /// Where to: postgres://USER@HOST:PORT/NAME, s3://BUCKET/PREFIX, or both; with one alone, also the new
+    /// data folder for the rest. A comma in a password is written %2C
+    #[arg(
+        long,
+        value_name = "TARGET,...",
+        value_delimiter = ',',
+        required = true
+    )]
+    to: Vec<String>,
+}
+
+/// Copies a data folder.
+///
+/// # Errors
+/// If it was not copied as a whole.
+pub fn run(args: &MigrateArgs) -> Result<()> {
+    let to = args.destination()?;
+    http::install_cryptography();
+    let told = Mutex::new(Instant::now());
+    let tell = |progress: Progress| {
+        let Ok(mut told) = told.lock() else { return };
+        if told.elapsed() >= TOLD_EVERY {
+            *told = Instant::now();
+            eprintln!("{}", line(progress));
+        }
+    };
+    Runtime::new()?.block_on(async {
+        let done = store::migrate(&args.from, &to, tell).await?;
+        print(&done);
+        check_trail(&to).await
+    })
+}
+
+impl MigrateArgs {
+    fn destination(&self) -> Result<Destination> {
+        let mut flags = Flags::default();
+        let mut folder = None;
+        for part in &self.to {
+            let twice = match part.split_once("://") {
+                Some(("postgres" | "postgresql", _)) => {
+                    let url: DatabaseUrl = part.parse().map_err(anyhow::Error::msg)?;
+                    flags.database.replace(url).is_some()
+                }
+                Some(("s3", _)) => {
+                    let place: BlobPlace = part.parse().map_err(anyhow::Error::msg)?;
+                    flags.blobs.replace(place).is_some()
+                }
+                Some((scheme, _)) => bail!("--to: {scheme}:// is none of postgres:// and s3://"),
+                None => folder.replace(PathBuf::from(part)).is_some(),
+            };
+            if twice {
+                bail!("--to: two targets of one kind: give one of each at most");
+            }
+        }
+        // What the environment says of the service is not meant here.
+        flags
+            .database
+            .get_or_insert("sqlite".parse().map_err(anyhow::Error::msg)?);
+        flags.blobs.get_or_insert(BlobPlace::Folder);
+        let mut settings = Settings::load(&flags, variable)?.0;
+        settings.read_aws(variable);
+        Ok(Destination {
+            database: settings.postgres(),
+            s3: s3_location(&settings),
+            folder,
+        })
+    }
+}
+
+fn line(progress: Progress) -> String {
+    match progress {
+        Progress::Items { done, of } => format!("{done} of {of} items"),
+        Progress::Rows { done } => format!("{done} rows"),
+    }
+}
+
+fn print(done: &Migrated) {
+    for table in done.tables.iter().filter(|table| table.rows > 0) {
+        println!("{:>10} {}", table.rows, table.name);
+    }
+    let rows: u64 = done.tables.iter().map(|table| table.rows).sum();
+    match done.was_done {
+        true => println!("{rows} rows are the same on both sides: it was moved before"),
+        false => println!(
+            "{rows} rows, {} items ({} of them copied now), {} received objects",
+            done.items, done.copied, done.received
+        ),
+    }
+}
+
+/// Walks the audit trail that the target has now.
+async fn check_trail(to: &Destination) -> Result<()> {
+    let folder = to.folder.clone().unwrap_or_default();
+    let rows = open_database(&folder, to.database.as_ref()).await?;
+    let report = verify(rows.as_ref()).await?;
+    rows.close().await;
+    match report.broken {
+        None => println!(
+            "audit trail: {} rows, unbroken up to {} ({})",
+            report.rows, report.newest, report.head
+        ),
+        Some(broken) => println!(
+            "audit trail: {broken}. It is the same in the folder that was moved: all was copied as it was"
+        ),
+    }
+    Ok(())
+}

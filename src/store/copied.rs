@@ -1,0 +1,11 @@
+//! The outcome of copying an item.
+
+/// What became of an item, or of a received object.
+pub(super) enum Copied {
+    /// It was copied.
+    Now,
+    /// The target had it.
+    Before,
+    /// It is missing or damaged: how.
+    Not(String),
+}
