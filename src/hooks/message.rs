@@ -1,10 +1,8 @@
 //! The body of a delivery.
 
 use super::DueDelivery;
-use crate::jobs::{Resource, Timestamp};
+use crate::jobs::{Resource, rfc3339};
 use serde_json::{Map, Value, json};
-use time::OffsetDateTime;
-use time::format_description::well_known::Rfc3339;
 
 /// The body of a delivery, the same in every attempt: `type`, `timestamp`, and `data` with the
 /// job's id, kind, state and paths. It holds no figures and no texts of errors: whoever may see
@@ -37,11 +35,6 @@ pub fn message_body(delivery: &DueDelivery) -> String {
         "data": data,
     });
     message.to_string()
-}
-
-fn rfc3339(at: Timestamp) -> Option<String> {
-    let time = OffsetDateTime::from_unix_timestamp_nanos(i128::from(at) * 1_000_000).ok()?;
-    time.format(&Rfc3339).ok()
 }
 
 #[cfg(test)]

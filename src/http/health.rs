@@ -41,9 +41,7 @@ pub struct NotReady {
     /// The problem.
     #[serde(flatten)]
     problem: ProblemBody,
-    /// What the service depends on; absent while it shuts down.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schema(required = false)]
+    /// What the service depends on.
     checks: Vec<Dependency>,
 }
 
@@ -103,12 +101,11 @@ pub async fn alive(RawQuery(query): RawQuery) -> Answer<Json<Health>> {
         ListProblems))]
 pub async fn ready(State(app): State<App>, RawQuery(query): RawQuery) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    if app.closing.is_cancelled() {
-        return Ok(unready("The service is shutting down.", Vec::new()));
-    }
     let found = app.readiness.check(&app.queue).await;
     let checks = found.iter().map(Dependency::from).collect();
-    if let Some(why) = why_unready(&found) {
+    let closing = app.closing.is_cancelled();
+    let why = closing.then_some("The service is shutting down.");
+    if let Some(why) = why.or_else(|| why_unready(&found)) {
         return Ok(unready(why, checks));
     }
     let Health { status, version } = healthy();

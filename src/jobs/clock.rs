@@ -5,10 +5,12 @@
 //! order of a job's stamps. Small corrections are followed at once. A step is followed only after
 //! it has lasted for [`SETTLING`]; until then time goes on as the monotonic clock says.
 
+use std::num::NonZero;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use time::OffsetDateTime;
-use time::format_description::well_known::Rfc3339;
+use time::format_description::well_known::iso8601::{Config, EncodedConfig, TimePrecision};
+use time::format_description::well_known::{Iso8601, Rfc3339};
 
 /// Milliseconds since 1970-01-01T00:00:00Z.
 pub type Timestamp = i64;
@@ -33,11 +35,19 @@ impl Clock for SystemClock {
     }
 }
 
-/// A time in UTC as RFC 3339 writes it, with milliseconds.
+/// Three digits of a second, zeros included: texts of equal length sort as the times do.
+const MILLISECONDS: EncodedConfig = Config::DEFAULT
+    .set_time_precision(TimePrecision::Second {
+        decimal_digits: NonZero::new(3),
+    })
+    .encode();
+
+/// A time in UTC as RFC 3339 writes it, always with three digits of milliseconds, so that the texts
+/// sort in the order of time. Empty before year 0 and after year 9999.
 pub fn rfc3339(at: Timestamp) -> String {
     OffsetDateTime::from_unix_timestamp_nanos(i128::from(at) * 1_000_000)
         .ok()
-        .and_then(|time| time.format(&Rfc3339).ok())
+        .and_then(|time| time.format(&Iso8601::<MILLISECONDS>).ok())
         .unwrap_or_default()
 }
 
@@ -134,6 +144,16 @@ mod tests {
 
     fn course() -> Course {
         Course::new(START, 0)
+    }
+
+    #[test]
+    fn texts_of_times_sort_as_the_times_do_and_read_back() {
+        let times = [0, 1, 10, 99, 100, 120, 123, 999, 1_000, START, START + 5];
+        let texts = times.map(rfc3339);
+        assert!(texts.is_sorted(), "{texts:?}");
+        assert_eq!(texts[5], "1970-01-01T00:00:00.120Z");
+        let read = texts.each_ref().map(|text| parse_rfc3339(text));
+        assert_eq!(read, times.map(Some));
     }
 
     #[test]

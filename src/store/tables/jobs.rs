@@ -40,6 +40,10 @@ const TURN: &str = "(SELECT CASE WHEN here > own THEN here ELSE own END FROM (SE
 /// The number of waiting jobs before each of the jobs `$1`. Each part of the queue is counted once, however
 /// many jobs are asked for: within a priority from one of them to the next, and all higher priorities at
 /// the first of each.
+///
+/// SQLite bounds a pair of columns by the first alone, so a part is counted in three: the whole turns from
+/// that of the job before on, the asked job's own turn up to the asked job, and less what the first turn
+/// has before the job before.
 const PLACES: &str = "
     WITH asked AS
         (SELECT sequence, priority, turn, lag(turn, 1, -1) OVER place AS turn_before,
@@ -48,11 +52,21 @@ const PLACES: &str = "
          WHERE sequence IN (SELECT CAST(value AS BIGINT) FROM json_each($1))
          WINDOW place AS (PARTITION BY priority ORDER BY turn, sequence))
     SELECT sequence,
-           CAST(sum((SELECT count(*) FROM jobs AS queue
-                     WHERE queue.state = 'queued' AND queue.volume != ''
-                       AND queue.priority = asked.priority
-                       AND (queue.turn, queue.sequence) >= (turn_before, sequence_before)
-                       AND (queue.turn, queue.sequence) < (asked.turn, asked.sequence))
+           CAST(sum((SELECT count(*) FROM jobs AS turns
+                     WHERE turns.state = 'queued' AND turns.volume != ''
+                       AND turns.priority = asked.priority
+                       AND turns.turn >= turn_before AND turns.turn < asked.turn)
+                    + (SELECT count(*) FROM jobs AS own
+                       WHERE own.state = 'queued' AND own.volume != ''
+                         AND own.priority = asked.priority AND own.turn = asked.turn
+                         AND own.sequence < asked.sequence
+                         AND own.sequence >= CASE WHEN turn_before = asked.turn
+                                             THEN sequence_before ELSE -1 END)
+                    - CASE WHEN turn_before = asked.turn THEN 0
+                      ELSE (SELECT count(*) FROM jobs AS earlier
+                            WHERE earlier.state = 'queued' AND earlier.volume != ''
+                              AND earlier.priority = asked.priority AND earlier.turn = turn_before
+                              AND earlier.sequence < sequence_before) END
                     + CASE WHEN sequence_before < 0
                       THEN (SELECT count(*) FROM jobs AS higher
                             WHERE higher.state = 'queued' AND higher.volume != ''
@@ -562,7 +576,9 @@ mod tests {
         let store = store.unwrap();
         let places = plan(&store, PLACES).await;
         for step in [
-            "SEARCH queue USING COVERING INDEX jobs_ready (state=? AND priority=? AND turn>? AND turn<?)",
+            "SEARCH turns USING COVERING INDEX jobs_ready (state=? AND priority=? AND turn>? AND turn<?)",
+            "SEARCH own USING COVERING INDEX jobs_ready (state=? AND priority=? AND turn=? AND sequence>? AND sequence<?)",
+            "SEARCH earlier USING COVERING INDEX jobs_ready (state=? AND priority=? AND turn=? AND sequence<?)",
             "SEARCH higher USING COVERING INDEX jobs_ready (state=? AND priority<?)",
         ] {
             assert!(places.iter().any(|found| found == step), "{places:#?}");
