@@ -1,6 +1,6 @@
 // Putting the heart where it is: by handles in the slices or by numbers, then a new fit from there.
 
-import { useEffect, useState } from "preact/hooks";
+import { useLayoutEffect, useState } from "preact/hooks";
 import { type ParameterValue, type Volume, fieldOf, words } from "../api";
 import { ReaderChoice, draftOf, parameterSpecs, valuesOf } from "../parameters";
 import { useWatched } from "../state";
@@ -41,7 +41,7 @@ export function Correction({ scene, volume, shown }: Props) {
   const [sending, setSending] = useState(false);
   const [edge, setEdge] = useState("");
   const [reader, setReader] = useState("");
-  useEffect(() => {
+  useLayoutEffect(() => {
     scene.edit.value = start(scene, shown);
     scene.tool.value = "correct";
     setProblem(null);
@@ -106,7 +106,7 @@ export function Correction({ scene, volume, shown }: Props) {
       <Triple name="Axis, base to apex" value={axis} digits={3} wrong={problem?.field === "axis"} onValue={axisTo} />
       <label class="field">
         Base, mm from the centre
-        <input type="number" step={1} value={dot(sub(edit.center, edit.base), axis).toFixed(0)} aria-invalid={problem?.field === "base" || undefined} onChange={event => baseTo(Number(event.currentTarget.value))} />
+        <NumberInput step={1} text={dot(sub(edit.center, edit.base), axis).toFixed(0)} aria-invalid={problem?.field === "base" || undefined} onNumber={baseTo} />
       </label>
       <label class="field">
         Turn about the axis, °
@@ -146,18 +146,40 @@ function Triple({ name, value, digits, wrong, onValue }: TripleProps) {
     <fieldset class={wrong ? "field triple wrong" : "field triple"}>
       <legend>{name}</legend>
       {value.map((part, n) => (
-        <input
+        <NumberInput
           key={n}
-          type="number"
           step={digits > 1 ? 0.05 : 1}
           aria-label={`${name}, ${["x", "y", "z"][n]}`}
-          value={part.toFixed(digits)}
-          onChange={event => {
-            const number = Number(event.currentTarget.value);
-            if (Number.isFinite(number)) onValue(value.map((old, at) => (at === n ? number : old)) as unknown as Vec);
-          }}
+          text={part.toFixed(digits)}
+          onNumber={number => onValue(value.map((old, at) => (at === n ? number : old)) as unknown as Vec)}
         />
       ))}
     </fieldset>
+  );
+}
+
+interface NumberInputProps {
+  step: number;
+  text: string;
+  onNumber: (value: number) => void;
+  "aria-label"?: string;
+  "aria-invalid"?: true | undefined;
+}
+
+/** A number that counts when the field is left. What is typed until then is kept, however often the view is drawn again. */
+function NumberInput({ text, onNumber, ...rest }: NumberInputProps) {
+  const [typed, setTyped] = useState<string | null>(null);
+  return (
+    <input
+      type="number"
+      {...rest}
+      value={typed ?? text}
+      onInput={event => setTyped(event.currentTarget.value)}
+      onChange={event => {
+        setTyped(null);
+        const { value } = event.currentTarget;
+        if (value !== "" && Number.isFinite(Number(value))) onNumber(Number(value));
+      }}
+    />
   );
 }
