@@ -24,7 +24,7 @@ export function bytes(count: number): string {
 
 const DAY = new Intl.DateTimeFormat(undefined, { dateStyle: "medium", timeStyle: "short" });
 
-/** The order of two things, the newest first. Times are not compared as texts: their fractions of a second differ in length. */
+/** The order of two things, the newest first. */
 export function newest(a: { created_at: string }, b: { created_at: string }): number {
   return Date.parse(b.created_at) - Date.parse(a.created_at);
 }
