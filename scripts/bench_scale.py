@@ -7,9 +7,10 @@ One replica that answers requests, over PostgreSQL and an S3 store (moto).
 1. Jobs per second (models of 67 points) with 1, 2 and 4 workers of one thread, in turn, three times.
 2. Uploads of 8 MiB through the replica, beside PUTs of the same bytes to the store itself, in turn.
 3. Lists, figures and jobs per second with few jobs and with ROWS ended ones in the table, and its size.
+4. With ROWS ended jobs: 100 claims a second, and 1, 2 and 4 processes whose jobs sleep (benches/queue.rs).
 Prints medians; quiet machines only. Needs what scripts/chaos.py needs.
 """
-import argparse, gzip, http.client, json, os, shutil, statistics, tempfile, time
+import argparse, gzip, http.client, json, os, shutil, statistics, subprocess, tempfile, time
 
 from chaos import Postgres, run, s3_server
 from crash_rounds import ROOT, Service
@@ -129,6 +130,10 @@ class Bench:
         after = self.jobs_per_second(2, 102)
         print(f"2 workers: {before:.2f} jobs/s before, {after:.2f} with {rows} ended jobs in the table", flush=True)
 
+    def sleepers(self):
+        environment = {**os.environ, "VENTRIFORM_DATABASE": self.postgres.url("127.0.0.1"), "VENTRIFORM_BLOBS": "s3://hearts/bench"}
+        subprocess.run(["cargo", "bench", "--quiet", "--bench", "queue"], cwd=ROOT, env=environment, check=True)
+
     def end(self):
         self.api.kill()
         self.store.kill()
@@ -149,6 +154,7 @@ def main():
         bench.throughput()
         bench.uploads()
         bench.full_tables()
+        bench.sleepers()
     finally:
         bench.end()
         shutil.rmtree(folder, ignore_errors=True)
