@@ -154,10 +154,11 @@ fn bytes(length: usize, seed: u32) -> Vec<u8> {
 async fn contract(subject: &Subject) {
     let blobs = &subject.blobs;
     blobs.check().await.unwrap();
-    // Three parts of a multipart upload, and files of every awkward length.
+    // Three parts of a multipart upload, a part and a little more in one request, and files of every awkward
+    // length.
     let files = [
         ("great.nii", bytes((17 << 20) + 5, 1)),
-        ("part.nii", bytes(8 << 20, 2)),
+        ("whole.nii", bytes((8 << 20) + 352, 2)),
         ("small.json", bytes(700, 3)),
         ("empty.txt", Vec::new()),
     ];
@@ -295,6 +296,18 @@ async fn a_bucket_keeps_the_contract() {
     assert_eq!(left, [format!("{prefix}/ready")]);
 }
 
+/// More parts than may be held in memory at once.
+#[tokio::test(flavor = "multi_thread")]
+async fn great_files_at_the_same_time_take_turns() {
+    let server = Arc::new(S3Server::start().await);
+    let subject = Subject::bucket(&server, &server.url, &random_id("")).await;
+    let files = [("great.nii", bytes(17 << 20, 1))];
+    let ids: Vec<_> = (0..8).map(|number| format!("vol_{number}")).collect();
+    let published = join_all(ids.iter().map(|id| subject.publish(id, &files)));
+    let published = tokio::time::timeout(Duration::from_secs(60), published).await;
+    assert!(published.unwrap().iter().all(Result::is_ok));
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn files_go_and_come_over_a_failing_network() {
     let server = Arc::new(S3Server::start().await);
@@ -302,7 +315,7 @@ async fn files_go_and_come_over_a_failing_network() {
     let subject = Subject::bucket(&server, &proxy.url, &random_id("")).await;
     proxy.set(Network::Failing);
     let files = [
-        ("great.nii", bytes(9 << 20, 1)),
+        ("great.nii", bytes(17 << 20, 1)),
         ("small.json", bytes(700, 2)),
     ];
     for id in ["vol_1", "vol_2"] {

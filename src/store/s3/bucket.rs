@@ -31,6 +31,9 @@ use tokio::time::Instant;
 /// Bytes of one part.
 const PART: usize = 8 << 20;
 
+/// Greatest file that is sent by one request: most scans are. Parts cost two requests more.
+const WHOLE: usize = 16 << 20;
+
 /// Bytes of parts that are sent or fetched at the same time, in [`UNIT`]s: they are held in memory.
 const UNITS: u32 = 48;
 
@@ -246,10 +249,9 @@ impl Bucket {
         let key = self.key(path);
         let mut file = File::open(from).await?;
         let length = file.metadata().await?.len();
-        let first = usize::try_from(length).map_or(PART, |length| length.min(PART));
-        let room = self.room(first).await;
-        let part = read_part(&mut file).await?;
-        if length <= PART as u64 {
+        if length <= WHOLE as u64 {
+            let _room = self.room(length as usize).await;
+            let part = read_part(&mut file, WHOLE).await?;
             let content = Content {
                 bytes: part.len() as u64,
                 sha256: hex(&Sha256::digest(&part)),
@@ -257,10 +259,9 @@ impl Bucket {
             self.put(path, part).await?;
             return Ok(content);
         }
-        drop(room);
         let begun = self.insist(|| self.store.create_multipart(&key)).await;
         let upload = begun.map_err(|error| self.fault(path, &error))?;
-        match self.put_parts(&key, &upload, part, &mut file).await {
+        match self.put_parts(&key, &upload, &mut file).await {
             Ok(content) => Ok(content),
             Err(error) => {
                 // What cannot be ended now is ended by a rule of the bucket.
@@ -277,21 +278,26 @@ impl Bucket {
         &self,
         key: &Key,
         upload: &MultipartId,
-        first: Bytes,
         file: &mut File,
     ) -> Result<Content, PartError> {
         let mut hash = Sha256::new();
         let (mut bytes, mut number) = (0, 0);
         let mut sent = FuturesUnordered::new();
         let mut ids = BTreeMap::new();
-        let mut part = first;
-        while !part.is_empty() {
+        loop {
+            // The parts under way go on while the next one waits for room, which they may hold.
+            let room = loop {
+                tokio::select! {
+                    Some(done) = sent.next() => ids.extend([done?]),
+                    room = self.room(PART), if sent.len() < PARALLEL => break room,
+                }
+            };
+            let part = read_part(file, PART).await?;
+            if part.is_empty() {
+                break;
+            }
             hash.update(&part);
             bytes += part.len() as u64;
-            if sent.len() >= PARALLEL {
-                ids.extend(sent.try_next().await?);
-            }
-            let room = self.room(part.len()).await;
             sent.push(async move {
                 let put = || {
                     self.store
@@ -301,7 +307,6 @@ impl Bucket {
                 drop(room);
                 Ok::<_, Error>((number, done?))
             });
-            part = read_part(file).await?;
             number += 1;
         }
         while let Some(done) = sent.try_next().await? {
@@ -520,9 +525,9 @@ enum PartError {
     Store(#[from] Error),
 }
 
-/// The next part of a file; less than [`PART`] bytes at its end.
-async fn read_part(file: &mut File) -> std::io::Result<Bytes> {
+/// The next bytes of a file; fewer than `limit` at its end.
+async fn read_part(file: &mut File, limit: usize) -> std::io::Result<Bytes> {
     let mut part = Vec::new();
-    file.take(PART as u64).read_to_end(&mut part).await?;
+    file.take(limit as u64).read_to_end(&mut part).await?;
     Ok(part.into())
 }
