@@ -716,21 +716,6 @@ async function main() {
       await drawn(page);
       await page.getByRole("button", { name: "Correct by hand" }).click();
       const base = page.locator(".correction label", { hasText: "Base" }).locator("input");
-      // A job that begins while somebody types draws the view again; what was typed stays.
-      const typed = String(Number(await base.inputValue()) + 3);
-      await base.fill(typed);
-      const job = await page.evaluate(async () => {
-        const order = { volume: /vol_\w+/.exec(location.hash)[0], kind: "model", parameters: { points: 3000, starts: 4, method: "paper" } };
-        const answer = await fetch("/v1/jobs", { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(order) });
-        return (await answer.json()).links.self;
-      });
-      await page.waitForSelector(".job.running");
-      assert.equal(await base.inputValue(), typed);
-      await base.press("Tab");
-      await page.waitForFunction(() => /Changed: base/.test(document.querySelector(".correction [role=status]").textContent));
-      await page.evaluate(path => fetch(path, { method: "DELETE" }), job);
-      await page.waitForSelector(".job.cancelled");
-      await page.getByRole("button", { name: "Undo changes" }).click();
       const [times, painted] = [[], []];
       for (let n = 0; n < 5; n++) {
         await base.fill(String(Number(await base.inputValue()) + 2 - 4 * (n % 2)));
