@@ -184,6 +184,29 @@ async function fragile(address, bytes) {
 /** The views of a fit are drawn. */
 const drawn = page => page.waitForSelector(".polar canvas");
 
+// Jobs that somebody else files draw the view again; what was typed in a correction stays.
+async function typedWhileJobsBegin(page, field) {
+  const typed = String(Number(await field.inputValue()) + 3);
+  await field.fill(typed);
+  // The page looks for jobs that it has not filed every 15 s: enough of them that some are left by then.
+  const filed = await page.evaluate(async () => {
+    const volume = /vol_\w+/.exec(location.hash)[0];
+    const file = async seed => {
+      const order = { volume, kind: "model", parameters: { points: 3000, starts: 4, method: "paper", seed } };
+      const answer = await fetch("/v1/jobs", { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(order) });
+      return (await answer.json()).links.self;
+    };
+    return Promise.all(Array.from({ length: 24 }, (_, n) => file(n + 1)));
+  });
+  await page.waitForSelector(".job.queued, .job.running");
+  assert.equal(await field.inputValue(), typed);
+  await field.press("Tab");
+  await page.waitForFunction(() => /Changed: base/.test(document.querySelector(".correction [role=status]").textContent));
+  await page.evaluate(jobs => Promise.all(jobs.map(job => fetch(job, { method: "DELETE" }))), filed);
+  await page.waitForFunction(() => !document.querySelector(".job.queued, .job.running"));
+  await page.getByRole("button", { name: "Undo changes" }).click();
+}
+
 async function main() {
   const browser = await chromium.launch({ executablePath: CHROMIUM, args: ["--no-sandbox", "--enable-unsafe-swiftshader"] });
   ends.push(() => browser.close());
@@ -716,6 +739,7 @@ async function main() {
       await drawn(page);
       await page.getByRole("button", { name: "Correct by hand" }).click();
       const base = page.locator(".correction label", { hasText: "Base" }).locator("input");
+      if (size === 64) await typedWhileJobsBegin(page, base);
       const [times, painted] = [[], []];
       for (let n = 0; n < 5; n++) {
         await base.fill(String(Number(await base.inputValue()) + 2 - 4 * (n % 2)));
