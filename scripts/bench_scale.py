@@ -22,7 +22,8 @@ class Bench:
         run(options.program, "phantom", "--size", "64", "--spacing", "6.4", "-o", folder)
         with open(f"{folder}/spect.nii.gz", "rb") as file:
             self.scan = gzip.decompress(file.read())
-        self.postgres = Postgres(folder, ["127.0.0.1"])
+        self.postgres = Postgres(folder, ["127.0.0.1"], ["shared_preload_libraries=pg_stat_statements"])
+        self.postgres.query("CREATE EXTENSION pg_stat_statements")
         self.store, self.store_port = s3_server()
         os.environ |= {"AWS_ACCESS_KEY_ID": "bench", "AWS_SECRET_ACCESS_KEY": "bench", "AWS_REGION": "us-east-1",
                        "AWS_ENDPOINT_URL": f"http://127.0.0.1:{self.store_port}"}
@@ -117,14 +118,15 @@ class Bench:
 
     def full_tables(self):
         self.lists("few jobs")
-        count = "SELECT xact_commit, pg_current_wal_lsn() - '0/0' FROM pg_stat_database WHERE datname = 'ventriform'"
+        count = ("SELECT xact_commit, pg_current_wal_lsn() - '0/0', (SELECT sum(calls) FROM pg_stat_statements "
+                 "WHERE query LIKE '%pg_advisory_xact_lock%') FROM pg_stat_database WHERE datname = 'ventriform'")
         time.sleep(1)
         start = [float(part) for part in self.postgres.query(count)[0]]
         before = self.jobs_per_second(2, 101)
         time.sleep(1)
-        end = [float(part) for part in self.postgres.query(count)[0]]
-        print(f"a job: {(end[0] - start[0]) / self.options.jobs:.1f} transactions (idle polls among them), "
-              f"{(end[1] - start[1]) / self.options.jobs / 1024:.1f} KiB of write-ahead log", flush=True)
+        transactions, written, alone = ((float(end) - start) / self.options.jobs for end, start in zip(self.postgres.query(count)[0], start))
+        print(f"a job: {transactions:.1f} transactions (idle polls among them), {alone:.1f} of them one after the other, "
+              f"{written / 1024:.1f} KiB of write-ahead log", flush=True)
         self.copies("succeeded", self.options.rows)
         table, indexes, rows = map(int, self.postgres.query("SELECT pg_table_size('jobs'), pg_indexes_size('jobs'), count(*) FROM jobs")[0])
         print(f"{rows} jobs: {table / rows:.0f} bytes a row, {indexes / rows:.0f} bytes of indexes", flush=True)

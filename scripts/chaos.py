@@ -51,7 +51,8 @@ def s3_server():
 class Postgres:
     """A database server of its own, on loopback and on the address that the other namespace sees."""
 
-    def __init__(self, folder, addresses):
+    def __init__(self, folder, addresses, settings=()):
+        self.settings = [part for setting in settings for part in ("-c", setting)]
         self.bin = sorted(glob.glob("/usr/lib/postgresql/*/bin"))[-1] + "/"
         self.data, self.port, self.addresses = folder + "/postgres", free_port(), addresses
         os.makedirs(self.data)
@@ -68,7 +69,7 @@ class Postgres:
     def start(self):
         """Starts the server, again if what a kill left of the one before is still there."""
         command = ["setpriv", "--reuid=postgres", "--regid=postgres", "--clear-groups", self.bin + "postgres", "-D", self.data,
-                   "-p", str(self.port), "-k", "", "-c", "listen_addresses=" + ",".join(self.addresses)]
+                   "-p", str(self.port), "-k", "", "-c", "listen_addresses=" + ",".join(self.addresses), *self.settings]
         ready = [self.bin + "pg_isready", "-q", "-h", "127.0.0.1", "-p", str(self.port), "-U", "ventriform"]
         deadline = time.time() + 60
         self.process = None

@@ -41,6 +41,11 @@ RARE = {
     "507": ("storage-full", "The disk of the service is full.", "Ask the operator to free or add space."),
 }
 
+# The checks in the answer of a service that is not ready, which the walk does not provoke either.
+NOT_READY = [{"name": "database", "status": "failing", "required": True, "detail": "The database does not answer."},
+             {"name": "files", "status": "ok", "required": True}, {"name": "disk", "status": "ok", "required": True},
+             {"name": "workers", "status": "failing", "required": False, "detail": "The database does not answer."}]
+
 # What stands in the examples for the keys and secrets of the recorded service.
 SECRETS = {"key": "vf_0123456789abcdef_KEEP-IT-SECRET", "secret": "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw"}
 
@@ -452,6 +457,8 @@ def main():
             title = code.replace("-", " ").capitalize()
             problem = {"type": f"urn:ventriform:problem:{code}", "title": title, "status": int(status), "detail": detail}
             walk.recorded["problems"].setdefault(status, {**problem, **({"fix": fix} if fix else {})})
+        problem = {**walk.recorded["problems"]["503"], "detail": NOT_READY[0]["detail"], "checks": NOT_READY}
+        walk.recorded["operations"]["ready"]["503"] = {PROBLEM: problem}
         walk.recorded["problems"] = dict(sorted(walk.recorded["problems"].items()))
         walk.recorded["operations"] = dict(sorted(walk.recorded["operations"].items()))
         with open(EXAMPLES, "w") as file:

@@ -155,9 +155,9 @@ async function printed(page, name) {
   return readFileSync(path, "latin1").split(/\/Type\s*\/Page\b/).length - 1;
 }
 
-/** A way to the service that breaks once so many bytes were sent on one connection; it is whole again after `mend`. */
-async function fragile(address, bytes) {
-  let breaks = true;
+/** A way to the service that breaks, or holds on, once so many bytes were sent on one connection; it is whole again after `mend`. */
+async function fragile(address, bytes, { holds = false } = {}) {
+  let whole = false;
   const server = net.createServer(from => {
     const to = net.connect(Number(new URL(address).port), "127.0.0.1");
     let sent = 0;
@@ -167,8 +167,9 @@ async function fragile(address, bytes) {
     };
     from.on("data", chunk => {
       sent += chunk.length;
-      if (breaks && sent > bytes) end();
-      else to.write(chunk);
+      if (whole || sent <= bytes) to.write(chunk);
+      else if (holds) from.pause();
+      else end();
     });
     to.on("data", chunk => from.write(chunk));
     for (const one of [from, to]) {
@@ -178,7 +179,26 @@ async function fragile(address, bytes) {
   });
   await new Promise(done => server.listen(0, "127.0.0.1", done));
   ends.push(() => server.close());
-  return { address: `http://127.0.0.1:${server.address().port}`, mend: () => (breaks = false) };
+  return { address: `http://127.0.0.1:${server.address().port}`, mend: () => (whole = true) };
+}
+
+/** A NIfTI-1 file of 42 MB. */
+function largeScan() {
+  const [shape, spacing] = [[256, 256, 320], 2];
+  const file = Buffer.alloc(352 + 2 * shape[0] * shape[1] * shape[2]);
+  file.writeInt32LE(348, 0);
+  [3, ...shape, 1, 1, 1, 1].forEach((n, at) => file.writeInt16LE(n, 40 + 2 * at));
+  file.writeInt16LE(4, 70);
+  file.writeInt16LE(16, 72);
+  [1, spacing, spacing, spacing].forEach((mm, at) => file.writeFloatLE(mm, 76 + 4 * at));
+  file.writeFloatLE(352, 108);
+  file.writeFloatLE(1, 112);
+  file[123] = 2;
+  file.writeInt16LE(1, 254);
+  [0, 1, 2].forEach(row => file.writeFloatLE(spacing, 280 + 20 * row));
+  file.write("n+1\0", 344, "latin1");
+  for (let at = 352; at < file.length; at += 2) file[at] = at >> 10;
+  return file;
 }
 
 /** The views of a fit are drawn. */
@@ -488,13 +508,13 @@ async function main() {
 
   await check("an upload is cancelled and sent again", async () => {
     const own = await service();
-    const { page, faults, close } = await tab(browser, own.address);
+    const line = await fragile(own.address, 900_000, { holds: true });
+    const { page, faults, close } = await tab(browser, line.address);
     await page.waitForSelector(".welcome");
-    const session = await page.context().newCDPSession(page);
-    const sendAt = uploadThroughput => session.send("Network.emulateNetworkConditions", { offline: false, latency: 0, downloadThroughput: -1, uploadThroughput });
-    await session.send("Network.enable");
-    await sendAt(50_000);
-    await choose(page, SCAN, TRUTH);
+    // More than what the system keeps of a connection that nobody reads.
+    const large = join(SCREENSHOTS, "large.nii");
+    writeFileSync(large, largeScan());
+    await choose(page, large, TRUTH);
     await page.waitForFunction(() => document.querySelector(".uploads .sending progress")?.value > 0);
     await look(page, "sending-1280");
     // What waits is cancelled as what is sent.
@@ -503,12 +523,13 @@ async function main() {
     await page.locator(".uploads .sending").getByRole("button", { name: "Cancel" }).click();
     await page.waitForFunction(() => document.querySelectorAll(".uploads .cancelled").length === 2);
     assert.equal(await stored(), 0);
-    await sendAt(-1);
-    await page.locator(".uploads .cancelled", { hasText: "spect" }).getByRole("button", { name: "Send again" }).click();
+    line.mend();
+    await page.locator(".uploads .cancelled", { hasText: "large" }).getByRole("button", { name: "Send again" }).click();
     await page.waitForSelector(".uploads .stored");
     assert.equal(await stored(), 1);
     await page.getByRole("button", { name: "Take lv_truth.nii.gz off this list" }).click();
     await page.waitForFunction(() => document.querySelectorAll(".uploads .cancelled").length === 0);
+    rmSync(large);
     assert.deepEqual(faults, []);
     await close();
   });

@@ -201,7 +201,7 @@ fn problem_examples(recorded: &Value) -> Value {
     Value::Object(examples.collect())
 }
 
-/// Adds the recorded request and answers, and to every problem the example of its status.
+/// Adds the recorded request and answers, and to every problem without one of its own the example of its status.
 fn add_examples(operation: &mut Value, recorded: &Value) {
     let id = operation["operationId"].as_str().unwrap_or_default();
     let own = &recorded["operations"][id];
@@ -211,7 +211,10 @@ fn add_examples(operation: &mut Value, recorded: &Value) {
     for (status, answer) in answers(operation) {
         add_own(answer, &own[status]);
         for (media_type, content) in contents(answer) {
-            if media_type == MEDIA_TYPE && recorded["problems"].get(status).is_some() {
+            if media_type == MEDIA_TYPE
+                && content.get("example").is_none()
+                && recorded["problems"].get(status).is_some()
+            {
                 let example = format!("#/components/examples/Problem{status}");
                 content["examples"] = json!({"problem": {"$ref": example}});
             }
