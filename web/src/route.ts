@@ -22,6 +22,11 @@ export function open(volume: string, result?: string | null, other?: string | nu
   location.hash = ["#", "scan", volume, result ?? "", other ?? ""].join("/").replace(/\/+$/, "");
 }
 
+/** Whether this scan is what the address names: the views follow a change of it a moment later. */
+export function isAt(volume: string): boolean {
+  return read().volume === volume;
+}
+
 export function home(): void {
   location.hash = "#/";
 }

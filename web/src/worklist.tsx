@@ -7,7 +7,7 @@ import { useDrop } from "./drop";
 import { JobLine, Trouble } from "./jobline";
 import { eraseVolume, fits, isActive, jobs, loadAllResults, loadMore, loadResultsOf, loaded, models, more, put, refresh, trouble, volumes } from "./library";
 import { Picture } from "./picture";
-import { open } from "./route";
+import { open, route } from "./route";
 import { useWatched } from "./state";
 import { type Upload, add, again, dismiss, keepNames, onStored, stop, uploads } from "./upload";
 import { bytes, isFit, isLabelMap, moment, nameOf, newest, number, resultName, shape, study } from "./words";
@@ -30,7 +30,7 @@ export function WorkList() {
       if (then === "nothing" || isLabelMap(volume)) return;
       const alone = uploads.value.filter(upload => upload.state !== "stored").length === 0 && uploads.value.length === 1;
       file(then === "fit" ? "segmentation" : "model", volume, {}).then(
-        () => alone && open(volume.id),
+        () => alone && route.value.view === "list" && open(volume.id),
         error => setMessage(words(error)),
       );
     });

@@ -6,7 +6,7 @@ import { Confirm } from "../confirm";
 import { JobLine } from "../jobline";
 import { eraseResult, find, fits, isActive, jobs, loadResult, loadScan, models, resultsOf } from "../library";
 import { type Draft, type Kind, ParameterForm, draftOf, parameterSpecs, valuesOf } from "../parameters";
-import { home, open, route } from "../route";
+import { home, isAt, open, route } from "../route";
 import { useWatched } from "../state";
 import { file } from "../work";
 import { isFit, moment, nameOf, resultName, shape, study } from "../words";
@@ -64,7 +64,7 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
       }
       if (!running.current.delete(job.id) || job.state !== "succeeded") continue;
       const made = job.segmentation ?? job.model;
-      if (made) open(volume.id, made, job.labels["parent"] ?? null);
+      if (made && isAt(volume.id)) open(volume.id, made, job.labels["parent"] ?? null);
     }
   }, [own]);
 
