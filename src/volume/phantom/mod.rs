@@ -6,19 +6,18 @@
 //! 1. `anatomy`: the uptake at every voxel. The wall of the LV is a truncated prolate ellipsoid
 //!    shell with a slanted base and optional perfusion defects by AHA segment (Cerqueira et al.,
 //!    Circulation 2002), surrounded by blood, right ventricle, liver, gut, lungs and torso.
-//! 2. Motion: the mean of the uptake before and after a displacement along the body, weighted by
-//!    the share of the scan.
+//! 2. `motion`: the views after a displacement along the body show the heart in another place.
 //! 3. A Gaussian blur: the resolution of camera and collimator.
 //! 4. `poisson`: counting noise.
 //! 5. A second Gaussian blur: the reconstruction filter, which correlates the noise.
 //!
 //! Steps 2 to 5 replace projection and reconstruction. Resolution and texture of the noise are
-//! realistic; attenuation and scatter are not modelled. Motion doubles walls as in a
-//! reconstruction, but without the streaks of projections that contradict each other.
+//! realistic; attenuation and scatter are not modelled.
 //!
 //! Guaranteed: the same parameters give the same voxels on any number of threads.
 
 mod anatomy;
+mod motion;
 mod parameters;
 mod poisson;
 
@@ -64,7 +63,7 @@ pub fn phantom(parameters: &PhantomParameters, monitor: &Monitor) -> Result<Phan
     let (mut voxels, wall) = anatomy.render(p.shape, &frame, monitor)?;
     if p.motion_mm != 0.0 {
         let slices = p.motion_mm / p.spacing_mm[2];
-        voxels = moved(&voxels, p.shape, slices, p.motion_share as f32);
+        voxels = motion::moved(&voxels, p.shape, p.spacing_mm, (slices, p.motion_share));
     }
     step(0.3)?;
     let filter = kernels(p.post_filter_mm, p.spacing_mm);
@@ -105,26 +104,6 @@ pub fn phantom(parameters: &PhantomParameters, monitor: &Monitor) -> Result<Phan
     })
 }
 
-/// The mean of `voxels` and the same moved by `slices` along k, the latter weighted by `share`. What
-/// comes in from outside continues the first or last slice.
-fn moved(voxels: &[f32], shape: [usize; 3], slices: f64, share: f32) -> Vec<f32> {
-    let slice = shape[0] * shape[1];
-    let last = shape[2] as f64 - 1.0;
-    (0..shape[2])
-        .into_par_iter()
-        .flat_map_iter(|k| {
-            let from = (k as f64 - slices).clamp(0.0, last);
-            let below = from.floor() as usize;
-            let above = (below + 1).min(shape[2] - 1);
-            let part = (from - from.floor()) as f32;
-            (0..slice).map(move |n| {
-                let [a, b] = [below, above].map(|k| voxels[k * slice + n]);
-                (1.0 - share) * voxels[k * slice + n] + share * (a + (b - a) * part)
-            })
-        })
-        .collect()
-}
-
 /// The kernels along i, j, k of a Gaussian with the full width at half maximum `fwhm_mm`, cut off at
 /// four sigma, beyond which lies 6e-5 of its mass.
 fn kernels(fwhm_mm: f64, spacing_mm: [f64; 3]) -> [Kernel; 3] {
@@ -148,7 +127,7 @@ fn count(
         monitor.check()?;
         let mut random = stream(seed, Purpose::PhantomNoise);
         for v in slice {
-            let n = poisson::draw(f64::from(*v) * counts, &mut random);
+            let n = poisson::draw(f64::from(v.max(0.0)) * counts, &mut random);
             *v = (n / counts) as f32;
         }
         Ok(())
