@@ -12,6 +12,7 @@ use super::rim;
 use super::sensors::{PER_TRIANGLE, SensorReading, SensorSettings};
 use super::setup::FitSetup;
 use super::uncertainty::NodeEvidence;
+use super::views::Views;
 use crate::geometry::Vec3;
 use crate::grid::Volume;
 use crate::locate::patient_orientation::OrientationSource;
@@ -166,7 +167,11 @@ impl Attempt {
                 residual,
                 strain: fit.strain.sqrt(),
             };
-            fit.evidence = Evidence::of(wall, &edges, found.hollowness, &setup.field);
+            let views = match orientation.source {
+                OrientationSource::Unknown => None,
+                _ => Views::of(&fit.mesh, superior, volume, monitor)?,
+            };
+            fit.evidence = Evidence::of(wall, &edges, found.hollowness, &setup.field, views);
             fit.nodes = nodes_seen(&fit.mesh, wall, &self.moved.readings);
         }
         fit.confidence = match &fit.evidence {

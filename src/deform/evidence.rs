@@ -9,6 +9,7 @@ use std::ops::Range;
 
 use nalgebra::Matrix3;
 
+use super::views::Views;
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::model::wall::{COLUMNS, ROWS, VentricleWall, WallRay};
@@ -53,6 +54,8 @@ pub struct Evidence {
     /// Share of the wall beside which, 12 to 18 mm beyond its outer surface, something takes up more than
     /// half as much as the bright wall does, 0..=1: other organs, or the wall's own image elsewhere.
     pub beside: f64,
+    /// What the projections of the image show of motion; `None` where it is unknown how the patient lay.
+    pub views: Option<Views>,
 }
 
 /// How a model met the edges of the image.
@@ -67,12 +70,13 @@ pub(super) struct Edges {
 
 impl Evidence {
     /// The figures of a fit whose apparent wall, before its rim was moved, is `wall`, in a heart that is hollow by
-    /// `hollowness`, and in this blurred `image`; `None` for models whose wall no ray meets.
+    /// `hollowness`, in this blurred `image` and its projections, the `views`; `None` for models whose wall no ray meets.
     pub(super) fn of(
         wall: &VentricleWall,
         edges: &Edges,
         hollowness: f64,
         image: &Field,
+        views: Option<Views>,
     ) -> Option<Self> {
         let uptake = WallUptake::of(wall, image)?;
         let middle: Vec<f64> = (0..COLUMNS)
@@ -102,6 +106,7 @@ impl Evidence {
             septal_overshoot: septal_overshoot(wall),
             dark: uptake.dark,
             beside: uptake.beside,
+            views,
         })
     }
 }

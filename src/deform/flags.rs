@@ -31,10 +31,10 @@ pub enum Flag {
     /// The wall looks doubled or displaced.
     #[error(
         "the patient may have moved during the scan (chance {:.0} %): the wall looks doubled or \
-         displaced; its thickness scatters by {thickness_spread:.1} mm, its middle lies {:.1} % of the \
+         displaced{}; its thickness scatters by {thickness_spread:.1} mm, its middle lies {:.1} % of the \
          radius off the axis and scatters by {:.0} %, length over radius is {slenderness:.2}, edges show \
          along {:.0} % of the surface. The true place of the heart may be some millimetres away",
-        100.0 * chance, 100.0 * evidence.offset, 100.0 * evidence.unroundness,
+        100.0 * chance, two_places(evidence), 100.0 * evidence.offset, 100.0 * evidence.unroundness,
         100.0 * evidence.active, thickness_spread = evidence.thickness_spread,
         slenderness = evidence.slenderness
     )]
@@ -119,6 +119,20 @@ pub enum Flag {
         /// Share of basal rays without wall.
         gaps: f64,
     },
+}
+
+/// What the projections say of two places, in words.
+fn two_places(evidence: &Evidence) -> String {
+    evidence.views.map_or_else(String::new, |views| {
+        format!(
+            ", with two places {:.0} mm apart along the bed in {:.0} and {:.0} % of the projections, which \
+             explain {:.0} % of what one place does not",
+            views.displacement,
+            100.0 * (1.0 - views.share),
+            100.0 * views.share,
+            100.0 * views.gain
+        )
+    })
 }
 
 impl Flag {

@@ -16,6 +16,7 @@
 //!    more likely right: beside a septum without uptake, the right ventricle's wall looks like one.
 //! 6. [`rim`]: move the rim of a ventricle where anatomy and image together put it.
 //! 7. [`fit`](mod@fit): measure the result; [`evidence`], [`confidence`]: how likely it is right;
+//!    [`views`]: whether the projections of the image show the wall in two places;
 //!    [`uncertainty`]: how far each node may be off; [`flags`]: what gives reason to doubt it.
 //! 8. [`consensus`]: of several models' fits to one volume, judge the chosen one by all of them.
 //!
@@ -52,6 +53,7 @@ pub mod rim;
 pub mod sensors;
 pub mod setup;
 pub mod uncertainty;
+pub mod views;
 
 pub use error::DeformError;
 pub use evidence::Evidence;

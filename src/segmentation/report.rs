@@ -190,6 +190,10 @@ fn evidence(e: &Evidence, spread: Option<f64>) -> Value {
         "septal_bulge": round(e.septal_bulge),
         "dark": round(e.dark),
         "beside": round(e.beside),
+        "agreement_of_views": e.views.map(|v| round(v.agreement)),
+        "gain_of_two_places": e.views.map(|v| round(v.gain)),
+        "displacement_mm": e.views.map(|v| round(v.displacement)),
+        "displaced_share": e.views.map(|v| round(v.share)),
         "chance_of_motion": round(confidence::of_motion(e)),
         "template_spread_mm": spread.map(round),
     })

@@ -945,6 +945,14 @@ schemas! {
         dark: f64,
         /// Share of the wall beside which something takes up more than that.
         beside: f64,
+        /// Mean correlation of image and wall in their projections; null where the orientation is unknown.
+        agreement_of_views: Option<f64>,
+        /// How much better two places of the wall in two runs of projections explain the image than one, as a share of what one leaves unexplained; null likewise.
+        gain_of_two_places: Option<f64>,
+        /// Distance of the two places along the bed; null likewise.
+        displacement_mm: Option<f64>,
+        /// Share of the projections that show the second place; null likewise.
+        displaced_share: Option<f64>,
         /// Chance that the patient moved, 0 to 1.
         chance_of_motion: f64,
         /// Mean distance of the nodes from the fits of the other built-in hearts; null without them.
