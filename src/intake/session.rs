@@ -62,9 +62,12 @@ impl Sessions {
         }
     }
 
-    /// Watches a group that an earlier run has left, as after a session that broke off.
+    /// Watches a group that an earlier run has left, as after a session that broke off. One that this run receives
+    /// already is left to its session.
     pub fn resume(&self, group: &str, whole: bool) {
-        self.change(group, whole, |watched| watched.broken = true);
+        if !self.watches(group) {
+            self.change(group, whole, |watched| watched.broken = true);
+        }
     }
 
     /// Whether a group is on the list.
@@ -224,6 +227,16 @@ mod tests {
         first.release();
         assert_eq!(wait(&sessions, "a"), PATIENCE);
         second.release();
+        assert_eq!(wait(&sessions, "a"), QUIET);
+    }
+
+    #[test]
+    fn what_the_start_finds_of_this_run_is_left_to_its_session() {
+        let sessions = sessions();
+        let mut session = sessions.begin();
+        session.brought("a", false);
+        sessions.resume("a", false);
+        session.release();
         assert_eq!(wait(&sessions, "a"), QUIET);
     }
 

@@ -553,7 +553,7 @@ async fn stow(app: &TestApp, path: &str, kind: &str, body: Vec<u8>) -> reqwest::
 #[tokio::test]
 async fn objects_are_stored_over_http() {
     // A machine that stands still for a moment is no sender that does.
-    let (app, _) = service(|settings| settings.series_patience = "30s".parse().unwrap()).await;
+    let (app, _) = service(|settings| settings.series_patience = "5s".parse().unwrap()).await;
     let files: Vec<_> = (1..4).map(|number| slice("1.2.4", number).file()).collect();
     let answer = stow(&app, "/dicom-web/studies", RELATED, related(&files)).await;
     assert_eq!(answer.status(), StatusCode::OK);
