@@ -34,6 +34,7 @@ mod doctor;
 mod faults;
 mod findings;
 mod migrate;
+mod news;
 mod postgres;
 mod query;
 mod received;

@@ -20,11 +20,10 @@
 
 use super::faults;
 use super::query::jitter;
-use crate::jobs::{News, NewsFeed, StoreError, StoreFault, StoreResult};
-use async_trait::async_trait;
+use crate::jobs::{StoreError, StoreFault, StoreResult};
 use sqlx::migrate::MigrateError;
 use sqlx::pool::PoolConnection;
-use sqlx::postgres::{PgConnectOptions, PgConnection, PgListener, PgPool, PgPoolOptions};
+use sqlx::postgres::{PgConnectOptions, PgConnection, PgPool, PgPoolOptions};
 use sqlx::{ConnectOptions, Connection, Postgres, Row};
 use std::ops::{Deref, DerefMut};
 use std::time::{Duration, Instant};
@@ -40,9 +39,6 @@ const OLDEST: i32 = 150_000;
 
 /// The key of the lock for writing, in any schema of its own.
 pub(super) const BEGIN: &str = "BEGIN; SELECT pg_advisory_xact_lock(hashtextextended('ventriform writes ' || current_schema(), 0))";
-
-/// The channel of the notifications of migration 2.
-const CHANNEL: &str = "SELECT 'ventriform_' || md5(current_schema())";
 
 /// How to reach a server.
 #[derive(Debug, Clone, PartialEq)]
@@ -407,82 +403,6 @@ impl PgWriter {
     }
 }
 
-/// What other processes on the same tables tell (`NOTIFY`), by a connection of its own.
-pub(super) struct PgNews {
-    pool: PgPool,
-    run: String,
-    listener: Option<PgListener>,
-}
-
-impl PgNews {
-    /// The news of others than `run` from the server of `pool`.
-    pub fn new(pool: &PgPool, run: &str) -> Self {
-        let own = PgPoolOptions::new()
-            .max_connections(1)
-            .max_lifetime(None)
-            .idle_timeout(None);
-        Self {
-            pool: own.connect_lazy_with((*pool.connect_options()).clone()),
-            run: run.to_owned(),
-            listener: None,
-        }
-    }
-
-    async fn listen(&self) -> Result<PgListener, sqlx::Error> {
-        let mut listener = PgListener::connect_with(&self.pool).await?;
-        let channel: String = sqlx::query_scalar(CHANNEL).fetch_one(&mut listener).await?;
-        listener.listen(&channel).await?;
-        Ok(listener)
-    }
-}
-
-/// What a notification tells; `None` if it is of `run` itself, or of a newer version.
-fn told(payload: &str, run: &str) -> Option<News> {
-    let mut words = payload.splitn(3, ' ');
-    let (kind, by, what) = (words.next()?, words.next()?, words.next()?);
-    match kind {
-        _ if by == run => None,
-        "job" => Some(News::Job(what.to_owned())),
-        "erased" => Some(News::Erased(what.to_owned())),
-        "workitem" => Some(News::Scheduled),
-        _ => None,
-    }
-}
-
-#[async_trait]
-impl NewsFeed for PgNews {
-    async fn next(&mut self) -> News {
-        loop {
-            let Some(listener) = &mut self.listener else {
-                match self.listen().await {
-                    Ok(listener) => {
-                        self.listener = Some(listener);
-                        return News::Missed;
-                    }
-                    Err(error) => {
-                        tracing::debug!(%error, "other processes cannot be listened to");
-                        tokio::time::sleep(jitter(AGAIN)).await;
-                        continue;
-                    }
-                }
-            };
-            match listener.try_recv().await {
-                Ok(Some(notification)) => {
-                    if let Some(news) = told(notification.payload(), &self.run) {
-                        return news;
-                    }
-                }
-                // It was connected anew.
-                Ok(None) => return News::Missed,
-                Err(error) => {
-                    tracing::warn!(%error, "other processes are not heard for a while");
-                    self.listener = None;
-                }
-            }
-        }
-    }
-}
-
 /// A transaction. Dropping it without [`PgTransaction::commit`] closes its connection, which rolls it
 /// back.
 pub(super) struct PgTransaction {
@@ -531,16 +451,6 @@ impl DerefMut for PgTransaction {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn what_others_tell_is_understood_and_what_this_run_tells_is_not_heard() {
-        let of_job = Some(News::Job("job_1".into()));
-        assert_eq!(told("job run_b job_1", "run_a"), of_job);
-        assert_eq!(told("job  job_1", "run_a"), of_job);
-        assert_eq!(told("job run_a job_1", "run_a"), None);
-        assert_eq!(told("workitem run_b ", "run_a"), Some(News::Scheduled));
-        assert_eq!(told("of a newer version", "run_a"), None);
-    }
 
     #[test]
     fn a_url_is_checked_and_printed_without_its_password() {

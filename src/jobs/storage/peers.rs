@@ -16,7 +16,7 @@ use async_trait::async_trait;
 use std::time::Duration;
 
 /// What another process has changed.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum News {
     /// A job was filed or changed.
     Job(String),
@@ -67,6 +67,6 @@ pub trait Peers: Send + Sync + 'static {
     /// still.
     async fn tidy(&self) -> StoreResult<()>;
 
-    /// The news from now on.
+    /// The news from now on. To be called in a runtime.
     fn news(&self) -> Box<dyn NewsFeed>;
 }

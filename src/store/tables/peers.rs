@@ -4,7 +4,7 @@
 use super::rows::{self, to_json};
 use crate::jobs::{NewsFeed, Peers, StoreResult};
 use crate::store::database::{Readers, SqlStore, Transaction};
-use crate::store::postgres::PgNews;
+use crate::store::news::PgNews;
 use crate::store::query::{Query, query};
 use async_trait::async_trait;
 use sqlx::postgres::PgPool;
