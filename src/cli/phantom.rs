@@ -45,6 +45,9 @@ pub struct PhantomArgs {
         allow_negative_numbers = true
     )]
     motion: f64,
+    /// Heads of the camera, 1 or 2 at a right angle: which views are after the motion
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
+    heads: u8,
     /// A perfusion defect: AHA segment 1 to 17 (1 to 6 are basal) and severity 0 to 1 (repeatable)
     #[arg(long, value_name = "SEGMENT:SEVERITY", value_parser = parse_defect)]
     defect: Vec<PerfusionDefect>,
@@ -77,6 +80,7 @@ pub fn run(args: &PhantomArgs) -> Result<()> {
         liver: args.liver,
         right_ventricle: args.right_ventricle,
         motion_mm: args.motion,
+        heads: args.heads,
         defects: args.defect.clone(),
         seed: args.seed,
         ..PhantomParameters::default()

@@ -55,9 +55,10 @@ fn a_usual_scan_is_believed() {
 
 #[test]
 fn a_scan_with_motion_is_doubted_the_more_the_farther_the_patient_moved() {
-    let confidence = |motion_mm: f64| {
+    let confidence = |motion_mm: f64, heads: u8| {
         let moved = PhantomParameters {
             motion_mm,
+            heads,
             ..patient()
         };
         match segmented(&scan(&moved).volume) {
@@ -69,8 +70,10 @@ fn a_scan_with_motion_is_doubted_the_more_the_farther_the_patient_moved() {
             Err(_) => 0.0,
         }
     };
-    let [still, moved] = [0.0, 24.0].map(confidence);
+    let [still, moved] = [0.0, 24.0].map(|motion_mm| confidence(motion_mm, 1));
     assert!(still > 0.9 && moved < 0.5, "{still} {moved}");
+    let moved = confidence(24.0, 2);
+    assert!(moved < 0.5, "two heads: {moved}");
 }
 
 #[test]

@@ -1,10 +1,12 @@
 //! Motion during the scan: the views after it show the patient in another place.
 //!
-//! In: the uptake, a displacement along k, and the share of the views after it. Out: what the views of both
-//! places together give.
+//! In: the uptake, a displacement along k, the share of the scan after it, and the number of the camera's heads.
+//! Out: what the views of both places together give.
 //!
-//! The camera moves over half a turn, from the right in front over the left to the left behind, as is usual for
-//! the heart. Filtered backprojection is linear, so the image is the uptake before the motion, plus what the views
+//! The camera sees half a turn, from the right in front over the left to the left behind, as is usual for
+//! the heart. One head moves over all of it. Two heads at a right angle see a quarter turn each at the same time,
+//! so that the views after the motion are two runs, a quarter turn apart. Filtered backprojection is
+//! linear, so the image is the uptake before the motion, plus what the views
 //! after it say of the difference. For each slice the difference is projected at the angles of those views, filtered
 //! by the ramp (Ramachandran and Lakshminarayanan, PNAS 1971; sampled as in Kak and Slaney, 1988, eq. 3-61), and
 //! projected back from these angles alone. If most views are after the motion, both places change their roles.
@@ -20,21 +22,27 @@ const VIEWS: usize = 60;
 /// Angle of the first view's rows (towards the patient's left and right), from i to j.
 const FIRST: f64 = 0.75 * PI;
 
-/// The image of a patient who moves by `slices` along k before the last `share` of the views. What comes in from
-/// outside continues the first or last slice.
+/// The image of a patient who moves by `slices` along k before the last `share` of the scan with one or two `heads`.
+/// What comes in from outside continues the first or last slice.
 pub(super) fn moved(
     voxels: &[f32],
     shape: [usize; 3],
     spacing_mm: [f64; 3],
     (slices, share): (f64, f64),
+    heads: usize,
 ) -> Vec<f32> {
     let after = displaced(voxels, shape, slices);
-    let first_after = ((1.0 - share) * VIEWS as f64).round() as usize;
-    let (mut image, other, views) = match first_after > VIEWS / 2 {
-        true => (voxels.to_vec(), after.as_slice(), first_after..VIEWS),
-        false => (after, voxels, 0..first_after),
+    let of_a_head = VIEWS / heads;
+    let first_after = ((1.0 - share) * of_a_head as f64).round() as usize;
+    let few_after = first_after > of_a_head / 2;
+    let (mut image, other) = match few_after {
+        true => (voxels.to_vec(), after.as_slice()),
+        false => (after, voxels),
     };
-    let views: Vec<View> = views.map(|n| View::new(n, shape, spacing_mm)).collect();
+    let views: Vec<View> = (0..VIEWS)
+        .filter(|n| (n % of_a_head >= first_after) == few_after)
+        .map(|n| View::new(n, shape, spacing_mm))
+        .collect();
     let slice = shape[0] * shape[1];
     let pairs = image.par_chunks_mut(slice).zip(other.par_chunks(slice));
     pairs.for_each(|(image, other)| {

@@ -44,6 +44,8 @@ pub struct PhantomParameters {
     pub motion_mm: f64,
     /// Share of the scan after the motion, 0..=1. Default 0.5.
     pub motion_share: f64,
+    /// Heads of the camera, 1 or 2 (at a right angle); matters with motion only. Default 1.
+    pub heads: u8,
     /// Resolution of the final volume (full width at half maximum), 0..=40. Default 11.
     pub fwhm_mm: f64,
     /// Full width at half maximum of the reconstruction filter, which is part of `fwhm_mm` and at most
@@ -88,6 +90,7 @@ impl Default for PhantomParameters {
             gut: 0.6,
             motion_mm: 0.0,
             motion_share: 0.5,
+            heads: 1,
             fwhm_mm: 11.0,
             post_filter_mm: 6.0,
             noise: 0.05,
@@ -168,6 +171,7 @@ impl PhantomParameters {
         within("gut", self.gut, 0.0, 5.0)?;
         within("motion_mm", self.motion_mm, -60.0, 60.0)?;
         within("motion_share", self.motion_share, 0.0, 1.0)?;
+        within("heads", f64::from(self.heads), 1.0, 2.0)?;
         within("fwhm_mm", self.fwhm_mm, 0.0, 40.0)?;
         within("post_filter_mm", self.post_filter_mm, 0.0, self.fwhm_mm)?;
         if self.noise != 0.0 {

@@ -244,3 +244,48 @@ fn views_before_and_after_the_motion_show_the_heart_in_either_place() {
         assert!(right < 0.2 * wrong, "{along}: {right} {wrong}");
     }
 }
+
+#[test]
+fn two_heads_see_either_place_in_two_runs_of_views() {
+    let moved = |heads, share| PhantomParameters {
+        shape: [48; 3],
+        spacing_mm: [4.0; 3],
+        noise: 0.0,
+        fwhm_mm: 0.0,
+        post_filter_mm: 0.0,
+        motion_mm: 12.0,
+        motion_share: share,
+        heads,
+        ..PhantomParameters::default()
+    };
+    let make = |heads, share| phantom(&moved(heads, share), &Monitor::silent()).unwrap();
+    let [first, half, last] = [0.0, 0.5, 1.0].map(|share| make(2, share));
+    assert_eq!(first.volume.voxels, make(1, 0.0).volume.voxels);
+    assert_eq!(last.volume.voxels, make(1, 1.0).volume.voxels);
+    // The heads start at 135 and 225 degrees. An eighth of a turn later the patient moves: rows at 157 and 247
+    // degrees are from before it, those at 202 and 292 from after it.
+    let seen = |p: &Phantom, degrees: f64| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let mut sums = vec![0.0; 48 * 80];
+        for (n, v) in p.volume.voxels.iter().enumerate() {
+            let [i, j] = [n % 48, n / 48 % 48].map(|n| n as f64 - 23.5);
+            let at = i * cos + j * sin + 40.0;
+            let place = n / (48 * 48) * 80 + at as usize;
+            sums[place] += (1.0 - at.fract()) * f64::from(*v);
+            sums[place + 1] += at.fract() * f64::from(*v);
+        }
+        sums
+    };
+    let apart =
+        |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum() };
+    for (degrees, [shown, hidden]) in [
+        (157.5, [&first, &last]),
+        (202.5, [&last, &first]),
+        (247.5, [&first, &last]),
+        (292.5, [&last, &first]),
+    ] {
+        let half = seen(&half, degrees);
+        let [right, wrong] = [shown, hidden].map(|p| apart(&half, &seen(p, degrees)));
+        assert!(right < 0.25 * wrong, "{degrees}: {right} {wrong}");
+    }
+}
