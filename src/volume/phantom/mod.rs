@@ -62,14 +62,7 @@ pub fn phantom(parameters: &PhantomParameters, monitor: &Monitor) -> Result<Phan
     step(0.0)?;
     let (mut voxels, wall) = anatomy.render(p.shape, &frame, monitor)?;
     if p.motion_mm != 0.0 {
-        let slices = p.motion_mm / p.spacing_mm[2];
-        voxels = motion::moved(
-            &voxels,
-            p.shape,
-            p.spacing_mm,
-            (slices, p.motion_share),
-            usize::from(p.heads),
-        );
+        voxels = motion::moved(&voxels, p);
     }
     step(0.3)?;
     let filter = kernels(p.post_filter_mm, p.spacing_mm);

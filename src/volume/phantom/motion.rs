@@ -14,6 +14,7 @@
 //! Guaranteed: the uptake itself for a share of 0, the displaced one for 1, and the same values on any number of
 //! threads. Not guaranteed: values of 0 or more; views that contradict each other leave dark streaks.
 
+use super::parameters::PhantomParameters;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -22,18 +23,13 @@ const VIEWS: usize = 60;
 /// Angle of the first view's rows (towards the patient's left and right), from i to j.
 const FIRST: f64 = 0.75 * PI;
 
-/// The image of a patient who moves by `slices` along k before the last `share` of the scan with one or two `heads`.
-/// What comes in from outside continues the first or last slice.
-pub(super) fn moved(
-    voxels: &[f32],
-    shape: [usize; 3],
-    spacing_mm: [f64; 3],
-    (slices, share): (f64, f64),
-    heads: usize,
-) -> Vec<f32> {
-    let after = displaced(voxels, shape, slices);
-    let of_a_head = VIEWS / heads;
-    let first_after = ((1.0 - share) * of_a_head as f64).round() as usize;
+/// The image of a patient who moves along k during the scan, as `p` says. What comes in from outside continues
+/// the first or last slice.
+pub(super) fn moved(voxels: &[f32], p: &PhantomParameters) -> Vec<f32> {
+    let (shape, spacing_mm) = (p.shape, p.spacing_mm);
+    let after = displaced(voxels, shape, p.motion_mm / spacing_mm[2]);
+    let of_a_head = VIEWS / usize::from(p.heads);
+    let first_after = ((1.0 - p.motion_share) * of_a_head as f64).round() as usize;
     let few_after = first_after > of_a_head / 2;
     let (mut image, other) = match few_after {
         true => (voxels.to_vec(), after.as_slice()),
