@@ -1,7 +1,9 @@
 //! A bounding-volume hierarchy over triangles, for closest points, box overlaps and rays.
 //!
 //! In: vertices and triangles. The tree is built from the root down; every node splits its
-//! triangles at the median of their centroids along the longest axis of the centroids' box.
+//! triangles in four: at the median of their centroids along the longest axis of the centroids' box,
+//! and each half again. Four boxes are tested at once, in single precision, rounded so that they
+//! contain what is in them: a closest-point query waits for memory more than for arithmetic.
 //!
 //! Guaranteed: queries are exact, and of several equal results the one with the lowest triangle
 //! index is returned, so results do not depend on the shape of the tree or the number of threads.
@@ -9,9 +11,8 @@
 
 use super::{Vec3, triangle};
 
-/// Largest number of triangles in a leaf. Smaller leaves mean more nodes, larger ones more
-/// triangle tests; 4 was the fastest of 2, 4 and 8.
-const LEAF_SIZE: usize = 4;
+/// Number of children of a node.
+const WIDTH: usize = 4;
 
 /// Smallest number of triangles in a half of a subtree for which both halves are built in
 /// parallel.
@@ -117,17 +118,88 @@ pub struct Closest {
     pub squared_distance: f64,
 }
 
-#[derive(Debug, Clone)]
-struct Node {
-    aabb: Aabb,
-    /// For a leaf, its first entry in `order`; for an inner node, the index of the right child.
-    /// The left child follows its parent.
-    first_or_right: u32,
-    /// Number of triangles in a leaf; 0 for an inner node.
-    count: u32,
+/// What a child of a node is, in [`Node::children`]: a triangle's place in `order`, with this bit set, or
+/// the index of a node.
+const IS_TRIANGLE: u32 = 1 << 31;
+/// No child.
+const NONE: u32 = u32::MAX;
+
+/// Share by which a squared distance in single precision, rounded towards zero wherever it is computed, may
+/// still exceed the true one.
+const ROUNDING: f64 = 1e-6;
+
+/// The largest number in single precision that is not greater.
+fn round_down(x: f64) -> f32 {
+    let near = x as f32;
+    if f64::from(near) > x {
+        near.next_down()
+    } else {
+        near
+    }
 }
 
-/// A leaf of a tree.
+/// The smallest number in single precision that is not less.
+fn round_up(x: f64) -> f32 {
+    let near = x as f32;
+    if f64::from(near) < x {
+        near.next_up()
+    } else {
+        near
+    }
+}
+
+/// Four children and their boxes, axis by axis.
+#[derive(Debug, Clone)]
+struct Node {
+    min: [[f32; WIDTH]; 3],
+    max: [[f32; WIDTH]; 3],
+    children: [u32; WIDTH],
+}
+
+impl Node {
+    /// A node without children, whose boxes contain nothing.
+    fn empty() -> Self {
+        Self {
+            min: [[f32::INFINITY; WIDTH]; 3],
+            max: [[f32::NEG_INFINITY; WIDTH]; 3],
+            children: [NONE; WIDTH],
+        }
+    }
+
+    fn set(&mut self, k: usize, child: u32, aabb: &Aabb) {
+        self.children[k] = child;
+        for r in 0..3 {
+            self.min[r][k] = round_down(aabb.min[r]);
+            self.max[r][k] = round_up(aabb.max[r]);
+        }
+    }
+
+    /// The box of a child.
+    fn aabb(&self, k: usize) -> Aabb {
+        Aabb {
+            min: Vec3::from_fn(|r, _| f64::from(self.min[r][k])),
+            max: Vec3::from_fn(|r, _| f64::from(self.max[r][k])),
+        }
+    }
+
+    /// Lower bounds of the squared distances from a point to the children, but for [`ROUNDING`]; infinite
+    /// for no child. `below` and `above` are the point's coordinates, rounded.
+    #[inline]
+    fn squared_distances(&self, below: &[f32; 3], above: &[f32; 3]) -> [f32; WIDTH] {
+        let mut sums = [0.0f32; WIDTH];
+        for r in 0..3 {
+            for k in 0..WIDTH {
+                let (low, high) = (self.min[r][k] - above[r], below[r] - self.max[r][k]);
+                let outside = if low > high { low } else { high };
+                let outside = if outside > 0.0 { outside } else { 0.0 };
+                sums[k] += outside * outside;
+            }
+        }
+        sums
+    }
+}
+
+/// A node some of whose children are triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Leaf(u32);
 
@@ -135,6 +207,8 @@ pub struct Leaf(u32);
 /// close together in memory.
 #[derive(Debug, Clone)]
 pub struct Bvh {
+    /// Parents come before their children, and earlier children, with all that is below them, before
+    /// later ones.
     nodes: Vec<Node>,
     /// The triangles in the order of the leaves.
     order: Vec<u32>,
@@ -142,8 +216,6 @@ pub struct Bvh {
     slots: Vec<u32>,
     /// The corners of the triangles, in the order of the leaves.
     corners: Vec<[Vec3; 3]>,
-    /// The boxes of the triangles, in the same order.
-    boxes: Vec<Aabb>,
 }
 
 impl Bvh {
@@ -156,15 +228,22 @@ impl Bvh {
             .iter()
             .map(|t| t.map(|v| vertices[v as usize]))
             .collect();
-        let centroids: Vec<Vec3> = corners.iter().map(|[a, b, c]| (a + b + c) / 3.0).collect();
-        let boxes: Vec<Aabb> = corners.iter().map(Aabb::of).collect();
-        let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
-        let mut nodes = Vec::with_capacity(triangles.len().max(1));
-        if !order.is_empty() {
-            build(&mut nodes, &mut order, 0, &boxes, &centroids);
+        let mut items: Vec<Item> = (0..)
+            .zip(&corners)
+            .map(|(triangle, [a, b, c])| {
+                let centroid = (a + b + c) / 3.0;
+                Item {
+                    centroid: [0, 1, 2].map(|r| centroid[r] as f32),
+                    triangle,
+                }
+            })
+            .collect();
+        let mut nodes = Vec::with_capacity(triangles.len() / 2 + 1);
+        if !items.is_empty() {
+            build(&mut nodes, &mut items, 0, &corners);
         }
+        let order: Vec<u32> = items.iter().map(|item| item.triangle).collect();
         let corners = order.iter().map(|&t| corners[t as usize]).collect();
-        let boxes = order.iter().map(|&t| boxes[t as usize]).collect();
         let mut slots = vec![0; order.len()];
         for (slot, &t) in (0..).zip(&order) {
             slots[t as usize] = slot;
@@ -174,7 +253,6 @@ impl Bvh {
             order,
             slots,
             corners,
-            boxes,
         }
     }
 
@@ -200,14 +278,19 @@ impl Bvh {
     ) -> Option<Closest> {
         let guessed = guess.filter(|t| (*t as usize) < self.slots.len() && admits(*t));
         let mut best = guessed.map(|t| self.closest_in(self.slots[t as usize] as usize, p));
-        let mut bound = best.map_or(f64::INFINITY, |found| found.squared_distance);
-        // The depth is at most log2 of 2^32 triangles, and each level adds one waiting node.
-        let mut stack = [(0u32, 0.0f64); 64];
-        let mut height = 0;
-        if let Some(root) = self.nodes.first() {
-            stack[0] = (0, root.aabb.squared_distance(p));
-            height = 1;
-        }
+        let (below, above) = (
+            [0, 1, 2].map(|r| round_down(p[r])),
+            [0, 1, 2].map(|r| round_up(p[r])),
+        );
+        let limit = |best: &Option<Closest>| {
+            best.map_or(f32::INFINITY, |found| {
+                round_up(found.squared_distance * (1.0 + ROUNDING))
+            })
+        };
+        let mut bound = limit(&best);
+        // The depth is at most log4 of 2^31 triangles, and each level adds three waiting nodes.
+        let mut stack = [(0u32, 0.0f32); 64];
+        let mut height = usize::from(!self.nodes.is_empty());
         while height > 0 {
             height -= 1;
             let (index, distance) = stack[height];
@@ -215,59 +298,55 @@ impl Bvh {
                 continue;
             }
             let node = &self.nodes[index as usize];
-            if node.count == 0 {
-                let (left, right) = (index + 1, node.first_or_right);
-                let dl = self.nodes[left as usize].aabb.squared_distance(p);
-                let dr = self.nodes[right as usize].aabb.squared_distance(p);
-                let ((near, dn), (far, df)) = if dl <= dr {
-                    ((left, dl), (right, dr))
-                } else {
-                    ((right, dr), (left, dl))
-                };
-                if df <= bound {
-                    stack[height] = (far, df);
-                    height += 1;
+            let distances = node.squared_distances(&below, &above);
+            let first = height;
+            for k in 0..WIDTH {
+                let child = node.children[k];
+                if child == NONE || distances[k] > bound {
+                    continue;
                 }
-                if dn <= bound {
-                    stack[height] = (near, dn);
-                    height += 1;
+                if child & IS_TRIANGLE != 0 {
+                    if self.improve((child & !IS_TRIANGLE) as usize, p, &admits, &mut best) {
+                        bound = limit(&best);
+                    }
+                    continue;
                 }
-                continue;
+                // The nearest child comes last, and is taken first.
+                let mut place = height;
+                while place > first && stack[place - 1].1 < distances[k] {
+                    stack[place] = stack[place - 1];
+                    place -= 1;
+                }
+                stack[place] = (child, distances[k]);
+                height += 1;
             }
-            self.improve_in_leaf(node, p, &admits, &mut best);
-            bound = best.map_or(bound, |found| found.squared_distance);
         }
         best
     }
 
-    /// Replaces `best` by the closest point on an admitted triangle of a leaf, if that is nearer or,
-    /// at the same distance, on a lower triangle.
+    /// Replaces `best` by the closest point on the triangle in a slot, if that is admitted and nearer or, at
+    /// the same distance, a lower triangle. Returns whether it did.
     #[inline]
-    fn improve_in_leaf(
+    fn improve(
         &self,
-        leaf: &Node,
+        slot: usize,
         p: &Vec3,
         admits: &impl Fn(u32) -> bool,
         best: &mut Option<Closest>,
-    ) {
-        for slot in self.slots_of(leaf) {
-            let triangle = self.order[slot];
-            let bound = best.map_or(f64::INFINITY, |found| found.squared_distance);
-            // The triangle's own box is faster to test than its closest point, and rules out most
-            // triangles.
-            if self.boxes[slot].squared_distance(p) > bound || !admits(triangle) {
-                continue;
-            }
-            let found = self.closest_in(slot, p);
-            let is_nearer = best.is_none_or(|known| {
-                found.squared_distance < known.squared_distance
-                    || (found.squared_distance == known.squared_distance
-                        && triangle < known.triangle)
-            });
-            if is_nearer {
-                *best = Some(found);
-            }
+    ) -> bool {
+        if !admits(self.order[slot]) {
+            return false;
         }
+        let found = self.closest_in(slot, p);
+        let is_nearer = best.is_none_or(|known| {
+            found.squared_distance < known.squared_distance
+                || (found.squared_distance == known.squared_distance
+                    && found.triangle < known.triangle)
+        });
+        if is_nearer {
+            *best = Some(found);
+        }
+        is_nearer
     }
 
     /// The closest point on the triangle in a slot.
@@ -286,45 +365,59 @@ impl Bvh {
     /// The leaves, in the order of the tree.
     pub fn leaves(&self) -> Vec<Leaf> {
         (0..self.nodes.len() as u32)
-            .filter(|&n| self.nodes[n as usize].count > 0)
+            .filter(|&n| self.own_slots(&self.nodes[n as usize]).next().is_some())
             .map(Leaf)
             .collect()
     }
 
     /// Calls `visit` with the pairs of triangles, lower index first, whose bounding boxes overlap and of which
-    /// one is in `leaf` and the other in it, too, or in a later leaf. Over all leaves that is every such
+    /// one is in `leaf` and the other in it, too, or comes later in the tree. Over all leaves that is every such
     /// pair once. One search for all triangles of a leaf is several times as fast as one for each.
     pub fn for_each_pair_from(&self, leaf: Leaf, mut visit: impl FnMut(u32, u32)) {
         let Leaf(own) = leaf;
-        let slots = self.slots_of(&self.nodes[own as usize]);
-        let aabb = self.nodes[own as usize].aabb;
+        let mut triangles = [(0usize, Aabb::empty()); WIDTH];
+        let mut count = 0;
+        let mut aabb = Aabb::empty();
+        for slot in self.own_slots(&self.nodes[own as usize]) {
+            let of_slot = Aabb::of(&self.corners[slot]);
+            aabb = aabb.union(&of_slot);
+            triangles[count] = (slot, of_slot);
+            count += 1;
+        }
+        let triangles = &triangles[..count];
+        let low = [0, 1, 2].map(|r| round_down(aabb.min[r]));
+        let high = [0, 1, 2].map(|r| round_up(aabb.max[r]));
         let mut stack = [0u32; 64];
         let mut height = 1;
         while height > 0 {
             height -= 1;
-            let index = stack[height];
-            let node = &self.nodes[index as usize];
-            if !node.aabb.overlaps(&aabb) {
-                continue;
-            }
-            if node.count == 0 {
-                stack[height] = node.first_or_right;
-                height += 1;
-                // The left half ends before the right one begins: earlier leaves have had their turn.
-                if node.first_or_right > own {
-                    stack[height] = index + 1;
-                    height += 1;
-                }
-                continue;
-            }
-            for other in self.slots_of(node) {
-                let other_box = &self.boxes[other];
-                if !other_box.overlaps(&aabb) {
+            let node = &self.nodes[stack[height] as usize];
+            // All below a child ends before the next node does: earlier leaves have had their turn.
+            let mut next = NONE;
+            for k in (0..WIDTH).rev() {
+                let child = node.children[k];
+                if child == NONE {
                     continue;
                 }
-                for slot in slots.clone() {
-                    if slot < other && self.boxes[slot].overlaps(other_box) {
-                        let (s, t) = (self.order[slot], self.order[other]);
+                let is_node = child & IS_TRIANGLE == 0;
+                let is_past = is_node && next <= own;
+                if is_node {
+                    next = child;
+                }
+                let apart = (0..3).any(|r| node.min[r][k] > high[r] || node.max[r][k] < low[r]);
+                if is_past || apart {
+                    continue;
+                }
+                if is_node {
+                    stack[height] = child;
+                    height += 1;
+                    continue;
+                }
+                let other = (child & !IS_TRIANGLE) as usize;
+                let of_other = Aabb::of(&self.corners[other]);
+                for (slot, of_slot) in triangles {
+                    if *slot < other && of_slot.overlaps(&of_other) {
+                        let (s, t) = (self.order[*slot], self.order[other]);
                         visit(s.min(t), s.max(t));
                     }
                 }
@@ -332,10 +425,11 @@ impl Bvh {
         }
     }
 
-    /// The places of a leaf's triangles in `order`.
-    fn slots_of(&self, leaf: &Node) -> std::ops::Range<usize> {
-        let first = leaf.first_or_right as usize;
-        first..first + leaf.count as usize
+    /// The places in `order` of the triangles that are children of a node.
+    fn own_slots<'a>(&self, node: &'a Node) -> impl Iterator<Item = usize> + use<'a> {
+        let is_triangle = |child: &&u32| **child != NONE && **child & IS_TRIANGLE != 0;
+        let triangles = node.children.iter().filter(is_triangle);
+        triangles.map(|child| (child & !IS_TRIANGLE) as usize)
     }
 
     /// Calls `visit` with every triangle whose bounding box the ray from `start` in `direction`
@@ -349,86 +443,128 @@ impl Bvh {
         let mut height = usize::from(!self.nodes.is_empty());
         while height > 0 {
             height -= 1;
-            let index = stack[height];
-            let node = &self.nodes[index as usize];
-            if !ray.meets(&node.aabb) {
-                continue;
-            }
-            if node.count == 0 {
-                stack[height] = node.first_or_right;
-                stack[height + 1] = index + 1;
-                height += 2;
-                continue;
-            }
-            for slot in self.slots_of(node) {
-                if ray.meets(&self.boxes[slot]) {
+            let child = stack[height];
+            if child & IS_TRIANGLE != 0 {
+                let slot = (child & !IS_TRIANGLE) as usize;
+                if ray.meets(&Aabb::of(&self.corners[slot])) {
                     visit(self.order[slot]);
+                }
+                continue;
+            }
+            let node = &self.nodes[child as usize];
+            for k in (0..WIDTH).rev() {
+                if node.children[k] != NONE && ray.meets(&node.aabb(k)) {
+                    stack[height] = node.children[k];
+                    height += 1;
                 }
             }
         }
     }
 }
 
-/// Appends the subtree over `order`, whose first entry has the place `offset` in the whole.
-fn build(
-    nodes: &mut Vec<Node>,
-    order: &mut [u32],
-    offset: usize,
-    boxes: &[Aabb],
-    centroids: &[Vec3],
-) {
+/// A triangle while the tree is built. Its place decides where it goes in the tree and thus how long queries
+/// take, not what they find: single precision will do.
+struct Item {
+    centroid: [f32; 3],
+    triangle: u32,
+}
+
+/// Splits the items at the median of their centroids along the longest axis of the centroids' box.
+fn halves(items: &mut [Item]) -> (&mut [Item], &mut [Item]) {
+    let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    for item in items.iter() {
+        for (r, &x) in item.centroid.iter().enumerate() {
+            min[r] = if x < min[r] { x } else { min[r] };
+            max[r] = if x > max[r] { x } else { max[r] };
+        }
+    }
+    let extent = |r: &usize| max[*r] - min[*r];
+    let axis = (0..3)
+        .max_by(|a, b| extent(a).total_cmp(&extent(b)))
+        .unwrap_or(0);
+    let middle = items.len() / 2;
+    items.select_nth_unstable_by(middle, |s, t| {
+        (s.centroid[axis].total_cmp(&t.centroid[axis])).then(s.triangle.cmp(&t.triangle))
+    });
+    items.split_at_mut(middle)
+}
+
+/// Appends the subtree over `items`, whose first one has the place `offset` in the whole, and returns its
+/// box.
+fn build(nodes: &mut Vec<Node>, items: &mut [Item], offset: usize, corners: &[[Vec3; 3]]) -> Aabb {
     let index = nodes.len();
-    nodes.push(Node {
-        aabb: Aabb::empty(),
-        first_or_right: offset as u32,
-        count: order.len() as u32,
-    });
-    if order.len() <= LEAF_SIZE {
-        let all = order.iter().map(|&t| &boxes[t as usize]);
-        nodes[index].aabb = all.fold(Aabb::empty(), |aabb, other| aabb.union(other));
-        return;
-    }
-    let spread = Aabb::of(order.iter().map(|&t| &centroids[t as usize]));
-    let axis = (spread.max - spread.min).imax();
-    let middle = order.len() / 2;
-    order.select_nth_unstable_by(middle, |&s, &t| {
-        centroids[s as usize][axis]
-            .total_cmp(&centroids[t as usize][axis])
-            .then(s.cmp(&t))
-    });
-    let (left, right) = order.split_at_mut(middle);
-    let right_index;
-    if middle < PARALLEL_SIZE {
-        build(nodes, left, offset, boxes, centroids);
-        right_index = nodes.len();
-        build(nodes, right, offset + middle, boxes, centroids);
+    nodes.push(Node::empty());
+    let count = items.len();
+    let quarters: [&mut [Item]; WIDTH] = if count <= WIDTH {
+        let mut rest = items;
+        std::array::from_fn(|k| {
+            let (own, others) = std::mem::take(&mut rest).split_at_mut(usize::from(k < count));
+            rest = others;
+            own
+        })
     } else {
-        let build_apart = |order, offset| {
-            let mut nodes = Vec::new();
-            build(&mut nodes, order, offset, boxes, centroids);
-            nodes
+        let (left, right) = halves(items);
+        let ((a, b), (c, d)) = if left.len() < PARALLEL_SIZE {
+            (halves(left), halves(right))
+        } else {
+            rayon::join(|| halves(left), || halves(right))
         };
-        let (left, right) = rayon::join(
-            || build_apart(left, offset),
-            || build_apart(right, offset + middle),
-        );
-        append(nodes, left);
-        right_index = nodes.len();
-        append(nodes, right);
-    }
-    nodes[index] = Node {
-        aabb: nodes[index + 1].aabb.union(&nodes[right_index].aabb),
-        first_or_right: right_index as u32,
-        count: 0,
+        [a, b, c, d]
     };
+    let mut first = offset;
+    let parts = quarters.map(|quarter| {
+        let part = (first, quarter);
+        first += part.1.len();
+        part
+    });
+    let mut whole = Aabb::empty();
+    let mut set = |nodes: &mut Vec<Node>, k: usize, child: u32, aabb: Aabb| {
+        nodes[index].set(k, child, &aabb);
+        whole = whole.union(&aabb);
+    };
+    if count >= WIDTH * PARALLEL_SIZE {
+        let apart = |(first, items): (usize, &mut [Item])| {
+            let mut nodes = Vec::new();
+            let aabb = build(&mut nodes, items, first, corners);
+            (nodes, aabb)
+        };
+        let [a, b, c, d] = parts;
+        let ((a, b), (c, d)) = rayon::join(
+            || rayon::join(|| apart(a), || apart(b)),
+            || rayon::join(|| apart(c), || apart(d)),
+        );
+        for (k, (subtree, aabb)) in [a, b, c, d].into_iter().enumerate() {
+            let child = nodes.len() as u32;
+            append(nodes, subtree);
+            set(nodes, k, child, aabb);
+        }
+        return whole;
+    }
+    for (k, (first, items)) in parts.into_iter().enumerate() {
+        match items {
+            [] => {}
+            [item] => {
+                let aabb = Aabb::of(&corners[item.triangle as usize]);
+                set(nodes, k, first as u32 | IS_TRIANGLE, aabb);
+            }
+            items => {
+                let child = nodes.len() as u32;
+                let aabb = build(nodes, items, first, corners);
+                set(nodes, k, child, aabb);
+            }
+        }
+    }
+    whole
 }
 
 /// Appends a subtree that was built separately.
 fn append(nodes: &mut Vec<Node>, subtree: Vec<Node>) {
     let shift = nodes.len() as u32;
     nodes.extend(subtree.into_iter().map(|mut node| {
-        if node.count == 0 {
-            node.first_or_right += shift;
+        for child in &mut node.children {
+            if *child & IS_TRIANGLE == 0 {
+                *child += shift;
+            }
         }
         node
     }));
