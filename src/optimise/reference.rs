@@ -1,5 +1,7 @@
 //! The reference surface S, prepared for distance queries.
 
+use std::sync::Arc;
+
 use super::fitness::Lengths;
 use crate::geometry::bvh::Bvh;
 use crate::geometry::{Vec3, triangle};
@@ -14,7 +16,9 @@ pub struct Reference {
     /// Unit normal of every triangle of S; zero for a degenerate one.
     pub normals: Vec<Vec3>,
     /// Search tree over the triangles of S.
-    pub bvh: Bvh,
+    pub bvh: Arc<Bvh>,
+    /// Area of S, mm².
+    pub area: f64,
     /// Smallest voxel spacing of the volume that S was extracted from, mm.
     pub spacing: f64,
     /// Standard deviation of the noise that was taken off S, mm.
@@ -28,8 +32,10 @@ impl Reference {
         let normals = (0..mesh.triangles.len())
             .map(|t| triangle::unit_normal(&mesh.corners(t)))
             .collect();
-        let bvh = Bvh::new(&mesh.vertices, &mesh.triangles);
+        let bvh = (surface.tree.clone())
+            .unwrap_or_else(|| Arc::new(Bvh::new(&mesh.vertices, &mesh.triangles)));
         Self {
+            area: mesh.area(),
             mesh,
             normals,
             bvh,
@@ -40,7 +46,7 @@ impl Reference {
 
     /// The lengths to which the distances of a mesh of `triangles` triangles are related.
     pub fn lengths(&self, triangles: usize) -> Lengths {
-        let each = self.mesh.area() / triangles.max(1) as f64;
+        let each = self.area / triangles.max(1) as f64;
         Lengths {
             voxel: self.spacing,
             edge: (4.0 * each / 3f64.sqrt()).sqrt(),

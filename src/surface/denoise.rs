@@ -31,7 +31,8 @@
 use rayon::prelude::*;
 
 use crate::geometry::Vec3;
-use crate::mesh::intersections::self_intersections;
+use crate::geometry::bvh::Bvh;
+use crate::mesh::intersections::self_intersections_by;
 use crate::mesh::{TriMesh, vertex_normals};
 use crate::progress::{Cancelled, Monitor};
 
@@ -86,7 +87,8 @@ pub struct SurfaceNoise {
 
 /// Moves the vertices of `mesh` to where they would be without noise. `even` are the same
 /// vertices spread evenly, `intensity` the value of the image at a point, `spacing` the size of a voxel, mm.
-/// `None` for a surface too small for its noise to be measured.
+/// Returns the noise and, if vertices moved, the search tree over the triangles in their new places. `None`
+/// for a surface too small for its noise to be measured.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -96,7 +98,7 @@ pub fn denoise(
     intensity: impl Fn(&Vec3) -> f64 + Sync,
     spacing: f64,
     monitor: &Monitor,
-) -> Result<Option<SurfaceNoise>, Cancelled> {
+) -> Result<Option<(SurfaceNoise, Option<Bvh>)>, Cancelled> {
     if mesh.vertices.len() < FEWEST_VERTICES {
         return Ok(None);
     }
@@ -136,7 +138,7 @@ pub fn denoise(
     };
     if !(level > 0.0) {
         noise.correlation_mm = 0.0;
-        return Ok(Some(noise));
+        return Ok(Some((noise, None)));
     }
 
     let wider = noise.correlation_mm / 2.0;
@@ -163,25 +165,26 @@ pub fn denoise(
         let by = (smooth[v] - *vertex).dot(&normals[v]).clamp(-most, most);
         *vertex += normals[v] * by;
     }
-    take_back_intersections(mesh, &original, monitor)?;
+    let tree = take_back_intersections(mesh, &original, monitor)?;
     let squares: f64 = (mesh.vertices.iter().zip(&original))
         .map(|(moved, from)| (moved - from).norm_squared())
         .sum();
     noise.moved_mm = (squares / mesh.vertices.len() as f64).sqrt();
-    Ok(Some(noise))
+    Ok(Some((noise, Some(tree))))
 }
 
 /// Puts vertices back to their original places wherever triangles intersect that did not. Ends, since each
-/// round puts at least one back.
+/// round puts at least one back. Returns the search tree over the triangles.
 fn take_back_intersections(
     mesh: &mut TriMesh,
     original: &[Vec3],
     monitor: &Monitor,
-) -> Result<(), Cancelled> {
+) -> Result<Bvh, Cancelled> {
     loop {
         monitor.check()?;
         let mut back = false;
-        for triangle in self_intersections(mesh).into_iter().flatten() {
+        let tree = Bvh::new(&mesh.vertices, &mesh.triangles);
+        for triangle in (self_intersections_by(mesh, &tree).into_iter()).flatten() {
             for v in mesh.triangles[triangle.index()] {
                 let (vertex, from) = (&mut mesh.vertices[v as usize], original[v as usize]);
                 back |= *vertex != from;
@@ -189,7 +192,7 @@ fn take_back_intersections(
             }
         }
         if !back {
-            return Ok(());
+            return Ok(tree);
         }
     }
 }
@@ -483,6 +486,7 @@ fn chebyshev(f: impl Fn(f64) -> f64, largest: f64, degree: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::intersections::self_intersections;
     use crate::mesh::shapes;
     use crate::surface::smoothing::taubin;
 
@@ -524,7 +528,10 @@ mod tests {
         let even = taubin(&mesh.vertices, &mesh.triangles, 15);
         let image = |p: &Vec3| STEEPNESS * (2.0 * RADIUS - p.norm());
         let silent = Monitor::silent();
-        denoise(mesh, &even, image, 2.0, &silent).unwrap().unwrap()
+        denoise(mesh, &even, image, 2.0, &silent)
+            .unwrap()
+            .unwrap()
+            .0
     }
 
     /// Root mean square of the distances from the sphere.
@@ -597,7 +604,8 @@ mod tests {
         let even = mesh.vertices.clone();
         let silent = Monitor::silent();
         let found = denoise(&mut mesh, &even, |p| -p.norm(), 2.0, &silent).unwrap();
-        assert_eq!((found, mesh.vertices), (None, even));
+        assert!(found.is_none());
+        assert_eq!(mesh.vertices, even);
     }
 
     #[test]

@@ -35,7 +35,10 @@ pub mod smoothing;
 pub mod table;
 pub mod topology_control;
 
+use std::sync::Arc;
+
 use crate::geometry::Vec3;
+use crate::geometry::bvh::Bvh;
 use crate::mesh::TriMesh;
 use crate::mesh::topology::{self, Census};
 use crate::progress::{Monitor, Stage};
@@ -58,6 +61,8 @@ pub struct Surface {
     /// The working surface W: the surface of Marching Cubes after Taubin smoothing, same connectivity. For
     /// geodesics and curvature only; distances are measured against S.
     pub working: Vec<Vec3>,
+    /// Search tree over the triangles of S, if one was needed to make it.
+    pub tree: Option<Arc<Bvh>>,
     /// Smallest voxel spacing, mm.
     pub spacing: f64,
     /// About the volume and the changes made.
@@ -71,6 +76,7 @@ impl Surface {
         Self {
             working: mesh.vertices.clone(),
             mesh,
+            tree: None,
             spacing,
             facts: SurfaceFacts::default(),
         }
@@ -128,11 +134,19 @@ pub fn extract(
         .fold(f64::INFINITY, f64::min);
     let (census, working) = rayon::join(|| topology::check(&mesh), || working_surface(&mesh));
     let census = census?;
+    let mut tree = None;
     if parameters.denoise == Denoise::Auto && !object.is_mask {
         let intensity = |p: &Vec3| object.at(p);
-        facts.noise = denoise::denoise(&mut mesh, &working, intensity, spacing, monitor)?;
+        let found = denoise::denoise(&mut mesh, &working, intensity, spacing, monitor)?;
+        if let Some((noise, search)) = found {
+            facts.noise = Some(noise);
+            tree = search.map(Arc::new);
+        }
     }
-    let surface = finish(mesh, working, census, spacing, facts);
+    let surface = Surface {
+        tree,
+        ..finish(mesh, working, census, spacing, facts)
+    };
     monitor.report(Stage::Surface, 1.0)?;
     Ok(surface)
 }
@@ -179,6 +193,7 @@ fn finish(
     Surface {
         working,
         mesh,
+        tree: None,
         spacing,
         facts,
     }

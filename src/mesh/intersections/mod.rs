@@ -1,13 +1,15 @@
 //! Self-intersections of a mesh.
 //!
 //! In: a mesh. Out: the pairs of its triangles that have more in common than shared vertices
-//! and edges. Candidates are the pairs whose bounding boxes overlap; each is decided exactly
+//! and edges. Candidates are the pairs whose bounding boxes overlap, without those at a vertex whose
+//! triangles are seen not to intersect ([`fans`]); each is decided exactly
 //! (see [`triangles_intersect`]), so an empty list proves that the mesh is embedded in space.
 //! This is stricter than MeshLab's filter, which works in floating point with tolerances and
 //! never reports a pair that shares an edge.
 //!
 //! [`IntersectionIndex`] answers the same question for single triangles while a mesh changes.
 
+mod fans;
 mod index;
 mod pair;
 
@@ -28,13 +30,22 @@ const LEAVES_PER_TASK: usize = 32;
 /// Takes O(n log n + pairs) on surfaces. The result does not depend on the number of threads.
 /// Positions must be finite.
 pub fn self_intersections(mesh: &TriMesh) -> Vec<[FaceId; 2]> {
-    let bvh = Bvh::new(&mesh.vertices, &mesh.triangles);
+    self_intersections_by(mesh, &Bvh::new(&mesh.vertices, &mesh.triangles))
+}
+
+/// [`self_intersections`] with the tree over the triangles of `mesh`.
+pub fn self_intersections_by(mesh: &TriMesh, tree: &Bvh) -> Vec<[FaceId; 2]> {
+    let embedded = fans::embedded_fans(mesh);
     let corners = |t: FaceId| (mesh.corner_ids(t), mesh.corners(t.index()));
-    let mut found: Vec<[FaceId; 2]> = (bvh.leaves().into_par_iter())
+    let mut found: Vec<[FaceId; 2]> = (tree.leaves().into_par_iter())
         .with_min_len(LEAVES_PER_TASK)
         .flat_map_iter(|leaf| {
             let mut found = Vec::new();
-            bvh.for_each_pair_from(leaf, |s, t| {
+            tree.for_each_pair_from(leaf, |s, t| {
+                let [of_s, of_t] = [s, t].map(|t| mesh.triangles[t as usize]);
+                if (of_s.iter()).any(|v| of_t.contains(v) && embedded[*v as usize]) {
+                    return;
+                }
                 let (s, t) = (FaceId(s), FaceId(t));
                 let ((s_ids, s_corners), (t_ids, t_corners)) = (corners(s), corners(t));
                 if triangles_intersect(s_ids, &s_corners, t_ids, &t_corners) {
