@@ -33,7 +33,7 @@ pub struct OptimiseParameters {
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeastSquaresParameters {
     /// Number of rounds, 0..=200. 0 leaves the vertices on the surface, as the paper does.
-    /// Default 16; four more change no measure of shape or distance by 1 %.
+    /// Default 10; six more make no model of a scan with noise nearer to the truth or more regular.
     pub rounds: usize,
     /// Weight of triangle shape relative to squared distance, (0, 10]. Default 0.06.
     pub shape_weight: f64,
@@ -71,7 +71,7 @@ pub struct LeastSquaresParameters {
 impl Default for LeastSquaresParameters {
     fn default() -> Self {
         Self {
-            rounds: 16,
+            rounds: 10,
             shape_weight: 0.06,
             worst_weight: 3.0,
             free_size: 1.0,

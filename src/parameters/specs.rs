@@ -229,7 +229,7 @@ pub const SPECS: &[ParameterSpec<ModelParameters>] = &[
         "relaxation_iterations",
         retile.relaxation_iterations,
         0..=1000,
-        "80",
+        "50",
         "Maximum number of rounds of centroidal relaxation (method refined)"
     ),
     optional!(
@@ -238,7 +238,7 @@ pub const SPECS: &[ParameterSpec<ModelParameters>] = &[
         fit_rounds => optimise.fit.rounds,
         0..=200,
         "Rounds of the least-squares fit; 0 leaves the points on the surface (default for refined: \
-         16, for paper: 0)"
+         10, for paper: 0)"
     ),
     number!(
         "fit_shape_weight",

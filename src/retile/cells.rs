@@ -7,6 +7,11 @@
 //! 1. a sample changes to the site of one of its *neighbours* if that is nearer;
 //! 2. every site moves towards the [centroid](super::clipping) of its cell.
 //!
+//! The first rounds count whole samples: a cell's centroid is the mean of its samples, kept as a running
+//! sum. Such centroids jump when samples change their cell, so the last rounds cut the
+//! triangles between cells ([`clipping`](super::clipping)). Only samples beside another cell can change
+//! theirs; a list of them ([`Border`]) spares the rest.
+//!
 //! Since samples only take over the sites of neighbours, cells spread along the surface and
 //! never through a thin wall, although distances are straight. Within one cell straight and
 //! geodesic distances differ by a few percent, which the fit that follows corrects. A round
@@ -66,7 +71,8 @@ impl Cells {
         Self { labels, sites }
     }
 
-    /// Relaxes the sites for at most `rounds` rounds. Returns the number of rounds.
+    /// Relaxes the sites for at most `rounds` rounds, the last `exact_rounds` of them with exact centroids.
+    /// Returns the number of rounds.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -74,20 +80,29 @@ impl Cells {
         &mut self,
         samples: &WeightedSamples,
         weights: &[f64],
-        rounds: usize,
+        (rounds, exact_rounds): (usize, usize),
         monitor: &Monitor,
     ) -> Result<usize, Cancelled> {
         let area: f64 = samples.area.iter().sum();
         let settled = SETTLED * (area / self.sites.len() as f64).sqrt();
         let patches = Patches::new(samples, weights);
-        let mut next_labels = self.labels.clone();
+        let mut border = Border::new(samples, &self.labels);
+        let mut means = Means::new(self, samples, weights);
         let mut velocities = vec![Vec3::zeros(); self.sites.len()];
+        let mut moved = f64::INFINITY;
         for round in 0..rounds {
             monitor.check()?;
-            self.reassign(samples, &mut next_labels);
-            let mut centroids = patches.centroids(&self.labels, &self.sites);
+            border.reassign(self, samples, |v, from, to| means.change(v, from, to));
+            let exact = round + exact_rounds >= rounds || moved < settled;
+            let mut centroids = if exact {
+                patches.centroids(&self.labels, &self.sites)
+            } else {
+                means.centroids()
+            };
             if centroids.contains(&None) {
                 self.fill_empty_cells(samples, weights);
+                border = Border::new(samples, &self.labels);
+                means = Means::new(self, samples, weights);
                 centroids = patches.centroids(&self.labels, &self.sites);
             }
             let (momentum, step) = if round + COOLING_ROUNDS < rounds {
@@ -104,27 +119,12 @@ impl Cells {
                 *velocity = *velocity * momentum + way * step;
                 *site += *velocity;
             }
-            if (squares / self.sites.len() as f64).sqrt() < settled {
+            moved = (squares / self.sites.len() as f64).sqrt();
+            if exact && moved < settled {
                 return Ok(round + 1);
             }
         }
         Ok(rounds)
-    }
-
-    /// Assigns every sample to the nearest of its own and its neighbours' sites. All decisions
-    /// are based on the same state, so the result does not depend on their order. `next_labels`
-    /// is memory for the new labels.
-    fn reassign(&mut self, samples: &WeightedSamples, next_labels: &mut Vec<u32>) {
-        let (labels, sites) = (&self.labels, &self.sites);
-        next_labels
-            .par_chunks_mut(CHUNK)
-            .enumerate()
-            .for_each(|(chunk, out)| {
-                for (offset, label) in out.iter_mut().enumerate() {
-                    *label = nearest_site(samples, labels, sites, chunk * CHUNK + offset);
-                }
-            });
-        std::mem::swap(&mut self.labels, next_labels);
     }
 
     /// Gives each site without samples the sample that is worst placed in its cell.
@@ -222,8 +222,129 @@ impl Cells {
     }
 }
 
+/// The samples that have a neighbour in another cell, and some that no longer have one.
+struct Border {
+    samples: Vec<u32>,
+    listed: Vec<bool>,
+    /// The nearest site of each listed sample.
+    nearest: Vec<u32>,
+}
+
+impl Border {
+    fn new(samples: &WeightedSamples, labels: &[u32]) -> Self {
+        let listed: Vec<bool> = (0..labels.len())
+            .map(|v| has_other_neighbour(samples, labels, v))
+            .collect();
+        let samples = (0..).zip(&listed).filter(|(_, listed)| **listed);
+        Self {
+            samples: samples.map(|(v, _)| v).collect(),
+            listed,
+            nearest: Vec::new(),
+        }
+    }
+
+    /// Assigns every sample to the nearest of its own and its neighbours' sites, and tells `changed` of
+    /// each that changes: sample, site before, site after. All decisions are based on the same
+    /// state, so the result does not depend on their order.
+    fn reassign(
+        &mut self,
+        cells: &mut Cells,
+        samples: &WeightedSamples,
+        mut changed: impl FnMut(usize, u32, u32),
+    ) {
+        self.nearest.resize(self.samples.len(), 0);
+        let (labels, sites) = (&cells.labels, &cells.sites);
+        let near = |v: &u32| nearest_site(samples, labels, sites, *v as usize);
+        (self.nearest.par_chunks_mut(CHUNK))
+            .zip(self.samples.par_chunks(CHUNK))
+            .for_each(|(nearest, samples)| {
+                for (nearest, v) in nearest.iter_mut().zip(samples) {
+                    *nearest = near(v);
+                }
+            });
+        let count = self.samples.len();
+        let mut kept = 0;
+        for place in 0..count {
+            let (v, nearest) = (self.samples[place], self.nearest[place]);
+            if nearest == UNASSIGNED {
+                // A neighbour that comes earlier may have changed; one that comes later lists it again.
+                let inside = !has_other_neighbour(samples, &cells.labels, v as usize);
+                if inside {
+                    self.listed[v as usize] = false;
+                } else {
+                    self.samples[kept] = v;
+                    kept += 1;
+                }
+                continue;
+            }
+            self.samples[kept] = v;
+            kept += 1;
+            let before = std::mem::replace(&mut cells.labels[v as usize], nearest);
+            if before == nearest {
+                continue;
+            }
+            changed(v as usize, before, nearest);
+            for &n in samples.around(v as usize) {
+                if !self.listed[n as usize] {
+                    self.listed[n as usize] = true;
+                    self.samples.push(n);
+                }
+            }
+        }
+        self.samples.drain(kept..count);
+    }
+}
+
+fn has_other_neighbour(samples: &WeightedSamples, labels: &[u32], v: usize) -> bool {
+    let mut around = samples.around(v).iter();
+    around.any(|&n| labels[n as usize] != labels[v])
+}
+
+/// The weighted means of the cells' samples, kept up to date while samples change their cell.
+struct Means<'a> {
+    positions: &'a [Vec3],
+    weights: &'a [f64],
+    /// First moment, mass and number of samples of each cell.
+    sums: Vec<(Vec3, f64, u32)>,
+}
+
+impl<'a> Means<'a> {
+    fn new(cells: &Cells, samples: &'a WeightedSamples, weights: &'a [f64]) -> Self {
+        let mut means = Self {
+            positions: &samples.working,
+            weights,
+            sums: vec![(Vec3::zeros(), 0.0, 0); cells.sites.len()],
+        };
+        for (v, &site) in cells.labels.iter().enumerate() {
+            means.add(v, site);
+        }
+        means
+    }
+
+    fn add(&mut self, v: usize, site: u32) {
+        let (first, mass, count) = &mut self.sums[site as usize];
+        *first += self.positions[v] * self.weights[v];
+        *mass += self.weights[v];
+        *count += 1;
+    }
+
+    fn change(&mut self, v: usize, from: u32, to: u32) {
+        let (first, mass, count) = &mut self.sums[from as usize];
+        *first -= self.positions[v] * self.weights[v];
+        *mass -= self.weights[v];
+        *count -= 1;
+        self.add(v, to);
+    }
+
+    /// `None` for a cell without samples.
+    fn centroids(&self) -> Vec<Option<Vec3>> {
+        let mean = |&(first, mass, count): &(Vec3, f64, u32)| (count > 0).then(|| first / mass);
+        self.sums.iter().map(mean).collect()
+    }
+}
+
 /// The nearest of the sites that sample `v` and its neighbours belong to; of two at the same
-/// distance the lower one.
+/// distance the lower one. [`UNASSIGNED`] where all neighbours belong to the sample's own site.
 fn nearest_site(samples: &WeightedSamples, labels: &[u32], sites: &[Vec3], v: usize) -> u32 {
     let own = labels[v];
     let position = samples.working[v];
@@ -242,7 +363,7 @@ fn nearest_site(samples: &WeightedSamples, labels: &[u32], sites: &[Vec3], v: us
             (best, least) = (site, distance);
         }
     }
-    best
+    if least.is_nan() { UNASSIGNED } else { best }
 }
 
 /// Spreads labels from the samples of `front` to all that have none.
@@ -280,4 +401,50 @@ fn connected_parts(samples: &WeightedSamples, labels: &[u32]) -> Vec<u32> {
         count += 1;
     }
     parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::random::{Purpose, stream};
+    use crate::mesh::shapes;
+    use rand::RngExt;
+
+    /// While sites move at random: the labels are those of a pass over all samples, and the running means
+    /// those of a new sum.
+    #[test]
+    fn the_border_has_every_sample_that_changes() {
+        let mesh = shapes::torus(30.0, 12.0, 60, 30);
+        let samples = WeightedSamples::new(&mesh.vertices, &mesh.vertices, &mesh.triangles, 0);
+        let weights = samples.area.clone();
+        let mut random = stream(3, Purpose::Measure);
+        let seeds: Vec<u32> = (0..40).map(|k| k * 45).collect();
+        let mut cells = Cells::grow(&samples, &seeds);
+        let mut border = Border::new(&samples, &cells.labels);
+        let mut means = Means::new(&cells, &samples, &weights);
+        let mut changes = 0;
+        for _ in 0..60 {
+            for site in &mut cells.sites {
+                *site += Vec3::from_fn(|_, _| random.random_range(-2.0..2.0));
+            }
+            let nearest = |v: usize| match nearest_site(&samples, &cells.labels, &cells.sites, v) {
+                UNASSIGNED => cells.labels[v],
+                site => site,
+            };
+            let expected: Vec<u32> = (0..samples.len()).map(nearest).collect();
+            border.reassign(&mut cells, &samples, |v, from, to| {
+                means.change(v, from, to);
+                changes += 1;
+            });
+            assert_eq!(cells.labels, expected);
+        }
+        assert!(changes > 3000, "{changes}");
+        let anew = Means::new(&cells, &samples, &weights).centroids();
+        for (kept, anew) in means.centroids().iter().zip(&anew) {
+            assert_eq!(kept.is_some(), anew.is_some());
+            if let (Some(kept), Some(anew)) = (kept, anew) {
+                assert!((kept - anew).norm() < 1e-9);
+            }
+        }
+    }
 }

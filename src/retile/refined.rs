@@ -184,7 +184,8 @@ impl<'a> RefinedRun<'a> {
         let seeds = self.seeds(start);
         monitor.check()?;
         let mut cells = Cells::grow(&self.samples, &seeds);
-        let rounds = self.parameters.relaxation_iterations;
+        let exact = self.parameters.exact_rounds;
+        let rounds = (self.parameters.relaxation_iterations, exact);
         monitor.report(Stage::Retile, 0.1)?;
         facts.relaxation_rounds += cells.relax(&self.samples, &self.weights, rounds, monitor)?;
         let mut weights = self.weights.clone();
@@ -226,7 +227,7 @@ impl<'a> RefinedRun<'a> {
                 cells.transplant(&self.samples, light, site);
             }
             facts.relaxation_rounds +=
-                cells.relax(&self.samples, &weights, SETTLING_ROUNDS, monitor)?;
+                cells.relax(&self.samples, &weights, (SETTLING_ROUNDS, exact), monitor)?;
             moved.drain(..moved.len().saturating_sub(self.points / 4));
         }
         Ok(None)

@@ -211,6 +211,7 @@ mod tests {
             regularity_with(&LeastSquaresParameters {
                 momentum,
                 glide: 0,
+                rounds: 16,
                 ..LeastSquaresParameters::default()
             })
         };

@@ -138,11 +138,15 @@ fn generate(
     let bytes = nifti::write(&scan, nifti::StoredType::Float32, false);
     let file = VolumeFile::in_memory("built-in.nii", sound(bytes, monitor)?);
     let points = POINTS.to_string();
-    let parameters = sound(
-        // The scan has no noise.
-        ModelParameters::from_pairs([("points", points.as_str()), ("denoise", "off")]),
-        monitor,
-    )?;
+    // The scan has no noise. The rounds are those of the release that the confidence was calibrated with.
+    let pairs = [
+        ("points", points.as_str()),
+        ("denoise", "off"),
+        ("relaxation_iterations", "80"),
+        ("fit_rounds", "16"),
+    ];
+    let mut parameters = sound(ModelParameters::from_pairs(pairs), monitor)?;
+    parameters.retile.exact_rounds = parameters.retile.relaxation_iterations;
     let limits = ReadLimits::default();
     let model = crate::pipeline::generate(&[file], &parameters, &limits, monitor);
     Ok(sound(model, monitor)?.mesh)
