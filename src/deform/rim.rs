@@ -311,7 +311,7 @@ mod tests {
     fn wave(term: usize, direction: usize) -> f64 {
         let angle = TAU * (direction as f64 + 0.5) / DIRECTIONS as f64;
         let times = (term / 2 + 1) as f64 * angle;
-        if term % 2 == 0 {
+        if term.is_multiple_of(2) {
             times.cos()
         } else {
             times.sin()
