@@ -405,4 +405,44 @@ mod tests {
             "{usual:?} {dark:?}"
         );
     }
+
+    /// What blur adds to a slab as thick as the mean wall is taken off in the mean; no wall gets thinner than the
+    /// least thickness.
+    #[test]
+    fn a_known_resolution_sets_the_mean_loss_and_some_wall_is_left() {
+        use crate::geometry::frame::VoxelToPatient;
+        use crate::grid::Volume;
+        use crate::locate::cup::Cup;
+        use crate::mesh::shapes;
+        use crate::progress::Monitor;
+        let cup = Cup {
+            centre: Vec3::new(0.0, 0.0, -25.0),
+            axis: -Vec3::z(),
+            length: 70.0,
+            breadth: 1.0,
+        };
+        let centre = Vec3::new(0.0, 0.0, -30.0);
+        let frame = VoxelToPatient::centred([40; 3], [3.0; 3], centre).unwrap();
+        let image = Field::new(&Volume::sampled([40; 3], frame, |_| 1.0), None, 0.0);
+        let of = |thickness: f64, resolution: Option<f64>| {
+            let mesh = shapes::cup(70.0, 30.0, thickness, 48);
+            let wall = VentricleWall::new(&mesh, &cup, &Vec3::y(), &Monitor::silent()).unwrap();
+            WallShifts::of(&wall, &image, resolution).unwrap()
+        };
+        for resolution in [8.0, 12.0] {
+            let shifts = of(16.0, Some(resolution));
+            let mean = |map: &RayMap| map.0.iter().sum::<f64>() / map.0.len() as f64;
+            let loss = mean(&shifts.inner_shift) - mean(&shifts.outer_shift);
+            let thickness = mean(&shifts.outer) - mean(&shifts.inner);
+            let excess = blur_correction::excess(thickness, resolution);
+            assert!((loss - excess).abs() < 1e-6, "{loss} {excess}");
+        }
+        let thin = of(6.0, None);
+        for index in 0..ROWS * COLUMNS {
+            let before = thin.outer.0[index] - thin.inner.0[index];
+            let loss = thin.inner_shift.0[index] - thin.outer_shift.0[index];
+            let left = before - loss;
+            assert!(left > THINNEST.min(before) - 1e-9 && left < THINNEST.max(before - 2.0) + 1e-9);
+        }
+    }
 }

@@ -325,6 +325,7 @@ mod tests {
             "{}",
             moved.offset
         );
+        assert!(moved.septal_overshoot.abs() < 0.02, "{moved:?}");
         // The rms of 3 cos about the mean radius.
         let exact = (still.unroundness.powi(2) + (3.0 / radius).powi(2) / 2.0).sqrt();
         assert!(

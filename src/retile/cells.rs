@@ -479,4 +479,20 @@ mod tests {
         assert!(moves < 0.01, "{moves}");
         assert!(rounds > 20, "{rounds}");
     }
+
+    #[test]
+    fn a_transplanted_site_goes_to_the_farthest_sample_of_the_crowded_cell() {
+        let samples = ball();
+        let mut cells = cells(&samples);
+        let far = |v: usize| (samples.working[v] - cells.sites[2]).norm();
+        let crowded = (0..samples.len()).filter(|v| cells.labels[*v] == 2);
+        let most = crowded.map(far).fold(0.0, f64::max);
+        cells.transplant(&samples, 8, 2);
+        assert!(((cells.sites[8] - cells.sites[2]).norm() - most).abs() < 1e-9);
+        let place = (0..samples.len())
+            .find(|v| samples.working[*v] == cells.sites[8])
+            .unwrap();
+        assert_eq!(cells.labels[place], 8);
+        assert!(cells.labels.iter().all(|label| *label < 12));
+    }
 }
