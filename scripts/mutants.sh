@@ -2,7 +2,7 @@
 # Changes the code that makes and fits models in one place at a time, and tells which changes no test notices.
 #
 #   scripts/mutants.sh [SIZE] [OFFSET]    SIZE mutants (100) from number OFFSET (0) on, in a random order
-#   scripts/mutants.sh all                all of them: a night
+#   scripts/mutants.sh all                all of them: many hours
 #   scripts/mutants.sh only REGEX         those whose names match
 #
 # Mutants come from cargo-mutants (installed if it is missing) and are made in a clone of the last commit, under
