@@ -143,3 +143,102 @@ impl Basis {
             .map_or_else(Coefficients::zeros, |c| c.solve(&rhs))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    fn basis(mesh: &TriMesh, axis: Vec3) -> Basis {
+        let centre = mesh.vertices.iter().sum::<Vec3>() / mesh.vertices.len() as f64;
+        let along = mesh.vertices.iter().map(|p| (p - centre).dot(&axis));
+        Basis {
+            axis,
+            centre,
+            base: along.fold(0.0, f64::min),
+        }
+    }
+
+    /// What each of the twelve fields does to a point 30 mm off the axis at the rim and on the axis at the apex.
+    #[test]
+    fn the_fields_move_turn_stretch_thicken_and_raise() {
+        let axis = Vec3::new(0.0, 0.6, 0.8);
+        let centre = Vec3::new(5.0, -3.0, 2.0);
+        let basis = Basis {
+            axis,
+            centre,
+            base: -40.0,
+        };
+        let (e1, e2) = perpendicular(&axis);
+        let normal = Vec3::x();
+        for (along, across) in [(-40.0, e1), (-20.0, e2), (-60.0, e2), (45.0, e1)] {
+            let r = axis * along + across * 30.0;
+            let fields = basis.fields(&(centre + r), &normal);
+            for axis in 0..3 {
+                assert_eq!(fields[axis], Vec3::ith(axis, 1.0));
+                // A turn by 1/30.
+                assert!((fields[3 + axis] - Vec3::ith(axis, 1.0).cross(&r) / 30.0).norm() < 1e-12);
+            }
+            assert!((fields[6] - axis * (along / 30.0)).norm() < 1e-12);
+            assert!((fields[7] - across).norm() < 1e-12);
+            assert_eq!(fields[8], normal);
+            let lift = (-along / 40.0).clamp(0.0, 1.0);
+            assert!((fields[9] - axis * lift).norm() < 1e-12);
+            let tilts = [e1, e2].map(|e| axis * (lift * e.dot(&across)));
+            assert!((fields[10] - tilts[0]).norm() < 1e-12);
+            assert!((fields[11] - tilts[1]).norm() < 1e-12);
+        }
+        let flat = Basis {
+            axis,
+            centre,
+            base: -0.5,
+        };
+        assert_eq!(flat.fields(&(centre - axis), &normal)[9], Vec3::zeros());
+    }
+
+    /// Sensors that saw a cup displaced by a combination of the fields find the combination, but for what the
+    /// penalties keep back.
+    #[test]
+    fn the_solution_is_the_displacement_that_the_sensors_saw() {
+        let mesh = shapes::cup(70.0, 30.0, 12.0, 24);
+        let basis = basis(&mesh, -Vec3::z());
+        let wanted = [
+            2.0, -1.0, 1.5, 0.5, -0.7, 0.0, 1.0, -1.2, 0.4, 1.0, 0.5, -0.8,
+        ];
+        let wanted = Coefficients::from_column_slice(&wanted);
+        let total = mesh.area();
+        let mut readings = Vec::new();
+        for t in 0..mesh.triangles.len() {
+            let [a, b, c] = mesh.corners(t);
+            let (place, area) = ((a + b + c) / 3.0, mesh.area_normal(t));
+            let normal = area.normalize();
+            let seen = basis.displacement(&place, &normal, &wanted);
+            readings.push(SensorReading {
+                place,
+                normal,
+                offset: seen.dot(&normal),
+                weight: 0.9,
+                share: area.norm() / 2.0 / total,
+            });
+        }
+        let step = basis.solve(&readings);
+        let (mut left, mut all) = (0.0, 0.0);
+        for r in &readings {
+            let moved = basis
+                .displacement(&r.place, &r.normal, &step)
+                .dot(&r.normal);
+            left += r.share * (r.offset - moved).powi(2);
+            all += r.share * r.offset.powi(2);
+        }
+        assert!(left < 0.01 * all, "{left} {all}");
+        // Penalties shrink, they do not turn round; without any edge nothing moves.
+        assert!(
+            step.iter()
+                .zip(wanted.iter())
+                .take(3)
+                .all(|(s, w)| s * w > 0.0)
+        );
+        readings.iter_mut().for_each(|r| r.weight = 0.0);
+        assert!(basis.solve(&readings).norm() < 1e-12);
+    }
+}

@@ -255,3 +255,194 @@ fn quantile_of(values: &[f64], share: f64) -> f64 {
     sorted.sort_by(f64::total_cmp);
     order::quantile(&sorted, share)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The value 1 on one ray, 0 elsewhere.
+    fn impulse(row: usize, column: usize) -> RayMap {
+        RayMap::from_fn(|index| f64::from(u8::from(index == row * COLUMNS + column)))
+    }
+
+    #[test]
+    fn smoothing_spreads_by_its_deviations_and_goes_round_the_wall() {
+        let level = RayMap::from_fn(|_| 7.0).smoothed();
+        assert!(level.0.iter().all(|v| (v - 7.0).abs() < 1e-9));
+        let (row, column) = (ROWS / 2, 1);
+        let spread = impulse(row, column).smoothed();
+        assert!((spread.0.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+        let (mut along, mut around) = (0.0, 0.0);
+        for (index, v) in spread.0.iter().enumerate() {
+            let rows = (index / COLUMNS) as f64 - row as f64;
+            let columns = (index % COLUMNS) as f64 - column as f64;
+            let half = COLUMNS as f64 / 2.0;
+            let columns = (columns + half).rem_euclid(COLUMNS as f64) - half;
+            along += v * rows * rows;
+            around += v * columns * columns;
+        }
+        assert!((along.sqrt() - SMOOTHING[0]).abs() < 0.02, "{along}");
+        assert!((around.sqrt() - SMOOTHING[1]).abs() < 0.02, "{around}");
+    }
+
+    #[test]
+    fn a_map_is_linear_between_rays_and_goes_round() {
+        let map =
+            RayMap::from_fn(|index| 10.0 * (index / COLUMNS) as f64 + (index % COLUMNS) as f64);
+        for (row, column) in [(0.0, 0.0), (3.25, 7.5), (30.75, 12.0), (31.0, 58.25)] {
+            assert!((map.at(row, column) - (10.0 * row + column)).abs() < 1e-9);
+        }
+        // Beyond the ends the values there; between the last column and the first one both.
+        assert_eq!((map.at(-4.0, 5.0), map.at(99.0, 5.0)), (5.0, 315.0));
+        assert!((map.at(0.0, 59.25) - 0.75 * 59.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn rays_that_miss_the_wall_take_the_next_value_of_their_column() {
+        let known = |index: usize| match (index / COLUMNS, index % COLUMNS) {
+            (row, 4) if row < 3 || row == 9 => None,
+            (row, column) => Some((100 * row + column) as f64),
+        };
+        let map = RayMap::filled(known).unwrap();
+        let at = |row: usize, column: usize| map.0[row * COLUMNS + column];
+        assert_eq!((at(0, 4), at(2, 4), at(9, 4)), (304.0, 304.0, 804.0));
+        assert_eq!((at(0, 5), at(9, 3)), (5.0, 903.0));
+        assert!(RayMap::filled(|index| (index % COLUMNS != 4).then_some(1.0)).is_none());
+    }
+
+    /// A wall of 14 mm about a cavity of 18 mm radius, whose uptake halves at a quarter of its columns.
+    #[test]
+    fn rays_are_described_by_what_the_wall_is_like() {
+        let inner = RayMap::from_fn(|_| 18.0);
+        let outer = RayMap::from_fn(|_| 32.0);
+        let dark = COLUMNS / 4..COLUMNS / 2;
+        let uptake = RayMap::from_fn(|i| {
+            if dark.contains(&(i % COLUMNS)) {
+                2.0
+            } else {
+                4.0
+            }
+        });
+        let numbers = describe(&inner, &outer, &uptake);
+        let size = 1.2f64.ln();
+        for (row, column) in [(0, 0), (10, 50), (31, 22)] {
+            let way = (row as f64 + 0.5) / ROWS as f64;
+            let missing = if column == 22 { 0.5 } else { 0.0 };
+            let wanted = [
+                1.0,
+                -1.0,
+                size,
+                size * size,
+                0.0,
+                (-1.5f64).exp(),
+                missing,
+                missing * missing,
+                way - 0.5,
+                (way - 0.5) * (way - 0.5),
+                (-way / 0.12).exp(),
+            ];
+            for (found, wanted) in numbers[row * COLUMNS + column].iter().zip(wanted) {
+                assert!((found - wanted).abs() < 0.02, "{found} {wanted}");
+            }
+        }
+    }
+
+    /// Of a usual wall, uniform in uptake, blur took some on both sides everywhere: the inner surface moves
+    /// outward, the outer one inward, together by 2 to 6 mm; where uptake is missing the blur hides more of the
+    /// cavity, and a wall that looks thicker than the rest is thinned by more.
+    #[test]
+    fn the_wall_itself_lies_within_the_wall_as_it_looks() {
+        let level = |value: f64| RayMap::from_fn(|_| value);
+        let shifts = |inner: &RayMap, outer: &RayMap, uptake: &RayMap, index: usize| {
+            let numbers = describe(inner, outer, uptake)[index];
+            [INNER, OUTER].map(|c| c.iter().zip(numbers).map(|(c, x)| c * x).sum::<f64>())
+        };
+        for (inner, outer) in [(15.0, 30.0), (20.0, 34.0), (26.0, 42.0)] {
+            let of = |row| shifts(&level(inner), &level(outer), &level(1.0), row * COLUMNS);
+            let all @ [apex, middle, rim] = [0, ROWS / 2, ROWS - 1].map(of);
+            for [i, o] in all {
+                assert!(
+                    i > 0.0 && o < 0.0 && (2.0..10.0).contains(&(i - o)),
+                    "{i} {o}"
+                );
+            }
+            // The inner surface moves most at the apex, the outer one at both ends of the wall.
+            assert!(
+                apex[0] > rim[0] + 1.0 && (apex[1] - rim[1]).abs() < 1.2,
+                "{apex:?} {rim:?}"
+            );
+            assert!(rim[1] < middle[1] - 0.6, "{rim:?} {middle:?}");
+        }
+        let index = ROWS / 2 * COLUMNS + 30;
+        let usual = shifts(&level(20.0), &level(34.0), &level(1.0), index);
+        let thick = RayMap::from_fn(|i| {
+            if (i % COLUMNS).abs_diff(30) < 12 {
+                37.0
+            } else {
+                34.0
+            }
+        });
+        let thicker = shifts(&level(20.0), &thick, &level(1.0), index);
+        assert!(
+            thicker[0] > usual[0] + 0.8 && thicker[1] < usual[1] - 0.8,
+            "{usual:?} {thicker:?}"
+        );
+        let all_thick = shifts(&level(20.0), &level(38.0), &level(1.0), index);
+        assert!(all_thick[0] > usual[0] + 1.0 && all_thick[1] < usual[1] - 0.5);
+        let larger = shifts(&level(30.0), &level(44.0), &level(1.0), index);
+        assert!((larger[0] - usual[0]).abs() < 0.6);
+        assert!(larger[1] < usual[1] - 0.3, "{usual:?} {larger:?}");
+        let defect = RayMap::from_fn(|i| {
+            if (i % COLUMNS).abs_diff(30) < 12 {
+                0.5
+            } else {
+                1.0
+            }
+        });
+        let dark = shifts(&level(20.0), &level(34.0), &defect, index);
+        assert!(
+            dark[0] > usual[0] + 0.5 && dark[1] < usual[1] - 0.3,
+            "{usual:?} {dark:?}"
+        );
+    }
+
+    /// What blur adds to a slab as thick as the mean wall is taken off in the mean; no wall gets thinner than the
+    /// least thickness.
+    #[test]
+    fn a_known_resolution_sets_the_mean_loss_and_some_wall_is_left() {
+        use crate::geometry::frame::VoxelToPatient;
+        use crate::grid::Volume;
+        use crate::locate::cup::Cup;
+        use crate::mesh::shapes;
+        use crate::progress::Monitor;
+        let cup = Cup {
+            centre: Vec3::new(0.0, 0.0, -25.0),
+            axis: -Vec3::z(),
+            length: 70.0,
+            breadth: 1.0,
+        };
+        let centre = Vec3::new(0.0, 0.0, -30.0);
+        let frame = VoxelToPatient::centred([40; 3], [3.0; 3], centre).unwrap();
+        let image = Field::new(&Volume::sampled([40; 3], frame, |_| 1.0), None, 0.0);
+        let of = |thickness: f64, resolution: Option<f64>| {
+            let mesh = shapes::cup(70.0, 30.0, thickness, 48);
+            let wall = VentricleWall::new(&mesh, &cup, &Vec3::y(), &Monitor::silent()).unwrap();
+            WallShifts::of(&wall, &image, resolution).unwrap()
+        };
+        for resolution in [8.0, 12.0] {
+            let shifts = of(16.0, Some(resolution));
+            let mean = |map: &RayMap| map.0.iter().sum::<f64>() / map.0.len() as f64;
+            let loss = mean(&shifts.inner_shift) - mean(&shifts.outer_shift);
+            let thickness = mean(&shifts.outer) - mean(&shifts.inner);
+            let excess = blur_correction::excess(thickness, resolution);
+            assert!((loss - excess).abs() < 1e-6, "{loss} {excess}");
+        }
+        let thin = of(6.0, None);
+        for index in 0..ROWS * COLUMNS {
+            let before = thin.outer.0[index] - thin.inner.0[index];
+            let loss = thin.inner_shift.0[index] - thin.outer_shift.0[index];
+            let left = before - loss;
+            assert!(left > THINNEST.min(before) - 1e-9 && left < THINNEST.max(before - 2.0) + 1e-9);
+        }
+    }
+}

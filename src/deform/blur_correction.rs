@@ -122,4 +122,19 @@ mod tests {
             }
         }
     }
+
+    /// Values of Abramowitz and Stegun's table 7.1.
+    #[test]
+    fn the_error_function_is_that_of_the_tables() {
+        for (x, value) in [
+            (0.0, 0.0),
+            (0.2, 0.222_702_589),
+            (0.5, 0.520_499_878),
+            (1.0, 0.842_700_793),
+            (1.5, 0.966_105_146),
+            (2.0, 0.995_322_265),
+        ] {
+            assert!((erf(x) - value).abs() < 2e-7 && (erf(-x) + value).abs() < 2e-7);
+        }
+    }
 }

@@ -321,3 +321,135 @@ impl MotionState {
         Some(farthest)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::deform::elastic::Stiffness;
+    use crate::mesh::shapes;
+
+    fn body(mesh: &TriMesh) -> Elastic {
+        Elastic::new(mesh, &[], Stiffness::default())
+    }
+
+    /// A body in flight, which nothing deforms, is slowed by the damping alone: implicitly,
+    /// v' = v / (1 + g dt).
+    #[test]
+    fn a_body_in_flight_is_slowed_by_the_damping() {
+        let mesh = shapes::icosphere(20.0, 1);
+        let body = body(&mesh);
+        for time_step in [0.4, 1.0, 2.5] {
+            let motion = Motion {
+                mass: 3.0,
+                damping: 0.6,
+                time_step,
+                ..Motion::default()
+            };
+            let mut state = MotionState::new(&mesh, &body, &motion);
+            let velocity = Vec3::new(1.0, -2.0, 0.5);
+            state.velocity = vec![velocity; mesh.vertices.len()];
+            let energy = 0.5 * 3.0 * velocity.norm_squared();
+            assert!((state.kinetic_energy() / energy - 1.0).abs() < 1e-9);
+            let slowed = velocity / (1.0 + 0.6 * time_step);
+            let farthest = state.step(&body, &motion, &[]).unwrap();
+            assert!((farthest - slowed.norm() * time_step).abs() < 1e-4);
+            for ((p, q), v) in state
+                .mesh
+                .vertices
+                .iter()
+                .zip(&mesh.vertices)
+                .zip(&state.velocity)
+            {
+                assert!((p - q - slowed * time_step).norm() < 1e-4);
+                assert!((v - slowed).norm() < 1e-4);
+            }
+        }
+    }
+
+    fn readings(mesh: &TriMesh, offset: f64, weight: f64) -> Vec<SensorReading> {
+        let mut readings = Vec::new();
+        for t in 0..mesh.triangles.len() {
+            let corners = mesh.corners(t);
+            for w in sensors::barycentric() {
+                let place = corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2];
+                readings.push(SensorReading {
+                    place,
+                    normal: mesh.area_normal(t).normalize(),
+                    offset,
+                    weight,
+                    share: 1.0 / (PER_TRIANGLE * mesh.triangles.len()) as f64,
+                });
+            }
+        }
+        readings
+    }
+
+    /// Sensors that all want the same shift get it, in many steps, against nothing but inertia.
+    #[test]
+    fn sensors_carry_the_body_to_their_edges() {
+        let mesh = shapes::icosphere(20.0, 1);
+        let body = body(&mesh);
+        let motion = Motion::default();
+        let shift = Vec3::new(3.0, 1.0, -2.0);
+        let mut state = MotionState::new(&mesh, &body, &motion);
+        for _ in 0..40 {
+            let mut readings = readings(&mesh, 0.0, 0.8);
+            for r in &mut readings {
+                r.offset = r.normal.dot(&shift);
+            }
+            state.step(&body, &motion, &readings).unwrap();
+        }
+        for (p, q) in state.mesh.vertices.iter().zip(&mesh.vertices) {
+            assert!((p - q - shift).norm() < 1e-3, "{}", p - q);
+        }
+        let energy = sensor_energy(&readings(&mesh, -3.0, 0.5));
+        assert!((energy - 0.5 * 0.5 * 9.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_body_that_leaves_diverges_and_stays() {
+        let mesh = shapes::icosphere(20.0, 1);
+        let body = body(&mesh);
+        let motion = Motion::default();
+        let mut state = MotionState::new(&mesh, &body, &motion);
+        state.velocity = vec![Vec3::new(300.0, 0.0, 0.0); mesh.vertices.len()];
+        // Damping halves it: 150 mm in the first step, more than 200 after the next one.
+        assert!(state.step(&body, &motion, &[]).is_some());
+        let before = state.mesh.vertices.clone();
+        assert!(state.step(&body, &motion, &[]).is_none());
+        assert_eq!(state.mesh.vertices, before);
+    }
+
+    /// While the reach falls only the last reading counts, afterwards the mean of all since, as a place: the
+    /// body may have moved meanwhile.
+    #[test]
+    fn readings_at_the_least_reach_are_averaged() {
+        let mesh = shapes::icosphere(20.0, 1);
+        let mut mean = SensorMean::default();
+        mean.add(readings(&mesh, 5.0, 0.9), false);
+        mean.add(readings(&mesh, 1.0, 0.2), true);
+        let of = |mean: &SensorMean, mesh: &TriMesh| {
+            let r = mean.readings(mesh)[17];
+            (r.offset, r.weight)
+        };
+        let near = |(a, b): (f64, f64), (c, d): (f64, f64)| {
+            assert!((a - c).abs() < 1e-9 && (b - d).abs() < 1e-9, "{a} {b}");
+        };
+        // The first reading at the least reach is the second of all.
+        near(of(&mean, &mesh), (3.0, 0.55));
+        mean.add(readings(&mesh, 3.0, 1.0), true);
+        near(of(&mean, &mesh), (3.0, 0.7));
+        mean.add(readings(&mesh, 7.0, 0.7), true);
+        near(of(&mean, &mesh), (4.0, 0.7));
+        let mut moved = mesh.clone();
+        let normal = mesh.area_normal(17 / PER_TRIANGLE).normalize();
+        moved.vertices.iter_mut().for_each(|p| *p += normal * 1.5);
+        near(of(&mean, &moved), (2.5, 0.7));
+        for _ in 0..SETTLED_READINGS - 5 {
+            mean.add(readings(&mesh, 4.0, 0.7), true);
+            assert!(!mean.is_fixed());
+        }
+        mean.add(readings(&mesh, 4.0, 0.7), true);
+        assert!(mean.is_fixed());
+    }
+}

@@ -406,4 +406,58 @@ mod tests {
         assert!((3.7..4.3).contains(&growth(SupportScaling::Fixed)));
         assert!((0.93..1.07).contains(&growth(SupportScaling::PerNode)));
     }
+
+    /// A body scaled as a whole: every term follows from the scale alone.
+    #[test]
+    fn a_scaled_model_has_the_energy_of_its_strain() {
+        let (mesh, body) = cup();
+        let k = Stiffness::default();
+        for scale in [0.8, 1.25] {
+            let scaled: Vec<Vec3> = mesh.vertices.iter().map(|p| p * scale).collect();
+            let square = (scale - 1.0) * (scale - 1.0);
+            let struts: f64 = struts(&mesh, &Monitor::silent())
+                .unwrap()
+                .iter()
+                .map(|s| {
+                    let [a, b] = s.nodes.map(|v| mesh.vertices[v as usize]);
+                    0.5 * k.thickness * s.share * square * (b - a).norm_squared()
+                })
+                .sum();
+            // Local torsion counts each edge at both of its ends.
+            let edges = 0.5 * square * (k.spring + k.torsion + k.body);
+            let energy = body.energy(&scaled);
+            assert!((energy / (edges + struts) - 1.0).abs() < 1e-9, "{energy}");
+            assert!((body.strain(&scaled) / square - 1.0).abs() < 1e-9);
+        }
+        let turn = Rotation3::from_euler_angles(1.4, 0.3, -0.7);
+        let turned: Vec<Vec3> = mesh.vertices.iter().map(|p| turn * p).collect();
+        assert!(body.strain(&turned) < 1e-20);
+        let mut again = body.clone();
+        again.set_rest(&shaken(&mesh.vertices));
+        assert!(again.energy(&shaken(&mesh.vertices)) < 1e-20);
+    }
+
+    #[test]
+    fn times_stiffens_all_but_the_radius() {
+        let of = |stiffness: Stiffness| {
+            let Stiffness {
+                spring,
+                torsion,
+                body,
+                thickness,
+                support,
+                ..
+            } = stiffness;
+            [spring, torsion, body, thickness, support]
+        };
+        let soft = Stiffness {
+            support: 0.3,
+            ..Stiffness::default()
+        };
+        let stiff = soft.times(3.0);
+        for (soft, stiff) in of(soft).iter().zip(of(stiff)) {
+            assert!((stiff / soft - 3.0).abs() < 1e-12);
+        }
+        assert_eq!(stiff.support_radius, soft.support_radius);
+    }
 }

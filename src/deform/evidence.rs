@@ -235,6 +235,11 @@ fn first_harmonic(around: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::frame::VoxelToPatient;
+    use crate::grid::Volume;
+    use crate::locate::cup::Cup;
+    use crate::mesh::{TriMesh, shapes};
+    use crate::progress::Monitor;
 
     #[test]
     fn a_circle_is_found_by_a_part_of_it() {
@@ -259,5 +264,139 @@ mod tests {
         };
         assert!(radius(0.0) < 1e-9);
         assert!((radius(1.5) - 1.5).abs() < 1e-9);
+    }
+
+    /// A cup of 70 mm, 30 mm outer radius and a wall of 10 mm; its axis points down.
+    fn cup() -> TriMesh {
+        shapes::cup(70.0, 30.0, 10.0, 48)
+    }
+
+    fn wall(mesh: &TriMesh) -> VentricleWall {
+        let cup = Cup {
+            centre: Vec3::new(0.0, 0.0, -25.0),
+            axis: -Vec3::z(),
+            length: 70.0,
+            breadth: 1.0,
+        };
+        VentricleWall::new(mesh, &cup, &Vec3::y(), &Monitor::silent()).unwrap()
+    }
+
+    fn image(value: impl Fn(&Vec3) -> f64) -> Field {
+        let centre = Vec3::new(0.0, 0.0, -30.0);
+        let frame = VoxelToPatient::centred([60; 3], [2.0; 3], centre).unwrap();
+        Field::new(&Volume::sampled([60; 3], frame, value), None, 0.0)
+    }
+
+    fn of(mesh: &TriMesh) -> Evidence {
+        let edges = Edges {
+            active: 0.6,
+            residual: 0.8,
+            strain: 0.2,
+        };
+        Evidence::of(&wall(mesh), &edges, 0.5, &image(|_| 1.0), None).unwrap()
+    }
+
+    /// A cup turned about its axis is round and lies about it; moved aside by 3 mm it lies 3 mm off the axis,
+    /// and one whose septum (the columns about 180 degrees, at the patient's right) is moved out has a bulge there.
+    #[test]
+    fn a_round_heart_is_round_and_a_bulge_is_seen() {
+        let still = of(&cup());
+        assert!(
+            (still.active, still.residual, still.strain, still.hollowness) == (0.6, 0.8, 0.2, 0.5)
+        );
+        // A half ellipsoid narrows a little within the rows of the body.
+        assert!(
+            still.unroundness < 0.12 && still.offset < 0.005,
+            "{still:?}"
+        );
+        assert!((still.septal_bulge - 1.0).abs() < 0.01 && still.septal_overshoot.abs() < 0.01);
+        // The rim's rounding is part of the length.
+        assert!((still.slenderness - 75.0 / 27.7).abs() < 0.15, "{still:?}");
+        // Half an ellipsoid of 50 ml, and what lies between it and the top of the rim.
+        assert!((50.0..62.0).contains(&still.cavity_ml), "{still:?}");
+        assert!((still.dark, still.beside) == (0.0, 1.0));
+
+        let mut moved = cup();
+        moved.vertices.iter_mut().for_each(|p| p.y += 3.0);
+        let moved = of(&moved);
+        let radius = 24.0;
+        assert!(
+            (moved.offset - 3.0 / radius).abs() < 0.02,
+            "{}",
+            moved.offset
+        );
+        assert!(moved.septal_overshoot.abs() < 0.02, "{moved:?}");
+        // The rms of 3 cos about the mean radius.
+        let exact = (still.unroundness.powi(2) + (3.0 / radius).powi(2) / 2.0).sqrt();
+        assert!(
+            (moved.unroundness - exact).abs() < 0.02,
+            "{}",
+            moved.unroundness
+        );
+
+        let wall = wall(&cup());
+        let septal = wall.rays[20 * COLUMNS + 30].direction;
+        let lateral = wall.rays[20 * COLUMNS].direction;
+        let mut bulged = cup();
+        for p in &mut bulged.vertices {
+            let across = Vec3::new(p.x, p.y, 0.0);
+            if across.dot(&septal) > 0.5 * across.norm() {
+                *p += septal * 3.0;
+            }
+        }
+        let bulged = of(&bulged);
+        assert!(
+            (1.08..1.16).contains(&bulged.septal_bulge),
+            "{}",
+            bulged.septal_bulge
+        );
+        assert!(
+            (0.07..0.16).contains(&bulged.septal_overshoot),
+            "{}",
+            bulged.septal_overshoot
+        );
+        // Moved as a whole towards the septum it has no bulge but by the axis.
+        let mut aside = cup();
+        aside.vertices.iter_mut().for_each(|p| *p -= lateral * 3.0);
+        let aside = of(&aside);
+        assert!(
+            aside.septal_bulge > 1.15 && aside.septal_overshoot.abs() < 0.02,
+            "{aside:?}"
+        );
+    }
+
+    #[test]
+    fn dark_wall_and_bright_neighbours_are_shares_of_the_area() {
+        let wall = wall(&cup());
+        let uptake = |value: &dyn Fn(&Vec3) -> f64| WallUptake::of(&wall, &image(value)).unwrap();
+        let uniform = uptake(&|_| 3.0);
+        assert!((uniform.dark, uniform.beside) == (0.0, 1.0));
+        let half = uptake(&|p| if p.y > 0.0 { 3.0 } else { 1.0 });
+        assert!(
+            (half.dark - 0.5).abs() < 0.04 && (half.beside - 0.5).abs() < 0.04,
+            "{}",
+            half.dark
+        );
+        // Most of the area lies across the axis, not about the apex.
+        let apex = uptake(&|p| if p.z < -55.0 { 1.0 } else { 3.0 });
+        assert!((0.02..0.2).contains(&apex.dark), "{}", apex.dark);
+        // A neighbour from 12 to 18 mm beyond a wall of 30 mm radius counts, a farther one does not.
+        for (from, to, seen) in [(43.0, 47.0, true), (52.0, 60.0, false), (33.0, 38.0, false)] {
+            let at = |p: &Vec3| {
+                let across = p.x.hypot(p.y);
+                if (across / 31.0).hypot(p.z.min(0.0) / 71.0) < 1.0 {
+                    3.0
+                } else if (from..to).contains(&across) && p.y > 0.0 && p.z > -20.0 {
+                    2.5
+                } else {
+                    0.0
+                }
+            };
+            let found = uptake(&at);
+            assert_eq!(found.dark, 0.0);
+            assert_eq!(found.beside > 0.05, seen, "{from}: {}", found.beside);
+            assert!(found.beside < 0.4);
+        }
+        assert!(WallUptake::of(&wall, &image(|_| 0.0)).is_some());
     }
 }

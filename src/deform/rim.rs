@@ -307,4 +307,100 @@ mod tests {
         }
         assert_eq!(settled.triangles, whole.triangles);
     }
+
+    fn wave(term: usize, direction: usize) -> f64 {
+        let angle = TAU * (direction as f64 + 0.5) / DIRECTIONS as f64;
+        let times = (term / 2 + 1) as f64 * angle;
+        if term.is_multiple_of(2) {
+            times.cos()
+        } else {
+            times.sin()
+        }
+    }
+
+    /// The aorta leaves between septum and anterior wall: the wall of hearts is shortest there, and longest
+    /// opposite to it.
+    #[test]
+    fn the_mean_rim_is_that_of_hearts() {
+        let height = |d: usize| (0..TERMS).map(|t| MEAN[t] * wave(t, d)).sum::<f64>();
+        let by_height = |a: &usize, b: &usize| height(*a).total_cmp(&height(*b));
+        let angle = |direction: usize| 360.0 * (direction as f64 + 0.5) / DIRECTIONS as f64;
+        let shortest = angle((0..DIRECTIONS).max_by(by_height).unwrap());
+        let longest = angle((0..DIRECTIONS).min_by(by_height).unwrap());
+        assert!((145.0..170.0).contains(&shortest), "{shortest}");
+        assert!((300.0..350.0).contains(&longest), "{longest}");
+        let precision = DMatrix::from_fn(TERMS, TERMS, |a, b| PRECISION[a][b]);
+        assert_eq!(precision, precision.transpose());
+        assert!(precision.cholesky().is_some());
+    }
+
+    /// Any other shape costs more: the sum of the robust distances to the heights, three directions counting
+    /// as one, and of the distance from the mean shape.
+    #[test]
+    fn the_expected_rim_is_the_best_compromise() {
+        for length in [60.0, 95.0] {
+            let rim: Vec<f64> = (0..DIRECTIONS)
+                .map(|n| 3.0 + 2.0 * (1.7 * n as f64).sin() + if n < 4 { 9.0 } else { 0.0 })
+                .collect();
+            let cost = |shape: &[f64]| {
+                let robust = rim
+                    .iter()
+                    .zip(shape)
+                    .map(|(h, s)| (1.0 + ((h - s) / 4.0).powi(2)).ln() / 2.0 / 3.0);
+                let off: [f64; TERMS] = std::array::from_fn(|t| {
+                    let sum: f64 = (0..DIRECTIONS).map(|d| shape[d] * wave(t, d)).sum();
+                    2.0 * sum / DIRECTIONS as f64 / length - MEAN[t]
+                });
+                let mut prior = 0.0;
+                for a in 0..TERMS {
+                    for b in 0..TERMS {
+                        prior += off[a] * PRECISION[a][b] * off[b] / 2.0;
+                    }
+                }
+                robust.sum::<f64>() + prior
+            };
+            let shape = expected(&rim, length).unwrap();
+            let least = cost(&shape);
+            for term in 0..=TERMS {
+                for step in [-0.02, 0.02] {
+                    let by = |d: usize| if term < TERMS { wave(term, d) } else { 1.0 };
+                    let moved: Vec<f64> =
+                        (0..DIRECTIONS).map(|d| shape[d] + step * by(d)).collect();
+                    assert!(cost(&moved) > least, "{length} {term} {step}");
+                }
+            }
+        }
+    }
+
+    /// A rim far from its shape is moved by more than the distance beyond 4 mm, and by 12 or 16 mm at most.
+    #[test]
+    fn the_correction_grows_steadily_to_its_limits() {
+        let steps: Vec<f64> = (-300..=300)
+            .map(|n| correction(f64::from(n) / 10.0))
+            .collect();
+        assert!(steps.windows(2).all(|s| s[1] >= s[0] && s[1] - s[0] < 0.25));
+        assert_eq!((steps[0], steps[600]), (-12.0, 16.0));
+        let slope = |d: f64| (correction(d + 0.5) - correction(d - 0.5)).abs();
+        assert!(correction(0.0).abs() < 1.0);
+        for within in [-3.0, 0.0, 3.0] {
+            assert!((slope(within) - 0.95).abs() < 1e-9);
+        }
+        assert!(slope(6.0) > 2.0 && slope(7.0) > 2.0 && slope(-6.0) < 0.95 && slope(-6.0) > 0.5);
+    }
+
+    #[test]
+    fn values_between_directions_are_linear_and_go_round() {
+        let mut values = [1.0; DIRECTIONS];
+        (values[0], values[DIRECTIONS - 1], values[7]) = (5.0, 3.0, 2.0);
+        let last = (DIRECTIONS - 1) as f64;
+        for (at, value) in [
+            (0.0, 5.0),
+            (0.25, 4.0),
+            (last, 3.0),
+            (last + 0.75, 4.5),
+            (6.5, 1.5),
+        ] {
+            assert!((between(&values, at) - value).abs() < 1e-12, "{at}");
+        }
+    }
 }

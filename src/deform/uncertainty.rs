@@ -56,3 +56,46 @@ pub fn of_nodes(nodes: &[NodeEvidence], chance: f64, edge: WallEdge) -> Vec<f64>
     };
     nodes.iter().map(of).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Strong edges, fits that agree, and good odds make a place certain; the ends of the wall are less
+    /// certain than its middle, and the true rim less than the true apex.
+    #[test]
+    fn what_is_known_of_a_node_makes_it_certain() {
+        let node = NodeEvidence {
+            seen: 0.5,
+            way: 0.5,
+            spread: Some(0.8),
+        };
+        for edge in [WallEdge::Apparent, WallEdge::Anatomical] {
+            let of = |node: NodeEvidence, chance: f64| of_nodes(&[node], chance, edge)[0];
+            let usual = of(node, 0.8);
+            assert!((1.0..4.0).contains(&usual), "{usual}");
+            assert!(of(NodeEvidence { seen: 0.9, ..node }, 0.8) < 0.8 * usual);
+            let spread = |spread| of(NodeEvidence { spread, ..node }, 0.8);
+            assert!(spread(Some(3.0)) > 1.3 * usual && spread(Some(0.1)) < 0.8 * usual);
+            assert_eq!(spread(None), usual);
+            assert!(of(node, 0.99) < 0.9 * usual && of(node, 0.2) > 1.1 * usual);
+            let [apex, rim] = [0.0, 1.0].map(|way| of(NodeEvidence { way, ..node }, 0.8));
+            assert!(apex.min(rim) > 1.2 * usual, "{apex} {usual} {rim}");
+            assert!((apex / rim).ln().abs() < 0.2);
+            assert_eq!(edge == WallEdge::Anatomical, rim > apex);
+            assert_eq!(of(NodeEvidence { way: 7.0, ..node }, 0.8), rim);
+            let lost = NodeEvidence {
+                seen: 0.0,
+                way: 1.0,
+                spread: Some(1e6),
+            };
+            assert_eq!(of(lost, 0.0), RANGE[1]);
+            let sure = NodeEvidence {
+                seen: 1.0,
+                spread: Some(0.0),
+                ..node
+            };
+            assert!((RANGE[0]..1.0).contains(&of(sure, 1.0)));
+        }
+    }
+}

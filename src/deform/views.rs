@@ -375,4 +375,149 @@ mod tests {
         let views = views.unwrap();
         assert!(views.agreement > 0.95 && views.gain < 0.02, "{views:?}");
     }
+
+    /// The weights of Catmull and Rom are exact for cubic polynomials.
+    #[test]
+    fn shifts_by_half_a_step_follow_a_cubic() {
+        let cubic = |x: f64| 0.3 + x * (0.2 - x * (0.05 + 0.01 * x));
+        let coarse = std::array::from_fn(|n| cubic(n as f64 - FARTHEST as f64));
+        let fine = refined(&coarse);
+        for (n, value) in fine.iter().enumerate() {
+            let exact = cubic(0.5 * n as f64 - FARTHEST as f64);
+            let end = n == 1 || n == SHIFTS - 2;
+            assert!(end || (value - exact).abs() < 1e-12, "{n}: {value} {exact}");
+        }
+        // At the ends the first and the last value continue.
+        let [a, b, c] = [coarse[0], coarse[1], coarse[2]];
+        assert!((fine[1] - (9.0 * (a + b) - a - c) / 16.0).abs() < 1e-12);
+    }
+
+    fn noise(seed: usize) -> Vec<f32> {
+        let of = |n: usize| (n * n % 8191) as f32 * 0.37 + (seed * n) as f32 * 1.3;
+        (0..SIDE * SIDE).map(|n| of(n).sin()).collect()
+    }
+
+    #[test]
+    fn correlations_are_those_of_the_wall_moved_by_steps() {
+        let (image, wall) = (noise(1), noise(2));
+        let seen: Vec<f32> = (0..SIDE * SIDE)
+            .map(|n| f32::from(u8::from(n % 3 > 0)))
+            .collect();
+        let found = correlations(&image, &wall, &seen);
+        for (n, found) in found.iter().enumerate() {
+            let shift = n as i64 - FARTHEST as i64;
+            let [mut both, mut first, mut second] = [0.0; 3];
+            for row in 0..SIDE {
+                for at in 0..SIDE as i64 {
+                    if !(0..SIDE as i64).contains(&(at + shift)) {
+                        continue;
+                    }
+                    let of = |all: &[f32], at: i64| f64::from(all[row * SIDE + at as usize]);
+                    let (p, q, w) = (of(&image, at + shift), of(&wall, at), of(&seen, at));
+                    both += w * p * q;
+                    first += w * p * p;
+                    second += w * q * q;
+                }
+            }
+            let exact = both / (first * second).sqrt();
+            assert!((found - exact).abs() < 1e-4, "{n}: {found} {exact}");
+        }
+        assert_eq!(
+            correlations(&image, &wall, &[0.0; SIDE * SIDE]),
+            [0.0; 2 * FARTHEST + 1]
+        );
+    }
+
+    /// A row of samples along the bed projects to its distance from the axis in the direction of each angle.
+    #[test]
+    fn a_line_along_the_bed_projects_to_its_place_at_each_angle() {
+        let (x, y) = (7, -5);
+        let row = (HALF as i64 + x) as usize + SIDE * (HALF as i64 + y) as usize;
+        let mut values = vec![0f32; SIDE * SIDE * SIDE];
+        for (n, v) in values[row * SIDE..][..SIDE].iter_mut().enumerate() {
+            *v = 1.0 + n as f32;
+        }
+        let views = project(&values);
+        for (angle, view) in views.chunks_exact(SIDE * SIDE).enumerate() {
+            let turn = PI * angle as f64 / ANGLES as f64;
+            let place = x as f64 * turn.cos() + y as f64 * turn.sin();
+            for along in [0, 20] {
+                let at = |bin: usize| f64::from(view[bin * SIDE + along]);
+                let sum: f64 = (0..SIDE).map(at).sum();
+                let mean = (0..SIDE)
+                    .map(|b| at(b) * (b as f64 - HALF as f64))
+                    .sum::<f64>()
+                    / sum;
+                assert!((sum - (1 + along) as f64).abs() < 1e-3, "{sum}");
+                assert!((mean - place).abs() < 1e-4, "{angle}: {mean} {place}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_image_fades_out_across_the_bed() {
+        assert_eq!(fade(HALF, HALF), 1.0);
+        assert_eq!(fade(HALF + 13, HALF), 1.0);
+        assert_eq!((fade(HALF + 18, HALF + 6), fade(0, 0)), (0.0, 0.0));
+        // Half-way through the fade; the same all round.
+        let at = |steps: f64| (RADIUS[0] - steps * STEP) / RADIUS[1];
+        let t = at(16.0);
+        assert!((fade(HALF, HALF - 16) - t * t * (3.0 - 2.0 * t)).abs() < 1e-12);
+        let t = at(12f64.hypot(12.0));
+        assert!((fade(HALF + 12, HALF - 12) - t * t * (3.0 - 2.0 * t)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_grid_lies_about_the_heart_and_along_the_bed() {
+        let mut ball = shapes::icosphere(30.0, 2);
+        let centre = Vec3::new(12.0, -40.0, 7.0);
+        ball.vertices.iter_mut().for_each(|p| *p += centre);
+        for superior in [Vec3::z(), Vec3::x(), Vec3::new(0.6, 0.0, 0.8)] {
+            let frame = frame_about(&ball, &superior).unwrap();
+            let at = |i: f64, j: f64, k: f64| frame.to_patient(&Vec3::new(i, j, k));
+            let half = HALF as f64;
+            assert!((at(half, half, half) - centre).norm() < 1e-6);
+            let along = at(half + 1.0, half, half) - centre;
+            assert!((along - superior * STEP).norm() < 1e-6);
+            for spacing in frame.spacing().iter() {
+                assert!((spacing - STEP).abs() < 1e-9);
+            }
+        }
+    }
+
+    /// Brute force over every division of the half-turn, for correlations without any order.
+    #[test]
+    fn the_division_found_is_the_best_of_all() {
+        let correlations: Vec<[f64; SHIFTS]> = (0..ANGLES)
+            .map(|a| {
+                std::array::from_fn(|s| 0.3 + 0.2 * ((a * a * 7 + s * s * a + 3 * s) as f64).sin())
+            })
+            .collect();
+        let best_of = |angles: &[usize]| {
+            let sum = |s: usize| angles.iter().map(|a| correlations[*a][s]).sum::<f64>();
+            (0..SHIFTS).map(sum).fold(f64::MIN, f64::max)
+        };
+        let all: Vec<usize> = (0..ANGLES).collect();
+        let one = best_of(&all) / ANGLES as f64;
+        let mut most = 0.0;
+        let mut consider = |inside: &dyn Fn(usize) -> bool| {
+            let (run, rest): (Vec<usize>, Vec<usize>) =
+                all.iter().copied().partition(|a| inside(*a));
+            let gain = (best_of(&run) + best_of(&rest)) / ANGLES as f64 - one;
+            if gain > most {
+                most = gain;
+            }
+        };
+        for first in 0..ANGLES {
+            for length in SHORTEST..=ANGLES / 2 {
+                consider(&|a| (a + ANGLES - first) % ANGLES < length);
+            }
+            for length in SHORTEST / 2..=ANGLES / 4 {
+                consider(&|a| (a + ANGLES - first) % (ANGLES / 2) < length);
+            }
+        }
+        let views = two_places(&correlations).unwrap();
+        assert!((views.agreement - one).abs() < 1e-9);
+        assert!((views.gain - most / (1.0 - one)).abs() < 1e-9);
+    }
 }

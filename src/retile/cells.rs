@@ -447,4 +447,216 @@ mod tests {
             }
         }
     }
+
+    fn ball() -> WeightedSamples {
+        let mesh = shapes::icosphere(10.0, 3);
+        WeightedSamples::new(&mesh.vertices, &mesh.vertices, &mesh.triangles, 0)
+    }
+
+    /// Twelve cells about the corners of the icosahedron, the first vertices of an icosphere.
+    fn cells(samples: &WeightedSamples) -> Cells {
+        Cells::grow(samples, &(0..12).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn cells_grow_by_rings_to_all_samples() {
+        let samples = ball();
+        let cells = cells(&samples);
+        for (v, &label) in cells.labels.iter().enumerate() {
+            let distance = |site: u32| (samples.working[v] - cells.sites[site as usize]).norm();
+            let least = (0..12).map(distance).fold(f64::INFINITY, f64::min);
+            // Rings of an icosphere are nearly circles.
+            assert!(distance(label) < least + 1.5, "{v}");
+        }
+    }
+
+    #[test]
+    fn a_sample_takes_the_nearest_of_the_sites_around_it() {
+        let samples = ball();
+        let mut cells = cells(&samples);
+        for (n, site) in cells.sites.iter_mut().enumerate() {
+            let n = n as f64;
+            *site += Vec3::new((3.1 * n).sin(), (5.3 * n).sin(), (7.7 * n).sin()) * 2.0;
+        }
+        let mut changed = 0;
+        for v in 0..samples.len() {
+            let mut near: Vec<u32> = samples
+                .around(v)
+                .iter()
+                .map(|n| cells.labels[*n as usize])
+                .collect();
+            near.push(cells.labels[v]);
+            let distance = |site: &u32| (samples.working[v] - cells.sites[*site as usize]).norm();
+            near.sort_by(|a, b| distance(a).total_cmp(&distance(b)).then(a.cmp(b)));
+            let found = match nearest_site(&samples, &cells.labels, &cells.sites, v) {
+                UNASSIGNED => cells.labels[v],
+                site => site,
+            };
+            assert_eq!(found, near[0]);
+            changed += usize::from(found != cells.labels[v]);
+        }
+        assert!(changed > 10);
+        // Of sites at the same distance the lowest one.
+        let v = 100;
+        let mut labels = vec![5; samples.len()];
+        labels[samples.around(v)[0] as usize] = 7;
+        labels[samples.around(v)[1] as usize] = 3;
+        let mut sites = vec![samples.working[v] * 2.0; 12];
+        assert_eq!(nearest_site(&samples, &labels, &sites, v), 3);
+        sites[5] *= 2.0;
+        assert_eq!(nearest_site(&samples, &labels, &sites, v), 3);
+        sites[7] *= 0.9;
+        assert_eq!(nearest_site(&samples, &labels, &sites, v), 7);
+    }
+
+    #[test]
+    fn an_empty_cell_gets_the_worst_placed_sample() {
+        let samples = ball();
+        let mut cells = cells(&samples);
+        // Cell 4 has no sample, cell 9 a single one, far from its site and heavy.
+        let of_nine = cells.labels.iter().position(|label| *label == 9).unwrap();
+        for label in &mut cells.labels {
+            if [4, 9].contains(label) {
+                *label = 0;
+            }
+        }
+        cells.labels[of_nine] = 9;
+        cells.sites[9] = Vec3::new(1e3, 0.0, 0.0);
+        let weights: Vec<f64> = (0..samples.len()).map(|v| 1.0 + (v % 5) as f64).collect();
+        let strain = |v: usize| {
+            let site = cells.labels[v];
+            let distance = (samples.working[v] - cells.sites[site as usize]).norm();
+            if site == 9 {
+                0.0
+            } else {
+                weights[v] * distance * distance
+            }
+        };
+        let worst =
+            (0..samples.len()).max_by(|a, b| strain(*a).total_cmp(&strain(*b)).then(b.cmp(a)));
+        let worst = worst.unwrap();
+        let before = cells.labels.clone();
+        cells.fill_empty_cells(&samples, &weights);
+        for (v, (before, after)) in before.iter().zip(&cells.labels).enumerate() {
+            assert_eq!(*after, if v == worst { 4 } else { *before });
+        }
+        assert_eq!(cells.sites[4], samples.working[worst]);
+    }
+
+    /// Three empty cells take samples one after the other, and never the last one of a cell.
+    #[test]
+    fn no_cell_is_left_empty() {
+        let samples = ball();
+        let mut cells = cells(&samples);
+        cells.labels.fill(1);
+        for v in 0..9 {
+            cells.labels[v] = 3 + v as u32;
+        }
+        cells.fill_empty_cells(&samples, &vec![1.0; samples.len()]);
+        for site in 0..12 {
+            assert!(cells.labels.contains(&site), "{site}");
+        }
+        assert!((3..12).all(|site| cells.labels.iter().filter(|l| **l == site).count() == 1));
+    }
+
+    #[test]
+    fn centroids_are_weighted_means() {
+        let samples = ball();
+        let cells = cells(&samples);
+        let weights: Vec<f64> = (0..samples.len()).map(|v| 1.0 + (v % 3) as f64).collect();
+        let found = cells.centroids(&samples.working, &weights);
+        for site in 0..12u32 {
+            let members: Vec<usize> = (0..samples.len())
+                .filter(|v| cells.labels[*v] == site)
+                .collect();
+            let mass: f64 = members.iter().map(|v| weights[*v]).sum();
+            let moment: Vec3 = members
+                .iter()
+                .map(|v| samples.working[*v] * weights[*v])
+                .sum();
+            assert!((found[site as usize] * mass - moment).norm() < 1e-9);
+        }
+    }
+
+    /// Of two parts of a cell the larger one stays, wherever its samples stand in the list; the other one falls
+    /// to the cell around it.
+    #[test]
+    fn tidying_keeps_the_largest_part_of_a_cell() {
+        let samples = ball();
+        for label in 0..12u32 {
+            let mut cells = cells(&samples);
+            let before = cells.labels.clone();
+            let other = (label + 5) % 12;
+            let middle = cells.labels.iter().rposition(|l| *l == other).unwrap();
+            let first = cells.labels.iter().position(|l| *l == other).unwrap();
+            for island in [middle, first] {
+                let inner = samples
+                    .around(island)
+                    .iter()
+                    .all(|n| before[*n as usize] == other);
+                if inner {
+                    cells.labels[island] = label;
+                }
+            }
+            cells.tidy(&samples);
+            assert_eq!(cells.labels, before);
+        }
+    }
+
+    /// On a sphere the relaxed sites of a hundred random cells are as far from each other as those of even cells.
+    #[test]
+    fn relaxed_cells_are_even_and_at_rest() {
+        let mesh = shapes::icosphere(10.0, 4);
+        let samples = WeightedSamples::new(&mesh.vertices, &mesh.vertices, &mesh.triangles, 0);
+        let seeds: Vec<u32> = (0..100)
+            .map(|n| n * n * 7 % 2557)
+            .collect::<std::collections::BTreeSet<_>>()
+            .into_iter()
+            .collect();
+        let mut cells = Cells::grow(&samples, &seeds);
+        let areas = |cells: &Cells| {
+            let mut areas = vec![0.0; seeds.len()];
+            for (label, area) in cells.labels.iter().zip(&samples.area) {
+                areas[*label as usize] += area;
+            }
+            let mean = areas.iter().sum::<f64>() / areas.len() as f64;
+            let square: f64 = areas.iter().map(|a| (a / mean - 1.0).powi(2)).sum();
+            (square / areas.len() as f64).sqrt()
+        };
+        let before = areas(&cells);
+        let rounds = cells
+            .relax(&samples, &samples.area, (80, 20), &Monitor::silent())
+            .unwrap();
+        let after = areas(&cells);
+        assert!(before > 0.3 && after < 0.12, "{before} {after}");
+        let patches = Patches::new(&samples, &samples.area);
+        let spacing = (4.0 * std::f64::consts::PI * 100.0 / seeds.len() as f64).sqrt();
+        let mut squares = 0.0;
+        for (centroid, site) in patches
+            .centroids(&cells.labels, &cells.sites)
+            .iter()
+            .zip(&cells.sites)
+        {
+            squares += (centroid.unwrap() - site).norm_squared();
+        }
+        let moves = (squares / seeds.len() as f64).sqrt() / spacing;
+        assert!(moves < 0.01, "{moves}");
+        assert!(rounds > 20, "{rounds}");
+    }
+
+    #[test]
+    fn a_transplanted_site_goes_to_the_farthest_sample_of_the_crowded_cell() {
+        let samples = ball();
+        let mut cells = cells(&samples);
+        let far = |v: usize| (samples.working[v] - cells.sites[2]).norm();
+        let crowded = (0..samples.len()).filter(|v| cells.labels[*v] == 2);
+        let most = crowded.map(far).fold(0.0, f64::max);
+        cells.transplant(&samples, 8, 2);
+        assert!(((cells.sites[8] - cells.sites[2]).norm() - most).abs() < 1e-9);
+        let place = (0..samples.len())
+            .find(|v| samples.working[*v] == cells.sites[8])
+            .unwrap();
+        assert_eq!(cells.labels[place], 8);
+        assert!(cells.labels.iter().all(|label| *label < 12));
+    }
 }

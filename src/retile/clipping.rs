@@ -304,4 +304,14 @@ mod tests {
         assert!((total.mass - 6.0).abs() < 1e-12);
         assert!((total.first / 6.0 - Vec3::new(4.0 / 3.0, 1.0, 0.0)).norm() < 1e-12);
     }
+
+    #[test]
+    fn a_cell_without_samples_has_no_centroid() {
+        let mesh = shapes::icosphere(10.0, 2);
+        let samples = WeightedSamples::new(&mesh.vertices, &mesh.vertices, &mesh.triangles, 0);
+        let sites = [Vec3::z() * 10.0, -Vec3::z() * 10.0, Vec3::x() * 99.0];
+        let labels = nearest(&samples, &sites);
+        let centroids = Patches::new(&samples, &samples.area).centroids(&labels, &sites);
+        assert!(centroids[0].is_some() && centroids[1].is_some() && centroids[2].is_none());
+    }
 }

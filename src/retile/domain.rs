@@ -85,3 +85,49 @@ pub(crate) fn apex(base: f64, left: f64, right: f64) -> (f64, f64) {
     let x = (left * left + base * base - right * right) / (2.0 * base);
     (x, (left * left - x * x).max(0.0).sqrt())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    /// The flat triangles are those in space, counter-clockwise from the first corner at the origin.
+    #[test]
+    fn flat_triangles_keep_all_lengths() {
+        let mesh = shapes::cup(60.0, 30.0, 10.0, 12);
+        let domain = Domain::new(mesh.vertices.clone(), mesh.triangles.clone()).unwrap();
+        assert!((domain.area - mesh.area()).abs() < 1e-9 * mesh.area());
+        for t in 0..mesh.triangles.len() {
+            let (space, flat) = (mesh.corners(t), domain.flat(FaceId(t as u32)));
+            for k in 0..3 {
+                let l = (k + 1) % 3;
+                let exact = (space[l] - space[k]).norm();
+                assert!(((flat[l] - flat[k]).norm() - exact).abs() < 1e-9);
+                let h = FaceId(t as u32).half_edge(k);
+                assert!((domain.length(h) - exact).abs() < 1e-12);
+                let (x, y) = domain.apex(h);
+                let along = (space[l] - space[k]) / exact;
+                let beyond = space[(k + 2) % 3] - space[k];
+                assert!((x - beyond.dot(&along)).abs() < 1e-9);
+                assert!((y - beyond.cross(&along).norm()).abs() < 1e-9);
+            }
+            assert!(flat[0].norm() == 0.0 && flat[1].y == 0.0 && flat[2].y > 0.0);
+        }
+    }
+
+    #[test]
+    fn values_are_interpolated_as_positions_are() {
+        let mesh = shapes::icosphere(8.0, 1);
+        let domain = Domain::new(mesh.vertices.clone(), mesh.triangles.clone()).unwrap();
+        let linear = |p: &Vec3| 2.0 * p.x - 3.0 * p.y + p.z + 1.0;
+        let values: Vec<f64> = mesh.vertices.iter().map(linear).collect();
+        let point = SurfacePoint {
+            triangle: FaceId(7),
+            barycentric: [0.2, 0.5, 0.3],
+        };
+        let corners = mesh.corners(7);
+        let place = corners[0] * 0.2 + corners[1] * 0.5 + corners[2] * 0.3;
+        assert!((point.position(&mesh.vertices, &mesh.triangles) - place).norm() < 1e-12);
+        assert!((domain.interpolate(&values, &point) - linear(&place)).abs() < 1e-12);
+    }
+}

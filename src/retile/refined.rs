@@ -397,3 +397,19 @@ fn sites_of(mesh: &TriMesh, intersecting: &[[FaceId; 2]]) -> Vec<u32> {
     sites.dedup();
     sites
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sites_of_intersecting_triangles_are_listed_once() {
+        let mesh = TriMesh {
+            vertices: vec![Vec3::zeros(); 8],
+            triangles: vec![[5, 1, 2], [2, 1, 3], [0, 6, 4], [7, 5, 3]],
+        };
+        let pairs = [[FaceId(0), FaceId(3)], [FaceId(0), FaceId(1)]];
+        assert_eq!(sites_of(&mesh, &pairs), [1, 2, 3, 5, 7]);
+        assert!(sites_of(&mesh, &[]).is_empty());
+    }
+}

@@ -222,4 +222,55 @@ mod tests {
         let moves = rest(&spread(40));
         assert!(moves < 0.003, "{moves}");
     }
+
+    /// Points on one flat triangle: each is pushed away from those nearer than the mean of the two radii, by the
+    /// strength times what is missing, and by half of its radius at most.
+    #[test]
+    fn points_are_pushed_by_what_their_distance_lacks() {
+        let mesh = shapes::tetrahedron(200.0);
+        let domain = Domain::new(mesh.vertices.clone(), mesh.triangles.clone()).unwrap();
+        let flat = domain.flat(FaceId(0));
+        let at = |x: f64, y: f64| {
+            let w = y / flat[2].y;
+            let v = (x - w * flat[2].x) / flat[1].x;
+            SurfacePoint {
+                triangle: FaceId(0),
+                barycentric: [1.0 - v - w, v, w],
+            }
+        };
+        let points = [
+            at(100.0, 50.0),
+            at(106.0, 50.0),
+            at(100.0, 58.0),
+            at(100.0, 39.0),
+        ];
+        let even = [1.0; 4];
+        let neighbourhood = Neighbourhood::new(&domain, &even, &points, 10.0);
+        let mut map = LogMap::over(&domain);
+        let mut push = |n: &Neighbourhood, p: usize, k: f64| n.push(&mut map, p, k);
+        // Neighbours at distances 6 and 8; the last one is too far away.
+        let wanted = Vec2::new(-4.0, -2.0) * 0.5;
+        assert!((push(&neighbourhood, 0, 0.5) - wanted).norm() < 1e-9);
+        // The second one sees the first at 6 and the third at 10.
+        assert!((push(&neighbourhood, 1, 0.5) - Vec2::new(2.0, 0.0)).norm() < 1e-9);
+        assert_eq!(push(&neighbourhood, 3, 0.5), Vec2::zeros());
+        let strong = push(&neighbourhood, 0, 100.0);
+        assert!((strong - Vec2::new(-4.0, -2.0).normalize() * 5.0).norm() < 1e-9);
+        // Radii grow with the wanted spacing, here along x: 12 and 12.36 mm for the first two points.
+        let along: Vec<f64> = (0..4u32)
+            .map(|v| {
+                let corners = domain.half_edges.corners(FaceId(0));
+                corners
+                    .iter()
+                    .position(|c| c.0 == v)
+                    .map_or(1.0, |k| 0.6 + 0.006 * flat[k].x)
+            })
+            .collect();
+        let wide = Neighbourhood::new(&domain, &along, &points[..2], 10.0);
+        let missing = (12.0 + 12.36) / 2.0 - 6.0;
+        assert!((push(&wide, 0, 0.5) - Vec2::new(-0.5 * missing, 0.0)).norm() < 1e-9);
+        let listed: Vec<u32> = neighbourhood.on_triangle(FaceId(0)).collect();
+        assert_eq!(listed, [0, 1, 2, 3]);
+        assert_eq!(neighbourhood.on_triangle(FaceId(1)).count(), 0);
+    }
 }

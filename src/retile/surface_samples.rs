@@ -143,4 +143,46 @@ mod tests {
         assert!((a - b).abs() < 1e-9 * a);
         assert!((a - mesh.area()).abs() < 1e-9 * a);
     }
+
+    /// W is here S, stretched and moved: subdivision keeps that, and all areas are of W.
+    #[test]
+    fn both_surfaces_are_subdivided_alike() {
+        let mesh = shapes::icosphere(5.0, 1);
+        let stretch = |p: &Vec3| Vec3::new(2.0 * p.x + 7.0, p.y - 3.0, 0.5 * p.z);
+        let working: Vec<Vec3> = mesh.vertices.iter().map(stretch).collect();
+        let fine = WeightedSamples::new(&mesh.vertices, &working, &mesh.triangles, 600);
+        assert_eq!(fine.len(), 642);
+        for (on_surface, on_working) in fine.surface.iter().zip(&fine.working) {
+            assert!((stretch(on_surface) - on_working).norm() < 1e-12);
+        }
+        let mut around = vec![Vec::new(); fine.len()];
+        let mut areas = vec![0.0; fine.len()];
+        for t in &fine.triangles {
+            let [a, b, c] = t.map(|v| fine.working[v as usize]);
+            for k in 0..3 {
+                around[t[k] as usize].push(t[(k + 1) % 3]);
+                areas[t[k] as usize] += (b - a).cross(&(c - a)).norm() / 6.0;
+            }
+        }
+        for (v, known) in around.iter_mut().enumerate() {
+            let mut found = fine.around(v).to_vec();
+            found.sort_unstable();
+            known.sort_unstable();
+            assert_eq!(found, *known);
+            assert!((fine.area[v] - areas[v]).abs() < 1e-9);
+        }
+        // The old vertices come first, and each new one is the middle of an edge of the old mesh or of the next one.
+        assert_eq!(fine.surface[..42], mesh.vertices);
+        let once = WeightedSamples::new(&mesh.vertices, &working, &mesh.triangles, 43);
+        for t in &mesh.triangles {
+            for k in 0..3 {
+                let [p, q] = [t[k], t[(k + 1) % 3]].map(|v| mesh.vertices[v as usize]);
+                assert!(
+                    once.surface[42..]
+                        .iter()
+                        .any(|m| (m - (p + q) / 2.0).norm() < 1e-12)
+                );
+            }
+        }
+    }
 }

@@ -199,6 +199,8 @@ fn weigh_by_width(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::frame::VoxelToPatient;
+    use crate::grid::Volume;
 
     /// Of edges alike in all but width, one much wider than usual hardly counts, however narrow or wide
     /// the usual ones are; the rim's edge is moved instead.
@@ -230,5 +232,126 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// The centroids of nine congruent parts: the mean of a quadratic over them is that over the triangle but
+    /// for the ninth part of its variance.
+    #[test]
+    fn the_sensors_of_a_triangle_stand_for_equal_parts_of_it() {
+        let all = barycentric();
+        let mean = |f: fn(&[f64; 3]) -> f64| all.iter().map(f).sum::<f64>() / 9.0;
+        for w in &all {
+            assert!((w.iter().sum::<f64>() - 1.0).abs() < 1e-12 && w.iter().all(|x| *x > 0.1));
+        }
+        for u in [mean(|w| w[0]), mean(|w| w[1]), mean(|w| w[2])] {
+            assert!((u - 1.0 / 3.0).abs() < 1e-12);
+        }
+        for square in [
+            mean(|w| w[0] * w[0]),
+            mean(|w| w[1] * w[1]),
+            mean(|w| w[2] * w[2]),
+        ] {
+            assert!((square - (1.0 / 6.0 - 1.0 / 162.0)).abs() < 1e-12);
+        }
+        assert!((mean(|w| w[1] * w[2]) - (1.0 / 12.0 + 1.0 / 324.0)).abs() < 1e-12);
+    }
+
+    fn readings(weights: impl Iterator<Item = f64>) -> Vec<SensorReading> {
+        weights
+            .map(|weight| SensorReading {
+                place: Vec3::zeros(),
+                normal: Vec3::z(),
+                offset: 0.0,
+                weight,
+                share: 1.0,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn weights_are_relative_to_strong_edges() {
+        let mut scored = readings((0..20).map(f64::from));
+        weigh(&mut scored);
+        assert_eq!(
+            (scored[0].weight, scored[18].weight, scored[19].weight),
+            (0.0, 1.0, 1.0)
+        );
+        assert!((scored[9].weight - 0.5f64.powf(1.5)).abs() < 1e-12);
+        let mut blank = readings([0.0; 8].into_iter());
+        weigh(&mut blank);
+        assert!(blank.iter().all(|r| r.weight == 0.0));
+    }
+
+    /// Ten reading of 4 mm and five of 2 mm that are hardly seen: the usual width is 4.
+    #[test]
+    fn the_usual_width_is_that_of_clear_edges() {
+        let mut seen = readings((0..15).map(|n| if n < 10 { 1.0 } else { 0.2 }));
+        let widths: Vec<_> = (0..15)
+            .map(|n| (WallSide::Outer, Some(if n < 10 { 4.0 } else { 2.5 })))
+            .collect();
+        weigh_by_width(&mut seen, &widths, WallSide::Outer);
+        assert!(seen[..10].iter().all(|r| r.weight == 1.0));
+        // One odd width less: 1 / (1 + 1 + 1/16).
+        assert!(
+            seen[10..]
+                .iter()
+                .all(|r| (r.weight - 0.2 / 2.0625).abs() < 1e-9)
+        );
+        let before = seen.clone();
+        weigh_by_width(&mut seen, &widths, WallSide::Inner);
+        assert_eq!(seen, before);
+    }
+
+    /// A ball whose edge lies 2 mm outside of the model: every sensor says so, and the shares are those of area.
+    #[test]
+    fn sensors_of_a_ball_see_how_far_its_edge_is() {
+        let ball = crate::mesh::shapes::icosphere(30.0, 2);
+        let frame = VoxelToPatient::centred([48; 3], [2.0; 3], Vec3::zeros()).unwrap();
+        let volume = Volume::sampled([48; 3], frame, |p| {
+            100.0 / (1.0 + ((p.norm() - 32.0) / 1.5).exp())
+        });
+        let field = Field::new(&volume, None, 0.0);
+        let settings = SensorSettings {
+            kind: SensorKind::Gradient,
+            reach: 8.0,
+            level: 50.0,
+            ceiling: f64::INFINITY,
+            shift: EdgeShift {
+                inner: 0.0,
+                outer: 0.5,
+                rim: 0.0,
+                axis: [Vec3::zeros(); 2],
+            },
+            blind: Some(BlindSector {
+                centre: Vec3::zeros(),
+                axis: Vec3::z(),
+                middle: Vec3::x(),
+                half_angle: 30.0,
+            }),
+        };
+        let readings = read(&ball, &field, &settings, &Monitor::silent()).unwrap();
+        assert_eq!(readings.len(), PER_TRIANGLE * ball.triangles.len());
+        assert!((readings.iter().map(|r| r.share).sum::<f64>() - 1.0).abs() < 1e-9);
+        let mut blind = 0;
+        for (n, r) in readings.iter().enumerate() {
+            let t = n / PER_TRIANGLE;
+            let exact = ball.area_normal(t).norm() / 2.0 / ball.area() / PER_TRIANGLE as f64;
+            assert!((r.share - exact).abs() < 1e-12);
+            assert!(
+                (r.normal.norm() - 1.0).abs() < 1e-9
+                    && r.normal.dot(&r.place) > 0.99 * r.place.norm()
+            );
+            // The model's facets lie inside of its sphere; the reader's edge is half a millimetre farther out.
+            let distance = 32.5 - r.place.norm();
+            assert!((r.offset - distance).abs() < 0.5, "{} {distance}", r.offset);
+            let across = r.place.x.hypot(r.place.y);
+            if r.place.x > across * 0.867 {
+                assert_eq!(r.weight, 0.0);
+                blind += 1;
+            } else if r.place.x < across * 0.865 {
+                assert!(r.weight > 0.3, "{}", r.weight);
+            }
+        }
+        assert!(8 * blind > readings.len(), "{blind}");
     }
 }

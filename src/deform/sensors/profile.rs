@@ -203,6 +203,8 @@ fn parabola(scores: &[f64], best: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::frame::VoxelToPatient;
+    use crate::grid::Volume;
 
     #[test]
     fn half_way_down_a_ramp_is_its_middle() {
@@ -219,5 +221,153 @@ mod tests {
         let (crossing, width) = half_way(|s| -(s * s * s) as f64);
         assert!(crossing.abs() <= NEAR && width.is_finite());
         assert_eq!(half_way(|_| 1.0), (0.0, 0.0));
+    }
+
+    fn settings(kind: SensorKind) -> SensorSettings {
+        SensorSettings {
+            kind,
+            reach: 10.0,
+            level: 30.0,
+            ceiling: f64::INFINITY,
+            shift: crate::deform::sensors::EdgeShift {
+                inner: 0.0,
+                outer: 0.0,
+                rim: 0.0,
+                axis: [Vec3::zeros(); 2],
+            },
+            blind: None,
+        }
+    }
+
+    /// The image of `value`, a function of the way along x, mm.
+    fn image(value: impl Fn(f64) -> f64) -> Field {
+        let frame = VoxelToPatient::centred([121, 5, 5], [0.5, 4.0, 4.0], Vec3::zeros());
+        let volume = Volume::sampled([121, 5, 5], frame.unwrap(), |p| value(p.x));
+        Field::new(&volume, None, 0.0)
+    }
+
+    /// A fall from 100 to 0 at `edge`, steepest (100 / 4 `width` per mm) there.
+    fn fall(edge: f64, width: f64) -> impl Fn(f64) -> f64 {
+        move |x| 100.0 / (1.0 + ((x - edge) / width).exp())
+    }
+
+    #[test]
+    fn every_kind_of_sensor_finds_its_point_of_an_edge() {
+        for distance in [-5.0, -2.3, 0.0, 0.4, 3.5, 6.0] {
+            let place = Vec3::new(-4.0, 0.0, 0.0);
+            let falling = image(fall(place.x + distance, 1.6));
+            let mirrored = fall(place.x + distance, 1.6);
+            let rising = image(|x| mirrored(-x));
+            let of = |kind, field: &Field, place: Vec3, normal: Vec3| {
+                Profile::new(&settings(kind)).edge(field, &place, &normal)
+            };
+            for kind in [
+                SensorKind::Gradient,
+                SensorKind::HalfMaximum,
+                SensorKind::Unsigned,
+            ] {
+                let edge = of(kind, &falling, place, Vec3::x());
+                assert!(
+                    (edge.offset - distance).abs() < 0.1,
+                    "{kind:?} {distance}: {edge:?}"
+                );
+                // Over four steps the slope is a little less than at the edge itself.
+                let near = (-distance * distance / 50.0).exp();
+                let share = edge.score / (100.0 / 6.4 * near);
+                assert!((0.8..1.25).contains(&share), "{share}");
+                assert_eq!(edge.half_width.is_some(), kind == SensorKind::HalfMaximum);
+                let back = of(kind, &rising, -place, -Vec3::x());
+                assert!((back.offset - edge.offset).abs() < 0.1);
+            }
+            // 30 % lies ln(7/3) widths behind the middle.
+            let level = of(SensorKind::Level, &falling, place, Vec3::x());
+            let exact = distance + 1.6 * (7f64 / 3.0).ln();
+            assert!((level.offset - exact).abs() < 0.1, "{level:?} {exact}");
+            let steepness = 0.3 * 0.7 * 100.0 / 1.6 * (-exact * exact / 50.0).exp();
+            assert!(
+                (level.score / steepness - 1.0).abs() < 0.15,
+                "{level:?} {steepness}"
+            );
+            // A rise is an edge to the unsigned sensor alone.
+            let rise = |kind| of(kind, &falling, place, -Vec3::x()).score;
+            assert!(rise(SensorKind::Unsigned) > 5.0);
+            assert!(rise(SensorKind::Gradient) < 1e-6 && rise(SensorKind::Level) == 0.0);
+        }
+    }
+
+    #[test]
+    fn the_nearest_fall_through_the_level_counts() {
+        let twice = |x: f64| fall(-3.0, 0.7)(x) + fall(5.0, 0.7)(x) - fall(1.0, 0.7)(x);
+        let of = |x: f64| {
+            let place = Vec3::new(x, 0.0, 0.0);
+            let mut profile = Profile::new(&settings(SensorKind::Level));
+            x + profile.edge(&image(twice), &place, &Vec3::x()).offset
+        };
+        let behind = 0.7 * (7f64 / 3.0).ln();
+        assert!((of(0.0) - (behind - 3.0)).abs() < 0.2, "{}", of(0.0));
+        assert!((of(2.5) - (behind + 5.0)).abs() < 0.2, "{}", of(2.5));
+    }
+
+    /// The half-way point lies between ridge and trough, not at the steepest slope: here the outer part of the
+    /// fall is longer and flatter.
+    #[test]
+    fn half_way_lies_between_ridge_and_trough() {
+        let uneven = |x: f64| match x {
+            x if x < 0.0 => 100.0,
+            x if x < 4.0 => 100.0 - 15.0 * x,
+            x => (40.0 - 5.0 * (x - 4.0)).max(0.0),
+        };
+        let place = Vec3::new(1.0, 0.0, 0.0);
+        let half = Profile::new(&settings(SensorKind::HalfMaximum)).edge(
+            &image(uneven),
+            &place,
+            &Vec3::x(),
+        );
+        // 50 is passed at 10/3; the ridge lies at 0.
+        assert!(
+            (place.x + half.offset - 10.0 / 3.0).abs() < 0.05,
+            "{half:?}"
+        );
+        assert!(
+            (half.half_width.unwrap() - 10.0 / 3.0).abs() < 0.05,
+            "{half:?}"
+        );
+        // Clipped at 60 the ridge lies lower, and at 8/3.
+        let clipped = SensorSettings {
+            ceiling: 60.0,
+            ..settings(SensorKind::HalfMaximum)
+        };
+        let clipped = Profile::new(&clipped).edge(&image(uneven), &place, &Vec3::x());
+        assert!((place.x + clipped.offset - 6.0).abs() < 0.4, "{clipped:?}");
+    }
+
+    #[test]
+    fn a_parabola_has_its_maximum_where_it_is() {
+        for top in [-0.4, 0.0, 0.3] {
+            let scores: Vec<f64> = (0..5)
+                .map(|n| 9.0 - (n as f64 - 2.0 - top).powi(2) * 1.7)
+                .collect();
+            assert!((parabola(&scores, 2) - top).abs() < 1e-12);
+        }
+        assert_eq!(parabola(&[0.0, 1.0, 3.0], 1), 0.0);
+        assert_eq!(
+            (parabola(&[3.0, 1.0], 0), parabola(&[1.0, 3.0], 1)),
+            (0.0, 0.0)
+        );
+        // At most half a step: farther on another sample would be the greatest.
+        assert_eq!(parabola(&[0.0, 4.0, 7.0], 1), 0.5);
+    }
+
+    #[test]
+    fn a_fall_ends_where_it_turns() {
+        let wave = |s: isize| (0.4 * (s as f64 + 2.0)).cos();
+        // It falls from -2 to about 5.85.
+        assert_eq!(turning(wave, -1), (2.0, 1.0));
+        assert_eq!(turning(wave, 1), (6.0, wave(6)));
+        assert_eq!(turning(|s| -(s as f64), 1), (14.0, -14.0));
+        let hills = [1.0, 2.0, 5.0, 3.0, 4.0, 9.0];
+        let tops: Vec<usize> = (0..6).map(|n| climb(&hills, n)).collect();
+        assert_eq!(tops, [2, 2, 2, 2, 5, 5]);
+        assert_eq!(climb(&[3.0, 2.0, 5.0], 1), 2);
     }
 }

@@ -111,3 +111,84 @@ impl EdgeShift {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHIFT: EdgeShift = EdgeShift {
+        inner: 1.0,
+        outer: 2.0,
+        rim: 3.0,
+        axis: [Vec3::new(5.0, 0.0, 0.0), Vec3::new(5.0, 0.0, 40.0)],
+    };
+
+    /// About an axis along z from the base at 0 to the apex at 40, at x = 5.
+    #[test]
+    fn a_sensor_is_on_the_side_that_it_faces() {
+        let at =
+            |place: [f64; 3], normal: [f64; 3]| SHIFT.at(&Vec3::from(place), &Vec3::from(normal));
+        let slanted = [0.6f64, 0.0, 0.8];
+        for z in [2.0, 20.0, 39.0] {
+            assert_eq!(at([25.0, 0.0, z], [-1.0, 0.0, 0.0]), (WallSide::Inner, 1.0));
+            assert_eq!(at([25.0, 0.0, z], [1.0, 0.0, 0.0]), (WallSide::Outer, 2.0));
+            assert_eq!(at([5.0, -9.0, z], [0.0, 1.0, 0.0]), (WallSide::Inner, 1.0));
+            // A surface that faces the axis aslant is moved less.
+            let (side, shift) = at([25.0, 0.0, z], slanted.map(|x| -x.abs() * 0.999));
+            if z > 20.0 {
+                assert!(side == WallSide::Inner && (shift - 0.6 * 0.999).abs() < 1e-9);
+            }
+            let (side, shift) = at([25.0, 0.0, z], slanted);
+            assert!(side == WallSide::Outer && (shift - 2.0 * 0.6).abs() < 1e-9);
+        }
+        // Beyond the ends the nearest end is what counts.
+        assert_eq!(
+            at([5.0, 0.0, 60.0], [0.0, 0.0, 1.0]),
+            (WallSide::Outer, 2.0)
+        );
+        assert_eq!(
+            at([5.0, 0.0, 60.0], [0.0, 0.0, -1.0]),
+            (WallSide::Inner, 1.0)
+        );
+        // The rim faces out of the base, in the basal half only.
+        assert_eq!(
+            at([25.0, 0.0, -3.0], [0.0, 0.0, -1.0]),
+            (WallSide::Rim, 3.0)
+        );
+        assert_eq!(
+            at([25.0, 0.0, 19.0], [0.7, 0.0, -0.71]),
+            (WallSide::Rim, 3.0)
+        );
+        assert_eq!(at([25.0, 0.0, 19.0], [0.9, 0.0, -0.43]).0, WallSide::Outer);
+        assert_ne!(at([25.0, 0.0, 21.0], [0.0, 0.0, -1.0]).0, WallSide::Rim);
+        let point = EdgeShift {
+            axis: [Vec3::zeros(); 2],
+            ..SHIFT
+        };
+        assert_eq!(point.at(&Vec3::z(), &-Vec3::z()), (WallSide::Inner, 1.0));
+        assert_eq!(point.at(&-Vec3::z(), &-Vec3::z()), (WallSide::Outer, 2.0));
+    }
+
+    #[test]
+    fn a_blind_sector_holds_what_lies_within_its_angle() {
+        let sector = BlindSector {
+            centre: Vec3::new(1.0, 2.0, 3.0),
+            axis: Vec3::z(),
+            middle: Vec3::x(),
+            half_angle: 50.0,
+        };
+        for (degrees, inside) in [
+            (0.0, true),
+            (49.0, true),
+            (-49.0, true),
+            (51.0, false),
+            (180.0, false),
+        ] {
+            let (sin, cos) = f64::to_radians(degrees).sin_cos();
+            for (radius, along) in [(20.0, 0.0), (3.0, -70.0), (60.0, 33.0)] {
+                let place = sector.centre + Vec3::new(radius * cos, radius * sin, along);
+                assert_eq!(sector.holds(&place), inside, "{degrees}");
+            }
+        }
+    }
+}

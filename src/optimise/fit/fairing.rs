@@ -87,3 +87,23 @@ impl<'a> Fairing<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Voxels and noise are each measured by the edges, and add up; voxels longer than the edges count as they do.
+    #[test]
+    fn facets_and_noise_add_to_the_weight() {
+        let parameters = LeastSquaresParameters::default();
+        let of = |voxel: f64, edge: f64, noise: f64| {
+            weight(&parameters, &Lengths { voxel, edge }, noise) / parameters.bend_weight
+        };
+        assert!((of(2.0, 8.0, 0.0) - 0.25).abs() < 1e-12);
+        assert!((of(9.0, 8.0, 0.0) - 1.0).abs() < 1e-12);
+        for noise in [0.1, 0.4] {
+            let more = of(2.0, 8.0, noise) - of(2.0, 8.0, 0.0);
+            assert!((more - PER_NOISE * noise / 8.0).abs() < 1e-12);
+        }
+    }
+}

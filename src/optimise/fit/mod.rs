@@ -403,4 +403,110 @@ mod tests {
         polish::polish(&mut state, 3, &Monitor::silent()).unwrap();
         assert_eq!(irregularity(&state.half_edges), 12);
     }
+
+    /// Samples stand for equal shares of the area, in the order of the triangles.
+    #[test]
+    fn samples_are_spread_by_area() {
+        let mesh = stretched(shapes::icosphere(30.0, 1), [1.0, 1.6, 0.5]);
+        let reference = reference(mesh.clone());
+        let count = 3000;
+        let samples = spread(&reference, count);
+        assert_eq!(samples.len(), count);
+        let share = mesh.area() / count as f64;
+        let mut on = vec![Vec::new(); mesh.triangles.len()];
+        let (mut last, mut passed, mut before) = (0, 0.0, 0);
+        for sample in &samples {
+            let near = reference.bvh.closest(&sample.point).unwrap();
+            assert!(near.squared_distance < 1e-18);
+            let t = near.triangle as usize;
+            assert!(t >= last);
+            last = t;
+            on[t].push(sample.point);
+            assert!(sample.normal.dot(&reference.normals[t]) > 0.5);
+            assert!((sample.normal.norm() - 1.0).abs() < 1e-9);
+        }
+        for (t, points) in on.iter().enumerate() {
+            passed += mesh.area_normal(t).norm() / 2.0;
+            before += points.len();
+            assert!((before as f64 - passed / share).abs() <= 0.5 + 1e-6, "{t}");
+            // Within a triangle they are even: their mean is near its centroid.
+            let [a, b, c] = mesh.corners(t);
+            let mean = points.iter().sum::<Vec3>() / points.len() as f64;
+            let size = mesh.area_normal(t).norm().sqrt();
+            assert!((mean - (a + b + c) / 3.0).norm() < 0.15 * size, "{t}");
+        }
+    }
+
+    /// After a small move the walk from the old partner ends at the nearest point of the whole model.
+    #[test]
+    fn the_walk_finds_what_the_search_of_the_whole_model_finds() {
+        let reference = reference(shapes::icosphere(30.0, 4));
+        let mesh = shapes::icosphere(30.0, 2);
+        let (parameters, sizing) = (LeastSquaresParameters::default(), Vec::new());
+        let mut walked = state(&mesh, &reference, &parameters, &sizing);
+        for (k, v) in (0..).zip(&mut walked.vertices) {
+            let k = f64::from(k);
+            *v += Vec3::new((k * k).sin(), (k * k * 1.3).sin(), (k * k * 1.7).sin()) * 1.5;
+        }
+        let mut searched = state(&mesh, &reference, &parameters, &sizing);
+        searched.vertices.clone_from(&walked.vertices);
+        let stale = walked.samples.clone();
+        follow_partners(&mut walked);
+        find_partners(&mut searched);
+        let (mut moved, mut differ) = (0, 0);
+        let samples = walked.samples.iter().zip(&searched.samples).zip(&stale);
+        for ((walk, search), stale) in samples {
+            let place = |s: &SurfaceSample| -> Vec3 {
+                let corners = walked.half_edges.corners(s.triangle);
+                (0..3)
+                    .map(|k| walked.vertices[corners[k].index()] * s.barycentric[k])
+                    .sum()
+            };
+            moved += usize::from(walk.triangle != stale.triangle);
+            differ += usize::from((place(walk) - place(search)).norm() > 1e-9);
+            assert!((walk.barycentric.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+            let distance = walk.normal.dot(&(walk.point - place(walk)));
+            assert!(walk.admitted && (walk.distance - distance).abs() < 1e-12);
+        }
+        // A few end in another local minimum.
+        assert!(moved > 100 && differ < 300, "{moved} {differ}");
+    }
+
+    /// The gain of a flip is the fall of the sum of R/2r and of (valence - 6)² over the whole mesh.
+    #[test]
+    fn polishing_predicts_what_a_flip_gains() {
+        let (mesh, reference) = irregular();
+        let (parameters, sizing) = (LeastSquaresParameters::default(), Vec::new());
+        let state = state(&mesh, &reference, &parameters, &sizing);
+        let objective = |half_edges: &HalfEdges| {
+            let shapes = half_edges.triangles().iter().map(|t| {
+                let [a, b, c] = t.map(|v| mesh.vertices[v as usize]);
+                1.0 / crate::geometry::triangle::radius_ratio(&a, &b, &c)
+            });
+            let valences = half_edges
+                .vertices()
+                .map(|v| (f64::from(half_edges.valence(v)) - 6.0).powi(2));
+            shapes.sum::<f64>() + valences.sum::<f64>()
+        };
+        let before = objective(&state.half_edges);
+        let mut judged = 0;
+        for h in state.half_edges.edges() {
+            let gain = polish::gain(&state, h);
+            if !state.half_edges.can_flip(h) {
+                continue;
+            }
+            let mut flipped = state.half_edges.clone();
+            flipped.flip(h);
+            let exact = before - objective(&flipped);
+            if gain.is_finite() {
+                assert!((gain - exact).abs() < 1e-9, "{gain} {exact}");
+                judged += 1;
+            } else {
+                let quad = state.half_edges.quad(h);
+                let legal = super::super::legality::replacement(&mesh.vertices, &quad, 0.0);
+                assert!(legal.is_none() || exact <= 1e-9, "{exact}");
+            }
+        }
+        assert!(judged > 20, "{judged}");
+    }
 }

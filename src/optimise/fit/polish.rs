@@ -208,7 +208,7 @@ fn valence_gain(state: &FitState, h: HalfEdgeId) -> i32 {
 }
 
 /// By how much flipping `h` would lower the objective; minus infinity if geometry forbids it.
-fn gain(state: &FitState, h: HalfEdgeId) -> f64 {
+pub(super) fn gain(state: &FitState, h: HalfEdgeId) -> f64 {
     let quad = state.half_edges.quad(h);
     let valences = f64::from(valence_gain(state, h));
     let shape = |t: [VertexId; 3]| {

@@ -226,7 +226,7 @@ impl LogMap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vec3;
+    use crate::geometry::{Vec2, Vec3};
     use crate::mesh::TriMesh;
     use crate::mesh::shapes;
 
@@ -355,5 +355,17 @@ mod tests {
         }
         let mean = sum / f64::from(count);
         assert!(mean < 2e-3 && worst < 1e-2, "{mean} {worst}");
+    }
+
+    /// A path that goes on along an edge keeps its first direction; its vector is as long as the path.
+    #[test]
+    fn a_path_along_an_edge_keeps_its_direction() {
+        let from = Reach {
+            vector: Vec2::new(3.0, 4.0),
+            distance: 5.0,
+        };
+        let on = along_edge(&from, 2.5);
+        assert_eq!(on.distance, 7.5);
+        assert!((on.vector - Vec2::new(4.5, 6.0)).norm() < 1e-12);
     }
 }
