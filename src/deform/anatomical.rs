@@ -42,6 +42,14 @@ const OUTER: [f64; TERMS] = [
     -1.066, -0.223, -1.725, -0.026, -0.417, 0.619, -1.1, -0.075, -1.404, -1.183, -2.356,
 ];
 
+/// A cavity that looks smaller than the first, ml, is as narrow as the blur: its edge hardly moves any
+/// more when the cavity shrinks, and so the inner surface moves outward less, by the second, mm, times the logarithm
+/// of the ratio.
+const SMALL: (f64, f64) = (25.0, 0.94);
+/// The outer surface moves outward more, the smaller the cavity looks: by the second, mm, times the logarithm of
+/// the ratio of the first, ml, and the cavity.
+const OF_SIZE: (f64, f64) = (68.0, 0.435);
+
 /// The thickness that is left at least, mm.
 const THINNEST: f64 = 4.0;
 
@@ -102,6 +110,13 @@ impl WallShifts {
             })
         };
         let (mut inner_shift, mut outer_shift) = (shift(&INNER), shift(&OUTER));
+        let of_size = shifts_of_size(wall.cavity_ml);
+        for (shift, more) in [&mut inner_shift, &mut outer_shift]
+            .into_iter()
+            .zip(of_size)
+        {
+            shift.0.iter_mut().for_each(|x| *x += more);
+        }
         if let Some(resolution) = resolution {
             let loss = mean_difference(&inner_shift, &outer_shift);
             let known = blur_correction::excess(mean_difference(&outer, &inner), resolution);
@@ -136,6 +151,16 @@ impl WallShifts {
         let shift = at(&self.inner_shift) * (1.0 - depth) + at(&self.outer_shift) * depth;
         place.direction * shift
     }
+}
+
+/// By how much more the inner and the outer surface of a heart move outward whose cavity looks like
+/// `cavity` ml, mm.
+fn shifts_of_size(cavity: f64) -> [f64; 2] {
+    let size = cavity.max(1.0).ln();
+    [
+        -SMALL.1 * (SMALL.0.ln() - size).max(0.0),
+        OF_SIZE.1 * (OF_SIZE.0.ln() - size),
+    ]
 }
 
 fn mean_difference(a: &RayMap, b: &RayMap) -> f64 {
