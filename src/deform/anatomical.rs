@@ -20,7 +20,8 @@
 //!
 //! Not guaranteed: a single heart's wall. Beating and breathing blur the wall as much as the camera
 //! does and cannot be measured in an image that is not gated; the mean thickness of a heart scatters
-//! by about 0.9 mm about the true one.
+//! by about 0.9 mm about the true one. No figure of the image that was tried tells the rest (14 of them on 65 hearts, each
+//! left out): hollowness, uptake, thickness, strength of the edges and the like.
 
 use super::blur_correction;
 use crate::geometry::Vec3;
@@ -279,4 +280,23 @@ fn quantile_of(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     order::quantile(&sorted, share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_narrow_cavity_keeps_more_of_its_wall_and_a_usual_one_is_left_as_calibrated() {
+        let [inner, outer] = shifts_of_size(12.0);
+        assert!(inner < -0.5 && outer > 0.5);
+        let [inner, outer] = shifts_of_size(OF_SIZE.0);
+        assert_eq!((inner, outer), (0.0, 0.0));
+        // The wall never gets thinner by it, the smaller the heart.
+        let added: Vec<f64> = [300.0, 100.0, 60.0, 30.0, 20.0, 10.0, 5.0, 0.0]
+            .map(shifts_of_size)
+            .map(|[inner, outer]| outer - inner)
+            .to_vec();
+        assert!(added.is_sorted(), "{added:?}");
+    }
 }
