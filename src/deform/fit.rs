@@ -18,12 +18,12 @@ use crate::model::wall::VentricleWall;
 use crate::progress::{Cancelled, Monitor};
 use nalgebra::Rotation3;
 
-/// A fitted model is no heart if less than this share of its area sees an edge, and the edges
-/// are farther away than this (weighted rms, mm). Hearts have at least 0.63 or at most 1.15,
+/// Where [`confidence::of_heart`] does not decide, a fitted model is no heart if less than this share of its
+/// area sees an edge, and the edges are farther away than this (weighted rms, mm). Hearts have at least 0.63 or at most 1.15,
 /// also with 100 % defects over seven segments; noise has at most 0.51 and at least 1.6.
 const EDGELESS: (f64, f64) = (0.57, 1.3);
 
-/// A fitted model is no heart if the search's confidence and the chance of a good fit are below one
+/// Likewise, if the search's confidence and the chance of a good fit are below one
 /// of these pairs. Hearts that fit badly, for motion or infarcts, are found with 0.32 at least, and
 /// with 0.58 where the chance is below the second limit; what was found in scans without a heart had
 /// 0.38 at most.
