@@ -1,29 +1,34 @@
 //! Prints the figures that the confidence of a fit is calibrated on.
 //!
-//! `cargo run --release --example confidence -- FOLDER...` segments `CASE/spect.nii.gz` of every case
-//! in the folders with the built-in hearts. Each case gives one line: its name, the Jaccard index of
-//! the apparent wall with `lv_expert_img.nii.gz` and of the anatomical wall with `lv_truth.nii.gz`
-//! (`-` without a fit), then, as JSON, the report's evidence, each heart's chances, flags and volumes, the
-//! nodes (apparent and anatomical place, strength of the edge, way from apex to rim, distance from the
-//! other hearts' fits) and the triangles, or the reason where no heart was found.
+//! `cargo run --release --no-default-features --example confidence -- FOLDER...` segments
+//! `CASE/spect.nii.gz` of every case in the folders with the built-in hearts, once for each wall. Each
+//! case gives one line: its name, the Jaccard index of the apparent wall with `lv_expert_img.nii.gz` and
+//! of the anatomical wall with `lv_truth.nii.gz` (`-` without a fit), then, as JSON, for each wall the
+//! confidence, flags and distance of the contours, and the report's evidence, each heart's chances, volumes, the polar
+//! segments, the nodes (apparent and anatomical place, strength of the edge, way from apex to rim,
+//! distance from the other hearts' fits) and the triangles, or the reason where no heart was found.
 
+use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
 use rayon::prelude::*;
-use serde_json::json;
+use serde_json::{Value, json};
 use ventriform::deform::confidence::of_agreement;
-use ventriform::deform::{Evidence, WallEdge};
+use ventriform::deform::{Evidence, Flag, WallEdge};
 use ventriform::grid::agreement::compare;
 use ventriform::parameters::FitParameters;
 use ventriform::progress::Monitor;
-use ventriform::segmentation::{SegmentationOrder, from_files, on_grid, report_json};
+use ventriform::segmentation::{
+    SegmentationOrder, SegmentedVolume, from_files, on_grid, report_json,
+};
 use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
+
+type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
 
 fn main() -> Result<()> {
     let mut cases: Vec<PathBuf> = Vec::new();
     for folder in std::env::args().skip(1) {
-        for entry in std::fs::read_dir(&folder).with_context(|| folder.clone())? {
+        for entry in std::fs::read_dir(&folder)? {
             cases.push(entry?.path());
         }
     }
@@ -42,33 +47,49 @@ fn line(case: &Path) -> Result<String> {
     let name = name.unwrap_or_default();
     let monitor = Monitor::silent();
     let limits = ReadLimits::default();
-    let parameters = FitParameters::default();
     let file = |name: &str| [VolumeFile::at(case.join(name))];
-    let order = SegmentationOrder {
-        volume: &file("spect.nii.gz"),
-        expert: None,
-        auto: true,
-        models: Vec::new(),
-        reader: None,
-        parameters: &parameters,
+    let with_edge = |edge| {
+        let mut parameters = FitParameters::default();
+        parameters.deform.edge = edge;
+        let order = SegmentationOrder {
+            volume: &file("spect.nii.gz"),
+            expert: None,
+            auto: true,
+            models: Vec::new(),
+            reader: None,
+            parameters: &parameters,
+        };
+        from_files(&order, &limits, &monitor)
     };
-    let segmented = match from_files(&order, &limits, &monitor) {
-        Ok(segmented) => segmented,
-        Err(error) => return Ok(format!("{name}\t-\t-\t{}", json!(error.to_string()))),
+    let both = [WallEdge::Apparent, WallEdge::Anatomical];
+    let [apparent, anatomical] = match both.map(with_edge) {
+        [Ok(apparent), Ok(anatomical)] => [apparent, anatomical],
+        [Err(error), _] | [_, Err(error)] => {
+            return Ok(format!("{name}\t-\t-\t{}", json!(error.to_string())));
+        }
     };
-    let (scan, made) = (&segmented.reading.volume, &segmented.segmentation);
-    let jaccard = |mask, gold: &str| -> Result<f64> {
+    let judged = |segmented: &SegmentedVolume, gold: &str| -> Result<(f64, Value)> {
+        let (scan, made) = (&segmented.reading.volume, &segmented.segmentation);
         let gold = volume::read(&file(gold), &ReadOptions::default(), &limits, &monitor)?.volume;
         let gold = on_grid(&gold, scan, &monitor)?;
-        Ok(compare(mask, &gold, scan.frame.spacing(), &monitor)?.jaccard)
+        let agreement = compare(&made.mask, &gold, scan.frame.spacing(), &monitor)?;
+        let flags: Vec<&str> = made.fit.flags.iter().map(Flag::code).collect();
+        Ok((
+            agreement.jaccard,
+            json!({
+                "jaccard": agreement.jaccard,
+                "contours_voxels": agreement.contours.map(|c| c.mean_voxels),
+                "confidence": made.fit.confidence,
+                "flags": flags,
+            }),
+        ))
     };
-    let apparent = jaccard(&made.mask, "lv_expert_img.nii.gz")?;
-    let anatomical = match &made.other_mask {
-        Some(mask) => jaccard(mask, "lv_truth.nii.gz")?,
-        None => f64::NAN,
-    };
+    let (of_apparent, of_anatomical) = (
+        judged(&apparent, "lv_expert_img.nii.gz")?,
+        judged(&anatomical, "lv_truth.nii.gz")?,
+    );
+    let made = &apparent.segmentation;
     let report = report_json(made);
-    let both = [WallEdge::Apparent, WallEdge::Anatomical];
     let chances = |evidence: &Evidence| both.map(|edge| of_agreement(evidence, edge));
     let candidates: Vec<_> = (made.candidates.iter())
         .map(|c| json!({"template": c.name, "chances": c.evidence.as_ref().map(chances)}))
@@ -82,16 +103,21 @@ fn line(case: &Path) -> Result<String> {
             .collect()
     });
     Ok(format!(
-        "{name}\t{apparent:.4}\t{anatomical:.4}\t{}",
+        "{name}\t{:.4}\t{:.4}\t{}",
+        of_apparent.0,
+        of_anatomical.0,
         json!({
+            "apparent": of_apparent.1,
+            "anatomical": of_anatomical.1,
             "evidence": report["evidence"],
-            "confidence": made.fit.confidence,
+            "localisation": report["localisation"],
             "chances": made.fit.evidence.as_ref().map(chances),
             "candidates": candidates,
+            "septal_overshoot": made.fit.evidence.as_ref().map(|e| e.septal_overshoot),
             "place": made.fit.place_confidence(),
-            "thickness_mm": report["wall_thickness_mm"],
-            "flags": report["flags"],
+            "thickness_mm": report["thickness_mm"],
             "volumes_ml": report["volumes_ml"],
+            "polar": report["polar"],
             "uncertainty_mm": surfaces.map(|s| [&s.apparent.uncertainty, &s.anatomical.uncertainty]),
             "nodes": nodes,
             "triangles": made.fit.mesh.triangles,

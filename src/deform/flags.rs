@@ -12,7 +12,7 @@ pub enum Flag {
         /// The place's confidence, 0..=1.
         confidence: f64,
     },
-    /// The chance of a good fit is below 0.5.
+    /// The chance of a good fit is below 0.7.
     #[error(
         "the chance that an expert's mask agrees with this one (Jaccard index 0.75 or more) is {:.0} %: \
          edges along {:.0} % of the surface, {residual:.1} mm off in the mean, strain {:.0} %, the \

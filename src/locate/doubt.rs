@@ -43,6 +43,22 @@ pub enum NotAHeart {
         /// Weighted rms distance of those edges, mm.
         residual: f64,
     },
+    /// The cavity, the projections and the search together speak against it.
+    #[error(
+        "is no heart: it is hollow by {hollowness:.2}, the projections of the image agree with the fitted wall by \
+         {agreement:.2}, and the search has a confidence of {search:.2}: a chance of {:.0} %",
+        100.0 * chance
+    )]
+    Unseen {
+        /// 1 - cavity / wall.
+        hollowness: f64,
+        /// Mean correlation of image and fitted wall in the projections, -1..=1.
+        agreement: f64,
+        /// Confidence of the search, 0..=1.
+        search: f64,
+        /// Chance of a heart, 0..=1.
+        chance: f64,
+    },
     /// Both the search and the fitted model doubt it.
     #[error(
         "is no heart: the search has a confidence of {search:.2}, and the model fitted there a chance \
