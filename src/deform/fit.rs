@@ -29,7 +29,7 @@ const EDGELESS: (f64, f64) = (0.57, 1.3);
 /// 0.38 at most.
 const UNLIKELY: [(f64, f64); 2] = [(0.3, 0.25), (0.5, 0.05)];
 /// Least chance of a heart ([`confidence::of_heart`]). Of 106 fits of hearts one has less (motion; Jaccard index 0.21),
-/// of 59 fits to scans without one all but one, which took a hot right ventricle (calibrating seeds).
+/// of 59 fits to scans without one or beside it all but one, which took a hot right ventricle (calibrating seeds).
 const LIKELY: f64 = 0.5;
 /// In a map of labels, or with a greater share of the model beyond the volume (per cent), the search's
 /// confidence does not count.
