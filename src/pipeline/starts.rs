@@ -133,7 +133,7 @@ mod tests {
     use crate::mesh::shapes;
 
     fn parameters(points: &str, starts: &str) -> ModelParameters {
-        let pairs = [("points", points), ("starts", starts), ("seed", "7")];
+        let pairs = [("points", points), ("starts", starts), ("seed", "8")];
         ModelParameters::from_pairs(pairs).unwrap()
     }
 
