@@ -238,6 +238,29 @@ mod tests {
                 .take(3)
                 .all(|(s, w)| s * w > 0.0)
         );
+        // At the least of the penalised squares, what is still pulled is what the penalties hold back.
+        let mut pull = Coefficients::zeros();
+        for r in &readings {
+            let fields = basis.fields(&r.place, &r.normal);
+            let row = Coefficients::from_fn(|i, _| fields[i].dot(&r.normal));
+            pull += row * (r.share * r.weight * (r.offset - row.dot(&step)));
+        }
+        for field in 0..FIELDS {
+            let penalty = 0.005
+                + match field {
+                    6 => LENGTH_PENALTY,
+                    7 => BREADTH_PENALTY,
+                    8 => 0.02,
+                    9.. => RIM_PENALTY,
+                    _ => 0.0,
+                };
+            let held = penalty * step[field];
+            assert!(
+                (pull[field] - held).abs() < 1e-9,
+                "{field}: {} {held}",
+                pull[field]
+            );
+        }
         readings.iter_mut().for_each(|r| r.weight = 0.0);
         assert!(basis.solve(&readings).norm() < 1e-12);
     }

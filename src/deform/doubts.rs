@@ -202,3 +202,70 @@ fn implausible(fit: &Fit) -> Vec<Flag> {
     }
     flags
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{DeformParameters, fit};
+    use super::*;
+    use crate::geometry::frame::VoxelToPatient;
+    use crate::mesh::shapes;
+    use crate::model::{Organ, Template};
+    use crate::progress::Monitor;
+
+    /// A ball of 30 mm, and the fit of a smaller one to it.
+    fn ball() -> (Volume, Fit) {
+        let (shape, spacing) = ([40; 3], [3.5; 3]);
+        let frame = VoxelToPatient::centred(shape, spacing, Vec3::zeros()).unwrap();
+        let value = |p: &Vec3| ((30.0 - p.norm()) / 7.0 + 0.5).clamp(0.0, 1.0);
+        let volume = Volume::sampled(shape, frame, value);
+        let silent = Monitor::silent();
+        let model = shapes::icosphere(25.0, 2);
+        let template = Template::new(model, Organ::Generic, &silent).unwrap();
+        let fit = fit(&volume, &template, &DeformParameters::default(), &silent).unwrap();
+        (volume, fit)
+    }
+
+    #[test]
+    fn each_reason_to_doubt_raises_its_flag_alone() {
+        let (volume, found) = ball();
+        let raised = |change: &dyn Fn(&mut Fit)| {
+            let mut fit = found.clone();
+            change(&mut fit);
+            let flags = flags(&fit, &volume, false, WallEdge::Apparent);
+            let codes: Vec<&str> = flags.iter().map(Flag::code).collect();
+            // Nobody searched for the place.
+            assert_eq!(codes[0], "uncertain_place");
+            codes[1..].join(" ")
+        };
+        assert_eq!(raised(&|_| {}), "");
+        assert_eq!(raised(&|fit| fit.active = 0.51), "");
+        assert_eq!(raised(&|fit| fit.active = 0.49), "poor_contrast");
+        assert_eq!(raised(&|fit| fit.self_intersections = 1), "folded");
+        assert_eq!(raised(&|fit| fit.turned_triangles = 1), "folded");
+        for reason in [StopReason::MaxIterations, StopReason::Diverged] {
+            assert_eq!(raised(&|fit| fit.reason = reason), "not_at_rest");
+        }
+        // The volume reaches 68 mm to either side.
+        let beyond = |x: f64| raised(&|fit| fit.mesh.vertices[7] = Vec3::new(x, 0.0, 0.0));
+        assert_eq!(beyond(68.0), "");
+        for x in [-68.5, 68.5, 100.0] {
+            assert_eq!(beyond(x), "touches_border");
+        }
+    }
+
+    #[test]
+    fn few_different_values_are_no_image() {
+        let (mut volume, _) = ball();
+        assert_eq!(few_values(&volume), None);
+        for values in [1, 8, 9] {
+            for (number, voxel) in volume.voxels.iter_mut().enumerate() {
+                *voxel = (number % values) as f32;
+            }
+            volume.voxels[5] = f32::NAN;
+            assert_eq!(
+                few_values(&volume),
+                (values < IMAGE_VALUES).then_some(values)
+            );
+        }
+    }
+}

@@ -330,3 +330,76 @@ fn validate(parameters: &RetileParameters) -> Result<(), RetileError> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(change: impl FnOnce(&mut RetileParameters)) -> Result<(), RetileError> {
+        let mut parameters = RetileParameters::default();
+        change(&mut parameters);
+        validate(&parameters)
+    }
+
+    #[test]
+    fn the_limits_of_the_number_of_points_are_allowed_and_what_is_beyond_is_not() {
+        for fine in [LEAST_POINTS, MOST_POINTS] {
+            assert!(check(|p| p.points = fine).is_ok(), "{fine}");
+        }
+        let few = check(|p| p.points = LEAST_POINTS - 1).unwrap_err();
+        assert!(matches!(few, RetileError::TooFewPoints { needed, .. } if needed == LEAST_POINTS));
+        let many = check(|p| p.points = MOST_POINTS + 1).unwrap_err();
+        assert!(matches!(many, RetileError::TooManyPoints { limit, .. } if limit == MOST_POINTS));
+    }
+
+    #[test]
+    fn each_parameter_is_refused_by_name_beyond_its_range() {
+        let refused = |change: &dyn Fn(&mut RetileParameters)| match check(change) {
+            Err(RetileError::BadParameter { name, .. }) => Some(name),
+            _ => None,
+        };
+        type Setter = fn(&mut RetileParameters, f64);
+        let cases: [(&str, Setter, [f64; 2], [f64; 2]); 6] = [
+            ("adaptive", |p, x| p.adaptive = x, [0.0, 1.0], [-0.01, 1.01]),
+            (
+                "adaptive_from",
+                |p, x| p.adaptive_from = x,
+                [0.0, 100.0],
+                [-0.01, 100.1],
+            ),
+            (
+                "repulsion_strength",
+                |p, x| p.repulsion_strength = x,
+                [0.01, 1.0],
+                [0.0, 1.01],
+            ),
+            (
+                "repulsion_iterations",
+                |p, x| p.repulsion_iterations = x as usize,
+                [0.0, 1000.0],
+                [1001.0, f64::INFINITY],
+            ),
+            (
+                "repeats",
+                |p, x| p.repeats = x as usize,
+                [0.0, 100.0],
+                [101.0, f64::INFINITY],
+            ),
+            (
+                "relaxation_iterations",
+                |p, x| p.relaxation_iterations = x as usize,
+                [0.0, 1000.0],
+                [1001.0, f64::INFINITY],
+            ),
+        ];
+        for (name, set, fine, beyond) in cases {
+            for x in fine {
+                assert_eq!(refused(&|p| set(p, x)), None, "{name} {x}");
+            }
+            for x in beyond {
+                assert_eq!(refused(&|p| set(p, x)), Some(name), "{x}");
+            }
+        }
+        assert_eq!(refused(&|p| p.adaptive = f64::NAN), Some("adaptive"));
+    }
+}

@@ -7,7 +7,7 @@ use nalgebra::Rotation3;
 use ventriform::deform::dynamics::{self, Motion, StopReason};
 use ventriform::deform::elastic::{Elastic, Stiffness};
 use ventriform::deform::sensors::{EdgeShift, SensorKind, SensorSettings};
-use ventriform::deform::{DeformError, DeformParameters, WallEdge, fit};
+use ventriform::deform::{DeformError, DeformParameters, Fit, Flag, WallEdge, fit};
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::grid::agreement::compare;
@@ -316,6 +316,123 @@ fn both_sides_of_a_clear_wall_lie_at_its_apparent_edge() {
         let all = format!("{half_maximum:?} {gradient:?}");
         assert!(a.abs() < 0.5 && b.abs() < 0.5, "{all}");
         assert!((a - b).abs() < 0.4, "{all}");
+    }
+}
+
+#[test]
+fn a_margin_moves_both_sides_and_the_rim_outwards() {
+    let centre = Vec3::new(5.0, -8.0, 3.0);
+    let truth = cup(centre, axis(), 1.05);
+    let volume = scan(&truth, 56, |_| 1.0);
+    let template = ventricle(cup(Vec3::zeros(), axis(), 1.0));
+    let monitor = Monitor::silent();
+    let edge = |mesh: TriMesh| Reference::new(&surface::Surface::exact(mesh, SPACING));
+    let truth = edge(truth);
+    let places = [-2.0, 2.0].map(|margin| {
+        let parameters = DeformParameters {
+            margin,
+            ..DeformParameters::default()
+        };
+        let mesh = fit(&volume, &template, &parameters, &monitor).unwrap().mesh;
+        let [inner, outer] = beyond(&mesh, &truth, &centre, &axis());
+        let basal = mesh.vertices.iter().map(|p| -(p - centre).dot(&axis()));
+        [inner, outer, basal.fold(f64::MIN, f64::max)]
+    });
+    // The springs give way to some of the 4 mm.
+    for (narrow, wide) in places[0].iter().zip(&places[1]) {
+        let moved = wide - narrow;
+        assert!((2.5..5.0).contains(&moved), "{places:?}");
+    }
+}
+
+#[test]
+fn support_springs_are_refused_where_their_number_would_be_too_large() {
+    let volume = picture(40, 2.0, |p| ball(p, &Vec3::zeros(), 30.0));
+    let token = CancelToken::new();
+    token.cancel();
+    // Nothing but the check is done.
+    let cancelled = Monitor::new(&Silent, token);
+    let result = |detail: u32, support: f64| {
+        let model = shapes::icosphere(20.0, detail);
+        let template = Template::new(model, Organ::Generic, &Monitor::silent()).unwrap();
+        let mut parameters = DeformParameters::default();
+        parameters.stiffness.support = support;
+        fit(&volume, &template, &parameters, &cancelled).unwrap_err()
+    };
+    let nodes = shapes::icosphere(20.0, 4).vertices.len();
+    let refused = result(4, 0.02);
+    assert!(
+        matches!(refused, DeformError::TooManyNodes { nodes: n, limit } if n == nodes && limit < n),
+        "{refused}"
+    );
+    for (detail, support) in [(4, 0.0), (3, 0.02)] {
+        let error = result(detail, support);
+        assert!(
+            !matches!(error, DeformError::TooManyNodes { .. }),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn merit_falls_with_misfit_strain_and_doubts_and_rises_with_what_is_seen() {
+    let volume = picture(40, 2.0, |p| ball(p, &Vec3::zeros(), 30.0));
+    let model = shapes::icosphere(20.0, 2);
+    let template = Template::new(model, Organ::Generic, &Monitor::silent()).unwrap();
+    let parameters = DeformParameters::default();
+    let found = fit(&volume, &template, &parameters, &Monitor::silent()).unwrap();
+    let merit = |change: &dyn Fn(&mut Fit)| {
+        let mut fit = found.clone();
+        change(&mut fit);
+        fit.merit()
+    };
+    let usual = merit(&|fit| fit.strain = 0.0);
+    let falls = |change: &dyn Fn(&mut Fit), by: f64| {
+        let changed = merit(&|fit| {
+            fit.strain = 0.0;
+            change(fit);
+        });
+        assert!(
+            (usual - changed - by).abs() < 1e-12,
+            "{usual} {changed} {by}"
+        );
+    };
+    falls(&|fit| fit.active -= 0.1, 0.1);
+    falls(&|fit| fit.residual += 1.0, 0.05);
+    falls(&|fit| fit.strain = 0.04, 0.1);
+    falls(
+        &|fit| fit.flags.push(Flag::UncertainPlace { confidence: 0.1 }),
+        0.02,
+    );
+}
+
+#[test]
+fn merit_falls_with_the_change_of_length_where_the_apex_does_not_show() {
+    let template = ventricle(cup(Vec3::zeros(), axis(), 1.0));
+    let volume = scan(&cup(Vec3::new(5.0, -8.0, 3.0), axis(), 1.05), 56, |_| 1.0);
+    let parameters = DeformParameters::default();
+    let mut found = fit(&volume, &template, &parameters, &Monitor::silent()).unwrap();
+    let long_axis = found.localisation.as_ref().unwrap().cup.axis;
+    let mut merit = |by: f64, offset: f64, dark: bool| {
+        let place = found.localisation.as_mut().unwrap();
+        place.dark_apex = dark.then_some(0.2);
+        // The whole scene moves along the axis, which changes no length.
+        place.cup.centre += long_axis * offset;
+        for p in &mut found.mesh.vertices {
+            *p += long_axis * offset;
+        }
+        found.displacements.fill(long_axis * by);
+        found.merit()
+    };
+    let usual = merit(0.0, 0.0, false);
+    assert_eq!(merit(10.0, 0.0, false), usual);
+    assert_eq!(merit(0.0, 0.0, true), usual);
+    for by in [-10.0, 10.0] {
+        let near = merit(by, 0.0, true);
+        // Half the logarithm of about 80 mm over 90 mm or 70 mm.
+        assert!((0.03..0.12).contains(&(usual - near)), "{near} {usual}");
+        let far = merit(by, 300.0, true);
+        assert!((near - far).abs() < 1e-9, "{near} {far}");
     }
 }
 

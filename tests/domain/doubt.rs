@@ -161,7 +161,10 @@ fn a_wall_that_is_not_seen_is_less_certain() {
     let median = |parameters: &PhantomParameters| {
         let fit = segmented(&scan(parameters).volume).unwrap();
         let surfaces = fit.surfaces.unwrap();
-        assert!(fit.nodes.iter().all(|node| node.spread.is_some()));
+        // The other built-in hearts lie near, but not on the same surface.
+        let spreads = fit.nodes.iter().map(|node| node.spread.unwrap());
+        let mean = spreads.sum::<f64>() / fit.nodes.len() as f64;
+        assert!((0.05..5.0).contains(&mean), "{mean}");
         [surfaces.apparent, surfaces.anatomical].map(|surface| {
             let mut all = surface.uncertainty;
             assert_eq!(all.len(), surface.mesh.vertices.len());

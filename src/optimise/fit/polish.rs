@@ -45,10 +45,9 @@ pub fn polish(state: &mut FitState, glide: usize, monitor: &Monitor) -> Result<u
         index: None,
         stale: Vec::new(),
     };
-    let chained = if glide > 0 {
-        polish.glide(glide, monitor)?
-    } else {
-        0
+    let chained = match glide {
+        0 => 0,
+        more => polish.glide(more, monitor)?,
     };
     Ok(chained + polish.flip())
 }

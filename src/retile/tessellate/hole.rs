@@ -312,6 +312,7 @@ fn cheapest(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::shapes;
 
     /// The cost of the cheapest triangulation of a convex polygon, by brute force.
     fn brute_force(i: usize, j: usize, cost: &dyn Fn(usize, usize, usize) -> Option<f64>) -> f64 {
@@ -349,5 +350,65 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// The cost of every triangle of a ring against its definition: the outer triangle of a side is looked for among
+    /// all triangles of the mesh.
+    #[test]
+    fn the_cost_counts_the_shape_and_the_angles_at_the_sides_of_the_hole() {
+        let mut sphere = shapes::icosphere(30.0, 2);
+        for (v, p) in sphere.vertices.iter_mut().enumerate() {
+            *p *= 1.0 + 0.1 * (v as f64 * 1.7).sin();
+        }
+        let unit = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|v| sphere.vertices[v as usize]);
+            triangle::area_normal(&a, &b, &c).normalize()
+        };
+        let mesh = Patchwork::new(sphere.vertices.clone(), sphere.triangles.clone(), 5.0);
+        let mut seen = [false; 4];
+        for v in [0u32, 3, 20, 50, 100] {
+            let star = mesh.star(VertexId::from_index(v as usize));
+            let hole = Hole::new(&mesh, &star, Demand::Embedded);
+            let (ring, m) = (&star.ring, star.ring.len());
+            let around = (0..sphere.triangles.len()).filter(|&t| sphere.triangles[t].contains(&v));
+            let normal: Vec3 = around.map(|t| sphere.area_normal(t)).sum();
+            let normal = normal.normalize();
+            for (i, k, j) in all_triangles(m) {
+                let corners = [i, k, j].map(|place| mesh.position(ring[place]));
+                let [a, b, c] = corners;
+                let n = triangle::area_normal(&a, &b, &c).normalize();
+                let mut turned = 2.0 * (1.0 - n.dot(&normal));
+                let mut sides = 0;
+                for (from, to) in [(i, k), (k, j), (j, i)] {
+                    if (from + 1) % m == to {
+                        let ends = [from, to].map(|place| ring[place].index() as u32);
+                        let outer = sphere
+                            .triangles
+                            .iter()
+                            .find(|t| ends.iter().all(|end| t.contains(end)) && !t.contains(&v));
+                        turned += 1.0 - n.dot(&unit(outer.unwrap()));
+                        sides += 1;
+                    }
+                }
+                seen[sides] = true;
+                let expected = 1.0 / triangle::radius_ratio(&a, &b, &c).max(0.05) + 2.0 * turned;
+                let cost = hole.cost(i, k, j, Demand::Embedded).unwrap();
+                assert!(
+                    (cost - expected).abs() < 1e-9,
+                    "{i} {k} {j}: {cost} {expected}"
+                );
+            }
+        }
+        assert!(seen[..3].iter().all(|s| *s), "{seen:?}");
+    }
+
+    fn all_triangles(m: usize) -> Vec<(usize, usize, usize)> {
+        let mut all = Vec::new();
+        for i in 0..m {
+            for k in i + 1..m {
+                all.extend((k + 1..m).map(|j| (i, k, j)));
+            }
+        }
+        all
     }
 }

@@ -311,7 +311,8 @@ mod tests {
     #[test]
     fn a_round_removes_the_vertices_of_lowest_valence_first() {
         let surface = shapes::icosphere(30.0, 3);
-        let points = scattered(&surface, 300, 7);
+        // Many, so that some old vertices have too many neighbours for the first rounds.
+        let points = scattered(&surface, 1500, 7);
         let triangles =
             mutual_tessellation(&surface.vertices, &surface.triangles, &points).unwrap();
         let positions: Vec<Vec3> = points
@@ -320,12 +321,14 @@ mod tests {
             .chain(surface.vertices.iter().copied())
             .collect();
         let mut mesh = Patchwork::new(positions, triangles, 5.0);
-        let old: Vec<VertexId> = VertexId::first(mesh.positions.len()).skip(300).collect();
+        let old: Vec<VertexId> = VertexId::first(mesh.positions.len()).skip(1500).collect();
 
         let mut order = old.clone();
         order.sort_by_key(|&v| (mesh.valence(v), v));
         let valences: BTreeSet<usize> = old.iter().map(|&v| mesh.valence(v)).collect();
         assert!(valences.len() > 4, "{valences:?}");
+        assert!(valences.contains(&HIGH_VALENCE), "{valences:?}");
+        assert!(valences.iter().any(|v| *v > HIGH_VALENCE), "{valences:?}");
         let (mut expected, mut waiting) = (Vec::new(), BTreeSet::new());
         for v in order {
             if !waiting.contains(&v) && mesh.valence(v) <= HIGH_VALENCE {
