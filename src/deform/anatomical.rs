@@ -126,15 +126,7 @@ impl WallShifts {
                 shift.0.iter_mut().for_each(|x| *x *= factor);
             }
         }
-        for index in 0..ROWS * COLUMNS {
-            let thickness = outer.0[index] - inner.0[index];
-            let less = inner_shift.0[index] - outer_shift.0[index];
-            let most = (thickness - THINNEST).max(0.0);
-            if less > most {
-                inner_shift.0[index] *= most / less;
-                outer_shift.0[index] *= most / less;
-            }
-        }
+        keep_thinnest([&inner, &outer], [&mut inner_shift, &mut outer_shift]);
         Some(Self {
             inner,
             outer,
@@ -151,6 +143,20 @@ impl WallShifts {
         let depth = ((place.distance - inner) / (outer - inner).max(1e-6)).clamp(0.0, 1.0);
         let shift = at(&self.inner_shift) * (1.0 - depth) + at(&self.outer_shift) * depth;
         place.direction * shift
+    }
+}
+
+/// Reduces the shifts of the rays on which less than the least thickness would be left of the wall, both by the same
+/// factor; to 0 where the wall is thinner already.
+fn keep_thinnest([inner, outer]: [&RayMap; 2], [inner_shift, outer_shift]: [&mut RayMap; 2]) {
+    for index in 0..ROWS * COLUMNS {
+        let thickness = outer.0[index] - inner.0[index];
+        let less = inner_shift.0[index] - outer_shift.0[index];
+        let most = (thickness - THINNEST).max(0.0);
+        if less > most {
+            inner_shift.0[index] *= most / less;
+            outer_shift.0[index] *= most / less;
+        }
     }
 }
 
@@ -321,6 +327,25 @@ mod tests {
         // Beyond the ends the values there; between the last column and the first one both.
         assert_eq!((map.at(-4.0, 5.0), map.at(99.0, 5.0)), (5.0, 315.0));
         assert!((map.at(0.0, 59.25) - 0.75 * 59.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_least_thickness_is_left_on_every_ray() {
+        let looks = |index: usize| 1.0 + (index % 23) as f64;
+        let (inner, outer) = (
+            RayMap::from_fn(|_| 20.0),
+            RayMap::from_fn(|i| 20.0 + looks(i)),
+        );
+        let mut inner_shift = RayMap::from_fn(|_| 4.0);
+        let mut outer_shift = RayMap::from_fn(|_| -2.0);
+        keep_thinnest([&inner, &outer], [&mut inner_shift, &mut outer_shift]);
+        for index in 0..ROWS * COLUMNS {
+            let (more, less) = (inner_shift.0[index], -outer_shift.0[index]);
+            let left = looks(index) - more - less;
+            let expected = (looks(index) - 6.0).max(THINNEST.min(looks(index)));
+            assert!((left - expected).abs() < 1e-9, "{left} {expected}");
+            assert!((more - 2.0 * less).abs() < 1e-9, "{more} {less}");
+        }
     }
 
     #[test]

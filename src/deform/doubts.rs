@@ -205,25 +205,8 @@ fn implausible(fit: &Fit) -> Vec<Flag> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{DeformParameters, fit};
+    use super::super::test_fits::ball;
     use super::*;
-    use crate::geometry::frame::VoxelToPatient;
-    use crate::mesh::shapes;
-    use crate::model::{Organ, Template};
-    use crate::progress::Monitor;
-
-    /// A ball of 30 mm, and the fit of a smaller one to it.
-    fn ball() -> (Volume, Fit) {
-        let (shape, spacing) = ([40; 3], [3.5; 3]);
-        let frame = VoxelToPatient::centred(shape, spacing, Vec3::zeros()).unwrap();
-        let value = |p: &Vec3| ((30.0 - p.norm()) / 7.0 + 0.5).clamp(0.0, 1.0);
-        let volume = Volume::sampled(shape, frame, value);
-        let silent = Monitor::silent();
-        let model = shapes::icosphere(25.0, 2);
-        let template = Template::new(model, Organ::Generic, &silent).unwrap();
-        let fit = fit(&volume, &template, &DeformParameters::default(), &silent).unwrap();
-        (volume, fit)
-    }
 
     #[test]
     fn each_reason_to_doubt_raises_its_flag_alone() {
@@ -245,7 +228,6 @@ mod tests {
         for reason in [StopReason::MaxIterations, StopReason::Diverged] {
             assert_eq!(raised(&|fit| fit.reason = reason), "not_at_rest");
         }
-        // The volume reaches 68 mm to either side.
         let beyond = |x: f64| raised(&|fit| fit.mesh.vertices[7] = Vec3::new(x, 0.0, 0.0));
         assert_eq!(beyond(68.0), "");
         for x in [-68.5, 68.5, 100.0] {

@@ -334,9 +334,9 @@ mod tests {
             moved.unroundness
         );
 
-        let wall = wall(&cup());
-        let septal = wall.rays[20 * COLUMNS + 30].direction;
-        let lateral = wall.rays[20 * COLUMNS].direction;
+        let round = wall(&cup());
+        let septal = round.rays[20 * COLUMNS + 30].direction;
+        let lateral = round.rays[20 * COLUMNS].direction;
         let mut bulged = cup();
         for p in &mut bulged.vertices {
             let across = Vec3::new(p.x, p.y, 0.0);
@@ -344,6 +344,19 @@ mod tests {
                 *p += septal * 3.0;
             }
         }
+        // A third of a turn of the free wall and half of the septum have to show.
+        let seen = |free: usize, septum: usize| {
+            let mut part = wall(&bulged);
+            let free = (FREE[1]..COLUMNS).chain(0..FREE[0]).skip(free);
+            for row in BODY {
+                for column in free.clone().chain(SEPTAL.start + septum..SEPTAL.end) {
+                    part.rays[row * COLUMNS + column].wall = None;
+                }
+            }
+            septal_overshoot(&part)
+        };
+        assert_eq!((seen(19, 16), seen(36, 7)), (0.0, 0.0));
+        assert!(seen(20, 16) > 0.05 && seen(36, 8) > 0.05);
         let bulged = of(&bulged);
         assert!(
             (1.08..1.16).contains(&bulged.septal_bulge),

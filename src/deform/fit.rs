@@ -265,3 +265,39 @@ impl Fit {
         (now / posed).ln()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_fits::ball;
+    use super::*;
+
+    #[test]
+    fn what_has_no_edges_or_no_chance_is_no_heart() {
+        let (_, found) = ball();
+        assert!(found.evidence.is_none());
+        let doubt = |active: f64, residual: f64, search: f64, chance: f64, share: f64| {
+            let mut fit = found.clone();
+            (fit.active, fit.residual, fit.confidence) = (active, residual, chance);
+            fit.flags.push(Flag::TouchesBorder { share });
+            match fit.doubt(search) {
+                None => "",
+                Some(NotAHeart::Edgeless { .. }) => "edgeless",
+                Some(NotAHeart::Unlikely { .. }) => "unlikely",
+                Some(_) => "another",
+            }
+        };
+        assert_eq!(doubt(0.9, 1.0, 0.9, 0.9, 1.0), "");
+        // Few edges, and far ones.
+        assert_eq!(doubt(0.5, 1.4, 0.9, 0.9, 1.0), "edgeless");
+        assert_eq!(doubt(0.5, f64::NAN, 0.9, 0.9, 1.0), "edgeless");
+        assert_eq!(doubt(0.5, 1.2, 0.9, 0.9, 1.0), "");
+        assert_eq!(doubt(0.6, 1.4, 0.9, 0.9, 1.0), "");
+        for [limit, least] in UNLIKELY.map(|(limit, least)| [limit, least]) {
+            assert_eq!(doubt(0.9, 1.0, limit - 0.01, least - 0.01, 1.0), "unlikely");
+            assert_eq!(doubt(0.9, 1.0, limit, least, 1.0), "");
+        }
+        // The search does not count where most of the model lies beyond the volume.
+        assert_eq!(doubt(0.9, 1.0, 0.9, 0.2, OUTSIDE), "");
+        assert_eq!(doubt(0.9, 1.0, 0.9, 0.2, OUTSIDE + 1.0), "unlikely");
+    }
+}

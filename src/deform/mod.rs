@@ -52,6 +52,8 @@ pub mod place;
 pub mod rim;
 pub mod sensors;
 pub mod setup;
+#[cfg(test)]
+mod test_fits;
 pub mod uncertainty;
 pub mod views;
 

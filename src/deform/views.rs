@@ -338,6 +338,7 @@ fn greatest(values: &[f64; SHIFTS]) -> (f64, usize) {
 mod tests {
     use super::*;
     use crate::mesh::shapes;
+    use std::f64::consts::TAU;
 
     /// The correlations of a wall that lies `shift` mm off at each angle.
     fn peaks(shift: impl Fn(usize) -> f64) -> Vec<[f64; SHIFTS]> {
@@ -349,6 +350,28 @@ mod tests {
                 })
             })
             .collect()
+    }
+
+    /// A wave across the bed is weakened by the Fourier transforms of both Gaussians, waves along the other axes by
+    /// none: what does not change across the bed vanishes.
+    #[test]
+    fn waves_across_the_bed_pass_as_the_band_lets_them() {
+        for length in [32.0, 48.0, 64.0] {
+            let wave = |i: usize| (TAU * STEP * (i as f64 - HALF as f64) / length).cos();
+            let views: Projections = (0..SIDE * SIDE * ANGLES)
+                .map(|n| wave(n / SIDE % SIDE) as f32)
+                .collect();
+            let passed = band(views, &Monitor::silent()).unwrap();
+            let left = |sigma: f64| (-(TAU * sigma / length).powi(2) / 2.0).exp();
+            let expected = (1.0 - left(BAND[0])) * left(BAND[1]);
+            let centre = f64::from(passed[(5 * SIDE + HALF) * SIDE + 11]);
+            assert!((centre - expected).abs() < 0.03, "{centre} {expected}");
+        }
+        let along = (0..SIDE * SIDE * ANGLES)
+            .map(|n| (n % SIDE) as f32)
+            .collect();
+        let passed = band(along, &Monitor::silent()).unwrap();
+        assert!(passed[(5 * SIDE + HALF) * SIDE + 11].abs() < 1e-4);
     }
 
     #[test]

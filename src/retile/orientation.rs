@@ -61,6 +61,9 @@ mod tests {
                 .iter()
                 .all(|v| *v > 0.0)
         );
+        let right = outward.clone();
+        assert_eq!(face_alike(&mut outward, &component, &[1.0, 1.0]), Ok(()));
+        assert_eq!(outward, right);
         // A cavity faces inward.
         let all: Vec<u32> = (0..count).collect();
         assert_eq!(face_alike(&mut ball, &component, &[-1.0, 1.0]), Err(all));

@@ -1,10 +1,11 @@
 //! The paper's method on whole surfaces. A result has exactly N vertices, is closed and has the
 //! topology of the surface.
 
+use std::sync::Mutex;
 use ventriform::geometry::Vec3;
 use ventriform::mesh::intersections::self_intersections;
 use ventriform::mesh::{TriMesh, shapes, topology};
-use ventriform::progress::{CancelToken, Monitor, Silent};
+use ventriform::progress::{CancelToken, Monitor, Observer, Silent, Stage};
 use ventriform::retile::{Method, RetileError, RetileParameters, Tiled, retile};
 use ventriform::surface::{Surface, from_mesh};
 
@@ -50,6 +51,33 @@ fn spheres_cups_and_tori_are_retiled() {
             check(&surface, points, &paper(&surface, points, seed).unwrap());
         }
     }
+}
+
+/// Keeps what is reported.
+#[derive(Default)]
+struct Heard(Mutex<Vec<f64>>);
+
+impl Observer for Heard {
+    fn progress(&self, _: Stage, fraction: f64) {
+        self.0.lock().unwrap().push(fraction);
+    }
+}
+
+#[test]
+fn repulsion_reports_its_progress() {
+    let surface = surface(shapes::icosphere(20.0, 3));
+    let heard = Heard::default();
+    let monitor = Monitor::new(&heard, CancelToken::new());
+    let parameters = RetileParameters {
+        points: 67,
+        method: Method::Paper,
+        ..RetileParameters::default()
+    };
+    retile(&surface, &parameters, &monitor).unwrap();
+    let heard = heard.0.into_inner().unwrap();
+    assert!(heard.is_sorted(), "{heard:?}");
+    let within = heard.iter().filter(|x| (0.05..0.55).contains(*x)).count();
+    assert!(within >= 10, "{heard:?}");
 }
 
 #[test]

@@ -308,6 +308,14 @@ mod tests {
         assert!((of(2.5) - (behind + 5.0)).abs() < 0.2, "{}", of(2.5));
     }
 
+    #[test]
+    fn a_plateau_at_the_level_ends_where_it_falls() {
+        let steps = |x: f64| [60.0, 30.0, 0.0][usize::from(x >= 0.0) + usize::from(x >= 6.0)];
+        let mut profile = Profile::new(&settings(SensorKind::Level));
+        let edge = profile.edge(&image(steps), &Vec3::zeros(), &Vec3::x());
+        assert!((5.0..6.5).contains(&edge.offset), "{edge:?}");
+    }
+
     /// The half-way point lies between ridge and trough, not at the steepest slope: here the outer part of the
     /// fall is longer and flatter.
     #[test]

@@ -118,6 +118,29 @@ mod tests {
     use crate::mesh::{TriMesh, shapes, topology};
 
     #[test]
+    fn the_own_frame_is_the_triangle_with_its_longest_side_scaled_to_one() {
+        let corners = [
+            Vec3::new(1.0, 2.0, 3.0),
+            Vec3::new(6.0, 1.0, 4.0),
+            Vec3::new(2.0, 9.0, -1.0),
+        ];
+        for turn in 0..3 {
+            let corners = [0, 1, 2].map(|k| corners[(k + turn) % 3]);
+            let frame = own_frame(&corners).unwrap();
+            let sides = [(0, 1), (1, 2), (2, 0)];
+            let lengths = sides.map(|(k, m)| (corners[k] - corners[m]).norm());
+            let longest = lengths.into_iter().fold(0.0, f64::max);
+            for ((k, m), length) in sides.into_iter().zip(lengths) {
+                assert!(((frame[k] - frame[m]).norm() - length / longest).abs() < 1e-12);
+            }
+            // Counter-clockwise, with the first corner at the origin and the second one on the x axis.
+            assert_eq!((frame[0], frame[1].y), (Vec2::zeros(), 0.0));
+            assert!(frame[1].perp(&frame[2]) > 0.0);
+        }
+        assert!(own_frame(&[corners[0], corners[1], corners[1]]).is_none());
+    }
+
+    #[test]
     fn keeps_the_surface_and_its_topology() {
         for (mesh, n) in [
             (shapes::icosphere(10.0, 0), 500),

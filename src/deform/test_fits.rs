@@ -1,0 +1,22 @@
+//! Fits for the tests of this folder.
+
+use super::{DeformParameters, Fit, fit};
+use crate::geometry::Vec3;
+use crate::geometry::frame::VoxelToPatient;
+use crate::grid::Volume;
+use crate::mesh::shapes;
+use crate::model::{Organ, Template};
+use crate::progress::Monitor;
+
+/// A ball of 30 mm in a volume that reaches 68 mm to either side, and the fit of a smaller one to it.
+pub(super) fn ball() -> (Volume, Fit) {
+    let (shape, spacing) = ([40; 3], [3.5; 3]);
+    let frame = VoxelToPatient::centred(shape, spacing, Vec3::zeros()).unwrap();
+    let value = |p: &Vec3| ((30.0 - p.norm()) / 7.0 + 0.5).clamp(0.0, 1.0);
+    let volume = Volume::sampled(shape, frame, value);
+    let silent = Monitor::silent();
+    let model = shapes::icosphere(25.0, 2);
+    let template = Template::new(model, Organ::Generic, &silent).unwrap();
+    let fit = fit(&volume, &template, &DeformParameters::default(), &silent).unwrap();
+    (volume, fit)
+}
