@@ -59,7 +59,8 @@ struct Heard(Mutex<Vec<f64>>);
 
 impl Observer for Heard {
     fn progress(&self, _: Stage, fraction: f64) {
-        self.0.lock().unwrap().push(fraction);
+        let mut heard = self.0.lock().expect("no thread panicked");
+        heard.push(fraction);
     }
 }
 
