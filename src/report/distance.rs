@@ -15,7 +15,7 @@
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::{HashMap, VecDeque};
+use std::collections::{BTreeMap, VecDeque};
 
 use super::summary::Summary;
 use crate::geometry::bvh::{Bvh, Closest};
@@ -210,7 +210,7 @@ struct Side {
 /// these sides, once for the two cells that share one.
 fn quarter(cells: &[[u32; 3]], points: &[Vec3]) -> (Vec<[u32; 3]>, Vec<Side>) {
     let mut sides: Vec<Side> = Vec::with_capacity(2 * cells.len());
-    let mut known: HashMap<[u32; 2], usize> = HashMap::with_capacity(2 * cells.len());
+    let mut known: BTreeMap<[u32; 2], usize> = BTreeMap::new();
     let mut quarters = Vec::with_capacity(4 * cells.len());
     for &cell in cells {
         let longest = longest_side(&cell.map(|v| points[v as usize])) / 2.0;
