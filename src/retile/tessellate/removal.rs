@@ -321,7 +321,9 @@ mod tests {
             .chain(surface.vertices.iter().copied())
             .collect();
         let mut mesh = Patchwork::new(positions, triangles, 5.0);
-        let old: Vec<VertexId> = VertexId::first(mesh.positions.len()).skip(1500).collect();
+        let old: Vec<VertexId> = VertexId::first(mesh.positions.len())
+            .skip(points.len())
+            .collect();
 
         let mut order = old.clone();
         order.sort_by_key(|&v| (mesh.valence(v), v));
