@@ -292,7 +292,7 @@ mod tests {
         assert_eq!(doubt(0.5, f64::NAN, 0.9, 0.9, 1.0), "edgeless");
         assert_eq!(doubt(0.5, 1.2, 0.9, 0.9, 1.0), "");
         assert_eq!(doubt(0.6, 1.4, 0.9, 0.9, 1.0), "");
-        for [limit, least] in UNLIKELY.map(|(limit, least)| [limit, least]) {
+        for (limit, least) in UNLIKELY {
             assert_eq!(doubt(0.9, 1.0, limit - 0.01, least - 0.01, 1.0), "unlikely");
             assert_eq!(doubt(0.9, 1.0, limit, least, 1.0), "");
         }
