@@ -38,8 +38,7 @@ pub fn align(
     let mut mesh = mesh.clone();
     let shares = area_shares(&mesh);
     for round in 0..ROUNDS {
-        let progress = round as f64 / (ROUNDS - 1) as f64;
-        let reach = settings.reach * (last_reach / settings.reach).powf(progress);
+        let reach = reach_in(round, settings.reach, last_reach);
         let readings = sensors::read(
             &mesh,
             field,
@@ -63,6 +62,12 @@ pub fn align(
         }
     }
     Ok(mesh)
+}
+
+/// The reach of the sensors in a round: from `first` to `last`, by the same factor from each round to the next.
+fn reach_in(round: usize, first: f64, last: f64) -> f64 {
+    let progress = round as f64 / (ROUNDS - 1) as f64;
+    first * (last / first).powf(progress)
 }
 
 /// Penalty on the rise and the tilts of the rim. Between 0.02 and 0.1 the mean Jaccard index over
@@ -147,6 +152,9 @@ impl Basis {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::deform::sensors::{EdgeShift, SensorKind};
+    use crate::geometry::frame::VoxelToPatient;
+    use crate::grid::Volume;
     use crate::mesh::shapes;
 
     fn basis(mesh: &TriMesh, axis: Vec3) -> Basis {
@@ -156,6 +164,47 @@ mod tests {
             axis,
             centre,
             base: along.fold(0.0, f64::min),
+        }
+    }
+
+    #[test]
+    fn the_reach_falls_by_one_factor_from_the_first_to_the_last() {
+        let reaches: Vec<f64> = (0..ROUNDS)
+            .map(|round| reach_in(round, 25.0, 6.0))
+            .collect();
+        assert!((reaches[0] - 25.0).abs() < 1e-9 && (reaches[ROUNDS - 1] - 6.0).abs() < 1e-9);
+        for three in reaches.windows(3) {
+            assert!((three[1] / three[0] - three[2] / three[1]).abs() < 1e-9);
+        }
+    }
+
+    /// A ball that lies off and is too small comes to the edge it sees, all round.
+    #[test]
+    fn a_ball_is_moved_and_stretched_onto_the_edge_in_its_reach() {
+        let (shape, centre) = ([40; 3], Vec3::new(4.0, -3.0, 6.0));
+        let frame = VoxelToPatient::centred(shape, [3.5; 3], Vec3::zeros()).unwrap();
+        let value = |p: &Vec3| ((30.0 - (p - centre).norm()) / 7.0 + 0.5).clamp(0.0, 1.0);
+        let monitor = Monitor::silent();
+        let volume = Volume::sampled(shape, frame, value);
+        let field = Field::new(&volume, None, 1.0);
+        let settings = SensorSettings {
+            kind: SensorKind::Gradient,
+            reach: 25.0,
+            level: 0.5,
+            ceiling: 1.6,
+            shift: EdgeShift {
+                inner: 0.0,
+                outer: 0.0,
+                rim: 0.0,
+                axis: [Vec3::zeros(), Vec3::z()],
+            },
+            blind: None,
+        };
+        let model = shapes::icosphere(26.0, 2);
+        let aligned = align(&model, &Vec3::z(), &field, &settings, 8.0, &monitor).unwrap();
+        for p in &aligned.vertices {
+            let off = (p - centre).norm() - 30.0;
+            assert!(off.abs() < 1.0, "{off}");
         }
     }
 

@@ -414,6 +414,31 @@ mod tests {
         assert!((of(0.0) - 0.01f64.ln()).abs() < 1e-9 && (of(0.24) - 0.25f64.ln()).abs() < 1e-9);
     }
 
+    /// Logistic regression: what either changes of the odds does not depend on the other.
+    #[test]
+    fn shape_and_projections_each_change_the_odds_of_motion() {
+        let odds = |active: f64, gain: f64| {
+            let chance = of_motion(&Evidence {
+                active,
+                ..evidence(Some(gain))
+            });
+            (chance / (1.0 - chance)).ln()
+        };
+        let by_shape = [0.02, 0.2].map(|gain| odds(0.6, gain) - odds(0.9, gain));
+        let by_gain = [0.6, 0.9].map(|active| odds(active, 0.2) - odds(active, 0.02));
+        assert!(by_shape[0] > 0.1 && (by_shape[0] - by_shape[1]).abs() < 1e-6);
+        assert!(by_gain[0] > 1.0 && (by_gain[0] - by_gain[1]).abs() < 1e-6);
+        // At rest the projections speak against what the shape of a usual heart leaves open.
+        let usual = |gain: Option<f64>| {
+            of_motion(&Evidence {
+                views: gain.map(views),
+                ..usual()
+            })
+        };
+        assert!(usual(Some(0.012)) < 0.5 * usual(None));
+        assert!(usual(Some(0.2)) > 2.0 * usual(None));
+    }
+
     #[test]
     fn what_is_solid_or_missing_in_the_projections_is_no_heart() {
         let chance = |hollowness: f64, agreement: f64, search: f64| {

@@ -300,4 +300,38 @@ mod tests {
         assert_eq!(doubt(0.9, 1.0, 0.9, 0.2, OUTSIDE), "");
         assert_eq!(doubt(0.9, 1.0, 0.9, 0.2, OUTSIDE + 1.0), "unlikely");
     }
+
+    #[test]
+    fn a_hint_and_what_is_no_ventricle_are_believed() {
+        let (_, mut fit) = ball();
+        let hinted = Hints {
+            centre: Some(Vec3::zeros()),
+            ..Hints::default()
+        };
+        (fit.active, fit.residual) = (0.1, 9.0);
+        assert!(fit.require_wall(&Hints::default()).is_ok());
+        let centre = Vec3::new(1.0, 2.0, 3.0);
+        fit.localisation = Some(Localisation {
+            cup: Cup {
+                centre,
+                axis: Vec3::z(),
+                length: 70.0,
+                breadth: 1.0,
+            },
+            correlation: 0.8,
+            wall: 1.0,
+            hollowness: 0.5,
+            dark_apex: None,
+            runner_up: None,
+            confidence: 0.9,
+        });
+        assert!(fit.require_wall(&hinted).is_ok());
+        let Err(LocateError::NoHeart { centre: at, .. }) = fit.require_wall(&Hints::default())
+        else {
+            panic!("a model without edges is no heart");
+        };
+        assert_eq!(Vec3::from(at), centre);
+        (fit.active, fit.residual, fit.confidence) = (0.9, 1.0, 0.9);
+        assert!(fit.require_wall(&Hints::default()).is_ok());
+    }
 }

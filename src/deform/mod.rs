@@ -82,7 +82,7 @@ pub fn fit(
     parameters: &DeformParameters,
     monitor: &Monitor,
 ) -> Result<Fit, DeformError> {
-    check_supports(template, &parameters.stiffness)?;
+    check_supports(template.mesh.vertices.len(), &parameters.stiffness)?;
     let place = OrganPlace::find(volume, template, parameters, monitor)?;
     fit_at(&place, volume, template, parameters, monitor)
 }
@@ -100,7 +100,7 @@ pub fn fit_at(
     monitor: &Monitor,
 ) -> Result<Fit, DeformError> {
     parameters.validate()?;
-    check_supports(template, &parameters.stiffness)?;
+    check_supports(template.mesh.vertices.len(), &parameters.stiffness)?;
     monitor.report(Stage::Align, 0.0)?;
     let mut setup = FitSetup::new(place, volume, template, parameters, monitor)?;
     let mut fit = fit_from(&setup, volume, template, parameters, monitor)?;
@@ -153,10 +153,28 @@ fn fit_from(
 /// Most nodes of a model with support springs, whose number grows with the square of the nodes.
 const MAX_SUPPORTED_NODES: usize = 1000;
 
-fn check_supports(template: &Template, stiffness: &Stiffness) -> Result<(), DeformError> {
-    let (nodes, limit) = (template.mesh.vertices.len(), MAX_SUPPORTED_NODES);
+fn check_supports(nodes: usize, stiffness: &Stiffness) -> Result<(), DeformError> {
+    let limit = MAX_SUPPORTED_NODES;
     if stiffness.support > 0.0 && nodes > limit {
         return Err(DeformError::TooManyNodes { nodes, limit });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_support_springs_limit_the_nodes() {
+        let allowed = |nodes: usize, support: f64| {
+            let stiffness = Stiffness {
+                support,
+                ..Stiffness::default()
+            };
+            check_supports(nodes, &stiffness).is_ok()
+        };
+        assert!(allowed(MAX_SUPPORTED_NODES, 0.5) && !allowed(MAX_SUPPORTED_NODES + 1, 0.5));
+        assert!(allowed(MAX_SUPPORTED_NODES + 1, 0.0));
+    }
 }

@@ -451,6 +451,24 @@ mod tests {
         );
     }
 
+    /// The limit of a view is its own, wherever in it the wall lies.
+    #[test]
+    fn a_wall_is_seen_in_each_view_against_the_brightest_there() {
+        let at = |along: usize, across: usize| across * SIDE + along;
+        let (bright, dim) = (at(9, 9), at(27, 27));
+        let mut views = vec![0.0; ANGLES * SIDE * SIDE];
+        for (angle, view) in views.chunks_exact_mut(SIDE * SIDE).enumerate() {
+            view[dim] = 1.0;
+            view[bright] = if angle % 2 == 0 { 0.5 } else { 50.0 };
+        }
+        let seen = where_seen(&views, &Monitor::silent()).unwrap();
+        for (angle, view) in seen.chunks_exact(SIDE * SIDE).enumerate() {
+            let even = f32::from(u8::from(angle % 2 == 0));
+            assert_eq!((view[bright], view[dim]), (1.0, even), "{angle}");
+            assert_eq!(view[at(27, 9)], 0.0);
+        }
+    }
+
     /// A row of samples along the bed projects to its distance from the axis in the direction of each angle.
     #[test]
     fn a_line_along_the_bed_projects_to_its_place_at_each_angle() {

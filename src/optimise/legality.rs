@@ -165,6 +165,11 @@ mod tests {
         // The new triangle (c, a, d) has no area.
         vertices[2] = Vec3::new(-0.5, 0.0, 0.0);
         assert!(replacement(&vertices, &quad, 0.0).is_none());
+        // It has next to none, and its normal does not count.
+        vertices[2] = Vec3::new(-0.5, 1e-10, 0.0);
+        assert!(replacement(&vertices, &quad, 0.0).is_none());
+        vertices[2] = Vec3::new(-0.5, 1e-7, 0.0);
+        assert!(replacement(&vertices, &quad, 0.0).is_some());
         // A roof: the ridge a b is 1 mm long, the eaves c and d are 2 mm apart and 1 mm lower.
         // The dihedral angle at the ridge is 90 degrees, at the valley c d it would be 127.
         let roof = [
