@@ -178,8 +178,11 @@ impl Attempt {
             Some(evidence) => confidence::of_agreement(evidence, parameters.edge),
             None => fit.place_confidence().min(0.5),
         };
+        if fit.by_a_part() {
+            fit.confidence = confidence::of_a_part(fit.confidence);
+        }
         let ventricle = template.organ == Organ::LeftVentricle;
-        fit.flags = doubts::flags(&fit, volume, ventricle, parameters.edge);
+        fit.flags = doubts::flags(&fit, volume, ventricle);
         // The chance is calibrated on images of uptake.
         if fit.flags.iter().any(|f| matches!(f, Flag::LabelMap { .. })) {
             fit.confidence = fit.confidence.min(0.5);

@@ -188,6 +188,13 @@ pub fn of_set(chances: &[f64], best: &Evidence, edge: WallEdge) -> f64 {
     1.0 / (1.0 + (-odds).exp())
 }
 
+/// The chance of a good fit where a part of the wall alone told its place, from that of the others: of 13 such fits
+/// to hearts that are refused without a hint, whose chances have a mean of 0.64, 3 have a Jaccard index of 0.75 or
+/// more (12 infarcts and a turned heart of the simulator's seeds 2101, 2103, 4102 and 4202).
+pub fn of_a_part(chance: f64) -> f64 {
+    0.35 * chance
+}
+
 /// The logarithm of the odds of a chance, between those of about 1 and 99 per cent.
 pub fn log_odds(chance: f64) -> f64 {
     ((chance + 0.01) / (1.01 - chance)).ln()

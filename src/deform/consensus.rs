@@ -44,6 +44,9 @@ pub fn judged(mut fit: Fit, members: &[MemberFit<'_>], own: Option<usize>, edge:
         node.spread = Some(*distance);
     }
     fit.confidence = confidence::of_set(&chances, &evidence, edge);
+    if fit.by_a_part() {
+        fit.confidence = confidence::of_a_part(fit.confidence);
+    }
     doubts::doubt_again(&mut fit);
     let [apparent, anatomical] =
         [WallEdge::Apparent, WallEdge::Anatomical].map(|edge| fit.uncertainty(edge));

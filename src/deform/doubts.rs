@@ -5,13 +5,11 @@ use super::dynamics::StopReason;
 use super::evidence::Evidence;
 use super::fit::Fit;
 use super::flags::Flag;
-use super::parameters::WallEdge;
 use crate::geometry::Vec3;
 use crate::grid::Volume;
 
-/// The reasons to doubt `fit`, whose wall with this `edge` is shown; volume, thickness, length and
-/// strain are judged for a ventricle only.
-pub(super) fn flags(fit: &Fit, volume: &Volume, ventricle: bool, edge: WallEdge) -> Vec<Flag> {
+/// The reasons to doubt `fit`; volume, thickness, length and strain are judged for a ventricle only.
+pub(super) fn flags(fit: &Fit, volume: &Volume, ventricle: bool) -> Vec<Flag> {
     let mut flags = Vec::new();
     let confidence = fit.place_confidence();
     if confidence < UNSURE_PLACE {
@@ -20,7 +18,7 @@ pub(super) fn flags(fit: &Fit, volume: &Volume, ventricle: bool, edge: WallEdge)
     if ventricle && let Some(values) = few_values(volume) {
         flags.push(Flag::LabelMap { values });
     }
-    flags.extend(unlike_calibrated(fit, edge));
+    flags.extend(unlike_calibrated(fit));
     if let Some(uptake) = fit.localisation.as_ref().and_then(|l| l.dark_apex) {
         flags.push(Flag::DarkApex { uptake });
     }
@@ -125,12 +123,11 @@ fn uncertain(chance: f64, evidence: Evidence) -> Option<Flag> {
     (chance < UNCERTAIN).then_some(Flag::UncertainFit { chance, evidence })
 }
 
-fn unlike_calibrated(fit: &Fit, edge: WallEdge) -> Vec<Flag> {
+fn unlike_calibrated(fit: &Fit) -> Vec<Flag> {
     let Some(evidence) = fit.evidence else {
         return Vec::new();
     };
-    let chance = confidence::of_agreement(&evidence, edge);
-    let mut flags: Vec<Flag> = uncertain(chance, evidence).into_iter().collect();
+    let mut flags: Vec<Flag> = uncertain(fit.confidence, evidence).into_iter().collect();
     let chance = confidence::of_motion(&evidence);
     if chance >= MOVED {
         flags.push(Flag::Motion { chance, evidence });
@@ -214,7 +211,7 @@ mod tests {
         let raised = |change: &dyn Fn(&mut Fit)| {
             let mut fit = found.clone();
             change(&mut fit);
-            let flags = flags(&fit, &volume, false, WallEdge::Apparent);
+            let flags = flags(&fit, &volume, false);
             let codes: Vec<&str> = flags.iter().map(Flag::code).collect();
             // Nobody searched for the place.
             assert_eq!(codes[0], "uncertain_place");

@@ -180,6 +180,11 @@ impl Fit {
         search * (self.active / 0.5).min(1.0)
     }
 
+    /// Whether an infarct left only a part of the wall to tell the place.
+    pub(super) fn by_a_part(&self) -> bool {
+        self.localisation.as_ref().is_some_and(|l| l.infarcted)
+    }
+
     /// Adds both walls of a ventricle, and shows the one of `edge`.
     ///
     /// # Errors
@@ -323,6 +328,7 @@ mod tests {
             hollowness: 0.5,
             dark_apex: None,
             runner_up: None,
+            infarcted: false,
             confidence: 0.9,
         });
         assert!(fit.require_wall(&hinted).is_ok());

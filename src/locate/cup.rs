@@ -135,7 +135,26 @@ impl Default for Pattern {
     }
 }
 
+/// What a wall without uptake shows, wall = 1: blood, and what blur and scatter bring there.
+const INFARCTED: f64 = 0.35;
+
 impl Pattern {
+    /// The samples of a ventricle whose wall takes up next to nothing within `half_width` of the direction `middle`
+    /// about the axis (radians, from the first of [`perpendicular`]'s vectors to the second). The tip of the wall is
+    /// left out: it belongs to all territories.
+    pub fn infarcted(middle: f64, half_width: f64) -> Self {
+        let mut samples = Self::default().0;
+        samples.retain(|s| s.expected < 1.0 || s.across > 0.0);
+        let (sin, cos) = middle.sin_cos();
+        let dark = |s: &Sample| s.round.0 * cos + s.round.1 * sin >= half_width.cos();
+        for s in samples.iter_mut().filter(|s| s.expected == 1.0) {
+            if dark(s) {
+                s.expected = INFARCTED;
+            }
+        }
+        Self(samples)
+    }
+
     /// The samples of the basal half: the wall's rings, their cavity and surroundings, and the end
     /// of the wall at the base. For hearts whose apex does not show.
     pub fn basal() -> Self {

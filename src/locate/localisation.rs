@@ -27,16 +27,21 @@ pub struct Localisation {
     pub correlation: f64,
     /// Mean value of the wall's middle in the image's unit.
     pub wall: f64,
-    /// How much darker the cavity is than the wall, 0..=1.
+    /// How much darker the cavity is than the wall, or than what an infarct left of it, 0..=1.
     pub hollowness: f64,
     /// Uptake of the apical wall against the basal one, if the apical wall does not show (less than
     /// 0.42): place and length then come from the base.
     pub dark_apex: Option<f64>,
     /// The best correlation at a place more than 25 mm away, if there was a candidate.
     pub runner_up: Option<f64>,
-    /// 0 (a guess) to 1.
+    /// Whether an infarct left only a part of the wall to tell the place.
+    pub infarcted: bool,
+    /// 0 (a guess) to 1; at most 0.5 where only a part of the wall tells the place.
     pub confidence: f64,
 }
+
+/// Most confidence of a place that a part of the wall tells: it is always doubted.
+const OF_A_PART: f64 = 0.5;
 
 /// Every cup found in a volume, best first, and the picture that they were found in.
 pub(super) struct Cups {
@@ -71,6 +76,17 @@ impl Cups {
             hints: hints.clone(),
             found,
         })
+    }
+
+    /// Adds the walls that infarcts leave ([`cup_search::infarcted`]).
+    ///
+    /// # Errors
+    /// [`LocateError::Cancelled`].
+    pub fn add_infarcted(&mut self, monitor: &Monitor) -> Result<(), LocateError> {
+        let infarcted = cup_search::infarcted(&self.field, &self.hints, &self.found, monitor)?;
+        self.found.extend(infarcted);
+        self.found.sort_by(|a, b| b.score.total_cmp(&a.score));
+        Ok(())
     }
 
     /// The best cup that is open at the base, among those whose centre is `admitted`.
@@ -112,6 +128,10 @@ impl Cups {
             .filter(|s| (s.cup.centre - best.cup.centre).norm() > DISTINCT)
             .find(|s| self.is_open(s));
         let place = report(best, elsewhere);
+        if best.infarcted {
+            // Where the dark arc holds the apex, what is left of the wall has told the length already.
+            return place;
+        }
         match apex::by_base(&CupSearch::new(&self.field, &self.hints), &best.cup) {
             None => place,
             Some(dark) => Localisation {
@@ -127,6 +147,7 @@ impl Cups {
 fn report(best: &ScoredCup, elsewhere: Option<&ScoredCup>) -> Localisation {
     let quality = ((best.correlation - NEEDED) / (0.8 - NEEDED)).clamp(0.0, 1.0);
     let margin = elsewhere.map_or(1.0, |e| ((best.score - e.score) / 0.15).clamp(0.0, 1.0));
+    let most = if best.infarcted { OF_A_PART } else { 1.0 };
     Localisation {
         cup: best.cup,
         correlation: best.correlation,
@@ -134,7 +155,8 @@ fn report(best: &ScoredCup, elsewhere: Option<&ScoredCup>) -> Localisation {
         hollowness: best.hollowness,
         dark_apex: None,
         runner_up: elsewhere.map(|e| e.correlation),
-        confidence: quality * (0.4 + 0.6 * margin),
+        infarcted: best.infarcted,
+        confidence: (quality * (0.4 + 0.6 * margin)).min(most),
     }
 }
 

@@ -8,6 +8,9 @@
 //! 2. A cup checks the best proposal ([`cup_search`]): where rays and cup agree, that is the
 //!    heart.
 //! 3. In any other case cups are tried all over the volume, and the best one decides.
+//!    If it is not clear though a hint says where the heart is, cups with a dark arc, as infarcts of one or two
+//!    territories leave them, are tried as well ([`cup_search::infarcted`]): a whole cup is drawn to whatever is closed
+//!    on all sides beside such a heart. Without a hint they are not believed: they also fit beside hearts.
 //! 4. Where no cup will do either, the heart is doubtful: [`Heart::localisation`] is an error, and
 //!    [`Heart::cavity`] is the best proposal of the rays, whatever its score.
 //!
@@ -51,7 +54,7 @@ use crate::geometry::bvh::Aabb;
 use crate::grid::Volume;
 use crate::progress::{Cancelled, Monitor};
 
-use cup_search::CupSearch;
+use cup_search::{CupSearch, ScoredCup};
 pub use doubt::NotAHeart;
 pub use error::LocateError;
 pub use hints::Hints;
@@ -99,7 +102,11 @@ pub fn find<'v>(
     let decision = match proposal {
         Some(cavity) if is_clear(volume, hints, cavity, monitor)? => Decision::Rays(cavity.clone()),
         _ => {
-            let cups = Cups::everywhere(volume, hints, monitor)?;
+            let mut cups = Cups::everywhere(volume, hints, monitor)?;
+            let clear = |best: &ScoredCup| best.correlation >= CLEAR;
+            if hints.centre.is_some() && !cups.best(|_| true).is_ok_and(clear) {
+                cups.add_infarcted(monitor)?;
+            }
             let place = match cups.best(|_| true) {
                 Ok(best) => Some(best.cup.centre),
                 Err(LocateError::NoHeart { .. }) => None,
@@ -194,7 +201,7 @@ fn to_patient(volume: &Volume, p: &Vec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::volume::phantom::{PhantomParameters, phantom};
+    use crate::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
 
     fn scan(parameters: &PhantomParameters) -> Volume {
         phantom(parameters, &Monitor::silent()).unwrap().volume
@@ -258,6 +265,43 @@ mod tests {
                 assert!((cup - place).norm() < 5.0, "{cup} {place}");
                 assert!((cavity - cup).norm() < SAME_HEART, "{cavity} {cup}");
             }
+        }
+    }
+
+    /// Two of the three territories take up next to nothing, and a hint lies 10 mm off the cavity's centre. The cup
+    /// lies by what is left of the wall, with its centre in the cavity, and its place is not taken for certain.
+    #[test]
+    fn a_hint_finds_a_heart_of_which_one_territory_is_left() {
+        let territories: [&[u8]; 3] = [
+            &[1, 2, 7, 8, 13, 14, 17],
+            &[3, 4, 9, 10, 15],
+            &[5, 6, 11, 12, 16],
+        ];
+        let whole = centres(&scan(&small()), &Hints::default()).1;
+        for (left, side) in territories.iter().zip([Vec3::x(), Vec3::y(), Vec3::z()]) {
+            let dark = territories.iter().filter(|t| *t != left);
+            let defect = |segment: &u8| PerfusionDefect {
+                segment: *segment,
+                severity: 0.95,
+            };
+            let infarcted = scan(&PhantomParameters {
+                defects: dark.flat_map(|t| t.iter().map(defect)).collect(),
+                ..small()
+            });
+            let monitor = Monitor::silent();
+            let hints = Hints {
+                centre: Some(whole + side * 10.0),
+                ..Hints::default()
+            };
+            let heart = find(&infarcted, &hints, &monitor).unwrap();
+            let found = heart.localisation(&monitor).unwrap();
+            let off = (found.cup.centre - whole).norm();
+            let cavity = 0.5 * small().width_mm - small().wall_mm;
+            assert!(off < cavity, "{left:?}: {off:.1} mm");
+            assert!(
+                found.infarcted && found.confidence <= 0.5,
+                "{left:?}: {found:?}"
+            );
         }
     }
 
