@@ -439,6 +439,115 @@ mod tests {
         ));
     }
 
+    /// An icosahedron with edges of 10 mm, of which as many points make triangles of a quarter of the area.
+    #[test]
+    fn the_grid_is_as_fine_as_the_edges_before_and_after() {
+        let unit = shapes::icosphere(1.0, 0);
+        let [a, b, _] = unit.corners(0);
+        let ball = shapes::icosphere(10.0 / (a - b).norm(), 0);
+        let spacing = |points| grid_spacing(&ball.vertices, &ball.triangles, points);
+        assert!((spacing(10) - 10.0).abs() < 1e-9);
+        assert!((spacing(40) - (10.0f64 * 5.0).sqrt()).abs() < 1e-9);
+        assert!(spacing(0).is_finite());
+    }
+
+    #[test]
+    fn a_finished_mesh_is_checked_again() {
+        let ball = shapes::icosphere(10.0, 1);
+        let census = topology::check(&ball).unwrap();
+        assert_eq!(verify(ball.clone(), &census), Ok(ball.clone()));
+        let two = together(&[ball.clone(), squeezed(&ball, [0.5; 3])]);
+        let ring = shapes::torus(9.0, 3.0, 12, 6);
+        for other in [&two, &ring] {
+            let outcome = verify(other.clone(), &census);
+            assert!(matches!(
+                outcome,
+                Err(TessellateError::TopologyChanged { .. })
+            ));
+        }
+        let mut open = ball.clone();
+        open.triangles.pop();
+        assert!(matches!(
+            verify(open, &census),
+            Err(TessellateError::OpenSurface(_))
+        ));
+        let mut folded = ball;
+        folded.vertices[0] *= -1.1;
+        let Err(TessellateError::SelfIntersecting { pairs, mesh }) =
+            verify(folded.clone(), &census)
+        else {
+            panic!("a vertex was pulled through the ball");
+        };
+        assert_eq!((pairs, *mesh), (self_intersections(&folded), folded));
+    }
+
+    /// The error names the first component that lacks points, its handles and how many it needs.
+    #[test]
+    fn a_component_with_too_few_points_is_named() {
+        let mut far = shapes::torus(9.0, 3.0, 12, 6);
+        far.vertices.iter_mut().for_each(|v| v.x += 100.0);
+        let surface = together(&[shapes::icosphere(10.0, 0), far]);
+        let on = |triangle: u32, n: usize| {
+            let point = SurfacePoint {
+                triangle: FaceId(triangle),
+                barycentric: [0.2, 0.3, 0.5],
+            };
+            vec![point; n]
+        };
+        let check = |ball: usize, ring: usize| {
+            let points = [on(3, ball), on(25, ring)].concat();
+            check_counts(surface.vertices.len(), &surface.triangles, &points)
+        };
+        assert_eq!(check(4, 7), Ok(()));
+        for (ball, ring, component, genus, points, needed) in
+            [(3, 9, 0, 0, 3, 4), (5, 6, 1, 1, 6, 7), (4, 0, 1, 1, 0, 7)]
+        {
+            let expected = TessellateError::TooFewPoints {
+                component,
+                genus,
+                points,
+                needed,
+            };
+            assert_eq!(check(ball, ring), Err(expected));
+        }
+    }
+
+    /// What the removal leaves over, at the positions of the vertices that the error names.
+    #[test]
+    fn stuck_vertices_are_named_by_their_numbers_on_the_surface() {
+        let surface = double_torus();
+        let mut seen = 0;
+        for seed in 0..10 {
+            let points = scattered(&surface, 14, seed);
+            let Err(TessellateError::Stuck { vertices }) = tile(&surface, 14, seed) else {
+                continue;
+            };
+            let all = mutual::mutual_tessellation(&surface.vertices, &surface.triangles, &points);
+            let mut positions = vec![Vec3::zeros(); 14];
+            positions.extend(&surface.vertices);
+            points.iter().zip(&mut positions).for_each(|(p, place)| {
+                *place = p.position(&surface.vertices, &surface.triangles);
+            });
+            let mut mesh = Patchwork::new(positions, all.unwrap(), 5.0);
+            let left = removal::remove_old_vertices(&mut mesh, 14, &Monitor::silent()).unwrap();
+            let left: Vec<Vec3> = left.iter().map(|v| mesh.position(*v)).collect();
+            let named: Vec<Vec3> = vertices
+                .iter()
+                .map(|v| surface.vertices[v.index()])
+                .collect();
+            assert_eq!(named, left);
+            seen += 1;
+        }
+        assert!(seen > 0);
+    }
+
+    #[test]
+    fn triangles_begin_with_their_lowest_vertex_and_are_sorted() {
+        let mesh = check(&shapes::icosphere(30.0, 2), 60, 3);
+        assert!(mesh.triangles.iter().all(|[a, b, c]| a < b && a < c));
+        assert!(mesh.triangles.is_sorted());
+    }
+
     #[test]
     fn invalid_points_are_reported() {
         let sphere = shapes::icosphere(1.0, 1);

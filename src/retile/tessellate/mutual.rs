@@ -96,7 +96,8 @@ fn own_frame([a, b, c]: &[Vec3; 3]) -> Option<[Vec2; 3]> {
     let longest = ab.norm().max(ac.norm()).max((c - b).norm());
     let base = ab.norm();
     let doubled_area = ab.cross(&ac).norm();
-    if !(doubled_area > FLATTEST * longest * longest) || !(base > FLATTEST * longest) {
+    // The height over any side is at most the longest one, so no side is shorter than the limit.
+    if !(doubled_area > FLATTEST * longest * longest) {
         return None;
     }
     let along = ab.dot(&ac) / base;
@@ -116,6 +117,7 @@ mod tests {
     use super::super::test_surfaces::scattered;
     use super::*;
     use crate::mesh::{TriMesh, shapes, topology};
+    use std::collections::BTreeSet;
 
     #[test]
     fn the_own_frame_is_the_triangle_with_its_longest_side_scaled_to_one() {
@@ -138,6 +140,100 @@ mod tests {
             assert!(frame[1].perp(&frame[2]) > 0.0);
         }
         assert!(own_frame(&[corners[0], corners[1], corners[1]]).is_none());
+    }
+
+    #[test]
+    fn a_triangle_has_an_own_frame_if_its_height_exceeds_the_limit_whatever_its_size() {
+        for size in [1e-3, 1.0, 1e3] {
+            for (height, own) in [(0.9, false), (1.1, true)] {
+                let top = Vec3::new(0.3, 0.0, height * FLATTEST);
+                let corners = [Vec3::zeros(), Vec3::x(), top].map(|p| p * size);
+                for turn in 0..3 {
+                    let corners = [0, 1, 2].map(|k| corners[(k + turn) % 3]);
+                    assert_eq!(own_frame(&corners).is_some(), own, "{size} {height}");
+                }
+            }
+        }
+    }
+
+    /// Points inside one triangle, as many as `n`.
+    fn inside(n: usize, seed: u64) -> Vec<SurfacePoint> {
+        let any = TriMesh {
+            vertices: equilateral().map(|p| Vec3::new(p.x, p.y, 0.0)).to_vec(),
+            triangles: vec![[0, 1, 2]],
+        };
+        scattered(&any, n, seed)
+    }
+
+    /// The circle through the corners of a part has no other point of the triangle inside, all parts face as the
+    /// triangle does, and they cover it.
+    #[test]
+    fn the_parts_of_a_triangle_are_delaunay_in_its_plane() {
+        let corners = [[1.0, 2.0, 3.0], [12.0, 1.0, 4.0], [2.0, 5.0, -1.0]].map(Vec3::from);
+        for turn in 0..3 {
+            let vertices = [0, 1, 2].map(|k| corners[(k + turn) % 3]);
+            let points = inside(15, turn as u64);
+            let parts = mutual_tessellation(&vertices, &[[0, 1, 2]], &points).unwrap();
+            let place = |p: &SurfacePoint| p.position(&vertices, &[[0, 1, 2]]);
+            let all: Vec<Vec3> = points.iter().map(place).chain(vertices).collect();
+            let whole = (vertices[1] - vertices[0]).cross(&(vertices[2] - vertices[0]));
+            let mut covered = 0.0;
+            for part in parts {
+                let [a, b, c] = part.map(|v| all[v as usize]);
+                let (ab, ac) = (b - a, c - a);
+                let normal = ab.cross(&ac);
+                assert!(normal.dot(&whole) > 0.0);
+                covered += normal.norm();
+                let to_centre =
+                    normal.cross(&ab) * ac.norm_squared() + ac.cross(&normal) * ab.norm_squared();
+                let to_centre = to_centre / (2.0 * normal.norm_squared());
+                for p in &all {
+                    let distance = (p - a - to_centre).norm();
+                    assert!(distance > to_centre.norm() * (1.0 - 1e-9));
+                }
+            }
+            assert!((covered / whole.norm() - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_sliver_is_divided_as_an_equilateral_triangle_is() {
+        let tall = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.75f64.sqrt(), 0.0]].map(Vec3::from);
+        let flat = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.9, 1e-8, 0.0]].map(Vec3::from);
+        for seed in 0..10 {
+            let points = inside(8, seed);
+            let parts = |vertices: &[Vec3; 3]| -> BTreeSet<[u32; 3]> {
+                let parts = mutual_tessellation(vertices, &[[0, 1, 2]], &points).unwrap();
+                let from_lowest = |mut part: [u32; 3]| {
+                    let lowest = (0..3).min_by_key(|&k| part[k]).unwrap();
+                    part.rotate_left(lowest);
+                    part
+                };
+                parts.into_iter().map(from_lowest).collect()
+            };
+            assert_eq!(parts(&flat), parts(&tall));
+        }
+    }
+
+    #[test]
+    fn points_on_corners_and_sides_become_vertices_beside_them() {
+        let vertices = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [1.0, 3.0, 0.0]].map(Vec3::from);
+        let points = [
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [0.0, 0.4, 0.6],
+        ];
+        let points = points.map(|barycentric| SurfacePoint {
+            triangle: FaceId(0),
+            barycentric,
+        });
+        let parts = mutual_tessellation(&vertices, &[[0, 1, 2]], &points).unwrap();
+        // A point inside adds two triangles.
+        assert_eq!(parts.len(), 9);
+        for v in 0..7 {
+            assert!(parts.iter().flatten().any(|c| *c == v), "{v}");
+        }
     }
 
     #[test]

@@ -183,3 +183,121 @@ impl Patchwork {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::hole::{self, Demand};
+    use super::super::test_surfaces::{jittered, stacked};
+    use super::*;
+    use crate::mesh::intersections::triangles_intersect;
+    use crate::mesh::shapes;
+
+    /// What the mesh says of its vertices, edges and intersections against a list of its triangles.
+    fn compare_with_list(mesh: &Patchwork) {
+        let live: Vec<[VertexId; 3]> = mesh.live_triangles().collect();
+        let vertices = VertexId::first(mesh.positions.len());
+        for v in vertices.clone() {
+            let around: Vec<_> = live.iter().filter(|t| t.contains(&v)).collect();
+            assert_eq!(mesh.valence(v), around.len());
+            let star = mesh.star(v);
+            assert_eq!(star.ring.iter().min(), star.ring.first());
+            let m = star.ring.len();
+            assert_eq!((m, star.triangles.len()), (around.len(), around.len()));
+            for k in 0..m {
+                let mut expected = [v, star.ring[k], star.ring[(k + 1) % m]];
+                let found = mesh.triangle(star.triangles[k]);
+                let turn = (0..3).find(|&turn| {
+                    expected.rotate_left(usize::from(turn > 0));
+                    expected == found
+                });
+                assert!(turn.is_some(), "{found:?}");
+            }
+            for w in vertices.clone().filter(|w| *w != v) {
+                let joined = live.iter().any(|t| t.contains(&v) && t.contains(&w));
+                assert_eq!(mesh.has_edge(v, w), joined);
+                let directed =
+                    |t: &&[VertexId; 3]| (0..3).any(|k| t[k] == v && t[(k + 1) % 3] == w);
+                match (mesh.triangle_along(v, w), live.iter().find(directed)) {
+                    (None, None) => {}
+                    (Some((t, third)), Some(expected)) => {
+                        assert_eq!(mesh.triangle(t), *expected);
+                        assert!(expected.contains(&third) && third != v && third != w);
+                    }
+                    other => panic!("{other:?}"),
+                }
+            }
+        }
+    }
+
+    /// While vertices are removed: the triangles and their index against the list, and the numbers of the last
+    /// changes against what was replaced.
+    #[test]
+    fn removals_keep_the_tables_and_number_the_changes() {
+        for (seed, surface) in [
+            (0, jittered(&shapes::icosphere(30.0, 1), 3.0, 1)),
+            (1, stacked(20, 2)),
+        ] {
+            let mut mesh = Patchwork::new(surface.vertices.clone(), surface.triangles, 7.0);
+            let count = mesh.positions.len();
+            let faces = FaceId::first(mesh.triangles.len());
+            let (mut changed, mut replaced) = (vec![0; count], vec![0; faces.len()]);
+            let mut changes = 0;
+            compare_with_list(&mesh);
+            for v in VertexId::first(count).map(|v| VertexId((v.0 * 5 + seed) % count as u32)) {
+                let star = mesh.star(v);
+                let Ok(new) = hole::close(&mesh, &star, Demand::Embedded) else {
+                    continue;
+                };
+                mesh.replace(&star.triangles, &new);
+                changes += 1;
+                changed[v.index()] = changes;
+                star.ring.iter().for_each(|w| changed[w.index()] = changes);
+                star.triangles
+                    .iter()
+                    .for_each(|t| replaced[t.index()] = changes);
+                assert_eq!(mesh.clock(), changes);
+                let numbers: Vec<u64> = VertexId::first(count).map(|w| mesh.changed(w)).collect();
+                assert_eq!(numbers, changed);
+                let numbers: Vec<u64> = faces.clone().map(|t| mesh.replaced(t)).collect();
+                assert_eq!(numbers, replaced);
+                assert_eq!(mesh.valence(v), 0);
+            }
+            assert!(changes > 12, "{changes}");
+            compare_with_list(&mesh);
+            // Any triangle over the vertices against those that are left.
+            let mut seen = [0; 2];
+            for a in 0..count as u32 {
+                let triangle = [a, (a * 7 + 3) % count as u32, (a * 11 + 5) % count as u32];
+                let triangle = triangle.map(VertexId);
+                if triangle[0] == triangle[1]
+                    || triangle[1] == triangle[2]
+                    || triangle[2] == triangle[0]
+                {
+                    continue;
+                }
+                for skipped in 0..2 {
+                    let live = || {
+                        faces
+                            .clone()
+                            .filter(|t| mesh.triangles[t.index()].is_some())
+                    };
+                    let mut meeting = live().filter(|t| {
+                        let other = mesh.triangle(*t);
+                        triangles_intersect(
+                            triangle,
+                            &mesh.corners(triangle),
+                            other,
+                            &mesh.corners(other),
+                        )
+                    });
+                    let except: Vec<FaceId> = meeting.by_ref().take(skipped).collect();
+                    let first = meeting.next();
+                    assert_eq!(mesh.first_intersecting(triangle, &except), first);
+                    assert_eq!(mesh.intersects(triangle, &except), first.is_some());
+                    seen[usize::from(first.is_some())] += 1;
+                }
+            }
+            assert!(seen.iter().all(|n| *n > 0), "{seen:?}");
+        }
+    }
+}

@@ -116,6 +116,60 @@ mod tests {
         }
     }
 
+    /// Polygons with nothing inside, of which parts of the convex hull are to be left out.
+    #[test]
+    fn what_lies_between_a_polygon_and_its_hull_is_left_out() {
+        let comb = [
+            [0.0, 0.0],
+            [9.0, 0.0],
+            [9.0, 5.0],
+            [7.0, 1.0],
+            [6.0, 6.0],
+            [4.0, 1.0],
+            [3.0, 5.0],
+            [1.0, 1.0],
+            [0.0, 6.0],
+        ];
+        for turn in 0..comb.len() {
+            let mut corners = comb.map(Vec2::from);
+            corners.rotate_left(turn);
+            let triangles = constrained_delaunay(&corners, corners.len()).unwrap();
+            assert_eq!(triangles.len(), corners.len() - 2);
+            let at = |v: u32| corners[v as usize];
+            assert!(triangles.iter().all(|t| doubled_area(t.map(at)) > 0.0));
+            let sum: f64 = triangles.iter().map(|t| doubled_area(t.map(at))).sum();
+            let n = corners.len();
+            let polygon: f64 = (0..n).map(|k| corners[k].perp(&corners[(k + 1) % n])).sum();
+            assert!((sum - polygon).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn coordinates_next_to_zero_count_as_zero() {
+        let tiny = 1e-60;
+        let points = [[tiny, -tiny], [1.0, tiny], [0.0, 1.0], [0.3, 0.3]].map(Vec2::from);
+        let exact = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.3, 0.3]].map(Vec2::from);
+        assert_eq!(
+            constrained_delaunay(&points, 3),
+            constrained_delaunay(&exact, 3)
+        );
+        assert_eq!(constrained_delaunay(&points, 3).unwrap().len(), 3);
+        // What is small but not next to zero keeps its place.
+        let apart = [
+            [0.0, 0.0],
+            [1.0, 0.0],
+            [0.0, 1.0],
+            [1e-30, 1e-30],
+            [1e-30, 2e-30],
+        ];
+        assert_eq!(
+            constrained_delaunay(&apart.map(Vec2::from), 3)
+                .unwrap()
+                .len(),
+            5
+        );
+    }
+
     #[test]
     fn errors_name_the_reason() {
         let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Vec2::from);

@@ -87,8 +87,7 @@ pub(super) fn remove_old_vertices(
     let mut step = 0;
     while let Some(rules) = schedule.get(step) {
         if let Some(demand) = rules.flips {
-            let turn = step % MAX_FLIP_ROUNDS;
-            flip_round(mesh, &removal.remaining, demand, turn, monitor)?;
+            flip_round(mesh, &removal.remaining, demand, step, monitor)?;
         }
         let before = removal.remaining.len();
         removal.run_round(mesh, *rules, monitor)?;
@@ -148,10 +147,8 @@ impl Removal {
         self.round += 1;
         self.remaining.sort_by_cached_key(|&v| (mesh.valence(v), v));
         let mut remaining = Vec::new();
-        for (count, v) in std::mem::take(&mut self.remaining).into_iter().enumerate() {
-            if count % 64 == 0 {
-                monitor.check()?;
-            }
+        for v in std::mem::take(&mut self.remaining) {
+            monitor.check()?;
             let waits = self.touched[v.index()] == self.round
                 || (!rules.any_valence && mesh.valence(v) > HIGH_VALENCE);
             if waits || !self.remove(mesh, v, rules.demand) {
@@ -190,7 +187,8 @@ impl Removal {
 }
 
 /// Flips one edge near every stuck vertex, if possible. In odd rounds (`turn`) other edges than
-/// the spokes come first, so that the same edges are not flipped back and forth.
+/// the spokes come first, chords and rim by turns, so that the same edges are not flipped back and
+/// forth.
 fn flip_round(
     mesh: &mut Patchwork,
     stuck: &[VertexId],
@@ -295,67 +293,4 @@ impl EdgeFlip {
 }
 
 #[cfg(test)]
-#[allow(
-    clippy::unwrap_used,
-    reason = "tests state their expectations by panicking"
-)]
-mod tests {
-    use super::super::mutual::mutual_tessellation;
-    use super::super::test_surfaces::scattered;
-    use super::*;
-    use crate::mesh::shapes;
-    use std::collections::BTreeSet;
-
-    /// On a surface on which every hole can be closed, a round removes the vertices that the rule
-    /// names: in ascending order of valence, then number, each unless a neighbour went before.
-    #[test]
-    fn a_round_removes_the_vertices_of_lowest_valence_first() {
-        let surface = shapes::icosphere(30.0, 3);
-        // Many, so that some old vertices have too many neighbours for the first rounds.
-        let points = scattered(&surface, 1500, 7);
-        let triangles =
-            mutual_tessellation(&surface.vertices, &surface.triangles, &points).unwrap();
-        let positions: Vec<Vec3> = points
-            .iter()
-            .map(|p| p.position(&surface.vertices, &surface.triangles))
-            .chain(surface.vertices.iter().copied())
-            .collect();
-        let mut mesh = Patchwork::new(positions, triangles, 5.0);
-        let old: Vec<VertexId> = VertexId::first(mesh.positions.len())
-            .skip(points.len())
-            .collect();
-
-        let mut order = old.clone();
-        order.sort_by_key(|&v| (mesh.valence(v), v));
-        let valences: BTreeSet<usize> = old.iter().map(|&v| mesh.valence(v)).collect();
-        assert!(valences.len() > 4, "{valences:?}");
-        assert!(valences.contains(&HIGH_VALENCE), "{valences:?}");
-        assert!(valences.iter().any(|v| *v > HIGH_VALENCE), "{valences:?}");
-        let (mut expected, mut waiting) = (Vec::new(), BTreeSet::new());
-        for v in order {
-            if !waiting.contains(&v) && mesh.valence(v) <= HIGH_VALENCE {
-                waiting.extend(mesh.star(v).ring);
-                expected.push(v);
-            }
-        }
-        // Under another order other vertices go first.
-        assert!(expected.len() < old.len() - 50);
-
-        let mut removal = Removal {
-            remaining: old.clone(),
-            attempts_left: 1000,
-            round: 0,
-            touched: vec![0; mesh.positions.len()],
-            failures: BTreeMap::new(),
-        };
-        let rules = schedule()[0];
-        removal
-            .run_round(&mut mesh, rules, &Monitor::silent())
-            .unwrap();
-        assert!(removal.failures.is_empty());
-        let left: BTreeSet<VertexId> = removal.remaining.into_iter().collect();
-        let gone: Vec<VertexId> = old.into_iter().filter(|v| !left.contains(v)).collect();
-        expected.sort_unstable();
-        assert_eq!(gone, expected);
-    }
-}
+mod tests;

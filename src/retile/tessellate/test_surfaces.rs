@@ -97,6 +97,25 @@ pub(super) fn squeezed(mesh: &TriMesh, scales: [f64; 3]) -> TriMesh {
     changed
 }
 
+/// A tetrahedron in which `n` times a random triangle was replaced by a flat pyramid over it: a sphere with vertices
+/// of valence 3 and with edges between vertices of one ring that lie outside its star.
+pub(super) fn stacked(n: usize, seed: u64) -> TriMesh {
+    let mut rng = stream(seed, Purpose::PhantomShape);
+    let mut mesh = shapes::tetrahedron(30.0);
+    for _ in 0..n {
+        let t = rng.random_range(0..mesh.triangles.len());
+        let [a, b, c] = mesh.triangles[t];
+        let top = mesh.vertices.len() as u32;
+        let corners = mesh.corners(t);
+        let raised = mesh.area_normal(t) * 0.02 / mesh.area_normal(t).norm().sqrt();
+        let middle: Vec3 = corners.iter().sum::<Vec3>() / 3.0;
+        mesh.vertices.push(middle + raised);
+        mesh.triangles[t] = [a, b, top];
+        mesh.triangles.extend([[b, c, top], [c, a, top]]);
+    }
+    mesh
+}
+
 #[test]
 fn the_test_surfaces_have_the_properties_they_are_named_for() {
     use crate::mesh::{intersections::self_intersections, topology};
@@ -105,4 +124,9 @@ fn the_test_surfaces_have_the_properties_they_are_named_for() {
     assert!(self_intersections(&double_torus()).is_empty());
     let rough = jittered(&shapes::icosphere(30.0, 3), 0.8, 0);
     assert!(self_intersections(&rough).is_empty());
+    for seed in 0..5 {
+        let stacked = stacked(20, seed);
+        assert_eq!(topology::check(&stacked).unwrap().genus(), 0);
+        assert!(self_intersections(&stacked).is_empty());
+    }
 }
