@@ -659,4 +659,167 @@ mod tests {
         assert_eq!(cells.labels[place], 8);
         assert!(cells.labels.iter().all(|label| *label < 12));
     }
+
+    /// Lloyd's relaxation by its definition: every sample to the nearest site around it, every site to the centroid
+    /// of its cell; before the last ten rounds with momentum.
+    fn relaxed_by_definition(
+        samples: &WeightedSamples,
+        weights: &[f64],
+        mut cells: Cells,
+        (rounds, exact): (usize, usize),
+    ) -> Cells {
+        let patches = Patches::new(samples, weights);
+        let mut velocities = vec![Vec3::zeros(); cells.sites.len()];
+        for round in 0..rounds {
+            let nearest = |v: usize| match nearest_site(samples, &cells.labels, &cells.sites, v) {
+                UNASSIGNED => cells.labels[v],
+                site => site,
+            };
+            cells.labels = (0..samples.len()).map(nearest).collect();
+            let left = rounds - round;
+            let centroids = if left <= exact {
+                let exact = patches.centroids(&cells.labels, &cells.sites);
+                exact
+                    .into_iter()
+                    .map(|c| c.expect("no cell is empty"))
+                    .collect()
+            } else {
+                cells.centroids(&samples.working, weights)
+            };
+            for (site, centroid) in centroids.into_iter().enumerate() {
+                let way = centroid - cells.sites[site];
+                velocities[site] = if left > COOLING_ROUNDS {
+                    velocities[site] * MOMENTUM + way * STEP
+                } else {
+                    way
+                };
+                cells.sites[site] += velocities[site];
+            }
+        }
+        cells
+    }
+
+    #[test]
+    fn relaxation_is_that_of_lloyd_with_momentum_until_it_cools() {
+        let mesh = shapes::torus(30.0, 12.0, 60, 30);
+        let samples = WeightedSamples::new(&mesh.vertices, &mesh.vertices, &mesh.triangles, 0);
+        let weights: Vec<f64> = (samples.area.iter().zip(&samples.working))
+            .map(|(area, p)| area * (1.0 + p.x / 60.0))
+            .collect();
+        let seeds: Vec<u32> = (0..40).map(|k| k * 45).collect();
+        let start = Cells::grow(&samples, &seeds);
+        for rounds in [(1, 0), (1, 1), (4, 2), (10, 0), (11, 3), (13, 13), (20, 7)] {
+            let mut cells = start.clone();
+            let done = cells.relax(&samples, &weights, rounds, &Monitor::silent());
+            assert_eq!(done, Ok(rounds.0));
+            let expected = relaxed_by_definition(&samples, &weights, start.clone(), rounds);
+            assert_eq!(cells.labels, expected.labels);
+            for (found, expected) in cells.sites.iter().zip(&expected.sites) {
+                assert!((found - expected).norm() < 1e-6, "{rounds:?}");
+            }
+        }
+    }
+
+    /// The cells of an icosahedron's corners stay as they are, so their sites come to rest early: then within a small
+    /// part of the spacing of the centroids.
+    #[test]
+    fn relaxation_ends_when_the_sites_rest_at_their_centroids() {
+        let samples = ball();
+        let mut cells = cells(&samples);
+        let silent = Monitor::silent();
+        let rounds = cells
+            .relax(&samples, &samples.area, (300, 300), &silent)
+            .unwrap();
+        assert!((5..290).contains(&rounds), "{rounds}");
+        let area: f64 = samples.area.iter().sum();
+        let spacing = (area / 12.0).sqrt();
+        let off = |cells: &Cells| {
+            let centroids =
+                Patches::new(&samples, &samples.area).centroids(&cells.labels, &cells.sites);
+            let ways = centroids.iter().zip(&cells.sites);
+            let squares: f64 = ways.map(|(c, s)| (c.unwrap() - s).norm_squared()).sum();
+            (squares / 12.0).sqrt()
+        };
+        // The last step may have been carried on by its momentum.
+        assert!(off(&cells) < 0.05 * spacing, "{}", off(&cells) / spacing);
+        // Without momentum the sites end at their centroids.
+        while cells.relax(&samples, &samples.area, (10, 10), &silent) == Ok(10) {}
+        assert!(off(&cells) < SETTLED * spacing);
+        assert_eq!(
+            cells.relax(&samples, &samples.area, (10, 10), &silent),
+            Ok(1)
+        );
+    }
+
+    #[test]
+    fn relaxation_can_be_cancelled_and_fills_cells_that_are_empty() {
+        let samples = ball();
+        let mut cells = cells(&samples);
+        for label in &mut cells.labels {
+            if *label == 6 {
+                *label = 2;
+            }
+        }
+        cells.sites[6] = Vec3::new(500.0, 0.0, 0.0);
+        cells
+            .relax(&samples, &samples.area, (30, 10), &Monitor::silent())
+            .unwrap();
+        assert!((0..12).all(|site| cells.labels.contains(&site)));
+        assert!(cells.sites.iter().all(|s| s.norm() < 11.0));
+        let token = crate::progress::CancelToken::new();
+        token.cancel();
+        let monitor = Monitor::new(&crate::progress::Silent, token);
+        assert_eq!(
+            cells.relax(&samples, &samples.area, (30, 10), &monitor),
+            Err(Cancelled)
+        );
+    }
+
+    /// Samples are connected if a path within their cell joins them.
+    #[test]
+    fn parts_of_cells_are_told_apart() {
+        let samples = ball();
+        let labels: Vec<u32> = samples
+            .working
+            .iter()
+            .map(|p| u32::from(p.z.abs() < 5.0))
+            .collect();
+        let parts = connected_parts(&samples, &labels);
+        for (v, p) in samples.working.iter().enumerate() {
+            for (w, q) in samples.working.iter().enumerate() {
+                let same = labels[v] == labels[w] && (labels[v] == 1 || p.z * q.z > 0.0);
+                assert_eq!(parts[v] == parts[w], same);
+            }
+        }
+        assert_eq!(parts.iter().max(), Some(&2));
+    }
+
+    #[test]
+    fn a_transplanted_site_leaves_its_samples_to_the_cells_around_it() {
+        let samples = ball();
+        let mut cells = cells(&samples);
+        let before = cells.labels.clone();
+        let beside: std::collections::BTreeSet<u32> = (0..samples.len())
+            .filter(|v| before[*v] == 8)
+            .flat_map(|v| samples.around(v).iter().map(|n| before[*n as usize]))
+            .collect();
+        cells.transplant(&samples, 8, 2);
+        let taken: Vec<usize> = (0..samples.len())
+            .filter(|v| cells.labels[*v] == 8)
+            .collect();
+        assert_eq!(taken.len(), 1);
+        assert_eq!(before[taken[0]], 2);
+        for v in 0..samples.len() {
+            match before[v] {
+                8 => assert!(cells.labels[v] != 8 && beside.contains(&cells.labels[v])),
+                label => assert!(cells.labels[v] == label || v == taken[0]),
+            }
+        }
+        // A site without a cell to go to stays where it is.
+        let mut empty = self::cells(&samples);
+        empty.labels.iter_mut().for_each(|l| *l %= 11);
+        let kept = empty.labels.clone();
+        empty.transplant(&samples, 3, 11);
+        assert_eq!(empty.labels, kept);
+    }
 }

@@ -243,7 +243,7 @@ impl Polygon {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes;
+    use crate::mesh::{TriMesh, shapes};
 
     /// The nearest site of every sample on a sphere.
     fn nearest(samples: &WeightedSamples, sites: &[Vec3]) -> Vec<u32> {
@@ -313,5 +313,100 @@ mod tests {
         let labels = nearest(&samples, &sites);
         let centroids = Patches::new(&samples, &samples.area).centroids(&labels, &sites);
         assert!(centroids[0].is_some() && centroids[1].is_some() && centroids[2].is_none());
+    }
+
+    /// A plane across a triangle, in any order of its corners: each site gets the area nearer to it.
+    #[test]
+    fn a_triangle_is_shared_out_along_the_bisecting_planes() {
+        let places =
+            [[0.0, 0.0], [6.0, 0.0], [1.0, 5.0]].map(|[x, y]: [f64; 2]| Vec3::new(x, y, 0.3 * x));
+        let mesh = TriMesh {
+            vertices: places.to_vec(),
+            triangles: vec![[0, 1, 2], [0, 2, 1]],
+        };
+        let samples = WeightedSamples::new(&mesh.vertices, &mesh.vertices, &mesh.triangles, 0);
+        let density = [1.0, 2.0, 4.5];
+        let weights: Vec<f64> = (0..3).map(|v| samples.area[v] * density[v]).collect();
+        let patches = Patches::new(&samples, &weights);
+        let sites = [
+            Vec3::new(1.0, 0.5, -1.0),
+            Vec3::new(5.0, 0.7, 2.0),
+            Vec3::new(1.5, 4.0, 1.0),
+        ];
+        for labels in [
+            [0, 1, 2],
+            [2, 0, 1],
+            [0, 0, 1],
+            [0, 1, 0],
+            [1, 0, 0],
+            [2, 2, 2],
+            [1, 2, 2],
+        ] {
+            // Only where every corner lies nearest to its own of the sites in question.
+            let own: Vec<Vec3> = labels.iter().map(|l: &u32| sites[*l as usize]).collect();
+            let mut moved = sites;
+            for v in 0..3 {
+                // Each site is drawn towards its corners.
+                let corners: Vec<usize> = (0..3).filter(|w| labels[*w] == labels[v]).collect();
+                let mean = corners.iter().map(|w| places[*w]).sum::<Vec3>() / corners.len() as f64;
+                moved[labels[v] as usize] = mean * 0.8 + own[v] * 0.2;
+            }
+            let mut sums = vec![Moment::zero(); 3];
+            patches.share(0, &labels, &moved, &mut sums);
+            // By many small parts of the triangle.
+            let whole = area_normal(&places[0], &places[1], &places[2]).norm();
+            let (mut masses, mut firsts) = ([0.0; 3], [Vec3::zeros(); 3]);
+            let n = 300;
+            let mut parts = 0.0;
+            for i in 0..n {
+                for j in 0..n - i {
+                    let third = 1.0 / 3.0;
+                    let (u, v) = (
+                        (f64::from(i) + third) / f64::from(n),
+                        (f64::from(j) + third) / f64::from(n),
+                    );
+                    let p = places[0] * (1.0 - u - v) + places[1] * u + places[2] * v;
+                    let nearest = labels.iter().min_by(|a, b| {
+                        let distance = |l: &u32| (moved[*l as usize] - p).norm();
+                        distance(a).total_cmp(&distance(b))
+                    });
+                    let site = *nearest.unwrap() as usize;
+                    masses[site] += 1.0;
+                    firsts[site] += p;
+                    parts += 1.0;
+                }
+            }
+            let mass: f64 = whole * density.iter().sum::<f64>();
+            for site in 0..3 {
+                assert!(
+                    (sums[site].mass / mass - masses[site] / parts).abs() < 0.01,
+                    "{labels:?}"
+                );
+                let moment = firsts[site] * (mass / parts);
+                assert!(
+                    (sums[site].first - moment).norm() < 0.03 * mass,
+                    "{labels:?}"
+                );
+            }
+            let total: f64 = sums.iter().map(|s| s.mass).sum();
+            assert!((total / mass - 1.0).abs() < 1e-12);
+        }
+    }
+
+    /// On the way between two points: at the plane both sites are equally far; off it, in the share of the sides.
+    #[test]
+    fn a_plane_is_crossed_where_both_sites_are_equally_far() {
+        let (own, other) = (Vec3::new(1.0, 2.0, 0.5), Vec3::new(4.0, -1.0, 1.5));
+        let plane = Bisector::new(&own, &other);
+        let (p, q) = (Vec3::new(0.0, 3.0, 0.0), Vec3::new(6.0, -2.0, 2.0));
+        let share = plane.crossing(&p, &q);
+        let at = p + (q - p) * share;
+        assert!(((at - own).norm() - (at - other).norm()).abs() < 1e-12);
+        // Points on the wrong side count as on the plane.
+        assert_eq!(plane.crossing(&q, &q), 0.0);
+        assert_eq!(plane.crossing(&p, &p), 1.0);
+        let middle = (own + other) / 2.0;
+        assert_eq!(plane.crossing(&middle, &middle), 0.5);
+        assert!(plane.side(&own) > 0.0 && plane.side(&other) < 0.0);
     }
 }

@@ -334,6 +334,8 @@ fn validate(parameters: &RetileParameters) -> Result<(), RetileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::shapes;
+    use crate::surface::from_mesh;
 
     fn check(change: impl FnOnce(&mut RetileParameters)) -> Result<(), RetileError> {
         let mut parameters = RetileParameters::default();
@@ -401,5 +403,74 @@ mod tests {
             }
         }
         assert_eq!(refused(&|p| p.adaptive = f64::NAN), Some("adaptive"));
+    }
+
+    /// The numbers tried are doubled from the least that the topology needs, or from one more than was asked for.
+    #[test]
+    fn a_sufficient_number_is_searched_by_doubling() {
+        let ring = from_mesh(shapes::torus(9.0, 3.0, 12, 6), 1.0).unwrap();
+        let search = |points: usize, enough: usize| {
+            let tried = std::cell::RefCell::new(Vec::new());
+            let parameters = RetileParameters {
+                points,
+                seed: 5,
+                ..RetileParameters::default()
+            };
+            let outcome = too_few(&ring, &parameters, |larger| {
+                tried.borrow_mut().push(larger.points);
+                let points = larger.points;
+                let same = RetileParameters {
+                    points,
+                    ..parameters.clone()
+                };
+                assert_eq!(*larger, same);
+                Ok(points >= enough)
+            });
+            (outcome, tried.into_inner())
+        };
+        let (outcome, tried) = search(4, 25);
+        assert_eq!(tried, [7, 14, 28]);
+        assert_eq!(
+            outcome,
+            RetileError::TooFewPoints {
+                points: 4,
+                needed: 28
+            }
+        );
+        assert_eq!(search(20, 0).1, [21]);
+        // Up to LEAST_TRIED, or to a multiple of the first number if that is more, but never beyond MOST_POINTS.
+        for (points, most) in [
+            (20, LEAST_TRIED),
+            (399, NEEDED_FACTOR * 400),
+            (4999, MOST_POINTS),
+        ] {
+            let (outcome, tried) = search(points, usize::MAX);
+            let doubled = tried.windows(2).all(|pair| pair[1] == 2 * pair[0]);
+            let last = tried[tried.len() - 1];
+            assert!(doubled && tried[0] == points + 1);
+            assert!(last <= most && 2 * last > most, "{last}");
+            assert_eq!(
+                outcome,
+                RetileError::NotCarried {
+                    points,
+                    tried: last
+                }
+            );
+        }
+        let parameters = RetileParameters::default();
+        let stopped = too_few(&ring, &parameters, |_| Err(Cancelled.into()));
+        assert_eq!(stopped, RetileError::Cancelled(Cancelled));
+    }
+
+    #[test]
+    fn surfaces_without_a_finite_area_are_refused() {
+        let ball = shapes::icosphere(1.0, 1);
+        for size in [0.0, 1e200] {
+            let mut mesh = ball.clone();
+            mesh.vertices.iter_mut().for_each(|v| *v *= size);
+            let surface = from_mesh(mesh, 1.0).unwrap();
+            let outcome = retile(&surface, &RetileParameters::default(), &Monitor::silent());
+            assert_eq!(outcome.unwrap_err(), RetileError::NoArea);
+        }
     }
 }

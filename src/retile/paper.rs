@@ -224,3 +224,146 @@ fn refusal(run: &PaperRun, last: Option<TessellateError>) -> RetileError {
         }),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{FaceId, shapes};
+    use crate::surface::from_mesh;
+
+    fn ball() -> Surface {
+        from_mesh(shapes::icosphere(20.0, 2), 1.0).expect("closed")
+    }
+
+    fn parameters(repeats: usize) -> RetileParameters {
+        RetileParameters {
+            points: 40,
+            repulsion_iterations: 4,
+            repeats,
+            ..RetileParameters::default()
+        }
+    }
+
+    #[test]
+    fn the_mean_radius_ratio_is_that_of_all_triangles() {
+        assert!((mean_radius_ratio(&shapes::icosphere(3.0, 0)) - 1.0).abs() < 1e-12);
+        let mut mesh = shapes::tetrahedron(1.0);
+        mesh.vertices[0] *= 3.0;
+        let ratios = [0, 1, 2, 3].map(|t| {
+            let [a, b, c] = mesh.corners(t);
+            let sides = [(a - b).norm(), (b - c).norm(), (c - a).norm()];
+            let half = sides.iter().sum::<f64>() / 2.0;
+            let area = mesh.area_normal(t).norm() / 2.0;
+            let (inscribed, circumscribed) =
+                (area / half, sides.iter().product::<f64>() / 4.0 / area);
+            2.0 * inscribed / circumscribed
+        });
+        assert!((mean_radius_ratio(&mesh) - ratios.iter().sum::<f64>() / 4.0).abs() < 1e-12);
+    }
+
+    /// All repetitions one after the other, and when and with which of them the procedure ends by its rules.
+    #[test]
+    fn the_procedure_is_repeated_until_the_triangles_no_longer_improve() {
+        let surface = ball();
+        let mut ended = [0; 2];
+        for seed in 0..6 {
+            let parameters = RetileParameters {
+                seed,
+                repulsion_iterations: 4 + 6 * (seed % 2) as usize,
+                ..parameters(14)
+            };
+            let monitor = Monitor::silent();
+            let run = PaperRun::new(&surface, &parameters, &monitor).unwrap();
+            let start = spread(&run, 40, 0).unwrap();
+            let mut meshes = vec![(start.clone(), join(&run, &start).unwrap())];
+            let mut points = start.clone();
+            for _ in 0..14 {
+                push_apart(&run, &mut points, |_| Ok(())).unwrap();
+                meshes.push((points.clone(), join(&run, &points).unwrap()));
+            }
+            let ratios: Vec<f64> = meshes.iter().map(|m| mean_radius_ratio(&m.1)).collect();
+            let best_until = |n: usize| ratios[..=n].iter().copied().fold(0.0, f64::max);
+            let mut risen = 0;
+            let mut expected = 14;
+            for n in 1..=14 {
+                if best_until(n) > best_until(risen) * (1.0 + LEAST_RISE) {
+                    risen = n;
+                } else if n == risen + PATIENCE {
+                    expected = n;
+                    break;
+                }
+            }
+            let best = repeat(&run, start, meshes[0].1.clone()).unwrap();
+            assert_eq!(best.repeats, expected, "{ratios:?}");
+            assert_eq!(best.ratio, best_until(expected));
+            let which = ratios.iter().position(|r| *r == best.ratio).unwrap();
+            assert_eq!(
+                (&best.points, &best.mesh),
+                (&meshes[which].0, &meshes[which].1)
+            );
+            ended[usize::from(expected < 14)] += 1;
+        }
+        assert!(ended[1] > 1, "{ended:?}");
+    }
+
+    #[test]
+    fn what_was_done_is_counted() {
+        let surface = ball();
+        for repeats in [0, 2] {
+            let tiled = retile(&surface, &parameters(repeats), &Monitor::silent()).unwrap();
+            assert_eq!(tiled.facts.repeats, repeats);
+            assert_eq!((tiled.facts.repulsion_rounds, tiled.facts.attempts), (4, 1));
+            assert_eq!((tiled.mesh.vertices.len(), tiled.sizing.len()), (40, 40));
+        }
+        let one = attempt(&surface, &parameters(1), 1, &Monitor::silent()).unwrap();
+        assert_eq!(one.unwrap().mesh.vertices.len(), 40);
+    }
+
+    #[test]
+    fn every_attempt_has_points_of_its_own() {
+        let (surface, parameters, monitor) = (ball(), parameters(0), Monitor::silent());
+        let run = PaperRun::new(&surface, &parameters, &monitor).unwrap();
+        let spread = |attempt| spread(&run, 40, attempt).unwrap();
+        assert_eq!(spread(1), spread(1));
+        assert!(spread(0) != spread(1) && spread(1) != spread(2));
+        let other = RetileParameters {
+            seed: 2,
+            ..parameters.clone()
+        };
+        let other = PaperRun::new(&surface, &other, &monitor).unwrap();
+        assert!(super::spread(&other, 40, 0).unwrap() != spread(1));
+    }
+
+    #[test]
+    fn the_refusal_says_what_the_last_seed_failed_at() {
+        let (surface, parameters, monitor) = (ball(), parameters(0), Monitor::silent());
+        let run = PaperRun::new(&surface, &parameters, &monitor).unwrap();
+        let mesh = shapes::cup(60.0, 30.0, 9.0, 12);
+        let error = TessellateError::SelfIntersecting {
+            pairs: vec![[FaceId(7), FaceId(9)], [FaceId(8), FaceId(11)]],
+            mesh: Box::new(mesh.clone()),
+        };
+        let RetileError::SelfIntersecting { points, place } = refusal(&run, Some(error)) else {
+            panic!("the mesh intersects itself");
+        };
+        let middle = mesh.corners(7).iter().sum::<crate::geometry::Vec3>() / 3.0;
+        assert_eq!(points, 40);
+        assert!((middle - crate::geometry::Vec3::from(place)).norm() < 1e-9);
+        let defect = crate::mesh::topology::MeshDefect::UnusedVertex {
+            vertex: crate::mesh::VertexId(4),
+        };
+        assert_eq!(
+            refusal(&run, Some(TessellateError::OpenSurface(defect))),
+            RetileError::OpenSurface(defect)
+        );
+        let stuck = TessellateError::Stuck {
+            vertices: Vec::new(),
+        };
+        for last in [None, Some(stuck)] {
+            let RetileError::TooFewPoints { points, needed } = refusal(&run, last) else {
+                panic!("a ball can be tiled");
+            };
+            assert_eq!((points, needed), (40, 41));
+        }
+    }
+}

@@ -85,4 +85,61 @@ mod tests {
         assert_eq!(points, draw(7));
         assert_ne!(points, draw(8));
     }
+
+    /// On the upper half the points are wanted half as far apart: four times as many lie there.
+    #[test]
+    fn points_are_as_dense_as_the_spacing_asks_for() {
+        let mesh = shapes::icosphere(10.0, 3);
+        let domain = Domain::new(mesh.vertices.clone(), mesh.triangles.clone()).unwrap();
+        let spacing: Vec<f64> = (mesh.vertices.iter())
+            .map(|p| if p.z > 0.0 { 1.0 } else { 2.0 })
+            .collect();
+        let points = place(&mesh, &domain, &spacing, 4000, 3);
+        let corners =
+            |p: &SurfacePoint| mesh.triangles[p.triangle.index()].map(|v| spacing[v as usize]);
+        let dense = points.iter().filter(|p| corners(p) == [1.0; 3]).count();
+        let sparse = points.iter().filter(|p| corners(p) == [2.0; 3]).count();
+        let area = |h: f64| -> f64 {
+            let own = (0..mesh.triangles.len())
+                .filter(|t| mesh.triangles[*t].iter().all(|v| spacing[*v as usize] == h));
+            own.map(|t| mesh.area_normal(t).norm()).sum()
+        };
+        let ratio = dense as f64 / sparse as f64 * area(2.0) / area(1.0);
+        // Its relative standard deviation is 4 %.
+        assert!((ratio / 4.0 - 1.0).abs() < 0.15, "{ratio}");
+    }
+
+    /// Uniform points in a triangle have coordinates of mean 1/3 and mean square 1/6.
+    #[test]
+    fn points_are_uniform_within_their_triangles() {
+        let mesh = shapes::tetrahedron(10.0);
+        let domain = Domain::new(mesh.vertices.clone(), mesh.triangles.clone()).unwrap();
+        let points = place(&mesh, &domain, &[1.0; 4], 6000, 5);
+        for k in 0..3 {
+            let mean = |f: &dyn Fn(&[f64; 3]) -> f64| {
+                points.iter().map(|p| f(&p.barycentric)).sum::<f64>() / points.len() as f64
+            };
+            assert!((mean(&|b| b[k]) - 1.0 / 3.0).abs() < 0.015);
+            assert!((mean(&|b| b[k] * b[k]) - 1.0 / 6.0).abs() < 0.015);
+            assert!((mean(&|b| b[k] * b[(k + 1) % 3]) - 1.0 / 12.0).abs() < 0.01);
+        }
+        let on = |t: usize| points.iter().filter(|p| p.triangle.index() == t).count();
+        assert!((0..4).all(|t| on(t).abs_diff(1500) < 140));
+    }
+
+    #[test]
+    fn every_component_gets_points_by_its_area() {
+        let mut mesh = shapes::icosphere(10.0, 2);
+        let small = shapes::icosphere(5.0, 2);
+        let first = mesh.vertices.len() as u32;
+        mesh.vertices
+            .extend(small.vertices.iter().map(|v| v.add_scalar(30.0)));
+        mesh.triangles
+            .extend(small.triangles.iter().map(|t| t.map(|v| v + first)));
+        let domain = Domain::new(mesh.vertices.clone(), mesh.triangles.clone()).unwrap();
+        let points = place(&mesh, &domain, &vec![1.0; mesh.vertices.len()], 200, 2);
+        assert_eq!(points.len(), 200);
+        let on_small = points.iter().filter(|p| p.triangle.index() >= 320).count();
+        assert_eq!(on_small, 40);
+    }
 }

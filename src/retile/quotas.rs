@@ -84,4 +84,38 @@ mod tests {
         assert_eq!(share(&mesh, &[0.001, 1000.0], 50), vec![4, 46]);
         assert_eq!(share(&mesh, &[1.0, 1.0], 11), vec![4, 7]);
     }
+
+    /// Of V vertices every two may be joined once, and a triangulation has 3 (V - χ) edges. Genus 2 is the one
+    /// exception.
+    #[test]
+    fn the_least_number_of_vertices_has_enough_pairs_for_the_edges() {
+        for genus in 0..40i64 {
+            let euler = 2 - 2 * genus;
+            let fits = |v: &i64| 3 * (v - euler) <= v * (v - 1) / 2;
+            let fewest = (4..).find(fits).unwrap() as usize;
+            let expected = if genus == 2 { fewest + 1 } else { fewest };
+            assert_eq!(least_vertices(euler), expected, "{genus}");
+        }
+    }
+
+    #[test]
+    fn shares_add_up_and_differ_from_the_fair_ones_by_less_than_one_point() {
+        let mesh = with_torus(shapes::icosphere(1.0, 0));
+        for points in 12..120 {
+            for part in [0.01, 0.2, 0.37, 0.5, 0.9, 0.999] {
+                let found = share(&mesh, &[part * 7.0, (1.0 - part) * 7.0], points);
+                assert_eq!(found.iter().sum::<usize>(), points);
+                let fair = part * points as f64;
+                match found[..] {
+                    [4, _] => assert!(fair < 5.0, "{fair}"),
+                    [_, 7] => assert!(points as f64 - fair < 8.0, "{fair}"),
+                    [ball, ring] => {
+                        assert!((ball as f64 - fair).abs() < 1.0, "{found:?} {fair}");
+                        assert!(ball > 4 && ring > 7);
+                    }
+                    _ => panic!("{found:?}"),
+                }
+            }
+        }
+    }
 }

@@ -401,6 +401,10 @@ fn sites_of(mesh: &TriMesh, intersecting: &[[FaceId; 2]]) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::bvh::Bvh;
+    use crate::mesh::shapes;
+    use crate::surface::from_mesh;
+    use std::collections::BTreeSet;
 
     #[test]
     fn the_sites_of_intersecting_triangles_are_listed_once() {
@@ -411,5 +415,279 @@ mod tests {
         let pairs = [[FaceId(0), FaceId(3)], [FaceId(0), FaceId(1)]];
         assert_eq!(sites_of(&mesh, &pairs), [1, 2, 3, 5, 7]);
         assert!(sites_of(&mesh, &[]).is_empty());
+    }
+
+    /// A ball, and a smaller one beside it.
+    fn two_balls() -> Surface {
+        let mut both = shapes::icosphere(20.0, 2);
+        let small = shapes::icosphere(6.0, 2);
+        let first = both.vertices.len() as u32;
+        let moved = small.vertices.iter().map(|v| v + Vec3::x() * 40.0);
+        both.vertices.extend(moved);
+        let renamed = small.triangles.iter().map(|t| t.map(|v| v + first));
+        both.triangles.extend(renamed);
+        from_mesh(both, 1.0).expect("closed")
+    }
+
+    fn even(points: usize) -> RetileParameters {
+        RetileParameters {
+            points,
+            adaptive: 0.0,
+            ..RetileParameters::default()
+        }
+    }
+
+    /// On the small ball the points are wanted half as far apart.
+    #[test]
+    fn every_component_gets_seeds_by_its_area_and_spacing() {
+        let (surface, parameters) = (two_balls(), even(90));
+        let mut run = RefinedRun::new(&surface, &parameters);
+        let mut load = [0.0; 2];
+        for v in 0..run.samples.len() {
+            let c = run.components[v] as usize;
+            run.spacing[v] = if c == 1 { 0.5 } else { 1.0 };
+            load[c] += run.samples.area[v] * if c == 1 { 4.0 } else { 1.0 };
+        }
+        let fair = 90.0 * load[1] / (load[0] + load[1]);
+        for start in 0..3 {
+            let seeds = run.seeds(start);
+            assert_eq!(seeds.iter().collect::<BTreeSet<_>>().len(), 90);
+            let small = seeds
+                .iter()
+                .filter(|v| run.components[**v as usize] == 1)
+                .count();
+            assert!((small as f64 - fair).abs() < 1.0, "{small} {fair}");
+            assert_eq!(seeds, run.seeds(start));
+            assert_ne!(seeds, run.seeds(start + 1));
+        }
+    }
+
+    /// Half the spacing is four times the density.
+    #[test]
+    fn seeds_are_as_dense_as_the_spacing_asks_for() {
+        let surface = from_mesh(shapes::icosphere(10.0, 3), 1.0).unwrap();
+        let parameters = even(400);
+        let mut run = RefinedRun::new(&surface, &parameters);
+        let is_upper = |run: &RefinedRun, v: usize| run.samples.working[v].z > 0.0;
+        for v in 0..run.samples.len() {
+            run.spacing[v] = if is_upper(&run, v) { 1.0 } else { 2.0 };
+        }
+        let drawn: Vec<u32> = (0..5).flat_map(|start| run.seeds(start)).collect();
+        let upper = drawn
+            .iter()
+            .filter(|v| is_upper(&run, **v as usize))
+            .count();
+        // Binomial: 1600 of 2000 expected, standard deviation 18.
+        assert!(upper.abs_diff(1600) < 80, "{upper}");
+    }
+
+    #[test]
+    fn the_density_rises_in_crowded_cells_and_those_beside_them() {
+        let (surface, parameters) = (two_balls(), even(60));
+        let run = RefinedRun::new(&surface, &parameters);
+        let cells = Cells::grow(&run.samples, &run.seeds(0));
+        let crowded = [3, 17];
+        let mut weights = run.weights.clone();
+        run.raise_density(&cells, &crowded, &mut weights);
+        let mut raised = BTreeSet::from(crowded);
+        for t in &run.samples.triangles {
+            let labels = t.map(|v| cells.labels[v as usize]);
+            if labels.iter().any(|label| crowded.contains(label)) {
+                raised.extend(labels);
+            }
+        }
+        assert!(raised.len() > 6 && raised.len() < 30, "{}", raised.len());
+        for v in 0..weights.len() {
+            let factor = if raised.contains(&cells.labels[v]) {
+                DENSITY_FACTOR
+            } else {
+                1.0
+            };
+            assert_eq!(weights[v], run.weights[v] * factor);
+        }
+    }
+
+    /// The lightest cell is moved, unless it is crowded, was moved, or its component would keep too few.
+    #[test]
+    fn the_lightest_cell_that_can_be_spared_is_moved() {
+        let surface = two_balls();
+        let mut from_small = [0; 2];
+        for points in [12, 60] {
+            let parameters = even(points);
+            let run = RefinedRun::new(&surface, &parameters);
+            let cells = Cells::grow(&run.samples, &run.seeds(0));
+            // Cells of the small ball are the lightest.
+            let weight = |v: usize| {
+                let share = if run.components[v] == 1 { 1e-3 } else { 1.0 };
+                share * (1.5 + (v as f64).sin())
+            };
+            let weights: Vec<f64> = (0..run.samples.len()).map(weight).collect();
+            let ball = |site: u32| {
+                let v = cells.labels.iter().position(|label| *label == site);
+                run.components[v.unwrap()]
+            };
+            let load = |site: u32| -> f64 {
+                let of_site = (0..weights.len()).filter(|v| cells.labels[*v] == site);
+                of_site.map(|v| weights[v]).sum()
+            };
+            let mut order: Vec<u32> = (0..points as u32).collect();
+            order.sort_by(|a, b| load(*a).total_cmp(&load(*b)));
+            let on_small = order.iter().filter(|site| ball(**site) == 1).count();
+            let on_big = *order.iter().find(|site| ball(**site) == 0).unwrap();
+            for to in [order[0], on_big] {
+                let mut moved = Vec::new();
+                for crowded in [vec![to], vec![to, order[1], order[5]]] {
+                    for _ in 0..4 {
+                        let spared = |site: u32| {
+                            let least = 4; // A ball needs a tetrahedron.
+                            ball(site) == ball(to) || ball(site) == 0 || on_small > least
+                        };
+                        let expected = order.iter().copied().find(|site| {
+                            !crowded.contains(site) && !moved.contains(site) && spared(*site)
+                        });
+                        let found = run.least_loaded(&cells, &weights, &crowded, to, &moved);
+                        assert_eq!(found, expected);
+                        let Some(found) = found else { break };
+                        from_small[ball(found) as usize] += 1;
+                        moved.push(found);
+                    }
+                }
+            }
+            let all: Vec<u32> = order.clone();
+            assert_eq!(run.least_loaded(&cells, &weights, &all, 0, &[]), None);
+        }
+        assert!(from_small.iter().all(|n| *n > 2), "{from_small:?}");
+    }
+
+    /// Against a search tree over the triangles that each cell touches.
+    #[test]
+    fn vertices_lie_in_their_cells_as_near_to_the_centroids_as_possible() {
+        let surface = from_mesh(shapes::torus(20.0, 8.0, 24, 12), 1.0).unwrap();
+        let parameters = even(40);
+        let run = RefinedRun::new(&surface, &parameters);
+        let cells = Cells::grow(&run.samples, &run.seeds(1));
+        let positions = &run.samples.surface;
+        let centroids = cells.centroids(positions, &run.weights);
+        for (site, vertex) in (0u32..).zip(run.vertices(&cells)) {
+            let mut own = run.samples.triangles.clone();
+            own.retain(|t| t.iter().any(|v| cells.labels[*v as usize] == site));
+            let tree = Bvh::new(positions, &own);
+            let centroid = &centroids[site as usize];
+            let least = tree.closest(centroid).unwrap().squared_distance.sqrt();
+            assert!(((vertex - centroid).norm() - least).abs() < 1e-9);
+            assert!(tree.closest(&vertex).unwrap().squared_distance < 1e-18);
+        }
+    }
+
+    #[test]
+    fn the_sizing_of_a_vertex_is_the_mean_over_its_cell() {
+        let (surface, parameters) = (two_balls(), even(50));
+        let mut run = RefinedRun::new(&surface, &parameters);
+        for (v, h) in run.spacing.iter_mut().enumerate() {
+            *h = 1.0 + 0.5 * (v as f64).sin();
+        }
+        let cells = Cells::grow(&run.samples, &run.seeds(0));
+        for (site, h) in (0u32..).zip(run.sizing(&cells)) {
+            let members = (0..run.spacing.len()).filter(|v| cells.labels[*v] == site);
+            let values: Vec<f64> = members.map(|v| run.spacing[v]).collect();
+            assert!((h * values.len() as f64 - values.iter().sum::<f64>()).abs() < 1e-9);
+        }
+    }
+
+    /// With the density h^-4 the area of a centroidal cell is proportional to h².
+    #[test]
+    fn samples_weigh_as_much_as_their_area_over_the_fourth_power_of_the_spacing() {
+        let surface = from_mesh(shapes::torus(20.0, 8.0, 24, 12), 1.0).unwrap();
+        let parameters = RetileParameters {
+            adaptive: 1.0,
+            adaptive_from: 0.0,
+            ..even(30)
+        };
+        let run = RefinedRun::new(&surface, &parameters);
+        assert!(run.samples.len() >= 30 * SAMPLES_PER_CELL);
+        assert!(run.spacing.iter().any(|h| *h > 1.01));
+        for (v, weight) in run.weights.iter().enumerate() {
+            let (h, area) = (run.spacing[v], run.samples.area[v]);
+            assert!((weight * h * h * h * h - area).abs() < 1e-12 * area.max(1.0));
+        }
+        assert_eq!(run.least, [7]);
+        assert!((run.volumes[0] - surface.mesh.volume()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_ball_is_tiled_at_the_first_attempt() {
+        let surface = from_mesh(shapes::icosphere(20.0, 3), 1.0).unwrap();
+        let tiled = retile(&surface, &even(60), &Monitor::silent()).unwrap();
+        assert_eq!((tiled.mesh.vertices.len(), tiled.facts.attempts), (60, 1));
+        assert!(tiled.facts.relaxation_rounds > 10 && tiled.facts.relaxation_rounds <= 50);
+        assert!(tiled.sizing.iter().all(|h| *h == 1.0));
+        assert!(tiled.facts.warnings.is_empty());
+        assert_eq!(
+            topology::check(&tiled.mesh).unwrap().euler_characteristic,
+            2
+        );
+        // The mesh follows the ball: it loses little of its volume, and is about as large as an even one.
+        let share = tiled.mesh.volume() / surface.mesh.volume();
+        assert!(share > 0.85 && share < 1.0, "{share}");
+    }
+
+    /// Four balls have no mesh of twelve points; the number named in the refusal suffices.
+    #[test]
+    fn a_refusal_names_a_number_that_suffices() {
+        let mut mesh = TriMesh::default();
+        for k in 0..4u32 {
+            let ball = shapes::icosphere(5.0, 1);
+            let first = mesh.vertices.len() as u32;
+            let moved = ball
+                .vertices
+                .iter()
+                .map(|v| v + Vec3::x() * (20.0 * f64::from(k)));
+            mesh.vertices.extend(moved);
+            mesh.triangles
+                .extend(ball.triangles.iter().map(|t| t.map(|v| v + first)));
+        }
+        let surface = from_mesh(mesh, 1.0).unwrap();
+        match retile(&surface, &even(12), &Monitor::silent()) {
+            Err(RetileError::TooFewPoints { points, needed }) => {
+                assert!(points == 12 && needed >= 16, "{needed}");
+                let tiled = retile(&surface, &even(needed), &Monitor::silent()).unwrap();
+                assert_eq!(tiled.mesh.vertices.len(), needed);
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn large_surfaces_are_left_to_the_cells() {
+        let parameters = even(40);
+        for (subdivisions, tried) in [(2, true), (6, false)] {
+            let ball = shapes::icosphere(20.0, subdivisions);
+            assert_eq!(ball.triangles.len() <= PAPER_TRIANGLES, tried);
+            let surface = from_mesh(ball, 1.0).unwrap();
+            let tiled = by_repulsion(&surface, &parameters, 1, &Monitor::silent()).unwrap();
+            assert_eq!(tiled.is_some(), tried);
+        }
+    }
+
+    /// Thin walls need repairs: sites are moved to where cells are too large, and the number of points stays.
+    #[test]
+    fn thin_walls_are_tiled_after_repairs() {
+        let mut repaired = 0;
+        for (wall, points) in [(3.0, 50), (2.0, 70), (1.2, 120)] {
+            let surface = from_mesh(shapes::cup(60.0, 30.0, wall, 36), 1.0).unwrap();
+            let tiled = retile(&surface, &even(points), &Monitor::silent()).unwrap();
+            let facts = &tiled.facts;
+            assert_eq!(tiled.mesh.vertices.len(), points);
+            assert_eq!(topology::check(&tiled.mesh).unwrap().genus(), 0);
+            assert!(self_intersections(&tiled.mesh).is_empty());
+            if facts.attempts > 1 && facts.attempts < REPAIRS {
+                // At most 50 rounds, and 20 after each repair.
+                let most = 50 + SETTLING_ROUNDS * (facts.attempts - 1);
+                let rounds = facts.relaxation_rounds;
+                assert!(rounds > 50 && rounds <= most, "{facts:?}");
+                repaired += 1;
+            }
+        }
+        assert!(repaired > 0);
     }
 }

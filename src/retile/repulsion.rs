@@ -179,8 +179,10 @@ impl<'a> Neighbourhood<'a> {
 )]
 mod tests {
     use super::*;
+    use crate::geometry::Vec3;
     use crate::mesh::shapes;
     use crate::retile::placement;
+    use crate::retile::surface_samples::WeightedSamples;
 
     #[test]
     fn the_force_falls_to_a_tenth() {
@@ -272,5 +274,157 @@ mod tests {
         let listed: Vec<u32> = neighbourhood.on_triangle(FaceId(0)).collect();
         assert_eq!(listed, [0, 1, 2, 3]);
         assert_eq!(neighbourhood.on_triangle(FaceId(1)).count(), 0);
+    }
+
+    /// A regular tetrahedron with edges of 200 mm in 16 384 triangles, and points all over its first side with the
+    /// side's normal.
+    fn points_on_a_side() -> (Domain, Vec<SurfacePoint>, Vec3) {
+        let coarse = shapes::tetrahedron(200.0);
+        let fine =
+            WeightedSamples::new(&coarse.vertices, &coarse.vertices, &coarse.triangles, 8000);
+        let domain = Domain::new(fine.working, fine.triangles).unwrap();
+        let normal = coarse.area_normal(0).normalize();
+        let triangles = domain.half_edges.triangles();
+        let corner = coarse.corners(0)[0];
+        let on_side = |t: &usize| {
+            let corners = triangles[*t].map(|v| domain.vertices[v as usize]);
+            corners
+                .iter()
+                .all(|p| (p - corner).dot(&normal).abs() < 1e-9)
+        };
+        let on_side: Vec<usize> = (0..triangles.len()).filter(on_side).collect();
+        assert_eq!(on_side.len(), triangles.len() / 4);
+        let points = (0..16).map(|k| SurfacePoint {
+            triangle: FaceId::from_index(on_side[k * 251 + 17]),
+            barycentric: [0.2, 0.5, 0.3],
+        });
+        let points = points.collect();
+        (domain, points, normal)
+    }
+
+    /// A step in the frame of a point's triangle as a vector in space.
+    fn in_space(domain: &Domain, p: &SurfacePoint, normal: &Vec3, step: Vec2) -> Vec3 {
+        let [a, b, _] = domain.half_edges.triangles()[p.triangle.index()];
+        let [a, b] = [a, b].map(|v| domain.vertices[v as usize]);
+        let along = (b - a).normalize();
+        along * step.x + normal.cross(&along) * step.y
+    }
+
+    fn position(domain: &Domain, p: &SurfacePoint) -> Vec3 {
+        p.position(&domain.vertices, domain.half_edges.triangles())
+    }
+
+    /// What the points push each other, by definition on a plane; the longest move is half of the radius.
+    fn pushes(places: &[Vec3], radii: &[f64], strength: f64) -> Vec<Vec3> {
+        let push = |p: usize| {
+            let mut step = Vec3::zeros();
+            for q in (0..places.len()).filter(|q| *q != p) {
+                let away = places[p] - places[q];
+                let missing = (radii[p] + radii[q]) / 2.0 - away.norm();
+                step += away.normalize() * (strength * missing.max(0.0));
+            }
+            let limit = radii[p] / 2.0;
+            if step.norm() > limit {
+                step.normalize() * limit
+            } else {
+                step
+            }
+        };
+        (0..places.len()).map(push).collect()
+    }
+
+    #[test]
+    fn points_on_many_triangles_push_each_other_as_on_a_plane() {
+        let (domain, points, normal) = points_on_a_side();
+        let places: Vec<Vec3> = points.iter().map(|p| position(&domain, p)).collect();
+        let spacing: Vec<f64> = domain.vertices.iter().map(|x| 1.0 + x.x / 500.0).collect();
+        let neighbourhood = Neighbourhood::new(&domain, &spacing, &points, 70.0);
+        let radii: Vec<f64> = places.iter().map(|x| 70.0 * (1.0 + x.x / 500.0)).collect();
+        let (mut map, mut capped, mut pushed) = (LogMap::over(&domain), 0, 0);
+        for strength in [0.1, 2.0] {
+            for (p, expected) in pushes(&places, &radii, strength).into_iter().enumerate() {
+                let step = neighbourhood.push(&mut map, p, strength);
+                let step = in_space(&domain, &points[p], &normal, step);
+                assert!((step - expected).norm() < 1e-6, "{p}: {step} {expected}");
+                pushed += usize::from(expected.norm() > 1.0);
+                capped += usize::from(expected.norm() > 0.499 * radii[p]);
+            }
+        }
+        assert!(pushed > 16 && capped > 4, "{pushed} {capped}");
+    }
+
+    /// The radius is two mean spacings, 2√(A/N), and every point moves by its push.
+    #[test]
+    fn a_round_moves_all_points_by_what_they_are_pushed() {
+        let (domain, before, normal) = points_on_a_side();
+        let places: Vec<Vec3> = before.iter().map(|p| position(&domain, p)).collect();
+        let radius = 2.0 * (3f64.sqrt() * 200.0 * 200.0 / before.len() as f64).sqrt();
+        let even = vec![1.0; domain.vertices.len()];
+        for geodesics in [Geodesics::Approximate, Geodesics::Exact] {
+            let parameters = RetileParameters {
+                repulsion_iterations: 1,
+                repulsion_strength: 0.02,
+                geodesics,
+                ..RetileParameters::default()
+            };
+            let mut points = before.clone();
+            repel(&domain, &even, &mut points, &parameters, |_| Ok(())).unwrap();
+            let steps = pushes(&places, &vec![radius; places.len()], 0.02);
+            for (p, (place, step)) in points.iter().zip(places.iter().zip(steps)) {
+                let end = place + step;
+                if (end - places[0]).dot(&normal).abs() < 1e-9 && p.triangle.index() < 4096 {
+                    // Points near the edge of a triangle are moved away from it a little.
+                    assert!((position(&domain, p) - end).norm() < 0.02);
+                }
+                assert!(step.norm() > 0.1, "{}", step.norm());
+            }
+        }
+    }
+
+    #[test]
+    fn every_round_reports_its_share_and_may_be_cancelled() {
+        let mesh = shapes::icosphere(30.0, 2);
+        let domain = Domain::new(mesh.vertices.clone(), mesh.triangles.clone()).unwrap();
+        let even = vec![1.0; mesh.vertices.len()];
+        let parameters = RetileParameters {
+            repulsion_iterations: 4,
+            ..RetileParameters::default()
+        };
+        let start = placement::place(&mesh, &domain, &even, 20, 1);
+        let heard = std::sync::Mutex::new(Vec::new());
+        let mut points = start.clone();
+        let hear = |share: f64| {
+            heard
+                .lock()
+                .expect("no test holds it")
+                .push((share * 100.0) as u32);
+            Ok(())
+        };
+        repel(&domain, &even, &mut points, &parameters, hear).unwrap();
+        let mut heard = heard.into_inner().unwrap();
+        heard.sort_unstable();
+        heard.dedup();
+        assert_eq!(heard, [0, 25, 50, 75]);
+        let stop = |share: f64| if share > 0.4 { Err(Cancelled) } else { Ok(()) };
+        assert_eq!(
+            repel(&domain, &even, &mut points, &parameters, stop),
+            Err(Cancelled)
+        );
+    }
+
+    #[test]
+    fn two_points_at_one_place_do_not_push_each_other() {
+        let (domain, points, _) = points_on_a_side();
+        let even = vec![1.0; domain.vertices.len()];
+        // On a corner, where rounding leaves no distance between them.
+        let twice = [SurfacePoint {
+            triangle: points[3].triangle,
+            barycentric: [1.0, 0.0, 0.0],
+        }; 2];
+        let neighbourhood = Neighbourhood::new(&domain, &even, &twice, 70.0);
+        assert_eq!(
+            neighbourhood.push(&mut LogMap::over(&domain), 0, 0.5),
+            Vec2::zeros()
+        );
     }
 }

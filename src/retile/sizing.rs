@@ -87,7 +87,8 @@ fn curvedness(samples: &WeightedSamples) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes;
+    use crate::geometry::Vec3;
+    use crate::mesh::{TriMesh, shapes};
 
     #[test]
     fn a_sphere_is_evenly_curved_and_a_torus_denser_inside() {
@@ -123,5 +124,133 @@ mod tests {
             let h = spacing(&samples, &parameters, points);
             assert!(h.iter().all(|h| (h - 1.0).abs() < 1e-12));
         }
+    }
+
+    fn on(mesh: &TriMesh) -> WeightedSamples {
+        WeightedSamples::new(&mesh.vertices, &mesh.vertices, &mesh.triangles, 0)
+    }
+
+    fn adapted(adaptive: f64, adaptive_from: f64) -> RetileParameters {
+        RetileParameters {
+            adaptive,
+            adaptive_from,
+            ..RetileParameters::default()
+        }
+    }
+
+    /// Curvedness of a torus at a place.
+    fn exact(p: &Vec3, major: f64, minor: f64) -> f64 {
+        let from_axis = p.xy().norm();
+        let (k1, k2) = (1.0 / minor, (from_axis - major) / minor / from_axis);
+        f64::midpoint(k1 * k1, k2 * k2).sqrt()
+    }
+
+    fn extent(h: &[f64]) -> (f64, f64) {
+        let least = h.iter().copied().fold(f64::INFINITY, f64::min);
+        (least, h.iter().copied().fold(0.0, f64::max))
+    }
+
+    /// Between the limits: spacing times curvedness to the power γ is the same everywhere.
+    #[test]
+    fn spacing_falls_with_the_power_of_the_curvedness() {
+        let samples = on(&shapes::torus(30.0, 15.0, 120, 60));
+        for gamma in [0.25, 0.5, 1.0] {
+            let h = spacing(&samples, &adapted(gamma, 0.0), 100);
+            let (least, most) = extent(&h);
+            let product = |v: usize| h[v] * exact(&samples.working[v], 30.0, 15.0).powf(gamma);
+            let within = (0..h.len()).filter(|v| h[*v] > least * 1.001 && h[*v] < most / 1.001);
+            let products: Vec<f64> = within.map(product).collect();
+            assert!(products.len() > h.len() / 2);
+            let (low, high) = extent(&products);
+            assert!(high / low < 1.0 + 0.12 * gamma, "{gamma}: {low} {high}");
+        }
+    }
+
+    /// The twentieth part of the samples with the least curvature and the 3 % with the most share a spacing.
+    #[test]
+    fn the_flattest_and_the_most_curved_samples_are_limited() {
+        let mesh = shapes::icosphere(20.0, 4);
+        let bumpy = mesh
+            .vertices
+            .iter()
+            .map(|p| p * (1.0 + 0.05 * (p.x * 0.31 + p.z * 0.17).sin()));
+        let mesh = TriMesh {
+            vertices: bumpy.collect(),
+            triangles: mesh.triangles,
+        };
+        let samples = on(&mesh);
+        let h = spacing(&samples, &adapted(0.5, 0.0), 100);
+        let (least, most) = extent(&h);
+        assert!(most / least < LARGEST_RATIO);
+        let share = |limit: f64| {
+            let at_limit = h.iter().filter(|h| (*h / limit - 1.0).abs() < 1e-12);
+            at_limit.count() as f64 / h.len() as f64
+        };
+        assert!((share(most) - 0.05).abs() < 0.002, "{}", share(most));
+        assert!((share(least) - 0.03).abs() < 0.002, "{}", share(least));
+    }
+
+    #[test]
+    fn two_spacings_differ_by_the_largest_ratio_at_most() {
+        // A fat ring is a hundred times more curved than the thin one beside it is.
+        let mut mesh = shapes::torus(500.0, 200.0, 40, 20);
+        let small = shapes::torus(5.0, 2.0, 40, 20);
+        let first = mesh.vertices.len() as u32;
+        mesh.vertices.extend(small.vertices);
+        mesh.triangles
+            .extend(small.triangles.iter().map(|t| t.map(|v| v + first)));
+        let samples = on(&mesh);
+        for gamma in [0.3, 1.0] {
+            let (least, most) = extent(&spacing(&samples, &adapted(gamma, 0.0), 100));
+            assert!((most / least / LARGEST_RATIO - 1.0).abs() < 1e-9, "{gamma}");
+        }
+    }
+
+    /// Evenly spaced points have triangles with edges e; an arc of curvature κ over such an edge rises by κe²/8.
+    /// Where that is less than the given share of the root of the area, spacing is even.
+    #[test]
+    fn spacing_is_even_where_even_points_resolve_the_surface() {
+        let mesh = shapes::torus(30.0, 15.0, 120, 60);
+        let samples = on(&mesh);
+        let of_all: Vec<f64> = samples
+            .working
+            .iter()
+            .map(|p| exact(p, 30.0, 15.0))
+            .collect();
+        let (flattest, most_curved) = extent(&of_all);
+        let limit = f64::midpoint(flattest, most_curved);
+        for points in [50, 200] {
+            // Each point has two triangles.
+            let triangle = mesh.area() / (2 * points) as f64;
+            let squared_edge = triangle * 4.0 / 3f64.sqrt();
+            let percent = 100.0 * limit * squared_edge / 8.0 / mesh.area().sqrt();
+            let h = spacing(&samples, &adapted(0.5, percent), points);
+            let (_, most) = extent(&h);
+            let mut seen = [0; 2];
+            for (v, h) in h.iter().enumerate() {
+                let ratio = exact(&samples.working[v], 30.0, 15.0) / limit;
+                if ratio < 0.93 {
+                    assert_eq!(*h, most);
+                    seen[0] += 1;
+                } else if ratio > 1.07 {
+                    assert!(*h < most);
+                    seen[1] += 1;
+                }
+            }
+            assert!(seen.iter().all(|n| *n > 300), "{seen:?}");
+        }
+    }
+
+    /// Noise at single samples is averaged away: one spike in a ball changes its own spacing little.
+    #[test]
+    fn the_curvature_is_smoothed_before_it_counts() {
+        let mut mesh = shapes::icosphere(20.0, 4);
+        mesh.vertices[1000] *= 1.03;
+        let samples = on(&mesh);
+        let raw = curvedness(&samples)[1000] * 20.0;
+        assert!(raw > 2.0, "{raw}");
+        let h = spacing(&samples, &adapted(1.0, 0.0), 100);
+        let (least, most) = extent(&h);
+        assert!(most / least < 1.3, "{least} {most}");
     }
 }

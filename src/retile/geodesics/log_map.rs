@@ -368,4 +368,111 @@ mod tests {
         assert_eq!(on.distance, 7.5);
         assert!((on.vector - Vec2::new(4.5, 6.0)).norm() < 1e-12);
     }
+
+    #[test]
+    fn a_path_from_the_source_itself_has_a_length_and_no_direction() {
+        let source = Reach {
+            vector: Vec2::zeros(),
+            distance: 0.0,
+        };
+        let on = along_edge(&source, 2.5);
+        assert_eq!((on.vector, on.distance), (Vec2::zeros(), 2.5));
+    }
+
+    /// From a source in the plane below the edge: the third corner is seen exactly if the ray crosses the edge, at its
+    /// distance in the plane and in its direction.
+    #[test]
+    fn unfolding_finds_the_third_corner_in_the_plane() {
+        let mut seen = [0; 2];
+        let (i, j) = (Vec2::zeros(), Vec2::new(5.0, 0.0));
+        for source in [[1.0, -2.0], [2.5, -7.0], [6.0, -1.5], [-3.1, -4.0]].map(Vec2::from) {
+            for k in [[2.0, 3.0], [-1.0, 4.0], [4.5, 0.5], [7.3, 1.0], [9.0, 6.0]].map(Vec2::from) {
+                // The frame of the source may be turned against that of the edge.
+                let turned = |p: Vec2| nalgebra::Rotation2::new(0.7) * (p - source);
+                let reach = |p: Vec2| Reach {
+                    vector: turned(p),
+                    distance: (p - source).norm(),
+                };
+                let found = unfold(&reach(i), &reach(j), 5.0, (k - i).norm(), (k - j).norm());
+                let share = -source.y / (k.y - source.y);
+                let crossing = source.x + (k.x - source.x) * share;
+                let passes = 0.0 < crossing && crossing < 5.0;
+                assert_eq!(found.is_some(), passes, "{source} {k}");
+                seen[usize::from(passes)] += 1;
+                if let Some(found) = found {
+                    assert!((found.distance - (k - source).norm()).abs() < 1e-12);
+                    assert!((found.vector - turned(k)).norm() < 1e-9);
+                }
+            }
+        }
+        assert!(seen.iter().all(|n| *n > 5), "{seen:?}");
+        // A source on the line of the edge sees nothing through it.
+        let reach = |distance: f64| Reach {
+            vector: Vec2::x() * distance,
+            distance,
+        };
+        assert!(unfold(&reach(2.0), &reach(7.0), 5.0, 4.0, 4.0).is_none());
+        assert!(unfold(&reach(1.0), &reach(1.0), 5.0, 4.0, 4.0).is_none());
+    }
+
+    /// Directions on a flat side are those in space, in the frame of the source's triangle; and each source is mapped
+    /// as by a new map.
+    #[test]
+    fn directions_on_a_flat_side_are_those_in_space() {
+        let domain = flat_sided();
+        let normal = shapes::tetrahedron(20.0).area_normal(0).normalize();
+        let triangles = domain.half_edges.triangles();
+        let mut map = LogMap::over(&domain);
+        for t in [0, 100, 255] {
+            let source = centre(t);
+            let x = source.position(&domain.vertices, triangles);
+            map.spread(&domain, &source, 30.0);
+            let [a, b, _] = triangles[t as usize].map(|v| domain.vertices[v as usize]);
+            let along = (b - a).normalize();
+            let in_frame = |p: Vec3| Vec2::new(along.dot(&p), normal.cross(&along).dot(&p));
+            for v in FaceId::first(256).flat_map(|t| domain.half_edges.corners(t)) {
+                let found = map.reach(v).unwrap();
+                let expected = in_frame(domain.vertices[v.index()] - x);
+                assert!((found.vector - expected).norm() < 1e-9 * found.distance);
+            }
+            for other in [0, 17, 100, 200, 255] {
+                let mut point = centre(other);
+                point.barycentric.rotate_left(1);
+                let expected = in_frame(point.position(&domain.vertices, triangles) - x);
+                let found = map.reach_point(&domain, &point).unwrap();
+                assert!((found.vector - expected).norm() < 1e-9);
+                assert!((found.distance - expected.norm()).abs() < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn a_map_is_used_again_as_if_it_were_new() {
+        let domain = domain(shapes::torus(9.0, 3.0, 20, 12));
+        let mut map = LogMap::over(&domain);
+        for (t, radius) in [(3, 9.0), (200, 4.0), (201, 0.1), (50, 12.0)] {
+            map.spread(&domain, &centre(t), radius);
+            let mut new = LogMap::over(&domain);
+            new.spread(&domain, &centre(t), radius);
+            assert_eq!(map.visited(), new.visited());
+            let mut seen = [0; 2];
+            for v in domain.half_edges.vertices() {
+                assert_eq!(map.reach(v), new.reach(v));
+                if let Some(reach) = map.reach(v) {
+                    assert!(reach.distance <= radius);
+                    assert!((reach.vector.norm() - reach.distance).abs() < 1e-9);
+                }
+                assert!(map.reach(v).is_none() || map.visited().contains(&v));
+                seen[usize::from(map.reach(v).is_some())] += 1;
+            }
+            assert!(seen[0] > 0);
+            let mut visited = map.visited().to_vec();
+            visited.sort_unstable();
+            visited.dedup();
+            assert_eq!(visited.len(), map.visited().len());
+            // The triangle of the source is known whatever the radius; beyond it a point is not.
+            assert!(map.reach_point(&domain, &centre(t)).unwrap().distance < 1e-9);
+            assert!(map.reach_point(&domain, &centre((t + 240) % 480)).is_none());
+        }
+    }
 }

@@ -1,10 +1,12 @@
 //! Tests of the exact geodesics against unfolded solids and a brute-force search, and of the log
 //! map against the exact geodesics.
 
+use nalgebra::Rotation2;
 use rand::RngExt;
 
 use super::{ExactMap, brute_force};
 use crate::geometry::random::{Purpose, stream};
+use crate::geometry::triangle::angle_between;
 use crate::geometry::{Vec2, Vec3};
 use crate::mesh::{FaceId, TriMesh, VertexId, shapes};
 use crate::retile::SurfacePoint;
@@ -348,4 +350,91 @@ fn the_log_map_is_close_to_exact_within_two_spacings() {
     let mean = all.iter().sum::<f64>() / all.len() as f64;
     assert!(mean < 1e-3, "{mean}");
     assert!(all.iter().all(|e| *e < 0.02));
+}
+
+/// A source on an edge or on a vertex has the directions of one beside it, in the frame of its triangle.
+#[test]
+fn directions_from_an_edge_or_a_vertex_are_those_from_beside_it() {
+    let mesh = jittered(shapes::icosphere(20.0, 2), 0.0, [1.0, 0.8, 1.1], 1);
+    let domain = domain(&mesh);
+    let mut maps = [ExactMap::over(&domain), ExactMap::over(&domain)];
+    let targets = scattered(&mesh, 60, 5);
+    let mut compared = 0;
+    for t in [0, 41, 160, 299] {
+        let defect = |on: [f64; 3]| {
+            let Some(k) = on.iter().position(|x| *x == 1.0) else {
+                return 0.0;
+            };
+            let v = mesh.triangles[t as usize][k];
+            let angles = mesh.triangles.iter().filter_map(|t| {
+                let k = t.iter().position(|c| *c == v)?;
+                let [a, b, c] = [0, 1, 2].map(|m| mesh.vertices[t[(k + m) % 3] as usize]);
+                Some(angle_between(&(b - a), &(c - a)))
+            });
+            std::f64::consts::TAU - angles.sum::<f64>()
+        };
+        for on in [
+            [0.0, 0.3, 0.7],
+            [0.4, 0.0, 0.6],
+            [0.2, 0.8, 0.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+        ] {
+            let beside = on.map(|x| x * (1.0 - 3e-7) + 1e-7);
+            maps[0].spread(&domain, &point(t, on), 25.0);
+            maps[1].spread(&domain, &point(t, beside), 25.0);
+            for target in &targets {
+                let [Some(from), Some(near)] = [0, 1].map(|k| maps[k].reach_point(&domain, target))
+                else {
+                    continue;
+                };
+                assert!((from.distance - near.distance).abs() < 1e-4);
+                assert!((from.vector.norm() - from.distance).abs() < 1e-9 * from.distance);
+                if from.distance > 20.0 {
+                    continue; // Where two paths are nearly as short, either may be found.
+                }
+                // Beside a vertex the path may pass it on the other side: it is turned by what the angles there lack
+                // of a full turn.
+                let ways =
+                    [0.0, defect(on), -defect(on)].map(|angle| Rotation2::new(angle) * from.vector);
+                let off = ways.map(|way| (way - near.vector).norm());
+                let least = off.into_iter().fold(f64::INFINITY, f64::min);
+                assert!(least < 1e-3 * from.distance.max(0.1), "{t} {on:?} {off:?}");
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 300, "{compared}");
+}
+
+/// Vectors are as long as the paths, vertices beyond the radius are not reached, and all within it are; from points
+/// inside triangles, on edges and on vertices of saddles.
+#[test]
+fn vectors_are_as_long_as_paths_and_no_vertex_is_reached_beyond_the_radius() {
+    let mesh = jittered(shapes::torus(9.0, 3.0, 14, 9), 0.05, [1.0, 1.0, 0.6], 2);
+    let domain = domain(&mesh);
+    let mut sources = scattered(&mesh, 12, 7);
+    sources.extend(vertices(&mesh).into_iter().step_by(9));
+    let all = exact(&mesh, &[sources.clone(), vertices(&mesh)].concat());
+    let mut map = ExactMap::over(&domain);
+    for radius in [5.0, 12.0] {
+        for (i, source) in sources.iter().enumerate() {
+            map.spread(&domain, source, radius);
+            let mut reached = 0;
+            for v in VertexId::first(mesh.vertices.len()) {
+                let distance = all[i][sources.len() + v.index()];
+                let Some(reach) = map.reach(v) else {
+                    assert!(distance > radius);
+                    continue;
+                };
+                reached += 1;
+                assert!(reach.distance <= radius);
+                assert!((reach.distance - distance).abs() < 1e-9);
+                assert!((reach.vector.norm() - reach.distance).abs() < 1e-9);
+                assert!(map.visited().contains(&v));
+            }
+            assert!(reached > 2 && reached < mesh.vertices.len());
+        }
+    }
 }
