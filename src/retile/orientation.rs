@@ -68,4 +68,53 @@ mod tests {
         let all: Vec<u32> = (0..count).collect();
         assert_eq!(face_alike(&mut ball, &component, &[-1.0, 1.0]), Err(all));
     }
+
+    /// Of several components only those with the wrong orientation are touched or named.
+    #[test]
+    fn components_that_face_rightly_are_left_alone() {
+        let count = 5;
+        let mut mesh = TriMesh::default();
+        let mut component = Vec::new();
+        for c in 0..count {
+            let part = if c % 2 == 0 {
+                shapes::tetrahedron(2.0)
+            } else {
+                shapes::icosphere(1.0, 0)
+            };
+            let first = mesh.vertices.len() as u32;
+            component.extend(vec![c; part.vertices.len()]);
+            mesh.vertices.extend(
+                part.vertices
+                    .iter()
+                    .map(|v| v.add_scalar(10.0 * f64::from(c))),
+            );
+            mesh.triangles
+                .extend(part.triangles.iter().map(|t| t.map(|v| v + first)));
+        }
+        // The middle one, a tetrahedron, is a cavity of the surface; then also the ball after it.
+        let mut reversed = mesh.clone();
+        assert_eq!(
+            face_alike(&mut reversed, &component, &[1.0, 1.0, -1.0, 1.0, 1.0]),
+            Ok(())
+        );
+        let volumes = component_volumes(&reversed.vertices, &reversed.triangles, &component);
+        let before = component_volumes(&mesh.vertices, &mesh.triangles, &component);
+        for c in 0..count as usize {
+            let sign = if c == 2 { -1.0 } else { 1.0 };
+            assert!((volumes[c] - sign * before[c]).abs() < 1e-12);
+        }
+        let wrong = face_alike(&mut mesh, &component, &[1.0, 1.0, -1.0, -1.0, 1.0]);
+        let ball = (0..component.len() as u32).filter(|v| component[*v as usize] == 3);
+        assert_eq!(wrong, Err(ball.collect()));
+    }
+
+    #[test]
+    fn a_flat_tetrahedron_cannot_be_turned_round() {
+        let mut flat = shapes::tetrahedron(2.0);
+        flat.vertices.iter_mut().for_each(|v| v.z = 0.0);
+        assert_eq!(
+            face_alike(&mut flat, &[0; 4], &[1.0]),
+            Err(vec![0, 1, 2, 3])
+        );
+    }
 }

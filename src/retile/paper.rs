@@ -264,17 +264,18 @@ mod tests {
     /// All repetitions one after the other, and when and with which of them the procedure ends by its rules.
     #[test]
     fn the_procedure_is_repeated_until_the_triangles_no_longer_improve() {
-        let surface = ball();
+        let surface = from_mesh(shapes::icosphere(20.0, 1), 1.0).unwrap();
         let mut ended = [0; 2];
         for seed in 0..6 {
             let parameters = RetileParameters {
+                points: 20,
                 seed,
                 repulsion_iterations: 4 + 6 * (seed % 2) as usize,
                 ..parameters(14)
             };
             let monitor = Monitor::silent();
             let run = PaperRun::new(&surface, &parameters, &monitor).unwrap();
-            let start = spread(&run, 40, 0).unwrap();
+            let start = spread(&run, 20, 0).unwrap();
             let mut meshes = vec![(start.clone(), join(&run, &start).unwrap())];
             let mut points = start.clone();
             for _ in 0..14 {
@@ -365,5 +366,36 @@ mod tests {
             };
             assert_eq!((points, needed), (40, 41));
         }
+    }
+
+    /// Keeps what is reported.
+    #[derive(Default)]
+    struct Heard(std::sync::Mutex<Vec<f64>>);
+
+    impl crate::progress::Observer for Heard {
+        fn progress(&self, _: Stage, fraction: f64) {
+            self.0.lock().expect("no report panics").push(fraction);
+        }
+    }
+
+    /// Repulsion takes the first part of the stage. Later attempts report nothing, so that progress never falls.
+    #[test]
+    fn the_first_attempt_reports_its_rounds() {
+        let (surface, parameters, heard) = (ball(), parameters(0), Heard::default());
+        let monitor = Monitor::new(&heard, crate::progress::CancelToken::new());
+        let run = PaperRun::new(&surface, &parameters, &monitor).unwrap();
+        spread(&run, 40, 0).unwrap();
+        let mut shares = std::mem::take(&mut *heard.0.lock().unwrap());
+        shares.sort_by(f64::total_cmp);
+        shares.dedup();
+        assert_eq!(shares.len(), 4);
+        for (k, share) in (0..).zip(&shares) {
+            assert!(
+                (share - 0.6 * f64::from(k) / 4.0).abs() < 1e-9,
+                "{shares:?}"
+            );
+        }
+        spread(&run, 40, 1).unwrap();
+        assert!(heard.0.lock().unwrap().is_empty());
     }
 }

@@ -660,13 +660,14 @@ mod tests {
     #[test]
     fn large_surfaces_are_left_to_the_cells() {
         let parameters = even(40);
-        for (subdivisions, tried) in [(2, true), (6, false)] {
-            let ball = shapes::icosphere(20.0, subdivisions);
-            assert_eq!(ball.triangles.len() <= PAPER_TRIANGLES, tried);
-            let surface = from_mesh(ball, 1.0).unwrap();
-            let tiled = by_repulsion(&surface, &parameters, 1, &Monitor::silent()).unwrap();
-            assert_eq!(tiled.is_some(), tried);
-        }
+        let mut surface = from_mesh(shapes::icosphere(20.0, 2), 1.0).unwrap();
+        let attempt = |surface: &Surface| by_repulsion(surface, &parameters, 1, &Monitor::silent());
+        assert!(attempt(&surface).unwrap().is_some());
+        // That these triangles are no surface is noticed only if they are looked at.
+        surface.mesh.triangles = vec![[0, 1, 2]; PAPER_TRIANGLES];
+        assert!(attempt(&surface).is_err());
+        surface.mesh.triangles.push([0, 1, 2]);
+        assert!(attempt(&surface).unwrap().is_none());
     }
 
     /// Thin walls need repairs: sites are moved to where cells are too large, and the number of points stays.
@@ -689,5 +690,23 @@ mod tests {
             }
         }
         assert!(repaired > 0);
+    }
+
+    /// A tetrahedron beside a ball with enough samples for all points is not subdivided: its four vertices are its
+    /// four seeds.
+    #[test]
+    fn a_component_of_as_many_samples_as_points_gives_them_all() {
+        let mut mesh = shapes::icosphere(20.0, 3);
+        let small = shapes::tetrahedron(1.0);
+        let first = mesh.vertices.len() as u32;
+        mesh.vertices
+            .extend(small.vertices.iter().map(|v| v.add_scalar(30.0)));
+        mesh.triangles
+            .extend(small.triangles.iter().map(|t| t.map(|v| v + first)));
+        let surface = from_mesh(mesh, 1.0).unwrap();
+        let parameters = even(20);
+        let seeds = RefinedRun::new(&surface, &parameters).seeds(0);
+        let on_small: BTreeSet<u32> = seeds.into_iter().filter(|v| *v >= first).collect();
+        assert_eq!(on_small, (first..first + 4).collect());
     }
 }

@@ -270,11 +270,16 @@ mod tests {
             triangle: FaceId(2),
             barycentric: [0.5, 0.5 - w, w],
         };
-        let points = [point(0.1), point(0.3), point(0.2), point(0.3)];
-        assert_eq!(
-            mutual_tessellation(&mesh.vertices, &mesh.triangles, &points),
-            Err(TessellateError::CoincidentPoints { points: [1, 3] })
-        );
+        for (first, second) in [(1, 3), (0, 1), (2, 5), (4, 5)] {
+            let mut points: Vec<_> = (0..6).map(|n| point(0.4 - 0.05 * f64::from(n))).collect();
+            points[second] = points[first];
+            assert_eq!(
+                mutual_tessellation(&mesh.vertices, &mesh.triangles, &points),
+                Err(TessellateError::CoincidentPoints {
+                    points: [first as u32, second as u32]
+                })
+            );
+        }
     }
 
     #[test]

@@ -112,13 +112,13 @@ fn all_triangulations(i: u32, j: u32) -> Vec<Vec<RingTriangle>> {
 fn surfaces() -> Vec<TriMesh> {
     let ball = shapes::icosphere(30.0, 1);
     let mut all = vec![shapes::tetrahedron(30.0), shapes::torus(30.0, 12.0, 6, 3)];
-    for seed in 0..4 {
+    for seed in 0..2 {
         all.push(stacked(14, seed));
         all.push(jittered(&ball, 6.0, seed));
         all.push(jittered(&squeezed(&ball, [1.0, 1.0, 0.1]), 1.0, seed));
     }
     all.retain(|surface| self_intersections(surface).is_empty());
-    assert!(all.len() > 8);
+    assert!(all.len() > 5);
     all
 }
 
@@ -203,7 +203,7 @@ fn the_best_triangulation_is_the_cheapest_admissible_one() {
         let mesh = patchwork(&surface);
         for v in 0..surface.vertices.len() as u32 {
             let star = mesh.star(VertexId(v));
-            if star.ring.len() > 7 {
+            if star.ring.len() > 6 {
                 continue;
             }
             let hole = Hole::new(&mesh, &star, Demand::Smooth);
@@ -235,7 +235,8 @@ fn the_best_triangulation_is_the_cheapest_admissible_one() {
 #[test]
 fn triangles_with_a_chord_that_is_an_edge_already_have_no_cost() {
     let mut kept = [0; 2];
-    for surface in surfaces() {
+    let large = (0..3).map(|seed| stacked(40, seed));
+    for surface in surfaces().into_iter().chain(large) {
         let mesh = patchwork(&surface);
         for v in VertexId::first(surface.vertices.len()) {
             let star = mesh.star(v);

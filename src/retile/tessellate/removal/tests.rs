@@ -92,13 +92,13 @@ fn patchwork(surface: &TriMesh) -> Patchwork {
 fn surfaces() -> Vec<TriMesh> {
     let ball = shapes::icosphere(30.0, 1);
     let mut all = vec![shapes::tetrahedron(30.0), shapes::torus(30.0, 12.0, 6, 3)];
-    for seed in 0..4 {
+    for seed in 0..2 {
         all.push(stacked(14, seed));
         all.push(jittered(&ball, 6.0, seed));
         all.push(jittered(&squeezed(&ball, [1.0, 1.0, 0.1]), 1.0, seed));
     }
     all.retain(|surface| self_intersections(surface).is_empty());
-    assert!(all.len() > 8);
+    assert!(all.len() > 5);
     all
 }
 
