@@ -266,27 +266,27 @@ mod tests {
     fn the_procedure_is_repeated_until_the_triangles_no_longer_improve() {
         let surface = from_mesh(shapes::icosphere(20.0, 1), 1.0).unwrap();
         let mut ended = [0; 2];
-        for seed in 0..6 {
+        for seed in 0..4 {
             let parameters = RetileParameters {
                 points: 20,
                 seed,
                 repulsion_iterations: 4 + 6 * (seed % 2) as usize,
-                ..parameters(14)
+                ..parameters(10)
             };
             let monitor = Monitor::silent();
             let run = PaperRun::new(&surface, &parameters, &monitor).unwrap();
             let start = spread(&run, 20, 0).unwrap();
             let mut meshes = vec![(start.clone(), join(&run, &start).unwrap())];
             let mut points = start.clone();
-            for _ in 0..14 {
+            for _ in 0..10 {
                 push_apart(&run, &mut points, |_| Ok(())).unwrap();
                 meshes.push((points.clone(), join(&run, &points).unwrap()));
             }
             let ratios: Vec<f64> = meshes.iter().map(|m| mean_radius_ratio(&m.1)).collect();
             let best_until = |n: usize| ratios[..=n].iter().copied().fold(0.0, f64::max);
             let mut risen = 0;
-            let mut expected = 14;
-            for n in 1..=14 {
+            let mut expected = 10;
+            for n in 1..=10 {
                 if best_until(n) > best_until(risen) * (1.0 + LEAST_RISE) {
                     risen = n;
                 } else if n == risen + PATIENCE {
@@ -302,7 +302,7 @@ mod tests {
                 (&best.points, &best.mesh),
                 (&meshes[which].0, &meshes[which].1)
             );
-            ended[usize::from(expected < 14)] += 1;
+            ended[usize::from(expected < 10)] += 1;
         }
         assert!(ended[1] > 1, "{ended:?}");
     }

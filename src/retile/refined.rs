@@ -659,7 +659,11 @@ mod tests {
 
     #[test]
     fn large_surfaces_are_left_to_the_cells() {
-        let parameters = even(40);
+        let parameters = RetileParameters {
+            repulsion_iterations: 5,
+            repeats: 0,
+            ..even(40)
+        };
         let mut surface = from_mesh(shapes::icosphere(20.0, 2), 1.0).unwrap();
         let attempt = |surface: &Surface| by_repulsion(surface, &parameters, 1, &Monitor::silent());
         assert!(attempt(&surface).unwrap().is_some());

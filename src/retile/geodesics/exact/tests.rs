@@ -438,3 +438,37 @@ fn vectors_are_as_long_as_paths_and_no_vertex_is_reached_beyond_the_radius() {
         }
     }
 }
+
+/// The fan of a vertex onto the opposite edge, for every corner: the vertex is as far from the edge's ends as the
+/// triangle says, and the rays to the window's ends have the angles of the fan.
+#[test]
+fn the_fan_of_a_vertex_opens_at_its_angles() {
+    let mesh = jittered(shapes::icosphere(10.0, 0), 0.15, [1.0; 3], 3);
+    let domain = domain(&mesh);
+    for h in domain.half_edges.half_edges() {
+        let [a, b] = domain.half_edges.ends(h).map(|v| mesh.vertices[v.index()]);
+        let c = mesh.vertices[domain.half_edges.origin(h.previous()).index()];
+        let angle = super::corner_angle(&domain, h);
+        assert!((angle - angle_between(&(b - a), &(c - a))).abs() < 1e-9);
+        for shares in [[0.0, 1.0], [0.0, 0.4], [0.3, 0.7], [0.8, 1.0]] {
+            let fan = shares.map(|share| share * angle);
+            let window = super::fan_window(&domain, h, angle, fan, 7);
+            assert_eq!(window.root, 7);
+            // The window's frame runs from c to b, beyond the triangle.
+            let ends = domain
+                .half_edges
+                .ends(window.half_edge)
+                .map(|v| mesh.vertices[v.index()]);
+            assert_eq!(ends, [c, b]);
+            let base = Vec2::new((b - c).norm(), 0.0);
+            assert!((window.source.norm() - (c - a).norm()).abs() < 1e-9);
+            assert!(((window.source - base).norm() - (b - a).norm()).abs() < 1e-9);
+            assert!(window.source.y < 0.0);
+            for (place, expected) in window.interval.into_iter().zip([fan[1], fan[0]]) {
+                let (to_b, ray) = (base - window.source, Vec2::new(place, 0.0) - window.source);
+                let found = to_b.perp(&ray).atan2(to_b.dot(&ray));
+                assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+            }
+        }
+    }
+}

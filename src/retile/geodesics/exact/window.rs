@@ -160,3 +160,144 @@ impl EdgeWindow {
         wide.then(|| (window, in_frame(axis, third - from)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    fn length(v: Vec2) -> f64 {
+        v.norm()
+    }
+
+    /// The place at which the line from `s` to `p` crosses the x axis.
+    fn crossing(s: Vec2, p: Vec2) -> f64 {
+        (s.x * p.y - p.x * s.y) / (p.y - s.y)
+    }
+
+    fn windows(domain: &Domain) -> Vec<EdgeWindow> {
+        let mut windows = Vec::new();
+        for (n, half_edge) in domain.half_edges.half_edges().enumerate() {
+            let edge = domain.length(half_edge);
+            let at = |share: f64| edge * share;
+            for (k, source) in [[-0.4, -0.9], [0.3, -2.0], [0.8, -0.2], [1.5, -1.1]]
+                .into_iter()
+                .enumerate()
+            {
+                let interval = [[0.0, 1.0], [0.2, 0.5], [0.6, 0.95], [0.4, 0.45]][(n + k) % 4];
+                let angle = n as f64 + 0.5;
+                windows.push(EdgeWindow {
+                    half_edge,
+                    interval: interval.map(at),
+                    source: Vec2::from(source.map(at)),
+                    turn: Vec2::new(angle.cos(), angle.sin()),
+                    root: k as u32,
+                });
+            }
+        }
+        windows
+    }
+
+    fn domain() -> Domain {
+        let mut mesh = shapes::icosphere(10.0, 0);
+        for (n, v) in mesh.vertices.iter_mut().enumerate() {
+            *v *= 1.0 + 0.3 * (n as f64 * 1.3).sin();
+        }
+        Domain::new(mesh.vertices, mesh.triangles).expect("closed")
+    }
+
+    #[test]
+    fn distances_through_a_window_are_straight() {
+        let domain = domain();
+        let mut seen = [0; 2];
+        for window in windows(&domain) {
+            let s = window.source;
+            let (x, y) = domain.apex(window.half_edge);
+            let apex = window.apex(&domain);
+            assert_eq!(apex.at, Vec2::new(x, y));
+            assert!((apex.distance - length(apex.at - s)).abs() < 1e-12);
+            assert!((apex.crossing - crossing(s, apex.at)).abs() < 1e-9);
+            let [first, last] = window.interval;
+            let through = |p: Vec2| (first..=last).contains(&crossing(s, p));
+            assert_eq!(apex.seen, through(apex.at));
+            seen[usize::from(apex.seen)] += 1;
+            for p in [
+                apex.at * 0.3,
+                apex.at * 0.9,
+                Vec2::new(x * 0.5 + 1.0, y * 0.4),
+            ] {
+                let sight = window.sight(&domain, p);
+                assert_eq!(sight, through(p).then(|| p - s));
+            }
+            // The nearest place of the window, among many.
+            let places = (0..=1000).map(|k| first + (last - first) * f64::from(k) / 1000.0);
+            let nearest = places
+                .map(|x| length(s - Vec2::new(x, 0.0)))
+                .fold(f64::INFINITY, f64::min);
+            assert!(window.nearest() < nearest + 1e-9 && window.nearest() > nearest - 0.01);
+            assert!((window.distance_at(first) - length(s - Vec2::new(first, 0.0))).abs() < 1e-12);
+        }
+        assert!(seen.iter().all(|n| *n > 20), "{seen:?}");
+    }
+
+    /// The two edges behind a window, each in its own frame: the source is as far from their ends as before, the
+    /// visible part is what the rays through the window hit, and directions turn by the same angle.
+    #[test]
+    fn windows_are_unfolded_onto_the_next_edges() {
+        let domain = domain();
+        let mut made = [0; 2];
+        for window in windows(&domain) {
+            let h = window.half_edge;
+            let apex = window.apex(&domain);
+            let s = window.source;
+            let end = Vec2::new(domain.length(h), 0.0);
+            let [first, last] = window.interval;
+            // The ends of the edge, the third corner, and the part of the window through which the edge is seen.
+            let left = (
+                Vec2::zeros(),
+                apex.at,
+                end,
+                [first, last.min(apex.crossing)],
+            );
+            let right = (
+                apex.at,
+                end,
+                Vec2::zeros(),
+                [first.max(apex.crossing), last],
+            );
+            let children = [window.left(&domain, &apex), window.right(&domain, &apex)];
+            for (side, ((from, to, third, gate), child)) in
+                [left, right].into_iter().zip(children).enumerate()
+            {
+                let Some((child, third_there)) = child else {
+                    assert!(gate[1] - gate[0] < 1e-9);
+                    continue;
+                };
+                made[side] += 1;
+                assert!(gate[1] > gate[0]);
+                let across = length(to - from);
+                let edge = if side == 0 { h.previous() } else { h.next() };
+                assert_eq!(child.half_edge, domain.half_edges.twin(edge));
+                assert!((domain.length(child.half_edge) - across).abs() < 1e-9);
+                assert_eq!(child.root, window.root);
+                for (here, there) in [(s, child.source), (third, third_there)] {
+                    assert!((length(there) - length(here - from)).abs() < 1e-9);
+                    let far = length(there - Vec2::new(across, 0.0));
+                    assert!((far - length(here - to)).abs() < 1e-9);
+                    assert!(there.y < 1e-12);
+                }
+                for k in 0..2 {
+                    let hit = from + (to - from) * (child.interval[k] / across);
+                    assert!((crossing(s, hit) - gate[k]).abs() < 1e-6 * end.x);
+                }
+                let axis = (to - from) / across;
+                let turned_back = Vec2::new(
+                    child.turn.dot(&window.turn),
+                    window.turn.x * child.turn.y - window.turn.y * child.turn.x,
+                );
+                assert!(length(turned_back - axis) < 1e-9);
+            }
+        }
+        assert!(made.iter().all(|n| *n > 100), "{made:?}");
+    }
+}

@@ -42,6 +42,20 @@ fn dynamic_programming_finds_the_cheapest_triangulation() {
     }
 }
 
+/// As everywhere, ties go to the lower number.
+#[test]
+fn of_equally_cheap_triangulations_the_one_with_the_lowest_corners_counts() {
+    for m in 3..9 {
+        let triangles = cheapest(m, |_, _, _| Some(1.0)).unwrap();
+        assert_eq!(triangles.len(), m - 2);
+        assert!(
+            triangles
+                .iter()
+                .all(|[i, k, j]| *k == i + 1 && *j == m as u32 - 1)
+        );
+    }
+}
+
 /// The cost of every triangle of a ring against its definition: the outer triangle of a side is looked for among
 /// all triangles of the mesh.
 #[test]
