@@ -409,4 +409,24 @@ mod tests {
         assert_eq!(plane.crossing(&middle, &middle), 0.5);
         assert!(plane.side(&own) > 0.0 && plane.side(&other) < 0.0);
     }
+
+    /// Three corners on a line, each in a cell of its own.
+    #[test]
+    fn a_triangle_without_area_has_no_mass() {
+        let line = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [3.0, 0.0, 0.0],
+            [1.0, 4.0, 2.0],
+        ]
+        .map(Vec3::from);
+        let triangles = [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]];
+        let samples = WeightedSamples::new(&line, &line, &triangles, 0);
+        let patches = Patches::new(&samples, &samples.area);
+        let mut sums = vec![Moment::zero(); 3];
+        patches.share(0, &[0, 1, 2, 2], &line[..3], &mut sums);
+        for sum in sums {
+            assert_eq!((sum.first, sum.mass), (Vec3::zeros(), 0.0));
+        }
+    }
 }

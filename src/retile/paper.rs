@@ -398,4 +398,24 @@ mod tests {
         spread(&run, 40, 1).unwrap();
         assert!(heard.0.lock().unwrap().is_empty());
     }
+
+    /// Two balls that reach into each other cannot be tiled with any seed.
+    #[test]
+    fn trying_ends_with_the_last_seed() {
+        let mut mesh = shapes::icosphere(10.0, 1);
+        let first = mesh.vertices.len() as u32;
+        let beside: Vec<_> = mesh.vertices.iter().map(|v| v.add_scalar(6.1)).collect();
+        mesh.vertices.extend(beside);
+        let renamed: Vec<_> = mesh
+            .triangles
+            .iter()
+            .map(|t| t.map(|v| v + first))
+            .collect();
+        mesh.triangles.extend(renamed);
+        let surface = from_mesh(mesh, 1.0).unwrap();
+        for seeds in [1, 3] {
+            let tried = attempt(&surface, &parameters(0), seeds, &Monitor::silent()).unwrap();
+            assert!(tried.is_none());
+        }
+    }
 }
