@@ -183,15 +183,11 @@ impl Cells {
             }
         }
         let mut front = VecDeque::new();
-        for v in 0..self.labels.len() {
-            if largest[self.labels[v] as usize] != parts[v] {
-                self.labels[v] = UNASSIGNED;
-            }
-        }
-        for v in 0..self.labels.len() {
-            let is_unassigned = |n: &u32| self.labels[*n as usize] == UNASSIGNED;
-            if self.labels[v] != UNASSIGNED && samples.around(v).iter().any(is_unassigned) {
-                front.push_back(v as u32);
+        for (v, label) in (0u32..).zip(&mut self.labels) {
+            if largest[*label as usize] == parts[v as usize] {
+                front.push_back(v);
+            } else {
+                *label = UNASSIGNED;
             }
         }
         flood(samples, &mut self.labels, &mut front);

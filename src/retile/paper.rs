@@ -418,4 +418,31 @@ mod tests {
             assert!(tried.is_none());
         }
     }
+
+    /// Three balls have a mesh of twelve points, four on each.
+    #[test]
+    fn the_least_number_of_points_is_enough_to_try() {
+        let mut mesh = TriMesh::default();
+        for k in 0..3u32 {
+            let ball = shapes::icosphere(5.0, 1);
+            let first = mesh.vertices.len() as u32;
+            mesh.vertices.extend(
+                ball.vertices
+                    .iter()
+                    .map(|v| v.add_scalar(20.0 * f64::from(k))),
+            );
+            mesh.triangles
+                .extend(ball.triangles.iter().map(|t| t.map(|v| v + first)));
+        }
+        let surface = from_mesh(mesh, 1.0).unwrap();
+        let tile = |points| {
+            let parameters = RetileParameters {
+                points,
+                ..parameters(0)
+            };
+            retile(&surface, &parameters, &Monitor::silent())
+        };
+        assert_eq!(tile(12).unwrap().mesh.triangles.len(), 12);
+        assert!(tile(11).is_err());
+    }
 }
