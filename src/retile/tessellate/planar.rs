@@ -1,7 +1,8 @@
 //! Constrained Delaunay triangulation of a simple polygon with points inside, by `spade`.
 //!
 //! In: the polygon's corners, counter-clockwise, followed by points inside it. Out: triangles over
-//! all of them that cover exactly the polygon, or an error.
+//! all of them that cover exactly the polygon, or an error. Not guaranteed: that a point outside is
+//! noticed. One beyond a corner that sees both sides there makes as many triangles as one inside.
 
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 
@@ -12,7 +13,8 @@ use crate::geometry::Vec2;
 pub(super) enum PlanarError {
     /// Two of the points have the same position.
     Coincident([u32; 2]),
-    /// The polygon touches or crosses itself or is clockwise, or a point is not inside.
+    /// The polygon touches or crosses itself or is clockwise, or a point that is not inside made the wrong number
+    /// of triangles.
     NotSimple,
 }
 
@@ -33,7 +35,7 @@ impl HasPosition for NumberedPoint {
 /// Triangulates the polygon of the first `corners` points (counter-clockwise) with the other
 /// points inside it. Returns counter-clockwise triples of indices into `points`.
 ///
-/// The predicates are exact, so the result covers exactly the polygon, with
+/// The predicates are exact, so if the points are inside, the result covers exactly the polygon, with
 /// `corners - 2 + 2 * inner` triangles, or is an error.
 pub(super) fn constrained_delaunay(
     points: &[Vec2],
