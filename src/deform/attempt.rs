@@ -244,3 +244,36 @@ fn turned(before: &TriMesh, now: &TriMesh) -> usize {
         .filter(|t| before.area_normal(*t).dot(&now.area_normal(*t)) <= 0.0)
         .count()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Readings of a quarter and of three quarters of the area.
+    fn readings(weights: [f64; 2], offsets: [f64; 2]) -> [SensorReading; 2] {
+        let reading = |share: f64, weight: f64, offset: f64| SensorReading {
+            place: Vec3::zeros(),
+            normal: Vec3::z(),
+            offset,
+            weight,
+            share,
+        };
+        [
+            reading(0.25, weights[0], offsets[0]),
+            reading(0.75, weights[1], offsets[1]),
+        ]
+    }
+
+    /// The distance is the root of the mean square, each sensor counting by area and weight.
+    #[test]
+    fn edges_are_seen_where_the_weight_says_so_and_as_far_as_they_lie() {
+        let (active, residual) = edges_seen(&readings([1.0, 1.0], [-3.0, 3.0]));
+        assert!(active == 1.0 && (residual - 3.0).abs() < 1e-12);
+        let (active, residual) = edges_seen(&readings([0.6, 0.2], [4.0, -1.0]));
+        assert_eq!(active, 0.25);
+        // Both count alike: 0.25 times 0.6 is 0.75 times 0.2.
+        assert!((residual - f64::midpoint(16.0, 1.0).sqrt()).abs() < 1e-12);
+        let (active, residual) = edges_seen(&readings([0.0, 0.0], [1.0, 1.0]));
+        assert!(active == 0.0 && residual.is_infinite());
+    }
+}

@@ -446,6 +446,13 @@ mod tests {
         assert!(usual(Some(0.2)) > 2.0 * usual(None));
     }
 
+    /// Three of 13 fits whose chances had a mean of 0.64 were good.
+    #[test]
+    fn a_place_told_by_a_part_of_the_wall_leaves_the_chance_of_such_fits() {
+        assert!((of_a_part(0.64) - 3.0 / 13.0).abs() < 0.02);
+        assert!(of_a_part(0.3) < of_a_part(0.9) && of_a_part(1.0) < 0.5);
+    }
+
     #[test]
     fn what_is_solid_or_missing_in_the_projections_is_no_heart() {
         let chance = |hollowness: f64, agreement: f64, search: f64| {

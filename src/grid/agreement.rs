@@ -297,6 +297,19 @@ mod tests {
     }
 
     #[test]
+    fn a_mask_without_voxels_has_no_contour_and_nothing_in_common() {
+        let (none, some) = (mask([4; 3], |_, _, _| false), mask([4; 3], |i, _, _| i < 2));
+        for (a, b) in [(&none, &some), (&some, &none)] {
+            let m = compare(a, b, [1.0; 3], &Monitor::silent()).unwrap();
+            assert_eq!((m.jaccard, m.dice), (0.0, 0.0));
+            assert!(m.contours.is_none());
+        }
+        let m = compare(&none, &none, [1.0; 3], &Monitor::silent()).unwrap();
+        assert_eq!((m.jaccard, m.dice), (1.0, 1.0));
+        assert!(m.contours.is_none());
+    }
+
+    #[test]
     fn distances_agree_with_brute_force() {
         let shape = [14, 12, 10];
         let noise = |seed: usize, i: usize, j: usize, k: usize| {
