@@ -174,13 +174,11 @@ impl Attempt {
             fit.evidence = Evidence::of(wall, &edges, found.hollowness, &setup.field, views);
             fit.nodes = nodes_seen(&fit.mesh, wall, &self.moved.readings);
         }
-        fit.confidence = match &fit.evidence {
+        let chance = match &fit.evidence {
             Some(evidence) => confidence::of_agreement(evidence, parameters.edge),
             None => fit.place_confidence().min(0.5),
         };
-        if fit.by_a_part() {
-            fit.confidence = confidence::of_a_part(fit.confidence);
-        }
+        fit.confidence = fit.chance_there(chance);
         let ventricle = template.organ == Organ::LeftVentricle;
         fit.flags = doubts::flags(&fit, volume, ventricle);
         // The chance is calibrated on images of uptake.

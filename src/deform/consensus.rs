@@ -43,10 +43,7 @@ pub fn judged(mut fit: Fit, members: &[MemberFit<'_>], own: Option<usize>, edge:
     for (node, distance) in fit.nodes.iter_mut().zip(distances.iter().flatten()) {
         node.spread = Some(*distance);
     }
-    fit.confidence = confidence::of_set(&chances, &evidence, edge);
-    if fit.by_a_part() {
-        fit.confidence = confidence::of_a_part(fit.confidence);
-    }
+    fit.confidence = fit.chance_there(confidence::of_set(&chances, &evidence, edge));
     doubts::doubt_again(&mut fit);
     let [apparent, anatomical] =
         [WallEdge::Apparent, WallEdge::Anatomical].map(|edge| fit.uncertainty(edge));

@@ -180,9 +180,12 @@ impl Fit {
         search * (self.active / 0.5).min(1.0)
     }
 
-    /// Whether an infarct left only a part of the wall to tell the place.
-    pub(super) fn by_a_part(&self) -> bool {
-        self.localisation.as_ref().is_some_and(|l| l.infarcted)
+    /// The chance of a good fit with this `chance` by all else, in view of what told the place.
+    pub(super) fn chance_there(&self, chance: f64) -> f64 {
+        match &self.localisation {
+            Some(found) if found.infarcted => confidence::of_a_part(chance),
+            _ => chance,
+        }
     }
 
     /// Adds both walls of a ventricle, and shows the one of `edge`.
