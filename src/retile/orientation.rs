@@ -43,7 +43,9 @@ pub(super) fn face_alike(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Vec3;
     use crate::mesh::shapes;
+    use crate::retile::tessellate::test_surfaces::{moved, together};
 
     #[test]
     fn tetrahedra_are_reversed_and_larger_components_reported() {
@@ -73,7 +75,7 @@ mod tests {
     #[test]
     fn components_that_face_rightly_are_left_alone() {
         let count = 5;
-        let mut mesh = TriMesh::default();
+        let mut parts = Vec::new();
         let mut component = Vec::new();
         for c in 0..count {
             let part = if c % 2 == 0 {
@@ -81,16 +83,10 @@ mod tests {
             } else {
                 shapes::icosphere(1.0, 0)
             };
-            let first = mesh.vertices.len() as u32;
             component.extend(vec![c; part.vertices.len()]);
-            mesh.vertices.extend(
-                part.vertices
-                    .iter()
-                    .map(|v| v.add_scalar(10.0 * f64::from(c))),
-            );
-            mesh.triangles
-                .extend(part.triangles.iter().map(|t| t.map(|v| v + first)));
+            parts.push(moved(part, Vec3::repeat(10.0 * f64::from(c))));
         }
+        let mut mesh = together(&parts);
         // The middle one, a tetrahedron, is a cavity of the surface; then also the ball after it.
         let mut reversed = mesh.clone();
         assert_eq!(

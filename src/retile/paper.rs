@@ -228,7 +228,9 @@ fn refusal(run: &PaperRun, last: Option<TessellateError>) -> RetileError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Vec3;
     use crate::mesh::{FaceId, shapes};
+    use crate::retile::tessellate::test_surfaces::{moved, together};
     use crate::surface::from_mesh;
 
     fn ball() -> Surface {
@@ -347,9 +349,9 @@ mod tests {
         let RetileError::SelfIntersecting { points, place } = refusal(&run, Some(error)) else {
             panic!("the mesh intersects itself");
         };
-        let middle = mesh.corners(7).iter().sum::<crate::geometry::Vec3>() / 3.0;
+        let middle = mesh.corners(7).iter().sum::<Vec3>() / 3.0;
         assert_eq!(points, 40);
-        assert!((middle - crate::geometry::Vec3::from(place)).norm() < 1e-9);
+        assert!((middle - Vec3::from(place)).norm() < 1e-9);
         let defect = crate::mesh::topology::MeshDefect::UnusedVertex {
             vertex: crate::mesh::VertexId(4),
         };
@@ -402,17 +404,8 @@ mod tests {
     /// Two balls that reach into each other cannot be tiled with any seed.
     #[test]
     fn trying_ends_with_the_last_seed() {
-        let mut mesh = shapes::icosphere(10.0, 1);
-        let first = mesh.vertices.len() as u32;
-        let beside: Vec<_> = mesh.vertices.iter().map(|v| v.add_scalar(6.1)).collect();
-        mesh.vertices.extend(beside);
-        let renamed: Vec<_> = mesh
-            .triangles
-            .iter()
-            .map(|t| t.map(|v| v + first))
-            .collect();
-        mesh.triangles.extend(renamed);
-        let surface = from_mesh(mesh, 1.0).unwrap();
+        let balls = [0.0, 6.1].map(|x| moved(shapes::icosphere(10.0, 1), Vec3::repeat(x)));
+        let surface = from_mesh(together(&balls), 1.0).unwrap();
         for seeds in [1, 3] {
             let tried = attempt(&surface, &parameters(0), seeds, &Monitor::silent()).unwrap();
             assert!(tried.is_none());
@@ -422,19 +415,8 @@ mod tests {
     /// Three balls have a mesh of twelve points, four on each.
     #[test]
     fn the_least_number_of_points_is_enough_to_try() {
-        let mut mesh = TriMesh::default();
-        for k in 0..3u32 {
-            let ball = shapes::icosphere(5.0, 1);
-            let first = mesh.vertices.len() as u32;
-            mesh.vertices.extend(
-                ball.vertices
-                    .iter()
-                    .map(|v| v.add_scalar(20.0 * f64::from(k))),
-            );
-            mesh.triangles
-                .extend(ball.triangles.iter().map(|t| t.map(|v| v + first)));
-        }
-        let surface = from_mesh(mesh, 1.0).unwrap();
+        let balls = [0.0, 20.0, 40.0].map(|x| moved(shapes::icosphere(5.0, 1), Vec3::repeat(x)));
+        let surface = from_mesh(together(&balls), 1.0).unwrap();
         let tile = |points| {
             let parameters = RetileParameters {
                 points,

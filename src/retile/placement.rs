@@ -59,7 +59,9 @@ pub(crate) fn place(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Vec3;
     use crate::mesh::shapes;
+    use crate::retile::tessellate::test_surfaces::{moved, together};
 
     #[test]
     fn points_fall_evenly_and_never_on_edges() {
@@ -129,13 +131,8 @@ mod tests {
 
     #[test]
     fn every_component_gets_points_by_its_area() {
-        let mut mesh = shapes::icosphere(10.0, 2);
-        let small = shapes::icosphere(5.0, 2);
-        let first = mesh.vertices.len() as u32;
-        mesh.vertices
-            .extend(small.vertices.iter().map(|v| v.add_scalar(30.0)));
-        mesh.triangles
-            .extend(small.triangles.iter().map(|t| t.map(|v| v + first)));
+        let small = moved(shapes::icosphere(5.0, 2), Vec3::repeat(30.0));
+        let mesh = together(&[shapes::icosphere(10.0, 2), small]);
         let domain = Domain::new(mesh.vertices.clone(), mesh.triangles.clone()).unwrap();
         let points = place(&mesh, &domain, &vec![1.0; mesh.vertices.len()], 200, 2);
         assert_eq!(points.len(), 200);

@@ -65,14 +65,10 @@ pub(super) fn share(mesh: &TriMesh, load: &[f64], points: usize) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::mesh::shapes;
+    use crate::retile::tessellate::test_surfaces::together;
 
-    fn with_torus(mut mesh: TriMesh) -> TriMesh {
-        let torus = shapes::torus(90.0, 30.0, 12, 7);
-        let first = mesh.vertices.len() as u32;
-        mesh.vertices.extend(torus.vertices);
-        let moved = torus.triangles.iter().map(|t| t.map(|v| v + first));
-        mesh.triangles.extend(moved);
-        mesh
+    fn with_torus(mesh: TriMesh) -> TriMesh {
+        together(&[mesh, shapes::torus(90.0, 30.0, 12, 7)])
     }
 
     #[test]

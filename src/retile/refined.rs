@@ -403,6 +403,7 @@ mod tests {
     use super::*;
     use crate::geometry::bvh::Bvh;
     use crate::mesh::shapes;
+    use crate::retile::tessellate::test_surfaces::{moved, together};
     use crate::surface::from_mesh;
     use std::collections::BTreeSet;
 
@@ -419,14 +420,8 @@ mod tests {
 
     /// A ball, and a smaller one beside it.
     fn two_balls() -> Surface {
-        let mut both = shapes::icosphere(20.0, 2);
-        let small = shapes::icosphere(6.0, 2);
-        let first = both.vertices.len() as u32;
-        let moved = small.vertices.iter().map(|v| v + Vec3::x() * 40.0);
-        both.vertices.extend(moved);
-        let renamed = small.triangles.iter().map(|t| t.map(|v| v + first));
-        both.triangles.extend(renamed);
-        from_mesh(both, 1.0).expect("closed")
+        let small = moved(shapes::icosphere(6.0, 2), Vec3::x() * 40.0);
+        from_mesh(together(&[shapes::icosphere(20.0, 2), small]), 1.0).expect("closed")
     }
 
     fn even(points: usize) -> RetileParameters {
@@ -634,19 +629,9 @@ mod tests {
     /// Four balls have no mesh of twelve points; the number named in the refusal suffices.
     #[test]
     fn a_refusal_names_a_number_that_suffices() {
-        let mut mesh = TriMesh::default();
-        for k in 0..4u32 {
-            let ball = shapes::icosphere(5.0, 1);
-            let first = mesh.vertices.len() as u32;
-            let moved = ball
-                .vertices
-                .iter()
-                .map(|v| v + Vec3::x() * (20.0 * f64::from(k)));
-            mesh.vertices.extend(moved);
-            mesh.triangles
-                .extend(ball.triangles.iter().map(|t| t.map(|v| v + first)));
-        }
-        let surface = from_mesh(mesh, 1.0).unwrap();
+        let balls =
+            [0.0, 20.0, 40.0, 60.0].map(|x| moved(shapes::icosphere(5.0, 1), Vec3::x() * x));
+        let surface = from_mesh(together(&balls), 1.0).unwrap();
         match retile(&surface, &even(12), &Monitor::silent()) {
             Err(RetileError::TooFewPoints { points, needed }) => {
                 assert!(points == 12 && needed >= 16, "{needed}");
@@ -700,14 +685,10 @@ mod tests {
     /// four seeds.
     #[test]
     fn a_component_of_as_many_samples_as_points_gives_them_all() {
-        let mut mesh = shapes::icosphere(20.0, 3);
-        let small = shapes::tetrahedron(1.0);
-        let first = mesh.vertices.len() as u32;
-        mesh.vertices
-            .extend(small.vertices.iter().map(|v| v.add_scalar(30.0)));
-        mesh.triangles
-            .extend(small.triangles.iter().map(|t| t.map(|v| v + first)));
-        let surface = from_mesh(mesh, 1.0).unwrap();
+        let ball = shapes::icosphere(20.0, 3);
+        let first = ball.vertices.len() as u32;
+        let small = moved(shapes::tetrahedron(1.0), Vec3::repeat(30.0));
+        let surface = from_mesh(together(&[ball, small]), 1.0).unwrap();
         let parameters = even(20);
         let seeds = RefinedRun::new(&surface, &parameters).seeds(0);
         let on_small: BTreeSet<u32> = seeds.into_iter().filter(|v| *v >= first).collect();

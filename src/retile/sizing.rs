@@ -89,6 +89,7 @@ mod tests {
     use super::*;
     use crate::geometry::Vec3;
     use crate::mesh::{TriMesh, shapes};
+    use crate::retile::tessellate::test_surfaces::together;
 
     #[test]
     fn a_sphere_is_evenly_curved_and_a_torus_denser_inside() {
@@ -193,13 +194,8 @@ mod tests {
     #[test]
     fn two_spacings_differ_by_the_largest_ratio_at_most() {
         // A fat ring is a hundred times more curved than the thin one beside it is.
-        let mut mesh = shapes::torus(500.0, 200.0, 40, 20);
-        let small = shapes::torus(5.0, 2.0, 40, 20);
-        let first = mesh.vertices.len() as u32;
-        mesh.vertices.extend(small.vertices);
-        mesh.triangles
-            .extend(small.triangles.iter().map(|t| t.map(|v| v + first)));
-        let samples = on(&mesh);
+        let fat = shapes::torus(500.0, 200.0, 40, 20);
+        let samples = on(&together(&[fat, shapes::torus(5.0, 2.0, 40, 20)]));
         for gamma in [0.3, 1.0] {
             let (least, most) = extent(&spacing(&samples, &adapted(gamma, 0.0), 100));
             assert!((most / least / LARGEST_RATIO - 1.0).abs() < 1e-9, "{gamma}");

@@ -29,7 +29,7 @@ mod patchwork;
 mod planar;
 mod removal;
 #[cfg(test)]
-mod test_surfaces;
+pub(in crate::retile) mod test_surfaces;
 
 use crate::geometry::{Vec3, triangle};
 use crate::mesh::ids::stored;

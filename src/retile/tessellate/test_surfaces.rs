@@ -1,9 +1,11 @@
-//! Surfaces and points for the tests of the mutual tessellation.
+//! Surfaces and points for the tests of the re-tiling.
 
 use rand::RngExt;
 
+use super::patchwork::Patchwork;
 use crate::geometry::Vec3;
 use crate::geometry::random::{Purpose, stream};
+use crate::mesh::intersections::self_intersections;
 use crate::mesh::{FaceId, TriMesh, shapes};
 use crate::retile::SurfacePoint;
 
@@ -32,8 +34,14 @@ pub(super) fn scattered(mesh: &TriMesh, n: usize, seed: u64) -> Vec<SurfacePoint
         .collect()
 }
 
+/// The mesh, `by` mm away.
+pub(in crate::retile) fn moved(mut mesh: TriMesh, by: Vec3) -> TriMesh {
+    mesh.vertices.iter_mut().for_each(|v| *v += by);
+    mesh
+}
+
 /// Several meshes as one.
-pub(super) fn together(parts: &[TriMesh]) -> TriMesh {
+pub(in crate::retile) fn together(parts: &[TriMesh]) -> TriMesh {
     let mut all = TriMesh::default();
     for part in parts {
         let first = all.vertices.len() as u32;
@@ -116,9 +124,29 @@ pub(super) fn stacked(n: usize, seed: u64) -> TriMesh {
     mesh
 }
 
+/// Rough, thin and pinched surfaces that do not intersect themselves: some holes in them can be closed in some ways only,
+/// some flips are impossible, turn triangles over or cause intersections.
+pub(super) fn awkward() -> Vec<TriMesh> {
+    let ball = shapes::icosphere(30.0, 1);
+    let mut all = vec![shapes::tetrahedron(30.0), shapes::torus(30.0, 12.0, 6, 3)];
+    for seed in 0..2 {
+        all.push(stacked(14, seed));
+        all.push(jittered(&ball, 6.0, seed));
+        all.push(jittered(&squeezed(&ball, [1.0, 1.0, 0.1]), 1.0, seed));
+    }
+    all.retain(|surface| self_intersections(surface).is_empty());
+    assert!(all.len() > 5);
+    all
+}
+
+/// The mesh as a patchwork, its index in cells of 10 mm.
+pub(super) fn patchwork(surface: &TriMesh) -> Patchwork {
+    Patchwork::new(surface.vertices.clone(), surface.triangles.clone(), 10.0)
+}
+
 #[test]
 fn the_test_surfaces_have_the_properties_they_are_named_for() {
-    use crate::mesh::{intersections::self_intersections, topology};
+    use crate::mesh::topology;
     let census = topology::check(&double_torus()).unwrap();
     assert_eq!((census.genus(), census.components), (2, 1));
     assert!(self_intersections(&double_torus()).is_empty());

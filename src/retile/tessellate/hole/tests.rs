@@ -1,6 +1,6 @@
 //! Holes in rough, thin and pinched surfaces, against all triangulations of their rings.
 
-use super::super::test_surfaces::{jittered, squeezed, stacked};
+use super::super::test_surfaces::{awkward, jittered, patchwork, stacked};
 use super::*;
 use crate::mesh::ids::stored;
 use crate::mesh::intersections::self_intersections;
@@ -122,24 +122,6 @@ fn all_triangulations(i: u32, j: u32) -> Vec<Vec<RingTriangle>> {
     all
 }
 
-/// Rough, thin and pinched surfaces on which holes can be closed in some ways and not in others.
-fn surfaces() -> Vec<TriMesh> {
-    let ball = shapes::icosphere(30.0, 1);
-    let mut all = vec![shapes::tetrahedron(30.0), shapes::torus(30.0, 12.0, 6, 3)];
-    for seed in 0..2 {
-        all.push(stacked(14, seed));
-        all.push(jittered(&ball, 6.0, seed));
-        all.push(jittered(&squeezed(&ball, [1.0, 1.0, 0.1]), 1.0, seed));
-    }
-    all.retain(|surface| self_intersections(surface).is_empty());
-    assert!(all.len() > 5);
-    all
-}
-
-fn patchwork(surface: &TriMesh) -> Patchwork {
-    Patchwork::new(surface.vertices.clone(), surface.triangles.clone(), 10.0)
-}
-
 /// Whether the surface with these triangles instead of the star of `v` keeps its topology, does not intersect
 /// itself and satisfies the demand.
 fn is_admissible(surface: &TriMesh, v: u32, new: &[[VertexId; 3]], demand: Demand) -> bool {
@@ -181,7 +163,7 @@ fn is_admissible(surface: &TriMesh, v: u32, new: &[[VertexId; 3]], demand: Deman
 #[test]
 fn a_hole_is_closed_admissibly_if_any_triangulation_is_admissible() {
     let mut seen = [[0; 2]; 2];
-    for surface in surfaces() {
+    for surface in awkward() {
         let mesh = patchwork(&surface);
         for v in 0..surface.vertices.len() as u32 {
             let star = mesh.star(VertexId(v));
@@ -213,7 +195,7 @@ fn a_hole_is_closed_admissibly_if_any_triangulation_is_admissible() {
 #[test]
 fn the_best_triangulation_is_the_cheapest_admissible_one() {
     let mut compared = 0;
-    for surface in surfaces() {
+    for surface in awkward() {
         let mesh = patchwork(&surface);
         for v in 0..surface.vertices.len() as u32 {
             let star = mesh.star(VertexId(v));
@@ -250,7 +232,7 @@ fn the_best_triangulation_is_the_cheapest_admissible_one() {
 fn triangles_with_a_chord_that_is_an_edge_already_have_no_cost() {
     let mut kept = [0; 2];
     let large = (0..3).map(|seed| stacked(40, seed));
-    for surface in surfaces().into_iter().chain(large) {
+    for surface in awkward().into_iter().chain(large) {
         let mesh = patchwork(&surface);
         for v in VertexId::first(surface.vertices.len()) {
             let star = mesh.star(v);
@@ -333,7 +315,7 @@ fn the_flat_triangulation_is_delaunay_in_the_plane_of_the_star() {
 #[test]
 fn triangles_that_intersect_the_mesh_or_each_other_are_found() {
     let mut seen = [[0; 2]; 2];
-    for surface in surfaces() {
+    for surface in awkward() {
         let mesh = patchwork(&surface);
         for v in VertexId::first(surface.vertices.len()) {
             let star = mesh.star(v);

@@ -1,11 +1,11 @@
 //! Rounds of removals and flips, against their rules applied to lists of triangles.
 
 use super::super::mutual::mutual_tessellation;
-use super::super::test_surfaces::{jittered, scattered, squeezed, stacked};
+use super::super::test_surfaces::{awkward, jittered, patchwork, scattered};
 use super::*;
 use crate::mesh::ids::stored;
 use crate::mesh::intersections::self_intersections;
-use crate::mesh::{TriMesh, shapes, topology};
+use crate::mesh::{shapes, topology};
 use std::collections::BTreeSet;
 
 /// On a surface on which every hole can be closed, a round removes the vertices that the rule
@@ -84,30 +84,12 @@ fn the_schedule_allows_more_and_more() {
     }
 }
 
-fn patchwork(surface: &TriMesh) -> Patchwork {
-    Patchwork::new(surface.vertices.clone(), surface.triangles.clone(), 10.0)
-}
-
-/// Embedded surfaces on which some flips are impossible, turn triangles over or cause intersections.
-fn surfaces() -> Vec<TriMesh> {
-    let ball = shapes::icosphere(30.0, 1);
-    let mut all = vec![shapes::tetrahedron(30.0), shapes::torus(30.0, 12.0, 6, 3)];
-    for seed in 0..2 {
-        all.push(stacked(14, seed));
-        all.push(jittered(&ball, 6.0, seed));
-        all.push(jittered(&squeezed(&ball, [1.0, 1.0, 0.1]), 1.0, seed));
-    }
-    all.retain(|surface| self_intersections(surface).is_empty());
-    assert!(all.len() > 5);
-    all
-}
-
 /// Every pair of vertices: a flip is offered exactly if the surface with the other diagonal is a closed manifold, it
 /// intersects if that surface does, and it is smooth if the new triangles face as the old ones together.
 #[test]
 fn flips_keep_the_topology_and_tell_what_they_change() {
     let mut seen = [[0; 2]; 3];
-    for surface in surfaces() {
+    for surface in awkward() {
         let mesh = patchwork(&surface);
         let n = surface.vertices.len();
         for v in VertexId::first(n) {
@@ -193,7 +175,7 @@ fn edges(mesh: &Patchwork) -> BTreeSet<[VertexId; 2]> {
 #[test]
 fn rounds_of_flips_begin_with_other_edges_in_turn() {
     let mut seen = 0;
-    for surface in surfaces() {
+    for surface in awkward() {
         for v in VertexId::first(surface.vertices.len()) {
             let before = patchwork(&surface);
             let ring = before.star(v).ring;
@@ -229,7 +211,7 @@ fn rounds_of_flips_begin_with_other_edges_in_turn() {
 /// Without spokes that can be flipped, other edges are, whatever the round.
 #[test]
 fn a_round_of_flips_takes_what_there_is() {
-    for surface in surfaces() {
+    for surface in awkward() {
         for v in VertexId::first(surface.vertices.len()) {
             let before = patchwork(&surface);
             let ring = before.star(v).ring;
