@@ -5,6 +5,7 @@ use super::facts::ByteOrder;
 use super::source::Source;
 use super::summary::Tally;
 use crate::progress::{Cancelled, Monitor, Stage};
+use std::cell::Cell;
 
 /// Voxels decoded at a time: a few milliseconds of unpacking and at most half a mebibyte.
 const PORTION: usize = 1 << 16;
@@ -70,6 +71,26 @@ pub(super) struct VoxelFormat {
     pub unused_bits: u32,
     /// Slope and intercept to apply.
     pub scaling: Option<(f64, f64)>,
+    /// Stored numbers that stand for no measurement.
+    pub padding: Option<Padding>,
+}
+
+/// Stored numbers that fill a picture where nothing was measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Padding {
+    /// The least and the greatest of them; both NaN for numbers that are NaN.
+    pub low: f64,
+    pub high: f64,
+    /// Whether they are compared with the leading bits that are no part of other values.
+    pub untrimmed: bool,
+    /// The value that they count as.
+    pub value: f32,
+}
+
+impl Padding {
+    fn covers(&self, stored: f64) -> bool {
+        (self.low..=self.high).contains(&stored) || (self.low.is_nan() && stored.is_nan())
+    }
 }
 
 impl VoxelFormat {
@@ -102,7 +123,17 @@ struct Decoder {
 #[derive(Debug, Default)]
 pub(super) struct Figures {
     odd: Odd,
+    /// Padded voxels of which the stored number would give another value than that of padding.
+    padded: Padded,
     tally: Tally,
+}
+
+/// Voxels that are padding.
+#[derive(Debug, Default)]
+struct Padded {
+    count: u64,
+    /// What they count as.
+    value: f32,
 }
 
 /// Values that `f32` cannot represent exactly.
@@ -126,6 +157,12 @@ impl Figures {
             let n = self.odd.infinite;
             warnings.push(format!(
                 "{n} voxels are infinite and are treated as missing (NaN)."
+            ));
+        }
+        if self.padded.count > 0 {
+            warnings.push(format!(
+                "{} voxels are Pixel Padding, no measurement, and count as {}.",
+                self.padded.count, self.padded.value
             ));
         }
         if let Some(rounded) = self.odd.inexact {
@@ -323,7 +360,13 @@ impl Decoder {
         out: &mut Vec<f32>,
     ) -> Result<(), VolumeError> {
         let start = out.len();
-        decode(bytes, &self.format, out);
+        let padded = decode(bytes, &self.format, out);
+        if padded > 0
+            && let Some(padding) = self.format.padding
+        {
+            self.figures.padded.count += padded;
+            self.figures.padded.value = padding.value;
+        }
         let decoded = &mut out[start..];
         let (format, figures) = (&self.format, &mut self.figures);
         if !format.is_exact() {
@@ -460,20 +503,35 @@ macro_rules! with_type {
 }
 
 /// Appends the numbers in `bytes` to `voxels`. Slope and intercept are applied in double precision,
-/// as nibabel does.
-fn decode(bytes: &[u8], format: &VoxelFormat, voxels: &mut Vec<f32>) {
+/// as nibabel does. Returns how many padded numbers got another value than their own.
+fn decode(bytes: &[u8], format: &VoxelFormat, voxels: &mut Vec<f32>) -> u64 {
     let (order, unused) = (format.byte_order, format.unused_bits);
     let scaling = match unused {
         0 => format.scaling,
         _ => Some(format.scaling.unwrap_or((1.0, 0.0))),
     };
-    with_type!(format.data_type, T => match scaling {
-        None => T::each(bytes, order, voxels, |v| v.single()),
-        Some((slope, inter)) => {
+    let padded = Cell::new(0);
+    with_type!(format.data_type, T => match (format.padding, scaling) {
+        (Some(padding), _) => {
+            let (slope, inter) = scaling.unwrap_or((1.0, 0.0));
+            T::each(bytes, order, voxels, |v| {
+                let value = v.trim(unused).double();
+                let stored = if padding.untrimmed { v.double() } else { value };
+                let own = (value * slope + inter) as f32;
+                if !padding.covers(stored) {
+                    return own;
+                }
+                padded.set(padded.get() + u64::from(own != padding.value));
+                padding.value
+            });
+        }
+        (None, None) => T::each(bytes, order, voxels, |v| v.single()),
+        (None, Some((slope, inter))) => {
             let scale = |v: f64| (v * slope + inter) as f32;
             T::each(bytes, order, voxels, |v| scale(v.trim(unused).double()));
         }
     });
+    padded.get()
 }
 
 /// The first number in `bytes` in double precision, which distinguishes large from infinite values.

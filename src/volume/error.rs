@@ -49,7 +49,7 @@ pub enum VolumeError {
     NotSlices {
         /// The file's name.
         file: String,
-        /// Value 3 of Image Type (0008,0008).
+        /// Image Type (0008,0008), or the value that tells.
         image_type: String,
         /// What it contains instead.
         reason: &'static str,

@@ -54,6 +54,17 @@ const FRAME_RESCALE: &[Tag] = &[FRAME, Tag(0x0028, 0x9145)];
 const FRAME_REAL_WORLD: &[Tag] = &[FRAME, Tag(0x0040, 0x9096)];
 const FRAME_CONTENT: &[Tag] = &[FRAME, Tag(0x0020, 0x9111)];
 const FRAME_SEGMENT_PATH: &[Tag] = &[FRAME, Tag(0x0062, 0x000a)];
+const FRAME_CARDIAC: &[Tag] = &[FRAME, Tag(0x0018, 0x9118)];
+const FRAME_RESPIRATORY: &[Tag] = &[FRAME, Tag(0x0020, 0x9253)];
+const FRAME_TEMPORAL: &[Tag] = &[FRAME, Tag(0x0020, 0x9310)];
+const FRAME_ECHO: &[Tag] = &[FRAME, Tag(0x0018, 0x9114)];
+const FRAME_DIFFUSION: &[Tag] = &[FRAME, Tag(0x0018, 0x9117)];
+const FRAME_CT_DETAILS: &[Tag] = &[FRAME, Tag(0x0018, 0x9325)];
+const FRAME_TYPE_MR: &[Tag] = &[FRAME, Tag(0x0018, 0x9226)];
+const FRAME_TYPE_CT: &[Tag] = &[FRAME, Tag(0x0018, 0x9329)];
+const FRAME_TYPE_PET: &[Tag] = &[FRAME, Tag(0x0018, 0x9751)];
+/// Attributes of single-frame images for which Legacy Converted Enhanced images have no group.
+const FRAME_UNASSIGNED: &[Tag] = &[FRAME, Tag(0x0020, 0x9171)];
 
 attributes! {
     CHARACTER_SET = &[], 0x0008, 0x0005, "Specific Character Set (0008,0005)";
@@ -65,6 +76,7 @@ attributes! {
     ACQUISITION_DATE = &[], 0x0008, 0x0022, "Acquisition Date (0008,0022)";
     CONTENT_DATE = &[], 0x0008, 0x0023, "Content Date (0008,0023)";
     ACQUISITION_DATE_TIME = &[], 0x0008, 0x002a, "Acquisition DateTime (0008,002A)";
+    CONTENT_TIME = &[], 0x0008, 0x0033, "Content Time (0008,0033)";
     STUDY_TIME = &[], 0x0008, 0x0030, "Study Time (0008,0030)";
     ACQUISITION_TIME = &[], 0x0008, 0x0032, "Acquisition Time (0008,0032)";
     ACCESSION_NUMBER = &[], 0x0008, 0x0050, "Accession Number (0008,0050)";
@@ -79,20 +91,31 @@ attributes! {
     PATIENT_BIRTH_DATE = &[], 0x0010, 0x0030, "Patient's Birth Date (0010,0030)";
     PATIENT_SEX = &[], 0x0010, 0x0040, "Patient's Sex (0010,0040)";
     SLICE_THICKNESS = &[], 0x0018, 0x0050, "Slice Thickness (0018,0050)";
+    KVP = &[], 0x0018, 0x0060, "KVP (0018,0060)";
+    ECHO_TIME = &[], 0x0018, 0x0081, "Echo Time (0018,0081)";
+    INVERSION_TIME = &[], 0x0018, 0x0082, "Inversion Time (0018,0082)";
+    ECHO_NUMBERS = &[], 0x0018, 0x0086, "Echo Number(s) (0018,0086)";
     SPACING_BETWEEN_SLICES = &[], 0x0018, 0x0088, "Spacing Between Slices (0018,0088)";
     SOFTWARE_VERSIONS = &[], 0x0018, 0x1020, "Software Versions (0018,1020)";
     PROTOCOL_NAME = &[], 0x0018, 0x1030, "Protocol Name (0018,1030)";
     TRIGGER_TIME = &[], 0x0018, 0x1060, "Trigger Time (0018,1060)";
+    LOW_RR_VALUE = &[], 0x0018, 0x1081, "Low R-R Value (0018,1081)";
+    B_VALUE = &[], 0x0018, 0x9087, "Diffusion b-value (0018,9087)";
+    FLIP_ANGLE = &[], 0x0018, 0x1314, "Flip Angle (0018,1314)";
     CONVOLUTION_KERNEL = &[], 0x0018, 0x1210, "Convolution Kernel (0018,1210)";
     STUDY_UID = &[], 0x0020, 0x000d, "Study Instance UID (0020,000D)";
     SERIES_UID = &[], 0x0020, 0x000e, "Series Instance UID (0020,000E)";
     STUDY_ID = &[], 0x0020, 0x0010, "Study ID (0020,0010)";
     SERIES_NUMBER = &[], 0x0020, 0x0011, "Series Number (0020,0011)";
+    ACQUISITION_NUMBER = &[], 0x0020, 0x0012, "Acquisition Number (0020,0012)";
     INSTANCE_NUMBER = &[], 0x0020, 0x0013, "Instance Number (0020,0013)";
     POSITION = &[], 0x0020, 0x0032, "Image Position (Patient) (0020,0032)";
     ORIENTATION = &[], 0x0020, 0x0037, "Image Orientation (Patient) (0020,0037)";
     FRAME_OF_REFERENCE = &[], 0x0020, 0x0052, "Frame of Reference UID (0020,0052)";
     TEMPORAL_POSITION = &[], 0x0020, 0x0100, "Temporal Position Identifier (0020,0100)";
+    IMAGES_IN_ACQUISITION = &[], 0x0020, 0x1002, "Images in Acquisition (0020,1002)";
+    TRIGGER_DELAY = &[], 0x0020, 0x9153, "Nominal Cardiac Trigger Delay Time (0020,9153)";
+    CARDIAC_PHASE = &[], 0x0020, 0x9241, "Nominal Percentage of Cardiac Phase (0020,9241)";
     POSITION_REFERENCE = &[], 0x0020, 0x1040, "Position Reference Indicator (0020,1040)";
     SAMPLES = &[], 0x0028, 0x0002, "Samples per Pixel (0028,0002)";
     PHOTOMETRIC = &[], 0x0028, 0x0004, "Photometric Interpretation (0028,0004)";
@@ -105,6 +128,13 @@ attributes! {
     BITS_STORED = &[], 0x0028, 0x0101, "Bits Stored (0028,0101)";
     HIGH_BIT = &[], 0x0028, 0x0102, "High Bit (0028,0102)";
     PIXEL_REPRESENTATION = &[], 0x0028, 0x0103, "Pixel Representation (0028,0103)";
+    PADDING = &[], 0x0028, 0x0120, "Pixel Padding Value (0028,0120)";
+    PADDING_LIMIT = &[], 0x0028, 0x0121, "Pixel Padding Range Limit (0028,0121)";
+    FLOAT_PADDING = &[], 0x0028, 0x0122, "Float Pixel Padding Value (0028,0122)";
+    DOUBLE_PADDING = &[], 0x0028, 0x0123, "Double Float Pixel Padding Value (0028,0123)";
+    FLOAT_PADDING_LIMIT = &[], 0x0028, 0x0124, "Float Pixel Padding Range Limit (0028,0124)";
+    DOUBLE_PADDING_LIMIT = &[], 0x0028, 0x0125,
+        "Double Float Pixel Padding Range Limit (0028,0125)";
     RESCALE_INTERCEPT = &[], 0x0028, 0x1052, "Rescale Intercept (0028,1052)";
     RESCALE_SLOPE = &[], 0x0028, 0x1053, "Rescale Slope (0028,1053)";
     MODALITY_TABLE = &[Tag(0x0028, 0x3000)], 0x0028, 0x3002, "Modality LUT Sequence (0028,3000)";
@@ -113,9 +143,16 @@ attributes! {
     ENERGY_WINDOW_VECTOR = &[], 0x0054, 0x0010, "Energy Window Vector (0054,0010)";
     DETECTOR_VECTOR = &[], 0x0054, 0x0020, "Detector Vector (0054,0020)";
     ROTATION_VECTOR = &[], 0x0054, 0x0050, "Rotation Vector (0054,0050)";
+    RR_INTERVALS = &[], 0x0054, 0x0061, "Number of R-R Intervals (0054,0061)";
+    TIME_SLOTS = &[], 0x0054, 0x0071, "Number of Time Slots (0054,0071)";
+    NUMBER_OF_SLICES = &[], 0x0054, 0x0081, "Number of Slices (0054,0081)";
+    TIME_SLICES = &[], 0x0054, 0x0101, "Number of Time Slices (0054,0101)";
+    SERIES_TYPE = &[], 0x0054, 0x1000, "Series Type (0054,1000)";
+    UNITS = &[], 0x0054, 0x1001, "Units (0054,1001)";
     SLICE_VECTOR = &[], 0x0054, 0x0080, "Slice Vector (0054,0080)";
     RECONSTRUCTION_METHOD = &[], 0x0054, 0x1103, "Reconstruction Method (0054,1103)";
     FRAME_REFERENCE_TIME = &[], 0x0054, 0x1300, "Frame Reference Time (0054,1300)";
+    IMAGE_INDEX = &[], 0x0054, 0x1330, "Image Index (0054,1330)";
     SEGMENTATION_TYPE = &[], 0x0062, 0x0001, "Segmentation Type (0062,0001)";
     MAXIMUM_FRACTION = &[], 0x0062, 0x000e, "Maximum Fractional Value (0062,000E)";
     DETECTOR_POSITION = DETECTOR, 0x0020, 0x0032, "Image Position (Patient) (0020,0032)";
@@ -143,6 +180,37 @@ attributes! {
         "Real World Value Slope (0040,9225)";
     FRAME_DATE_TIME = FRAME_CONTENT, 0x0018, 0x9074, "Frame Acquisition DateTime (0018,9074)";
     FRAME_TEMPORAL_INDEX = FRAME_CONTENT, 0x0020, 0x9128, "Temporal Position Index (0020,9128)";
+    FRAME_REFERENCE_DATE_TIME = FRAME_CONTENT, 0x0018, 0x9151,
+        "Frame Reference DateTime (0018,9151)";
+    FRAME_ACQUISITION_NUMBER = FRAME_CONTENT, 0x0020, 0x9156,
+        "Frame Acquisition Number (0020,9156)";
+    FRAME_DIMENSIONS = FRAME_CONTENT, 0x0020, 0x9157, "Dimension Index Values (0020,9157)";
+    FRAME_STACK = FRAME_CONTENT, 0x0020, 0x9056, "Stack ID (0020,9056)";
+    FRAME_TIME_OFFSET = FRAME_TEMPORAL, 0x0020, 0x930d, "Temporal Position Time Offset (0020,930D)";
+    FRAME_TRIGGER_DELAY = FRAME_CARDIAC, 0x0020, 0x9153,
+        "Nominal Cardiac Trigger Delay Time (0020,9153)";
+    FRAME_ACTUAL_DELAY = FRAME_CARDIAC, 0x0020, 0x9252,
+        "Actual Cardiac Trigger Delay Time (0020,9252)";
+    FRAME_CARDIAC_PHASE = FRAME_CARDIAC, 0x0020, 0x9241,
+        "Nominal Percentage of Cardiac Phase (0020,9241)";
+    FRAME_RESPIRATORY_DELAY = FRAME_RESPIRATORY, 0x0020, 0x9255,
+        "Nominal Respiratory Trigger Delay Time (0020,9255)";
+    FRAME_RESPIRATORY_PHASE = FRAME_RESPIRATORY, 0x0020, 0x9245,
+        "Nominal Percentage of Respiratory Phase (0020,9245)";
+    FRAME_ECHO_TIME = FRAME_ECHO, 0x0018, 0x9082, "Effective Echo Time (0018,9082)";
+    FRAME_B_VALUE = FRAME_DIFFUSION, 0x0018, 0x9087, "Diffusion b-value (0018,9087)";
+    FRAME_KVP = FRAME_CT_DETAILS, 0x0018, 0x0060, "KVP (0018,0060)";
+    FRAME_MR_TYPE = FRAME_TYPE_MR, 0x0008, 0x9007, "Frame Type (0008,9007)";
+    FRAME_CT_TYPE = FRAME_TYPE_CT, 0x0008, 0x9007, "Frame Type (0008,9007)";
+    FRAME_PET_TYPE = FRAME_TYPE_PET, 0x0008, 0x9007, "Frame Type (0008,9007)";
+    OLD_TEMPORAL_POSITION = FRAME_UNASSIGNED, 0x0020, 0x0100,
+        "Temporal Position Identifier (0020,0100)";
+    OLD_TRIGGER_TIME = FRAME_UNASSIGNED, 0x0018, 0x1060, "Trigger Time (0018,1060)";
+    OLD_REFERENCE_TIME = FRAME_UNASSIGNED, 0x0054, 0x1300, "Frame Reference Time (0054,1300)";
+    OLD_ECHO_TIME = FRAME_UNASSIGNED, 0x0018, 0x0081, "Echo Time (0018,0081)";
+    OLD_ACQUISITION_TIME = FRAME_UNASSIGNED, 0x0008, 0x0032, "Acquisition Time (0008,0032)";
+    OLD_IMAGE_INDEX = FRAME_UNASSIGNED, 0x0054, 0x1330, "Image Index (0054,1330)";
+    OLD_INSTANCE_NUMBER = FRAME_UNASSIGNED, 0x0020, 0x0013, "Instance Number (0020,0013)";
     FRAME_SEGMENT = FRAME_SEGMENT_PATH, 0x0062, 0x000b, "Referenced Segment Number (0062,000B)";
 }
 
@@ -263,13 +331,26 @@ impl Attributes {
         }
     }
 
+    /// Number of frames that the functional groups describe by attributes that are kept.
+    pub(super) fn frames_described(&self) -> usize {
+        let frames = self.values.keys().filter_map(|(.., frame)| *frame);
+        frames.max().map_or(0, |last| last + 1)
+    }
+
+    /// Whether the attribute has a value that belongs to `frame` alone; for `None`, to the data set.
+    pub(super) fn states(&self, attribute: Attribute, frame: Option<usize>) -> bool {
+        let value = self.values.get(&(attribute.path, attribute.tag, frame));
+        value.is_some_and(|value| !value.is_empty())
+    }
+
     /// The values of a text attribute, which are separated by backslashes; an empty list if the
     /// attribute is absent or empty.
     pub(super) fn texts(&self, attribute: Attribute) -> Vec<String> {
         self.texts_of(attribute, None)
     }
 
-    fn texts_of(&self, attribute: Attribute, frame: Option<usize>) -> Vec<String> {
+    /// As [`Attributes::texts`], for stored frame number `frame`, from 0.
+    pub(super) fn texts_of(&self, attribute: Attribute, frame: Option<usize>) -> Vec<String> {
         let text = String::from_utf8_lossy(self.bytes_of(attribute, frame).unwrap_or_default());
         let parts = text
             .split('\\')
@@ -346,12 +427,23 @@ impl Attributes {
         numbers.iter().map(number).collect()
     }
 
-    /// The first 32-bit number (UL) of an attribute of stored frame number `frame`.
-    pub(super) fn long_of(&self, attribute: Attribute, frame: usize) -> Option<u32> {
-        let bytes = self.bytes_of(attribute, Some(frame))?.first_chunk()?;
+    /// The 32-bit numbers (UL) of an attribute of `frame`; an empty list if it is absent.
+    pub(super) fn longs_of(&self, attribute: Attribute, frame: Option<usize>) -> Vec<u32> {
+        let bytes = self.bytes_of(attribute, frame).unwrap_or_default();
+        let (numbers, _) = bytes.as_chunks::<4>();
+        let number = |b: &[u8; 4]| match self.byte_order {
+            ByteOrder::Little => u32::from_le_bytes(*b),
+            ByteOrder::Big => u32::from_be_bytes(*b),
+        };
+        numbers.iter().map(number).collect()
+    }
+
+    /// The 32-bit floating-point number (FL) of an attribute of the data set, `None` if it is absent.
+    pub(super) fn single(&self, attribute: Attribute) -> Option<f32> {
+        let bytes = self.bytes_of(attribute, None)?.first_chunk()?;
         Some(match self.byte_order {
-            ByteOrder::Little => u32::from_le_bytes(*bytes),
-            ByteOrder::Big => u32::from_be_bytes(*bytes),
+            ByteOrder::Little => f32::from_le_bytes(*bytes),
+            ByteOrder::Big => f32::from_be_bytes(*bytes),
         })
     }
 

@@ -1,7 +1,7 @@
 //! What a DICOM object is, and what to send instead of one that holds no volume.
 
 use super::super::VolumeError;
-use super::attributes::{Attributes, IMAGE_TYPE, MODALITY, SOP_CLASS, clip};
+use super::attributes::{Attributes, IMAGE_TYPE, MODALITY, SERIES_TYPE, SOP_CLASS, UNITS, clip};
 use dicom_core::dictionary::{UidDictionary, UidDictionaryEntry};
 use dicom_dictionary_std::StandardSopClassDictionary;
 
@@ -55,6 +55,16 @@ pub(super) fn classes() -> impl Iterator<Item = String> {
 pub(super) fn is_slice_class(class: &str) -> bool {
     let suffix = class.strip_prefix(STORAGE).unwrap_or_default();
     READ.contains(&(suffix, Kind::Slice))
+}
+
+/// Whether the object is a CT image.
+pub(super) fn is_ct(attributes: &Attributes) -> bool {
+    let class = attributes.text(SOP_CLASS);
+    let class = class.or_else(|| attributes.media_class.clone());
+    let suffix = class
+        .as_deref()
+        .and_then(|class| class.strip_prefix(STORAGE));
+    matches!(suffix, Some("2" | "2.1" | "2.2"))
 }
 
 /// Why an object holds no volume, by the beginning of its SOP class after [`STORAGE`]; the first entry
@@ -124,14 +134,11 @@ impl Kind {
         if let Some((_, kind)) = READ.iter().find(|(read, _)| *read == suffix) {
             return match kind {
                 Self::Nuclear { .. } => nuclear(attributes, &image_type),
-                Self::Slice if image_type.iter().any(|value| value == "LOCALIZER") => {
-                    Err(VolumeError::NotSlices {
-                        file: attributes.file.clone(),
-                        image_type: "LOCALIZER".into(),
-                        reason: "it is a projection for planning, not a slice",
-                    })
+                Self::Segmentation => Ok(Self::Segmentation),
+                kind => {
+                    check_slices(attributes, &image_type)?;
+                    Ok(*kind)
                 }
-                kind => Ok(*kind),
             };
         }
         let name = StandardSopClassDictionary.by_uid(&class);
@@ -168,16 +175,63 @@ impl Kind {
     }
 }
 
+/// Refuses PET, CT and MR images that hold something else than slices of the scan.
+fn check_slices(attributes: &Attributes, image_type: &[String]) -> Result<(), VolumeError> {
+    let others = [
+        ("LOCALIZER", "it is a projection for planning, not a slice"),
+        (
+            "MOSAIC",
+            "it shows many slices side by side in one picture; export the slices one by one",
+        ),
+        (
+            "TRANSMISSION",
+            "it is a transmission map, which shows attenuation and no uptake",
+        ),
+    ];
+    for (value, reason) in others {
+        if image_type.iter().any(|given| given == value) {
+            return Err(VolumeError::NotSlices {
+                file: attributes.file.clone(),
+                image_type: value.into(),
+                reason,
+            });
+        }
+    }
+    let series_type = attributes.texts(SERIES_TYPE).join("\\");
+    if series_type.ends_with("REPROJECTION") {
+        let reason = "the images are projections, not slices".into();
+        return Err(attributes.wrong(SERIES_TYPE.name, &series_type, reason));
+    }
+    match attributes.text(UNITS).as_deref() {
+        Some(units @ ("1CM" | "CM-1")) => {
+            let reason = "it is a transmission map in 1/cm, which shows attenuation and no uptake; \
+                          send the emission images";
+            Err(attributes.wrong(UNITS.name, units, reason.into()))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// The kind of a Nuclear Medicine Image by value 3 of its Image Type.
 fn nuclear(attributes: &Attributes, image_type: &[String]) -> Result<Kind, VolumeError> {
+    if image_type.is_empty() {
+        return Err(attributes.missing(IMAGE_TYPE));
+    }
     let shown = image_type.get(2).map_or("", String::as_str);
     let refuse = |reason| {
         Err(VolumeError::NotSlices {
             file: attributes.file.clone(),
-            image_type: clip(shown),
+            image_type: clip(&image_type.join("\\")),
             reason,
         })
     };
+    let is_map = image_type.iter().skip(2).any(|v| v == "TRANSMISSION");
+    if is_map && shown.starts_with("RECON") {
+        return refuse(
+            "it is a transmission map, which shows attenuation and no uptake; send the emission \
+             images",
+        );
+    }
     match shown {
         "RECON TOMO" => Ok(Kind::Nuclear { gated: false }),
         "RECON GATED TOMO" => Ok(Kind::Nuclear { gated: true }),

@@ -9,7 +9,8 @@
 //!    sequences that a program wrote without knowing them.
 //! 3. `kind`: what the object is. One that holds no slices is refused by its name, with what to send.
 //! 4. `frames`: orders the frames of a Nuclear Medicine Image by its vectors; `geometry` places them.
-//!    `stack`: orders and places all other frames by their positions. `segments`: labels.
+//!    `stack`: orders and places all other frames by their positions; `volumes` tells which of those at
+//!    one place belong together. `segments`: labels.
 //! 5. `pixels`, `fragments` and `codec`: checks the pixel format and decodes frame by frame.
 //! 6. `provenance`: patient, study, series, instances and acquisition.
 //!
@@ -34,6 +35,7 @@ mod segments;
 mod stack;
 mod syntax;
 mod unknown;
+mod volumes;
 
 #[cfg(test)]
 mod tests;
@@ -42,13 +44,18 @@ pub use header::{DicomHeader, read_header, storage_classes, transfer_syntaxes};
 pub use provenance::Provenance;
 pub(super) use syntax::is_dicom;
 
-use self::attributes::{Attributes, SERIES_NUMBER, SERIES_UID, SLICE_THICKNESS, SOP_INSTANCE};
+use self::attributes::{
+    Attributes, IMAGES_IN_ACQUISITION, INSTANCE_NUMBER, MODALITY, NUMBER_OF_FRAMES,
+    NUMBER_OF_SLICES, RR_INTERVALS, SERIES_DESCRIPTION, SERIES_NUMBER, SERIES_UID, SLICE_THICKNESS,
+    SOP_INSTANCE, TIME_SLICES, TIME_SLOTS, clip,
+};
 use self::frames::FrameOrder;
 use self::kind::Kind;
 use self::pixels::{Pixels, too_many_voxels};
 use self::scan::Scan;
 use self::segments::Segments;
 use self::stack::{Located, Stack, stated_gap};
+use self::volumes::Marks;
 use super::VolumeError;
 use super::decode::Figures;
 use super::facts::{FileFormat, LengthUnit};
@@ -57,6 +64,8 @@ use super::open::{Decoded, HeaderFacts, OpenVolume, Placement};
 use super::source::VolumeFile;
 use super::summary::Tally;
 use crate::progress::{Monitor, Stage};
+use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// DICOM files whose attributes have been read and checked.
@@ -156,6 +165,10 @@ impl DicomFile {
             Kind::Nuclear { gated } => {
                 let order = FrameOrder::of(a, pixels.frames, gated, &mut warnings)?;
                 let (slices, volumes) = (order.slices(), order.gates());
+                check_numbers(a, slices, volumes, &mut warnings)?;
+                if slices == 1 {
+                    warnings.push(stack::one_slice());
+                }
                 let stored = (0..volumes).flat_map(|volume| {
                     let slices = order.slices_of(volume).iter().enumerate();
                     slices.map(move |(slice, frame)| StoredSlice {
@@ -175,13 +188,24 @@ impl DicomFile {
                 (Content::Labels(segments), 1, slices, placement)
             }
             Kind::Enhanced | Kind::Slice => {
-                let located = (0..pixels.frames).map(|frame| Located::of(a, 0, frame));
-                let located: Vec<Located> = located.collect::<Result<_, _>>()?;
+                check_groups(a, pixels.frames)?;
+                let located = (0..pixels.frames).map(|frame| {
+                    let mut located = Located::of(a, 0, frame)?;
+                    located.marks = Marks::of_frame(a, frame);
+                    Ok(located)
+                });
+                let located: Vec<Located> = located.collect::<Result<_, VolumeError>>()?;
+                let stated = a.shorts(NUMBER_OF_SLICES).first().copied().unwrap_or(1);
+                if scan.kind == Kind::Slice && stated > 1 {
+                    let reason = "the file holds one of them; send all files of the series".into();
+                    return Err(a.wrong(NUMBER_OF_SLICES.name, &stated.to_string(), reason));
+                }
                 let gap = stated_gap(a)?;
                 if located.len() == 1 && gap.is_none() {
                     return Err(a.missing(SLICE_THICKNESS));
                 }
-                let stack = Stack::of(&located, pixels.extent, gap);
+                let name = |frame| format!("frame {}", frame + 1);
+                let stack = Stack::of(&located, pixels.extent, gap, &name);
                 let stack = stack.map_err(|reason| {
                     a.wrong(
                         "Image Position (Patient) (0020,0032)",
@@ -199,6 +223,7 @@ impl DicomFile {
                 )
             }
         };
+        warnings.extend(attenuation_doubt(a));
         let voxels = (columns * rows) as u64 * slices as u64;
         if voxels > limits.voxels {
             return Err(too_many_voxels(a, voxels, limits.voxels));
@@ -236,29 +261,44 @@ impl DicomFile {
             })
         };
         let mut series = Series::default();
+        let mut whole = Vec::new();
         for file in files {
             monitor.check()?;
             let ScannedFile { scan, pixels } = ScannedFile::open(file, limits, monitor)?;
+            series.name(&scan.attributes);
             if !scan.kind.is_single_slice() {
-                return refuse(format!(
-                    "{} is a volume of its own and not a slice of a series",
-                    file.name()
-                ));
+                whole.push(file.name());
+            } else if let Some(reason) = series.add(&scan.attributes, pixels)? {
+                return refuse(reason);
             }
-            series.add(&scan.attributes, pixels)?;
+        }
+        whole.sort_unstable();
+        if let Some(name) = whole.first() {
+            return refuse(format!(
+                "{name} is a volume of its own and not a slice of a series; {}",
+                series.listed()
+            ));
         }
         if let Some(reason) = series.contradiction() {
             return refuse(reason);
         }
-        let Some(provenance) = series.provenance else {
+        let Some((_, provenance, gap)) = series.first.take() else {
             return Err(VolumeError::NoFile);
         };
         let extent = series.parts[0].extent;
-        let stack = match Stack::of(&series.located, extent, series.gap) {
+        let name = |part: usize| series.parts[part].name().to_owned();
+        let stack = match Stack::of(&series.located, extent, gap, &name) {
             Ok(stack) => stack,
             Err(reason) => return refuse(reason),
         };
         let volumes = series.located.len() / stack.slices;
+        if series.slices > stack.slices {
+            return refuse(format!(
+                "{} is {}, and they hold {} slices; slices are missing at an end",
+                NUMBER_OF_SLICES.name, series.slices, stack.slices
+            ));
+        }
+        let warnings = series.warnings(&stack, volumes);
         let voxels = (extent[0] * extent[1]) as u64 * stack.slices as u64;
         if voxels > limits.voxels {
             return Err(VolumeError::TooLarge {
@@ -268,22 +308,25 @@ impl DicomFile {
                 limit: limits.voxels,
             });
         }
-        let repeated = series.repeated;
-        let warning = (repeated > 0).then(|| {
-            format!("{repeated} files repeat an instance of the series and were left out.")
+        let (parts, instances) = series.in_order(&stack.order);
+        let stored = (0..parts.len()).map(|part| StoredSlice {
+            part,
+            frame: 0,
+            volume: part / stack.slices,
+            slice: part % stack.slices,
         });
         Ok(Self {
             name: "the series".into(),
             format: FileFormat::DicomSeries,
-            content: Content::Slices(stored_slices(&stack, &series.located)),
+            content: Content::Slices(stored.collect()),
             volumes,
             gated: false,
             shape: [extent[0], extent[1], stack.slices],
             placement: stack.placement,
             provenance,
-            parts: series.parts,
-            instances: series.instances,
-            warnings: warning.into_iter().collect(),
+            parts,
+            instances,
+            warnings,
         })
     }
 
@@ -361,6 +404,72 @@ impl DicomFile {
     }
 }
 
+/// Checks that the numbers of slices, time slots and R-R intervals that a Nuclear Medicine Image states
+/// are not above those that its vectors count.
+fn check_numbers(
+    a: &Attributes,
+    slices: usize,
+    gates: usize,
+    warnings: &mut Vec<String>,
+) -> Result<(), VolumeError> {
+    let stated = |attribute| a.shorts(attribute).first().map(|n| usize::from(*n));
+    if let Some(stated) = stated(NUMBER_OF_SLICES) {
+        if stated > slices {
+            let reason = format!("the frames hold {slices} slices; slices are missing");
+            return Err(a.wrong(NUMBER_OF_SLICES.name, &stated.to_string(), reason));
+        }
+        if stated < slices {
+            warnings.push(format!(
+                "{} is {stated}, but the frames hold {slices} slices, which are all read.",
+                NUMBER_OF_SLICES.name
+            ));
+        }
+    }
+    let of_gates = stated(TIME_SLOTS).unwrap_or(1) * stated(RR_INTERVALS).unwrap_or(1);
+    if of_gates > gates {
+        let reason = format!("the frames hold {gates} gates; gates are missing");
+        return Err(a.wrong(TIME_SLOTS.name, &of_gates.to_string(), reason));
+    }
+    Ok(())
+}
+
+/// A doubt about an emission image whose description is that of an attenuation map.
+fn attenuation_doubt(a: &Attributes) -> Option<String> {
+    if !matches!(a.text(MODALITY).as_deref(), Some("NM" | "PT")) {
+        return None;
+    }
+    let text = a.prose(SERIES_DESCRIPTION)?.to_lowercase();
+    let words: Vec<&str> = text.split(|c: char| !c.is_alphanumeric()).collect();
+    let any = |names: &[&str]| words.iter().any(|word| names.contains(word));
+    let map = any(&["mumap", "umap", "µmap", "μmap", "transmission"])
+        || any(&["attenuation", "mu", "µ", "μ"]) && any(&["map", "maps"]);
+    map.then(|| {
+        format!(
+            "{} is that of an attenuation map: a scan of uptake is expected.",
+            SERIES_DESCRIPTION.name
+        )
+    })
+}
+
+/// Checks that the functional groups do not describe more frames than there are.
+fn check_groups(a: &Attributes, frames: usize) -> Result<(), VolumeError> {
+    let described = a.frames_described();
+    match described > frames {
+        true => Err(a.wrong(
+            NUMBER_OF_FRAMES.name,
+            &frames.to_string(),
+            format!(
+                "the Per-frame Functional Groups Sequence (5200,9230) describes {described} frames"
+            ),
+        )),
+        false => Ok(()),
+    }
+}
+
+/// What orders files for whatever one of them has to speak for all: Instance Number, SOP Instance UID,
+/// name.
+type FirstKey = (u64, String, String);
+
 /// The files of a series found so far.
 #[derive(Default)]
 struct Series {
@@ -368,60 +477,185 @@ struct Series {
     located: Vec<Located>,
     /// SOP Instance UID of each part.
     instances: Vec<String>,
-    /// Every series, with its number and how many files it has.
-    names: Vec<(String, String, usize)>,
-    provenance: Option<Provenance>,
-    gap: Option<f64>,
+    /// The part of each SOP Instance UID.
+    known: BTreeMap<String, usize>,
+    /// Every series by its UID.
+    names: BTreeMap<String, SeriesName>,
+    /// Provenance and distance of slices by the first instance.
+    first: Option<(FirstKey, Provenance, Option<f64>)>,
     /// Files that repeat an instance.
     repeated: usize,
+    /// The most that any file states: slices of a volume, volumes, images.
+    slices: usize,
+    volumes: usize,
+    images: f64,
+    /// Whether the description is that of another kind of image.
+    doubt: Option<String>,
+}
+
+/// What a person knows a series by.
+#[derive(Default)]
+struct SeriesName {
+    number: Option<String>,
+    description: Option<String>,
+    files: usize,
 }
 
 impl Series {
-    fn add(&mut self, a: &Attributes, pixels: Pixels) -> Result<(), VolumeError> {
-        let name = a.text(SERIES_UID).unwrap_or_default();
-        match self.names.iter_mut().find(|(known, ..)| *known == name) {
-            Some((.., count)) => *count += 1,
-            None => {
-                let number = a
-                    .text(SERIES_NUMBER)
-                    .unwrap_or_else(|| "without number".into());
-                self.names.push((name, number, 1));
+    /// Counts the file with attributes `a` to its series.
+    fn name(&mut self, a: &Attributes) {
+        let uid = a.text(SERIES_UID).unwrap_or_default();
+        let name = self.names.entry(uid).or_default();
+        // The least, whatever the order of the files.
+        let least = |known: &mut Option<String>, given: Option<String>| {
+            if known.is_none() || given.is_some() && given < *known {
+                *known = given;
             }
-        }
+        };
+        least(&mut name.number, a.text(SERIES_NUMBER));
+        least(&mut name.description, a.prose(SERIES_DESCRIPTION));
+        name.files += 1;
+    }
+
+    /// Adds a slice; `Some` says why it cannot be one of the series.
+    fn add(&mut self, a: &Attributes, pixels: Pixels) -> Result<Option<String>, VolumeError> {
         let instance = a.text(SOP_INSTANCE).unwrap_or_default();
-        if !instance.is_empty() && self.instances.contains(&instance) {
-            self.repeated += 1;
-            return Ok(());
+        let mut located = Located::of(a, self.parts.len(), 0)?;
+        located.marks = Marks::of_file(a);
+        if let Some(known) = self.known.get(&instance) {
+            if located.is_same_place(&self.located[*known])
+                && image_hash(&pixels)? == image_hash(&self.parts[*known])?
+            {
+                self.repeated += 1;
+                return Ok(None);
+            }
+            let mut names = [pixels.name(), self.parts[*known].name()];
+            names.sort_unstable();
+            return Ok(Some(format!(
+                "{} and {} have the same SOP Instance UID (0008,0018) and are different images; \
+                 an export that gives each image its own is needed",
+                names[0], names[1]
+            )));
         }
-        self.located.push(Located::of(a, self.parts.len(), 0)?);
-        if self.provenance.is_none() {
-            self.provenance = Some(Provenance::of(a));
-            self.gap = stated_gap(a)?;
+        if !instance.is_empty() {
+            self.known.insert(instance.clone(), self.parts.len());
         }
+        let number = match a.decimals::<1>(INSTANCE_NUMBER) {
+            Ok(Some([number])) if number >= 0.0 => number as u64,
+            _ => u64::MAX,
+        };
+        let key = (number, instance.clone(), pixels.name().to_owned());
+        if self.first.as_ref().is_none_or(|(first, ..)| key < *first) {
+            self.first = Some((key, Provenance::of(a), stated_gap(a)?));
+        }
+        let stated = |attribute| a.shorts(attribute).first().map_or(1, |n| usize::from(*n));
+        self.slices = self.slices.max(stated(NUMBER_OF_SLICES));
+        let volumes = stated(TIME_SLOTS) * stated(RR_INTERVALS) * stated(TIME_SLICES);
+        self.volumes = self.volumes.max(volumes);
+        self.doubt = attenuation_doubt(a).or(self.doubt.take());
+        if let Ok(Some([images])) = a.decimals::<1>(IMAGES_IN_ACQUISITION) {
+            self.images = self.images.max(images);
+        }
+        self.located.push(located);
         self.instances.push(instance);
         self.parts.push(pixels);
-        Ok(())
+        Ok(None)
+    }
+
+    /// The series, and how to choose one.
+    fn listed(&self) -> String {
+        let each = self.names.iter().take(8).map(|(uid, name)| {
+            let number = name.number.as_deref().map(clip);
+            let number = number.map_or_else(|| "without number".into(), |n| format!("number {n}"));
+            let described = name.description.as_deref().map(clip);
+            let described = described.map_or_else(String::new, |text| format!(" \"{text}\""));
+            format!(
+                "{number}{described} (UID {}, {} files)",
+                clip(uid),
+                name.files
+            )
+        });
+        let list: Vec<String> = each.collect();
+        format!(
+            "they belong to {} series: {}; send the files of one of them alone",
+            self.names.len(),
+            list.join(", ")
+        )
     }
 
     /// Why the files are not one series.
     fn contradiction(&self) -> Option<String> {
         if self.names.len() > 1 {
-            let each = self.names.iter().take(8);
-            let each = each.map(|(_, number, count)| format!("{number} ({count} files)"));
-            let list: Vec<String> = each.collect();
-            return Some(format!(
-                "they belong to {} series, numbers {}; send the files of one of them",
-                self.names.len(),
-                list.join(", ")
+            return Some(self.listed());
+        }
+        let extents = self.parts.iter().map(|part| part.extent);
+        let (least, most) = (extents.clone().min()?, extents.max()?);
+        (least != most).then(|| {
+            format!(
+                "some have {} x {} pixels, others {} x {}",
+                least[0], least[1], most[0], most[1]
+            )
+        })
+    }
+
+    /// Doubts about `volumes` volumes in `stack`.
+    fn warnings(&self, stack: &Stack, volumes: usize) -> Vec<String> {
+        let mut warnings: Vec<String> = self.doubt.clone().into_iter().collect();
+        if self.repeated > 0 {
+            warnings.push(format!(
+                "{} files repeat an instance of the series and were left out.",
+                self.repeated
             ));
         }
-        let first = self.parts.first()?.extent;
-        let other = self.parts.iter().find(|part| part.extent != first)?.extent;
-        Some(format!(
-            "some have {} x {} pixels, others {} x {}",
-            first[0], first[1], other[0], other[1]
-        ))
+        if self.images > self.parts.len() as f64 {
+            warnings.push(format!(
+                "{} is {}, and {} images were sent: part of the series may be missing.",
+                IMAGES_IN_ACQUISITION.name,
+                self.images,
+                self.parts.len()
+            ));
+        }
+        if self.slices > 1 && self.slices < stack.slices {
+            warnings.push(format!(
+                "{} is {}, but the files hold {} slices, which are all read.",
+                NUMBER_OF_SLICES.name, self.slices, stack.slices
+            ));
+        }
+        if self.volumes > volumes {
+            warnings.push(format!(
+                "The header states {} volumes (time slots, R-R intervals, time slices), and the \
+                 files hold {volumes}: part of the series may be missing.",
+                self.volumes
+            ));
+        }
+        warnings
     }
+
+    /// The parts and instances in the given order.
+    fn in_order(self, order: &[usize]) -> (Vec<Pixels>, Vec<String>) {
+        let mut numbered: Vec<usize> = vec![0; order.len()];
+        for (place, part) in order.iter().enumerate() {
+            numbered[*part] = place;
+        }
+        let files = self.parts.into_iter().zip(self.instances);
+        let mut files: Vec<_> = numbered.into_iter().zip(files).collect();
+        files.sort_unstable_by_key(|(place, _)| *place);
+        files.into_iter().map(|(_, file)| file).unzip()
+    }
+}
+
+/// A hash over the values of the only frame of `pixels`.
+fn image_hash(pixels: &Pixels) -> Result<u64, VolumeError> {
+    let mut hasher = DefaultHasher::new();
+    let mut take = |_: usize, values: &[f32]| {
+        for value in values {
+            value.to_bits().hash(&mut hasher);
+        }
+    };
+    let figures = Figures::default();
+    let mut reader = pixels.open()?;
+    reader.read(0, 0, figures, &mut take, &mut |_| Ok(()))?;
+    Ok(hasher.finish())
 }
 
 fn sorted(mut stored: Vec<StoredSlice>) -> Vec<StoredSlice> {

@@ -2,19 +2,20 @@
 //! frame.
 
 use super::super::VolumeError;
-use super::super::decode::{DataType, Figures, VoxelFormat, VoxelReader};
+use super::super::decode::{DataType, Figures, Padding, VoxelFormat, VoxelReader};
 use super::super::facts::ByteOrder;
 use super::super::limits::ReadLimits;
 use super::super::source::{Source, VolumeFile};
 use super::attributes::{
-    Attributes, BITS_ALLOCATED, BITS_STORED, COLUMNS, FRAME_REAL_WORLD_INTERCEPT,
-    FRAME_REAL_WORLD_SLOPE, FRAME_RESCALE_INTERCEPT, FRAME_RESCALE_SLOPE, HIGH_BIT, MODALITY_TABLE,
-    NUMBER_OF_FRAMES, PHOTOMETRIC, PIXEL_REPRESENTATION, REAL_WORLD_INTERCEPT, REAL_WORLD_SLOPE,
-    RESCALE_INTERCEPT, RESCALE_SLOPE, ROWS, SAMPLES,
+    Attributes, BITS_ALLOCATED, BITS_STORED, COLUMNS, DOUBLE_PADDING, DOUBLE_PADDING_LIMIT,
+    FLOAT_PADDING, FLOAT_PADDING_LIMIT, FRAME_REAL_WORLD_INTERCEPT, FRAME_REAL_WORLD_SLOPE,
+    FRAME_RESCALE_INTERCEPT, FRAME_RESCALE_SLOPE, HIGH_BIT, MODALITY_TABLE, NUMBER_OF_FRAMES,
+    PADDING, PADDING_LIMIT, PHOTOMETRIC, PIXEL_REPRESENTATION, REAL_WORLD_INTERCEPT,
+    REAL_WORLD_SLOPE, RESCALE_INTERCEPT, RESCALE_SLOPE, ROWS, SAMPLES,
 };
 use super::codec::{self, FrameLayout};
 use super::fragments::frames_of;
-use super::kind::Kind;
+use super::kind::{Kind, is_ct};
 use super::scan::{Fragment, PixelElement, PixelPlace, Scan};
 use super::syntax::Syntax;
 use crate::progress::Cancelled;
@@ -39,6 +40,8 @@ pub(super) struct Pixels {
     unused_bits: u32,
     /// One for each frame, or one for all.
     scaling: Vec<Scaling>,
+    /// Stored numbers that stand for no measurement.
+    padding: Option<Padding>,
     storage: Storage,
 }
 
@@ -99,6 +102,7 @@ impl Pixels {
                             found: begin + length,
                         });
                     }
+                    check_surplus(a, frames, voxels, *length, bytes)?;
                     match bits {
                         true => Storage::Bits { begin: *begin },
                         false => Storage::Whole { begin: *begin },
@@ -144,10 +148,16 @@ impl Pixels {
             frames,
             data_type,
             unused_bits,
+            padding: padding(scan, data_type, unused_bits),
             scaling,
             storage,
             syntax,
         })
+    }
+
+    /// Name of the file.
+    pub(super) fn name(&self) -> &str {
+        self.file.name()
     }
 
     /// Voxels of one frame.
@@ -217,6 +227,7 @@ impl FrameReader<'_> {
             byte_order: pixels.byte_order,
             unused_bits: pixels.unused_bits,
             scaling: pixels.scaling(frame),
+            padding: pixels.padding,
         };
         let mut unpacked;
         let (source, begin) = match &pixels.storage {
@@ -400,6 +411,79 @@ fn data_type(scan: &Scan) -> Result<(DataType, u32), VolumeError> {
         return Err(a.wrong(HIGH_BIT.name, &high_bit.to_string(), reason));
     }
     Ok((data_type, u32::from(allocated - stored)))
+}
+
+/// Refuses Pixel Data in one piece of `length` bytes that hold at least one more frame than is stated.
+fn check_surplus(
+    a: &Attributes,
+    frames: usize,
+    voxels: u64,
+    length: u64,
+    bytes: u64,
+) -> Result<(), VolumeError> {
+    let of_one = (bytes / frames as u64).max(1);
+    let held = length / of_one;
+    match voxels > 0 && held > frames as u64 && length - bytes >= of_one.max(2) {
+        true => Err(a.wrong(
+            NUMBER_OF_FRAMES.name,
+            &frames.to_string(),
+            format!("the Pixel Data (7FE0,0010) of {length} bytes hold {held} frames"),
+        )),
+        false => Ok(()),
+    }
+}
+
+/// The stored numbers that are padding (PS3.3 C.7.5.1.1.2), and what they count as: no uptake, or air in
+/// CT images in Hounsfield units.
+fn padding(scan: &Scan, data_type: DataType, unused_bits: u32) -> Option<Padding> {
+    const AIR: f32 = -1000.0;
+    let a = &scan.attributes;
+    if scan.kind == Kind::Segmentation {
+        return None;
+    }
+    let (value, limit) = match scan.element {
+        PixelElement::Float => {
+            let value = |attribute| a.single(attribute).map(f64::from);
+            (value(FLOAT_PADDING)?, value(FLOAT_PADDING_LIMIT))
+        }
+        PixelElement::Double => (
+            a.double(DOUBLE_PADDING, None)?,
+            a.double(DOUBLE_PADDING_LIMIT, None),
+        ),
+        PixelElement::Integer => {
+            let signed = matches!(data_type, DataType::I8 | DataType::I16 | DataType::I32);
+            let value = |attribute| {
+                let stored = a.shorts(attribute).first().copied()?;
+                Some(match signed {
+                    true => f64::from(stored as i16),
+                    false => f64::from(stored),
+                })
+            };
+            (value(PADDING)?, value(PADDING_LIMIT))
+        }
+    };
+    let limit = limit.unwrap_or(value);
+    let (low, high) = (value.min(limit), value.max(limit));
+    // Some writers pad with numbers that need bits above Bits Stored.
+    let bits = 8 * data_type.size() as u32 - unused_bits;
+    let (least, most) = match data_type {
+        DataType::U8 | DataType::U16 | DataType::U32 => (0.0, 2_f64.powi(bits as i32) - 1.0),
+        DataType::I8 | DataType::I16 | DataType::I32 => {
+            let half = 2_f64.powi(bits as i32 - 1);
+            (-half, half - 1.0)
+        }
+        _ => (f64::NEG_INFINITY, f64::INFINITY),
+    };
+    let intercept = [FRAME_RESCALE_INTERCEPT, RESCALE_INTERCEPT]
+        .into_iter()
+        .find_map(|attribute| a.decimals_of::<1>(attribute, Some(0)).ok().flatten());
+    let in_hounsfield = is_ct(a) && intercept.is_some_and(|[value]| value < 0.0);
+    Some(Padding {
+        low,
+        high,
+        untrimmed: low < least || high > most,
+        value: if in_hounsfield { AIR } else { 0.0 },
+    })
 }
 
 /// Slope and intercept of `frame` or of the whole file: Rescale Slope and Intercept, otherwise the

@@ -92,11 +92,16 @@ pub(super) fn scan(
 ) -> Result<Scan, VolumeError> {
     let mut walk = Walk::of(source, syntax);
     let found = find_pixels(source, syntax, &mut walk, monitor);
-    // For another kind of object, the kind is the more useful error.
+    // For another class of object, the class is the more useful error. What else a damaged data set
+    // says of itself may be part of the damage.
     let kind = match &found {
         Err(VolumeError::Cancelled(_)) => None,
         Err(_) if !walk.attributes.names_a_class() => None,
-        _ => Some(Kind::of(&walk.attributes)?),
+        Err(_) | Ok(None) => match Kind::of(&walk.attributes) {
+            Err(other @ VolumeError::NotVolume { .. }) => return Err(other),
+            _ => None,
+        },
+        Ok(Some(_)) => Some(Kind::of(&walk.attributes)?),
     };
     let (Some(found), Some(kind)) = (found?, kind) else {
         return Err(walk.attributes.wrong(
@@ -154,6 +159,8 @@ fn find_pixels(
     let mut reader =
         LazyDataSetReader::new(decoder(source, syntax).map_err(|e| damaged(start, &e))?);
     let mut pixels: Option<Pieces> = None;
+    // Whether fragments of a picture inside a sequence, such as an icon, are passed over.
+    let mut inner = false;
     let mut tokens = 0_usize;
     let mut byte = start;
     while let Some(token) = reader.advance() {
@@ -222,6 +229,9 @@ fn find_pixels(
                     ));
                 }
             }
+            LazyDataToken::PixelSequenceStart if !walk.path.is_empty() => inner = true,
+            LazyDataToken::SequenceEnd if inner => inner = false,
+            LazyDataToken::ItemStart { .. } if inner => {}
             LazyDataToken::PixelSequenceStart => {
                 if syntax.compression == Compression::None {
                     return Err(walk.attributes.wrong(

@@ -7,7 +7,7 @@
 //!
 //! 1. All frames must have the same directions and pixel spacing.
 //! 2. Positions along row x column, rising, are the slices; positions closer than 0.01 mm are one.
-//! 3. Several frames at every position are several volumes: ordered by time, then by number.
+//! 3. Several frames at every position are several volumes: `volumes` tells which belong together.
 //! 4. Neighbouring slices must lie equally far apart. The step from one to the next is taken from the
 //!    positions, so that it may be oblique to the slices (a tilted gantry).
 //!
@@ -17,11 +17,11 @@ use super::super::VolumeError;
 use super::super::facts::AffineSource;
 use super::super::open::Placement;
 use super::attributes::{
-    Attributes, FRAME_BETWEEN_SLICES, FRAME_DATE_TIME, FRAME_ORIENTATION, FRAME_POSITION,
-    FRAME_REFERENCE_TIME, FRAME_TEMPORAL_INDEX, FRAME_THICKNESS, INSTANCE_NUMBER, ORIENTATION,
-    POSITION, SLICE_THICKNESS, SPACING_BETWEEN_SLICES, TEMPORAL_POSITION, TRIGGER_TIME,
+    Attributes, FRAME_BETWEEN_SLICES, FRAME_ORIENTATION, FRAME_POSITION, FRAME_THICKNESS,
+    ORIENTATION, POSITION, SLICE_THICKNESS, SPACING_BETWEEN_SLICES,
 };
 use super::geometry::{directions, pixel_spacing};
+use super::volumes::{Marks, deal};
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
 use nalgebra::Matrix3;
@@ -50,8 +50,8 @@ pub(super) struct Located {
     oriented: bool,
     /// Distance of rows and of columns, mm.
     spacing: [f64; 2],
-    /// What orders frames at the same position.
-    rank: [f64; 5],
+    /// What tells frames at the same position apart.
+    pub marks: Marks,
 }
 
 /// Frames in order.
@@ -80,11 +80,6 @@ impl Located {
             None => a.decimals(POSITION)?,
         };
         let (x, y) = directions(a, orientation.unwrap_or([1.0, 0.0, 0.0, 0.0, 1.0, 0.0]))?;
-        let number = |attribute| match a.decimals::<1>(attribute) {
-            Ok(Some([number])) => number,
-            _ => 0.0,
-        };
-        let index = a.long_of(FRAME_TEMPORAL_INDEX, frame);
         Ok(Self {
             part,
             frame,
@@ -92,16 +87,7 @@ impl Located {
             axes: [x, y],
             oriented: orientation.is_some(),
             spacing: pixel_spacing(a, of)?,
-            rank: [
-                index.map_or_else(|| number(TEMPORAL_POSITION), f64::from),
-                number(TRIGGER_TIME),
-                number(FRAME_REFERENCE_TIME),
-                a.decimals_of::<1>(FRAME_DATE_TIME, of)
-                    .ok()
-                    .flatten()
-                    .map_or(0.0, |[time]| time),
-                number(INSTANCE_NUMBER),
-            ],
+            marks: Marks::default(),
         })
     }
 
@@ -111,13 +97,23 @@ impl Located {
     }
 
     /// Whether rows, columns and pixels are those of `other`.
-    fn is_like(&self, other: &Self) -> bool {
+    pub(super) fn is_like(&self, other: &Self) -> bool {
         let axes = self.axes.iter().zip(&other.axes);
         let spacing = self.spacing.iter().zip(&other.spacing);
         axes.into_iter().all(|(a, b)| (a - b).norm() <= SAME_GRID)
             && spacing
                 .into_iter()
                 .all(|(a, b)| (a - b).abs() <= SAME_GRID * a)
+    }
+
+    /// Whether it covers the same pixels of the patient as `other`.
+    pub(super) fn is_same_place(&self, other: &Self) -> bool {
+        let apart = match (self.position, other.position) {
+            (Some(a), Some(b)) => (a - b).norm(),
+            (None, None) => 0.0,
+            _ => f64::INFINITY,
+        };
+        self.is_like(other) && apart <= SAME_POSITION
     }
 
     /// Voxel index to patient, with the first voxel at `origin` and `step` from slice to slice.
@@ -172,7 +168,7 @@ pub(super) fn heights(frames: &[Located]) -> Result<Vec<f64>, String> {
 
 impl Stack {
     /// Orders `frames`, of which there is at least one. `gap` is the stated distance of slices, for a
-    /// volume of one slice; `shape` has the columns and rows.
+    /// volume of one slice; `name` says for error messages which frame that of an index is.
     ///
     /// # Errors
     /// What contradicts one volume.
@@ -180,6 +176,7 @@ impl Stack {
         frames: &[Located],
         [columns, rows]: [usize; 2],
         gap: Option<f64>,
+        name: &dyn Fn(usize) -> String,
     ) -> Result<Self, String> {
         let first = &frames[0];
         if frames.len() == 1 && first.position.is_none() {
@@ -201,20 +198,22 @@ impl Stack {
                 heights[groups[0][0]],
             ));
         }
-        let by_rank = |a: &usize, b: &usize| {
-            let (a, b) = (&frames[*a], &frames[*b]);
-            let ranks = a.rank.iter().zip(&b.rank).map(|(a, b)| a.total_cmp(b));
-            let ranks = ranks.fold(std::cmp::Ordering::Equal, |all, next| all.then(next));
-            ranks.then((a.part, a.frame).cmp(&(b.part, b.frame)))
-        };
-        let mut sorted = vec![0; frames.len()];
-        for (slice, group) in groups.iter().enumerate() {
-            let mut group = group.to_vec();
-            group.sort_by(by_rank);
-            for (volume, frame) in group.into_iter().enumerate() {
-                sorted[volume * slices + slice] = frame;
-            }
+        if slices == 1 && volumes > 1 {
+            return Err(format!(
+                "all {volumes} images lie at one place, {:.2} mm along the axis of the slices \
+                 (Image Position (Patient) (0020,0032)); a volume needs slices at different places",
+                heights[0]
+            ));
         }
+        for group in &groups {
+            check_side_by_side(frames, group, name)?;
+        }
+        let groups: Vec<Vec<usize>> = groups.iter().map(|group| group.to_vec()).collect();
+        let marks: Vec<&Marks> = frames.iter().map(|frame| &frame.marks).collect();
+        let dealt = deal(&groups, &marks, name).map_err(|reason| {
+            format!("there are {volumes} images at every place of a slice, and {reason}")
+        })?;
+        let sorted: Vec<usize> = dealt.into_iter().flatten().collect();
         let position = |slice: usize| frames[sorted[slice]].position.unwrap_or_default();
         let origin = position(0);
         let mut warnings = Vec::new();
@@ -269,7 +268,8 @@ impl Stack {
     }
 }
 
-fn one_slice() -> String {
+/// The warning about a volume of one slice.
+pub(super) fn one_slice() -> String {
     "The file holds a single slice. Send all files of the series together to get the whole volume."
         .into()
 }
@@ -285,6 +285,38 @@ fn flat() -> String {
 
 fn known_gap(gap: Option<f64>) -> Result<f64, String> {
     gap.ok_or_else(|| "a single slice needs a Slice Thickness (0018,0050)".into())
+}
+
+/// Checks that the frames of `group`, which lie at the same height, cover the same pixels.
+fn check_side_by_side(
+    frames: &[Located],
+    group: &[usize],
+    name: &dyn Fn(usize) -> String,
+) -> Result<(), String> {
+    let [rows, columns] = frames[group[0]].spacing;
+    let slack = (PLACE_SLACK * rows.min(columns)).max(SAME_POSITION);
+    let apart = |a: usize, b: usize| match (frames[a].position, frames[b].position) {
+        (Some(a), Some(b)) => (a - b).norm(),
+        _ => 0.0,
+    };
+    if group.iter().all(|other| apart(group[0], *other) <= slack) {
+        return Ok(());
+    }
+    // The same two in whatever order the files came.
+    let mut named: Vec<(String, usize)> =
+        group.iter().map(|frame| (name(*frame), *frame)).collect();
+    named.sort_unstable();
+    let first = named[0].1;
+    let far = |(_, a): &&(String, usize), (_, b): &&(String, usize)| {
+        apart(first, *a).total_cmp(&apart(first, *b))
+    };
+    let other = named.iter().rev().max_by(far).unwrap_or(&named[0]);
+    Err(format!(
+        "{} and {} lie side by side in one plane, {:.2} mm apart",
+        named[0].0,
+        other.0,
+        apart(first, other.1)
+    ))
 }
 
 /// Checks that slice k lies `step` * k from the first.
@@ -309,7 +341,12 @@ fn check_steps(position: &dyn Fn(usize) -> Vec3, slices: usize, step: Vec3) -> R
 
 #[cfg(test)]
 mod tests {
+    use super::super::volumes::Mark;
     use super::*;
+
+    fn name(frame: usize) -> String {
+        format!("frame {frame}")
+    }
 
     fn at(z: f64, rank: f64) -> Located {
         Located {
@@ -319,14 +356,14 @@ mod tests {
             axes: [Vec3::x(), Vec3::y()],
             oriented: true,
             spacing: [2.0, 3.0],
-            rank: [rank, 0.0, 0.0, 0.0, 0.0],
+            marks: Marks::from([Mark::time(rank)]),
         }
     }
 
     #[test]
     fn positions_order_slices_and_ranks_order_volumes() {
         let frames = [at(8.0, 2.0), at(4.0, 1.0), at(4.0, 2.0), at(8.0, 1.0)];
-        let stack = Stack::of(&frames, [5, 5], None).unwrap();
+        let stack = Stack::of(&frames, [5, 5], None, &name).unwrap();
         assert_eq!((stack.slices, &*stack.order), (2, &[1, 3, 2, 0][..]));
         let frame = &stack.placement.frame;
         assert_eq!(frame.spacing(), [3.0, 2.0, 4.0]);
@@ -336,7 +373,7 @@ mod tests {
 
     #[test]
     fn gaps_and_strangers_are_named() {
-        let of = |frames: &[Located]| Stack::of(frames, [5, 5], Some(4.0)).map(|s| s.slices);
+        let of = |frames: &[Located]| Stack::of(frames, [5, 5], Some(4.0), &name).map(|s| s.slices);
         let gap = of(&[at(0.0, 0.0), at(4.0, 0.0), at(12.0, 0.0)]).unwrap_err();
         assert!(gap.contains("4.000 to 8.000 mm"), "{gap}");
         let twice = of(&[at(0.0, 0.0), at(0.0, 1.0), at(4.0, 0.0)]).unwrap_err();

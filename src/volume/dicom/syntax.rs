@@ -3,6 +3,9 @@
 //! After PS3.10, a file begins with 128 bytes of preamble, `DICM`, and group 0002 in Explicit VR
 //! Little Endian, which names the transfer syntax. Old files lack the preamble or all three. They
 //! are recognised as DICOM if they begin with an element of group 0002 or 0008, as a data set does.
+//!
+//! The first element of the data set shows its encoding. A transfer syntax that contradicts it is an
+//! error of its own, because whatever is read by the wrong one makes no sense.
 
 use super::super::VolumeError;
 use super::super::limits::ReadLimits;
@@ -10,6 +13,7 @@ use super::super::source::{Source, VolumeFile};
 use super::attributes::clip;
 use dicom_encoding::transfer_syntax::{Endianness, TransferSyntax, TransferSyntaxIndex};
 use dicom_transfer_syntax_registry::TransferSyntaxRegistry;
+use std::fmt;
 
 /// Group 0002 must end within this many bytes.
 const META_REACH: usize = 64 * 1024;
@@ -86,6 +90,63 @@ impl Syntax {
         Ok(source)
     }
 
+    /// Compares the transfer syntax with the data set, which begins with `stored`.
+    ///
+    /// # Errors
+    /// [`VolumeError::Field`] if they contradict each other.
+    fn check(
+        &self,
+        file: &VolumeFile,
+        stored: &[u8],
+        limits: &ReadLimits,
+    ) -> Result<(), VolumeError> {
+        let ts = self.transfer_syntax;
+        let wrong = |reason: String| VolumeError::Field {
+            file: file.name().into(),
+            field: "Transfer Syntax UID (0002,0010)",
+            value: format!("{} ({})", ts.uid(), ts.name()),
+            reason,
+            byte: Some(self.data_set),
+        };
+        let deflate = || {
+            let mut start = [0; 8];
+            let mut source = Source::inflate(file, self.data_set, limits.unpacked_bytes).ok()?;
+            let there = source.fill(&mut start).ok()?;
+            encoding(start.get(..there)?)
+        };
+        if self.deflated {
+            return match (encoding(stored), deflate(), stored) {
+                (_, Some(Encoding::ExplicitLittle), _) => Ok(()),
+                (_, Some(other), _) => Err(wrong(format!("the inflated data set is in {other}"))),
+                (Some(plain), ..) => Err(wrong(format!(
+                    "the data set is not deflated, but in {plain}"
+                ))),
+                (None, None, [0x1f, 0x8b, ..]) => Err(wrong(
+                    "the data set begins with a gzip header; expected a raw deflate stream".into(),
+                )),
+                (None, None, [first, second, ..]) if is_zlib(*first, *second) => Err(wrong(
+                    "the data set begins with a zlib header; expected a raw deflate stream \
+                     (PS3.5 A.5)"
+                        .into(),
+                )),
+                _ => Ok(()),
+            };
+        }
+        let expected = match (ts.uid(), ts.endianness()) {
+            (IMPLICIT_LITTLE, _) => Encoding::ImplicitLittle,
+            (_, Endianness::Big) => Encoding::ExplicitBig,
+            (_, Endianness::Little) => Encoding::ExplicitLittle,
+        };
+        match encoding(stored) {
+            Some(found) if found != expected => Err(wrong(format!("the data set is in {found}"))),
+            Some(_) => Ok(()),
+            None => match deflate() {
+                Some(Encoding::ExplicitLittle) => Err(wrong("the data set is deflated".into())),
+                _ => Ok(()),
+            },
+        }
+    }
+
     /// Whether the data set is in Explicit VR Little Endian, whatever its pixels are in.
     pub(super) fn is_explicit_little(&self) -> bool {
         let big = self.transfer_syntax.endianness() == Endianness::Big;
@@ -101,18 +162,62 @@ pub(in super::super) fn is_dicom(start: &[u8]) -> bool {
 /// Guesses the encoding of a data set that has no group 0002 and begins with `start`.
 fn guess(start: &[u8]) -> Option<&'static TransferSyntax> {
     let first: &[u8; 8] = start.first_chunk()?;
-    let vr = first[4].is_ascii_uppercase() && first[5].is_ascii_uppercase();
-    match (&first[..4], vr) {
-        ([8, 0, 0..=0x70, 0] | [2, 0, 0..=2, 0], true) => {
+    match (&first[..4], encoding(start)?) {
+        ([8, 0, 0..=0x70, 0] | [2, 0, 0..=2, 0], Encoding::ExplicitLittle) => {
             TransferSyntaxRegistry.get(EXPLICIT_LITTLE)
         }
-        ([0, 8, 0, 0..=0x70], true) => TransferSyntaxRegistry.get(EXPLICIT_BIG),
-        // Implicit VR: the length of the value is even and below 65536.
-        ([8, 0, 0..=0x70, 0], false) if first[4].is_multiple_of(2) && first[6..] == [0, 0] => {
+        ([0, 8, 0, 0..=0x70], Encoding::ExplicitBig) => TransferSyntaxRegistry.get(EXPLICIT_BIG),
+        ([8, 0, 0..=0x70, 0], Encoding::ImplicitLittle) => {
             TransferSyntaxRegistry.get(IMPLICIT_LITTLE)
         }
         _ => None,
     }
+}
+
+/// How the elements of a data set are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Encoding {
+    ImplicitLittle,
+    ExplicitLittle,
+    ExplicitBig,
+    /// No transfer syntax of the standard.
+    ImplicitBig,
+}
+
+impl fmt::Display for Encoding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::ImplicitLittle => "Implicit VR Little Endian",
+            Self::ExplicitLittle => "Explicit VR Little Endian",
+            Self::ExplicitBig => "Explicit VR Big Endian",
+            Self::ImplicitBig => "Implicit VR Big Endian",
+        })
+    }
+}
+
+/// The encoding of a data set that begins with `start`, if its first element shows it: its group is a low
+/// even number; a value representation is two capital letters, a length even and below 65536.
+fn encoding(start: &[u8]) -> Option<Encoding> {
+    let first: &[u8; 8] = start.first_chunk()?;
+    let explicit = first[4].is_ascii_uppercase() && first[5].is_ascii_uppercase();
+    let is_group = |group: u8| group > 0 && group <= 0x20 && group.is_multiple_of(2);
+    match (first, explicit) {
+        ([group, 0, ..], true) if is_group(*group) => Some(Encoding::ExplicitLittle),
+        ([0, group, ..], true) if is_group(*group) => Some(Encoding::ExplicitBig),
+        // Implicit VR: the length of the value is even and below 65536.
+        ([group, 0, _, _, low, _, 0, 0], false) if is_group(*group) && low.is_multiple_of(2) => {
+            Some(Encoding::ImplicitLittle)
+        }
+        ([0, group, _, _, 0, 0, _, low], false) if is_group(*group) && low.is_multiple_of(2) => {
+            Some(Encoding::ImplicitBig)
+        }
+        _ => None,
+    }
+}
+
+/// Whether two bytes are the header of a zlib stream (RFC 1950).
+fn is_zlib(first: u8, second: u8) -> bool {
+    first & 0x0f == 8 && first >> 4 <= 7 && u16::from_be_bytes([first, second]).is_multiple_of(31)
 }
 
 /// Finds the data set of `file`.
@@ -157,14 +262,21 @@ pub(super) fn find(file: &VolumeFile, limits: &ReadLimits) -> Result<Syntax, Vol
         _ => None,
     };
     match (transfer_syntax, compression) {
-        (Some(transfer_syntax), Some(compression)) => Ok(Syntax {
-            data_set: meta.end as u64,
-            transfer_syntax,
-            deflated,
-            compression,
-            gzip: source.is_gzip(),
-            media_class: meta.media_class,
-        }),
+        (Some(transfer_syntax), Some(compression)) => {
+            let found = Syntax {
+                data_set: meta.end as u64,
+                transfer_syntax,
+                deflated,
+                compression,
+                gzip: source.is_gzip(),
+                media_class: meta.media_class,
+            };
+            // Without group 0002 the first element was asked already.
+            if meta.transfer_syntax.is_some() {
+                found.check(file, &start[meta.end..], limits)?;
+            }
+            Ok(found)
+        }
         _ => Err(refuse(file, transfer_syntax, uid)),
     }
 }

@@ -10,21 +10,31 @@ use std::collections::BTreeMap;
 
 mod compressed;
 mod objects;
+mod padding;
+mod refused;
+mod sorted;
 
 /// An element's value.
 #[derive(Clone)]
 enum Value {
     Text(&'static str),
     Shorts(Vec<u16>),
+    Longs(Vec<u32>),
+    Single(f32),
     Double(f64),
     Items(Vec<Elements>),
 }
-use Value::{Double, Items, Shorts, Text};
+use Value::{Double, Items, Longs, Shorts, Single, Text};
+
+/// A text that the test made.
+fn written(text: impl ToString) -> Value {
+    Text(Box::leak(text.to_string().into_boxed_str()))
+}
 
 /// Elements by tag, with their VR.
 type Elements = BTreeMap<(u16, u16), (&'static str, Value)>;
 
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Encoding {
     Implicit,
     Explicit,
@@ -84,6 +94,8 @@ impl Encoding {
                 format!("{text}{padding}").into_bytes()
             }
             Shorts(numbers) => numbers.iter().flat_map(|n| self.short(*n)).collect(),
+            Longs(numbers) => numbers.iter().flat_map(|n| self.long(*n)).collect(),
+            Single(number) => self.long(number.to_bits()).to_vec(),
             Double(number) => match self {
                 Encoding::BigEndian => number.to_be_bytes().to_vec(),
                 _ => number.to_le_bytes().to_vec(),

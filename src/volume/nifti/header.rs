@@ -121,6 +121,7 @@ impl Header {
             byte_order: self.byte_order,
             unused_bits: 0,
             scaling: self.scaling,
+            padding: None,
         }
     }
 

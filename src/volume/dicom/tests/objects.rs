@@ -8,7 +8,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
 /// A CT slice of 3 x 2 pixels at `height` mm, with the numbers from `first` on.
-fn ct(height: &'static str, first: u16) -> Elements {
+pub(super) fn ct(height: &'static str, first: u16) -> Elements {
     BTreeMap::from([
         ((0x08, 0x05), ("CS", Text("ISO_IR 192"))),
         ((0x08, 0x08), ("CS", Text("ORIGINAL\\PRIMARY\\AXIAL"))),
@@ -47,7 +47,7 @@ fn position(height: &str) -> &'static str {
     }
 }
 
-fn files(slices: &[Elements]) -> Vec<VolumeFile> {
+pub(super) fn files(slices: &[Elements]) -> Vec<VolumeFile> {
     let named = slices.iter().enumerate();
     named
         .map(|(n, e)| VolumeFile::in_memory(format!("{n}"), Encoding::Explicit.file(e)))
@@ -133,7 +133,10 @@ fn files_that_are_not_one_series_are_named() {
     other.insert((0x20, 0x0e), ("UI", Text("9")));
     other.insert((0x20, 0x11), ("IS", Text("8")));
     let two = complain(&[ct("0", 0), other]);
-    assert!(two.contains("2 series, numbers 7 (1 files), 8"), "{two}");
+    assert!(
+        two.contains("2 series: number 7 (UID 1.2.3.4, 1 files), number 8 (UID 9"),
+        "{two}"
+    );
     let mut wide = ct("3", 0);
     wide.insert((0x28, 0x10), ("US", Shorts(vec![1])));
     assert!(complain(&[ct("0", 0), wide]).contains("3 x 1"));
@@ -173,16 +176,16 @@ fn several_slices_at_one_place_are_several_volumes() {
     assert_eq!(second.provenance.unwrap().instance_uids, ["a", "b"]);
 }
 
-fn item(tag: (u16, u16), vr: &'static str, value: Value) -> Elements {
+pub(super) fn item(tag: (u16, u16), vr: &'static str, value: Value) -> Elements {
     BTreeMap::from([(tag, (vr, value))])
 }
 
-fn group(tag: (u16, u16), content: Elements) -> ((u16, u16), (&'static str, Value)) {
+pub(super) fn group(tag: (u16, u16), content: Elements) -> ((u16, u16), (&'static str, Value)) {
     (tag, ("SQ", Items(vec![content])))
 }
 
 /// An Enhanced PET image of four frames, stored from above, with a scaling of its own each.
-fn enhanced() -> Elements {
+pub(super) fn enhanced() -> Elements {
     let mut elements = ct("0", 0);
     let heights = ["1\\2\\9", "1\\2\\3", "1\\2\\0", "1\\2\\6"];
     let slopes = ["4", "2", "1", "3"];
