@@ -7,11 +7,12 @@
 //! 2. `scan`: one pass over the data set collects the needed `attributes` and finds the pixels. It
 //!    follows at most 32 nested sequences and rejects lengths beyond the size of the file. `unknown`:
 //!    sequences that a program wrote without knowing them.
-//! 3. `kind`: what the object is. One that holds no slices is refused by its name, with what to send.
+//! 3. `kind`: what the object is. One that holds no slices is refused by its name, with what to send;
+//!    `company`: beside others it is left out.
 //! 4. `frames`: orders the frames of a Nuclear Medicine Image by its vectors; `geometry` places them.
 //!    `stack`: orders and places all other frames by their positions. `segments`: labels.
 //! 5. `pixels`, `fragments` and `codec`: checks the pixel format and decodes frame by frame.
-//! 6. `provenance`: patient, study, series, instances and acquisition.
+//! 6. `provenance`: patient, study, series, instances and acquisition; `characters`: their text.
 //!
 //! Guaranteed: no memory is taken for a stated size before the file was found large enough for it;
 //! beside the voxels, one compressed frame and at most 16 MiB of attributes are held. A damaged
@@ -21,7 +22,9 @@
 //! JPEG 2000, JPEG XL, video, and values that are mapped by a table.
 
 mod attributes;
+mod characters;
 mod codec;
+mod company;
 mod fragments;
 mod frames;
 mod geometry;
@@ -137,10 +140,13 @@ impl DicomFile {
         limits: &ReadLimits,
         monitor: &Monitor,
     ) -> Result<Self, VolumeError> {
-        match files {
+        let sorted = company::set_apart(files, limits, monitor)?;
+        let mut opened = match &sorted.slices[..] {
             [file] => Self::single(file, limits, monitor),
-            files => Self::series(files, limits, monitor),
-        }
+            slices => Self::series(slices, limits, monitor),
+        }?;
+        opened.warnings.extend(sorted.notes);
+        Ok(opened)
     }
 
     fn single(
@@ -150,7 +156,7 @@ impl DicomFile {
     ) -> Result<Self, VolumeError> {
         let ScannedFile { scan, pixels } = ScannedFile::open(file, limits, monitor)?;
         let a = &scan.attributes;
-        let mut warnings = Vec::new();
+        let mut warnings = Provenance::warnings(a);
         let [columns, rows] = pixels.extent;
         let (content, volumes, slices, placement) = match scan.kind {
             Kind::Nuclear { gated } => {
@@ -283,7 +289,7 @@ impl DicomFile {
             provenance,
             parts: series.parts,
             instances: series.instances,
-            warnings: warning.into_iter().collect(),
+            warnings: series.warnings.into_iter().chain(warning).collect(),
         })
     }
 
@@ -371,6 +377,8 @@ struct Series {
     /// Every series, with its number and how many files it has.
     names: Vec<(String, String, usize)>,
     provenance: Option<Provenance>,
+    /// About the text of the first part.
+    warnings: Vec<String>,
     gap: Option<f64>,
     /// Files that repeat an instance.
     repeated: usize,
@@ -396,6 +404,7 @@ impl Series {
         self.located.push(Located::of(a, self.parts.len(), 0)?);
         if self.provenance.is_none() {
             self.provenance = Some(Provenance::of(a));
+            self.warnings = Provenance::warnings(a);
             self.gap = stated_gap(a)?;
         }
         self.instances.push(instance);

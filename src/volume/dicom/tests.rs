@@ -8,18 +8,22 @@ use crate::geometry::Vec3;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
+mod company;
 mod compressed;
 mod objects;
+mod text;
 
 /// An element's value.
 #[derive(Clone)]
 enum Value {
     Text(&'static str),
+    /// As it is, of an even length.
+    Bytes(Vec<u8>),
     Shorts(Vec<u16>),
     Double(f64),
     Items(Vec<Elements>),
 }
-use Value::{Double, Items, Shorts, Text};
+use Value::{Bytes, Double, Items, Shorts, Text};
 
 /// Elements by tag, with their VR.
 type Elements = BTreeMap<(u16, u16), (&'static str, Value)>;
@@ -83,6 +87,7 @@ impl Encoding {
                 let padding = if text.len() % 2 == 1 { " " } else { "" };
                 format!("{text}{padding}").into_bytes()
             }
+            Bytes(bytes) => bytes.clone(),
             Shorts(numbers) => numbers.iter().flat_map(|n| self.short(*n)).collect(),
             Double(number) => match self {
                 Encoding::BigEndian => number.to_be_bytes().to_vec(),

@@ -8,7 +8,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
 /// A CT slice of 3 x 2 pixels at `height` mm, with the numbers from `first` on.
-fn ct(height: &'static str, first: u16) -> Elements {
+pub(super) fn ct(height: &'static str, first: u16) -> Elements {
     BTreeMap::from([
         ((0x08, 0x05), ("CS", Text("ISO_IR 192"))),
         ((0x08, 0x08), ("CS", Text("ORIGINAL\\PRIMARY\\AXIAL"))),
@@ -47,7 +47,7 @@ fn position(height: &str) -> &'static str {
     }
 }
 
-fn files(slices: &[Elements]) -> Vec<VolumeFile> {
+pub(super) fn files(slices: &[Elements]) -> Vec<VolumeFile> {
     let named = slices.iter().enumerate();
     named
         .map(|(n, e)| VolumeFile::in_memory(format!("{n}"), Encoding::Explicit.file(e)))
@@ -55,18 +55,18 @@ fn files(slices: &[Elements]) -> Vec<VolumeFile> {
 }
 
 /// Whose scan the volume `frame` of `files` is, by the headers alone.
-fn headers(files: &[VolumeFile], frame: Option<usize>) -> Provenance {
+pub(super) fn headers(files: &[VolumeFile], frame: Option<usize>) -> Provenance {
     let (options, limits) = (ReadOptions { frame }, ReadLimits::default());
     let found = provenance(files, &options, &limits, &Monitor::silent());
     found.unwrap().unwrap()
 }
 
-fn read_files(files: &[VolumeFile]) -> Result<Reading, VolumeError> {
+pub(super) fn read_files(files: &[VolumeFile]) -> Result<Reading, VolumeError> {
     let (options, limits) = (ReadOptions::default(), ReadLimits::default());
     read_volume(files, &options, &limits, &Monitor::silent())
 }
 
-fn archive(files: &[(&str, Vec<u8>)], method: CompressionMethod) -> VolumeFile {
+pub(super) fn archive(files: &[(&str, Vec<u8>)], method: CompressionMethod) -> VolumeFile {
     let mut zip = ZipWriter::new(std::io::Cursor::new(Vec::new()));
     let options = SimpleFileOptions::default().compression_method(method);
     for (name, bytes) in files {
