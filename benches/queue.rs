@@ -280,7 +280,11 @@ impl Work for Sleepy {
         self.real.page_files()
     }
 
-    fn page(&self, product: &StoredItem) -> Result<String, Failure> {
-        self.real.page(product)
+    fn page(
+        &self,
+        product: &StoredItem,
+        scan: &serde_json::Map<String, serde_json::Value>,
+    ) -> Result<String, Failure> {
+        self.real.page(product, scan)
     }
 }

@@ -10,7 +10,8 @@ C.8.4.15, and the objects are compared with mask.nii.gz and mesh.json of the sam
   cavity, has the volume of report.json and shares no voxel;
 - contours.dcm: voxel centres inside the polygons of every slice;
 - mesh.dcm: every vertex of the STL within 0.01 mm, also of the glTF's; surface.dcm: points and triangles;
-- measurements.dcm, read by highdicom: the volumes of report.json;
+- measurements.dcm, read by highdicom and by dcmqi: the volumes of report.json, those of the apparent and of the
+  anatomical wall each in a group whose method says which it is;
 - all: patient, study, Frame of Reference, source; no private attribute, none that is not of the IOD, none
   missing that it asks for (tables of highdicom); codes have the meaning of PS3.16 (tables of pydicom).
 """
@@ -246,8 +247,24 @@ def check_measurements(out, report, seg):
     assert group.tracking_uid == seg.SegmentSequence[0].TrackingUID
     volumes = [m.value for m in group.get_measurements() if m.name.meaning == "Volume"]
     assert report["volumes_ml"]["wall"] in volumes and report["volumes_ml"]["cavity"] in volumes
-    segments = sr.content.get_image_measurement_groups()
-    assert len(segments) == 17, len(segments)
+    groups = sr.content.get_image_measurement_groups()
+    walls = {group.method.value: group for group in groups if group.method is not None}
+    assert set(walls) == {"APPARENT", "ANATOMICAL"} and len(groups) == 17 + 2, (walls, len(groups))
+    program = Path(sys.executable).parent / "tid1500reader"
+    read = out / "measurements.json"
+    subprocess.run([program, "--inputDICOM", out / "measurements.dcm", "--outputMetadata", read],
+                   check=True, capture_output=True)
+    named = {g["TrackingIdentifier"]: g for g in json.loads(read.read_text())["Measurements"]}
+    for wall in "apparent", "anatomical":
+        wanted = [report["volumes_ml"][wall][part] for part in ("wall", "cavity")]
+        group = walls[wall.upper()]
+        found = [float(m.value) for m in group.get_measurements() if m.name.meaning == "Volume"]
+        assert np.allclose(found, wanted), (wall, found, wanted)
+        other = named[group.tracking_identifier]
+        found = [float(m["value"]) for m in other["measurementItems"]
+                 if m["quantity"]["CodeMeaning"] == "Volume"]
+        assert np.allclose(found, wanted), (wall, found, wanted)
+        assert other["MeasurementMethod"]["CodeValue"] == wall.upper(), other
 
 
 def check_object(data):

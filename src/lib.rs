@@ -98,6 +98,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod text;
+
 pub mod geometry;
 
 pub mod numeric;

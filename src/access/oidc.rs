@@ -13,6 +13,7 @@
 
 use super::{Identity, Quota, Scope};
 use crate::jobs::{Tenant, content_id};
+use crate::text::is_printable;
 use jsonwebtoken::jwk::{AlgorithmParameters, EllipticCurve, Jwk};
 use jsonwebtoken::{Algorithm, DecodingKey, Header, Validation, decode, decode_header};
 use serde_json::{Map, Value};
@@ -160,7 +161,7 @@ impl Issuer {
             .ok_or_else(|| refused(&format!("its claim `{name}` holds no scope")))?;
         let name: String = subject
             .chars()
-            .filter(|c| !c.is_control())
+            .filter(|c| is_printable(*c))
             .take(LONGEST_NAME)
             .collect();
         Ok(Identity {

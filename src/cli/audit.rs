@@ -1,6 +1,7 @@
 //! `ventriform audit`: checks the audit trail of a data folder, also while the service runs on it.
 
 use super::data_args::DataArgs;
+use super::output::{json, say};
 use crate::access::{AccessStore, AuditFilter, fhir, verify};
 use crate::jobs::ListRequest;
 use anyhow::{Result, bail};
@@ -50,9 +51,11 @@ async fn check(args: &DataArgs) -> Result<()> {
             report.rows
         );
     }
-    println!(
+    say!(
         "{} rows are in order; the newest is {} with the hash {}",
-        report.rows, report.newest, report.head
+        report.rows,
+        report.newest,
+        report.head
     );
     Ok(())
 }
@@ -67,7 +70,7 @@ async fn print(args: &DataArgs) -> Result<()> {
         };
         let page = store.audit(&AuditFilter::default(), page).await?;
         for record in &page.items {
-            println!("{}", fhir(record));
+            json(&fhir(record).to_string());
         }
         before = page.next;
         if before.is_none() {

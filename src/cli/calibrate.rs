@@ -1,6 +1,6 @@
 //! `ventriform calibrate`: [`crate::evaluate::calibration`] on the command line.
 
-use super::output::write_file;
+use super::output::{note, say, write_file};
 use super::{Bar, FitArgs};
 use crate::evaluate::calibration::{
     Calibration, CalibrationError, CaseFigures, calibrate, cases_of,
@@ -54,9 +54,9 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
     let made = made?;
     write_file(&args.output, made.profile.to_json().as_bytes())?;
     for (case, problem) in &made.problems {
-        eprintln!("warning: {case}: {problem}");
+        note!("warning: {case}: {problem}");
     }
-    print!("{}", table(&made));
+    say!("{}", table(&made).trim_end_matches('\n'));
     Ok(())
 }
 

@@ -1,6 +1,6 @@
 //! `ventriform demo`: starts the service, and uses it over HTTP to make a model of a simulated scan.
 
-use super::output::{create_folder, write_file};
+use super::output::{create_folder, say, write_file};
 use super::{Bar, serve};
 use crate::progress::Monitor;
 use crate::volume::nifti::{self, StoredType};
@@ -113,10 +113,10 @@ async fn demonstrate(args: &DemoArgs, data_dir: &Path) -> Result<()> {
         client: Client::new(),
         base: format!("http://{}", service.address()),
     };
-    println!("The service listens on {}", remote.base);
+    say!("The service listens on {}", remote.base);
 
     let volume = tokio::task::spawn_blocking(simulated_scan).await??;
-    println!(
+    say!(
         "Sending a simulated scan (128³ voxels of 3.2 mm, {} KiB) ...",
         volume.len() / 1024
     );
@@ -136,7 +136,7 @@ async fn demonstrate(args: &DemoArgs, data_dir: &Path) -> Result<()> {
         write_file(&args.output.join(file), &bytes)?;
     }
     print_figures(&remote.json(&format!("{model}/report")).await?);
-    println!(
+    say!(
         "\nWritten: {} and {}",
         args.output.join("lv.glb").display(),
         args.output.join("report.html").display()
@@ -160,38 +160,38 @@ fn simulated_scan() -> Result<Vec<u8>> {
 fn print_figures(report: &Value) {
     let figure = |section: &str, key: &str| report[section][key].as_f64().unwrap_or(f64::NAN);
     let ratio = &report["shape"]["radius_ratio"];
-    println!("\nThe model");
-    println!(
+    say!("\nThe model");
+    say!(
         "  {} points, {} triangles, Euler characteristic {}, {} self-intersections",
         report["mesh"]["vertices"],
         report["mesh"]["triangles"],
         report["mesh"]["euler_characteristic"],
         report["mesh"]["self_intersections"]
     );
-    println!(
+    say!(
         "  fitness {:.3} after re-tiling, {:.3} optimised ({:+.1} %)",
         figure("fitness", "retiled"),
         figure("fitness", "optimised"),
         figure("fitness", "gain_percent")
     );
-    println!(
+    say!(
         "  triangle shape 2r/R {:.3} mean, {:.3} least (1 = equilateral)",
         ratio["mean"].as_f64().unwrap_or(f64::NAN),
         ratio["min"].as_f64().unwrap_or(f64::NAN)
     );
-    println!(
+    say!(
         "  {:.2} mm mean and {:.2} mm largest distance to the surface",
         figure("distance", "mean_mm"),
         figure("distance", "hausdorff_mm")
     );
-    println!(
+    say!(
         "  took {:.0} ms on this machine",
         figure("timings_ms", "total")
     );
 }
 
 fn print_next_steps(base: &str, model: &str) {
-    println!(
+    say!(
         "\nServing until Ctrl-C. In another terminal:
   curl {base}/
   curl -s {base}{model}/report

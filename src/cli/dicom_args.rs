@@ -1,6 +1,8 @@
 //! The flags of DICOM output.
 
-use crate::export::dicom::{Deidentification, Moment, SourceScan, StatedIdentity, identity};
+use crate::export::dicom::{
+    Deidentification, Moment, SourceScan, StatedIdentity, identity, legible,
+};
 use crate::progress::Monitor;
 use crate::segmentation::SegmentedVolume;
 use crate::volume::dicom::Provenance;
@@ -42,11 +44,15 @@ pub struct DicomArgs {
     /// Accession number
     #[arg(long, value_name = "NUMBER", requires = "dicom")]
     accession_number: Option<String>,
+    /// Referring physician's name, as FAMILY^GIVEN
+    #[arg(long, value_name = "NAME", requires = "dicom")]
+    referring_physician: Option<String>,
     /// Frame of Reference UID of the scan
     #[arg(long, value_name = "UID", requires = "dicom")]
     frame_of_reference_uid: Option<String>,
-    /// Remove the patient's identity from the DICOM objects (PS3.15, basic profile)
-    #[arg(long, requires = "dicom")]
+    /// Remove the patient's identity from the DICOM objects (PS3.15, basic profile) and leave it out of
+    /// report.html
+    #[arg(long)]
     deidentify: bool,
     /// Secret from which --deidentify derives new UIDs: with the same secret, objects of one study
     /// stay together [default: VENTRIFORM_DEIDENTIFY_SECRET, or a random one]
@@ -87,6 +93,10 @@ impl DicomArgs {
             true => (stated.check()).and_then(|()| identity(found.as_ref(), &Default::default())),
             false => identity(found.as_ref(), &stated),
         };
+        let known = known.and_then(|known| match self.deidentify {
+            true => Ok(known),
+            false => legible(&known).map(|()| known),
+        });
         let identity = known.map_err(|error| anyhow!(error.with_advice()))?;
         let secret = || {
             let given = self.deidentify_secret.clone();
@@ -106,6 +116,26 @@ impl DicomArgs {
         }))
     }
 
+    /// Whose scan the report names: what `files` say, completed by the flags; nobody with
+    /// `--deidentify`.
+    ///
+    /// # Errors
+    /// If a file cannot be read.
+    pub(super) fn whose(
+        &self,
+        files: &[VolumeFile],
+        frame: Option<usize>,
+    ) -> Result<Option<Provenance>> {
+        if self.deidentify {
+            return Ok(None);
+        }
+        let (options, limits) = (ReadOptions { frame }, ReadLimits::default());
+        let found = volume::provenance(files, &options, &limits, &Monitor::silent())
+            .map_err(|error| anyhow!(error.with_advice()))?;
+        let stated = self.stated();
+        Ok(identity(found.as_ref(), &stated).ok().or(found))
+    }
+
     fn stated(&self) -> StatedIdentity {
         StatedIdentity {
             patient_id: self.patient_id.clone(),
@@ -116,6 +146,7 @@ impl DicomArgs {
             study_date: self.study_date.clone(),
             study_id: self.study_id.clone(),
             accession_number: self.accession_number.clone(),
+            referring_physician: self.referring_physician.clone(),
             frame_of_reference_uid: self.frame_of_reference_uid.clone(),
         }
     }

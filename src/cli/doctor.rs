@@ -1,5 +1,6 @@
 //! `ventriform doctor` and `ventriform backup`: checking, repairing and copying a data folder.
 
+use super::output::{json, say};
 use super::serve::variable;
 use crate::config::{BlobPlace, Flags, Settings};
 use crate::http::{self, s3_location};
@@ -71,7 +72,7 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
     let found = store::examine(&args.data_dir, s3.as_ref(), heirs);
     let found = Runtime::new()?.block_on(found)?;
     match args.json {
-        true => println!("{}", serde_json::to_string_pretty(&found)?),
+        true => json(&serde_json::to_string_pretty(&found)?),
         false => print(&found),
     }
     if found.is_healthy() {
@@ -83,7 +84,7 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
 fn print(found: &Examination) {
     for finding in &found.findings {
         let repair = finding.repair.map(|done| format!(" Repaired: {done}."));
-        println!(
+        say!(
             "{} {}: {}{}",
             finding.kind,
             finding.subject,
@@ -91,7 +92,7 @@ fn print(found: &Examination) {
             repair.unwrap_or_default()
         );
     }
-    println!(
+    say!(
         "{} items with a row, {} files read, {} findings",
         found.items,
         found.files,
@@ -105,9 +106,10 @@ fn print(found: &Examination) {
 /// If the folder cannot be copied, or items in it are damaged.
 pub fn back_up(args: &BackupArgs) -> Result<()> {
     let done = Runtime::new()?.block_on(store::backup(&args.data_dir, &args.target))?;
-    println!(
+    say!(
         "{} items in the backup, {} of them copied now",
-        done.items, done.copied
+        done.items,
+        done.copied
     );
     if done.damaged.is_empty() {
         return Ok(());

@@ -2,6 +2,7 @@
 
 use super::Bar;
 use super::cohort_args::CohortArgs;
+use super::output::note;
 use crate::deform::DeformParameters;
 use crate::deform::elastic::{Stiffness, SupportScaling};
 use crate::evaluate::parameters::InSample;
@@ -193,7 +194,7 @@ fn with_advice(error: EvaluateError) -> anyhow::Error {
 /// Prints the problems and the means on standard error.
 fn print_summary(evaluation: &Evaluation) {
     for (case, problem) in &evaluation.problems {
-        eprintln!("warning: {case}: {problem}");
+        note!("warning: {case}: {problem}");
     }
     let rows = &evaluation.rows;
     for kind in rows::kinds(rows) {
@@ -210,17 +211,18 @@ fn print_summary(evaluation: &Evaluation) {
                 );
             }
         }
-        eprintln!("{line}");
+        note!("{line}");
     }
     if let Some(found) = &evaluation.leave_one_out {
         let [held_out, in_sample] = found.means().map(|mean| mean.unwrap_or(f64::NAN));
-        eprintln!(
+        note!(
             "model chosen without the case: held-out E_J {held_out:.3}; with it: in-sample {in_sample:.3}"
         );
     }
     if let Some(made) = &evaluation.reader {
         for sample in [Sample::HeldOut, Sample::InSample] {
-            eprint!("reader's profile: {}", super::calibrate::gain(made, sample));
+            let gain = super::calibrate::gain(made, sample);
+            note!("reader's profile: {}", gain.trim_end_matches('\n'));
         }
     }
 }

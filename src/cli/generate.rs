@@ -1,12 +1,14 @@
 //! `ventriform generate`: a surface model from a volume.
 
-use super::output::write_file;
+use super::output::{note, write_file};
+use super::volume_args::volume_files;
 use super::{Bar, ModelArgs};
 use crate::export::{self, Format};
 use crate::pipeline::{self, Model};
 use crate::progress::{CancelToken, Monitor};
 use crate::report::{MeasuredSurface, ModelReport};
-use crate::volume::{ReadLimits, VolumeFile};
+use crate::volume::dicom::Provenance;
+use crate::volume::{self, ReadLimits, ReadOptions};
 use crate::work::problems::Explain;
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -22,7 +24,7 @@ use std::path::{Path, PathBuf};
   ventriform generate series/*.dcm -o lv.glb")]
 pub struct GenerateArgs {
     /// The volume: NIfTI (.nii, .nii.gz, or a .hdr and .img pair) or DICOM (a multi-frame NM, PET, CT or
-    /// MR file, all files of one series, or a zip of them)
+    /// MR file, all files of one series, or a zip or folder of them)
     #[arg(value_name = "IN", required = true, num_args = 1..)]
     input: Vec<PathBuf>,
     /// File to write the model to; the extension chooses the format: glb, gltf, stl, ply, obj, vtp
@@ -32,6 +34,9 @@ pub struct GenerateArgs {
     /// File to write the quality report to: .json or .html (repeatable)
     #[arg(long, value_name = "FILE")]
     report: Vec<PathBuf>,
+    /// Leave patient, study and series out of the HTML report
+    #[arg(long)]
+    deidentify: bool,
     /// Print only errors
     #[arg(short, long)]
     quiet: bool,
@@ -51,7 +56,7 @@ pub fn run(args: &GenerateArgs) -> Result<()> {
         .model
         .parameters()
         .map_err(|error| anyhow::anyhow!(error.with_advice()))?;
-    let files: Vec<VolumeFile> = args.input.iter().map(VolumeFile::at).collect();
+    let files = volume_files(&args.input)?;
     let bar = Bar::start();
     let monitor = Monitor::new(&bar, CancelToken::new());
     let made = pipeline::generate(&files, &parameters, &ReadLimits::default(), &monitor);
@@ -63,11 +68,16 @@ pub fn run(args: &GenerateArgs) -> Result<()> {
         let bytes = export::encode(format, &model.mesh, &metadata)?;
         write_file(path, &bytes)?;
     }
+    let options = ReadOptions {
+        frame: parameters.frame,
+    };
+    let whose = match args.deidentify {
+        false => volume::provenance(&files, &options, &ReadLimits::default(), &monitor)?,
+        true => None,
+    };
     for path in &args.report {
-        write_file(
-            path,
-            report_text(path, &model, &surface, &monitor)?.as_bytes(),
-        )?;
+        let text = report_text(path, (&model, whose.as_ref()), &surface, &monitor)?;
+        write_file(path, text.as_bytes())?;
     }
     if !args.quiet {
         print_summary(&model.report);
@@ -104,12 +114,15 @@ fn check_report_names(reports: &[PathBuf]) -> Result<()> {
 
 fn report_text(
     path: &Path,
-    model: &Model,
+    (model, whose): (&Model, Option<&Provenance>),
     surface: &MeasuredSurface<'_>,
     monitor: &Monitor,
 ) -> Result<String> {
     Ok(match extension(path).as_str() {
-        "html" => model.report_html(Some(&surface.closeness(&model.mesh, monitor)?)),
+        "html" => {
+            let closeness = surface.closeness(&model.mesh, monitor)?;
+            model.report_html(Some(&closeness), whose)
+        }
         _ => model.report.to_json_text(),
     })
 }
@@ -123,9 +136,9 @@ fn extension(path: &Path) -> String {
 /// Prints the main figures and all warnings on standard error.
 pub fn print_summary(report: &ModelReport) {
     for line in report.headlines() {
-        eprintln!("{line}");
+        note!("{line}");
     }
     for warning in &report.warnings {
-        eprintln!("warning: {warning}");
+        note!("warning: {warning}");
     }
 }

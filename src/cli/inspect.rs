@@ -1,8 +1,10 @@
 //! `ventriform inspect`: what a file says about itself.
 
+use super::output::json;
+use super::volume_args::volume_files;
 use crate::progress::Monitor;
 use crate::report;
-use crate::volume::{self, ReadLimits, ReadOptions, VolumeFile};
+use crate::volume::{self, ReadLimits, ReadOptions};
 use crate::work::problems::Explain;
 use anyhow::Result;
 use clap::Args;
@@ -17,7 +19,7 @@ use std::path::PathBuf;
 Prints JSON. The values under `dicom` are personal data.")]
 pub struct InspectArgs {
     /// The volume: NIfTI (.nii, .nii.gz, or a .hdr and .img pair) or DICOM (one file, all files of one
-    /// series, or a zip of them)
+    /// series, or a zip or folder of them)
     #[arg(value_name = "IN", required = true, num_args = 1..)]
     input: Vec<PathBuf>,
 }
@@ -27,19 +29,17 @@ pub struct InspectArgs {
 /// # Errors
 /// If the volume cannot be read.
 pub fn run(args: &InspectArgs) -> Result<()> {
-    let files: Vec<VolumeFile> = match args.input.as_slice() {
-        [one] => VolumeFile::with_other_half(one),
-        several => several.iter().map(VolumeFile::at).collect(),
-    };
+    let files = volume_files(&args.input)?;
     let (limits, monitor) = (ReadLimits::default(), Monitor::silent());
     let facts = volume::inspect(&files, &limits, &monitor);
     let facts = facts.map_err(|error| anyhow::anyhow!(error.with_advice()))?;
     let first = ReadOptions { frame: Some(0) };
-    let from = volume::provenance(&files, &first, &limits, &monitor)?;
+    let from = volume::provenance(&files, &first, &limits, &monitor)
+        .map_err(|error| anyhow::anyhow!(error.with_advice()))?;
     let mut shown = report::input(&facts);
     if let (Value::Object(shown), Some(from)) = (&mut shown, from) {
         shown.insert("dicom".into(), serde_json::to_value(from)?);
     }
-    println!("{}", serde_json::to_string_pretty(&shown)?);
+    json(&serde_json::to_string_pretty(&shown)?);
     Ok(())
 }

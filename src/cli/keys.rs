@@ -2,9 +2,11 @@
 //! runs on it.
 
 use super::data_args::DataArgs;
+use super::output::{note, say};
 use crate::access::{AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Quota, Scope};
 use crate::config::{Size, Span};
 use crate::jobs::{Clock, ListRequest, SystemClock, Tenant, Timestamp, rfc3339};
+use crate::text::escaped;
 use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
 use tokio::runtime::Runtime;
@@ -103,11 +105,13 @@ async fn create(args: &CreateArgs) -> Result<()> {
     let store = args.data.open().await?;
     let event = event(Activity::KeyCreated, &key, now);
     store.add_key(&key, &event).await?;
-    eprintln!(
+    note!(
         "key {} of tenant {} with scope {}; it is shown only this once",
-        key.id, key.tenant, key.scope
+        key.id,
+        key.tenant,
+        key.scope
     );
-    println!("{text}");
+    say!("{text}");
     Ok(())
 }
 
@@ -115,11 +119,11 @@ async fn list(args: &DataArgs) -> Result<()> {
     let store = args.open().await?;
     let now = SystemClock.now();
     let mut before = None;
-    println!("id\tstate\tscope\ttenant\tcreated\texpires\tname");
+    say!("id\tstate\tscope\ttenant\tcreated\texpires\tname");
     loop {
         let page = store.keys(None, ListRequest { before, limit: 100 }).await?;
         for key in &page.items {
-            println!(
+            say!(
                 "{}\t{}\t{}\t{}\t{}\t{}\t{}",
                 key.id,
                 key.state(now).as_str(),
@@ -127,7 +131,7 @@ async fn list(args: &DataArgs) -> Result<()> {
                 key.tenant,
                 rfc3339(key.created_at),
                 key.expires_at.map_or_else(|| "never".to_owned(), rfc3339),
-                key.name,
+                escaped(&key.name),
             );
         }
         before = page.next;
@@ -148,7 +152,7 @@ async fn revoke(args: &RevokeArgs) -> Result<()> {
     let now = SystemClock.now();
     let event = event(Activity::KeyRevoked, &key, now);
     store.revoke_key(&args.id, now, &event).await?;
-    println!("{} is revoked", args.id);
+    say!("{} is revoked", args.id);
     Ok(())
 }
 

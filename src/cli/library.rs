@@ -1,5 +1,6 @@
 //! `ventriform templates import`: adds models to the library in a service's data folder.
 
+use super::output::say;
 use super::serve::settings_beside;
 use crate::config::{DatabaseUrl, Settings};
 use crate::jobs::{Queue, QueueSettings, SystemClock, TemplateSource, Tenant};
@@ -68,7 +69,7 @@ pub fn import(args: &ImportArgs) -> Result<()> {
             let id = add(&queue, &engine, path, args)
                 .await
                 .with_context(|| format!("{}", path.display()))?;
-            println!("{id} {}", name(path));
+            say!("{id} {}", name(path));
         }
         Ok(())
     })

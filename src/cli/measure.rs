@@ -1,5 +1,6 @@
 //! `ventriform measure`: the agreement of two masks.
 
+use super::output::json;
 use super::segment::read;
 use crate::grid::agreement::compare;
 use crate::grid::voxelise::Mask;
@@ -44,9 +45,6 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
     }
     let reference = on_grid(&b, &a, &monitor).with_context(|| format!("{}", args.b.display()))?;
     let agreement = compare(&judged, &reference, a.frame.spacing(), &monitor)?;
-    println!(
-        "{}",
-        serde_json::to_string_pretty(&agreement_json(&agreement))?
-    );
+    json(&serde_json::to_string_pretty(&agreement_json(&agreement))?);
     Ok(())
 }

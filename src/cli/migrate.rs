@@ -1,5 +1,6 @@
 //! `ventriform migrate`: moving a data folder to PostgreSQL and an S3 store.
 
+use super::output::{note, say};
 use super::serve::variable;
 use crate::access::verify;
 use crate::config::{BlobPlace, DatabaseUrl, Flags, Settings};
@@ -52,7 +53,7 @@ pub fn run(args: &MigrateArgs) -> Result<()> {
         let Ok(mut told) = told.lock() else { return };
         if told.elapsed() >= TOLD_EVERY {
             *told = Instant::now();
-            eprintln!("{}", line(progress));
+            note!("{}", line(progress));
         }
     };
     Runtime::new()?.block_on(async {
@@ -107,14 +108,16 @@ fn line(progress: Progress) -> String {
 
 fn print(done: &Migrated) {
     for table in done.tables.iter().filter(|table| table.rows > 0) {
-        println!("{:>10} {}", table.rows, table.name);
+        say!("{:>10} {}", table.rows, table.name);
     }
     let rows: u64 = done.tables.iter().map(|table| table.rows).sum();
     match done.was_done {
-        true => println!("{rows} rows are the same on both sides: it was moved before"),
-        false => println!(
+        true => say!("{rows} rows are the same on both sides: it was moved before"),
+        false => say!(
             "{rows} rows, {} items ({} of them copied now), {} received objects",
-            done.items, done.copied, done.received
+            done.items,
+            done.copied,
+            done.received
         ),
     }
 }
@@ -126,11 +129,13 @@ async fn check_trail(to: &Destination) -> Result<()> {
     let report = verify(rows.as_ref()).await?;
     rows.close().await;
     match report.broken {
-        None => println!(
+        None => say!(
             "audit trail: {} rows, unbroken up to {} ({})",
-            report.rows, report.newest, report.head
+            report.rows,
+            report.newest,
+            report.head
         ),
-        Some(broken) => println!(
+        Some(broken) => say!(
             "audit trail: {broken}. It is the same in the folder that was moved: all was copied as it was"
         ),
     }

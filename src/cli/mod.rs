@@ -22,10 +22,12 @@ mod segment;
 mod serve;
 mod statistics;
 mod templates;
+mod volume_args;
 
 pub use bar::Bar;
 pub use parameter_args::{FitArgs, ModelArgs};
 
+use self::output::note;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -36,7 +38,11 @@ use std::process::ExitCode;
     after_help = "Start with:
   ventriform demo                            a model of a simulated scan, through the service
   ventriform generate scan.nii.gz -o lv.glb  a model of your own volume
-  ventriform serve --data-dir data           the HTTP service"
+  ventriform serve --data-dir data           the HTTP service
+
+Exit status: 0 done; 1 failed, with the reason on standard error (also: doctor and backup found damage,
+audit verify found a break, healthcheck found the service not ready); 2 arguments that cannot be used.
+A reader that closes the pipe early (| head) is no failure."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -94,19 +100,17 @@ pub fn main() -> ExitCode {
         Command::Backup(args) => doctor::back_up(&args),
         Command::Migrate(args) => migrate::run(&args),
         Command::Completions { shell } => {
-            clap_complete::generate(
-                shell,
-                &mut Cli::command(),
-                env!("CARGO_PKG_NAME"),
-                &mut std::io::stdout(),
-            );
+            let mut script = Vec::new();
+            let name = env!("CARGO_PKG_NAME");
+            clap_complete::generate(shell, &mut Cli::command(), name, &mut script);
+            output::write_out(&script);
             Ok(())
         }
     };
-    match outcome {
+    match outcome.and_then(|()| output::finish()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            note!("error: {error:#}");
             ExitCode::FAILURE
         }
     }

@@ -1,7 +1,7 @@
 //! `ventriform phantom`: a simulated scan with its true mask.
 
 use super::Bar;
-use super::output::{create_folder, write_file};
+use super::output::{create_folder, note, write_file};
 use crate::progress::{CancelToken, Monitor};
 use crate::volume::Volume;
 use crate::volume::nifti::{self, StoredType};
@@ -95,7 +95,7 @@ pub fn run(args: &PhantomArgs) -> Result<()> {
     write_volume(&at("lv_truth.nii.gz"), &made.truth, StoredType::Uint8)?;
     let text = serde_json::to_string_pretty(&made.parameters)?;
     write_file(&at("params.json"), text.as_bytes())?;
-    eprintln!(
+    note!(
         "Written: spect.nii.gz, lv_truth.nii.gz and params.json in {}",
         args.output.display()
     );

@@ -1,7 +1,8 @@
 //! `ventriform segment`: fits a model to a patient's volume.
 
 use super::dicom_args::DicomArgs;
-use super::output::{create_folder, write_file};
+use super::output::{create_folder, note, write_file};
+use super::volume_args::volume_files;
 use super::{Bar, FitArgs};
 use crate::export::{self, Format};
 use crate::parameters::FitParameters;
@@ -28,7 +29,7 @@ mask_apparent.nii.gz, mesh_apparent.glb, ...); with --dicom also mask.dcm, conto
 surface.dcm, measurements.dcm, polar.dcm and page.dcm")]
 pub struct SegmentArgs {
     /// The volume: NIfTI (.nii, .nii.gz, or a .hdr and .img pair) or DICOM (a multi-frame NM, PET, CT or
-    /// MR file, all files of one series, or a zip of them)
+    /// MR file, all files of one series, or a zip or folder of them)
     #[arg(value_name = "IN", required = true, num_args = 1..)]
     input: Vec<PathBuf>,
     /// Model to fit: a JSON mesh written by `generate`, or auto for the built-in hearts (repeatable: the
@@ -83,8 +84,9 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
         .iter()
         .filter(|m| m.as_os_str() != AUTO)
         .collect();
-    let volume: Vec<VolumeFile> = args.input.iter().map(VolumeFile::at).collect();
+    let volume = volume_files(&args.input)?;
     let dicom = args.dicom.order(&volume, parameters.frame)?;
+    let whose = args.dicom.whose(&volume, parameters.frame)?;
     let expert = args.expert.as_ref().map(|path| [VolumeFile::at(path)]);
     let order = SegmentationOrder {
         volume: &volume,
@@ -101,23 +103,23 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
         .and_then(|made| Ok((made.files(&args.formats, None, &monitor)?, made)));
     bar.finish();
     let (mut files, made) = made?;
-    files.push(made.page(&files));
+    files.push(made.page(&files, whose.as_ref()));
     if let Some(order) = dicom {
         let scan = order.of(&made);
         let objects = made.dicom_files(&scan);
         files.extend(objects.map_err(|error| anyhow!(error.with_advice()))?);
     }
     write_all(&args.output, &files)?;
-    eprintln!("{}", headline(&made.segmentation));
+    note!("{}", headline(&made.segmentation));
     for flag in &made.segmentation.fit.flags {
-        eprintln!("warning: {flag}");
+        note!("warning: {flag}");
     }
     Ok(())
 }
 
 /// Reads one volume.
 pub(super) fn read(paths: &[PathBuf], frame: Option<usize>, monitor: &Monitor) -> Result<Reading> {
-    let files: Vec<VolumeFile> = paths.iter().map(VolumeFile::at).collect();
+    let files = volume_files(paths)?;
     volume::read(
         &files,
         &ReadOptions { frame },

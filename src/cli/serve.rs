@@ -1,13 +1,16 @@
 //! `ventriform serve` and `ventriform healthcheck`: settings, log, listener, signals.
 
+use super::output::say;
 use crate::config::{DatabaseUrl, Flags, LogFormat, Settings};
 use crate::http::{self, Running};
 use crate::jobs::{Isolation, serve_isolated};
+use crate::text::{escaped_json, escaped_lines};
 use crate::volume::ReadLimits;
 use crate::work::Engine;
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use std::io::IsTerminal;
+use std::borrow::Cow;
+use std::io::{self, IsTerminal, Write};
 use std::net::{SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -48,7 +51,7 @@ pub struct HealthcheckArgs {
 pub fn run(args: &ServeArgs) -> Result<()> {
     let (mut settings, origins) = Settings::load(&args.flags, variable)?;
     if args.print_config {
-        print!("{}", settings.print(&origins));
+        say!("{}", settings.print(&origins).trim_end_matches('\n'));
         return Ok(());
     }
     settings.read_credentials(variable)?;
@@ -65,7 +68,7 @@ pub fn run(args: &ServeArgs) -> Result<()> {
         let running = http::start(settings, engine, listener).await?;
         let dicom = running.dicom_address();
         let dicom = dicom.map(|address| format!(", for DICOM on {address}"));
-        println!(
+        say!(
             "Listening on {scheme}://{address} (documentation: {scheme}://{address}/docs){}",
             dicom.unwrap_or_default()
         );
@@ -257,12 +260,38 @@ fn start_log(settings: &Settings) -> Result<()> {
     let log = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_ansi(has_colours(std::io::stderr().is_terminal(), variable))
-        .with_writer(std::io::stderr);
+        .log_internal_errors(false);
     match settings.log_format {
-        LogFormat::Json => log.json().init(),
-        LogFormat::Text => log.init(),
+        LogFormat::Json => log.json().with_writer(|| LogLine(escaped_json)).init(),
+        LogFormat::Text => log.with_writer(|| LogLine(escaped_but_colours)).init(),
     }
     Ok(())
+}
+
+/// A line of the log on its way to standard error, and how its control characters are escaped.
+struct LogLine(fn(&str) -> Cow<'_, str>);
+
+impl Write for LogLine {
+    fn write(&mut self, line: &[u8]) -> io::Result<usize> {
+        let text = String::from_utf8_lossy(line);
+        io::stderr().lock().write_all((self.0)(&text).as_bytes())?;
+        Ok(line.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        io::stderr().flush()
+    }
+}
+
+/// A line of text. Colours of the formatter stay; it has escaped what values contain of ESC.
+fn escaped_but_colours(line: &str) -> Cow<'_, str> {
+    match line.contains('\x1b') {
+        false => escaped_lines(line),
+        true => {
+            let parts: Vec<Cow<'_, str>> = line.split('\x1b').map(escaped_lines).collect();
+            parts.join("\x1b").into()
+        }
+    }
 }
 
 /// Whether log lines may have colours: only on a terminal, and not if `NO_COLOR` has a value

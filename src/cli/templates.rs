@@ -1,7 +1,7 @@
 //! `ventriform templates`: the library of models that `segment` and the service choose from.
 
 use super::cohort_args::CohortArgs;
-use super::output::{create_folder, write_file};
+use super::output::{create_folder, note, write_file};
 use crate::evaluate::cohort::read_volume;
 use crate::evaluate::parameters::ascending;
 use crate::export::{self, Format};
@@ -68,7 +68,7 @@ fn build(args: &BuildArgs) -> Result<()> {
             let bytes = export::encode(Format::Json, &model.mesh, &model.metadata())?;
             let path = output.join(format!("{case}_{n}.json"));
             write_file(&path, &bytes)?;
-            eprintln!("{} written, made from {what}", path.display());
+            note!("{} written, made from {what}", path.display());
         }
     }
     Ok(())

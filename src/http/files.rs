@@ -18,10 +18,7 @@ pub const PAGE: &str = "report.html";
 /// Results never change; only the client that asked may cache them.
 const CACHE_CONTROL: &str = "private, max-age=31536000, immutable";
 
-/// A later version of the program may draw a page differently.
-const PAGE_CACHE_CONTROL: &str = "private, max-age=86400";
-
-/// Whose scan it is may be stated otherwise, or erased.
+/// Of pages and objects: whose scan it is may be stated otherwise, or erased, and not every key sees it.
 const OBJECT_CACHE_CONTROL: &str = "private, no-cache";
 
 /// A file to be sent.
@@ -71,7 +68,7 @@ pub async fn send_page(product: &Product, page: String, headers: &HeaderMap) -> 
         media_type: "text/html; charset=utf-8".into(),
         bytes: page.into_bytes(),
     };
-    send_made(product, file, PAGE_CACHE_CONTROL, false, headers).await
+    send_made(product, file, OBJECT_CACHE_CONTROL, false, headers).await
 }
 
 /// Answers with a DICOM object of a product in the same way.

@@ -17,7 +17,7 @@ use super::openapi::{
 use super::problem::not_found::{missing, no_such_file};
 use super::problem::{Answer, Problem};
 use super::request::{PathSegments, flag, query_pairs, refuse_unknown};
-use super::scans::ScanUidsBody;
+use super::scans::{self, ScanUidsBody};
 use super::wire::path_of;
 use crate::access::Scope;
 use crate::export::Format;
@@ -31,6 +31,7 @@ use axum::extract::{RawQuery, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::routing::get;
 use serde::Serialize;
+use serde_json::{Map, Value};
 use std::borrow::Cow;
 use std::convert::Infallible;
 use std::marker::PhantomData;
@@ -403,8 +404,14 @@ async fn kept<P: ProductCollection>(app: &App, tenant: &Tenant, id: &str) -> Ans
 }
 
 /// Answers with the offered file, under the media type by which it was offered.
-pub async fn send(app: &App, product: &Product, offer: &Offer, headers: &HeaderMap) -> Answer {
-    let mut response = send_named(app, product, &offer.file, headers).await?;
+pub async fn send(
+    app: &App,
+    asker: Asker<'_>,
+    product: &Product,
+    offer: &Offer,
+    headers: &HeaderMap,
+) -> Answer {
+    let mut response = send_named(app, asker, product, &offer.file, headers).await?;
     if let Some(own) = response.headers_mut().get_mut(header::CONTENT_TYPE)
         && !own.as_bytes().starts_with(offer.media_type.as_bytes())
     {
@@ -444,7 +451,8 @@ async fn get_offered<P: ProductCollection>(
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let product = kept::<P>(&app, &caller.tenant, &id).await?;
-    let mut response = send(&app, &product, choose(&headers, offers)?, &headers).await?;
+    let asker = Asker::of(&caller);
+    let mut response = send(&app, asker, &product, choose(&headers, offers)?, &headers).await?;
     response
         .headers_mut()
         .insert(header::VARY, HeaderValue::from_static("accept"));
@@ -460,9 +468,9 @@ async fn get_file<P: ProductCollection>(
 ) -> Answer {
     let pairs = query_pairs(query.as_deref());
     let object = dicom::object_named(P::RESOURCE, &name);
-    let known: &[&str] = match object {
-        Some(_) => &["deidentify"],
-        None => &[],
+    let known: &[&str] = match object.is_some() || name == files::PAGE {
+        true => &["deidentify"],
+        false => &[],
     };
     refuse_unknown(&pairs, known)?;
     let names = file_names::<P>();
@@ -470,12 +478,16 @@ async fn get_file<P: ProductCollection>(
         return Err(no_such_file(P::RESOURCE, &name, &names));
     }
     let product = kept::<P>(&app, &caller.tenant, &id).await?;
-    let Some(object) = object else {
-        return send_named(&app, &product, &name, &headers).await;
-    };
     let deidentify = match pairs.first() {
         Some((_, value)) => flag("deidentify", value)?,
         None => false,
+    };
+    let Some(object) = object else {
+        let asker = Asker {
+            deidentify,
+            ..Asker::of(&caller)
+        };
+        return send_named(&app, asker, &product, &name, &headers).await;
     };
     if !deidentify {
         caller.require(Scope::Submit)?;
@@ -539,7 +551,52 @@ fn volume_erased(id: &str) -> Problem {
     .fix("Upload the same file again; DICOM objects of the result can then be had.")
 }
 
-async fn send_named(app: &App, product: &Product, name: &str, headers: &HeaderMap) -> Answer {
+/// Who asks for a file of a product.
+#[derive(Clone, Copy)]
+pub struct Asker<'a> {
+    tenant: &'a Tenant,
+    scope: Scope,
+    /// Whether a page names nobody.
+    deidentify: bool,
+}
+
+impl<'a> Asker<'a> {
+    /// `caller`, who sees of a scan what its scope allows.
+    pub fn of(caller: &'a Caller) -> Self {
+        Self {
+            tenant: &caller.tenant,
+            scope: caller.scope,
+            deidentify: false,
+        }
+    }
+
+    /// Somebody who files a job of `tenant`, for which the scope `submit` is needed.
+    pub fn filer(tenant: &'a Tenant) -> Self {
+        Self {
+            tenant,
+            scope: Scope::Submit,
+            deidentify: false,
+        }
+    }
+
+    /// What the page of `product` names of the scan.
+    async fn sees(self, app: &App, product: &Product) -> Answer<Map<String, Value>> {
+        let Some(volume) = product.volume.as_deref().filter(|_| !self.deidentify) else {
+            return Ok(Map::new());
+        };
+        let scan = app.queue.catalogue.scan(self.tenant, volume).await?;
+        let shown = scan.and_then(|scan| scans::shown(&scan, self.scope));
+        Ok(shown.unwrap_or_default())
+    }
+}
+
+async fn send_named(
+    app: &App,
+    asker: Asker<'_>,
+    product: &Product,
+    name: &str,
+    headers: &HeaderMap,
+) -> Answer {
     if let Some(file) = product.file(name) {
         return files::send(app, product, file, headers).await;
     }
@@ -550,7 +607,8 @@ async fn send_named(app: &App, product: &Product, name: &str, headers: &HeaderMa
                 .queue
                 .with_files(product.clone(), work.page_files())
                 .await?;
-            let draw = move |_: &Monitor<'_>| work.page(&stored);
+            let scan = asker.sees(app, product).await?;
+            let draw = move |_: &Monitor<'_>| work.page(&stored, &scan);
             let page = app.decoding.run(LITTLE_MEMORY, draw).await??;
             files::send_page(product, page, headers).await
         }

@@ -13,6 +13,7 @@ use crate::jobs::{
     BlobError, FileRecord, ScanFields, ScanFilter, ScanIdentity, StoreFault, Tenant,
 };
 use crate::progress::Monitor;
+use crate::text::is_printable;
 use crate::work::INSPECTION_MEMORY;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -107,7 +108,7 @@ pub fn take_filter(pairs: Vec<(String, String)>) -> Answer<(ScanFilter, Vec<(Str
     let mut filter = ScanFilter::default();
     for (name, value) in own {
         let length = value.chars().count();
-        if !(1..=VALUE_LENGTH).contains(&length) || value.chars().any(char::is_control) {
+        if !(1..=VALUE_LENGTH).contains(&length) || !value.chars().all(is_printable) {
             return Err(Problem::bad_request(
                 "invalid-parameter",
                 format!("`{name}` must have 1 to {VALUE_LENGTH} printable characters."),

@@ -37,7 +37,8 @@ impl ProductCollection for Segmentations {
     ];
     const FILE_SCHEMA: &'static str = "SegmentationFileName";
     const FILE_HELP: &'static str = "`mask.nii.gz`, the mesh in each format, `report.json`, \
-        `report.html` (made on request), `slices.png` (three slices with the contour of the \
+        `report.html` (made on request; it names patient, study and series as far as the key may \
+        see them), `slices.png` (three slices with the contour of the \
         fit) and `region.nii.gz` (the scan about the organ, in 256 steps); for a left ventricle also `polar.json`, `polar.svg` and `polar.png`, and mask and \
         meshes of the wall that `edge` does not ask for: `mask_anatomical.nii.gz` and \
         `mesh_anatomical.*`, or `mask_apparent.nii.gz` and `mesh_apparent.*`. The `.dcm` files are \

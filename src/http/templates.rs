@@ -13,6 +13,7 @@ use super::wire::{added, path_of, rfc3339};
 use crate::config::Size;
 use crate::jobs::{Resource, TemplateSource, Tenant};
 use crate::progress::Monitor;
+use crate::text::is_printable;
 use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{RawQuery, Request, State};
@@ -236,7 +237,7 @@ async fn given_mesh(
 /// Refuses a name that is empty, longer than [`NAME_LENGTH`] or not printable.
 pub(super) fn check_name(name: &str) -> Answer<()> {
     let length = name.chars().count();
-    if (1..=NAME_LENGTH).contains(&length) && !name.chars().any(char::is_control) {
+    if (1..=NAME_LENGTH).contains(&length) && name.chars().all(is_printable) {
         return Ok(());
     }
     Err(Problem::invalid_field(

@@ -59,11 +59,12 @@ pub trait Work: Send + Sync + 'static {
     /// Names of the product's files from which [`Work::page`] is made.
     fn page_files(&self) -> &'static [&'static str];
 
-    /// The report on a product as an HTML page, made from the product's files.
+    /// The report on a product as an HTML page, made from the product's files. It names whose scan
+    /// it is as far as the fields of `scan` do.
     ///
     /// # Errors
     /// If a file is missing, cannot be read or cannot be parsed.
-    fn page(&self, product: &StoredItem) -> Result<String, Failure>;
+    fn page(&self, product: &StoredItem, scan: &Map<String, Value>) -> Result<String, Failure>;
 }
 
 /// Parameters as they were given.

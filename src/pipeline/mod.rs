@@ -21,6 +21,7 @@ use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, Closeness, MeasuredSurface, ModelReport, ReportInput};
 use crate::retile::RetileError;
 use crate::surface::{self, SurfaceError};
+use crate::volume::dicom::Provenance;
 use crate::volume::{
     self, ReadLimits, ReadOptions, Reading, Volume, VolumeError, VolumeFacts, VolumeFile,
 };
@@ -81,9 +82,10 @@ impl Model {
         self.measured_surface().closeness(&self.mesh, monitor)
     }
 
-    /// The report as a self-contained HTML page, coloured by `closeness` if given.
-    pub fn report_html(&self, closeness: Option<&Closeness>) -> String {
-        report::model_page(&self.report, &self.mesh, closeness)
+    /// The report as a self-contained HTML page, coloured by `closeness` if given. It names patient,
+    /// study and series as far as `scan` does.
+    pub fn report_html(&self, closeness: Option<&Closeness>, scan: Option<&Provenance>) -> String {
+        report::model_page(&self.report, &self.mesh, closeness, scan)
     }
 }
 

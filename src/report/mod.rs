@@ -25,6 +25,7 @@ mod segmentation_page;
 mod segmentation_report;
 mod stage_facts;
 pub mod summary;
+mod whose;
 
 pub use closeness::{Closeness, MeasuredSurface};
 pub use distance_pictures::vertex_colours;

@@ -11,15 +11,24 @@ use super::embedded::Embedded;
 use super::model_report::ModelReport;
 use super::sections::{FitnessForms, FitnessTermsSection};
 use super::summary::{Histogram, Summary};
+use super::whose;
 use crate::draw::chart::{self, Bins};
 use crate::draw::document::{self, HeadlineFigure, HtmlDocument, Sign};
 use crate::draw::text::{number, signed};
 use crate::draw::views;
 use crate::mesh::TriMesh;
+use crate::volume::dicom::Provenance;
 
 /// The page for `report` on `mesh`; with `closeness`, the distances to the surface that the
 /// model was made from, also the model coloured by them. Distances of another mesh are left out.
-pub fn model_page(report: &ModelReport, mesh: &TriMesh, closeness: Option<&Closeness>) -> String {
+///
+/// The page names patient, study and series as far as `scan` does.
+pub fn model_page(
+    report: &ModelReport,
+    mesh: &TriMesh,
+    closeness: Option<&Closeness>,
+    scan: Option<&Provenance>,
+) -> String {
     let closeness = closeness.filter(|c| c.suits(mesh.triangles.len()));
     HtmlDocument {
         title: &format!(
@@ -28,6 +37,7 @@ pub fn model_page(report: &ModelReport, mesh: &TriMesh, closeness: Option<&Close
         ),
         subtitle: &origin(report),
         body: html! {
+            (whose::section(scan))
             (verdict(report))
             (figures(report))
             (document::notes("Please note", report.warnings.iter().map(String::as_str)))

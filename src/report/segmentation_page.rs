@@ -6,10 +6,12 @@ use serde_json::{Map, Value, json};
 use super::embedded::Embedded;
 use super::sections::Program;
 use super::segmentation_report::{ReaderEntry, SegmentationReport};
+use super::whose;
 use crate::draw::document::{self, HeadlineFigure, HtmlDocument, Sign};
 use crate::draw::text::{data_uri, number, signed};
 use crate::draw::views;
 use crate::mesh::TriMesh;
+use crate::volume::dicom::Provenance;
 
 /// A segmentation's report with its pictures.
 #[derive(Debug, Clone, Copy)]
@@ -30,6 +32,8 @@ pub struct SegmentationPage<'a> {
     pub polar_map: Option<&'a Value>,
     /// The scan about the organ, a packed NIfTI file.
     pub region: Option<&'a [u8]>,
+    /// Whose scan it is, as far as the page is to name it.
+    pub scan: Option<&'a Provenance>,
 }
 
 /// The page as HTML. What the report does not contain is left out.
@@ -40,6 +44,7 @@ pub fn segmentation_page(page: &SegmentationPage) -> String {
         title: &format!("{}: segmentation", organ(report)),
         subtitle: &origin(report),
         body: html! {
+            (whose::section(page.scan))
             (verdict(report))
             (figures(report))
             (document::notes("Reasons to look closer", reasons))

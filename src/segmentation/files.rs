@@ -155,8 +155,9 @@ impl SegmentedVolume {
         report
     }
 
-    /// The report as a self-contained page; `files` are those of [`SegmentedVolume::files`].
-    pub fn page(&self, files: &[NamedFile]) -> NamedFile {
+    /// The report as a self-contained page; `files` are those of [`SegmentedVolume::files`]. It names
+    /// patient, study and series as far as `scan` does.
+    pub fn page(&self, files: &[NamedFile], scan: Option<&Provenance>) -> NamedFile {
         let bytes = |name: &str| {
             let found = files.iter().find(|file| file.name == name);
             found.map(|file| file.bytes.as_slice())
@@ -177,6 +178,7 @@ impl SegmentedVolume {
             polar: bytes("polar.svg"),
             polar_map: map.as_ref(),
             region: bytes(REGION),
+            scan,
         });
         NamedFile {
             name: "report.html".into(),

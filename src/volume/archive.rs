@@ -7,8 +7,7 @@
 //!
 //! Checksums of entries are not verified: a damaged entry shows in what is read of it.
 //!
-//! Entries that accompany images on a medium are left out: folders, hidden files, DICOMDIR and
-//! whatever is neither DICOM nor NIfTI.
+//! Entries that accompany images on a medium are left out: folders, hidden files and DICOMDIR.
 
 use super::VolumeError;
 use super::limits::ReadLimits;
@@ -17,7 +16,7 @@ use std::io::{Read, Seek, SeekFrom};
 use zip::{CompressionMethod, ZipArchive};
 
 /// Most files in an archive.
-const MOST_FILES: u64 = 8192;
+pub(super) const MOST_FILES: u64 = 8192;
 
 /// Most bytes of an archive's directory.
 const MOST_DIRECTORY: u64 = 4 << 20;
@@ -111,15 +110,15 @@ pub(super) fn files_in(
         }
         let begin = entry.data_start();
         let begin = begin.ok_or_else(|| corrupt("an entry has no place".into()))?;
-        let last = name.rsplit('/').next().unwrap_or_default().to_owned();
         let sizes = [entry.compressed_size(), entry.size()];
-        files.push(VolumeFile::inside(file, last, begin, sizes, deflated));
+        files.push(VolumeFile::inside(file, name, begin, sizes, deflated));
     }
     Ok(Some(files))
 }
 
 /// Whether the entry of that name accompanies images and is none.
-fn is_company(name: &str) -> bool {
+pub(super) fn is_company(name: &str) -> bool {
+    let mut parts = name.split(['/', '\\']);
     let last = name.rsplit(['/', '\\']).next().unwrap_or_default();
-    name.starts_with("__MACOSX/") || last.starts_with('.') || last == "DICOMDIR"
+    parts.any(|part| part == "__MACOSX") || last.starts_with('.') || last == "DICOMDIR"
 }

@@ -6,7 +6,8 @@
 //!
 //! 1. `source`: opens the file and unpacks gzip (also several members), counting every byte against
 //!    the limits; `unpack` is a faster way for small files.
-//! 2. `archive` and `recognise`: finds the files in a zip archive, and determines the format by the content, never by the file name.
+//! 2. `archive`, `folder` and `recognise`: finds the files in a zip archive or a folder, and determines
+//!    the format by the content. A name only tells which `.img` belongs to a `.hdr` among many files.
 //! 3. [`nifti`] or `dicom`: checks the header field by field.
 //! 4. `decode`: decodes the voxels in portions directly into the result.
 //! 5. `summary`: figures over the values, and whether they look like labels.
@@ -44,6 +45,7 @@ mod decode;
 pub mod dicom;
 pub mod error;
 pub mod facts;
+mod folder;
 mod limits;
 pub mod nifti;
 mod open;

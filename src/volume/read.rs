@@ -3,14 +3,16 @@
 use super::dicom::{DicomFile, Provenance};
 use super::limits::{ReadLimits, ReadOptions};
 use super::open::{self, OpenVolume, Reading};
-use super::recognise::{Recognised, recognise, volumes_among};
+use super::recognise::{Recognised, recognise};
 use super::source::VolumeFile;
 use super::{VolumeError, VolumeFacts, archive, nifti};
 use crate::draw::Image;
 use crate::progress::Monitor;
+use std::cell::RefCell;
 
 /// Reads one volume from `files`: a single file, a `.hdr` file and its `.img` file in any order, the
-/// DICOM files of a series, or a zip archive of them.
+/// DICOM files of a series, or a zip archive of any of these. Of several files, those that are no
+/// volumes are left out.
 ///
 /// # Errors
 /// [`VolumeError`]; in particular [`VolumeError::FrameNeeded`] if the file holds several volumes
@@ -21,7 +23,10 @@ pub fn read(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Reading, VolumeError> {
-    open::read(&mut *open(files, limits, monitor)?, *options, monitor)
+    let mut opened = open(files, limits, monitor)?;
+    let mut reading = open::read(&mut *opened.file, *options, monitor)?;
+    reading.facts.warnings.extend(opened.notes);
+    Ok(reading)
 }
 
 /// Whose scan the volume in `files` is; `None` unless they are DICOM. Only headers are read.
@@ -35,7 +40,7 @@ pub fn provenance(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Option<Provenance>, VolumeError> {
-    let file = open(files, limits, monitor)?;
+    let file = open(files, limits, monitor)?.file;
     let header = file.header();
     let frame = options.choose(header.frames, header.gated)?;
     Ok(file.provenance(frame.unwrap_or(0)))
@@ -53,7 +58,15 @@ pub fn inspect(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<VolumeFacts, VolumeError> {
-    open::inspect(|| open(files, limits, monitor), monitor)
+    let notes = RefCell::new(Vec::new());
+    let again = || {
+        let opened = open(files, limits, monitor)?;
+        notes.replace(opened.notes);
+        Ok(opened.file)
+    };
+    let mut facts = open::inspect(again, monitor)?;
+    facts.warnings.extend(notes.take());
+    Ok(facts)
 }
 
 /// Draws the three middle slices of the first volume in `files`; see [`mod@super::preview`]. The
@@ -66,33 +79,49 @@ pub fn preview_files(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Image<1>, VolumeError> {
-    open::preview(&mut *open(files, limits, monitor)?, monitor)
+    open::preview(&mut *open(files, limits, monitor)?.file, monitor)
 }
 
-/// Recognises the format of `files` and checks the header.
+/// A volume whose header was checked.
+struct Opened {
+    file: Box<dyn OpenVolume>,
+    /// What was left out of the files.
+    notes: Vec<String>,
+}
+
+/// Recognises the format of `files` and checks the header. Archives stand for the files in them.
 fn open(
     files: &[VolumeFile],
     limits: &ReadLimits,
     monitor: &Monitor,
-) -> Result<Box<dyn OpenVolume>, VolumeError> {
-    if let [file] = files
-        && let Some(packed) = archive::files_in(file, limits)?
-    {
-        let packed = volumes_among(packed, file.name(), limits)?;
-        return open_unpacked(&packed, limits, monitor);
+) -> Result<Opened, VolumeError> {
+    let mut inside = None;
+    let mut members = Vec::with_capacity(files.len());
+    for file in files {
+        match archive::files_in(file, limits)? {
+            Some(packed) => {
+                inside = Some(file.name());
+                members.extend(packed);
+            }
+            None => members.push(file.clone()),
+        }
     }
-    open_unpacked(files, limits, monitor)
-}
-
-fn open_unpacked(
-    files: &[VolumeFile],
-    limits: &ReadLimits,
-    monitor: &Monitor,
-) -> Result<Box<dyn OpenVolume>, VolumeError> {
-    Ok(match recognise(files, limits)? {
+    if inside.is_none() && files.iter().any(VolumeFile::was_found) {
+        inside = Some("the folder");
+    }
+    // Archives list their files in any order.
+    if inside.is_some() {
+        members.sort_by(|a, b| a.name().cmp(b.name()));
+    }
+    let found = recognise(&members, inside, limits)?;
+    let file: Box<dyn OpenVolume> = match found.volume {
         Recognised::Nifti { header, voxels } => {
             Box::new(nifti::NiftiFile::open(header, voxels, limits)?)
         }
         Recognised::Dicom(files) => Box::new(DicomFile::open(&files, limits, monitor)?),
+    };
+    Ok(Opened {
+        file,
+        notes: found.notes,
     })
 }

@@ -30,93 +30,166 @@ enum FileKind {
     Other,
 }
 
-/// Determines the format of `files`.
+/// What was found among files, and what is said of the others.
+pub(super) struct Found<'a> {
+    pub volume: Recognised<'a>,
+    /// What was left out.
+    pub notes: Vec<String>,
+}
+
+/// Files by what they are.
+#[derive(Default)]
+struct Sorted<'a> {
+    singles: Vec<&'a VolumeFile>,
+    headers: Vec<&'a VolumeFile>,
+    dicom: Vec<&'a VolumeFile>,
+    /// Files that are no volumes, with their first bytes.
+    others: Vec<(&'a VolumeFile, Vec<u8>)>,
+    empty: Vec<&'a VolumeFile>,
+}
+
+/// Most files that a warning names.
+const MOST_NAMED: usize = 8;
+
+/// Determines the format of `files`, which were found in the archive or folder `inside`, if they were.
+///
+/// A single file must be a volume. Of several, those that are none are left out: empty files, and
+/// files that are neither NIfTI nor DICOM.
 ///
 /// # Errors
 /// [`VolumeError`] for unknown or unsupported formats, and for files that do not belong together.
 pub(super) fn recognise<'a>(
     files: &'a [VolumeFile],
+    inside: Option<&str>,
     limits: &ReadLimits,
-) -> Result<Recognised<'a>, VolumeError> {
-    match files {
-        [] => Err(VolumeError::NoFile),
-        [file] => match look(file, limits)? {
-            (FileKind::NiftiSingle, _) => Ok(Recognised::Nifti {
-                header: file,
-                voxels: file,
-            }),
-            (FileKind::NiftiHeader, _) => {
-                nifti::check_header(file, limits)?;
-                Err(VolumeError::ImageMissing {
-                    file: file.name().into(),
-                })
-            }
-            (FileKind::Dicom, _) => Ok(Recognised::Dicom(vec![file])),
-            (FileKind::Other, start) => Err(refuse(file, &start)),
-        },
-        [a, b] => pair(a, b, limits),
-        more => {
-            for file in more {
-                if look(file, limits)?.0 != FileKind::Dicom {
-                    return Err(VolumeError::NotOneVolume { count: more.len() });
-                }
-            }
-            Ok(Recognised::Dicom(more.iter().collect()))
-        }
-    }
-}
-
-/// Two files: one must be a header whose voxels are in the other.
-fn pair<'a>(
-    a: &'a VolumeFile,
-    b: &'a VolumeFile,
-    limits: &ReadLimits,
-) -> Result<Recognised<'a>, VolumeError> {
-    let (header, voxels) = match (look(a, limits)?, look(b, limits)?) {
-        // A file of voxels may start with any bytes.
-        ((FileKind::NiftiHeader, _), (FileKind::Other | FileKind::Dicom, _)) => (a, b),
-        ((FileKind::Other | FileKind::Dicom, _), (FileKind::NiftiHeader, _)) => (b, a),
-        ((FileKind::Dicom, _), (FileKind::Dicom, _)) => {
-            return Ok(Recognised::Dicom(vec![a, b]));
-        }
-        ((FileKind::Other, start), (FileKind::Other, _)) if is_analyze(&start) => {
-            return Err(refuse(a, &start));
-        }
-        ((FileKind::Other, _), (FileKind::Other, start)) if is_analyze(&start) => {
-            return Err(refuse(b, &start));
-        }
-        _ => return Err(VolumeError::NotOneVolume { count: 2 }),
-    };
-    Ok(Recognised::Nifti { header, voxels })
-}
-
-/// The files of an archive that can hold volumes, in the order of their names.
-///
-/// # Errors
-/// [`VolumeError`] if a file cannot be read, or the archive `name` holds no volume.
-pub(super) fn volumes_among(
-    files: Vec<VolumeFile>,
-    name: &str,
-    limits: &ReadLimits,
-) -> Result<Vec<VolumeFile>, VolumeError> {
-    let mut volumes = Vec::new();
+) -> Result<Found<'a>, VolumeError> {
+    let mut sorted = Sorted::default();
     for file in files {
-        match look(&file, limits) {
-            Ok((FileKind::Other, _)) | Err(VolumeError::Empty { .. }) => {}
-            Ok(_) => volumes.push(file),
+        match look(file, limits) {
+            Ok((FileKind::NiftiSingle, _)) => sorted.singles.push(file),
+            Ok((FileKind::NiftiHeader, _)) => sorted.headers.push(file),
+            Ok((FileKind::Dicom, _)) => sorted.dicom.push(file),
+            Ok((FileKind::Other, start)) => sorted.others.push((file, start)),
+            Err(VolumeError::Empty { .. }) if files.len() > 1 => sorted.empty.push(file),
             Err(error) => return Err(error),
         }
     }
-    // Archives list their files in any order.
-    volumes.sort_by(|a, b| a.name().cmp(b.name()));
-    match volumes.is_empty() {
-        true => Err(VolumeError::Unsupported {
-            file: name.into(),
-            format: "a zip archive without DICOM or NIfTI files".into(),
-            fix: "Pack the files of one DICOM series into the archive.",
-        }),
-        false => Ok(volumes),
+    let volume = sorted.volume(files.len(), inside, limits)?;
+    Ok(Found {
+        notes: sorted.notes(&volume),
+        volume,
+    })
+}
+
+impl<'a> Sorted<'a> {
+    /// The one volume among the files.
+    fn volume(
+        &self,
+        count: usize,
+        inside: Option<&str>,
+        limits: &ReadLimits,
+    ) -> Result<Recognised<'a>, VolumeError> {
+        let kinds = [self.singles.len(), self.headers.len(), self.dicom.len()];
+        match (kinds, &self.others[..]) {
+            ([1, 0, 0], _) => Ok(Recognised::Nifti {
+                header: self.singles[0],
+                voxels: self.singles[0],
+            }),
+            ([0, 1, _], _) => self.pair(self.headers[0], count, limits),
+            ([0, 0, dicom], _) if dicom > 0 => Ok(Recognised::Dicom(self.dicom.clone())),
+            ([0, 0, 0], []) if count == 0 => Err(VolumeError::NoFile),
+            ([0, 0, 0], others) => {
+                let analyze = others.iter().find(|(_, start)| is_analyze(start));
+                Err(match (analyze, others, inside) {
+                    (Some((file, start)), ..) | (None, [(file, start)], None) if count == 1 => {
+                        refuse(file, start)
+                    }
+                    (Some((file, start)), ..) => refuse(file, start),
+                    (_, _, Some(name)) => VolumeError::Unsupported {
+                        file: name.into(),
+                        format: "an archive or folder without DICOM or NIfTI files".into(),
+                        fix: "Give the files of one DICOM series, or one NIfTI file.",
+                    },
+                    (_, [], None) => VolumeError::NoFile,
+                    _ => VolumeError::NotOneVolume { count },
+                })
+            }
+            _ => Err(VolumeError::NotOneVolume { count }),
+        }
     }
+
+    /// A header and the file with its voxels: the `.img` of the same name, or the only `.img`, or the
+    /// only other file.
+    fn pair(
+        &self,
+        header: &'a VolumeFile,
+        count: usize,
+        limits: &ReadLimits,
+    ) -> Result<Recognised<'a>, VolumeError> {
+        // A file of voxels may start with any bytes.
+        let others = self.others.iter().map(|(file, _)| *file);
+        let others: Vec<&VolumeFile> = others.chain(self.dicom.iter().copied()).collect();
+        let images = others.iter().filter(|file| stem(file, ".img").is_some());
+        let images: Vec<&VolumeFile> = images.copied().collect();
+        let own = stem(header, ".hdr");
+        let named = images
+            .iter()
+            .find(|image| own.is_some() && stem(image, ".img") == own);
+        let voxels = match (named, &images[..], &others[..]) {
+            (Some(image), ..) | (None, [image], _) | (None, [], [image]) => *image,
+            (None, [], []) => {
+                nifti::check_header(header, limits)?;
+                return Err(VolumeError::ImageMissing {
+                    file: header.name().into(),
+                });
+            }
+            _ => return Err(VolumeError::NotOneVolume { count }),
+        };
+        let rest = self.dicom.iter().any(|file| !std::ptr::eq(*file, voxels));
+        match rest {
+            true => Err(VolumeError::NotOneVolume { count }),
+            false => Ok(Recognised::Nifti { header, voxels }),
+        }
+    }
+
+    /// What was left out of what a person named, and which files are empty.
+    fn notes(&self, volume: &Recognised<'_>) -> Vec<String> {
+        let used = |file: &VolumeFile| match volume {
+            Recognised::Nifti { voxels, .. } => std::ptr::eq(file, *voxels),
+            Recognised::Dicom(_) => false,
+        };
+        let foreign = self.others.iter().map(|(file, _)| *file);
+        let foreign: Vec<&VolumeFile> = foreign
+            .filter(|file| !file.was_found() && !used(file))
+            .collect();
+        let list = |files: &[&VolumeFile]| {
+            let names: Vec<&str> = files.iter().take(MOST_NAMED).map(|f| f.name()).collect();
+            let more = match files.len().saturating_sub(MOST_NAMED) {
+                0 => String::new(),
+                more => format!(" and {more} more"),
+            };
+            format!("{}{more}", names.join(", "))
+        };
+        let mut notes = Vec::new();
+        if !foreign.is_empty() {
+            let list = list(&foreign);
+            notes.push(format!(
+                "Files that are neither NIfTI nor DICOM were left out: {list}."
+            ));
+        }
+        if !self.empty.is_empty() {
+            let list = list(&self.empty);
+            notes.push(format!("Files without content were left out: {list}."));
+        }
+        notes
+    }
+}
+
+/// The name of `file` without `ending` and `.gz`, in lower case; `None` if it ends otherwise.
+fn stem(file: &VolumeFile, ending: &str) -> Option<String> {
+    let name = file.name().to_lowercase();
+    let bare = name.strip_suffix(".gz").unwrap_or(&name);
+    bare.strip_suffix(ending).map(str::to_owned)
 }
 
 /// The kind of `file`, and its first bytes.

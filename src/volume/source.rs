@@ -5,7 +5,9 @@
 //! member are unpacked [at once](super::unpack), which is faster.
 
 use super::VolumeError;
+use super::folder;
 use super::unpack::{self, Unpacked};
+use crate::text::escaped;
 use flate2::bufread::{DeflateDecoder, GzDecoder};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, ErrorKind, Read, Seek, SeekFrom};
@@ -24,6 +26,8 @@ const GREATEST_RATIO: u64 = 1032;
 pub struct VolumeFile {
     name: String,
     content: Content,
+    /// Whether it was found in an archive or a folder, and not named by a person.
+    found: bool,
 }
 
 #[derive(Debug, Clone)]
@@ -32,6 +36,11 @@ enum Content {
     Memory(Arc<[u8]>),
     /// A file inside an archive.
     Entry(Arc<Entry>),
+}
+
+/// The name of a file for messages: control characters are escaped.
+fn shown(name: String) -> String {
+    escaped(&name).into_owned()
 }
 
 /// Place of a file inside an archive.
@@ -55,16 +64,18 @@ impl VolumeFile {
     /// The file at `path` under another name, for example an upload that is stored under a key.
     pub fn named(name: impl Into<String>, path: impl AsRef<Path>) -> Self {
         Self {
-            name: name.into(),
+            name: shown(name.into()),
             content: Content::Path(path.as_ref().to_path_buf()),
+            found: false,
         }
     }
 
     /// A file whose content is in memory.
     pub fn in_memory(name: impl Into<String>, bytes: impl Into<Arc<[u8]>>) -> Self {
         Self {
-            name: name.into(),
+            name: shown(name.into()),
             content: Content::Memory(bytes.into()),
+            found: false,
         }
     }
 
@@ -84,8 +95,9 @@ impl VolumeFile {
             deflated,
         };
         Self {
-            name: name.into(),
+            name: shown(name.into()),
             content: Content::Entry(Arc::new(entry)),
+            found: true,
         }
     }
 
@@ -97,13 +109,51 @@ impl VolumeFile {
         Ok(match &self.content {
             Content::Path(path) => Box::new(File::open(path)?),
             Content::Memory(bytes) => Box::new(Cursor::new(Arc::clone(bytes))),
-            Content::Entry(entry) => Box::new(Window {
-                archive: entry.archive.bytes()?,
-                begin: entry.begin,
-                length: entry.packed,
-                position: 0,
-            }),
+            Content::Entry(entry) => {
+                let packed = Window {
+                    archive: entry.archive.bytes()?,
+                    begin: entry.begin,
+                    length: entry.packed,
+                    position: 0,
+                };
+                match entry.deflated {
+                    // The archive states the size, and no more is taken from it.
+                    true => Box::new(Inflated::new(packed, entry.size)),
+                    false => Box::new(packed),
+                }
+            }
         })
+    }
+
+    /// The file, marked as found in a folder.
+    pub(super) fn found(self) -> Self {
+        Self {
+            found: true,
+            ..self
+        }
+    }
+
+    /// Whether the file was found in an archive or a folder, and not named by a person.
+    pub(super) fn was_found(&self) -> bool {
+        self.found
+    }
+
+    /// The files that a person names by `paths`: each file, all files in a folder
+    /// ([`folder::files_in`]), and the other half of a single `.hdr` or `.img`.
+    ///
+    /// # Errors
+    /// [`VolumeError`] if a folder cannot be read, is empty, or holds too many files.
+    pub fn given(paths: &[impl AsRef<Path>]) -> Result<Vec<Self>, VolumeError> {
+        let mut files = Vec::new();
+        for path in paths {
+            let path = path.as_ref();
+            match path.is_dir() {
+                true => files.extend(folder::files_in(path)?),
+                false if paths.len() == 1 => files.extend(Self::with_other_half(path)),
+                false => files.push(Self::at(path)),
+            }
+        }
+        Ok(files)
     }
 
     /// The file at `path` and, if it is one of a `.hdr`/`.img` pair, the other file of the pair, if
@@ -148,7 +198,7 @@ pub(super) struct Source {
 
 enum Body {
     Plain(BufReader<Box<dyn ReadSeek>>),
-    /// Deflated without header or checksum, as in archives and deflated DICOM data sets.
+    /// Deflated without header or checksum, as in deflated DICOM data sets.
     Deflated(Box<DeflateDecoder<BufReader<Box<dyn Read>>>>),
     Gzip(Box<Members>),
     /// The whole content, in memory.
@@ -171,15 +221,6 @@ impl Source {
         };
         let mut reader = file.bytes().map_err(io)?;
         let stored = reader.seek(SeekFrom::End(0)).map_err(io)?;
-        if let Content::Entry(entry) = &file.content
-            && entry.deflated
-        {
-            reader.rewind().map_err(io)?;
-            let mut source = Self::new(file, Self::inflater(reader), stored, limit);
-            // The archive states the size, and no more is taken from it.
-            source.limit = limit.min(entry.size);
-            return Ok(source);
-        }
         reader.rewind().map_err(io)?;
         let mut mark = [0; 2];
         let gzipped = stored >= 2 && reader.read_exact(&mut mark).is_ok() && mark == GZIP;
@@ -452,14 +493,87 @@ impl Read for Window {
 
 impl Seek for Window {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        let target = match to {
-            SeekFrom::Start(at) => Some(at),
-            SeekFrom::End(by) => self.length.checked_add_signed(by),
-            SeekFrom::Current(by) => self.position.checked_add_signed(by),
-        };
-        self.position = target.ok_or_else(|| io::Error::from(ErrorKind::InvalidInput))?;
+        self.position = target(to, self.length, self.position)?;
         Ok(self.position)
     }
+}
+
+/// The content of a deflated file, at most as many bytes as were stated. It is unpacked when it is read,
+/// and from the beginning after a move backward.
+struct Inflated {
+    /// `None` after a failed restart.
+    inflater: Option<DeflateDecoder<BufReader<Window>>>,
+    length: u64,
+    /// Bytes unpacked so far.
+    unpacked: u64,
+    /// Where the next byte is read.
+    position: u64,
+}
+
+impl Inflated {
+    fn new(packed: Window, size: u64) -> Self {
+        // A size that the packed bytes cannot reach is not believed.
+        let length = size.min(packed.length.saturating_mul(GREATEST_RATIO));
+        let packed = BufReader::with_capacity(PORTION, packed);
+        Self {
+            inflater: Some(DeflateDecoder::new(packed)),
+            length,
+            unpacked: 0,
+            position: 0,
+        }
+    }
+
+    /// The decoder, at the position.
+    fn decoder(&mut self) -> io::Result<&mut DeflateDecoder<BufReader<Window>>> {
+        if self.position < self.unpacked
+            && let Some(inflater) = self.inflater.take()
+        {
+            let mut packed = inflater.into_inner();
+            packed.rewind()?;
+            self.inflater = Some(DeflateDecoder::new(packed));
+            self.unpacked = 0;
+        }
+        let decoder = self.inflater.as_mut().ok_or(ErrorKind::Other)?;
+        if self.unpacked < self.position {
+            let skipped = self.position - self.unpacked;
+            let skipped = io::copy(&mut decoder.by_ref().take(skipped), &mut io::sink())?;
+            self.unpacked += skipped;
+        }
+        Ok(decoder)
+    }
+}
+
+impl Read for Inflated {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let left = self.length.saturating_sub(self.position);
+        let most = buffer
+            .len()
+            .min(usize::try_from(left).unwrap_or(usize::MAX));
+        if most == 0 {
+            return Ok(0);
+        }
+        let got = self.decoder()?.read(&mut buffer[..most])?;
+        self.unpacked += got as u64;
+        self.position = self.unpacked;
+        Ok(got)
+    }
+}
+
+impl Seek for Inflated {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.position = target(to, self.length, self.position)?;
+        Ok(self.position)
+    }
+}
+
+/// The place in a file of `length` bytes that `to` names, seen from `position`.
+fn target(to: SeekFrom, length: u64, position: u64) -> io::Result<u64> {
+    let target = match to {
+        SeekFrom::Start(at) => Some(at),
+        SeekFrom::End(by) => length.checked_add_signed(by),
+        SeekFrom::Current(by) => position.checked_add_signed(by),
+    };
+    target.ok_or_else(|| ErrorKind::InvalidInput.into())
 }
 
 /// For parsers that need a reader. Every error becomes [`ErrorKind::Other`].

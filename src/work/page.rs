@@ -3,11 +3,13 @@
 //! A page consists mostly of pictures: it is ten times as large as the other files together and
 //! takes as long to make as the model, and few are ever looked at. Pages are therefore not stored.
 //! Each is made when it is requested, from the product's own files; the volume may have been
-//! deleted by then.
+//! deleted by then. The scan that a page names is not one of these files: whoever asks hands in what
+//! may be shown of it.
 
 use crate::export::read_json::{self, ReadMeshError};
 use crate::report::{self, Closeness, ModelReport, SegmentationPage, SegmentationReport};
-use serde_json::Value;
+use crate::volume::dicom::Provenance;
+use serde_json::{Map, Value};
 use std::io;
 
 /// Why there is no page.
@@ -52,14 +54,23 @@ const OTHER_WALLS: [&str; 2] = ["mesh_anatomical.json", "mesh_apparent.json"];
 ///
 /// # Errors
 /// [`PageError`].
-pub(super) fn model_page(read: &ReadFile<'_>) -> Result<String, PageError> {
+pub(super) fn model_page(
+    read: &ReadFile<'_>,
+    scan: &Map<String, Value>,
+) -> Result<String, PageError> {
     let text = required(read, "report.json")?;
     let report: ModelReport = from_json("report.json", &text)?;
     let mesh = read_json::decode(&required(read, "mesh.json")?)?;
     let closeness: Option<Closeness> = optional(read, "distance.json")?
         .map(|text| from_json("distance.json", &text))
         .transpose()?;
-    Ok(report::model_page(&report, &mesh, closeness.as_ref()))
+    let scan = provenance(scan);
+    Ok(report::model_page(
+        &report,
+        &mesh,
+        closeness.as_ref(),
+        Some(&scan),
+    ))
 }
 
 /// The page of a segmentation, made of `report.json`, `mesh.json` and those of [`SEGMENTATION_FILES`] that
@@ -67,7 +78,10 @@ pub(super) fn model_page(read: &ReadFile<'_>) -> Result<String, PageError> {
 ///
 /// # Errors
 /// [`PageError`].
-pub(super) fn segmentation_page(read: &ReadFile<'_>) -> Result<String, PageError> {
+pub(super) fn segmentation_page(
+    read: &ReadFile<'_>,
+    scan: &Map<String, Value>,
+) -> Result<String, PageError> {
     let report: SegmentationReport = from_json("report.json", &required(read, "report.json")?)?;
     let mesh_file = required(read, "mesh.json")?;
     let mesh = read_json::decode(&mesh_file)?;
@@ -94,7 +108,13 @@ pub(super) fn segmentation_page(read: &ReadFile<'_>) -> Result<String, PageError
         polar: polar.as_deref(),
         polar_map: polar_map.as_ref(),
         region: region.as_deref(),
+        scan: Some(&provenance(scan)),
     }))
+}
+
+/// What is to be named of a scan; fields of another type are left out.
+fn provenance(scan: &Map<String, Value>) -> Provenance {
+    serde_json::from_value(scan.clone().into()).unwrap_or_default()
 }
 
 fn optional(read: &ReadFile<'_>, name: &'static str) -> Result<Option<Vec<u8>>, PageError> {

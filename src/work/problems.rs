@@ -311,6 +311,11 @@ impl Explain for DicomError {
                  `study_uid`, or the scan as the DICOM file that it came from."
                     .into(),
             ),
+            DicomError::Undecoded { field } => (
+                (Fault::Request, "identity-needed"),
+                Some(*field),
+                undecoded_advice(field),
+            ),
             DicomError::Contradiction { field } => (
                 (Fault::Request, "identity-differs"),
                 Some(*field),
@@ -373,6 +378,20 @@ pub(super) fn broken_result(error: &dyn Display) -> Failure {
         format!("The stored result cannot be used: {error}."),
     )
     .fix("Start the same job again, which stores the result anew.")
+}
+
+/// What to do about a field of a scan that cannot be decoded.
+fn undecoded_advice(field: &str) -> String {
+    let correct = "correct Specific Character Set (0008,0005) or the value in the file (its warnings \
+                   say what is wrong)";
+    match StatedIdentity::FIELDS.contains(&field) {
+        true => format!(
+            "State `{field}` (PUT .../identity, or --{}), or {correct}, or ask for de-identified \
+             objects.",
+            field.replace('_', "-")
+        ),
+        false => format!("Ask for de-identified objects, or {correct}."),
+    }
 }
 
 /// Nobody knows of which patient and study the volume with that id is.

@@ -87,8 +87,13 @@ impl Work for SegmentationWork {
         page::SEGMENTATION_FILES
     }
 
-    fn page(&self, segmentation: &StoredItem) -> Result<String, Failure> {
-        page::segmentation_page(&|name| segmentation.read(name)).map_err(|error| error.explain())
+    fn page(
+        &self,
+        segmentation: &StoredItem,
+        scan: &Map<String, Value>,
+    ) -> Result<String, Failure> {
+        page::segmentation_page(&|name| segmentation.read(name), scan)
+            .map_err(|error| error.explain())
     }
 }
 

@@ -450,8 +450,8 @@ impl Work for Sphere {
         self.0.page_files()
     }
 
-    fn page(&self, product: &StoredItem) -> Result<String, Failure> {
-        self.0.page(product)
+    fn page(&self, product: &StoredItem, scan: &Map<String, Value>) -> Result<String, Failure> {
+        self.0.page(product, scan)
     }
 }
 

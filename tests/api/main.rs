@@ -14,6 +14,7 @@ mod helpers;
 mod archives;
 mod blobs;
 mod canary;
+mod command;
 mod config;
 mod contract;
 mod dicom;

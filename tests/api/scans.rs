@@ -521,3 +521,99 @@ async fn dicomweb_parts_are_the_files_of_one_volume() {
     let unbounded = send("multipart/related; type=\"application/dicom\"", head).await;
     problem(unbounded, 400, "malformed-form").await;
 }
+
+#[tokio::test]
+async fn pages_name_the_scan_to_those_who_see_it() {
+    let app = real().await;
+    let submit = with_scope(&app, Scope::Submit, "clinic").await;
+    let read = with_scope(&app, Scope::Read, "clinic").await;
+    let volume = upload(&submit, nm(&JANE, 1)).await;
+    let model = result(&submit, "model", &volume, json!({"points": 50})).await;
+    let page = async |app: &Api, path: &str| {
+        let answer = app
+            .get(path)
+            .header("accept", "text/html")
+            .send()
+            .await
+            .unwrap();
+        assert_eq!(answer.status(), StatusCode::OK, "{path}");
+        let cached = text(&json!(answer.headers()["cache-control"].to_str().unwrap()));
+        assert_eq!(cached, "private, no-cache");
+        let etag = answer.headers()["etag"].to_str().unwrap().to_owned();
+        (answer.text().await.unwrap(), etag)
+    };
+    let names = [JANE.name, JANE.id, JANE.accession, "19500102"];
+    for path in [format!("{model}/report.html"), format!("{model}/report")] {
+        let (whole, whole_tag) = page(&submit, &path).await;
+        assert!(names.iter().all(|name| whole.contains(name)), "{path}");
+        let (part, part_tag) = page(&read, &path).await;
+        assert!(!names.iter().any(|name| part.contains(name)), "{path}");
+        assert!(part.contains(JANE.study) && part_tag != whole_tag);
+    }
+    let nobody = format!("{model}/report.html?deidentify=true");
+    let (none, _) = page(&submit, &nobody).await;
+    assert!(
+        !names
+            .iter()
+            .chain([&JANE.study])
+            .any(|name| none.contains(name))
+    );
+    // Whose scan it is stays out of what is stored, and of pages after an erasure.
+    let erased = submit
+        .delete(&text(&volume["links"]["identity"]))
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(erased.status(), StatusCode::NO_CONTENT);
+    let (none, _) = page(&submit, &format!("{model}/report.html")).await;
+    assert!(
+        !names
+            .iter()
+            .chain([&JANE.study])
+            .any(|name| none.contains(name))
+    );
+}
+
+#[tokio::test]
+async fn a_name_that_cannot_be_decoded_makes_no_object() {
+    let app = real().await;
+    let original = nm(&JANE, 1);
+    let at = original
+        .windows(8)
+        .position(|w| w == JANE.name.as_bytes())
+        .unwrap();
+    for (name, code) in [(b"Doe^Jan\xe9", "byte"), (b"A\x1b[2J^B\n", "escape")] {
+        let mut scan = original.clone();
+        scan[at..at + 8].copy_from_slice(name);
+        let volume = upload(&app, scan).await;
+        assert_eq!(volume["dicom"]["patient_name"], Value::Null);
+        assert_eq!(volume["dicom"]["undecoded"], json!(["patient_name"]));
+        let warnings = volume["warnings"].to_string();
+        assert!(
+            warnings.contains("(0010,0010)") && warnings.contains(code),
+            "{warnings}"
+        );
+        let model = result(&app, "model", &volume, json!({"points": 50})).await;
+        let object = format!("{model}/mesh.dcm");
+        let refused = problem(get(&app, &object).await, 409, "identity-needed").await;
+        assert_eq!(refused["field"], "patient_name");
+        let hidden = bytes(&app, &format!("{object}?deidentify=true")).await;
+        assert!(!contains(&hidden, "Doe"));
+        let path = format!("{}{}", app.url, text(&volume["links"]["identity"]));
+        let put = async |name: &str| {
+            let body = json!({"patient_name": name});
+            app.client.put(&path).json(&body).send().await.unwrap()
+        };
+        for refused in [
+            "A\u{1b}[2J^B",
+            "A\u{202e}B",
+            "A\u{9b}B",
+            "A\u{2028}B",
+            "A\\B",
+        ] {
+            problem(put(refused).await, 422, "invalid-parameter").await;
+        }
+        assert_eq!(put("Doe^Jané").await.status(), StatusCode::OK);
+        assert!(contains(&bytes(&app, &object).await, "Doe^Jané"));
+    }
+}

@@ -213,7 +213,7 @@ fn a_profile_moves_the_wall_by_its_millimetres_and_a_profile_of_zeros_does_not()
         let volumes = |r: &serde_json::Value| r["volumes_ml"][wall].clone();
         assert_eq!(volumes(&report), volumes(&without.report()));
     }
-    let page = made.page(&files(&made));
+    let page = made.page(&files(&made), None);
     let page = String::from_utf8(page.bytes).unwrap();
     assert!(page.contains("drawn as reader one: endocardium +1.50 mm outward"));
 }

@@ -10,13 +10,14 @@ use std::path::{Path, PathBuf};
 /// Each module of the crate and the modules it uses, in reading order: a module uses only what
 /// stands above it.
 const USES: &[(&str, &[&str])] = &[
+    ("text", &[]),
     ("geometry", &[]),
     ("numeric", &["geometry"]),
     ("mesh", &["geometry", "numeric"]),
     ("progress", &[]),
     ("grid", &["geometry", "numeric", "mesh", "progress"]),
     ("draw", &["geometry", "numeric", "mesh"]),
-    ("volume", &["geometry", "progress", "grid", "draw"]),
+    ("volume", &["text", "geometry", "progress", "grid", "draw"]),
     (
         "locate",
         &["geometry", "numeric", "mesh", "progress", "grid"],
@@ -33,7 +34,7 @@ const USES: &[(&str, &[&str])] = &[
         ],
     ),
     ("decimate", &["geometry", "mesh", "progress"]),
-    ("export", &["geometry", "mesh", "grid", "volume"]),
+    ("export", &["text", "geometry", "mesh", "grid", "volume"]),
     ("model", &["geometry", "mesh", "progress", "grid", "locate"]),
     (
         "deform",
@@ -119,7 +120,7 @@ const USES: &[(&str, &[&str])] = &[
         ],
     ),
     ("jobs", &["progress"]),
-    ("access", &["jobs"]),
+    ("access", &["text", "jobs"]),
     ("pem", &[]),
     ("hooks", &["jobs"]),
     ("archive", &["jobs", "pem", "hooks"]),
@@ -161,6 +162,7 @@ const USES: &[(&str, &[&str])] = &[
     (
         "http",
         &[
+            "text",
             "progress",
             "volume",
             "export",
@@ -180,6 +182,7 @@ const USES: &[(&str, &[&str])] = &[
     (
         "cli",
         &[
+            "text",
             "mesh",
             "progress",
             "grid",

@@ -3,8 +3,9 @@
 //!
 //! One measurement group holds what was measured of the whole structure ([`FIGURES`]). It is a
 //! group of TID 1411 that refers to the segment of `mask.dcm`, or of TID 1501 where the source is no
-//! DICOM image that the template could name. For a ventricle each of the 17 segments of the heart
-//! association has a group of TID 1501 ([`WALL_SEGMENTS`]). A figure that the report lacks is left out.
+//! DICOM image that the template could name. For a ventricle the apparent and the anatomical wall
+//! have a group of TID 1501 each ([`WALLS`]), and so has each of the 17 segments of the heart
+//! association ([`WALL_SEGMENTS`]). A figure that the report lacks is left out.
 
 use super::codes::{CAVITY, Code, MILLIMETRE, OWN_SCHEME, dcm, own, sct, ucum};
 use super::data_set::{DataSet, reference};
@@ -23,8 +24,6 @@ struct Figure {
     site: Option<Code>,
     /// How it was derived from the single values.
     derivation: Option<Code>,
-    /// How it was measured, where that makes a difference.
-    method: Option<Code>,
 }
 
 const VOLUME: Code = sct("118565006", "Volume");
@@ -36,8 +35,6 @@ const DEFECT: Code = sct(
 );
 const PERFUSION: Code = sct("251053005", "Myocardial perfusion (observable entity)");
 const MEAN: Code = sct("373098007", "Mean");
-const APPARENT: Code = own("APPARENT", "Wall with the blur of the image");
-const ANATOMICAL: Code = own("ANATOMICAL", "Wall without the blur of the image");
 
 const MILLILITRE: Code = ucum("ml", "milliliter");
 const GRAM: Code = ucum("g", "gram");
@@ -51,7 +48,6 @@ const fn figure(pointer: &'static str, concept: Code, unit: Code) -> Figure {
         unit,
         site: None,
         derivation: None,
-        method: None,
     }
 }
 
@@ -69,35 +65,14 @@ impl Figure {
             ..self
         }
     }
-
-    const fn by(self, method: Code) -> Self {
-        Self {
-            method: Some(method),
-            ..self
-        }
-    }
 }
 
 /// What is measured of the whole structure. A new figure of the report is a new line here.
 const FIGURES: &[Figure] = &[
     figure("/volumes_ml/wall", VOLUME, MILLILITRE),
     figure("/volumes_ml/cavity", VOLUME, MILLILITRE).of(CAVITY),
-    figure("/volumes_ml/apparent/wall", VOLUME, MILLILITRE).by(APPARENT),
-    figure("/volumes_ml/apparent/cavity", VOLUME, MILLILITRE)
-        .of(CAVITY)
-        .by(APPARENT),
-    figure("/volumes_ml/anatomical/wall", VOLUME, MILLILITRE).by(ANATOMICAL),
-    figure("/volumes_ml/anatomical/cavity", VOLUME, MILLILITRE)
-        .of(CAVITY)
-        .by(ANATOMICAL),
     figure("/mass_g", MASS, GRAM),
     figure("/wall_thickness_mm", THICKNESS, MILLIMETRE).mean(),
-    figure("/thickness_mm/apparent/mean", THICKNESS, MILLIMETRE)
-        .mean()
-        .by(APPARENT),
-    figure("/thickness_mm/anatomical/mean", THICKNESS, MILLIMETRE)
-        .mean()
-        .by(ANATOMICAL),
     figure("/polar/extent_percent", DEFECT, PERCENT),
     figure(
         "/measures/jaccard",
@@ -119,6 +94,35 @@ const FIGURES: &[Figure] = &[
         own("HAUSDORFF-MM", "Hausdorff distance to the expert's mask"),
         MILLIMETRE,
     ),
+];
+
+/// One of the two walls that a fit of a ventricle gives, and what is measured of it.
+struct Wall {
+    /// What it is called, after the name of the structure.
+    name: &'static str,
+    method: Code,
+    figures: [Figure; 3],
+}
+
+const WALLS: [Wall; 2] = [
+    Wall {
+        name: "apparent wall",
+        method: own("APPARENT", "Wall with the blur of the image"),
+        figures: [
+            figure("/volumes_ml/apparent/wall", VOLUME, MILLILITRE),
+            figure("/volumes_ml/apparent/cavity", VOLUME, MILLILITRE).of(CAVITY),
+            figure("/thickness_mm/apparent/mean", THICKNESS, MILLIMETRE).mean(),
+        ],
+    },
+    Wall {
+        name: "anatomical wall",
+        method: own("ANATOMICAL", "Wall without the blur of the image"),
+        figures: [
+            figure("/volumes_ml/anatomical/wall", VOLUME, MILLILITRE),
+            figure("/volumes_ml/anatomical/cavity", VOLUME, MILLILITRE).of(CAVITY),
+            figure("/thickness_mm/anatomical/mean", THICKNESS, MILLIMETRE).mean(),
+        ],
+    },
 ];
 
 /// The 17 segments of the left ventricle in their order (CID 3717).
@@ -234,6 +238,7 @@ fn image_library(results: &DicomResults<'_>) -> Option<DataSet> {
 
 fn groups(results: &DicomResults<'_>) -> Vec<DataSet> {
     let mut groups = vec![whole(results)];
+    groups.extend(WALLS.iter().filter_map(|wall| of_wall(results, wall)));
     let segments = results.report.pointer("/polar/segments");
     for segment in segments.and_then(Value::as_array).into_iter().flatten() {
         let number = segment["number"].as_u64().unwrap_or(0) as usize;
@@ -291,6 +296,28 @@ fn whole(results: &DicomResults<'_>) -> DataSet {
     group(if images.is_some() { "1411" } else { "1501" }, content)
 }
 
+/// The group of one wall; `None` where the report tells nothing of it. How it was measured is said of
+/// the group, where readers of the template look for it, and not of each figure.
+fn of_wall(results: &DicomResults<'_>, wall: &Wall) -> Option<DataSet> {
+    let figures = measured(results.report, &wall.figures);
+    if figures.is_empty() {
+        return None;
+    }
+    let structure = results.structure;
+    let name = format!("{}, {}", structure.label, wall.name);
+    let mut content = tracking(&name, &results.uids.uid(wall.name));
+    let finding = dcm("121071", "Finding");
+    content.push(concept("CONTAINS", finding, structure.kind));
+    content.push(concept(
+        "HAS CONCEPT MOD",
+        sct("370129005", "Measurement Method"),
+        wall.method,
+    ));
+    content.push(finding_site(structure.site));
+    content.extend(figures);
+    Some(group("1501", content))
+}
+
 fn segment_reference(results: &DicomResults<'_>) -> DataSet {
     let instance = results.instance(DicomObject::Mask);
     let mut item = reference(uids::SEGMENTATION_STORAGE, &instance);
@@ -312,8 +339,7 @@ fn measured(report: &Value, figures: &[Figure]) -> Vec<DataSet> {
             code.map(|code| concept("HAS CONCEPT MOD", name, code))
         };
         let derivation = modifier(dcm("121401", "Derivation"), figure.derivation);
-        let method = modifier(sct("370129005", "Measurement Method"), figure.method);
-        let modifiers: Vec<DataSet> = [method, derivation, site].into_iter().flatten().collect();
+        let modifiers: Vec<DataSet> = [derivation, site].into_iter().flatten().collect();
         if !modifiers.is_empty() {
             item.items(tags::CONTENT_SEQUENCE, modifiers);
         }

@@ -15,6 +15,9 @@
 //! position in the patient is assumed gives objects with a Frame of Reference of their own, so that
 //! no viewer lays them over other images.
 //!
+//! Text is written in UTF-8. What could not be decoded of the source ([`legible`]) is in no object:
+//! there is none.
+//!
 //! Not guaranteed: that the values which a source states about the patient are valid DICOM; they
 //! are copied, so that the archive finds the same patient.
 
@@ -34,7 +37,7 @@ mod tests;
 
 pub use codes::Structure;
 pub use data_set::{IMPLEMENTATION, IMPLEMENTATION_NAME, file_start};
-pub use source::{Deidentification, Moment, SourceScan, StatedIdentity, identity};
+pub use source::{Deidentification, Moment, SourceScan, StatedIdentity, identity, legible};
 pub use uid::is_uid;
 
 use self::codes::{ANATOMICAL_STRUCTURE, Code, DEFORMABLE_MODELS};
@@ -59,6 +62,12 @@ pub enum DicomError {
     #[error("`{field}` differs from what the volume's file says")]
     Contradiction {
         /// What differs.
+        field: &'static str,
+    },
+    /// The file states a value in characters that cannot be told.
+    #[error("the volume's file has a `{field}` that cannot be decoded")]
+    Undecoded {
+        /// What cannot be decoded.
         field: &'static str,
     },
     /// A stated value is not valid DICOM.
@@ -283,6 +292,7 @@ impl<'a> DicomResults<'a> {
     /// # Errors
     /// See [`DicomError`].
     pub fn write(&self, object: DicomObject) -> Result<Option<Vec<u8>>, DicomError> {
+        self.scan.check()?;
         let mut set = DataSet::new();
         match object {
             DicomObject::Mask => segmentation::put(self, &mut set)?,

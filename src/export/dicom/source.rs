@@ -5,6 +5,7 @@ use super::codes::SOURCE_FOR_PROCESSING;
 use super::data_set::{DataSet, reference};
 use super::uid::{derived, is_uid};
 use crate::geometry::frame::VoxelToPatient;
+use crate::text::is_printable;
 use crate::volume::dicom::Provenance;
 use dicom_dictionary_std::tags;
 use serde::{Deserialize, Serialize};
@@ -46,6 +47,9 @@ pub struct StatedIdentity {
     /// Accession Number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accession_number: Option<String>,
+    /// Referring Physician's Name, components separated by `^`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub referring_physician: Option<String>,
     /// Frame of Reference UID.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frame_of_reference_uid: Option<String>,
@@ -107,7 +111,7 @@ pub(super) fn for_processing(mut reference: DataSet) -> DataSet {
 
 impl StatedIdentity {
     /// The names of all fields.
-    pub const FIELDS: [&str; 9] = [
+    pub const FIELDS: [&str; 10] = [
         "patient_id",
         "patient_name",
         "patient_birth_date",
@@ -116,6 +120,7 @@ impl StatedIdentity {
         "study_date",
         "study_id",
         "accession_number",
+        "referring_physician",
         "frame_of_reference_uid",
     ];
 
@@ -136,7 +141,7 @@ impl StatedIdentity {
     fn beside<'a>(
         &'a self,
         provenance: &'a mut Provenance,
-    ) -> [(&'static str, &'a Option<String>, &'a mut Option<String>); 9] {
+    ) -> [(&'static str, &'a Option<String>, &'a mut Option<String>); 10] {
         let p = provenance;
         [
             ("patient_id", &self.patient_id, &mut p.patient_id),
@@ -156,6 +161,11 @@ impl StatedIdentity {
                 &mut p.accession_number,
             ),
             (
+                "referring_physician",
+                &self.referring_physician,
+                &mut p.referring_physician,
+            ),
+            (
                 "frame_of_reference_uid",
                 &self.frame_of_reference_uid,
                 &mut p.frame_of_reference_uid,
@@ -164,7 +174,39 @@ impl StatedIdentity {
     }
 }
 
-/// Completes the identity of a scan by what a person states.
+/// The fields of a scan that its objects state or refer to.
+const CARRIED: [&str; 15] = [
+    "patient_name",
+    "patient_id",
+    "patient_birth_date",
+    "patient_sex",
+    "study_uid",
+    "study_date",
+    "study_time",
+    "study_id",
+    "accession_number",
+    "referring_physician",
+    "series_uid",
+    "frame_of_reference_uid",
+    "sop_class_uid",
+    "sop_instance_uid",
+    "position_reference_indicator",
+];
+
+/// Checks that everything about a scan that its objects would state could be decoded.
+///
+/// # Errors
+/// [`DicomError::Undecoded`].
+pub fn legible(scan: &Provenance) -> Result<(), DicomError> {
+    let lost = |field: &&str| scan.undecoded.iter().any(|lost| lost == field);
+    match CARRIED.into_iter().find(lost) {
+        Some(field) => Err(DicomError::Undecoded { field }),
+        None => Ok(()),
+    }
+}
+
+/// Completes the identity of a scan by what a person states. Whether all of it is [`legible`] is left
+/// open: without the patient's identity it need not be.
 ///
 /// # Errors
 /// [`DicomError::NoIdentity`] if neither names the study, or if no file and no person names the
@@ -176,13 +218,16 @@ pub fn identity(
 ) -> Result<Provenance, DicomError> {
     stated.check()?;
     let mut whole = file.cloned().unwrap_or_default();
+    let mut undecoded = std::mem::take(&mut whole.undecoded);
     for (field, stated, known) in stated.beside(&mut whole) {
         let Some(value) = stated else { continue };
+        undecoded.retain(|lost| lost != field);
         match known {
             Some(known) if known != value => return Err(DicomError::Contradiction { field }),
             _ => *known = Some(value.clone()),
         }
     }
+    whole.undecoded = undecoded;
     if file.is_none() && whole.patient_id.is_none() {
         return Err(DicomError::NoIdentity {
             field: "patient_id",
@@ -207,7 +252,7 @@ fn check(field: &'static str, value: &str) -> Result<(), DicomError> {
     };
     let plain = |longest: usize| {
         let length = value.chars().count();
-        (1..=longest).contains(&length) && !value.chars().any(|c| c.is_control() || c == '\\')
+        (1..=longest).contains(&length) && value.chars().all(|c| is_printable(c) && c != '\\')
     };
     let (valid, expected) = match field {
         "study_uid" | "frame_of_reference_uid" => (
@@ -216,8 +261,14 @@ fn check(field: &'static str, value: &str) -> Result<(), DicomError> {
         ),
         "patient_birth_date" | "study_date" => (date(value), "a date as YYYYMMDD"),
         "patient_sex" => (["M", "F", "O"].contains(&value), "M, F or O"),
-        "study_id" | "accession_number" => (plain(16), "1 to 16 characters without a backslash"),
-        _ => (plain(64), "1 to 64 characters without a backslash"),
+        "study_id" | "accession_number" => (
+            plain(16),
+            "1 to 16 printable characters without a backslash",
+        ),
+        _ => (
+            plain(64),
+            "1 to 64 printable characters without a backslash",
+        ),
     };
     match valid {
         true => Ok(()),
@@ -276,6 +327,11 @@ impl SourceScan {
             deidentified: true,
             ..self
         }
+    }
+
+    /// As [`legible`], for this scan.
+    pub(super) fn check(&self) -> Result<(), DicomError> {
+        legible(&self.provenance)
     }
 
     /// Study Instance UID.

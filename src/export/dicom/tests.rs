@@ -429,6 +429,99 @@ fn the_report_repeats_the_figures() {
     assert_eq!(named, ["1.2.3.4.5.6", &mask]);
 }
 
+/// The groups that say by which method they were measured: the method's code, and their volumes, ml.
+fn walls(set: &InMemDicomObject, into: &mut Vec<(String, Vec<f64>)>) {
+    let Some(children) = set.get(tags::CONTENT_SEQUENCE).and_then(|e| e.items()) else {
+        return;
+    };
+    let code = |item: &InMemDicomObject, tag, part| text(only(item, tag), part);
+    let method = children.iter().find(|child| {
+        child.get(tags::CONCEPT_NAME_CODE_SEQUENCE).is_some()
+            && code(child, tags::CONCEPT_NAME_CODE_SEQUENCE, tags::CODE_VALUE) == "370129005"
+    });
+    if let Some(method) = method {
+        let mut found = Vec::new();
+        figures(set, &mut found, "");
+        let volumes = found
+            .into_iter()
+            .filter(|(concept, ..)| concept == "Volume");
+        into.push((
+            code(method, tags::CONCEPT_CODE_SEQUENCE, tags::CODE_VALUE),
+            volumes.map(|(.., number)| number).collect(),
+        ));
+    }
+    children.iter().for_each(|child| walls(child, into));
+}
+
+#[test]
+fn each_wall_has_a_group_that_says_which_it_is() {
+    let mut scene = straight();
+    let apart = |set: &InMemDicomObject| {
+        let mut found = Vec::new();
+        walls(set, &mut found);
+        found
+    };
+    assert!(apart(&scene.read(DicomObject::Measurements)).is_empty());
+    scene.report["volumes_ml"]["apparent"] = json!({"wall": 120.5, "cavity": 40.25});
+    scene.report["volumes_ml"]["anatomical"] = json!({"wall": 101.25, "cavity": 55.5});
+    scene.report["thickness_mm"] = json!({"anatomical": {"mean": 9.5}});
+    let set = scene.read(DicomObject::Measurements);
+    let wall = |method: &str, volumes: [f64; 2]| (method.to_owned(), volumes.to_vec());
+    assert_eq!(
+        apart(&set),
+        [
+            wall("APPARENT", [120.5, 40.25]),
+            wall("ANATOMICAL", [101.25, 55.5])
+        ]
+    );
+    let mut all = Vec::new();
+    figures(&set, &mut all, "");
+    assert_eq!(all.len(), 4 + 2 + 3 + 2 * 17);
+}
+
+#[test]
+fn what_could_not_be_decoded_makes_no_object() {
+    let lost = |fields: &[&str]| Provenance {
+        patient_name: None,
+        undecoded: fields.iter().map(|f| (*f).to_owned()).collect(),
+        ..provenance()
+    };
+    let of = |scan: Provenance| Scene::new(Matrix3::identity(), scan, true);
+    for field in StatedIdentity::FIELDS
+        .iter()
+        .chain(&["study_time", "series_uid"])
+    {
+        let scene = of(lost(&[field]));
+        for object in DicomObject::ALL {
+            let refused = scene.results().write(object);
+            assert!(
+                matches!(refused, Err(DicomError::Undecoded { field: named }) if named == *field),
+                "{field}: {refused:?}"
+            );
+        }
+    }
+    // Descriptions are in no object.
+    assert!(legible(&lost(&["series_description"])).is_ok());
+    let scan = lost(&["patient_name", "protocol_name"]);
+    let stated = StatedIdentity {
+        patient_name: Some("Doe^Jane".into()),
+        ..StatedIdentity::default()
+    };
+    let known = identity(Some(&scan), &stated).unwrap();
+    assert!(legible(&known).is_ok());
+    let scene = of(known);
+    assert_eq!(
+        text(&scene.read(DicomObject::Mesh), tags::PATIENT_NAME),
+        "Doe^Jane"
+    );
+    let how = Deidentification {
+        secret: b"s".to_vec(),
+    };
+    let mut scene = of(scan);
+    scene.scan = scene.scan.deidentified(&how, &StatedIdentity::default());
+    assert_eq!(text(&scene.read(DicomObject::Mesh), tags::PATIENT_NAME), "");
+}
+
 /// Calls `visit` with every element of `set` and of its sequences.
 fn walk(set: &InMemDicomObject, visit: &mut dyn FnMut(Tag, &str)) {
     for element in set.iter() {

@@ -250,8 +250,10 @@ async fn wait(
         (JobState::Succeeded, Some(id)) => {
             let product = products::find_any(app, &job.tenant, id).await?;
             let offer = products::choose(headers, offers)?;
+            let asker = products::Asker::filer(&job.tenant);
             // The conditional headers of this request concern the upload, not the result.
-            let mut response = products::send(app, &product, offer, &HeaderMap::new()).await?;
+            let mut response =
+                products::send(app, asker, &product, offer, &HeaderMap::new()).await?;
             if let Ok(location) = HeaderValue::from_str(&path_of(id)) {
                 response.headers_mut().insert(header::LOCATION, location);
             }

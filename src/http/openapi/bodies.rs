@@ -233,6 +233,9 @@ pub struct StatedScanSchema {
     /// Accession Number.
     #[schema(max_length = 16)]
     accession_number: Option<String>,
+    /// Referring Physician's Name, components separated by `^`.
+    #[schema(max_length = 64)]
+    referring_physician: Option<String>,
     /// Frame of Reference UID.
     #[schema(max_length = 64, pattern = "^[0-9.]+$")]
     frame_of_reference_uid: Option<String>,

@@ -131,7 +131,10 @@ fn of_one_file(folder: &str, name: &str, any: &Value) -> Value {
             }
         }
     }
-    if !is_object && let Some(parameters) = one["parameters"].as_array_mut() {
+    if !is_object
+        && name != PAGE
+        && let Some(parameters) = one["parameters"].as_array_mut()
+    {
         parameters.retain(|parameter| parameter["name"] != "deidentify");
     }
     let schema = match (name, media_type) {

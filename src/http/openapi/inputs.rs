@@ -273,7 +273,7 @@ impl IntoParams for DeidentifyParameter {
             .schema_type(Type::Boolean)
             .default(Some(json!(false)));
         let help = "Of DICOM objects: whether to remove the patient's identity (PS3.15, basic \
-                    profile)";
+                    profile); of report.html: whether it names nobody";
         vec![query("deidentify", help).schema(Some(flag)).build()]
     }
 }

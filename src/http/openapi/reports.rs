@@ -100,6 +100,9 @@ schemas! {
         rest_or_stress: Option<String>,
         /// SOP Instance UIDs of a series of several instances; in `/identity` only.
         instance_uids: Option<Vec<String>>,
+        /// Fields that the file states and that cannot be decoded; while they belong to patient or
+        /// study, no DICOM object is made.
+        undecoded: Option<Vec<String>>,
     }
     /// The report of a model. Lengths are millimetres in the patient frame LPS.
     ModelReportSchema as ModelReport {

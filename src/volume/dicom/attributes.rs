@@ -2,8 +2,11 @@
 
 use super::super::VolumeError;
 use super::super::facts::ByteOrder;
-use dicom_core::Tag;
-use dicom_encoding::text::{SpecificCharacterSet, TextCodec};
+use super::characters::{CharacterSets, Division};
+use crate::text::escaped;
+use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
+use dicom_core::{Tag, VR};
+use dicom_dictionary_std::StandardDataDictionary;
 use std::collections::BTreeMap;
 
 /// Most values that are kept of one data set. Enough for 20,000 frames with a dozen each.
@@ -68,6 +71,12 @@ const FRAME_UNASSIGNED: &[Tag] = &[FRAME, Tag(0x0020, 0x9171)];
 
 attributes! {
     CHARACTER_SET = &[], 0x0008, 0x0005, "Specific Character Set (0008,0005)";
+    PHARMACEUTICAL_SET = PHARMACEUTICAL, 0x0008, 0x0005, "Specific Character Set (0008,0005)";
+    PHARMACEUTICAL_CODE_SET = PHARMACEUTICAL_CODE, 0x0008, 0x0005,
+        "Specific Character Set (0008,0005)";
+    NUCLIDE_SET = NUCLIDE_CODE, 0x0008, 0x0005, "Specific Character Set (0008,0005)";
+    CONTEXT_SET = CONTEXT_NAME, 0x0008, 0x0005, "Specific Character Set (0008,0005)";
+    PROTOCOL_SET = PROTOCOL_CODE, 0x0008, 0x0005, "Specific Character Set (0008,0005)";
     IMAGE_TYPE = &[], 0x0008, 0x0008, "Image Type (0008,0008)";
     SOP_CLASS = &[], 0x0008, 0x0016, "SOP Class UID (0008,0016)";
     SOP_INSTANCE = &[], 0x0008, 0x0018, "SOP Instance UID (0008,0018)";
@@ -246,12 +255,12 @@ impl Attribute {
     }
 }
 
-/// `text`, cut to 100 characters for an error message.
+/// `text`, cut to 100 characters for an error message, control characters escaped.
 pub(super) fn clip(text: &str) -> String {
     const LONGEST: usize = 100;
     match text.char_indices().nth(LONGEST) {
-        Some((end, _)) => format!("{}...", &text[..end]),
-        None => text.to_owned(),
+        Some((end, _)) => format!("{}...", escaped(&text[..end])),
+        None => escaped(text).into_owned(),
     }
 }
 
@@ -368,15 +377,39 @@ impl Attributes {
         first.filter(|text| !text.is_empty())
     }
 
-    /// The whole text of an attribute in the data set's character set, for people to read.
+    /// The whole text of an attribute, for people to read; `None` if it is absent, empty, or cannot
+    /// be decoded.
     pub(super) fn prose(&self, attribute: Attribute) -> Option<String> {
-        let bytes = self.bytes_of(attribute, None)?;
-        let code = self.text(CHARACTER_SET);
-        let set = code.and_then(|code| SpecificCharacterSet::from_code(&code));
-        let decoded = set.and_then(|set| set.decode(bytes).ok());
-        let text = decoded.unwrap_or_else(|| String::from_utf8_lossy(bytes).into_owned());
-        let text = text.trim_matches(['\0', ' ']);
-        (!text.is_empty()).then(|| text.to_owned())
+        self.decoded(attribute).ok().flatten()
+    }
+
+    /// The whole text of an attribute, decoded by the character sets that the data set, or the item
+    /// of the attribute, names; `None` if it is absent or empty.
+    ///
+    /// # Errors
+    /// Why the text cannot be told, without any of it.
+    pub(super) fn decoded(&self, attribute: Attribute) -> Result<Option<String>, String> {
+        let Some(bytes) = self.bytes_of(attribute, None) else {
+            return Ok(None);
+        };
+        let entry = StandardDataDictionary.by_tag(attribute.tag);
+        let representation = entry.map_or(VR::UN, |entry| entry.vr().relaxed());
+        let sets = self.character_sets(attribute.path);
+        let text = sets.decode(bytes, Division::of(representation))?;
+        Ok((!text.is_empty()).then_some(text))
+    }
+
+    /// The character sets of an item inside the sequences `path`: those that the item or, if it names
+    /// none, an item around it or the data set names (PS3.3 C.12.1.1.2).
+    pub(super) fn character_sets(&self, path: &'static [Tag]) -> CharacterSets {
+        let stated = (0..=path.len()).rev().find_map(|depth| {
+            let key = (&path[..depth], CHARACTER_SET.tag, None);
+            self.values.get(&key)
+        });
+        let text = String::from_utf8_lossy(stated.map_or(&[][..], Vec::as_slice));
+        let terms = text.split('\\').map(|term| term.trim_matches(['\0', ' ']));
+        let terms: Vec<String> = terms.map(str::to_owned).collect();
+        CharacterSets::of(&terms)
     }
 
     /// The `N` decimal numbers (DS, IS) of an attribute, `None` if it is absent or empty.

@@ -7,12 +7,13 @@
 //! 2. `scan`: one pass over the data set collects the needed `attributes` and finds the pixels. It
 //!    follows at most 32 nested sequences and rejects lengths beyond the size of the file. `unknown`:
 //!    sequences that a program wrote without knowing them.
-//! 3. `kind`: what the object is. One that holds no slices is refused by its name, with what to send.
+//! 3. `kind`: what the object is. One that holds no slices is refused by its name, with what to send;
+//!    `company`: beside others it is left out.
 //! 4. `frames`: orders the frames of a Nuclear Medicine Image by its vectors; `geometry` places them.
 //!    `stack`: orders and places all other frames by their positions; `volumes` tells which of those at
 //!    one place belong together. `segments`: labels.
 //! 5. `pixels`, `fragments` and `codec`: checks the pixel format and decodes frame by frame.
-//! 6. `provenance`: patient, study, series, instances and acquisition.
+//! 6. `provenance`: patient, study, series, instances and acquisition; `characters`: their text.
 //!
 //! Guaranteed: no memory is taken for a stated size before the file was found large enough for it;
 //! beside the voxels, one compressed frame and at most 16 MiB of attributes are held. A damaged
@@ -22,7 +23,9 @@
 //! JPEG 2000, JPEG XL, video, and values that are mapped by a table.
 
 mod attributes;
+mod characters;
 mod codec;
+mod company;
 mod fragments;
 mod frames;
 mod geometry;
@@ -146,10 +149,13 @@ impl DicomFile {
         limits: &ReadLimits,
         monitor: &Monitor,
     ) -> Result<Self, VolumeError> {
-        match files {
+        let sorted = company::set_apart(files, limits, monitor)?;
+        let mut opened = match &sorted.slices[..] {
             [file] => Self::single(file, limits, monitor),
-            files => Self::series(files, limits, monitor),
-        }
+            slices => Self::series(slices, limits, monitor),
+        }?;
+        opened.warnings.extend(sorted.notes);
+        Ok(opened)
     }
 
     fn single(
@@ -159,7 +165,7 @@ impl DicomFile {
     ) -> Result<Self, VolumeError> {
         let ScannedFile { scan, pixels } = ScannedFile::open(file, limits, monitor)?;
         let a = &scan.attributes;
-        let mut warnings = Vec::new();
+        let mut warnings = Provenance::warnings(a);
         let [columns, rows] = pixels.extent;
         let (content, volumes, slices, placement) = match scan.kind {
             Kind::Nuclear { gated } => {
@@ -282,12 +288,12 @@ impl DicomFile {
         if let Some(reason) = series.contradiction() {
             return refuse(reason);
         }
-        let Some((_, provenance, gap)) = series.first.take() else {
+        let Some(first) = series.first.take() else {
             return Err(VolumeError::NoFile);
         };
         let extent = series.parts[0].extent;
         let name = |part: usize| series.parts[part].name().to_owned();
-        let stack = match Stack::of(&series.located, extent, gap, &name) {
+        let stack = match Stack::of(&series.located, extent, first.gap, &name) {
             Ok(stack) => stack,
             Err(reason) => return refuse(reason),
         };
@@ -298,7 +304,8 @@ impl DicomFile {
                 NUMBER_OF_SLICES.name, series.slices, stack.slices
             ));
         }
-        let warnings = series.warnings(&stack, volumes);
+        let mut warnings = first.warnings;
+        warnings.extend(series.warnings(&stack, volumes));
         let voxels = (extent[0] * extent[1]) as u64 * stack.slices as u64;
         if voxels > limits.voxels {
             return Err(VolumeError::TooLarge {
@@ -323,7 +330,7 @@ impl DicomFile {
             gated: false,
             shape: [extent[0], extent[1], stack.slices],
             placement: stack.placement,
-            provenance,
+            provenance: first.provenance,
             parts,
             instances,
             warnings,
@@ -470,6 +477,16 @@ fn check_groups(a: &Attributes, frames: usize) -> Result<(), VolumeError> {
 /// name.
 type FirstKey = (u64, String, String);
 
+/// The file that speaks for its series.
+struct First {
+    key: FirstKey,
+    provenance: Provenance,
+    /// About its text.
+    warnings: Vec<String>,
+    /// The distance of slices that it states, in millimetres.
+    gap: Option<f64>,
+}
+
 /// The files of a series found so far.
 #[derive(Default)]
 struct Series {
@@ -481,8 +498,8 @@ struct Series {
     known: BTreeMap<String, usize>,
     /// Every series by its UID.
     names: BTreeMap<String, SeriesName>,
-    /// Provenance and distance of slices by the first instance.
-    first: Option<(FirstKey, Provenance, Option<f64>)>,
+    /// The first instance.
+    first: Option<First>,
     /// Files that repeat an instance.
     repeated: usize,
     /// The most that any file states: slices of a volume, volumes, images.
@@ -545,8 +562,13 @@ impl Series {
             _ => u64::MAX,
         };
         let key = (number, instance.clone(), pixels.name().to_owned());
-        if self.first.as_ref().is_none_or(|(first, ..)| key < *first) {
-            self.first = Some((key, Provenance::of(a), stated_gap(a)?));
+        if self.first.as_ref().is_none_or(|first| key < first.key) {
+            self.first = Some(First {
+                key,
+                provenance: Provenance::of(a),
+                warnings: Provenance::warnings(a),
+                gap: stated_gap(a)?,
+            });
         }
         let stated = |attribute| a.shorts(attribute).first().map_or(1, |n| usize::from(*n));
         self.slices = self.slices.max(stated(NUMBER_OF_SLICES));

@@ -8,7 +8,7 @@ use super::attributes::{
     PHARMACEUTICAL_NAME, POSITION_REFERENCE, PROTOCOL_MEANING, PROTOCOL_NAME,
     RECONSTRUCTION_METHOD, REFERRING_PHYSICIAN, SERIES_DATE, SERIES_DESCRIPTION, SERIES_NUMBER,
     SERIES_UID, SOFTWARE_VERSIONS, SOP_CLASS, SOP_INSTANCE, STUDY_DATE, STUDY_DESCRIPTION,
-    STUDY_ID, STUDY_TIME, STUDY_UID,
+    STUDY_ID, STUDY_TIME, STUDY_UID, clip,
 };
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -39,18 +39,43 @@ macro_rules! provenance {
             /// empty for a series of single-frame instances, and for a segmentation.
             #[serde(skip_serializing_if = "Vec::is_empty")]
             pub slice_frames: Vec<u32>,
+            /// The fields of this that the data set has and that cannot be decoded
+            /// ([`decode`](super::characters)).
+            #[serde(skip_serializing_if = "Vec::is_empty")]
+            pub undecoded: Vec<String>,
         }
 
         impl Provenance {
             /// What the data set says, without the frames of the slices.
             pub(super) fn of(a: &Attributes) -> Self {
+                let mut undecoded = Vec::new();
+                $(if a.decoded($attribute).is_err() {
+                    undecoded.push(stringify!($field).to_owned());
+                })*
                 Self {
                     $($field: a.prose($attribute),)*
                     rest_or_stress: rest_or_stress(a),
                     instance_uids: Vec::new(),
                     slice_frames: Vec::new(),
+                    undecoded,
                 }
                 .settled(a)
+            }
+
+            /// Which of the attributes cannot be decoded, and why, for people to read.
+            pub(super) fn warnings(a: &Attributes) -> Vec<String> {
+                let sets = a.character_sets(&[]);
+                let unknown = sets.unknown().map(|term| format!(
+                    "Specific Character Set (0008,0005) has the value {:?}, which DICOM does not \
+                     define: only text of ASCII is read.",
+                    clip(term)
+                ));
+                let each = [$(($attribute, a.decoded($attribute)),)*];
+                let each = each.into_iter().filter_map(|(attribute, decoded)| {
+                    let reason = decoded.err()?;
+                    Some(format!("{} cannot be decoded: {reason}.", attribute.name))
+                });
+                unknown.into_iter().chain(each).collect()
             }
 
             /// The stated values, each with its name, without the numbers of slices.

@@ -119,6 +119,24 @@ pub(super) fn scan(
     })
 }
 
+/// Checks whether the object whose data set begins at the position of `source` is of a kind that holds
+/// slices, as far as it tells.
+///
+/// # Errors
+/// As [`Kind::of`]; for one that names no class, as [`attributes`].
+pub(super) fn check_kind(
+    source: &mut Source,
+    syntax: &Syntax,
+    monitor: &Monitor,
+) -> Result<(), VolumeError> {
+    let mut walk = Walk::of(source, syntax);
+    match find_pixels(source, syntax, &mut walk, monitor) {
+        Err(error @ VolumeError::Cancelled(_)) => Err(error),
+        _ if walk.attributes.names_a_class() => Kind::of(&walk.attributes).map(|_| ()),
+        found => found.map(|_| ()),
+    }
+}
+
 /// Reads the needed attributes of a data set of any kind, up to its pixels if it has any.
 ///
 /// # Errors

@@ -226,15 +226,7 @@ fn is_zlib(first: u8, second: u8) -> bool {
 /// [`VolumeError::Unsupported`] for transfer syntaxes that are not read, and
 /// [`VolumeError::Field`] if group 0002 is damaged or the encoding cannot be determined.
 pub(super) fn find(file: &VolumeFile, limits: &ReadLimits) -> Result<Syntax, VolumeError> {
-    let reach = META_REACH.min(usize::try_from(limits.unpacked_bytes).unwrap_or(META_REACH));
-    let mut start = vec![0; reach];
-    let mut source = Source::open(file, limits.unpacked_bytes)?;
-    let there = source.fill(&mut start)?;
-    start.truncate(there);
-    let begin = match start.get(128..132) {
-        Some(b"DICM") => 132,
-        _ => 0,
-    };
+    let (start, begin, gzip) = beginning(file, limits)?;
     let meta = Meta::read(&start, begin).ok_or_else(|| VolumeError::Field {
         file: file.name().into(),
         field: "File Meta Information (0002,xxxx)",
@@ -268,7 +260,7 @@ pub(super) fn find(file: &VolumeFile, limits: &ReadLimits) -> Result<Syntax, Vol
                 transfer_syntax,
                 deflated,
                 compression,
-                gzip: source.is_gzip(),
+                gzip,
                 media_class: meta.media_class,
             };
             // Without group 0002 the first element was asked already.
@@ -279,6 +271,35 @@ pub(super) fn find(file: &VolumeFile, limits: &ReadLimits) -> Result<Syntax, Vol
         }
         _ => Err(refuse(file, transfer_syntax, uid)),
     }
+}
+
+/// The first bytes of `file`, where group 0002 begins in them, and whether the file is gzipped.
+fn beginning(
+    file: &VolumeFile,
+    limits: &ReadLimits,
+) -> Result<(Vec<u8>, usize, bool), VolumeError> {
+    let reach = META_REACH.min(usize::try_from(limits.unpacked_bytes).unwrap_or(META_REACH));
+    let mut start = vec![0; reach];
+    let mut source = Source::open(file, limits.unpacked_bytes)?;
+    let there = source.fill(&mut start)?;
+    start.truncate(there);
+    let begin = match start.get(128..132) {
+        Some(b"DICM") => 132,
+        _ => 0,
+    };
+    Ok((start, begin, source.is_gzip()))
+}
+
+/// The Media Storage SOP Class UID (0002,0002) of `file`, whatever transfer syntax it is in.
+///
+/// # Errors
+/// [`VolumeError`] if the file cannot be read.
+pub(super) fn media_class(
+    file: &VolumeFile,
+    limits: &ReadLimits,
+) -> Result<Option<String>, VolumeError> {
+    let (start, begin, _) = beginning(file, limits)?;
+    Ok(Meta::read(&start, begin).and_then(|meta| meta.media_class))
 }
 
 fn refuse(file: &VolumeFile, syntax: Option<&TransferSyntax>, uid: &str) -> VolumeError {

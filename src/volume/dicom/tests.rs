@@ -8,23 +8,27 @@ use crate::geometry::Vec3;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
+mod company;
 mod compressed;
 mod objects;
 mod padding;
 mod refused;
 mod sorted;
+mod text;
 
 /// An element's value.
 #[derive(Clone)]
 enum Value {
     Text(&'static str),
+    /// As it is, of an even length.
+    Bytes(Vec<u8>),
     Shorts(Vec<u16>),
     Longs(Vec<u32>),
     Single(f32),
     Double(f64),
     Items(Vec<Elements>),
 }
-use Value::{Double, Items, Longs, Shorts, Single, Text};
+use Value::{Bytes, Double, Items, Longs, Shorts, Single, Text};
 
 /// A text that the test made.
 fn written(text: impl ToString) -> Value {
@@ -93,6 +97,7 @@ impl Encoding {
                 let padding = if text.len() % 2 == 1 { " " } else { "" };
                 format!("{text}{padding}").into_bytes()
             }
+            Bytes(bytes) => bytes.clone(),
             Shorts(numbers) => numbers.iter().flat_map(|n| self.short(*n)).collect(),
             Longs(numbers) => numbers.iter().flat_map(|n| self.long(*n)).collect(),
             Single(number) => self.long(number.to_bits()).to_vec(),

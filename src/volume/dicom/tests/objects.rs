@@ -55,18 +55,18 @@ pub(super) fn files(slices: &[Elements]) -> Vec<VolumeFile> {
 }
 
 /// Whose scan the volume `frame` of `files` is, by the headers alone.
-fn headers(files: &[VolumeFile], frame: Option<usize>) -> Provenance {
+pub(super) fn headers(files: &[VolumeFile], frame: Option<usize>) -> Provenance {
     let (options, limits) = (ReadOptions { frame }, ReadLimits::default());
     let found = provenance(files, &options, &limits, &Monitor::silent());
     found.unwrap().unwrap()
 }
 
-fn read_files(files: &[VolumeFile]) -> Result<Reading, VolumeError> {
+pub(super) fn read_files(files: &[VolumeFile]) -> Result<Reading, VolumeError> {
     let (options, limits) = (ReadOptions::default(), ReadLimits::default());
     read_volume(files, &options, &limits, &Monitor::silent())
 }
 
-fn archive(files: &[(&str, Vec<u8>)], method: CompressionMethod) -> VolumeFile {
+pub(super) fn archive(files: &[(&str, Vec<u8>)], method: CompressionMethod) -> VolumeFile {
     let mut zip = ZipWriter::new(std::io::Cursor::new(Vec::new()));
     let options = SimpleFileOptions::default().compression_method(method);
     for (name, bytes) in files {

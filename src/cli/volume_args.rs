@@ -1,0 +1,14 @@
+//! The files of a volume, as they are named on the command line.
+
+use crate::volume::VolumeFile;
+use crate::work::problems::Explain;
+use anyhow::{Result, anyhow};
+use std::path::PathBuf;
+
+/// The files that `paths` name; a folder stands for the files in it.
+///
+/// # Errors
+/// If a folder cannot be read, or holds no or too many files.
+pub(super) fn volume_files(paths: &[PathBuf]) -> Result<Vec<VolumeFile>> {
+    VolumeFile::given(paths).map_err(|error| anyhow!(error.with_advice()))
+}
