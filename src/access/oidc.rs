@@ -173,6 +173,7 @@ impl Issuer {
             scope,
             key: None,
             quota: Quota::default(),
+            expires_at: None,
         })
     }
 

@@ -2,6 +2,7 @@
 //! 14).
 
 use super::app::App;
+use super::memory::charge;
 use super::problem::{Answer, Problem};
 use super::validators::not_modified;
 use super::wire::path_of;
@@ -23,6 +24,9 @@ const PAGE_CACHE_CONTROL: &str = "private, max-age=86400";
 
 /// Whose scan it is may be stated otherwise, or erased.
 const OBJECT_CACHE_CONTROL: &str = "private, no-cache";
+
+/// Memory of a download: a slow client has one portion waiting and one on its way.
+const SENT_MEMORY: u64 = 512 << 10;
 
 /// A file to be sent.
 pub struct Download<'a> {
@@ -57,7 +61,8 @@ pub async fn send(app: &App, product: &Product, file: &ProductFile, headers: &He
 
 /// Answers with a stored file, or the part of it that `Range` asks for, or 304.
 pub async fn send_file(app: &App, file: &Download<'_>, headers: &HeaderMap) -> Answer {
-    let read = async |span| {
+    let read = async |span: Range<u64>| {
+        charge(SENT_MEMORY.min(span.end - span.start)).await?;
         let content = app.queue.read(file.id, &file.record, span).await?;
         Ok(Body::from_stream(content))
     };

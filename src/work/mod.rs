@@ -29,7 +29,7 @@ pub use model::ModelWork;
 pub use page::PageError;
 pub use segmentation::SegmentationWork;
 pub use upload::{
-    DomainReader, INSPECTION_MEMORY, IntensityFacts, UploadFacts, UploadReader, preview_memory,
+    DomainReader, INSPECTION_MEMORY, IntensityFacts, TEMPLATE_BYTES, UploadFacts, UploadReader, preview_memory,
     voxels_memory,
 };
 

@@ -1596,7 +1596,7 @@ async fn work_items_change_once(on: &Stores) {
         changed.0.unwrap() != changed.1.unwrap(),
         "one of two claims it"
     );
-    assert_eq!(on.b.performed_workitems().await.unwrap().len(), 1);
+    assert_eq!(on.b.performed_workitems(0, 10).await.unwrap().len(), 1);
     let listed =
         on.b.workitems(&tenant(), Some(WorkitemState::Scheduled), 0, 10)
             .await

@@ -178,6 +178,13 @@ impl Attribute {
     }
 }
 
+/// Most bytes of a text that is kept: a name has at most three groups of 64 characters of four bytes (PS3.5, 6.2), a
+/// description 64 characters.
+const LONGEST_TEXT: usize = 1024;
+
+/// Most values of a code string that are kept.
+const MOST_CODES: usize = 16;
+
 /// `text`, cut to 100 characters for an error message.
 pub(super) fn clip(text: &str) -> String {
     const LONGEST: usize = 100;
@@ -281,15 +288,25 @@ impl Attributes {
         }
     }
 
-    /// The first value of a text attribute.
+    /// The first value of a text attribute; none if it is longer than any that the standard has.
     pub(super) fn text(&self, attribute: Attribute) -> Option<String> {
         let first = self.texts(attribute).into_iter().next();
-        first.filter(|text| !text.is_empty())
+        first.filter(|text| !text.is_empty() && text.len() <= LONGEST_TEXT)
+    }
+
+    /// The values of a code string, as many and as long as any that the standard has.
+    pub(super) fn codes(&self, attribute: Attribute) -> Vec<String> {
+        let mut codes = self.texts(attribute);
+        codes.truncate(MOST_CODES);
+        codes.retain(|code| code.len() <= LONGEST_TEXT);
+        codes
     }
 
     /// The whole text of an attribute in the data set's character set, for people to read.
     pub(super) fn prose(&self, attribute: Attribute) -> Option<String> {
         let bytes = self.bytes_of(attribute, None)?;
+        // These texts are stored with every volume, and listed.
+        let bytes = &bytes[..bytes.len().min(LONGEST_TEXT)];
         let code = self.text(CHARACTER_SET);
         let set = code.and_then(|code| SpecificCharacterSet::from_code(&code));
         let decoded = set.and_then(|set| set.decode(bytes).ok());
