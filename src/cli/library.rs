@@ -103,9 +103,9 @@ async fn add(
     };
     let added = queue.add_template(source, organ, output, room).await;
     let (template, _) = added.map_err(|error| match error {
-        NotAdded::Refused(failure)
-        | NotAdded::TooMany(failure)
-        | NotAdded::TooLarge(failure) => refused(&failure),
+        NotAdded::Refused(failure) | NotAdded::TooMany(failure) | NotAdded::TooLarge(failure) => {
+            refused(&failure)
+        }
         NotAdded::Store(error) => error.into(),
     })?;
     Ok(template.item.id)

@@ -151,7 +151,8 @@ pub async fn get_workitem(
 ///
 /// Attributes are named by keyword or tag, with points between a sequence and what is in it:
 /// `ProcedureStepState=SCHEDULED`, `InputInformationSequence.StudyInstanceUID=1.2.3`. `*` and `?` are
-/// wildcards, `FIRST-LAST` is a range of dates. Items come with all their attributes, oldest first.
+/// wildcards, `FIRST-LAST` is a range of dates. Items come with all their attributes, oldest first; a `Warning`
+/// says that there are more than one answer holds, to be asked for by `offset`.
 #[utoipa::path(get, path = "/dicom-web/workitems", tag = "workitems",
     operation_id = "search_workitems",
     params(
@@ -163,6 +164,8 @@ pub async fn get_workitem(
         (status = 200, description = "The items", body = openapi::WorkitemBody,
             content_type = "application/dicom+json"),
         (status = 204, description = "No item matches"),
+        (status = 413, description = "The search takes too long",
+            body = ProblemBody, content_type = "application/problem+json"),
         openapi::ScopeProblems, openapi::ListProblems))]
 pub async fn search_workitems(
     State(app): State<App>,

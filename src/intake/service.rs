@@ -138,7 +138,10 @@ mod tests {
             .map(|n| places.take(IpAddr::from([10, 0, 0, n])))
             .collect();
         let taken = others.iter().filter(|place| place.is_some()).count();
-        assert_eq!(taken, 3, "those that have none get one, up to twice as many");
+        assert_eq!(
+            taken, 3,
+            "those that have none get one, up to twice as many"
+        );
         drop(others);
         drop(first);
         assert!(places.take(a).is_some() && places.open().len() == 2);

@@ -179,7 +179,10 @@ impl Archive<'_> {
 
     /// The `length` bytes from byte `at` on; `None` if the file ends before.
     fn read(&mut self, at: u64, length: usize) -> Result<Option<Vec<u8>>, VolumeError> {
-        if at.checked_add(length as u64).is_none_or(|end| end > self.size) {
+        if at
+            .checked_add(length as u64)
+            .is_none_or(|end| end > self.size)
+        {
             return Ok(None);
         }
         let mut found = vec![0; length];
@@ -204,7 +207,8 @@ impl Archive<'_> {
                 return Ok(directory);
             }
         }
-        let reason = "no end record of the archive is followed by its comment and preceded by its directory";
+        let reason =
+            "no end record of the archive is followed by its comment and preceded by its directory";
         Err(self.corrupt(self.size, reason))
     }
 
@@ -290,7 +294,10 @@ impl Archive<'_> {
                 at: place,
             }));
         }
-        Err(self.corrupt(locator_at, "there is no zip64 end record where its locator says"))
+        Err(self.corrupt(
+            locator_at,
+            "there is no zip64 end record where its locator says",
+        ))
     }
 
     /// The entry with which `rest` of a directory begins, and what follows it.
@@ -397,7 +404,8 @@ mod tests {
             zip.start_file(format!("folder/file {n}"), options).unwrap();
             zip.write_all(&vec![n as u8; 100 + n]).unwrap();
         }
-        zip.set_raw_comment(comment.to_vec().into_boxed_slice()).unwrap();
+        zip.set_raw_comment(comment.to_vec().into_boxed_slice())
+            .unwrap();
         zip.finish().unwrap().into_inner()
     }
 
@@ -513,7 +521,10 @@ mod tests {
     #[test]
     fn too_large_a_directory_is_refused_wherever_that_is_stated() {
         assert_eq!(files(&Made::of(3).bytes()).unwrap().len(), 3);
-        assert_eq!(files(&Made::of(MOST_FILES).bytes()).unwrap().len() as u64, MOST_FILES);
+        assert_eq!(
+            files(&Made::of(MOST_FILES).bytes()).unwrap().len() as u64,
+            MOST_FILES
+        );
         for entries in [MOST_FILES + 1, 70_000, 200_000] {
             for (zip64, extension) in [(false, 0), (true, 0), (true, 30)] {
                 for comment in [0, 1, 0xffff] {
@@ -541,7 +552,10 @@ mod tests {
             let mut made = Made::of(3);
             made.counts = [3, plain, wide];
             let found = files(&made.bytes());
-            assert!(is_corrupt(&found) || is_too_large(&found), "{plain} {wide}: {found:?}");
+            assert!(
+                is_corrupt(&found) || is_too_large(&found),
+                "{plain} {wide}: {found:?}"
+            );
         }
         // What the plain record leaves to the other.
         let mut made = Made::of(3);

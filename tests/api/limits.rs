@@ -59,7 +59,11 @@ async fn one_tenant_cannot_keep_another_out_of_the_queue() {
     let app = TestApp::with(|settings| settings.queue_limit = 6).await;
     let mut keys = Vec::new();
     for tenant in ["a", "b", "c"] {
-        keys.push(key(app.data.path(), Scope::Submit, tenant, Quota::default()).await.1);
+        keys.push(
+            key(app.data.path(), Scope::Submit, tenant, Quota::default())
+                .await
+                .1,
+        );
     }
     closed(&app).await;
     let mut accepted = [0; 3];
@@ -161,7 +165,10 @@ async fn everything_that_is_stored_counts_and_nothing_exceeds_the_quota() {
     };
     let (_, tight) = key(app.data.path(), Scope::Admin, "a", of(expected + 1000)).await;
     problem(item(&tight, 2000).await.unwrap(), 507, "storage-quota").await;
-    assert_eq!(item(&large, 2000).await.unwrap().status(), StatusCode::CREATED);
+    assert_eq!(
+        item(&large, 2000).await.unwrap().status(),
+        StatusCode::CREATED
+    );
     let now = stored().await;
     assert!((expected + 2000..expected + 3000).contains(&now), "{now}");
     // What is erased does not count any more.
@@ -197,9 +204,15 @@ async fn an_upload_of_unknown_length_has_room_under_any_quota_that_it_fits() {
     };
     let (_, key) = key(app.data.path(), Scope::Submit, "a", quota).await;
     closed(&app).await;
-    assert_eq!(chunked(&app, &key, 4000).await.status(), StatusCode::CREATED);
+    assert_eq!(
+        chunked(&app, &key, 4000).await.status(),
+        StatusCode::CREATED
+    );
     problem(chunked(&app, &key, 6001).await, 507, "storage-quota").await;
-    assert_eq!(chunked(&app, &key, 6000).await.status(), StatusCode::CREATED);
+    assert_eq!(
+        chunked(&app, &key, 6000).await.status(),
+        StatusCode::CREATED
+    );
     problem(chunked(&app, &key, 100).await, 507, "storage-quota").await;
     // Several at once do not exceed it together.
     let app = TestApp::start().await;
@@ -225,28 +238,54 @@ async fn a_key_gets_no_more_than_its_maker_and_the_operator_allow() {
     closed(&app).await;
     let make = |maker: &str, fields: Value| {
         let mut body = json!({"name": "k", "scope": "submit"});
-        body.as_object_mut().unwrap().extend(fields.as_object().unwrap().clone());
+        body.as_object_mut()
+            .unwrap()
+            .extend(fields.as_object().unwrap().clone());
         app.post("/v1/keys").bearer_auth(maker).json(&body).send()
     };
-    for (field, most) in [("requests_per_minute", 500), ("stored_bytes", 1000), ("queued_jobs", 7)] {
+    for (field, most) in [
+        ("requests_per_minute", 500),
+        ("stored_bytes", 1000),
+        ("queued_jobs", 7),
+    ] {
         let refused = make(&maker, json!({field: most + 1})).await.unwrap();
         let refused = problem(refused, 422, "invalid-field").await;
         assert_eq!(refused["field"], field);
-        let made: Value = make(&maker, json!({field: most})).await.unwrap().json().await.unwrap();
+        let made: Value = make(&maker, json!({field: most}))
+            .await
+            .unwrap()
+            .json()
+            .await
+            .unwrap();
         assert_eq!(made[field], most);
         // What is left out is the maker's.
         assert_eq!(made["stored_bytes"], 1000);
         assert_eq!(made["requests_per_minute"], 500);
     }
     // The operator's limits hold for a maker that has none of its own.
-    problem(make(&free, json!({"queued_jobs": 8})).await.unwrap(), 422, "invalid-field").await;
-    let made: Value = make(&free, json!({"stored_bytes": 5})).await.unwrap().json().await.unwrap();
+    problem(
+        make(&free, json!({"queued_jobs": 8})).await.unwrap(),
+        422,
+        "invalid-field",
+    )
+    .await;
+    let made: Value = make(&free, json!({"stored_bytes": 5}))
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap();
     assert_eq!(made["stored_bytes"], 5);
     // A key does not outlive its maker.
     let mortal = json!({"scope": "admin", "expires_at": "2100-01-01T00:00:00Z"});
     let mortal: Value = make(&free, mortal).await.unwrap().json().await.unwrap();
     let mortal = text(&mortal["key"]);
-    let child: Value = make(&mortal, json!({})).await.unwrap().json().await.unwrap();
+    let child: Value = make(&mortal, json!({}))
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap();
     assert_eq!(child["expires_at"], "2100-01-01T00:00:00Z");
     let later = json!({"expires_at": "2100-01-01T00:00:01Z"});
     problem(make(&mortal, later).await.unwrap(), 422, "invalid-field").await;
@@ -270,7 +309,10 @@ async fn a_key_that_reads_gets_no_upload_that_may_name_a_patient() {
             .json()
             .await
             .unwrap();
-        for path in [text(&about["links"]["content"]), text(&about["originals"][0]["href"])] {
+        for path in [
+            text(&about["links"]["content"]),
+            text(&about["originals"][0]["href"]),
+        ] {
             let own = app.get(&path).bearer_auth(&submit).send().await.unwrap();
             assert_eq!(own.status(), 200);
             let answer = app.get(&path).bearer_auth(&read).send().await.unwrap();
@@ -288,7 +330,13 @@ async fn every_row_of_the_trail_names_its_item() {
     let (_, admin) = key(app.data.path(), Scope::Admin, "a", Quota::default()).await;
     closed(&app).await;
     let id = upload(&app, &admin, "sphere").await;
-    let filed: Value = job(&app, &admin, &id, 1).send().await.unwrap().json().await.unwrap();
+    let filed: Value = job(&app, &admin, &id, 1)
+        .send()
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap();
     let model = text(&ended(&app, &admin, &filed).await["model"]);
     let uid = "1.2.840.99.1";
     let item = format!("/dicom-web/workitems/{uid}");
@@ -301,26 +349,40 @@ async fn every_row_of_the_trail_names_its_item() {
     let url = |path: &str| format!("{}{path}", app.url);
     let hook = json!({"url": "https://example.org/x"});
     let requests = [
-        client.post(url(&format!("/dicom-web/workitems?workitem={uid}"))).json(&scheduled),
+        client
+            .post(url(&format!("/dicom-web/workitems?workitem={uid}")))
+            .json(&scheduled),
         client.get(url(&item)),
         client.put(url(&format!("{item}/state"))).json(&claim),
         client.post(url(&item)).json(&label),
         client.post(url(&format!("{item}/cancelrequest"))),
         client.get(url("/dicom-web/workitems")),
         client.get(url(&format!("/v1/volumes/{id}"))),
-        client.patch(url(&format!("/v1/volumes/{id}"))).json(&json!({"external_id": "e"})),
-        client.post(url(&format!("/v1/templates?name=t&organ=generic&model={model}"))),
+        client
+            .patch(url(&format!("/v1/volumes/{id}")))
+            .json(&json!({"external_id": "e"})),
+        client.post(url(&format!(
+            "/v1/templates?name=t&organ=generic&model={model}"
+        ))),
         client.post(url("/v1/webhooks")).json(&hook),
         client.post(url("/v1/webhooks/secret")),
         client.get(url("/v1/keys")),
     ];
     for request in requests {
         let answer = request.bearer_auth(&admin).send().await.unwrap();
-        assert!(answer.status().is_success() || answer.status() == 422, "{answer:?}");
+        assert!(
+            answer.status().is_success() || answer.status() == 422,
+            "{answer:?}"
+        );
     }
     let until = Instant::now() + Duration::from_secs(10);
     loop {
-        let trail = app.get("/v1/audit?limit=100").bearer_auth(&admin).send().await.unwrap();
+        let trail = app
+            .get("/v1/audit?limit=100")
+            .bearer_auth(&admin)
+            .send()
+            .await
+            .unwrap();
         let trail: Value = trail.json().await.unwrap();
         let events = trail["events"].as_array().unwrap();
         let objects: Vec<&str> = events
@@ -386,7 +448,9 @@ async fn work_items_are_bounded_one_by_one_and_in_pages() {
     let create = |n: usize, size: usize| {
         let set = json!([{"00741000": {"vr": "CS", "Value": ["SCHEDULED"]},
                           "00741204": {"vr": "LT", "Value": ["x".repeat(size)]}}]);
-        app.post(&format!("/dicom-web/workitems?workitem=1.2.{n}")).json(&set).send()
+        app.post(&format!("/dicom-web/workitems?workitem=1.2.{n}"))
+            .json(&set)
+            .send()
     };
     const ITEMS: usize = 15;
     for n in 0..ITEMS {
@@ -414,11 +478,15 @@ async fn work_items_are_bounded_one_by_one_and_in_pages() {
         pages += 1;
     }
     assert!(pages > 1);
-    let found = app.get("/dicom-web/workitems?ProcedureStepLabel=x*&limit=2").send();
+    let found = app
+        .get("/dicom-web/workitems?ProcedureStepLabel=x*&limit=2")
+        .send();
     let found: Vec<Value> = found.await.unwrap().json().await.unwrap();
     assert_eq!(found.len(), 2);
     let terms: String = (0..30).map(|_| "&PatientID=*").collect();
-    let broad = app.get(&format!("/dicom-web/workitems?limit=1{terms}")).send();
+    let broad = app
+        .get(&format!("/dicom-web/workitems?limit=1{terms}"))
+        .send();
     problem(broad.await.unwrap(), 400, "unknown-parameter").await;
 }
 
@@ -437,7 +505,10 @@ async fn templates_have_the_same_limits_whichever_way_they_come() {
             .env("VENTRIFORM_TEMPLATE_LIMIT", "2")
             .output();
         let run = run.unwrap();
-        (run.status.success(), String::from_utf8_lossy(&run.stderr).into_owned())
+        (
+            run.status.success(),
+            String::from_utf8_lossy(&run.stderr).into_owned(),
+        )
     };
     assert!(import("first", 20.0).0);
     let (done, said) = import(&"n".repeat(81), 21.0);
@@ -455,7 +526,10 @@ async fn templates_have_the_same_limits_whichever_way_they_come() {
             .arg(&path)
             .output()
             .unwrap();
-        (run.status.success(), String::from_utf8_lossy(&run.stderr).into_owned())
+        (
+            run.status.success(),
+            String::from_utf8_lossy(&run.stderr).into_owned(),
+        )
     };
     assert!(!done && said.contains("4194304 bytes"), "{said}");
 }

@@ -53,7 +53,7 @@ const SEND_BUFFER: usize = 128 << 10;
 
 /// Bytes that are read from one client before they are taken: of thousands that send as fast as they can, each
 /// has as many in memory. The head of a request must fit.
-const READ_BUFFER: usize = 64 << 10;
+const READ_BUFFER: usize = 32 << 10;
 
 /// When a silent connection is asked whether its other end still exists.
 const KEEPALIVE: Duration = Duration::from_secs(60);

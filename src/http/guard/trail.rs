@@ -7,8 +7,8 @@
 //! A row names an item by its id and never a path, a query or a name from a file.
 
 use crate::access::{Activity, AuditEvent, Identity, Outcome, Refusal};
-use crate::http::app::App;
 use crate::export::dicom::is_uid;
+use crate::http::app::App;
 use crate::http::problem::Problem;
 use crate::jobs::{ErasureAgent, Tenant, Timestamp};
 use axum::extract::MatchedPath;
@@ -259,7 +259,10 @@ mod tests {
                 assert_eq!(item(&path).as_deref(), Some(uid), "{path}");
             }
         }
-        assert_eq!(place_of("/v1/webhooks/secret").as_deref(), Some("webhooks/secret"));
+        assert_eq!(
+            place_of("/v1/webhooks/secret").as_deref(),
+            Some("webhooks/secret")
+        );
         assert_eq!(place_of("/v1/audit").as_deref(), Some("audit"));
         assert_eq!(place_of("/v1/volumes/{id}"), None);
         for path in [

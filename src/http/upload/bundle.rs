@@ -82,16 +82,39 @@ impl Arriving<'_> {
         }
     }
 
-    /// Writes the bytes that wait.
+    /// Takes the next piece: lets it wait, or writes it with what waits.
+    async fn take(&mut self, piece: &[u8]) -> Answer<()> {
+        if self.waiting.len() + piece.len() > self.room {
+            self.extend(match self.file {
+                None => FIRST_WRITE,
+                Some(_) => WRITE_BYTES,
+            });
+        }
+        if self.waiting.len() + piece.len() > self.room {
+            self.flush().await?;
+        }
+        if piece.len() > self.room {
+            return self.write(piece).await;
+        }
+        if self.waiting.is_empty() {
+            self.waiting.reserve_exact(self.room);
+        }
+        self.waiting.extend_from_slice(piece);
+        Ok(())
+    }
+
+    /// Writes the bytes that wait, and keeps no room for others: more may not come for a while.
     async fn flush(&mut self) -> Answer<()> {
+        let waiting = std::mem::take(&mut self.waiting);
+        self.write(&waiting).await
+    }
+
+    async fn write(&mut self, bytes: &[u8]) -> Answer<()> {
         let file = match &mut self.file {
             Some(file) => file,
             none => none.insert(self.bundle.staged().await?.create(&self.name).await?),
         };
-        file.write_all(&self.waiting)
-            .await
-            .map_err(BlobError::from)?;
-        self.waiting.clear();
+        file.write_all(bytes).await.map_err(BlobError::from)?;
         Ok(())
     }
 
@@ -178,16 +201,7 @@ impl Bundle {
             if head.len() < 132 {
                 head.extend_from_slice(&piece[..piece.len().min(132 - head.len())]);
             }
-            if arriving.waiting.len() + piece.len() > arriving.room {
-                arriving.extend(match arriving.file {
-                    None => FIRST_WRITE,
-                    Some(_) => WRITE_BYTES,
-                });
-            }
-            arriving.waiting.extend_from_slice(&piece);
-            if arriving.waiting.len() >= arriving.room {
-                arriving.flush().await?;
-            }
+            arriving.take(&piece).await?;
         }
         arriving.end().await?;
         self.files.push(Received {
@@ -234,12 +248,7 @@ impl Bundle {
         Ok(stored)
     }
 
-    async fn store_uncounted(
-        mut self,
-        app: &App,
-        tenant: &Tenant,
-        tags: &Tags,
-    ) -> Answer<Stored> {
+    async fn store_uncounted(mut self, app: &App, tenant: &Tenant, tags: &Tags) -> Answer<Stored> {
         let id = self.volume_id();
         let records = self.records();
         let hold = app.queue.hold(&id).await?;

@@ -19,6 +19,9 @@ const FIELD_BYTES: usize = 4096;
 /// Most text fields.
 const FIELDS: usize = 100;
 
+/// Memory of a form beside the parts' contents: what the parser has read and not handed out.
+const FORM_MEMORY: u64 = 128 << 10;
+
 /// Memory that is kept of a part whose content is on disk: its names and its hash.
 const PART_MEMORY: u64 = 512;
 
@@ -73,6 +76,7 @@ async fn receive_parts(
     apart: Option<&[&'static str]>,
     upload: &mut Upload,
 ) -> Answer<()> {
+    charge(FORM_MEMORY).await?;
     let unparsed = Unparsed::default();
     let pieces = unparsed.pieces(request.into_body().into_data_stream());
     let mut form = Multipart::new(pieces, boundary);

@@ -5,9 +5,10 @@
 
 use super::Queue;
 use crate::jobs::{
-    AddedProduct, BlobError, Failure, Fault, FileRecord, Held, ItemRecord, Job, JobOutcome, JobState, Lease, OutputFile,
-    Product, ProductFile, ProductRoom, Resource, ScanFields, StagedFiles, StagedFor, StoreError, StoreFault,
-    StoredVolume, Tags, Tenant, WorkOutput, content_id, hex,
+    AddedProduct, BlobError, Failure, Fault, FileRecord, Held, ItemRecord, Job, JobOutcome,
+    JobState, Lease, OutputFile, Product, ProductFile, ProductRoom, Resource, ScanFields,
+    StagedFiles, StagedFor, StoreError, StoreFault, StoredVolume, Tags, Tenant, WorkOutput,
+    content_id, hex,
 };
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};

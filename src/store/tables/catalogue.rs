@@ -5,9 +5,9 @@ use super::access::stored_bytes;
 use super::rows::{self, SCAN_COLUMNS, to_json};
 use super::scans::{note_upload, push_scan};
 use crate::jobs::{
-    AddedProduct, Catalogue, Erased, ErasureOrder, Expiry, Held, ItemFilter, LegalHold, ListPage, ListRequest,
-    Product, ProductRoom, Receipt, Resource, ScanFields, StoreResult, StoredVolume, TagFilter, Tags, Tenant,
-    Timestamp,
+    AddedProduct, Catalogue, Erased, ErasureOrder, Expiry, Held, ItemFilter, LegalHold, ListPage,
+    ListRequest, Product, ProductRoom, Receipt, Resource, ScanFields, StoreResult, StoredVolume,
+    TagFilter, Tags, Tenant, Timestamp,
 };
 use crate::store::database::{SqlStore, Transaction};
 use crate::store::query::{DbRow, QueryBuilder, query};

@@ -23,9 +23,9 @@ use super::erasure::record_deletion;
 use super::rows::{self, to_json};
 use super::scans::push_scan;
 use crate::jobs::{
-    Claimant, DeathLimit, Deleted, Failure, Fault, Filed, Interrupted, Job, JobFilter, JobOutcome, JobState,
-    JobStore, Lease, ListPage, ListRequest, NewJob, Product, QueueLoad, Resource, StoreResult, Tenant,
-    Timestamp, random_id,
+    Claimant, DeathLimit, Deleted, Failure, Fault, Filed, Interrupted, Job, JobFilter, JobOutcome,
+    JobState, JobStore, Lease, ListPage, ListRequest, NewJob, Product, QueueLoad, Resource,
+    StoreResult, Tenant, Timestamp, random_id,
 };
 use crate::store::database::{SqlStore, Transaction};
 use crate::store::query::{QueryBuilder, query};

@@ -72,7 +72,9 @@ impl Worklist for SqlStore {
         let state = state.map(WorkitemState::as_str);
         let items = match state {
             None => query(batch("tenant = $4")).bind(after).bind(limit),
-            Some(_) => query(batch("tenant = $4 AND state = $5")).bind(after).bind(limit),
+            Some(_) => query(batch("tenant = $4 AND state = $5"))
+                .bind(after)
+                .bind(limit),
         };
         let items = items.bind(most_bytes()).bind(tenant.as_str());
         let items = match state {

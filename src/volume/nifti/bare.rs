@@ -102,9 +102,7 @@ impl Content {
                 Err(error)
                     if matches!(
                         error.kind(),
-                        ErrorKind::InvalidInput
-                            | ErrorKind::InvalidData
-                            | ErrorKind::UnexpectedEof
+                        ErrorKind::InvalidInput | ErrorKind::InvalidData | ErrorKind::UnexpectedEof
                     ) =>
                 {
                     return Ok(None);
@@ -175,7 +173,10 @@ mod tests {
         assert!(bare(&packed(&plain, GzBuilder::new())));
         assert!(!bare(&packed(&plain, GzBuilder::new().filename("doe.nii"))));
         assert!(!bare(&packed(&plain, GzBuilder::new().comment("doe"))));
-        assert!(!bare(&packed(&plain, GzBuilder::new().extra(b"doe".to_vec()))));
+        assert!(!bare(&packed(
+            &plain,
+            GzBuilder::new().extra(b"doe".to_vec())
+        )));
         for at in FIRST_TEXT.into_iter().flatten().chain(FIRST..FIRST + 4) {
             let mut named = plain.clone();
             named[at] = b'd';
@@ -196,7 +197,9 @@ mod tests {
         assert!(!bare(&plain[..plain.len() - 1]));
         let member = packed(&plain, GzBuilder::new());
         assert!(!bare(&[&member[..], b"doe"].concat()));
-        assert!(!bare(&[&member[..], &packed(b"doe", GzBuilder::new())].concat()));
+        assert!(!bare(
+            &[&member[..], &packed(b"doe", GzBuilder::new())].concat()
+        ));
         for other in [&b""[..], b"\x1f\x8b", b"PK\x03\x04 and so on", &[0; 400]] {
             assert!(!bare(other));
         }
