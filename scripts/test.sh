@@ -132,6 +132,8 @@ if wait "${running[install]}"; then
   start s3 scripts/check_s3.sh
   start chaos "$PYTHON" scripts/chaos.py --program target/debug/ventriform --rounds 10
   start kubernetes scripts/check_kubernetes.sh
+  # Beside other checks on the same processors, and without optimisation, honest requests take longer.
+  start limits "$PYTHON" scripts/check_limits.py --program target/debug/ventriform --patience 4
   start dependencies "$PYTHON" scripts/dependencies.py check
   collect formats "formats read by trimesh, vtk and the glTF validator"
   collect geodesics "geodesics against pygeodesic"
@@ -145,6 +147,7 @@ if wait "${running[install]}"; then
   collect s3 "files in S3 by moto"
   collect chaos "ten faults of replicas, database and store"
   collect kubernetes "manifests against the schemas of Kubernetes"
+  collect limits "attacks of one client under a limit of memory"
   collect dependencies "licences, sources and bill of materials"
 else
   cat "$tools/install.log"

@@ -148,6 +148,7 @@ impl Gate {
             scope: self.anonymous,
             key: None,
             quota: Quota::default(),
+            expires_at: None,
             account: None,
         }
     }
@@ -165,6 +166,7 @@ impl Gate {
                 scope: key.scope,
                 key: Some(key.id),
                 quota: key.quota,
+                expires_at: key.expires_at,
             }),
             state => Err(Refusal::EndedKey {
                 key: key.id,

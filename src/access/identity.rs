@@ -1,7 +1,7 @@
 //! Who sends a request.
 
 use super::{Quota, Scope};
-use crate::jobs::Tenant;
+use crate::jobs::{Tenant, Timestamp};
 
 /// Who sends a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -16,6 +16,8 @@ pub struct Identity {
     pub key: Option<String>,
     /// Limits that replace the general ones.
     pub quota: Quota,
+    /// When its key expires.
+    pub expires_at: Option<Timestamp>,
     /// Tells callers apart where requests are counted; `None` for the anonymous caller.
     pub account: Option<String>,
 }

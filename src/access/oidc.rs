@@ -174,6 +174,7 @@ impl Issuer {
             scope,
             key: None,
             quota: Quota::default(),
+            expires_at: None,
         })
     }
 

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::task::Poll;
 
 /// Most bytes between two pieces of content: headers, boundaries, and what comes before the first.
-const HEADER_BYTES: usize = 256 << 10;
+const HEADER_BYTES: usize = 64 << 10;
 
 /// A header or a boundary without end.
 #[derive(Debug, thiserror::Error)]

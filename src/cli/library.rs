@@ -3,12 +3,15 @@
 use super::output::say;
 use super::serve::settings_beside;
 use crate::config::{DatabaseUrl, Settings};
-use crate::jobs::{Queue, QueueSettings, SystemClock, TemplateSource, Tenant};
+use crate::jobs::{
+    Failure, NotAdded, ProductRoom, Queue, QueueSettings, SystemClock, TemplateSource, Tenant,
+};
 use crate::store::{Store, StoreSettings};
 use crate::volume::ReadLimits;
-use crate::work::Engine;
-use anyhow::{Context, Result, anyhow};
+use crate::work::{Engine, TEMPLATE_BYTES};
+use anyhow::{Context, Result, anyhow, ensure};
 use clap::Args;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tokio::runtime::Runtime;
@@ -65,8 +68,12 @@ pub fn import(args: &ImportArgs) -> Result<()> {
             },
         ));
         let engine = Engine::new(ReadLimits::default());
+        let room = ProductRoom {
+            count: settings.template_limit,
+            bytes: settings.quota_bytes.0.map(|size| size.0),
+        };
         for path in &args.models {
-            let id = add(&queue, &engine, path, args)
+            let id = add(&queue, &engine, path, args, room)
                 .await
                 .with_context(|| format!("{}", path.display()))?;
             say!("{id} {}", name(path));
@@ -80,13 +87,14 @@ async fn add(
     engine: &Engine,
     path: &Path,
     args: &ImportArgs,
+    room: ProductRoom,
 ) -> Result<String> {
     let organ = &args.organ;
-    let mesh = std::fs::read(path)?;
+    let mesh = read_mesh(path)?;
     let output = engine
         .reader
         .template(&mesh, organ)
-        .map_err(|failure| anyhow!("{failure} {}", failure.fix.clone().unwrap_or_default()))?;
+        .map_err(|failure| refused(&failure))?;
     let name = name(path);
     let source = TemplateSource {
         tenant: &Tenant::default(),
@@ -94,8 +102,30 @@ async fn add(
         volume: None,
         library: args.library.then_some(true),
     };
-    let (template, _) = queue.add_template(source, organ, output).await?;
+    let added = queue.add_template(source, organ, output, room).await;
+    let (template, _) = added.map_err(|error| match error {
+        NotAdded::Refused(failure) | NotAdded::TooMany(failure) | NotAdded::TooLarge(failure) => {
+            refused(&failure)
+        }
+        NotAdded::Store(error) => error.into(),
+    })?;
     Ok(template.item.id)
+}
+
+fn refused(failure: &Failure) -> anyhow::Error {
+    anyhow!("{failure} {}", failure.fix.clone().unwrap_or_default())
+}
+
+/// The bytes of a mesh that is no larger than `POST /v1/templates` takes.
+fn read_mesh(path: &Path) -> Result<Vec<u8>> {
+    let mut mesh = Vec::new();
+    let file = std::fs::File::open(path)?;
+    file.take(TEMPLATE_BYTES + 1).read_to_end(&mut mesh)?;
+    ensure!(
+        mesh.len() as u64 <= TEMPLATE_BYTES,
+        "the file has more than the {TEMPLATE_BYTES} bytes that a model may have. Give one of fewer points."
+    );
+    Ok(mesh)
 }
 
 fn name(path: &Path) -> String {

@@ -276,7 +276,8 @@ settings! {
     workers: Count = "auto";
     /// Threads of one job; `auto` is one. More make a single job faster, but fewer jobs per hour
     threads: Count = "auto";
-    /// Largest number of waiting jobs; more are rejected with status 429
+    /// Largest number of waiting jobs; more are rejected with status 429, unless their tenant has less than
+    /// its equal share of them
     queue_limit: usize = "1000";
     /// Number of times a job may end its own process before it is failed. A job that was running
     /// when the service died is computed in a process of its own, so power cuts do not count
@@ -305,6 +306,9 @@ settings! {
     /// Memory for answers about volumes, models, segmentations, templates and ended jobs, which are
     /// kept until something is written; `0B` keeps none
     answer_memory: Size = "8MiB";
+    /// Memory that bodies of requests and answers take together, shared out between clients: one alone has
+    /// at most half of it. Requests beyond that wait for two seconds, then they are answered with status 503
+    request_memory: Size = "128MiB";
     /// Longest time a request with `Prefer: wait` waits
     wait_limit: Span = "60s";
     /// Largest number of templates in the library
@@ -349,9 +353,10 @@ settings! {
     /// How long after its last slice a series is taken to be complete while an association is open, or
     /// if one broke off
     series_patience: Span = "2m";
-    /// Largest number of received objects that are not part of a volume yet; more are refused
+    /// Largest number of received objects that are not part of a volume yet; more are refused, unless their
+    /// tenant has less than its equal share of them. Those that make up no volume count for their tenant alone
     intake_objects: u64 = "20000";
-    /// Largest size of received objects that are not part of a volume yet; more are refused
+    /// Largest size of received objects that are not part of a volume yet, counted likewise
     intake_bytes: Size = "8GiB";
     /// Age at which received objects that make up no volume are erased; `off` keeps them
     intake_keep: Retention = "7d";
@@ -423,7 +428,8 @@ settings! {
     cors_origins: Words = "";
     /// Requests per minute of each caller; a key can have a limit of its own; `off` is none
     quota_requests: Limit<u64> = "60000";
-    /// Size of all volumes that one tenant stores; `off` is none
+    /// Size of all that one tenant stores: volumes, results, templates, readers, received objects and work
+    /// items; `off` is none
     quota_bytes: Limit<Size> = "off";
     /// Waiting jobs of one tenant; `off` is none but queue_limit
     quota_jobs: Limit<u64> = "off";

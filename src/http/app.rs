@@ -6,6 +6,7 @@ use super::guard::state::Guard;
 use super::hooks::Hooks;
 use super::intake::Intake;
 use super::kept::Kept;
+use super::memory::MemoryBudget;
 use super::metrics::Metrics;
 use super::readiness::Readiness;
 use super::spans::Spans;
@@ -55,6 +56,8 @@ pub struct Shared {
     pub closing: CancellationToken,
     /// Reads files outside of jobs.
     pub decoding: Decoding,
+    /// What requests hold in memory.
+    pub memory: MemoryBudget,
     /// Answers about items that are still current.
     pub answers: Kept<ValidatedJson>,
     /// Products that are still current.
@@ -107,6 +110,7 @@ impl App {
             scheduled: Notify::new(),
             guard,
             decoding: Decoding::new(&settings, watching.metrics.requests.decoding_waits.clone()),
+            memory: MemoryBudget::new(settings.request_memory.0),
             answers: Kept::new(answer_memory / 2),
             products: Kept::new(answer_memory / 2),
             streams: EventStreams::new(&settings),

@@ -41,7 +41,7 @@ pub async fn list_audit_events(
     RawQuery(query): RawQuery,
 ) -> Answer<Json<AuditPage>> {
     let names = ["agent", "object", "since", "until"];
-    let (page, [agent, object, since, until]) = list_query(query.as_deref(), names)?;
+    let (page, [agent, object, since, until]) = list_query(query.as_deref(), names).await?;
     let filter = AuditFilter {
         tenant: Some(caller.tenant),
         agent,

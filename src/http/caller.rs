@@ -2,8 +2,8 @@
 //! handlers take it as an extractor.
 
 use super::problem::{Answer, Problem};
-use crate::access::{Identity, Scope};
-use crate::jobs::Tenant;
+use crate::access::{Identity, Quota, Scope};
+use crate::jobs::{Tenant, Timestamp};
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{StatusCode, header};
@@ -17,6 +17,10 @@ pub struct Caller {
     pub name: String,
     /// What it may do.
     pub scope: Scope,
+    /// What its tenant may store and queue by its requests; those of its key, or the general limits.
+    pub quota: Quota,
+    /// Limits of its own key, and when that expires.
+    pub own: (Quota, Option<Timestamp>),
 }
 
 impl Caller {
@@ -48,12 +52,15 @@ impl Caller {
     }
 }
 
-impl From<&Identity> for Caller {
-    fn from(identity: &Identity) -> Self {
+impl Caller {
+    /// The caller of that identity, with the limits that apply to it.
+    pub fn of(identity: &Identity, quota: Quota) -> Self {
         Self {
             tenant: identity.tenant.clone(),
             name: identity.name.clone(),
             scope: identity.scope,
+            quota,
+            own: (identity.quota, identity.expires_at),
         }
     }
 }

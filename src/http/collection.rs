@@ -168,7 +168,7 @@ async fn list<C: Collection>(
         false => (ScanFilter::default(), pairs),
     };
     let filter = ItemFilter { tags, scan };
-    let (page, []) = page_of(pairs, [])?;
+    let (page, []) = page_of(pairs, []).await?;
     let page = C::rows(&*app.queue.catalogue, &caller.tenant, &filter, page).await?;
     let next_cursor = next_cursor(&page);
     let items = page

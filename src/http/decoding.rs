@@ -6,7 +6,8 @@
 //! 1. Admission. Each piece of work states the memory that it needs at most. It is admitted when
 //!    that much of the budget is free (setting `decoding_memory`). What waits is admitted client by
 //!    client in turn, so that one client's queue does not delay another's work. The queue is
-//!    bounded (setting `decoding_queue`); beyond that the answer is 503.
+//!    bounded (setting `decoding_queue`); beyond that the answer is 503, except for a client that has less
+//!    than its equal share of the queue.
 //! 2. Turns. As many pieces of work as the machine has cores compute at the same time, on blocking
 //!    threads. Each gives its turn to the next one after [`SLICE`] and queues again, so that short
 //!    work does not wait until long work ends.
@@ -169,10 +170,10 @@ impl Admission {
         let (admit, admitted) = oneshot::channel();
         {
             let mut queue = self.queue();
-            if queue.waiting.values().map(VecDeque::len).sum::<usize>() >= self.longest {
+            if !queue.has_room(client, self.longest) {
                 // Some of them may belong to clients that have gone.
                 queue.forget_gone();
-                if queue.waiting.values().map(VecDeque::len).sum::<usize>() >= self.longest {
+                if !queue.has_room(client, self.longest) {
                     return Err(busy());
                 }
             }
@@ -198,6 +199,15 @@ impl Admission {
 }
 
 impl AdmissionQueue {
+    /// Whether a queue of `longest` has room for one more of this client. One that has less than its equal
+    /// share has room also where others have filled the queue.
+    fn has_room(&self, client: ClientAddress, longest: usize) -> bool {
+        let own = self.waiting.get(&client).map_or(0, VecDeque::len);
+        let clients = self.waiting.len() + usize::from(own == 0);
+        let all: usize = self.waiting.values().map(VecDeque::len).sum();
+        all < longest || own * clients < longest
+    }
+
     fn add(&mut self, client: ClientAddress, work: Waiting) {
         let list = self.waiting.entry(client).or_default();
         if list.is_empty() {
@@ -358,12 +368,20 @@ mod tests {
             })
             .await;
         }
-        assert!(admission.enter(client(4), 1).await.is_err());
+        // The queue is full for the client that has filled it, and not for one that has nothing in it.
+        assert!(admission.enter(client(1), 1).await.is_err());
+        let (waiting, order_of_4) = (admission.clone(), order.clone());
+        tasks.push(tokio::spawn(async move {
+            let admitted = waiting.enter(client(4), 1 << 20).await.unwrap();
+            order_of_4.lock().unwrap().push(4);
+            drop(admitted);
+        }));
+        until(|| admission.queue().waiting.len() == 4).await;
         drop(first);
         for task in tasks {
             task.await.unwrap();
         }
-        assert_eq!(*order.lock().unwrap(), [1, 2, 3, 1, 2, 1, 1]);
+        assert_eq!(*order.lock().unwrap(), [1, 2, 3, 4, 1, 2, 1, 1]);
         assert!(admission.queue().order.is_empty());
     }
 

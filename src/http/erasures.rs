@@ -239,7 +239,7 @@ pub async fn list_erasures(
     caller: Caller,
     RawQuery(query): RawQuery,
 ) -> Answer<Json<ReceiptList>> {
-    let (page, [item]) = list_query(query.as_deref(), ["item"])?;
+    let (page, [item]) = list_query(query.as_deref(), ["item"]).await?;
     let catalogue = &app.queue.catalogue;
     let page = catalogue
         .receipts(&caller.tenant, item.as_deref(), page)

@@ -2,6 +2,7 @@
 //! trail.
 
 use super::app::App;
+use super::guard::Counting;
 use super::problem::Problem;
 use super::upload::Bundle;
 use crate::access::{Activity, AuditEvent, Outcome, Usage};
@@ -71,7 +72,7 @@ impl ExchangeHost for App {
     ) -> Result<StoredSeries, Trouble> {
         let blobs = &self.queue.blobs;
         blobs.require_room(0).map_err(StoreError::from)?;
-        let mut bundle = Bundle::new(self);
+        let mut bundle = Bundle::new(self, &Counting::default());
         while let Some(part) = parts.next().await? {
             let mut broken = None;
             let pieces = part.map(|piece| {

@@ -2,6 +2,7 @@
 //! 14).
 
 use super::app::App;
+use super::memory::charge;
 use super::problem::{Answer, Problem};
 use super::validators::not_modified;
 use super::wire::path_of;
@@ -20,6 +21,9 @@ const CACHE_CONTROL: &str = "private, max-age=31536000, immutable";
 
 /// Of pages and objects: whose scan it is may be stated otherwise, or erased, and not every key sees it.
 const OBJECT_CACHE_CONTROL: &str = "private, no-cache";
+
+/// Memory of a download: a slow client has one portion waiting and one on its way.
+const SENT_MEMORY: u64 = 512 << 10;
 
 /// A file to be sent.
 pub struct Download<'a> {
@@ -54,7 +58,8 @@ pub async fn send(app: &App, product: &Product, file: &ProductFile, headers: &He
 
 /// Answers with a stored file, or the part of it that `Range` asks for, or 304.
 pub async fn send_file(app: &App, file: &Download<'_>, headers: &HeaderMap) -> Answer {
-    let read = async |span| {
+    let read = async |span: Range<u64>| {
+        charge(SENT_MEMORY.min(span.end - span.start)).await?;
         let content = app.queue.read(file.id, &file.record, span).await?;
         Ok(Body::from_stream(content))
     };

@@ -18,6 +18,7 @@ use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use serde::Serialize;
 use serde_json::{Map, Value};
+use std::fmt::Display;
 use utoipa::ToSchema;
 
 /// A key. Its secret is shown once, when it is made.
@@ -178,7 +179,7 @@ pub async fn list_keys(
     caller: Caller,
     RawQuery(query): RawQuery,
 ) -> Answer<Json<KeyList>> {
-    let (page, []) = list_query(query.as_deref(), [])?;
+    let (page, []) = list_query(query.as_deref(), []).await?;
     let now = app.queue.clock.now();
     let page = app.access.keys(Some(&caller.tenant), page).await?;
     let next_cursor = next_cursor(&page);
@@ -254,17 +255,45 @@ fn read(object: &Map<String, Value>, caller: &Caller) -> Answer<KeyRequest> {
     let expires_at = text("expires_at", time)?
         .map(|text| parse_rfc3339(&text).ok_or_else(|| wrong("expires_at", time)))
         .transpose()?;
+    if !caller.scope.includes(scope) {
+        return Err(beyond("scope", caller.scope));
+    }
+    // What the maker has itself, and what the operator allows everybody.
+    let (own, own_end) = caller.own;
+    let bounded = |field: &str, own: Option<u64>, allowed: Option<u64>| {
+        let asked = number(field)?;
+        match (asked, allowed) {
+            (Some(asked), Some(allowed)) if asked > allowed => Err(beyond(field, allowed)),
+            (None, _) => Ok(own),
+            (asked, _) => Ok(asked),
+        }
+    };
+    let expires_at = match (expires_at, own_end) {
+        (Some(asked), Some(end)) if asked > end => {
+            return Err(beyond("expires_at", rfc3339(end)));
+        }
+        (asked, end) => asked.or(end),
+    };
     Ok(KeyRequest {
         name: text("name", "Give a text.")?.unwrap_or_default(),
         tenant: caller.tenant.clone(),
         scope,
         quota: Quota {
-            requests: number("requests_per_minute")?,
-            bytes: number("stored_bytes")?,
-            jobs: number("queued_jobs")?,
+            requests: bounded("requests_per_minute", own.requests, caller.quota.requests)?,
+            bytes: bounded("stored_bytes", own.bytes, caller.quota.bytes)?,
+            jobs: bounded("queued_jobs", own.jobs, caller.quota.jobs)?,
         },
         expires_at,
     })
+}
+
+/// 422: a key gets no more than the one that makes it has, and than the operator allows.
+fn beyond(field: &str, allowed: impl Display) -> Problem {
+    Problem::invalid_field(
+        field,
+        format!("`{field}` is more than this caller may give: at most {allowed}."),
+    )
+    .fix("Give less, or leave it out; the operator can make keys with more by `ventriform keys create`.")
 }
 
 fn unusable(error: KeyError) -> Problem {

@@ -59,6 +59,7 @@ mod kept;
 mod keys;
 mod legal_hold;
 mod limits;
+mod memory;
 mod metrics;
 mod models;
 mod negotiate;

@@ -1,12 +1,13 @@
 //! `/v1/volumes/{id}/content` and `/v1/volumes/{id}/files`: the uploaded files, byte for byte.
 //!
-//! A volume of one file has `content`; every volume has `files/{name}`. The names are the store's:
-//! those that the client gave may name a patient and are not kept. A DICOM file names the patient
-//! itself, so it needs the scope `submit`.
+//! A volume of one file has `content`; every volume has `files/{name}`. The names are the store's: those that the
+//! client gave may name a patient and are not kept. A file that may name the patient itself needs the scope
+//! `submit`: that is every file but a NIfTI file that holds voxels, where they lie and nothing else.
 
 use super::app::App;
 use super::caller::Caller;
 use super::collection::find;
+use super::decoding::LITTLE_MEMORY;
 use super::files::{self, Download};
 use super::openapi::{self, ConditionalHeaders, DownloadAnswers, LookupProblems};
 use super::problem::not_found::no_such_file;
@@ -16,7 +17,7 @@ use super::volumes::{Volumes, media_type};
 use super::wire::path_of;
 use crate::access::Scope;
 use crate::jobs::{FileRecord, Resource, StoredVolume};
-use crate::work::UploadFacts;
+use crate::progress::Monitor;
 use axum::extract::{RawQuery, State};
 use axum::http::{HeaderMap, StatusCode};
 
@@ -77,6 +78,19 @@ pub async fn download_volume_file(
     }
 }
 
+/// Whether the file cannot name a patient: it is one NIfTI file that holds nothing but voxels.
+async fn is_bare(app: &App, volume: &StoredVolume, file: &FileRecord) -> Answer<bool> {
+    if volume.files.len() > 1 {
+        return Ok(false);
+    }
+    let Some(local) = app.queue.blobs.local(&volume.id, file).await? else {
+        return Ok(false);
+    };
+    let reader = app.engine.reader.clone();
+    let look = move |monitor: &Monitor<'_>| reader.is_bare(&local, monitor);
+    Ok(app.decoding.run(LITTLE_MEMORY, look).await??)
+}
+
 async fn send(
     app: &App,
     caller: &Caller,
@@ -84,8 +98,7 @@ async fn send(
     file: &FileRecord,
     headers: &HeaderMap,
 ) -> Answer {
-    if UploadFacts::of(volume)?.format.starts_with("DICOM") {
-        // Its header names the patient.
+    if !caller.scope.includes(Scope::Submit) && !is_bare(app, volume, file).await? {
         caller.require(Scope::Submit)?;
     }
     let download = Download {

@@ -1,5 +1,6 @@
 //! `limit` and `cursor` of lists.
 
+use super::memory::charge;
 use super::problem::{Answer, Problem};
 use super::request::{query_pairs, refuse_unknown};
 use crate::jobs::{ListPage, ListRequest};
@@ -9,16 +10,20 @@ const USUAL: u32 = 20;
 /// Greatest `limit`.
 const MOST: u32 = 100;
 
-/// The page that a query asks for, and the values of the list's `own` parameters.
-pub fn list_query<const N: usize>(
+/// Memory for one entry of a page: its row, what is made of it, and its JSON. Labels of 16 KiB are the largest part.
+const ENTRY_MEMORY: u64 = 64 << 10;
+
+/// The page that a query asks for, for which the request is charged, and the values of the list's `own`
+/// parameters.
+pub async fn list_query<const N: usize>(
     query: Option<&str>,
     own: [&'static str; N],
 ) -> Answer<(ListRequest, [Option<String>; N])> {
-    page_of(query_pairs(query), own)
+    page_of(query_pairs(query), own).await
 }
 
 /// As [`list_query`], of the pairs of the query.
-pub fn page_of<const N: usize>(
+pub async fn page_of<const N: usize>(
     pairs: Vec<(String, String)>,
     own: [&'static str; N],
 ) -> Answer<(ListRequest, [Option<String>; N])> {
@@ -34,6 +39,7 @@ pub fn page_of<const N: usize>(
         before: value("cursor").map(|c| parse_cursor(&c)).transpose()?,
         limit: value("limit").map_or(Ok(USUAL), |l| parse_limit(&l))?,
     };
+    charge(ENTRY_MEMORY * u64::from(page.limit)).await?;
     Ok((page, own.map(value)))
 }
 

@@ -81,10 +81,17 @@ fn procedure<'a>(app: &'a App, item: &Workitem) -> Option<&'a Procedure> {
 }
 
 async fn follow_all(app: &App) -> Result<(), StoreError> {
-    for item in app.worklist.performed_workitems().await? {
-        follow(app, item).await?;
+    let mut after = 0;
+    loop {
+        let items = app.worklist.performed_workitems(after, BATCH).await?;
+        let Some(last) = items.last() else {
+            return Ok(());
+        };
+        after = last.sequence;
+        for item in items {
+            follow(app, item).await?;
+        }
     }
-    Ok(())
 }
 
 /// Takes a claimed item one step on.

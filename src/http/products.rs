@@ -9,6 +9,7 @@ use super::collection::{Collection, find};
 use super::decoding::LITTLE_MEMORY;
 use super::files;
 use super::kept::Keep;
+use super::memory::charge;
 use super::negotiate;
 use super::openapi::{
     ConditionalHeaders, DeidentifyParameter, DicomProblems, Documented, DownloadAnswers,
@@ -176,6 +177,9 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
     }
     routes
 }
+
+/// Memory for a byte of the files that a page is made of: the file, what is read of it, and the page.
+const PAGE_MEMORY_PER_BYTE: u64 = 8;
 
 /// The file that holds the report.
 const REPORT: &str = "report.json";
@@ -505,6 +509,8 @@ async fn send_object(
     headers: &HeaderMap,
 ) -> Answer {
     let id = &product.id;
+    let size: u64 = product.files.iter().map(|file| file.bytes).sum();
+    charge(size).await?;
     let result = app.queue.result(tenant, id, dicom::FILES).await?;
     let result = result.ok_or_else(|| volume_erased(id))?;
     let secret = match deidentify {
@@ -603,6 +609,10 @@ async fn send_named(
     let work = app.engine.work(product.resource().noun());
     match work.filter(|_| name == files::PAGE).cloned() {
         Some(work) => {
+            let files = product.files.iter();
+            let needed = files.filter(|file| work.page_files().contains(&&file.name[..]));
+            let size: u64 = needed.map(|file| file.bytes).sum();
+            charge(PAGE_MEMORY_PER_BYTE * size).await?;
             let stored = app
                 .queue
                 .with_files(product.clone(), work.page_files())

@@ -7,10 +7,9 @@ use super::openapi::{self, UploadProblems};
 use super::problem::{Answer, ProblemBody};
 use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody, refuse_when_full};
 use super::request::{json_bytes, query_pairs, refuse_unknown};
-use super::templates::check_name;
 use super::wire::{added, path_of, rfc3339};
 use crate::config::Size;
-use crate::jobs::Resource;
+use crate::jobs::{ProductRoom, Resource, check_name};
 use crate::progress::Monitor;
 use axum::extract::{RawQuery, Request, State};
 use serde::Serialize;
@@ -117,13 +116,17 @@ pub async fn create_reader(
     refuse_unknown(&pairs, &["name"])?;
     let name = pairs.first().map_or("reader", |(_, value)| value.as_str());
     check_name(name)?;
-    let (tenant, limit) = (&caller.tenant, app.settings.reader_limit);
-    refuse_when_full::<Readers>(&app, tenant, limit, "reader_limit").await?;
+    let tenant = &caller.tenant;
+    let room = ProductRoom {
+        count: app.settings.reader_limit,
+        bytes: caller.quota.bytes,
+    };
+    refuse_when_full::<Readers>(&app, tenant, room.count, "reader_limit").await?;
     let profile = json_bytes(request).await?;
     let reader = app.engine.reader.clone();
     let check = move |_: &Monitor<'_>| reader.profile(&profile);
     let output = app.decoding.run(LITTLE_MEMORY, check).await??;
-    let (stored, new) = app.queue.add_reader(tenant, name, output).await?;
+    let (stored, new) = app.queue.add_reader(tenant, name, output, room).await?;
     let body = ReaderBody::from(Presented::of(&app, stored));
     Ok(added(new, &body.id, &body))
 }

@@ -144,7 +144,7 @@ pub async fn list_received(
     caller: Caller,
     RawQuery(query): RawQuery,
 ) -> Answer<Json<ReceivedList>> {
-    let (page, [state]) = list_query(query.as_deref(), ["state"])?;
+    let (page, [state]) = list_query(query.as_deref(), ["state"]).await?;
     let state = state.map(|name| parse_state(&name)).transpose()?;
     let page = app.intake.store.groups(&caller.tenant, state, page).await?;
     let next_cursor = next_cursor(&page);

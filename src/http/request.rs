@@ -2,12 +2,14 @@
 //! refused.
 
 use super::limits::BodyLimits;
+use super::memory::charge;
 use super::problem::{Answer, Problem, body, shorten};
 use crate::parameters::nearest;
 use axum::body::Bytes;
 use axum::extract::{FromRequestParts, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, header};
+use futures::StreamExt;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
@@ -134,9 +136,36 @@ pub async fn bytes_of(request: Request, types: &[&str]) -> Answer<Bytes> {
         Some(other) => return Err(body::unsupported_type(other, types[0])),
     }
     let limits = BodyLimits::of(&request)?;
-    axum::body::to_bytes(request.into_body(), limits.size.as_usize())
-        .await
-        .map_err(|error| body::interrupted(&error, limits.size))
+    let mut pieces = request.into_body().into_data_stream();
+    let (mut bytes, mut charged) = (Vec::new(), UNCHARGED);
+    while let Some(piece) = pieces.next().await {
+        let piece = piece.map_err(|error| body::interrupted(&error, limits.size))?;
+        while bytes.len() + piece.len() > charged {
+            // A vector that grows has up to twice as much.
+            charge(2 * CHARGED_AT_ONCE as u64).await?;
+            charged += CHARGED_AT_ONCE;
+        }
+        bytes.extend_from_slice(&piece);
+    }
+    Ok(bytes.into())
+}
+
+/// Bytes of a body in memory that are not charged, and that are charged at once beyond these.
+const UNCHARGED: usize = 8 << 10;
+const CHARGED_AT_ONCE: usize = 64 << 10;
+
+/// Memory for a byte of JSON that is parsed: `[0,0]` takes a value and its place for two.
+const PARSED_MEMORY: u64 = 40;
+
+/// Charges for the value that JSON of that length becomes.
+///
+/// # Errors
+/// 503 if there is no memory for it.
+pub async fn charge_parsed(bytes: &[u8]) -> Answer<()> {
+    match bytes.len() <= UNCHARGED {
+        true => Ok(()),
+        false => charge(PARSED_MEMORY * bytes.len() as u64).await,
+    }
 }
 
 /// The JSON object in a request's body.
@@ -144,7 +173,7 @@ pub async fn bytes_of(request: Request, types: &[&str]) -> Answer<Bytes> {
 /// # Errors
 /// As [`json_bytes`], and 400 if the body is not one JSON object.
 pub async fn json_object(request: Request) -> Answer<Map<String, Value>> {
-    object(&json_bytes(request).await?)
+    object(&json_bytes(request).await?).await
 }
 
 /// The JSON merge patch (RFC 7396) in a request's body.
@@ -153,10 +182,11 @@ pub async fn json_object(request: Request) -> Answer<Map<String, Value>> {
 /// As [`json_object`].
 pub async fn merge_patch(request: Request) -> Answer<Map<String, Value>> {
     let types = ["application/merge-patch+json", "application/json"];
-    object(&bytes_of(request, &types).await?)
+    object(&bytes_of(request, &types).await?).await
 }
 
-fn object(bytes: &[u8]) -> Answer<Map<String, Value>> {
+async fn object(bytes: &[u8]) -> Answer<Map<String, Value>> {
+    charge_parsed(bytes).await?;
     match serde_json::from_slice(bytes) {
         Ok(Value::Object(object)) => Ok(object),
         Ok(_) => Err(body::malformed_json("it is another JSON value")),

@@ -7,8 +7,9 @@
 use super::app::App;
 use super::caller::Caller;
 use super::client::ClientAddress;
-use super::guard::Agent;
+use super::guard::{Agent, AlreadyRecorded, Counting};
 use super::limits::BodyLimits;
+use super::memory::charge;
 use super::negotiate::require_offer;
 use super::openapi::{StowAnswers, UploadProblems};
 use super::problem::{Answer, Problem, body};
@@ -34,6 +35,10 @@ const OFFERS: [&str; 2] = ["application/dicom+json", "application/json"];
 const OBJECT: &str = "application/dicom";
 /// The media type of several.
 const RELATED: &str = "multipart/related";
+/// Memory of a request: what is gathered for a write, here and in the file's writer; and of what is answered about
+/// one object.
+const REQUEST_MEMORY: u64 = 1 << 20;
+const OBJECT_MEMORY: u64 = 1 << 10;
 /// The failure reason of a part that holds no object (PS3.18, table I.2-2): cannot understand.
 const NOT_UNDERSTOOD: u16 = 0xC000;
 
@@ -161,6 +166,7 @@ struct Storing<'a> {
     study: Option<String>,
     origin: Origin,
     session: Session,
+    counting: Counting,
     outcome: Outcome,
 }
 
@@ -175,6 +181,7 @@ impl Storing<'_> {
         let mut object: Result<Incoming, ReceiveError> = receiver.begin().await;
         while let Some(piece) = pieces.next().await {
             let piece = piece?;
+            self.counting.arrived(piece.len() as u64).await?;
             if let Ok(incoming) = &mut object
                 && let Err(error) = incoming.write(&piece).await
             {
@@ -220,6 +227,7 @@ impl Storing<'_> {
         let mut count = 0;
         while let Some(part) = parts.next_field().await.map_err(interrupted)? {
             unparsed.reset();
+            charge(OBJECT_MEMORY).await?;
             count += 1;
             if count > self.app.settings.parts_limit {
                 return Err(body::too_many_files(self.app.settings.parts_limit));
@@ -251,6 +259,7 @@ async fn store(
     refuse_content_encoding(request.headers())?;
     let limits = BodyLimits::of(&request)?;
     let boundary = boundary(request.headers())?;
+    charge(REQUEST_MEMORY).await?;
     let mut storing = Storing {
         app,
         study,
@@ -261,6 +270,7 @@ async fn store(
             address: ClientAddress::current().to_string(),
         },
         session: app.intake.sessions.begin(),
+        counting: Counting::of(&request),
         outcome: Outcome::default(),
     };
     match boundary {
@@ -290,7 +300,8 @@ async fn store(
         (header::CACHE_CONTROL, "no-store"),
     ];
     let module = outcome.module().to_string();
-    Ok((outcome.status(), headers, module).into_response())
+    let recorded = Extension(AlreadyRecorded);
+    Ok((outcome.status(), headers, recorded, module).into_response())
 }
 
 /// The boundary of a body of several objects; `None` for a body that is one.

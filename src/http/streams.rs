@@ -39,7 +39,10 @@ impl EventStreams {
         let client = ClientAddress::current();
         let mut open = lock(&self.open);
         let own = open.get(&client).copied().unwrap_or(0);
-        if own >= self.of_one_client || open.values().sum::<usize>() >= self.limit {
+        // A client that has less than its equal share finds room also where others have taken all.
+        let clients = open.len() + usize::from(own == 0);
+        let full = open.values().sum::<usize>() >= self.limit && own * clients >= self.limit;
+        if own >= self.of_one_client || full {
             return Err(Problem::new(
                 StatusCode::TOO_MANY_REQUESTS,
                 "too-many-streams",

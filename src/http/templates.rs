@@ -11,9 +11,9 @@ use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody, 
 use super::request::{PathSegments, json_bytes, merge_patch, query_pairs, refuse_unknown, unknown};
 use super::wire::{added, path_of, rfc3339};
 use crate::config::Size;
-use crate::jobs::{Resource, TemplateSource, Tenant};
+use crate::jobs::{ProductRoom, Resource, TemplateSource, Tenant, check_name};
 use crate::progress::Monitor;
-use crate::text::is_printable;
+use crate::work::TEMPLATE_BYTES;
 use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{RawQuery, Request, State};
@@ -22,15 +22,11 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 
-/// Largest mesh: a model to be fitted has at most 5000 points of about 200 bytes, and as many
-/// bytes of triangles.
-pub const MESH_SIZE: Size = Size(4 << 20);
+/// Largest mesh.
+pub const MESH_SIZE: Size = Size(TEMPLATE_BYTES);
 
 /// Memory for a byte of a JSON mesh: numbers as text, parsed, and as files of several formats.
 const MEMORY_PER_BYTE: u64 = 16;
-
-/// Longest name, characters.
-const NAME_LENGTH: usize = 80;
 
 /// The collection of templates.
 pub struct Templates;
@@ -149,8 +145,11 @@ pub async fn create_template(
         Some(_) => return Err(not_a_flag()),
     };
     let tenant = &caller.tenant;
-    let limit = app.settings.template_limit;
-    refuse_when_full::<Templates>(&app, tenant, limit, "template_limit").await?;
+    let room = ProductRoom {
+        count: app.settings.template_limit,
+        bytes: caller.quota.bytes,
+    };
+    refuse_when_full::<Templates>(&app, tenant, room.count, "template_limit").await?;
     let body = json_bytes(request).await?;
     let (mesh, volume) = given_mesh(&app, tenant, value("model"), body).await?;
     let reader = app.engine.reader.clone();
@@ -164,7 +163,8 @@ pub async fn create_template(
         volume: volume.as_deref(),
         library,
     };
-    let (template, new) = app.queue.add_template(source, &organ, output).await?;
+    let added_template = app.queue.add_template(source, &organ, output, room);
+    let (template, new) = added_template.await?;
     let body = TemplateBody::from(Presented::of(&app, template));
     Ok(added(new, &body.id, &body))
 }
@@ -232,19 +232,6 @@ async fn given_mesh(
         .at("model")
         .fix("Send a mesh or name a model, not both.")),
     }
-}
-
-/// Refuses a name that is empty, longer than [`NAME_LENGTH`] or not printable.
-pub(super) fn check_name(name: &str) -> Answer<()> {
-    let length = name.chars().count();
-    if (1..=NAME_LENGTH).contains(&length) && name.chars().all(is_printable) {
-        return Ok(());
-    }
-    Err(Problem::invalid_field(
-        "name",
-        format!("The name must have 1 to {NAME_LENGTH} printable characters."),
-    )
-    .fix("Give a short name such as t1_150."))
 }
 
 /// The JSON mesh of a stored model or segmentation, with the id of its volume.

@@ -1,6 +1,7 @@
 //! Volumes and jobs of what other systems have sent: stored as an upload is, filed as a request is.
 
 use super::app::App;
+use super::guard::Counting;
 use super::jobs::Filing;
 use super::jobs::archives::{send_of, source_of};
 use super::jobs::filing::new_job;
@@ -28,7 +29,7 @@ impl From<Problem> for MakeError {
 #[async_trait]
 impl VolumeMaker for App {
     async fn make(&self, group: &IntakeGroup, files: &[LocalFile]) -> Result<String, MakeError> {
-        let mut bundle = Bundle::new(self);
+        let mut bundle = Bundle::new(self, &Counting::default());
         for file in files {
             let file = tokio::fs::File::open(file).await;
             let file = file.map_err(|error| MakeError::Later(error.to_string()))?;
@@ -108,6 +109,7 @@ pub async fn file_unattended(app: &App, job: UnattendedJob<'_>) -> Result<String
         source,
         send,
         trace_parent: None,
+        storage_limit: app.guard.quota.bytes,
     };
     let volume = job.volume.map(str::to_owned);
     let new = new_job(&**work, volume, parameters, filing);

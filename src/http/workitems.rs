@@ -7,11 +7,14 @@
 
 use super::app::App;
 use super::caller::Caller;
+use super::guard::Counting;
+use super::memory::charge;
 use super::openapi::{self, LookupProblems};
 use super::problem::{Answer, Problem, ProblemBody, body, shorten};
-use super::request::{PathSegments, bytes_of, query_pairs, refuse_unknown};
+use super::request::{PathSegments, bytes_of, charge_parsed, query_pairs, refuse_unknown};
 use crate::export::dicom::is_uid;
 use crate::jobs::{Timestamp, random_id, rfc3339};
+use crate::progress::{Monitor, Stage};
 use crate::worklist::{
     AddedWorkitem, Change, DataSetJson, Matching, Refusal, Workitem, WorkitemState,
 };
@@ -20,6 +23,7 @@ use axum::extract::{RawQuery, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{AppendHeaders, IntoResponse};
 use serde_json::{Map, Value};
+use std::time::{Duration, Instant};
 
 const MEDIA_TYPE: &str = "application/dicom+json";
 
@@ -41,6 +45,15 @@ const PAGE: (usize, usize) = (100, 1000);
 
 /// Items read from the table at a time.
 const BATCH: u32 = 200;
+
+/// Bytes of a page of items, unless one alone has more.
+const ANSWER_BYTES: usize = 2 << 20;
+
+/// Memory of a search: a batch of items, parsed, and the answer.
+const SEARCH_MEMORY: u64 = 20 << 20;
+
+/// Longest search.
+const LONGEST_SEARCH: Duration = Duration::from_secs(10);
 
 /// How often a change is tried again that another one came before.
 const TRIES: usize = 20;
@@ -75,10 +88,13 @@ pub async fn create_workitem(
             pairs.into_iter().next().map(|(_, uid)| uid)
         }
     };
+    let counting = Counting::of(&request);
     let attributes = data_set(request).await?;
     let named = named.or_else(|| attributes.text(SOP_INSTANCE).map(str::to_owned));
     let uid = named.unwrap_or_else(new_uid);
     require_uid("workitem", &uid)?;
+    let size = text_of(&attributes)?.len() as u64;
+    counting.arrived(size).await?;
     let moment = now(&app);
     let made = Workitem::create(&caller.tenant, &uid, attributes, (moment.0, &moment.1));
     let (item, completed) = made.map_err(refused)?;
@@ -135,7 +151,8 @@ pub async fn get_workitem(
 ///
 /// Attributes are named by keyword or tag, with points between a sequence and what is in it:
 /// `ProcedureStepState=SCHEDULED`, `InputInformationSequence.StudyInstanceUID=1.2.3`. `*` and `?` are
-/// wildcards, `FIRST-LAST` is a range of dates. Items come with all their attributes, oldest first.
+/// wildcards, `FIRST-LAST` is a range of dates. Items come with all their attributes, oldest first; a `Warning`
+/// says that there are more than one answer holds, to be asked for by `offset`.
 #[utoipa::path(get, path = "/dicom-web/workitems", tag = "workitems",
     operation_id = "search_workitems",
     params(
@@ -147,6 +164,8 @@ pub async fn get_workitem(
         (status = 200, description = "The items", body = openapi::WorkitemBody,
             content_type = "application/dicom+json"),
         (status = 204, description = "No item matches"),
+        (status = 413, description = "The search takes too long",
+            body = ProblemBody, content_type = "application/problem+json"),
         openapi::ScopeProblems, openapi::ListProblems))]
 pub async fn search_workitems(
     State(app): State<App>,
@@ -168,29 +187,88 @@ pub async fn search_workitems(
             })?,
         }
     }
+    charge(SEARCH_MEMORY).await?;
     let state = matching.wanted(STATE).and_then(WorkitemState::parse);
-    let (mut found, mut after) = (Vec::new(), 0);
-    while found.len() < limit {
+    let late = Instant::now() + LONGEST_SEARCH;
+    let (mut found, mut count, mut after) = (String::new(), 0, 0);
+    let mut more = false;
+    'search: while count < limit {
+        if Instant::now() > late {
+            return Err(too_broad());
+        }
         let page = app.worklist.workitems(&caller.tenant, state, after, BATCH);
         let page = page.await?;
         let Some(last) = page.last() else { break };
         after = last.sequence;
-        for item in page {
-            if !matching.matches(item.shown()) {
+        for item in matched(&app, &matching, page).await? {
+            if skip > 0 {
+                skip -= 1;
                 continue;
             }
-            match skip {
-                0 => found.push(item),
-                _ => skip -= 1,
+            if count == limit {
+                break 'search;
             }
+            let item = serde_json::to_string(item.shown()).map_err(Problem::internal)?;
+            if count > 0 && found.len() + item.len() > ANSWER_BYTES {
+                more = true;
+                break 'search;
+            }
+            found.push(match count {
+                0 => '[',
+                _ => ',',
+            });
+            found.push_str(&item);
+            count += 1;
         }
     }
-    found.truncate(limit);
-    if found.is_empty() {
+    if count == 0 {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
-    let found: Vec<_> = found.iter().map(Workitem::shown).collect();
-    Ok(shown(StatusCode::OK, &found))
+    found.push(']');
+    let headers = [
+        (header::CONTENT_TYPE, MEDIA_TYPE),
+        (header::CACHE_CONTROL, "no-store"),
+    ];
+    // PS3.18, 8.3.4.4.
+    let warning = more.then(|| {
+        let text = "The number of results exceeded the maximum supported by the server. \
+                    Additional results can be requested.";
+        (header::WARNING, warning(text))
+    });
+    Ok((StatusCode::OK, headers, AppendHeaders(warning), found).into_response())
+}
+
+/// The items that match. Wildcards may be compared with much text, so that takes turns with what is decoded.
+async fn matched(app: &App, matching: &Matching, items: Vec<Workitem>) -> Answer<Vec<Workitem>> {
+    let is_match = |item: &Workitem, matching: &Matching| matching.matches(item.shown());
+    if !matching.has_patterns() {
+        let matched = items.into_iter().filter(|item| is_match(item, matching));
+        return Ok(matched.collect());
+    }
+    let matching = matching.clone();
+    let search = move |monitor: &Monitor<'_>| {
+        let mut matched = Vec::new();
+        for item in items {
+            if monitor.report(Stage::Read, 0.0).is_err() {
+                break;
+            }
+            if is_match(&item, &matching) {
+                matched.push(item);
+            }
+        }
+        matched
+    };
+    app.decoding.run(1, search).await
+}
+
+/// 413: PS3.18, table 8.3.4-1.
+fn too_broad() -> Problem {
+    Problem::new(
+        StatusCode::PAYLOAD_TOO_LARGE,
+        "search-too-broad",
+        format!("The search has not ended within {} seconds.", LONGEST_SEARCH.as_secs()),
+    )
+    .fix("Name the state, as in ProcedureStepState=SCHEDULED, or ask for fewer items by `limit` and `offset`.")
 }
 
 /// Change a work item
@@ -212,7 +290,9 @@ pub async fn update_workitem(
     headers: HeaderMap,
     request: Request,
 ) -> Answer {
+    let counting = Counting::of(&request);
     let (changes, stated) = claimed_data_set(query.as_deref(), &headers, request).await?;
+    counting.arrived(text_of(&changes)?.len() as u64).await?;
     change(&app, &caller, &uid, |item, now| {
         item.update(stated.as_deref(), changes.clone(), now)?;
         Ok(Change::Done)
@@ -288,7 +368,7 @@ pub async fn cancel_workitem(
     let bytes = bytes_of(request, &TYPES).await?;
     let details = match bytes.is_empty() {
         true => DataSetJson::default(),
-        false => parse(&bytes)?,
+        false => parse(&bytes).await?,
     };
     let done = change(&app, &caller, &uid, |item, now| {
         item.request_cancel(&details, now)
@@ -311,12 +391,23 @@ async fn change(
     for _ in 0..TRIES {
         let mut item = find(app, caller, uid).await?;
         let moment = now(app);
+        let before = text_of(&item.attributes)?.len();
         let done = how(&mut item, (moment.0, &moment.1)).map_err(refused)?;
+        let size = text_of(&item.attributes)?.len();
+        let limit = app.settings.json_limit;
+        if size > before && size as u64 > limit.0 {
+            return Err(body::too_large(limit));
+        }
         if done == Change::Already || app.worklist.change_workitem(&item).await? {
             return Ok(done);
         }
     }
     Err(Problem::internal("a work item changes all the time"))
+}
+
+/// An item's attributes as they are stored.
+fn text_of(attributes: &DataSetJson) -> Answer<String> {
+    serde_json::to_string(attributes.object()).map_err(Problem::internal)
 }
 
 async fn find(app: &App, caller: &Caller, uid: &str) -> Answer<Workitem> {
@@ -403,11 +494,12 @@ async fn claimed_data_set(
 }
 
 async fn data_set(request: Request) -> Answer<DataSetJson> {
-    parse(&bytes_of(request, &TYPES).await?)
+    parse(&bytes_of(request, &TYPES).await?).await
 }
 
 /// The data set in an array with one, or alone.
-fn parse(bytes: &[u8]) -> Answer<DataSetJson> {
+async fn parse(bytes: &[u8]) -> Answer<DataSetJson> {
+    charge_parsed(bytes).await?;
     let malformed = |reason: &str| body::malformed_json(reason);
     let value = serde_json::from_slice(bytes).map_err(|error| malformed(&error.to_string()))?;
     let object = match value {

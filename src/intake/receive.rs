@@ -24,7 +24,7 @@ use tokio::sync::Semaphore;
 const EXAMINED_AT_ONCE: usize = 2;
 
 /// Bytes that are gathered for one write.
-const WRITE_BYTES: usize = 256 << 10;
+const WRITE_BYTES: usize = 64 << 10;
 
 /// Bytes hashed at a time.
 const HASHED_BYTES: usize = 128 << 10;

@@ -93,7 +93,10 @@ impl Places {
         let peer = peer.to_canonical();
         let mut open = self.open();
         let of_peer = open.get(&peer).copied().unwrap_or(0);
-        if open.values().sum::<usize>() >= self.all || of_peer >= self.of_one {
+        // A caller that has none finds room also where others have taken all, as long as that is not twice as many.
+        let all: usize = open.values().sum();
+        let full = all >= self.all && (of_peer > 0 || all >= 2 * self.all);
+        if full || of_peer >= self.of_one {
             return None;
         }
         open.insert(peer, of_peer + 1);
@@ -131,6 +134,15 @@ mod tests {
         assert!(places.take(a).is_none());
         let _third = places.take(b).unwrap();
         assert!(places.take(b).is_none());
+        let others: Vec<_> = (3..9_u8)
+            .map(|n| places.take(IpAddr::from([10, 0, 0, n])))
+            .collect();
+        let taken = others.iter().filter(|place| place.is_some()).count();
+        assert_eq!(
+            taken, 3,
+            "those that have none get one, up to twice as many"
+        );
+        drop(others);
         drop(first);
         assert!(places.take(a).is_some() && places.open().len() == 2);
     }

@@ -165,6 +165,8 @@ pub struct NewJob {
     pub webhook: Option<JobWebhook>,
     /// See [`Job::trace_parent`].
     pub trace_parent: Option<String>,
+    /// Bytes that the tenant may store in all once the result is added; `None` is no bound.
+    pub storage_limit: Option<u64>,
 }
 
 /// Where a job is told about, as it is stored with the job. `Debug` does not show it.

@@ -68,18 +68,19 @@ pub use job::{Filed, Idempotency, Job, JobState, JobWebhook, NewJob, SendOrder, 
 pub use observer::JobObserver;
 pub use priority::Priority;
 pub use queue::{
-    Custodian, Hold, Queue, QueuePosition, QueueSettings, RetentionAges, Swept, TemplateSource,
-    Upkeep, recover_after_crash,
+    Custodian, Hold, NotAdded, Queue, QueuePosition, QueueSettings, RetentionAges, Swept,
+    TemplateSource, Upkeep, check_name, recover_after_crash,
 };
 pub use resource::Resource;
 pub use storage::{
-    AuditMark, BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Claimant, Custody,
-    DeathLimit, Deleted, DiskSpace, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder,
-    ErasureReason, Expiry, FigureStore, FileRecord, Held, Holding, Interrupted, ItemFilter,
-    ItemRecord, JobFilter, JobOutcome, JobStore, Lease, LegalHold, ListPage, ListRequest,
-    LocalFile, News, NewsFeed, Peers, Product, ProductFile, QueueFigures, QueueLoad, Receipt,
-    RecordPages, ScanFields, ScanFilter, ScanIdentity, Scans, Shelved, StagedFiles, StagedFor,
-    StoreError, StoreFault, StoreResult, StoredVolume, TagFilter, Tags, UnreadScan,
+    AddedProduct, AuditMark, BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Claimant,
+    Custody, DeathLimit, Deleted, DiskSpace, Erased, ErasedFile, ErasedItem, ErasureAgent,
+    ErasureOrder, ErasureReason, Expiry, FigureStore, FileRecord, Held, Holding, Interrupted,
+    ItemFilter, ItemRecord, JobFilter, JobOutcome, JobStore, Lease, LegalHold, ListPage,
+    ListRequest, LocalFile, News, NewsFeed, Peers, Product, ProductFile, ProductRoom, QueueFigures,
+    QueueLoad, Receipt, RecordPages, ScanFields, ScanFilter, ScanIdentity, Scans, Shelved,
+    StagedFiles, StagedFor, StoreError, StoreFault, StoreResult, StoredVolume, TagFilter, Tags,
+    UnreadScan,
 };
 pub use tenant::{InvalidTenant, Tenant};
 pub use work::{

@@ -6,9 +6,13 @@ use super::{profile, template};
 use crate::jobs::{Failure, Fault, LocalFile, ScanFields, StoreError, StoredVolume, WorkOutput};
 use crate::progress::Monitor;
 use crate::volume::nifti::{self, StoredType};
-use crate::volume::{self, ReadLimits, ReadOptions};
+use crate::volume::{self, ReadLimits, ReadOptions, VolumeFile};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+
+/// Largest mesh of a template: a model to be fitted has at most 5000 points of about 200 bytes, and as many
+/// bytes of triangles.
+pub const TEMPLATE_BYTES: u64 = 4 << 20;
 
 /// Most memory that [`UploadReader::inspect`] takes, bytes: that of the largest DICOM Segmentation. The
 /// largest JPEG 2000 frame takes 40 MiB. A gzipped file of 16 MiB is unpacked in memory if it holds at
@@ -74,6 +78,12 @@ pub trait UploadReader: Send + Sync + 'static {
     /// # Errors
     /// Why the mesh cannot be fitted.
     fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure>;
+
+    /// Whether a stored file holds voxels, where they lie and nothing else, so that it cannot name a patient.
+    ///
+    /// # Errors
+    /// If it cannot be read, or the caller asked for an end.
+    fn is_bare(&self, file: &LocalFile, monitor: &Monitor<'_>) -> Result<bool, Failure>;
 
     /// Reads and validates a reader's profile. Returns its main figures and its file.
     ///
@@ -214,6 +224,11 @@ impl UploadReader for DomainReader {
 
     fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure> {
         template::make(mesh, organ)
+    }
+
+    fn is_bare(&self, file: &LocalFile, monitor: &Monitor<'_>) -> Result<bool, Failure> {
+        let file = VolumeFile::at(file);
+        nifti::is_bare(&file, &self.limits, monitor).map_err(|error| error.explain())
     }
 
     fn profile(&self, profile: &[u8]) -> Result<WorkOutput, Failure> {

@@ -29,5 +29,5 @@ pub use dataset::{DataSetJson, Malformed};
 pub use perform::WorkOutputObject;
 pub use procedure::Procedure;
 pub use query::{Matching, QueryError};
-pub use storage::{AddedWorkitem, Worklist};
+pub use storage::{AddedWorkitem, BATCH_BYTES, Worklist};
 pub use workitem::{Change, Refusal, Workitem, WorkitemState};

@@ -5,12 +5,21 @@ use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_dictionary_std::StandardDataDictionary;
 use serde_json::{Map, Value};
 
+/// Most attributes of a search.
+const MOST_TERMS: usize = 16;
+/// Longest value that is searched for, bytes, and longest one with wildcards: no text that they stand for is
+/// longer (PS3.5, 6.2), and each character may be compared with each of a text.
+const LONGEST_VALUE: usize = 4096;
+const LONGEST_PATTERN: usize = 64;
+
 /// A search cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{name}` is no attribute of DICOM")]
+#[error("`{name}` {reason}")]
 pub struct QueryError {
     /// The parameter.
     pub name: String,
+    /// What is wrong with it.
+    pub reason: &'static str,
 }
 
 /// Attributes and what each must have.
@@ -22,18 +31,28 @@ impl Matching {
     /// `value`. Attributes are named by tag or keyword.
     ///
     /// # Errors
-    /// If a name is none.
+    /// If a name is none, a value is too long, or there are too many.
     pub fn add(&mut self, name: &str, value: &str) -> Result<(), QueryError> {
-        let tags: Option<Vec<String>> = name.split('.').map(tag).collect();
-        match tags {
-            Some(tags) => {
-                self.0.push((tags, value.to_owned()));
-                Ok(())
-            }
-            None => Err(QueryError {
-                name: name.chars().take(80).collect(),
-            }),
+        let wrong = |reason| QueryError {
+            name: name.chars().take(80).collect(),
+            reason,
+        };
+        if self.0.len() == MOST_TERMS {
+            return Err(wrong("is one attribute more than a search may have"));
         }
+        let is_pattern = value.contains(['*', '?']);
+        if value.len() > LONGEST_VALUE || (is_pattern && value.chars().count() > LONGEST_PATTERN) {
+            return Err(wrong("has too long a value"));
+        }
+        let tags: Option<Vec<String>> = name.split('.').map(tag).collect();
+        let tags = tags.ok_or_else(|| wrong("is no attribute of DICOM"))?;
+        self.0.push((tags, value.to_owned()));
+        Ok(())
+    }
+
+    /// Whether something is searched for by wildcards, which takes longer.
+    pub fn has_patterns(&self) -> bool {
+        self.0.iter().any(|(_, value)| value.contains(['*', '?']))
     }
 
     /// Whether a data set matches.
@@ -184,5 +203,13 @@ mod tests {
             assert_eq!(matching.matches(item), expected, "{name}={value}");
         }
         assert!(Matching::default().add("PatientNme", "x").is_err());
+        let mut matching = Matching::default();
+        let long = "x".repeat(LONGEST_PATTERN);
+        assert!(matching.add("PatientID", &format!("{long}*")).is_err());
+        assert!(matching.add("PatientID", &long.repeat(100)).is_err());
+        for _ in 0..MOST_TERMS {
+            matching.add("PatientID", &long).unwrap();
+        }
+        assert!(matching.add("PatientID", &long).is_err());
     }
 }

@@ -4,6 +4,9 @@ use super::{Workitem, WorkitemState};
 use crate::jobs::{StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
 
+/// Bytes of work items that are read at a time.
+pub const BATCH_BYTES: u64 = 512 << 10;
+
 /// The result of adding a work item.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AddedWorkitem {
@@ -29,7 +32,7 @@ pub trait Worklist: Send + Sync + 'static {
     async fn change_workitem(&self, item: &Workitem) -> StoreResult<bool>;
 
     /// At most `limit` items of a tenant after position `after`, oldest first, in that state or in
-    /// any.
+    /// any; fewer where they are larger than [`BATCH_BYTES`] together, and at least one if there is one.
     async fn workitems(
         &self,
         tenant: &Tenant,
@@ -38,11 +41,12 @@ pub trait Worklist: Send + Sync + 'static {
         limit: u32,
     ) -> StoreResult<Vec<Workitem>>;
 
-    /// At most `limit` scheduled items of all tenants after position `after`, oldest first.
+    /// At most `limit` scheduled items of all tenants after position `after`, oldest first, and as few as of
+    /// [`Worklist::workitems`].
     async fn scheduled_workitems(&self, after: i64, limit: u32) -> StoreResult<Vec<Workitem>>;
 
-    /// The items that this service has claimed and not ended.
-    async fn performed_workitems(&self) -> StoreResult<Vec<Workitem>>;
+    /// The items that this service has claimed and not ended, likewise.
+    async fn performed_workitems(&self, after: i64, limit: u32) -> StoreResult<Vec<Workitem>>;
 
     /// Deletes the items that ended before that moment. Returns how many.
     async fn delete_ended_workitems(&self, before: Timestamp) -> StoreResult<u64>;

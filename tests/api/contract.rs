@@ -19,16 +19,18 @@ use ventriform::hooks::{
 };
 use ventriform::intake::{Added, GroupState, IntakeRoom, IntakeStore, NewObject, Origin, Protocol};
 use ventriform::jobs::{
-    Catalogue, Claimant, Clock, Custody, DeathLimit, Deleted, Erased, ErasureAgent, ErasureOrder,
-    ErasureReason, Expiry, Failure, Fault, FigureStore, FileRecord, Filed, Idempotency,
-    Interrupted, ItemFilter, ItemRecord, Job, JobFilter, JobOutcome, JobState, JobStore,
-    JobWebhook, Lease, LegalHold, ListRequest, NewJob, Priority, Product, ProductFile, Resource,
-    ScanFields, ScanFilter, Scans, SendOrder, SeriesSource, StoreFault, StoredVolume, SystemClock,
-    TagFilter, Tags, Tenant, Timestamp, random_id,
+    AddedProduct, Catalogue, Claimant, Clock, Custody, DeathLimit, Deleted, Erased, ErasureAgent,
+    ErasureOrder, ErasureReason, Expiry, Failure, Fault, FigureStore, FileRecord, Filed,
+    Idempotency, Interrupted, ItemFilter, ItemRecord, Job, JobFilter, JobOutcome, JobState,
+    JobStore, JobWebhook, Lease, LegalHold, ListRequest, NewJob, Priority, Product, ProductFile,
+    ProductRoom, Resource, ScanFields, ScanFilter, Scans, SendOrder, SeriesSource, StoreFault,
+    StoredVolume, SystemClock, TagFilter, Tags, Tenant, Timestamp, random_id,
 };
 use ventriform::store::{DiskGauge, PostgresError, SqlStore, Store, StoreSettings};
 use ventriform::volume::dicom::DicomHeader;
-use ventriform::worklist::{AddedWorkitem, DataSetJson, Workitem, WorkitemState, Worklist};
+use ventriform::worklist::{
+    AddedWorkitem, BATCH_BYTES, DataSetJson, Workitem, WorkitemState, Worklist,
+};
 
 /// Longer than a busy machine keeps anybody waiting.
 const WAIT: Duration = Duration::from_secs(30);
@@ -38,6 +40,11 @@ const LEASE: Duration = Duration::from_millis(150);
 const ALL: ListRequest = ListRequest {
     before: None,
     limit: 1000,
+};
+
+const ROOM: ProductRoom = ProductRoom {
+    count: u32::MAX,
+    bytes: None,
 };
 
 /// Two users of one database.
@@ -255,6 +262,9 @@ contracts!(
     received_objects_become_volumes,
     work_items_change_once,
     figures_are_counted,
+    everything_stored_counts_for_its_tenant,
+    a_full_queue_and_a_full_intake_keep_a_share_for_others,
+    work_items_are_read_in_batches_of_few_bytes,
 );
 
 async fn a_lost_lease_writes_nothing(on: &Stores) {
@@ -712,11 +722,8 @@ async fn jobs_end_in_every_way(on: &Stores) {
 async fn holds_keep_what_they_name(on: &Stores) {
     let volume = on.volume(&tenant()).await;
     let result = model(&volume);
-    assert!(
-        on.a.add_product(&result, &tenant(), Some(&volume))
-            .await
-            .unwrap()
-    );
+    let added = on.a.add_product(&result, &tenant(), Some(&volume), ROOM);
+    assert_eq!(added.await.unwrap(), AddedProduct::New);
     let hold = LegalHold {
         reason: "a trial".into(),
         since: now(),
@@ -980,7 +987,7 @@ async fn lists_find_by_tags_and_scans(on: &Stores) {
         1
     );
     let template = product(random_id(Resource::Template.prefix()), None);
-    on.a.add_product(&template, &tenant(), Some(&ids[0]))
+    on.a.add_product(&template, &tenant(), Some(&ids[0]), ROOM)
         .await
         .unwrap();
     assert!(
@@ -1080,7 +1087,9 @@ async fn items_are_shared_by_tenants(on: &Stores) {
     let page = on.b.records(Resource::Volume, 0, 10).await.unwrap();
     assert_eq!(page, [ItemRecord::Volume(amended)]);
     let template = product(random_id(Resource::Template.prefix()), None);
-    on.a.add_product(&template, &tenant(), None).await.unwrap();
+    on.a.add_product(&template, &tenant(), None, ROOM)
+        .await
+        .unwrap();
     on.a.amend(&ItemRecord::Product(template.clone()))
         .await
         .unwrap();
@@ -1461,29 +1470,7 @@ async fn series_are_fetched_and_results_sent(on: &Stores) {
 }
 
 async fn received_objects_become_volumes(on: &Stores) {
-    let received = |instance: &str, data: &str| NewObject {
-        origin: Origin {
-            tenant: tenant(),
-            protocol: Protocol::CStore,
-            sender: "CAMERA".into(),
-            address: "10.0.0.1".into(),
-        },
-        header: DicomHeader {
-            sop_class: "1.2.840.10008.5.1.4.1.1.20".into(),
-            sop_instance: instance.into(),
-            study: "1.2".into(),
-            series: "1.2.3".into(),
-            is_slice: true,
-            modality: Some("NM".into()),
-            image_type: vec!["ORIGINAL".into()],
-            study_description: None,
-            data_set: 0,
-        },
-        data_sha256: data.into(),
-        file_sha256: data.into(),
-        file: format!("file-{instance}-{data}"),
-        bytes: 10,
-    };
+    let received = |instance: &str, data: &str| object_of(&tenant(), instance, data);
     let room = IntakeRoom {
         objects: 2,
         bytes: 1000,
@@ -1596,7 +1583,7 @@ async fn work_items_change_once(on: &Stores) {
         changed.0.unwrap() != changed.1.unwrap(),
         "one of two claims it"
     );
-    assert_eq!(on.b.performed_workitems().await.unwrap().len(), 1);
+    assert_eq!(on.b.performed_workitems(0, 10).await.unwrap().len(), 1);
     let listed =
         on.b.workitems(&tenant(), Some(WorkitemState::Scheduled), 0, 10)
             .await
@@ -1615,7 +1602,7 @@ async fn work_items_change_once(on: &Stores) {
 async fn figures_are_counted(on: &Stores) {
     let volume = on.volume(&tenant()).await;
     let job = on.file(&new_job(&volume)).await;
-    on.a.add_product(&model(&volume), &tenant(), Some(&volume))
+    on.a.add_product(&model(&volume), &tenant(), Some(&volume), ROOM)
         .await
         .unwrap();
     let figures = on.b.queue_figures().await.unwrap();
@@ -1858,4 +1845,209 @@ async fn a_server_that_is_away_is_waited_for_and_never_answered_for() {
         );
         store.check().await.unwrap();
     }
+}
+
+async fn everything_stored_counts_for_its_tenant(on: &Stores) {
+    let bytes = async |tenant: &Tenant| on.b.usage(tenant).await.unwrap().bytes;
+    let other: Tenant = "other".parse().unwrap();
+    let before = bytes(&tenant()).await;
+    let volume = on.volume(&tenant()).await;
+    let size = bytes(&tenant()).await - before;
+    assert!(size > 0);
+    // A product: new, again, one more of its kind than there may be, and larger than there is room for.
+    let mut template = product(random_id(Resource::Template.prefix()), None);
+    template.files.push(ProductFile {
+        name: "mesh.glb".into(),
+        bytes: 5000,
+        ..template.files[0].clone()
+    });
+    let add = async |product: &Product, room: ProductRoom| {
+        let added = on.a.add_product(product, &other, None, room);
+        added.await.unwrap()
+    };
+    let limits = |count, bytes| ProductRoom {
+        count,
+        bytes: Some(bytes),
+    };
+    let too_large = AddedProduct::TooLarge { stored: 0 };
+    assert_eq!(add(&template, limits(1, 5001)).await, too_large);
+    assert_eq!(bytes(&other).await, 0);
+    assert_eq!(add(&template, limits(1, 5002)).await, AddedProduct::New);
+    assert_eq!(add(&template, limits(1, 0)).await, AddedProduct::Known);
+    assert_eq!(bytes(&other).await, 5002);
+    let second = product(random_id(Resource::Template.prefix()), None);
+    assert_eq!(add(&second, limits(1, 9000)).await, AddedProduct::TooMany);
+    let reader = product(random_id(Resource::Reader.prefix()), None);
+    assert_eq!(add(&reader, limits(1, 9000)).await, AddedProduct::New);
+    assert_eq!(bytes(&other).await, 5004);
+    // Files that are replaced, a work item, and one that grows.
+    template.files.truncate(1);
+    let amended = ItemRecord::Product(template.clone());
+    on.a.amend(&amended).await.unwrap();
+    assert_eq!(bytes(&other).await, 4);
+    let text = "\u{e4}".repeat(100);
+    let mut item = workitem("1.7.1", &text);
+    item.tenant = other.clone();
+    on.a.add_workitem(&item, 10).await.unwrap();
+    let stored = serde_json::to_string(item.attributes.object()).unwrap();
+    assert_eq!(bytes(&other).await, 4 + stored.len() as u64);
+    // A result: as many bytes as the tenant may store, or the job fails and nothing is added.
+    for (limit, state) in [
+        (size + 1, JobState::Failed),
+        (size + 2, JobState::Succeeded),
+    ] {
+        let job = NewJob {
+            storage_limit: Some(before + limit),
+            ..new_job(&volume)
+        };
+        on.file(&job).await;
+        let claimed = on.claim().await.unwrap();
+        let made = model(&volume);
+        let outcome = JobOutcome::Succeeded(Box::new(made.clone()));
+        let ended =
+            on.a.finish(&claimed.1, &outcome, now())
+                .await
+                .unwrap()
+                .unwrap();
+        assert_eq!(ended.state, state, "{limit}");
+        let failed = state == JobState::Failed;
+        assert_eq!(ended.failure.is_some(), failed);
+        assert_eq!(ended.result.is_none(), failed);
+        let stored = on.b.product(&tenant(), &made.id).await.unwrap();
+        assert_eq!(stored.is_none(), failed);
+    }
+    assert_eq!(bytes(&tenant()).await, before + size + 2);
+}
+
+async fn a_full_queue_and_a_full_intake_keep_a_share_for_others(on: &Stores) {
+    let tenants: [Tenant; 3] = ["a", "b", "c"].map(|name| name.parse().unwrap());
+    let mut accepted = Vec::new();
+    for tenant in &tenants {
+        let volume = on.volume(tenant).await;
+        let mut count = 0;
+        loop {
+            let has_room = on.b.has_room(tenant, 6).await.unwrap();
+            let job = NewJob {
+                tenant: tenant.clone(),
+                ..new_job(&volume)
+            };
+            match on.a.file(&job, 6, now()).await.unwrap() {
+                Filed::New(_) => assert!(has_room),
+                Filed::QueueFull => break assert!(!has_room),
+                other => panic!("{other:?}"),
+            }
+            count += 1;
+        }
+        accepted.push(count);
+    }
+    assert_eq!(accepted, [6, 3, 2]);
+    // Received objects likewise; those that make up no volume count for their tenant alone.
+    let room = IntakeRoom {
+        objects: 6,
+        bytes: 1000,
+        tenant_bytes: None,
+    };
+    let mut accepted = Vec::new();
+    for tenant in &tenants {
+        let mut count = 0;
+        loop {
+            let object = received_object(tenant, &format!("{count}"));
+            match on.a.add(&object, room, now()).await.unwrap() {
+                Added::New(..) => count += 1,
+                Added::NoRoom => break,
+                other => panic!("{other:?}"),
+            }
+        }
+        accepted.push(count);
+    }
+    assert_eq!(accepted, [6, 3, 2]);
+    for group in on.b.unfinished().await.unwrap() {
+        if group.origin.tenant == tenants[0] {
+            let failed =
+                on.a.failed(&group.id, group.revision, &failure("no"), now());
+            failed.await.unwrap();
+        }
+    }
+    let another = received_object(&tenants[0], "another");
+    let refused = on.a.add(&another, room, now()).await.unwrap();
+    assert_eq!(
+        refused,
+        Added::NoRoom,
+        "its own room is taken by what failed"
+    );
+    let another = received_object(&tenants[1], "another");
+    let taken = on.a.add(&another, room, now()).await.unwrap();
+    assert!(matches!(taken, Added::New(..)));
+}
+
+async fn work_items_are_read_in_batches_of_few_bytes(on: &Stores) {
+    let large = BATCH_BYTES as usize * 2 / 5;
+    for (n, size) in [large, large, large, large, 10, 3 * large, 10]
+        .into_iter()
+        .enumerate()
+    {
+        let item = workitem(&format!("1.8.{n}"), &"x".repeat(size));
+        on.a.add_workitem(&item, 100).await.unwrap();
+    }
+    let (mut after, mut batches) = (0, Vec::new());
+    loop {
+        let batch = on.b.workitems(&tenant(), None, after, 100).await.unwrap();
+        let Some(last) = batch.last() else { break };
+        after = last.sequence;
+        batches.push(batch.len());
+    }
+    // Each ends with the item that exceeds the bound.
+    assert_eq!(batches, [3, 3, 1]);
+    let few =
+        on.b.workitems(&tenant(), Some(WorkitemState::Scheduled), 0, 2);
+    assert_eq!(few.await.unwrap().len(), 2);
+    assert_eq!(on.b.scheduled_workitems(0, 100).await.unwrap().len(), 3);
+}
+
+fn workitem(uid: &str, label: &str) -> Workitem {
+    Workitem {
+        tenant: tenant(),
+        uid: uid.into(),
+        sequence: 0,
+        revision: 0,
+        state: WorkitemState::Scheduled,
+        transaction: None,
+        performer: None,
+        attributes: DataSetJson::of(object(json!({
+            "00741000": {"vr": "CS", "Value": ["SCHEDULED"]},
+            "00741204": {"vr": "LO", "Value": [label]},
+        })))
+        .unwrap(),
+        changed_at: now(),
+    }
+}
+
+fn object_of(tenant: &Tenant, instance: &str, data: &str) -> NewObject {
+    NewObject {
+        origin: Origin {
+            tenant: tenant.clone(),
+            protocol: Protocol::CStore,
+            sender: "CAMERA".into(),
+            address: "10.0.0.1".into(),
+        },
+        header: DicomHeader {
+            sop_class: "1.2.840.10008.5.1.4.1.1.20".into(),
+            sop_instance: instance.into(),
+            study: "1.2".into(),
+            series: "1.2.3".into(),
+            is_slice: true,
+            modality: Some("NM".into()),
+            image_type: vec!["ORIGINAL".into()],
+            study_description: None,
+            data_set: 0,
+        },
+        data_sha256: data.into(),
+        file_sha256: data.into(),
+        file: format!("file-{instance}-{data}"),
+        bytes: 10,
+    }
+}
+
+fn received_object(tenant: &Tenant, instance: &str) -> NewObject {
+    object_of(tenant, instance, instance)
 }

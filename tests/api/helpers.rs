@@ -380,6 +380,11 @@ impl UploadReader for FakeReader {
         self.0.template(mesh, organ)
     }
 
+    fn is_bare(&self, file: &LocalFile, _: &Monitor<'_>) -> Result<bool, Failure> {
+        let words = words(std::slice::from_ref(file))?;
+        Ok(!words.contains("patient"))
+    }
+
     fn profile(&self, profile: &[u8]) -> Result<WorkOutput, Failure> {
         self.0.profile(profile)
     }

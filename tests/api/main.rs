@@ -32,6 +32,7 @@ mod intake;
 mod isolation;
 mod items;
 mod jobs;
+mod limits;
 mod migrate;
 mod models;
 mod monitoring;

@@ -51,6 +51,10 @@ const PAUSE: Duration = Duration::from_millis(20);
 /// write timeout to be seen reading at all.
 const SEND_BUFFER: usize = 128 << 10;
 
+/// Bytes that are read from one client before they are taken: of thousands that send as fast as they can, each
+/// has as many in memory. The head of a request must fit.
+const READ_BUFFER: usize = 32 << 10;
+
 /// When a silent connection is asked whether its other end still exists.
 const KEEPALIVE: Duration = Duration::from_secs(60);
 
@@ -214,6 +218,7 @@ impl Server {
         let connection = http1::Builder::new()
             .timer(TokioTimer::new())
             .header_read_timeout(self.limits.head)
+            .max_buf_size(READ_BUFFER)
             .keep_alive(!ticket.reserve)
             .serve_connection(TokioIo::new(stream), service);
         Ok(end.watch(connection).await?)

@@ -7,7 +7,8 @@
 //! 3. The caller's requests are counted: 429 beyond the quota. Every answer carries `RateLimit` and
 //!    `RateLimit-Policy` (draft-ietf-httpapi-ratelimit-headers-10).
 //! 4. The scope must include what method and path need: 403 if not.
-//! 5. What the request may add is held against the tenant's quotas, see [`reserve`].
+//! 5. What the request may add is held against the tenant's quotas, see [`reserve`]. From here on, its memory
+//!    is charged to its client ([`super::memory`]).
 //! 6. After the handler, [`trail`] writes what was done to the audit trail. An act that changed
 //!    something is answered when its event is on disk.
 //!
@@ -21,11 +22,13 @@ mod reservations;
 mod reserve;
 mod trail;
 
+pub use reserve::Counting;
 pub use trail::{Agent, AlreadyRecorded};
 
 use super::app::App;
 use super::caller::Caller;
 use super::client::ClientAddress;
+use super::memory::Ledger;
 use super::problem::{Answer, Problem};
 use crate::access::{Allowance, Identity, Refusal, Scope};
 use crate::config::Settings;
@@ -34,7 +37,6 @@ use axum::http::request::Parts;
 use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
-use reservations::Reservation;
 use state::Guard;
 use std::time::Instant;
 
@@ -100,9 +102,14 @@ pub async fn guard(State(app): State<App>, request: Request, next: Next) -> Resp
         Ok(reservation) => {
             let act = trail::Act::of(&request, &identity, address);
             request.extensions.insert(act.agent());
-            let response = next.run(Request::from_parts(request, body)).await;
+            let ledger = Ledger::new(&app.memory);
+            let answer = next.run(Request::from_parts(request, body));
+            let response = ledger.clone().scope(answer).await;
             drop(reservation);
-            act.record(&app, response).await
+            match ledger.answered(response).await {
+                Ok(response) => act.record(&app, response).await,
+                Err(problem) => problem.into_response(),
+            }
         }
         Err(problem) => problem.into_response(),
     };
@@ -144,8 +151,9 @@ async fn admit(
     identity: &Identity,
     address: &str,
     request: &mut Parts,
-) -> Answer<Option<Reservation>> {
-    let caller = Caller::from(identity);
+) -> Answer<Counting> {
+    let quota = identity.quota.or(app.guard.quota);
+    let caller = Caller::of(identity, quota);
     if identity.account.is_none() {
         app.guard.hosts.check_site(request)?;
     }
@@ -155,10 +163,10 @@ async fn admit(
         trail::access_refused(app, request, identity, address).await;
         return Err(problem);
     }
-    let quota = identity.quota.or(app.guard.quota);
-    let reservation = reserve::reserve(app, request, &caller.tenant, quota).await?;
+    let counting = reserve::reserve(app, request, &caller).await?;
+    request.extensions.insert(counting.clone());
     request.extensions.insert(caller);
-    Ok(reservation)
+    Ok(counting)
 }
 
 fn count(guard: &Guard, identity: &Identity, address: &str) -> Option<Allowance> {

@@ -33,6 +33,37 @@ impl Reservations {
     }
 }
 
+impl Reservation {
+    /// Adds `bytes` to it; returns what is reserved in all.
+    pub fn grow(&mut self, bytes: u64) -> Usage {
+        let mut all = self.all.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let sum = all.entry(self.tenant.clone()).or_default();
+        sum.bytes = sum.bytes.saturating_add(bytes);
+        self.amount.bytes = self.amount.bytes.saturating_add(bytes);
+        *sum
+    }
+
+    /// Ends the reservation of bytes: the database counts them now.
+    pub fn stored(&mut self) {
+        let mut all = self.all.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(sum) = all.get_mut(&self.tenant) {
+            sum.bytes = sum.bytes.saturating_sub(self.amount.bytes);
+        }
+        self.amount.bytes = 0;
+    }
+
+    /// What is reserved in all.
+    pub fn sum(&self) -> Usage {
+        let all = self.all.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.get(&self.tenant).copied().unwrap_or_default()
+    }
+
+    /// The tenant.
+    pub fn tenant(&self) -> &Tenant {
+        &self.tenant
+    }
+}
+
 impl Drop for Reservation {
     fn drop(&mut self) {
         let mut all = self.all.0.lock().unwrap_or_else(PoisonError::into_inner);

@@ -7,9 +7,10 @@
 //! A row names an item by its id and never a path, a query or a name from a file.
 
 use crate::access::{Activity, AuditEvent, Identity, Outcome, Refusal};
+use crate::export::dicom::is_uid;
 use crate::http::app::App;
 use crate::http::problem::Problem;
-use crate::jobs::{ErasureAgent, Resource, Tenant, Timestamp};
+use crate::jobs::{ErasureAgent, Tenant, Timestamp};
 use axum::extract::MatchedPath;
 use axum::http::request::Parts;
 use axum::http::{Method, StatusCode, header};
@@ -96,9 +97,10 @@ impl Act {
         self.event.activity = activity;
         self.event.object = match activity {
             Activity::Create | Activity::Execute => location(&response).or(self.object),
-            Activity::Search => self.route.split('/').nth(2).map(str::to_owned),
             _ => self.object,
         };
+        let place = || place_of(&self.route);
+        self.event.object = self.event.object.take().or_else(place);
         if self.method.is_safe() {
             app.guard.recorder.note(self.event).await;
             return response;
@@ -146,6 +148,7 @@ pub async fn sign_in_refused(app: &App, request: &Parts, address: &str, refusal:
         key,
         scope: crate::access::Scope::Read,
         quota: crate::access::Quota::default(),
+        expires_at: None,
         account: None,
     };
     let refused = event(
@@ -188,13 +191,31 @@ fn event(request: &Parts, identity: &Identity, address: String, activity: Activi
     }
 }
 
-/// The id in a path `/v1/KIND/ID/...`, if it has the form of one.
+/// The id in a path `/v1/KIND/ID/...` or `/dicom-web/workitems/UID/...`, if it has the form of one.
 fn item_of(path: &str) -> Option<String> {
+    if let Some(rest) = path.strip_prefix("/dicom-web/workitems/") {
+        let uid = rest.split('/').next()?;
+        return is_uid(uid).then(|| uid.to_owned());
+    }
     let id = path.strip_prefix("/v1/")?.split('/').nth(1)?;
-    let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'_';
-    let formed = !id.is_empty() && id.len() <= LONGEST_ID && id.bytes().all(plain);
-    let known = Resource::of(id).is_some() || id.bytes().all(|b| b.is_ascii_hexdigit());
-    (formed && known).then(|| id.to_owned())
+    // A prefix of three letters, or none.
+    let number = match id.split_once('_') {
+        Some((prefix, number))
+            if prefix.len() == 3 && prefix.bytes().all(|b| b.is_ascii_lowercase()) =>
+        {
+            number
+        }
+        Some(_) => return None,
+        None => id,
+    };
+    let formed = !number.is_empty() && id.len() <= LONGEST_ID;
+    (formed && number.bytes().all(|b| b.is_ascii_hexdigit())).then(|| id.to_owned())
+}
+
+/// What a route without an id stands for: `webhooks/secret`.
+fn place_of(route: &str) -> Option<String> {
+    let rest = route.split('/').skip(2).collect::<Vec<_>>().join("/");
+    (!rest.is_empty() && !rest.contains('{')).then_some(rest)
 }
 
 /// The id of what the answer's `Location` names.
@@ -228,7 +249,26 @@ mod tests {
             item("/v1/keys/0123456789abcdef").as_deref(),
             Some("0123456789abcdef")
         );
+        assert_eq!(
+            item("/v1/webhooks/whk_0123456789abcdef").as_deref(),
+            Some("whk_0123456789abcdef")
+        );
+        for uid in ["1.2.3.99", "2.25.340282366920938463463374607431768211455"] {
+            for rest in ["", "/state", "/cancelrequest"] {
+                let path = format!("/dicom-web/workitems/{uid}{rest}");
+                assert_eq!(item(&path).as_deref(), Some(uid), "{path}");
+            }
+        }
+        assert_eq!(
+            place_of("/v1/webhooks/secret").as_deref(),
+            Some("webhooks/secret")
+        );
+        assert_eq!(place_of("/v1/audit").as_deref(), Some("audit"));
+        assert_eq!(place_of("/v1/volumes/{id}"), None);
         for path in [
+            "/dicom-web/workitems/Doe^John",
+            "/dicom-web/workitems",
+            "/v1/volumes/doe_john",
             "/v1/volumes",
             "/v1/volumes/Doe%20John",
             "/healthz",

@@ -78,12 +78,13 @@ pub async fn file_upload(
         source: None,
         send: None,
         trace_parent: observe::trace_parent(&request),
+        storage_limit: caller.quota.bytes,
     };
     let mut parameters = work.parameters_from_text(&pairs)?;
     // A repeated request gets its job, whatever has become of the queue and of what it names.
     if !key_was_used(app, tenant, filing.key.as_deref()).await? {
         require(app, tenant, &work.needs(&parameters).items).await?;
-        if app.queue.is_full().await? {
+        if app.queue.is_full(tenant).await? {
             return Err(queue_full(app).await);
         }
     }
@@ -152,6 +153,8 @@ pub struct Filing {
     pub send: Option<SendOrder>,
     /// The request's trace context.
     pub trace_parent: Option<String>,
+    /// Bytes that the tenant may store in all once the result is added.
+    pub storage_limit: Option<u64>,
 }
 
 /// Whether an earlier request of the tenant was accepted under that key.
@@ -228,6 +231,7 @@ pub fn new_job(
         source: filing.source,
         send: filing.send,
         trace_parent: filing.trace_parent,
+        storage_limit: filing.storage_limit,
     }
 }
 

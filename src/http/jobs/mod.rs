@@ -81,6 +81,7 @@ pub async fn create_job(
         source: None,
         send: None,
         trace_parent,
+        storage_limit: caller.quota.bytes,
     };
     let job = read_job(&app, &object, filing).await?;
     let job = filing::file(&app, &job).await?;
@@ -162,7 +163,7 @@ pub async fn list_jobs(
     let (tags, pairs) = tags::take_filter(&app, query_pairs(query.as_deref()))?;
     let (scan, pairs) = scans::take_filter(pairs)?;
     let own = ["state", "kind", priority::FIELD, "volume", "created_after"];
-    let (page, [state, kind, priority, volume, created_after]) = page_of(pairs, own)?;
+    let (page, [state, kind, priority, volume, created_after]) = page_of(pairs, own).await?;
     let priority = priority.map(|name| priority::parse(&name).map_err(Problem::of_search));
     let filter = JobFilter {
         tenant: caller.tenant,

@@ -1,7 +1,7 @@
 //! Errors of the domain and of the store as problems.
 
 use super::Problem;
-use crate::jobs::{BlobError, Failure, Fault, StoreError, StoreFault};
+use crate::jobs::{BlobError, Failure, Fault, NotAdded, StoreError, StoreFault};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use std::any::Any;
@@ -20,6 +20,22 @@ impl From<Failure> for Problem {
         problem.body.field = failure.field;
         problem.body.fix = failure.fix;
         problem
+    }
+}
+
+impl From<NotAdded> for Problem {
+    fn from(error: NotAdded) -> Self {
+        let of = |failure: Failure, status: StatusCode| {
+            let mut problem = Self::from(failure);
+            problem.body.status = status.as_u16();
+            problem
+        };
+        match error {
+            NotAdded::Refused(failure) => failure.into(),
+            NotAdded::TooMany(failure) => of(failure, StatusCode::CONFLICT),
+            NotAdded::TooLarge(failure) => of(failure, StatusCode::INSUFFICIENT_STORAGE),
+            NotAdded::Store(error) => error.into(),
+        }
     }
 }
 

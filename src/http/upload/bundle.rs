@@ -1,6 +1,8 @@
 //! The received files of one volume, before they are published.
 
 use crate::http::app::App;
+use crate::http::guard::Counting;
+use crate::http::memory::{HeldMemory, MemoryBudget};
 use crate::http::problem::{Answer, Problem, body};
 use crate::http::scans;
 use crate::jobs::{
@@ -15,13 +17,21 @@ use sha2::{Digest, Sha256};
 use std::sync::Arc;
 use tokio::io::AsyncWriteExt;
 
-/// Bytes gathered for one write. Up to the first one an upload lies in memory alone: thousands of
-/// clients that send a few bytes and then wait cost neither files nor turns of the disk.
+/// Bytes gathered for one write: at most, for the first one, and where the client has no memory left.
+/// Up to the first write an upload lies in memory alone: clients that send a few bytes and then wait cost neither
+/// files nor turns of the disk.
 const WRITE_BYTES: usize = 1 << 20;
+const FIRST_WRITE: usize = 64 << 10;
+const LEAST_WRITE: usize = 8 << 10;
+
+/// Memory for a gathered byte: it lies here, and once more in the file's writer.
+const MEMORY_PER_BYTE: u64 = 2;
 
 /// The files of one volume, which are not published yet.
 pub struct Bundle {
     blobs: Arc<dyn BlobStore>,
+    memory: MemoryBudget,
+    counting: Counting,
     /// Where the files lie; made for the first of them.
     staged: Option<Box<dyn StagedFiles>>,
     files: Vec<Received>,
@@ -58,19 +68,53 @@ struct Arriving<'a> {
     name: String,
     file: Option<BlobWriter>,
     waiting: Vec<u8>,
+    /// Bytes that may wait, and the memory that is held for them.
+    room: usize,
+    held: HeldMemory,
 }
 
 impl Arriving<'_> {
-    /// Writes the bytes that wait.
+    /// Lets `room` bytes wait, if the client's share of memory has them.
+    fn extend(&mut self, room: usize) {
+        let more = room.saturating_sub(self.room) as u64;
+        if more > 0 && self.held.try_extend(MEMORY_PER_BYTE * more) {
+            self.room = room;
+        }
+    }
+
+    /// Takes the next piece: lets it wait, or writes it with what waits.
+    async fn take(&mut self, piece: &[u8]) -> Answer<()> {
+        if self.waiting.len() + piece.len() > self.room {
+            self.extend(match self.file {
+                None => FIRST_WRITE,
+                Some(_) => WRITE_BYTES,
+            });
+        }
+        if self.waiting.len() + piece.len() > self.room {
+            self.flush().await?;
+        }
+        if piece.len() > self.room {
+            return self.write(piece).await;
+        }
+        if self.waiting.is_empty() {
+            self.waiting.reserve_exact(self.room);
+        }
+        self.waiting.extend_from_slice(piece);
+        Ok(())
+    }
+
+    /// Writes the bytes that wait, and keeps no room for others: more may not come for a while.
     async fn flush(&mut self) -> Answer<()> {
+        let waiting = std::mem::take(&mut self.waiting);
+        self.write(&waiting).await
+    }
+
+    async fn write(&mut self, bytes: &[u8]) -> Answer<()> {
         let file = match &mut self.file {
             Some(file) => file,
             none => none.insert(self.bundle.staged().await?.create(&self.name).await?),
         };
-        file.write_all(&self.waiting)
-            .await
-            .map_err(BlobError::from)?;
-        self.waiting.clear();
+        file.write_all(bytes).await.map_err(BlobError::from)?;
         Ok(())
     }
 
@@ -101,10 +145,12 @@ fn kind_by_name(name: &str) -> Option<&'static str> {
 }
 
 impl Bundle {
-    /// An empty bundle.
-    pub fn new(app: &App) -> Self {
+    /// An empty bundle. What it receives counts against a quota.
+    pub fn new(app: &App, counting: &Counting) -> Self {
         Self {
             blobs: app.queue.blobs.clone(),
+            memory: app.memory.clone(),
+            counting: counting.clone(),
             staged: None,
             files: Vec::new(),
         }
@@ -127,18 +173,23 @@ impl Bundle {
     /// file to the disk.
     ///
     /// # Errors
-    /// The problem in the stream, or 500 if the file cannot be written.
+    /// The problem in the stream, 507 beyond the tenant's quota, or 500 if the file cannot be written.
     pub async fn write(
         &mut self,
         mut pieces: impl Stream<Item = Answer<Bytes>> + Unpin,
     ) -> Answer<&mut Received> {
         let name = self.files.len().to_string();
+        let counting = self.counting.clone();
+        let held = self.memory.hold();
         let mut arriving = Arriving {
             bundle: self,
             name: name.clone(),
             file: None,
             waiting: Vec::new(),
+            room: 0,
+            held,
         };
+        arriving.extend(LEAST_WRITE);
         let mut hash = Sha256::new();
         let mut head = Vec::new();
         let mut bytes = 0;
@@ -146,13 +197,11 @@ impl Bundle {
             let piece = piece?;
             hash.update(&piece);
             bytes += piece.len() as u64;
+            counting.arrived(piece.len() as u64).await?;
             if head.len() < 132 {
                 head.extend_from_slice(&piece[..piece.len().min(132 - head.len())]);
             }
-            arriving.waiting.extend_from_slice(&piece);
-            if arriving.waiting.len() >= WRITE_BYTES {
-                arriving.flush().await?;
-            }
+            arriving.take(&piece).await?;
         }
         arriving.end().await?;
         self.files.push(Received {
@@ -191,7 +240,15 @@ impl Bundle {
     ///
     /// # Errors
     /// 413 or 422 if the files are not a usable volume.
-    pub async fn store(mut self, app: &App, tenant: &Tenant, tags: &Tags) -> Answer<Stored> {
+    pub async fn store(self, app: &App, tenant: &Tenant, tags: &Tags) -> Answer<Stored> {
+        let counting = self.counting.clone();
+        counting.settle().await?;
+        let stored = self.store_uncounted(app, tenant, tags).await?;
+        counting.stored();
+        Ok(stored)
+    }
+
+    async fn store_uncounted(mut self, app: &App, tenant: &Tenant, tags: &Tags) -> Answer<Stored> {
         let id = self.volume_id();
         let records = self.records();
         let hold = app.queue.hold(&id).await?;

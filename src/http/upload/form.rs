@@ -6,6 +6,7 @@ use super::{Bundle, Upload};
 use crate::archive::{RelatedType, Unparsed};
 use crate::config::Size;
 use crate::http::app::App;
+use crate::http::memory::charge;
 use crate::http::problem::{Answer, body, shorten};
 use axum::extract::Request;
 use axum::http::{HeaderMap, header};
@@ -17,6 +18,12 @@ use std::error::Error;
 const FIELD_BYTES: usize = 4096;
 /// Most text fields.
 const FIELDS: usize = 100;
+
+/// Memory of a form beside the parts' contents: what the parser has read and not handed out.
+const FORM_MEMORY: u64 = 128 << 10;
+
+/// Memory that is kept of a part whose content is on disk: its names and its hash.
+const PART_MEMORY: u64 = 512;
 
 /// Receives a form of at most `limit` bytes into `upload`; files named in `apart` are kept apart.
 pub async fn receive(
@@ -69,6 +76,7 @@ async fn receive_parts(
     apart: Option<&[&'static str]>,
     upload: &mut Upload,
 ) -> Answer<()> {
+    charge(FORM_MEMORY).await?;
     let unparsed = Unparsed::default();
     let pieces = unparsed.pieces(request.into_body().into_data_stream());
     let mut form = Multipart::new(pieces, boundary);
@@ -87,6 +95,7 @@ async fn receive_parts(
             }
             continue;
         }
+        charge(PART_MEMORY).await?;
         files += 1;
         if files > app.settings.parts_limit {
             return Err(body::too_many_files(app.settings.parts_limit));
@@ -111,8 +120,10 @@ fn bundle_of<'a>(
     match apart.iter().find(|own| **own == name) {
         None => &mut upload.volume,
         Some(own) => {
-            let others = &mut upload.others;
-            others.entry(own).or_insert_with(|| Bundle::new(app))
+            let (others, counting) = (&mut upload.others, &upload.counting);
+            others
+                .entry(own)
+                .or_insert_with(|| Bundle::new(app, counting))
         }
     }
 }
@@ -128,6 +139,7 @@ async fn text_field(
     let mut bytes = Vec::new();
     while let Some(piece) = field.chunk().await.map_err(|error| interrupted(&error))? {
         unparsed.reset();
+        charge(2 * piece.len() as u64).await?;
         bytes.extend_from_slice(&piece);
         if bytes.len() > FIELD_BYTES {
             return Err(unusable(format!("is longer than {FIELD_BYTES} bytes")));

@@ -13,6 +13,7 @@ mod form;
 pub use bundle::Bundle;
 
 use super::app::App;
+use super::guard::Counting;
 use super::limits::BodyLimits;
 use super::problem::{Answer, body};
 use super::request::{media_type, refuse_content_encoding};
@@ -39,6 +40,8 @@ pub struct Upload {
     pub volume: Bundle,
     /// The files that were to be kept apart, by name.
     pub others: BTreeMap<&'static str, Bundle>,
+    /// Counts what comes against the tenant's quota.
+    counting: Counting,
     /// The form's text fields: name and value.
     pub fields: Vec<(String, String)>,
 }
@@ -56,13 +59,15 @@ fn announced_length(headers: &HeaderMap) -> u64 {
 /// 400 empty or malformed, 408 too slow, 413 too large, 415 of another type or encoding.
 pub async fn receive(app: &App, request: Request, apart: &[&'static str]) -> Answer<Upload> {
     refuse_content_encoding(request.headers())?;
+    let counting = Counting::of(&request);
     let limits = BodyLimits::of(&request)?;
     app.queue
         .blobs
         .require_room(announced_length(request.headers()))?;
     let mut upload = Upload {
-        volume: Bundle::new(app),
+        volume: Bundle::new(app, &counting),
         others: BTreeMap::new(),
+        counting,
         fields: Vec::new(),
     };
     match media_type(request.headers()).as_deref() {

@@ -10,13 +10,13 @@ mod upkeep;
 
 pub use erase::RetentionAges;
 pub use items::Hold;
-pub use publish::TemplateSource;
+pub use publish::{NotAdded, TemplateSource, check_name};
 pub use sweep::{Custodian, Swept};
 pub use upkeep::{Upkeep, recover_after_crash};
 
 use super::{
     BlobStore, Catalogue, Clock, Filed, Interrupted, Job, JobObserver, JobState, JobStore, Lease,
-    NewJob, Peers, QueueLoad, StoreError, random_id,
+    NewJob, Peers, QueueLoad, StoreError, Tenant, random_id,
 };
 use crate::progress::CancelToken;
 use items::Items;
@@ -122,12 +122,12 @@ impl Queue {
         Ok(filed)
     }
 
-    /// Whether the queue would reject another job.
+    /// Whether the queue would reject another job of that tenant.
     ///
     /// # Errors
     /// If the database fails.
-    pub async fn is_full(&self) -> Result<bool, StoreError> {
-        Ok(self.jobs.load().await?.queued >= self.settings.limit as u64)
+    pub async fn is_full(&self, tenant: &Tenant) -> Result<bool, StoreError> {
+        Ok(!self.jobs.has_room(tenant, self.settings.limit).await?)
     }
 
     /// Keeps an item from being deleted, by request or by age, until the hold is dropped. The item

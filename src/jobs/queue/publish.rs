@@ -5,10 +5,12 @@
 
 use super::Queue;
 use crate::jobs::{
-    BlobError, Failure, Fault, FileRecord, Held, ItemRecord, Job, JobOutcome, Lease, OutputFile,
-    Product, ProductFile, Resource, ScanFields, StagedFiles, StagedFor, StoreError, StoreFault,
-    StoredVolume, Tags, Tenant, WorkOutput, content_id, hex,
+    AddedProduct, BlobError, Failure, Fault, FileRecord, Held, ItemRecord, Job, JobOutcome,
+    JobState, Lease, OutputFile, Product, ProductFile, ProductRoom, Resource, ScanFields,
+    StagedFiles, StagedFor, StoreError, StoreFault, StoredVolume, Tags, Tenant, WorkOutput,
+    content_id, hex,
 };
+use crate::text::is_printable;
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
 use std::sync::Arc;
@@ -81,35 +83,39 @@ impl Queue {
     /// same mesh for the same organ is the same template, whatever its name.
     ///
     /// # Errors
-    /// If the files or the record cannot be written.
+    /// [`NotAdded`] if its name cannot be used, the tenant has no room for it, or it cannot be written.
     pub async fn add_template(
         self: &Arc<Self>,
         source: TemplateSource<'_>,
         organ: &str,
         output: WorkOutput,
-    ) -> Result<(Held<Product>, bool), StoreError> {
-        self.blobs.require_room(0)?;
+        room: ProductRoom,
+    ) -> Result<(Held<Product>, bool), NotAdded> {
+        check_name(source.name)?;
+        self.blobs.require_room(0).map_err(StoreError::from)?;
         let parameters = [("name", source.name), ("organ", organ)]
             .map(|(key, value)| (key.to_owned(), Value::from(value)))
             .into_iter()
             .collect();
         let made = (source.tenant, Resource::Template);
         let template = self.product(made, &[organ], None, parameters, &output);
-        self.add_product(template, source, output).await
+        self.add_product(template, source, output, room).await
     }
 
     /// Adds a reader's profile, durably. Returns the record, and whether it is new: the same profile is
     /// the same reader, whatever its name.
     ///
     /// # Errors
-    /// If the files or the record cannot be written.
+    /// As [`Queue::add_template`].
     pub async fn add_reader(
         self: &Arc<Self>,
         tenant: &Tenant,
         name: &str,
         output: WorkOutput,
-    ) -> Result<(Held<Product>, bool), StoreError> {
-        self.blobs.require_room(0)?;
+        room: ProductRoom,
+    ) -> Result<(Held<Product>, bool), NotAdded> {
+        check_name(name)?;
+        self.blobs.require_room(0).map_err(StoreError::from)?;
         let parameters = [("name".to_owned(), Value::from(name))]
             .into_iter()
             .collect();
@@ -121,7 +127,7 @@ impl Queue {
             volume: None,
             library: None,
         };
-        self.add_product(reader, source, output).await
+        self.add_product(reader, source, output, room).await
     }
 
     /// Adds a product that no job made.
@@ -130,23 +136,35 @@ impl Queue {
         mut product: Product,
         source: TemplateSource<'_>,
         output: WorkOutput,
-    ) -> Result<(Held<Product>, bool), StoreError> {
+        room: ProductRoom,
+    ) -> Result<(Held<Product>, bool), NotAdded> {
         let (queue, tenant) = (self.clone(), source.tenant.clone());
         let (volume, library) = (source.volume.map(str::to_owned), source.library);
         to_its_end(async move {
             let _lock = queue.items.lock(&product.id).await;
             queue.items.unsettle(&product.id);
             let mut again = ROUNDS;
-            let new = loop {
+            let added = loop {
                 let unused = queue.write_files(&mut product, &output).await?;
                 let added = queue
                     .catalogue
-                    .add_product(&product, &tenant, volume.as_deref());
+                    .add_product(&product, &tenant, volume.as_deref(), room);
                 match added.await {
                     Err(error) if again > 0 && queue.was_erased_meanwhile(&error, &unused) => {
                         again -= 1;
                     }
                     added => break added?,
+                }
+            };
+            let new = match added {
+                AddedProduct::New => true,
+                AddedProduct::Known => false,
+                // Its files have no record, so the upkeep deletes them.
+                AddedProduct::TooMany => {
+                    return Ok(Err(NotAdded::too_many(product.resource(), room.count)));
+                }
+                AddedProduct::TooLarge { stored } => {
+                    return Ok(Err(NotAdded::too_large(&product, stored, room)));
                 }
             };
             if let Some(library) = library {
@@ -155,9 +173,9 @@ impl Queue {
             }
             queue.items.settle(&product.id);
             let stored = queue.catalogue.product(&tenant, &product.id).await?;
-            Ok((stored.ok_or_else(vanished)?, new))
+            Ok(Ok((stored.ok_or_else(vanished)?, new)))
         })
-        .await
+        .await?
     }
 
     /// Stores what a job made and ends the job: the files first, then, in one commit, the record
@@ -200,7 +218,9 @@ impl Queue {
             }
         };
         let ended = self.jobs.finish(lease, &outcome, self.clock.now()).await?;
-        if ended.is_some() && matches!(outcome, JobOutcome::Succeeded(_)) {
+        // It fails all the same where the tenant's quota has no room for the result.
+        let stored = |job: &Job| job.state == JobState::Succeeded;
+        if ended.as_ref().is_some_and(stored) {
             self.items.settle(&id);
         }
         Ok(ended)
@@ -326,6 +346,68 @@ impl Queue {
             files,
         }
     }
+}
+
+/// Longest name of a template or a reader, characters.
+const NAME_LENGTH: usize = 80;
+
+/// Why a template or a reader was not added.
+#[derive(Debug)]
+pub enum NotAdded {
+    /// It may not be: what is wrong, and what to do.
+    Refused(Failure),
+    /// The tenant has as many as it may have.
+    TooMany(Failure),
+    /// The tenant's quota of bytes has no room for it.
+    TooLarge(Failure),
+    /// The files or the record cannot be written.
+    Store(StoreError),
+}
+
+impl From<StoreError> for NotAdded {
+    fn from(error: StoreError) -> Self {
+        Self::Store(error)
+    }
+}
+
+impl NotAdded {
+    fn too_many(kind: Resource, limit: u32) -> Self {
+        let (noun, plural) = (kind.noun(), kind.plural());
+        let detail =
+            format!("There are {limit} {plural} already, the most that this service allows.");
+        let failure = Failure::new(Fault::Request, "library-full", detail);
+        Self::TooMany(failure.fix(format!(
+            "DELETE a {noun} first, or ask the operator to raise `{noun}_limit`."
+        )))
+    }
+
+    fn too_large(product: &Product, stored: u64, room: ProductRoom) -> Self {
+        let size: u64 = product.files.iter().map(|file| file.bytes).sum();
+        let limit = room.bytes.unwrap_or(u64::MAX);
+        let detail = format!(
+            "It has {size} bytes; the tenant stores {stored} of the {limit} bytes that it may store."
+        );
+        let failure = Failure::new(Fault::TooLarge, "storage-quota", detail);
+        Self::TooLarge(
+            failure.fix("DELETE items that are no longer needed, or ask the operator for more."),
+        )
+    }
+}
+
+/// Refuses a name that is empty, longer than [`NAME_LENGTH`] or not printable.
+///
+/// # Errors
+/// [`NotAdded::Refused`].
+pub fn check_name(name: &str) -> Result<(), NotAdded> {
+    let length = name.chars().count();
+    if (1..=NAME_LENGTH).contains(&length) && name.chars().all(is_printable) {
+        return Ok(());
+    }
+    let detail = format!("The name must have 1 to {NAME_LENGTH} printable characters.");
+    let failure = Failure::new(Fault::Request, "invalid-field", detail).at("name");
+    Err(NotAdded::Refused(
+        failure.fix("Give a short name such as t1_150."),
+    ))
 }
 
 /// Where a template comes from.

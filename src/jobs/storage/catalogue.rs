@@ -20,6 +20,31 @@ pub enum Deleted {
     Unknown,
 }
 
+/// Bounds on what a tenant may have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ProductRoom {
+    /// Products of the kind.
+    pub count: u32,
+    /// Bytes of everything that it stores; `None` is no bound.
+    pub bytes: Option<u64>,
+}
+
+/// The result of adding a product.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AddedProduct {
+    /// It is new for the tenant.
+    New,
+    /// The tenant has it already.
+    Known,
+    /// The tenant has as many of the kind as it may have.
+    TooMany,
+    /// The tenant stores this many bytes, and the product does not fit.
+    TooLarge {
+        /// The bytes.
+        stored: u64,
+    },
+}
+
 /// The tables of volumes and products. Every method is one transaction and fails only if the
 /// database does.
 #[async_trait]
@@ -59,13 +84,14 @@ pub trait Catalogue: Custody + Scans {
     ) -> StoreResult<ListPage<Held<StoredVolume>>>;
 
     /// Adds a product that was not made by a job, unless it is stored already, and gives it to a
-    /// tenant. `source` is the volume it was made of. Returns whether it is new for the tenant.
+    /// tenant that has it already or has room for it. `source` is the volume it was made of.
     async fn add_product(
         &self,
         product: &Product,
         tenant: &Tenant,
         source: Option<&str>,
-    ) -> StoreResult<bool>;
+        room: ProductRoom,
+    ) -> StoreResult<AddedProduct>;
 
     /// The product with that id.
     async fn product(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Held<Product>>>;

@@ -95,9 +95,13 @@ pub struct JobFilter {
 /// The jobs table. Every method is one transaction and fails only if the database does.
 #[async_trait]
 pub trait JobStore: Send + Sync + 'static {
-    /// Accepts a job and writes it to disk, unless `queue_limit` jobs are waiting, the volume or
+    /// Accepts a job and writes it to disk, unless the queue [has no room](Self::has_room), the volume or
     /// another needed item does not exist, or the idempotency key was used before.
     async fn file(&self, job: &NewJob, queue_limit: usize, now: Timestamp) -> StoreResult<Filed>;
+
+    /// Whether the queue has room for one more job of that tenant: fewer than `queue_limit` jobs wait, or the
+    /// tenant has less than its equal share of them.
+    async fn has_room(&self, tenant: &Tenant, queue_limit: usize) -> StoreResult<bool>;
 
     /// The job with that id.
     async fn job(&self, id: &str) -> StoreResult<Option<Job>>;

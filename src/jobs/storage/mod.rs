@@ -22,7 +22,7 @@ pub use blobs::{
     BlobError, BlobStore, BlobStream, BlobWriter, DiskSpace, LocalFile, Shelved, StagedFiles,
     StagedFor,
 };
-pub use catalogue::{Catalogue, Deleted};
+pub use catalogue::{AddedProduct, Catalogue, Deleted, ProductRoom};
 pub use custody::{Custody, RecordPages};
 pub use erasure::{
     AuditMark, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder, ErasureReason, Expiry,

@@ -10,6 +10,25 @@ use crate::store::database::{SqlStore, Transaction};
 use crate::store::query::{DbRow, query};
 use async_trait::async_trait;
 
+/// The bytes of everything that tenant `$1` stores: volumes, products (results, templates, readers), received
+/// objects that are not part of a volume, and work items.
+pub(super) const STORED_BYTES: &str = "CAST(
+    (SELECT coalesce(sum(v.bytes), 0) FROM holdings AS h JOIN volumes AS v ON v.id = h.id
+     WHERE h.tenant = $1 AND h.kind = 'volume')
+    + (SELECT coalesce(sum(p.bytes), 0) FROM holdings AS h JOIN products AS p ON p.id = h.id
+       WHERE h.tenant = $1 AND h.kind != 'volume')
+    + (SELECT coalesce(sum(bytes), 0) FROM intake_objects WHERE tenant = $1 AND file IS NOT NULL)
+    + (SELECT coalesce(sum(bytes), 0) FROM workitems WHERE tenant = $1) AS BIGINT)";
+
+/// The bytes of everything that a tenant stores.
+pub(super) async fn stored_bytes(of: &mut Transaction<'_>, tenant: &Tenant) -> StoreResult<u64> {
+    let row = query(format!("SELECT {STORED_BYTES}"))
+        .bind(tenant.as_str())
+        .fetch_one(&mut *of)
+        .await?;
+    Ok(rows::unsigned(row.try_get(0)?))
+}
+
 #[async_trait]
 impl AccessStore for SqlStore {
     async fn add_key(&self, key: &ApiKey, event: &AuditEvent) -> StoreResult<()> {
@@ -86,13 +105,10 @@ impl AccessStore for SqlStore {
     }
 
     async fn usage(&self, tenant: &Tenant) -> StoreResult<Usage> {
-        let row = query(
-            "SELECT CAST((SELECT coalesce(sum(bytes), 0) FROM volumes WHERE id IN
-                        (SELECT id FROM holdings WHERE tenant = $1 AND kind = 'volume'))
-                    + (SELECT coalesce(sum(bytes), 0) FROM intake_objects
-                       WHERE tenant = $1 AND file IS NOT NULL) AS BIGINT),
-                    (SELECT count(*) FROM jobs WHERE tenant = $1 AND state = 'queued')",
-        )
+        let row = query(format!(
+            "SELECT {STORED_BYTES},
+                    (SELECT count(*) FROM jobs WHERE tenant = $1 AND state = 'queued')"
+        ))
         .bind(tenant.as_str())
         .fetch_one(&self.readers)
         .await?;

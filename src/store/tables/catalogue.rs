@@ -1,12 +1,13 @@
 //! The tables of volumes and products, and the table of holdings that says which tenant
 //! has which of them.
 
+use super::access::stored_bytes;
 use super::rows::{self, SCAN_COLUMNS, to_json};
 use super::scans::{note_upload, push_scan};
 use crate::jobs::{
-    Catalogue, Erased, ErasureOrder, Expiry, Held, ItemFilter, LegalHold, ListPage, ListRequest,
-    Product, Receipt, Resource, ScanFields, StoreResult, StoredVolume, TagFilter, Tags, Tenant,
-    Timestamp,
+    AddedProduct, Catalogue, Erased, ErasureOrder, Expiry, Held, ItemFilter, LegalHold, ListPage,
+    ListRequest, Product, ProductRoom, Receipt, Resource, ScanFields, StoreResult, StoredVolume,
+    TagFilter, Tags, Tenant, Timestamp,
 };
 use crate::store::database::{SqlStore, Transaction};
 use crate::store::query::{DbRow, QueryBuilder, query};
@@ -130,14 +131,22 @@ impl Catalogue for SqlStore {
         product: &Product,
         tenant: &Tenant,
         source: Option<&str>,
-    ) -> StoreResult<bool> {
+        room: ProductRoom,
+    ) -> StoreResult<AddedProduct> {
         let mut transaction = self.writer.begin().await?;
+        if let Some(refused) = has_no_room(&mut transaction, product, tenant, room).await? {
+            transaction.commit().await?;
+            return Ok(refused);
+        }
         let new = insert_product(&mut transaction, product, tenant).await?;
         if let Some(volume) = source {
             add_source(&mut transaction, tenant, &product.id, volume).await?;
         }
         transaction.commit().await?;
-        Ok(new)
+        Ok(match new {
+            true => AddedProduct::New,
+            false => AddedProduct::Known,
+        })
     }
 
     async fn product(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Held<Product>>> {
@@ -374,6 +383,38 @@ pub(super) fn push_page(query: &mut QueryBuilder, sequence: &str, page: ListRequ
     }
     query.push(" ORDER BY ").push(sequence).push(" DESC LIMIT ");
     query.push_bind(i64::from(page.limit) + 1);
+}
+
+/// Why a tenant that does not have a product yet cannot have it.
+async fn has_no_room(
+    to: &mut Transaction<'_>,
+    product: &Product,
+    tenant: &Tenant,
+    room: ProductRoom,
+) -> StoreResult<Option<AddedProduct>> {
+    let row = query(
+        "SELECT (SELECT count(*) FROM holdings WHERE tenant = $1 AND id = $2),
+                (SELECT count(*) FROM holdings WHERE tenant = $1 AND kind = $3)",
+    )
+    .bind(tenant.as_str())
+    .bind(&product.id)
+    .bind(product.resource().noun())
+    .fetch_one(&mut *to)
+    .await?;
+    let [held, count] = [0, 1].map(|column| row.try_get::<i64, _>(column));
+    if held? > 0 {
+        return Ok(None);
+    }
+    if count? >= i64::from(room.count) {
+        return Ok(Some(AddedProduct::TooMany));
+    }
+    let Some(limit) = room.bytes else {
+        return Ok(None);
+    };
+    let stored = stored_bytes(to, tenant).await?;
+    let size: u64 = product.files.iter().map(|file| file.bytes).sum();
+    let fits = stored.saturating_add(size) <= limit;
+    Ok((!fits).then_some(AddedProduct::TooLarge { stored }))
 }
 
 /// Gives an item to a tenant, or renews its holding. Returns whether it is new for the tenant.

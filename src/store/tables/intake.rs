@@ -1,5 +1,6 @@
 //! The tables of received objects.
 
+use super::access::stored_bytes;
 use super::rows;
 use crate::intake::{
     Added, GROUP_PREFIX, GroupState, IntakeGroup, IntakeRoom, IntakeStore, NewObject, Origin,
@@ -335,21 +336,40 @@ async fn has_room(
     object: &NewObject,
     room: IntakeRoom,
 ) -> StoreResult<bool> {
+    // Of all tenants, what may still become a volume; of this one, all that takes room.
     let row = query(
-        "SELECT count(*), CAST(coalesce(sum(bytes), 0) AS BIGINT),
-                CAST(coalesce(sum(bytes) FILTER (WHERE tenant = $1), 0)
-                + (SELECT coalesce(sum(bytes), 0) FROM volumes WHERE id IN
-                      (SELECT id FROM holdings WHERE tenant = $1 AND kind = 'volume')) AS BIGINT)
-         FROM intake_objects WHERE file IS NOT NULL",
+        "SELECT count(*) FILTER (WHERE state != 'failed'),
+                CAST(coalesce(sum(bytes) FILTER (WHERE state != 'failed'), 0) AS BIGINT),
+                count(*) FILTER (WHERE o.tenant = $1),
+                CAST(coalesce(sum(bytes) FILTER (WHERE o.tenant = $1), 0) AS BIGINT),
+                count(DISTINCT o.tenant) FILTER (WHERE o.tenant != $1 AND state != 'failed')
+         FROM intake_objects AS o JOIN intake_groups AS g ON g.id = o.group_id
+         WHERE file IS NOT NULL",
     )
     .bind(object.origin.tenant.as_str())
-    .fetch_one(to)
+    .fetch_one(&mut *to)
     .await?;
-    let [objects, bytes, of_tenant] = [0, 1, 2].map(|column| row.try_get::<i64, _>(column));
-    let fits = |used: i64, limit: u64| rows::unsigned(used).saturating_add(object.bytes) <= limit;
-    Ok(rows::unsigned(objects?) < room.objects
-        && fits(bytes?, room.bytes)
-        && fits(of_tenant?, room.tenant_bytes.unwrap_or(u64::MAX)))
+    let mut counted = [0; 5];
+    for (column, count) in counted.iter_mut().enumerate() {
+        *count = rows::unsigned(row.try_get(column)?);
+    }
+    let [objects, bytes, own_objects, own_bytes, others] = counted;
+    let shared = |used: u64, own: u64, added: u64, limit: u64| {
+        let own = own.saturating_add(added);
+        // A tenant that has less than its equal share has room also where others have taken all.
+        own <= limit
+            && (used.saturating_add(added) <= limit || own.saturating_mul(others + 1) <= limit)
+    };
+    if !shared(objects, own_objects, 1, room.objects)
+        || !shared(bytes, own_bytes, object.bytes, room.bytes)
+    {
+        return Ok(false);
+    }
+    let Some(limit) = room.tenant_bytes else {
+        return Ok(true);
+    };
+    let stored = stored_bytes(to, &object.origin.tenant).await?;
+    Ok(stored.saturating_add(object.bytes) <= limit)
 }
 
 /// Finds or makes the group of an object, and opens it. Returns its id.

@@ -17,14 +17,15 @@
 //! take an index of unfinished jobs, which looks small to it, for as good as the job's key; after a busy
 //! minute that index is full of entries of ended versions, and each of them is read.
 
+use super::access::stored_bytes;
 use super::catalogue::{insert_product, push_page, push_tags};
 use super::erasure::record_deletion;
 use super::rows::{self, to_json};
 use super::scans::push_scan;
 use crate::jobs::{
-    Claimant, DeathLimit, Deleted, Filed, Interrupted, Job, JobFilter, JobOutcome, JobState,
-    JobStore, Lease, ListPage, ListRequest, NewJob, QueueLoad, Resource, StoreResult, Tenant,
-    Timestamp, random_id,
+    Claimant, DeathLimit, Deleted, Failure, Fault, Filed, Interrupted, Job, JobFilter, JobOutcome,
+    JobState, JobStore, Lease, ListPage, ListRequest, NewJob, Product, QueueLoad, Resource,
+    StoreResult, Tenant, Timestamp, random_id,
 };
 use crate::store::database::{SqlStore, Transaction};
 use crate::store::query::{QueryBuilder, query};
@@ -41,6 +42,12 @@ const TURN: &str = "(SELECT CASE WHEN here > own THEN here ELSE own END FROM (SE
              (SELECT max(turn) + 1 FROM jobs WHERE state = 'running' AND priority = $17), 0) AS here,
     coalesce((SELECT max(turn) + 1 FROM jobs
               WHERE tenant = $10 AND priority = $17 AND state IN ('queued', 'running')), 0) AS own) AS turns)";
+
+/// Whether a queue of `$8` waiting jobs has room for one more of tenant `$10`. A tenant that has less than its
+/// equal share has room also where others have filled the queue.
+const HAS_ROOM: &str = "((SELECT count(*) FROM jobs WHERE state = 'queued') < $8
+    OR (SELECT count(*) FROM jobs WHERE tenant = $10 AND state = 'queued')
+       * (1 + (SELECT count(DISTINCT tenant) FROM jobs WHERE state = 'queued' AND tenant != $10)) < $8)";
 
 /// The number of waiting jobs before each of the jobs `$1`. Each part of the queue is counted once, however
 /// many jobs are asked for: within a priority from one of them to the next, and all higher priorities at
@@ -139,9 +146,9 @@ impl JobStore for SqlStore {
         let inserted = query(format!(
             "INSERT INTO jobs (id, kind, volume, parameters, created_at, idempotency_key,
                                fingerprint, needs, tenant, external_id, labels, webhook,
-                               trace_parent, source, send, priority, turn)
-             SELECT $1, $2, $3, $4, $5, $6, $7, $9, $10, $11, $12, $13, $14, $15, $16, $17, {TURN}
-             WHERE (SELECT count(*) FROM jobs WHERE state = 'queued') < $8
+                               trace_parent, source, send, priority, storage_limit, turn)
+             SELECT $1, $2, $3, $4, $5, $6, $7, $9, $10, $11, $12, $13, $14, $15, $16, $17, $18, {TURN}
+             WHERE {HAS_ROOM}
                AND ($15 IS NOT NULL
                     OR EXISTS (SELECT 1 FROM holdings
                                WHERE tenant = $10 AND id = $3 AND kind = 'volume'))
@@ -168,6 +175,7 @@ impl JobStore for SqlStore {
         .bind(job.source.as_ref().map(to_json).transpose()?)
         .bind(job.send.as_ref().map(to_json).transpose()?)
         .bind(job.priority.rank())
+        .bind(job.storage_limit.map(|limit| i64::try_from(limit).unwrap_or(i64::MAX)))
         .fetch_optional(&mut transaction)
         .await?;
         if let Some(row) = inserted {
@@ -182,6 +190,16 @@ impl JobStore for SqlStore {
             return Ok(earlier);
         }
         Ok(self.missing(job).await?.unwrap_or(Filed::QueueFull))
+    }
+
+    async fn has_room(&self, tenant: &Tenant, queue_limit: usize) -> StoreResult<bool> {
+        let has_room = HAS_ROOM.replace("$10", "$1").replace("$8", "$2");
+        let row = query(format!("SELECT {has_room}"))
+            .bind(tenant.as_str())
+            .bind(i64::try_from(queue_limit).unwrap_or(i64::MAX))
+            .fetch_one(&self.readers)
+            .await?;
+        row.try_get(0)
     }
 
     async fn job(&self, id: &str) -> StoreResult<Option<Job>> {
@@ -372,10 +390,16 @@ impl JobStore for SqlStore {
             transaction.commit().await?;
             return Ok(None);
         };
-        let job = rows::job(row)?;
+        let limit: Option<i64> = row.try_get("storage_limit")?;
+        let mut job = rows::job(row)?;
         renew_volumes(&mut transaction, &job, now).await?;
         if let Some(product) = product {
-            insert_product(&mut transaction, product, &job.tenant).await?;
+            match has_no_room(&mut transaction, &job.tenant, product, limit).await? {
+                None => {
+                    insert_product(&mut transaction, product, &job.tenant).await?;
+                }
+                Some(failure) => job = fail(&mut transaction, &job.id, &failure).await?,
+            }
         }
         transaction.commit().await?;
         Ok(Some(job))
@@ -558,6 +582,47 @@ impl SqlStore {
         let earlier = self.filed_under(&job.tenant, &promise.key).await?;
         Ok(earlier.map(|(job, fingerprint)| promise.judge(job, &fingerprint)))
     }
+}
+
+/// Why a product cannot be added, if the tenant may store no more than `limit` bytes.
+async fn has_no_room(
+    to: &mut Transaction<'_>,
+    tenant: &Tenant,
+    product: &Product,
+    limit: Option<i64>,
+) -> StoreResult<Option<Failure>> {
+    let Some(limit) = limit.map(rows::unsigned) else {
+        return Ok(None);
+    };
+    let held = query("SELECT 1 FROM holdings WHERE tenant = $1 AND id = $2")
+        .bind(tenant.as_str())
+        .bind(&product.id)
+        .fetch_optional(&mut *to)
+        .await?;
+    let stored = stored_bytes(to, tenant).await?;
+    let size: u64 = product.files.iter().map(|file| file.bytes).sum();
+    if held.is_some() || stored.saturating_add(size) <= limit {
+        return Ok(None);
+    }
+    let detail = format!(
+        "The result has {size} bytes; the tenant stores {stored} of the {limit} bytes that it may store."
+    );
+    let failure = Failure::new(Fault::Request, "storage-quota", detail);
+    Ok(Some(failure.fix(
+        "DELETE items that are no longer needed, or ask the operator for more, then file the job again.",
+    )))
+}
+
+/// Fails a job instead of the success that was just noted.
+async fn fail(to: &mut Transaction<'_>, id: &str, failure: &Failure) -> StoreResult<Job> {
+    let row = query(
+        "UPDATE jobs SET state = 'failed', failure = $1, result = NULL WHERE id = $2 RETURNING *",
+    )
+    .bind(to_json(failure)?)
+    .bind(id)
+    .fetch_one(to)
+    .await?;
+    rows::job(row)
 }
 
 /// A key as the table holds it: unique among all tenants, as no tenant's name contains a slash.

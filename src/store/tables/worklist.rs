@@ -4,7 +4,7 @@ use super::rows::{self, to_json};
 use crate::jobs::{StoreError, StoreResult, Tenant, Timestamp};
 use crate::store::database::SqlStore;
 use crate::store::query::{DbRow, query};
-use crate::worklist::{AddedWorkitem, DataSetJson, Workitem, WorkitemState, Worklist};
+use crate::worklist::{AddedWorkitem, BATCH_BYTES, DataSetJson, Workitem, WorkitemState, Worklist};
 use async_trait::async_trait;
 
 #[async_trait]
@@ -69,40 +69,32 @@ impl Worklist for SqlStore {
         after: i64,
         limit: u32,
     ) -> StoreResult<Vec<Workitem>> {
-        let rows = query(
-            "SELECT * FROM workitems
-             WHERE tenant = $1 AND ($2 IS NULL OR state = $2) AND sequence > $3
-             ORDER BY sequence LIMIT $4",
-        )
-        .bind(tenant.as_str())
-        .bind(state.map(WorkitemState::as_str))
-        .bind(after)
-        .bind(limit)
-        .fetch_all(&self.readers)
-        .await?;
-        rows::all(rows, item_of)
+        let state = state.map(WorkitemState::as_str);
+        let items = match state {
+            None => query(batch("tenant = $4")).bind(after).bind(limit),
+            Some(_) => query(batch("tenant = $4 AND state = $5"))
+                .bind(after)
+                .bind(limit),
+        };
+        let items = items.bind(most_bytes()).bind(tenant.as_str());
+        let items = match state {
+            None => items,
+            Some(state) => items.bind(state),
+        };
+        rows::all(items.fetch_all(&self.readers).await?, item_of)
     }
 
     async fn scheduled_workitems(&self, after: i64, limit: u32) -> StoreResult<Vec<Workitem>> {
-        let rows = query(
-            "SELECT * FROM workitems WHERE state = 'SCHEDULED' AND sequence > $1
-             ORDER BY sequence LIMIT $2",
-        )
-        .bind(after)
-        .bind(limit)
-        .fetch_all(&self.readers)
-        .await?;
-        rows::all(rows, item_of)
+        let items = query(batch("state = 'SCHEDULED'")).bind(after).bind(limit);
+        let items = items.bind(most_bytes()).fetch_all(&self.readers);
+        rows::all(items.await?, item_of)
     }
 
-    async fn performed_workitems(&self) -> StoreResult<Vec<Workitem>> {
-        let rows = query(
-            "SELECT * FROM workitems WHERE state = 'IN PROGRESS' AND performer IS NOT NULL
-             ORDER BY sequence",
-        )
-        .fetch_all(&self.readers)
-        .await?;
-        rows::all(rows, item_of)
+    async fn performed_workitems(&self, after: i64, limit: u32) -> StoreResult<Vec<Workitem>> {
+        let which = "state = 'IN PROGRESS' AND performer IS NOT NULL";
+        let items = query(batch(which)).bind(after).bind(limit);
+        let items = items.bind(most_bytes()).fetch_all(&self.readers);
+        rows::all(items.await?, item_of)
     }
 
     async fn delete_ended_workitems(&self, before: Timestamp) -> StoreResult<u64> {
@@ -114,6 +106,24 @@ impl Worklist for SqlStore {
         .write(&self.writer)
         .await
     }
+}
+
+/// A statement for the items for which `which` holds: at most `$2` after position `$1`, as long as those before each
+/// have fewer than `$3` bytes together. Sizes are added up before any item is read.
+fn batch(which: &str) -> String {
+    format!(
+        "SELECT * FROM workitems WHERE sequence IN (
+             SELECT sequence FROM (
+                 SELECT sequence, bytes, sum(bytes) OVER (ORDER BY sequence) AS total FROM (
+                     SELECT sequence, bytes FROM workitems WHERE {which} AND sequence > $1
+                     ORDER BY sequence LIMIT $2) AS next) AS added
+             WHERE total - bytes < $3)
+         ORDER BY sequence"
+    )
+}
+
+fn most_bytes() -> i64 {
+    i64::try_from(BATCH_BYTES).unwrap_or(i64::MAX)
 }
 
 fn item_of(row: DbRow) -> StoreResult<Workitem> {

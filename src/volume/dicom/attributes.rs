@@ -255,6 +255,13 @@ impl Attribute {
     }
 }
 
+/// Most bytes of a text that is kept: a name has at most three groups of 64 characters of four bytes (PS3.5, 6.2), a
+/// description 64 characters.
+const LONGEST_TEXT: usize = 1024;
+
+/// Most values of a code string that are kept.
+const MOST_CODES: usize = 16;
+
 /// `text`, cut to 100 characters for an error message, control characters escaped.
 pub(super) fn clip(text: &str) -> String {
     const LONGEST: usize = 100;
@@ -371,10 +378,18 @@ impl Attributes {
         }
     }
 
-    /// The first value of a text attribute.
+    /// The first value of a text attribute; none if it is longer than any that the standard has.
     pub(super) fn text(&self, attribute: Attribute) -> Option<String> {
         let first = self.texts(attribute).into_iter().next();
-        first.filter(|text| !text.is_empty())
+        first.filter(|text| !text.is_empty() && text.len() <= LONGEST_TEXT)
+    }
+
+    /// The values of a code string, as many and as long as any that the standard has.
+    pub(super) fn codes(&self, attribute: Attribute) -> Vec<String> {
+        let mut codes = self.texts(attribute);
+        codes.truncate(MOST_CODES);
+        codes.retain(|code| code.len() <= LONGEST_TEXT);
+        codes
     }
 
     /// The whole text of an attribute, for people to read; `None` if it is absent, empty, or cannot
@@ -392,6 +407,13 @@ impl Attributes {
         let Some(bytes) = self.bytes_of(attribute, None) else {
             return Ok(None);
         };
+        // These texts are stored with every volume, and listed.
+        if bytes.len() > LONGEST_TEXT {
+            return Err(format!(
+                "it has {} bytes, more than the {LONGEST_TEXT} of the longest text",
+                bytes.len()
+            ));
+        }
         let entry = StandardDataDictionary.by_tag(attribute.tag);
         let representation = entry.map_or(VR::UN, |entry| entry.vr().relaxed());
         let sets = self.character_sets(attribute.path);

@@ -65,7 +65,7 @@ pub fn read_header(
         study: uid(&a, STUDY_UID)?,
         series: uid(&a, SERIES_UID)?,
         modality: a.text(MODALITY),
-        image_type: a.texts(IMAGE_TYPE),
+        image_type: a.codes(IMAGE_TYPE),
         study_description: a.prose(STUDY_DESCRIPTION),
         data_set: syntax.data_set,
     })

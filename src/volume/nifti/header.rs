@@ -51,6 +51,11 @@ pub(super) struct Header {
 }
 
 impl Header {
+    /// Whether it is that of NIfTI-2.
+    pub(super) fn is_second(&self) -> bool {
+        self.second_version
+    }
+
     /// Reads and checks the header at the start of `source`.
     ///
     /// # Errors

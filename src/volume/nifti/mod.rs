@@ -7,6 +7,7 @@
 //! Colour and complex data types are rejected, because the uptake cannot be told from their parts.
 //! CIFTI files, which store matrices in a NIfTI-2 file, are rejected too.
 
+mod bare;
 mod header;
 mod place;
 mod stated;
@@ -15,6 +16,7 @@ pub mod write;
 #[cfg(test)]
 mod tests;
 
+pub use bare::is_bare;
 pub use write::{MaskError, StoredType, TooLong, write, write_mask};
 
 use self::header::Header;

@@ -1,0 +1,268 @@
+#!/usr/bin/env python3
+"""What is cheap to ask for is cheap to answer: attacks by one client on the built program, under a limit of memory.
+
+    scripts/check_limits.py --program target/debug/ventriform
+
+Each attack runs against a service of its own that may have 1 GiB of data (`prlimit --data`), and 60 s of
+processor time. Meanwhile another client, told apart by a trusted proxy's header, asks for its lists, health and small
+uploads; it must be answered within two seconds (more where `--patience` says so, for slow programs), and the
+service must live and be what it was when the attack is over. Uses the standard library alone."""
+import argparse
+import json
+import os
+import random
+import re
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import urllib.error
+import urllib.request
+
+GIB = 1 << 30
+HOST = b"Host: localhost\r\nX-Forwarded-For: 192.0.2.66\r\n"
+HONEST = {"X-Forwarded-For": "192.0.2.7"}
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+class Service:
+    def __init__(self, program, folder, *arguments):
+        self.port, self.folder = free_port(), folder
+        self.url = f"http://127.0.0.1:{self.port}"
+        self.log = open(folder + ".log", "wb")
+        command = ["prlimit", f"--data={GIB}", "--cpu=60", "--nofile=16384", program, "serve", "--listen", f"127.0.0.1:{self.port}",
+                   "--data-dir", folder, "--workers", "1", "--trusted-proxies", "127.0.0.1", *arguments]
+        self.process = subprocess.Popen(command, stdout=self.log, stderr=subprocess.STDOUT)
+        end = time.time() + 30
+        while time.time() < end and self.process.poll() is None:
+            try:
+                urllib.request.urlopen(self.url + "/readyz", timeout=2).read()
+                return
+            except OSError:
+                time.sleep(0.05)
+        sys.exit(f"the service did not start: {open(folder + '.log').read()[-500:]}")
+
+    def memory(self, what="VmHWM"):
+        status = open(f"/proc/{self.process.pid}/status").read()
+        return int(re.search(what + r":\s+(\d+)", status)[1]) >> 10
+
+    def ask(self, method, path, body=None, headers=None, timeout=30):
+        request = urllib.request.Request(self.url + path, data=body, method=method, headers=headers or {})
+        try:
+            with urllib.request.urlopen(request, timeout=timeout) as answer:
+                return answer.status, answer.read()
+        except urllib.error.HTTPError as answer:
+            return answer.code, answer.read()
+
+    def connect(self):
+        s = socket.create_connection(("127.0.0.1", self.port), 10)
+        s.settimeout(10)
+        return s
+
+    def stop(self):
+        if self.process.poll() is None:
+            self.process.terminate()
+            try:
+                self.process.wait(20)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+                self.process.wait()
+        self.log.close()
+
+
+class Honest(threading.Thread):
+    """Another client, which asks for little, all the time."""
+
+    def __init__(self, service, scan):
+        super().__init__(daemon=True)
+        self.service, self.scan, self.over = service, scan, threading.Event()
+        self.slowest, self.refused, self.asked = (0.0, ""), [], 0
+
+    def run(self):
+        number = 0
+        while not self.over.is_set():
+            number += 1
+            upload = self.scan[:-8] + struct.pack("<d", number)
+            for method, path, body in [("GET", "/healthz", None), ("GET", "/v1/volumes?limit=5", None), ("GET", "/v1/jobs", None),
+                                       ("POST", "/v1/volumes", upload)]:
+                began = time.time()
+                headers = dict(HONEST, **({"content-type": "application/octet-stream"} if body else {}))
+                try:
+                    status, _ = self.service.ask(method, path, body, headers)
+                except OSError as error:
+                    status = repr(error)
+                self.asked += 1
+                self.slowest = max(self.slowest, (time.time() - began, f"{method} {path}"))
+                if status not in (200, 201):
+                    self.refused.append((method, path, status))
+            time.sleep(0.05)
+
+
+def nifti(side=16):
+    """A scan of noise as NIfTI-1."""
+    header = bytearray(352)
+    struct.pack_into("<i", header, 0, 348)
+    struct.pack_into("<8h", header, 40, 3, side, side, side, 1, 1, 1, 1)
+    struct.pack_into("<2h", header, 70, 64, 64)
+    struct.pack_into("<8f", header, 76, 1, 4, 4, 4, 1, 1, 1, 1)
+    struct.pack_into("<f", header, 108, 352)
+    header[123] = 2
+    struct.pack_into("<2h", header, 252, 0, 1)
+    struct.pack_into("<12f", header, 280, 4, 0, 0, 0, 0, 4, 0, 0, 0, 0, 4, 0)
+    header[344:348] = b"n+1\0"
+    noise = random.Random(1)
+    return bytes(header) + struct.pack(f"<{side ** 3}d", *(noise.random() for _ in range(side ** 3)))
+
+
+def archive(entries, plain):
+    """A zip archive whose zip64 record states `entries`, and whose plain record states `plain`."""
+    local = b"PK\x03\x04" + struct.pack("<5H3I2H", 45, 0, 0, 0, 33, 0, 0, 0, 1, 0) + b"a"
+    entry = struct.pack("<4s6H3I5H2I", b"PK\x01\x02", 45, 45, 0, 0, 0, 33, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0) + b"a"
+    directory = entry * entries
+    start, size = len(local), len(directory)
+    record = struct.pack("<4sQ2H2I4Q", b"PK\x06\x06", 44, 45, 45, 0, 0, entries, entries, size, start)
+    locator = struct.pack("<4sIQI", b"PK\x06\x07", 0, start + size, 1)
+    end = struct.pack("<4s4H2IH", b"PK\x05\x06", 0, 0, plain, plain, 47 if plain == 1 else 0xFFFFFFFF, 0xFFFFFFFF, 0)
+    return local + directory + record + locator + end
+
+
+def held(service, requests, count, seconds=3):
+    """Sends `count` requests, one on each connection, that are not completed or whose answers are not read."""
+    open_ones, refused = [], 0
+    for number in range(count):
+        try:
+            s = service.connect()
+            s.sendall(requests(number))
+            open_ones.append(s)
+        except OSError:
+            refused += 1
+    time.sleep(seconds)
+    for s in open_ones:
+        s.close()
+    return f"{len(open_ones)} connections, {refused} broken"
+
+
+def head(method, path, length=None, kind="application/octet-stream"):
+    text = f"{method} {path} HTTP/1.1\r\n".encode() + HOST
+    if length is not None:
+        text += f"Content-Type: {kind}\r\nContent-Length: {length}\r\n".encode()
+    return text + b"\r\n"
+
+
+def zip64(service):
+    said = []
+    for plain in (1, 0xFFFF):
+        status, body = service.ask("POST", "/v1/volumes", archive(600_000, plain), {"content-type": "application/octet-stream", "X-Forwarded-For": "192.0.2.66"}, 60)
+        assert status in (413, 422), (status, body)
+        said.append(status)
+    return f"answers {said}"
+
+
+def half_uploads(service):
+    body = bytes((1 << 20) - 1)
+    return held(service, lambda _: head("POST", "/v1/volumes", 2_000_000) + body, 900)
+
+
+def half_json(service):
+    body = b"[" + b" " * 230_000
+    paths = ["/v1/jobs", "/v1/keys", "/v1/templates?name=t", "/v1/readers", "/dicom-web/workitems", "/v1/webhooks"]
+    return held(service, lambda n: head("POST", paths[n % len(paths)], 250_000, "application/json") + body, 1500)
+
+
+def dense_json(service):
+    body = b'{"parameters":{"x":[' + b"0," * 120_000 + b"0]}}"
+    return held(service, lambda _: head("POST", "/v1/jobs", len(body), "application/json") + body, 600)
+
+
+def half_forms(service):
+    start = b"--B\r\nContent-Disposition: form-data; name=\"f\"; filename=\"a\"\r\n\r\n" + bytes(400_000)
+    kind = "multipart/form-data; boundary=B"
+    return held(service, lambda _: head("POST", "/v1/volumes", 900_000, kind) + start, 1200)
+
+
+def half_objects(service):
+    start = b"--B\r\nContent-Type: application/dicom\r\n\r\n" + bytes(400_000)
+    kind = 'multipart/related; type="application/dicom"; boundary=B'
+    return held(service, lambda _: head("POST", "/dicom-web/studies", 900_000, kind) + start, 1200)
+
+
+def labelled(service):
+    """Lists whose entries are as large as a client can make them, asked for and not read."""
+    _, body = service.ask("POST", "/v1/volumes", nifti(), {"content-type": "application/octet-stream"})
+    volume = json.loads(body)["id"]
+    labels = {f"n{number}": "\U0001F600" * 256 for number in range(16)}
+    for seed in range(60):
+        order = {"kind": "model", "volume": volume, "priority": "bulk", "labels": labels, "parameters": {"points": 67, "seed": seed}}
+        status, body = service.ask("POST", "/v1/jobs", json.dumps(order).encode(), {"content-type": "application/json"})
+        assert status == 202, (status, body)
+    return held(service, lambda _: head("GET", "/v1/jobs?limit=100"), 1200)
+
+
+def work_items(service):
+    item = [{"00741000": {"vr": "CS", "Value": ["SCHEDULED"]}, "00741204": {"vr": "LT", "Value": ["x" * 240_000]}}]
+    for _ in range(100):
+        status, body = service.ask("POST", "/dicom-web/workitems", json.dumps(item).encode(), {"content-type": "application/json"})
+        assert status == 201, (status, body)
+    queries = ["limit=1000", "limit=1000&PatientName=*a*b*c*", "ProcedureStepLabel=*x*x*x*x*y", "limit=1000&offset=90"]
+    return held(service, lambda n: head("GET", "/dicom-web/workitems?" + queries[n % len(queries)]), 400, 5)
+
+
+def slow_downloads(service):
+    _, body = service.ask("POST", "/v1/volumes", nifti(64), {"content-type": "application/octet-stream"})
+    volume = json.loads(body)["id"]
+    return held(service, lambda _: head("GET", f"/v1/volumes/{volume}/content"), 1200)
+
+
+ATTACKS = [zip64, half_uploads, half_json, dense_json, half_forms, half_objects, labelled, work_items, slow_downloads]
+
+
+def attempt(attack, program, patience):
+    with tempfile.TemporaryDirectory() as folder:
+        service = Service(program, folder + "/data", "--queue-limit", "1000")
+        honest = Honest(service, nifti())
+        honest.start()
+        said, wrong = "", []
+        try:
+            said = attack(service)
+        except (AssertionError, OSError) as error:
+            wrong.append(repr(error)[:300])
+        honest.over.set()
+        honest.join(60)
+        if service.process.poll() is not None:
+            wrong.append(f"the service died: {service.process.poll()}")
+        else:
+            said += f", at most {service.memory()} MiB"
+            status, _ = service.ask("GET", "/readyz")
+            if status != 200:
+                wrong.append(f"/readyz {status}")
+        if honest.refused:
+            wrong.append(f"refused: {honest.refused[:3]}")
+        if honest.slowest[0] > patience:
+            wrong.append("an honest request took too long")
+        service.stop()
+        slowest = f"slowest of {honest.asked} honest requests {honest.slowest[0]:.2f} s ({honest.slowest[1]})"
+        print(f"{'FAILED' if wrong else 'ok'}: {attack.__name__}: {said}; {slowest} {'; '.join(wrong)}", flush=True)
+        return not wrong
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--program", default="target/debug/ventriform")
+    parser.add_argument("--patience", type=float, default=2.0)
+    parser.add_argument("attacks", nargs="*")
+    given = parser.parse_args()
+    chosen = [attack for attack in ATTACKS if not given.attacks or attack.__name__ in given.attacks]
+    done = [attempt(attack, os.path.abspath(given.program), given.patience) for attack in chosen]
+    sys.exit(not all(done))
+
+
+if __name__ == "__main__":
+    main()
