@@ -71,6 +71,9 @@ install_external_tools() {
   need dciodvfy dicom3tools dcmtk
   need chromium chromium fonts-dejavu-core
   need ip iproute2
+  need openssl openssl
+  [ -x /usr/sbin/nginx ] || need nginx nginx-light
+  need promtool prometheus
   need kubectl kubernetes-client
   python3 -c 'import ensurepip, venv' 2>/dev/null || need no-such-command python3 python3-venv python3-pip
   if ! cmp -s scripts/requirements.txt "$tools/python.done"; then
@@ -132,6 +135,8 @@ if wait "${running[install]}"; then
   start s3 scripts/check_s3.sh
   start chaos "$PYTHON" scripts/chaos.py --program target/debug/ventriform --rounds 10
   start kubernetes scripts/check_kubernetes.sh
+  start proxy scripts/check_proxy.sh
+  start alerts promtool test rules deploy/prometheus/alerts_test.yml
   start dependencies "$PYTHON" scripts/dependencies.py check
   collect formats "formats read by trimesh, vtk and the glTF validator"
   collect geodesics "geodesics against pygeodesic"
@@ -145,6 +150,8 @@ if wait "${running[install]}"; then
   collect s3 "files in S3 by moto"
   collect chaos "ten faults of replicas, database and store"
   collect kubernetes "manifests against the schemas of Kubernetes"
+  collect proxy "service behind nginx"
+  collect alerts "alerts of Prometheus"
   collect dependencies "licences, sources and bill of materials"
 else
   cat "$tools/install.log"
