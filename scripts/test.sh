@@ -71,6 +71,9 @@ install_external_tools() {
   need dciodvfy dicom3tools dcmtk
   need chromium chromium fonts-dejavu-core
   need ip iproute2
+  need openssl openssl
+  [ -x /usr/sbin/nginx ] || need nginx nginx-light
+  need promtool prometheus
   need kubectl kubernetes-client
   python3 -c 'import ensurepip, venv' 2>/dev/null || need no-such-command python3 python3-venv python3-pip
   if ! cmp -s scripts/requirements.txt "$tools/python.done"; then
@@ -134,6 +137,8 @@ if wait "${running[install]}"; then
   start kubernetes scripts/check_kubernetes.sh
   # Beside other checks on the same processors, and without optimisation, honest requests take longer.
   start limits "$PYTHON" scripts/check_limits.py --program target/debug/ventriform --patience 4
+  start proxy scripts/check_proxy.sh
+  start alerts promtool test rules deploy/prometheus/alerts_test.yml
   start dependencies "$PYTHON" scripts/dependencies.py check
   collect formats "formats read by trimesh, vtk and the glTF validator"
   collect geodesics "geodesics against pygeodesic"
@@ -148,6 +153,8 @@ if wait "${running[install]}"; then
   collect chaos "ten faults of replicas, database and store"
   collect kubernetes "manifests against the schemas of Kubernetes"
   collect limits "attacks of one client under a limit of memory"
+  collect proxy "service behind nginx"
+  collect alerts "alerts of Prometheus"
   collect dependencies "licences, sources and bill of materials"
 else
   cat "$tools/install.log"

@@ -16,7 +16,8 @@ const report: BuildOptions = {
 const esbuild = { jsx: "automatic", jsxImportSource: "preact", legalComments: "none" } as const;
 
 export default defineConfig(({ mode }) => (mode === "report" ? { build: report, esbuild } : {
-  base: "/",
+  // Files are named relative to the page and to each other: a proxy may show the service under a path.
+  base: "./",
   esbuild,
   server: { proxy: { "/v1": service, "/openapi.json": service, "/docs": service } },
   build: {

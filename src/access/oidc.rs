@@ -3,17 +3,21 @@
 //!
 //! 1. The header names algorithm and key. Only RS256/384/512, PS256/384/512, ES256, ES384 and
 //!    EdDSA are read, and only with a key made for that algorithm. So neither `none` nor a token
-//!    "signed" with a public key as an HMAC secret is accepted.
+//!    "signed" with a public key as an HMAC secret is accepted. A header with `crit` is refused: it names
+//!    extensions that a reader must understand (RFC 7515, 4.1.11), and none is known here.
 //! 2. Signature, issuer, audience, expiry (required) and `nbf` are checked, with a leeway.
-//! 3. Claims give tenant and scope.
+//! 3. Claims give tenant and scope. The setting is the claim's name, or a path of names with dots
+//!    between them (`realm_access.roles`).
 //!
 //! The JWKS is read when the first token comes, again each [`REFRESH_AFTER`], and for an unknown
-//! key at most once per [`RETRY_AFTER`]. If the issuer does not answer, the known keys are used
-//! for at most [`STALE_AFTER`].
+//! key at most once per [`RETRY_AFTER`]. A token whose key is known does not wait for that: the keys are
+//! used as they are, for at most [`STALE_AFTER`], and read anew beside the requests.
 
 use super::{Identity, Quota, Scope};
 use crate::jobs::{Tenant, content_id};
 use crate::text::is_printable;
+use base64::Engine;
+use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use jsonwebtoken::jwk::{AlgorithmParameters, EllipticCurve, Jwk};
 use jsonwebtoken::{Algorithm, DecodingKey, Header, Validation, decode, decode_header};
 use serde_json::{Map, Value};
@@ -66,7 +70,9 @@ pub enum IssuerError {
 }
 
 /// The issuer, with its keys as they were read last.
-pub struct Issuer {
+pub struct Issuer(Arc<Known>);
+
+struct Known {
     settings: IssuerSettings,
     client: reqwest::Client,
     keys: RwLock<Option<Keys>>,
@@ -101,12 +107,12 @@ impl Issuer {
             .redirect(reqwest::redirect::Policy::none())
             .build()
             .map_err(|error| IssuerError::Unavailable(error.to_string()))?;
-        Ok(Self {
+        Ok(Self(Arc::new(Known {
             settings,
             client,
             keys: RwLock::new(None),
             tried: tokio::sync::Mutex::new(None),
-        })
+        })))
     }
 
     /// Who presents this token.
@@ -121,22 +127,29 @@ impl Issuer {
         ) {
             return Err(refused("it is signed with a shared secret"));
         }
-        let keys = self.keys_for(&header).await?;
+        if demands_extensions(token) {
+            return Err(refused(
+                "it demands extensions (`crit`) that are unknown here",
+            ));
+        }
+        let keys = self.0.keys_for(&header).await?;
         let mut candidates = keys.iter().filter(|key| key.fits(&header)).peekable();
         if candidates.peek().is_none() {
             return Err(refused("no key of the issuer fits it"));
         }
-        let validation = self.validation(header.alg);
+        let validation = self.0.validation(header.alg);
         let mut reason = refused("its signature is wrong");
         for key in candidates {
             match decode::<Map<String, Value>>(token, &key.key, &validation) {
-                Ok(token) => return self.identity(&token.claims),
+                Ok(token) => return self.0.identity(&token.claims),
                 Err(error) => reason = why(&error),
             }
         }
         Err(reason)
     }
+}
 
+impl Known {
     fn validation(&self, algorithm: Algorithm) -> Validation {
         let mut validation = Validation::new(algorithm);
         validation.set_issuer(&[&self.settings.issuer]);
@@ -152,12 +165,13 @@ impl Issuer {
         let subject = text("sub").unwrap_or_default();
         let tenant = match &self.settings.tenant_claim {
             None => Tenant::default(),
-            Some(name) => text(name)
+            Some(name) => claim(claims, name)
+                .and_then(Value::as_str)
                 .and_then(|tenant| tenant.parse().ok())
                 .ok_or_else(|| refused(&format!("its claim `{name}` names no tenant")))?,
         };
         let name = &self.settings.scope_claim;
-        let scope = widest_scope(claims.get(name))
+        let scope = widest_scope(claim(claims, name))
             .ok_or_else(|| refused(&format!("its claim `{name}` holds no scope")))?;
         let name: String = subject
             .chars()
@@ -179,37 +193,54 @@ impl Issuer {
     }
 
     /// The issuer's keys, read anew if that is due or may find the key of this header.
-    async fn keys_for(&self, header: &Header) -> Result<Arc<Vec<TokenKey>>, IssuerError> {
+    async fn keys_for(
+        self: &Arc<Self>,
+        header: &Header,
+    ) -> Result<Arc<Vec<TokenKey>>, IssuerError> {
         let fits = |keys: &Keys| keys.keys.iter().any(|key| key.fits(header));
         let fresh = |keys: &Keys| keys.read.elapsed() < REFRESH_AFTER && fits(keys);
         if let Some(keys) = self.known().filter(fresh) {
             return Ok(keys.keys);
         }
-        let mut tried = self.tried.lock().await;
-        // Another request may have read them while this one waited.
-        if let Some(keys) = self.known().filter(fresh) {
+        let stale = |keys: &Keys| keys.read.elapsed() < STALE_AFTER && fits(keys);
+        if let Some(keys) = self.known().filter(stale) {
+            let known = self.clone();
+            // Whoever holds the lock is reading already.
+            if let Ok(tried) = self.tried.try_lock()
+                && is_due(*tried)
+            {
+                drop(tried);
+                tokio::spawn(async move { known.renew(|_| false).await });
+            }
             return Ok(keys.keys);
         }
-        if tried.is_none_or(|at| at.elapsed() >= RETRY_AFTER) {
-            *tried = Some(Instant::now());
-            match self.read().await {
-                Ok(keys) => {
-                    let mut known = self.keys.write().unwrap_or_else(PoisonError::into_inner);
-                    *known = Some(Keys {
-                        keys: Arc::new(keys),
-                        read: Instant::now(),
-                    });
-                }
-                Err(reason) => {
-                    tracing::error!(reason, "the keys of the issuer cannot be read");
-                }
-            }
-        }
-        drop(tried);
+        self.renew(fresh).await;
         let usable = self.known().filter(|k| k.read.elapsed() < STALE_AFTER);
         usable.map(|keys| keys.keys).ok_or_else(|| {
             IssuerError::Unavailable("the keys of the issuer cannot be read".to_owned())
         })
+    }
+
+    /// Reads the keys, unless that was tried a moment ago or another request has read keys that will do
+    /// while this one waited for its turn.
+    async fn renew(&self, will_do: impl Fn(&Keys) -> bool) {
+        let mut tried = self.tried.lock().await;
+        if self.known().is_some_and(|keys| will_do(&keys)) || !is_due(*tried) {
+            return;
+        }
+        *tried = Some(Instant::now());
+        match self.read().await {
+            Ok(keys) => {
+                let mut known = self.keys.write().unwrap_or_else(PoisonError::into_inner);
+                *known = Some(Keys {
+                    keys: Arc::new(keys),
+                    read: Instant::now(),
+                });
+            }
+            Err(reason) => {
+                tracing::error!(reason, "the keys of the issuer cannot be read");
+            }
+        }
     }
 
     fn known(&self) -> Option<Keys> {
@@ -305,6 +336,30 @@ impl TokenKey {
     }
 }
 
+/// Whether it is time to read the keys after the last attempt.
+fn is_due(tried: Option<Instant>) -> bool {
+    tried.is_none_or(|at| at.elapsed() >= RETRY_AFTER)
+}
+
+/// Whether the header of a token has `crit`, whatever it holds.
+fn demands_extensions(token: &str) -> bool {
+    let header = token.split('.').next().unwrap_or_default();
+    let header = URL_SAFE_NO_PAD.decode(header).unwrap_or_default();
+    let header = serde_json::from_slice::<Map<String, Value>>(&header);
+    header.is_ok_and(|header| header.contains_key("crit"))
+}
+
+/// The claim of that name, or what lies at the path of names with dots between them. Names may hold dots
+/// themselves (`https://clinic.example/roles`); the longest name that is there counts.
+fn claim<'a>(claims: &'a Map<String, Value>, name: &str) -> Option<&'a Value> {
+    if let Some(value) = claims.get(name) {
+        return Some(value);
+    }
+    let dots = name.rmatch_indices('.');
+    dots.map(|(at, _)| (&name[..at], &name[at + 1..]))
+        .find_map(|(first, rest)| claim(claims.get(first)?.as_object()?, rest))
+}
+
 /// The widest scope that a claim holds.
 fn widest_scope(claim: Option<&Value>) -> Option<Scope> {
     let scope = |word: &str| {
@@ -374,6 +429,51 @@ mod tests {
     }
 
     #[test]
+    fn claims_are_found_by_name_and_by_path() {
+        let claims = json!({
+            "scope": "read",
+            "realm_access": {"roles": ["submit"]},
+            "resource_access": {"heart.example": {"roles": ["admin"]}},
+            "https://clinic.example/roles": ["read", "admin"],
+            "a.b": {"c": 1},
+            "a": {"b": {"c": 2}, "b.c": 3},
+        });
+        let claims = claims.as_object().unwrap();
+        for (name, found) in [
+            ("scope", Some(json!("read"))),
+            ("realm_access.roles", Some(json!(["submit"]))),
+            (
+                "resource_access.heart.example.roles",
+                Some(json!(["admin"])),
+            ),
+            (
+                "https://clinic.example/roles",
+                Some(json!(["read", "admin"])),
+            ),
+            ("a.b.c", Some(json!(1))),
+            ("realm_access.groups", None),
+            ("scope.roles", None),
+            ("realm_access.", None),
+            (".", None),
+        ] {
+            assert_eq!(claim(claims, name), found.as_ref(), "{name}");
+        }
+    }
+
+    #[test]
+    fn any_crit_demands_extensions() {
+        for (header, demands) in [
+            (json!({"alg": "ES256", "crit": ["b64"], "b64": false}), true),
+            (json!({"alg": "ES256", "crit": []}), true),
+            (json!({"alg": "ES256", "crit": null}), true),
+            (json!({"alg": "ES256", "kid": "crit"}), false),
+        ] {
+            let token = URL_SAFE_NO_PAD.encode(header.to_string()) + ".e30.c2ln";
+            assert_eq!(demands_extensions(&token), demands, "{header}");
+        }
+    }
+
+    #[test]
     fn keys_that_are_not_for_signatures_are_skipped() {
         let rsa = json!({"kty": "RSA", "n": "AQAB", "e": "AQAB", "kid": "a"});
         assert_eq!(TokenKey::read(&rsa).unwrap().algorithms.len(), 6);
@@ -439,5 +539,65 @@ mod tests {
         for bad in ["http://id.example", "ftp://127.0.0.1", "id.example", ""] {
             assert!(check_address(bad).is_err(), "{bad}");
         }
+    }
+
+    /// An issuer at an address that accepts connections and never answers, with keys read that long ago.
+    async fn slow_issuer(age: Duration) -> (Issuer, tokio::net::TcpListener, String) {
+        let _ = rustls::crypto::ring::default_provider().install_default();
+        let silent = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let url = format!("http://{}", silent.local_addr().unwrap());
+        let issuer = Issuer::new(IssuerSettings {
+            issuer: url.clone(),
+            audience: "ventriform".into(),
+            jwks: Some(format!("{url}/keys")),
+            tenant_claim: None,
+            scope_claim: "scope".into(),
+            leeway: Duration::from_secs(60),
+        })
+        .unwrap();
+        let pair = rcgen::KeyPair::generate_for(&rcgen::PKCS_ECDSA_P256_SHA256).unwrap();
+        let point = pair.public_key_raw();
+        let base64 = |bytes: &[u8]| URL_SAFE_NO_PAD.encode(bytes);
+        let key = json!({"kty": "EC", "crv": "P-256", "kid": "a",
+            "x": base64(&point[1..33]), "y": base64(&point[33..])});
+        *issuer.0.keys.write().unwrap() = Some(Keys {
+            keys: Arc::new(vec![TokenKey::read(&key).unwrap()]),
+            read: Instant::now() - age,
+        });
+        let expires = std::time::SystemTime::now()
+            .duration_since(std::time::UNIX_EPOCH)
+            .unwrap()
+            .as_secs()
+            + 300;
+        let claims =
+            json!({"iss": url, "aud": "ventriform", "sub": "me", "exp": expires, "scope": "read"});
+        let mut header = Header::new(Algorithm::ES256);
+        header.kid = Some("a".into());
+        let secret = jsonwebtoken::EncodingKey::from_ec_der(pair.serialized_der());
+        let token = jsonwebtoken::encode(&header, &claims, &secret).unwrap();
+        (issuer, silent, token)
+    }
+
+    #[tokio::test]
+    async fn stale_keys_are_used_at_once_and_renewed_beside_the_requests() {
+        let (issuer, silent, token) = slow_issuer(2 * REFRESH_AFTER).await;
+        let begun = Instant::now();
+        for _ in 0..20 {
+            assert_eq!(issuer.subject(&token).await.unwrap().name, "me");
+        }
+        assert!(begun.elapsed() < TIMEOUT, "{:?}", begun.elapsed());
+        // One of them made the service ask.
+        let asked = tokio::time::timeout(TIMEOUT, silent.accept()).await;
+        asked.unwrap().unwrap();
+        let again = tokio::time::timeout(Duration::from_millis(200), silent.accept()).await;
+        assert!(again.is_err(), "asked twice");
+    }
+
+    #[tokio::test]
+    async fn keys_that_are_too_old_are_not_used() {
+        let (issuer, silent, token) = slow_issuer(STALE_AFTER).await;
+        drop(silent);
+        let refused = issuer.subject(&token).await.unwrap_err();
+        assert!(matches!(refused, IssuerError::Unavailable(_)), "{refused}");
     }
 }

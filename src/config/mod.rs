@@ -15,9 +15,9 @@ mod units;
 
 pub use tables::Tables;
 pub use units::{
-    Auto, AutoSize, AwsVariables, BlobPlace, Count, DatabaseUrl, Keyword, Limit, LogFormat,
-    MinFree, Networks, NoAddress, NoLimit, Off, OptionalAddress, OptionalPath, OrKeyword,
-    OtlpEndpoint, OwnRetention, Retention, Role, Size, Span, Words,
+    Auto, AutoSize, AwsVariables, BasePath, BlobPlace, Count, DatabaseUrl, Keyword, Limit,
+    LogFormat, MinFree, Networks, NoAddress, NoLimit, Off, OptionalAddress, OptionalPath,
+    OrKeyword, OtlpEndpoint, OwnRetention, Retention, Role, Size, Span, Words,
 };
 
 use crate::archive::Archives;
@@ -309,8 +309,9 @@ settings! {
     /// Memory that bodies of requests and answers take together, shared out between clients: one alone has
     /// at most half of it. Requests beyond that wait for two seconds, then they are answered with status 503
     request_memory: Size = "128MiB";
-    /// Longest time a request with `Prefer: wait` waits
-    wait_limit: Span = "60s";
+    /// Longest time a request with `Prefer: wait` waits. It is shorter than usual proxies wait for an
+    /// answer (HAProxy 50s, nginx 60s), which would answer in its place
+    wait_limit: Span = "45s";
     /// Largest number of templates in the library
     template_limit: u32 = "50";
     /// Largest number of readers' profiles
@@ -389,11 +390,18 @@ settings! {
     connection_limit: usize = "4096";
     /// Largest number of open connections of one client address, counted as for connection_limit
     client_connection_limit: usize = "3072";
-    /// Proxies whose X-Forwarded-For or Forwarded header names the client: addresses and networks,
-    /// separated by commas. The limit on one client's connections does not apply to them
+    /// Proxies whose word is taken: addresses and networks, separated by commas. X-Forwarded-For or
+    /// Forwarded names the client; X-Forwarded-Proto, -Host, -Port and -Prefix or Forwarded the address
+    /// that it used, for links and the page. The limit on one client's connections does not apply to them
     trusted_proxies: Networks = "";
-    /// Time limit for the headers of a request, for the TLS handshake, and for an idle connection
+    /// Path under which a proxy shows the service, such as `/heart`; with or without it, requests are
+    /// answered, and links begin with it. X-Forwarded-Prefix of a trusted proxy goes before it
+    base_path: BasePath = "";
+    /// Time limit for the headers of a request, and for the TLS handshake
     header_timeout: Span = "10s";
+    /// How long a connection may be idle between two requests. It is longer than usual proxies keep
+    /// theirs (nginx 60s, Traefik 90s, Google Cloud 600s), or they would send requests into closing ones
+    keep_alive_timeout: Span = "620s";
     /// Longest pause of a client in reading an answer; it must also read 1 KiB per second on average
     write_timeout: Span = "30s";
     /// Largest number of streams of events (/v1/jobs/ID/events); more are answered with status 429
@@ -443,10 +451,11 @@ settings! {
     oidc_audience: String = "ventriform";
     /// Address of the issuer's JWKS; empty asks the issuer's discovery document
     oidc_jwks: String = "";
-    /// Claim that names a caller's tenant; empty puts every caller into the tenant `default`
+    /// Claim that names a caller's tenant, or a path to it, as for oidc_scope_claim; empty puts every caller
+    /// into the tenant `default`
     oidc_tenant_claim: String = "tenant";
     /// Claim that holds a caller's scopes: the words read, submit or admin, also with `ventriform:`
-    /// before them
+    /// before them. Dots lead into objects: `realm_access.roles`
     oidc_scope_claim: String = "scope";
     /// How far the clocks of issuer and service may differ
     oidc_leeway: Span = "60s";
@@ -722,6 +731,7 @@ shown_by_display!(
     Role,
     AeTitle,
     AllowList,
+    BasePath,
     BlobPlace,
     DatabaseUrl,
     OtlpEndpoint,

@@ -494,6 +494,55 @@ impl fmt::Display for Networks {
     }
 }
 
+/// A path before those of the service: empty, or `/heart`, `/apps/heart`, without a slash at its end.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct BasePath(String);
+
+/// Longest path before those of the service.
+const LONGEST_BASE: usize = 200;
+
+impl BasePath {
+    /// The path; empty if there is none.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+
+    /// The rest of a path below this one, with a slash at its start; `None` for other paths.
+    pub fn rest_of<'a>(&self, path: &'a str) -> Option<&'a str> {
+        if self.0.is_empty() {
+            return None;
+        }
+        match path.strip_prefix(&self.0)? {
+            "" => Some("/"),
+            rest => rest.starts_with('/').then_some(rest),
+        }
+    }
+}
+
+impl FromStr for BasePath {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let path = text.strip_suffix('/').unwrap_or(text);
+        let plain = |segment: &str| is_plain_part(segment) && segment.len() <= LONGEST_BASE;
+        let usable = path.is_empty()
+            || path.len() <= LONGEST_BASE
+                && path
+                    .strip_prefix('/')
+                    .is_some_and(|rest| rest.split('/').all(plain));
+        match usable {
+            true => Ok(Self(path.to_owned())),
+            false => Err("give a path such as /heart, with letters, digits, points, `-` and `_`"),
+        }
+    }
+}
+
+impl fmt::Display for BasePath {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
 fn scaled(text: &str, units: &[(&str, u64)]) -> Option<u64> {
     let digits = text.find(|c: char| !c.is_ascii_digit())?;
     let (number, unit) = text.split_at(digits);
@@ -514,6 +563,27 @@ fn write_scaled(f: &mut fmt::Formatter<'_>, value: u64, units: &[(&str, u64)]) -
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_base_path_is_plain_and_the_rest_of_a_path_begins_with_a_slash() {
+        for text in ["/heart", "/heart/", "/apps/heart_2.0/v-1"] {
+            let path: BasePath = text.parse().unwrap();
+            assert_eq!(path.as_str(), text.trim_end_matches('/'));
+        }
+        let bad = [
+            "heart", "//heart", "/a//b", "/a/../b", "/a b", "/a?b", "/ä", "/a%2Fb",
+        ];
+        for text in bad {
+            assert!(text.parse::<BasePath>().is_err(), "{text}");
+        }
+        let heart: BasePath = "/heart".parse().unwrap();
+        assert_eq!(heart.rest_of("/heart/v1/jobs"), Some("/v1/jobs"));
+        assert_eq!(heart.rest_of("/heart"), Some("/"));
+        assert_eq!(heart.rest_of("/hearts"), None);
+        assert_eq!(heart.rest_of("/v1/heart"), None);
+        assert_eq!(BasePath::default().rest_of("/v1"), None);
+        assert_eq!("/".parse(), Ok(BasePath::default()));
+    }
 
     #[test]
     fn places_of_files_that_are_none_are_refused() {

@@ -15,7 +15,7 @@ use tokio::sync::{Notify, broadcast};
 use tokio_util::sync::CancellationToken;
 
 /// How webhooks are sent.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct HookSettings {
     /// When failed deliveries are tried again.
     pub retries: RetrySchedule,
@@ -29,6 +29,8 @@ pub struct HookSettings {
     pub backlog: u32,
     /// How long ended deliveries are kept.
     pub history: Duration,
+    /// What the paths in messages begin with.
+    pub base_path: String,
 }
 
 /// Counts since the start, for operators.
@@ -75,7 +77,7 @@ impl Dispatcher {
         Self {
             store,
             clock,
-            sender: Sender::new(guard, settings.attempt_limit),
+            sender: Sender::new(guard, settings.attempt_limit, settings.base_path.clone()),
             settings,
             counts: DeliveryCounts::default(),
             woken: Arc::default(),

@@ -5,10 +5,11 @@ use crate::jobs::{Resource, rfc3339};
 use serde_json::{Map, Value, json};
 
 /// The body of a delivery, the same in every attempt: `type`, `timestamp`, and `data` with the
-/// job's id, kind, state and paths. It holds no figures and no texts of errors: whoever may see
+/// job's id, kind, state and paths, which begin with `base_path`. It holds no figures and no texts of errors: whoever may see
 /// them reads them from the API.
-pub fn message_body(delivery: &DueDelivery) -> String {
-    let path = |id: &str| Resource::of(id).map(|kind| format!("/v1/{}/{id}", kind.plural()));
+pub fn message_body(delivery: &DueDelivery, base_path: &str) -> String {
+    let path =
+        |id: &str| Resource::of(id).map(|kind| format!("{base_path}/v1/{}/{id}", kind.plural()));
     let mut links = Map::new();
     let mut data = Map::new();
     data.insert("job".into(), json!(delivery.job));
@@ -59,7 +60,7 @@ mod tests {
             attempts: 0,
             since: 0,
         };
-        let body: Value = serde_json::from_str(&message_body(&delivery)).unwrap();
+        let body: Value = serde_json::from_str(&message_body(&delivery, "")).unwrap();
         let links = json!({"self": "/v1/jobs/job_1", "mesh": "/v1/models/mdl_1/mesh",
             "report": "/v1/models/mdl_1/report", "model": "/v1/models/mdl_1"});
         assert_eq!(
@@ -74,11 +75,14 @@ mod tests {
             cause: Some("no-surface".into()),
             ..delivery
         };
-        let body: Value = serde_json::from_str(&message_body(&failed)).unwrap();
+        let body: Value = serde_json::from_str(&message_body(&failed, "/heart")).unwrap();
         assert_eq!(
             body["data"]["error"]["type"],
             "urn:ventriform:problem:no-surface"
         );
-        assert_eq!(body["data"]["links"], json!({"self": "/v1/jobs/job_1"}));
+        assert_eq!(
+            body["data"]["links"],
+            json!({"self": "/heart/v1/jobs/job_1"})
+        );
     }
 }

@@ -24,16 +24,19 @@ pub struct Sender {
     /// Made for the first delivery: reading the system's certificates takes time and memory.
     client: OnceCell<Client>,
     limit: Duration,
+    base_path: String,
 }
 
 impl Sender {
-    /// A sender that lets pass what the guard does, and gives each attempt that much time.
-    pub fn new(guard: UrlGuard, limit: Duration) -> Self {
+    /// A sender that lets pass what the guard does, and gives each attempt that much time. Paths in
+    /// messages begin with `base_path`.
+    pub fn new(guard: UrlGuard, limit: Duration, base_path: String) -> Self {
         Self {
             guard,
             names: PinnedNames::default(),
             client: OnceCell::new(),
             limit,
+            base_path,
         }
     }
 
@@ -63,7 +66,7 @@ impl Sender {
             return (AttemptOutcome::Unreachable, None);
         };
         let _pin = self.names.pin(&checked);
-        let body = message_body(delivery);
+        let body = message_body(delivery, &self.base_path);
         let seconds = now / 1000;
         let sent = client
             .post(checked.url.clone())

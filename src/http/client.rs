@@ -96,7 +96,7 @@ fn forwarded_for(headers: &HeaderMap) -> Vec<Option<IpAddr>> {
 }
 
 /// The address in `192.0.2.1`, `192.0.2.1:80`, `2001:db8::1`, `"[2001:db8::1]:80"`.
-fn node_address(node: &str) -> Option<IpAddr> {
+pub(super) fn node_address(node: &str) -> Option<IpAddr> {
     let node = node.trim().trim_matches('"');
     let bare = node
         .strip_prefix('[')

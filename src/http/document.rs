@@ -1,13 +1,17 @@
-//! `/openapi.json`: serialised and compressed once, with validators.
+//! `/openapi.json`: serialised and compressed once, with validators. For clients who reach the service under a
+//! path, `servers` names it: made when it is first asked for, and kept for the last path.
 
+use super::public_base::PublicBase;
 use super::validators::matches_any;
 use crate::jobs::hex;
 use axum::body::Bytes;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use flate2::{Compression, write::GzEncoder};
+use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::io::Write;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Another version of the program may publish another document.
 const CACHE_CONTROL: HeaderValue = HeaderValue::from_static("public, max-age=300");
@@ -17,6 +21,50 @@ const CACHE_CONTROL: HeaderValue = HeaderValue::from_static("public, max-age=300
 pub struct PublishedDocument {
     plain: Variant,
     gzip: Variant,
+}
+
+/// The document, also for those who reach the service under a path.
+#[derive(Clone)]
+pub struct PublishedDocuments {
+    document: Arc<Value>,
+    plain: Arc<PublishedDocument>,
+    prefixed: Arc<Mutex<Option<(String, Arc<PublishedDocument>)>>>,
+}
+
+impl PublishedDocuments {
+    /// Of this document.
+    pub fn new(document: Value) -> Self {
+        Self {
+            plain: Arc::new(PublishedDocument::new(&document)),
+            document: Arc::new(document),
+            prefixed: Arc::default(),
+        }
+    }
+
+    /// The document for the client of the current request, or 304 if the client has it.
+    pub fn answer(&self, request: &HeaderMap) -> Response {
+        let base = PublicBase::current();
+        let prefix = base.as_ref().map_or("", |base| base.prefix());
+        if prefix.is_empty() {
+            return self.plain.answer(request);
+        }
+        self.of(prefix).answer(request)
+    }
+
+    fn of(&self, prefix: &str) -> Arc<PublishedDocument> {
+        // A panic cannot leave the pair half changed: it is one assignment.
+        let mut kept = self.prefixed.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*kept {
+            Some((path, document)) if path == prefix => document.clone(),
+            _ => {
+                let mut document = (*self.document).clone();
+                document["servers"] = json!([{ "url": prefix }]);
+                let document = Arc::new(PublishedDocument::new(&document));
+                *kept = Some((prefix.to_owned(), document.clone()));
+                document
+            }
+        }
+    }
 }
 
 /// The document in one encoding.

@@ -10,6 +10,7 @@ use super::problem::{Answer, Problem, shorten};
 use super::request::{PathSegments, query_pairs, refuse_unknown};
 use super::wire::{path_of, rfc3339};
 use super::{negotiate, validators};
+use crate::http::public_base::public_path;
 use crate::jobs::{Erased, ErasureOrder, ErasureReason, Receipt, Resource};
 use axum::extract::{RawQuery, State};
 use axum::http::{HeaderMap, StatusCode, header};
@@ -147,7 +148,7 @@ impl From<Receipt> for ReceiptBody {
 }
 
 fn path(id: &str) -> String {
-    format!("/v1/erasures/{id}")
+    public_path(&format!("/v1/erasures/{id}"))
 }
 
 /// Reads the query of a request to erase a volume: whether what was made of it goes too.

@@ -2,17 +2,28 @@
 //!
 //! The page is built from `web/` and committed as `web/dist`, each file beside its compressed forms. The
 //! names of what lies in `assets/` hold a hash of the content, so browsers keep those files for ever.
+//!
+//! The page names its files relative to itself, so it works under any path of a proxy. Where the path is
+//! known ([`super::public_base`]), they are named from the root instead: a proxy may show the page at
+//! `/heart`, from where `assets/` would lead to `/assets/`. The page's programs find the service from
+//! their own address.
 
 use super::negotiate;
 use super::problem::not_found::no_such_path;
+use super::public_base::PublicBase;
 use axum::extract::Path;
-use axum::http::{HeaderMap, HeaderValue, header};
+use axum::http::{HeaderMap, HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 use include_dir::{Dir, include_dir};
 
 static BUNDLE: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/web/dist");
 
 const INDEX: &str = "index.html";
+
+const HTML: &str = "text/html; charset=utf-8";
+
+/// What the names of its files begin with in the page.
+const ROOT: &str = "./";
 
 /// What the page may do: run the programs and styles that are files of this service, show pictures that
 /// it fetched or drew itself, and call its own service. Nothing comes from elsewhere.
@@ -28,10 +39,10 @@ const CURRENT: &str = "no-cache";
 /// The page if the client prefers HTML, else text.
 pub async fn welcome(headers: HeaderMap) -> Response {
     let html = negotiate::best_offer(&headers, &["text/plain", "text/html"]) == Some(1);
-    let page = html.then(|| file(INDEX, "text/html; charset=utf-8", CURRENT, &headers));
+    let page = html.then(|| index("./", &headers));
     let mut response = match page.flatten() {
         Some(page) => page,
-        None => commands(&base_url(&headers)).into_response(),
+        None => commands(&url()).into_response(),
     };
     let vary = HeaderValue::from_static("accept, accept-encoding");
     response.headers_mut().insert(header::VARY, vary);
@@ -39,11 +50,30 @@ pub async fn welcome(headers: HeaderMap) -> Response {
 }
 
 /// The documentation of the API: the same page, which reads `/openapi.json`.
-pub async fn documentation(headers: HeaderMap) -> Response {
-    match file(INDEX, "text/html; charset=utf-8", CURRENT, &headers) {
+pub async fn documentation(uri: Uri, headers: HeaderMap) -> Response {
+    let root = match uri.path().ends_with('/') {
+        true => "../",
+        false => "./",
+    };
+    match index(root, &headers) {
         Some(page) => page,
         None => no_such_path().await.into_response(),
     }
+}
+
+/// The page; `root` leads from where it is asked for to the root of the service.
+fn index(root: &str, headers: &HeaderMap) -> Option<Response> {
+    let prefix = PublicBase::current().map(|base| base.prefix().to_owned());
+    let root = match prefix.as_deref() {
+        None | Some("") => root.to_owned(),
+        Some(prefix) => format!("{prefix}/"),
+    };
+    if root == ROOT {
+        return file(INDEX, HTML, CURRENT, headers);
+    }
+    let page = BUNDLE.get_file(INDEX)?.contents_utf8()?;
+    let page = page.replace(&format!("\"{ROOT}"), &format!("\"{root}"));
+    Some(described(page.into_response(), HTML, CURRENT))
 }
 
 /// A program, style or picture of the page.
@@ -85,20 +115,29 @@ fn file(
             accepts(headers, coding).then_some((Some(coding), content))
         });
     let (coding, content) = packed.or_else(|| Some((None, BUNDLE.get_file(name)?)))?;
-    let mut response = content.contents().into_response();
-    let mut set = |name, value| {
+    let mut response = described(content.contents().into_response(), media_type, kept);
+    if let Some(coding) = coding {
+        let coding = HeaderValue::from_static(coding);
         response
             .headers_mut()
-            .insert(name, HeaderValue::from_static(value))
-    };
-    set(header::CONTENT_TYPE, media_type);
-    set(header::CACHE_CONTROL, kept);
-    set(header::VARY, "accept-encoding");
-    set(header::CONTENT_SECURITY_POLICY, POLICY);
-    if let Some(coding) = coding {
-        set(header::CONTENT_ENCODING, coding);
+            .insert(header::CONTENT_ENCODING, coding);
     }
     Some(response)
+}
+
+/// A part of the page with the headers that say what it is and may do.
+fn described(mut response: Response, media_type: &'static str, kept: &'static str) -> Response {
+    for (name, value) in [
+        (header::CONTENT_TYPE, media_type),
+        (header::CACHE_CONTROL, kept),
+        (header::VARY, "accept-encoding"),
+        (header::CONTENT_SECURITY_POLICY, POLICY),
+    ] {
+        response
+            .headers_mut()
+            .insert(name, HeaderValue::from_static(value));
+    }
+    response
 }
 
 /// Whether `Accept-Encoding` names this coding and does not refuse it by `q=0`.
@@ -118,16 +157,8 @@ fn accepts(headers: &HeaderMap, coding: &str) -> bool {
 }
 
 /// The address under which the client reached the service.
-fn base_url(headers: &HeaderMap) -> String {
-    let host = headers
-        .get(header::HOST)
-        .and_then(|value| value.to_str().ok())
-        .filter(|host| {
-            host.bytes()
-                .all(|b| b.is_ascii_alphanumeric() || b"-.:[]_".contains(&b))
-        })
-        .unwrap_or("127.0.0.1:8080");
-    format!("http://{host}")
+fn url() -> String {
+    PublicBase::current().map_or_else(String::new, |base| base.url())
 }
 
 fn commands(url: &str) -> String {

@@ -5,11 +5,12 @@
 //! ([`crate::jobs::Catalogue::version`]) under which it was read. Whatever is written changes the
 //! version, and what was kept under other versions is never used: neither what was erased, changed or
 //! put on hold meanwhile, nor what another tenant has. Callers who see whose scan a volume is have
-//! values of their own.
+//! values of their own, and so have clients who reach the service under another path.
 //!
 //! Memory is limited: when there is no room for one more, all are dropped.
 
 use super::problem::Answer;
+use super::public_base::public_path;
 use crate::jobs::{Catalogue, Resource, Tenant};
 use std::collections::HashMap;
 use std::ops::ControlFlow;
@@ -76,7 +77,7 @@ impl<V: Keep> Kept<V> {
         let version = catalogue.version();
         if Resource::of(id) == Some(resource)
             && let Some(version) = version
-            && let Some(value) = self.find(version, asker, id)
+            && let Some(value) = self.find(version, asker, &public_path(id))
         {
             return Ok(ControlFlow::Continue(value));
         }
@@ -85,7 +86,7 @@ impl<V: Keep> Kept<V> {
             && let Some(version) = version
             && catalogue.version() == Some(version)
         {
-            self.keep(version, asker, id, value);
+            self.keep(version, asker, &public_path(id), value);
         }
         Ok(found)
     }

@@ -10,6 +10,7 @@ use super::problem::{Answer, Problem, shorten};
 use super::request::{PathSegments, json_object, query_pairs, refuse_unknown, unknown};
 use super::wire::rfc3339;
 use crate::access::{Activity, ApiKey, KeyError, KeyRequest, Quota, Scope};
+use crate::http::public_base::public_path;
 use crate::jobs::{Timestamp, parse_rfc3339};
 use axum::Extension;
 use axum::Json;
@@ -150,7 +151,7 @@ pub async fn create_key(
     let event = by.event(Activity::KeyCreated, now).on(&key.id);
     app.access.add_key(&key, &event).await?;
     app.guard.gate.refresh();
-    let location = format!("/v1/keys/{}", key.id);
+    let location = public_path(&format!("/v1/keys/{}", key.id));
     let body = KeyBody {
         key: Some(text),
         ..KeyBody::of(key, now)

@@ -70,6 +70,7 @@ mod pagination;
 mod performer;
 mod problem;
 mod products;
+mod public_base;
 mod readers;
 mod readiness;
 mod received;

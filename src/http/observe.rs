@@ -165,7 +165,7 @@ impl<B> OnResponse<B> for Answered {
     fn on_response(self, response: &Response<B>, latency: Duration, _: &Span) {
         let status = response.status();
         let ms = latency.as_millis() as u64;
-        tracing::debug!(status = status.as_u16(), ms, "answered");
+        tracing::info!(status = status.as_u16(), ms, "answered");
     }
 }
 

@@ -8,6 +8,7 @@ use super::pagination::{list_query, next_cursor};
 use super::problem::{Answer, Problem, ProblemBody, shorten};
 use super::request::{PathSegments, query_pairs, refuse_unknown, unknown_state};
 use super::wire::{path_of, rfc3339};
+use crate::http::public_base::public_path;
 use crate::intake::{GroupState, IntakeGroup};
 use axum::Json;
 use axum::extract::{RawQuery, State};
@@ -120,9 +121,12 @@ impl From<IntakeGroup> for ReceivedBody {
             created_at: rfc3339(group.created_at),
             changed_at: rfc3339(group.changed_at),
             links: ReceivedLinks {
-                itself: format!("/v1/intake/{}", group.id),
+                itself: public_path(&format!("/v1/intake/{}", group.id)),
                 volume: group.volume.as_deref().map(path_of),
-                job: group.job.as_ref().map(|job| format!("/v1/jobs/{job}")),
+                job: group
+                    .job
+                    .as_ref()
+                    .map(|job| public_path(&format!("/v1/jobs/{job}"))),
             },
             volume: group.volume,
             job: group.job,

@@ -1,7 +1,7 @@
 //! The map of the API, and the layers around it.
 
 use super::app::App;
-use super::document::PublishedDocument;
+use super::document::PublishedDocuments;
 use super::guard::{self, hosts, pages};
 use super::limits::BodyLimits;
 use super::models::Models;
@@ -106,7 +106,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
 /// The documented routes and the pages.
 fn public(settings: &Settings) -> Router<App> {
     let (api, collected) = routes(settings).split_for_parts();
-    let document = PublishedDocument::new(&openapi::publish(collected));
+    let document = PublishedDocuments::new(openapi::publish(collected));
     api.route("/", get(front_page::welcome))
         .route(
             "/openapi.json",

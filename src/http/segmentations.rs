@@ -127,6 +127,7 @@ fn offers() -> Vec<Offer> {
     request_body(content(
         (Vec<u8> = "application/octet-stream"),
         (Vec<u8> = "application/gzip"),
+        (Vec<u8> = "application/zip"),
         (Vec<u8> = "application/dicom"),
         (Vec<u8> = "application/nifti"),
         (openapi::SegmentationForm = "multipart/form-data"),

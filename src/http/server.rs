@@ -183,7 +183,9 @@ pub async fn start(
         connections: settings.connection_limit,
         of_one_client: settings.client_connection_limit,
         trusted_proxies: settings.trusted_proxies.clone(),
+        base_path: settings.base_path.clone(),
         head: settings.header_timeout.0,
+        idle: settings.keep_alive_timeout.0,
         write: settings.write_timeout.0,
         grace: settings.shutdown_grace.0,
     };
@@ -462,6 +464,7 @@ fn hooks(settings: &Settings, store: &Store, queue: &Queue) -> Hooks {
         per_destination: settings.webhook_destination_concurrency,
         backlog: settings.webhook_backlog,
         history: settings.webhook_history.0,
+        base_path: settings.base_path.as_str().to_owned(),
     };
     let dispatcher = Dispatcher::new(
         store.rows.clone(),

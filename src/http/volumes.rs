@@ -278,6 +278,7 @@ impl VolumeBody {
     request_body(content(
         (Vec<u8> = "application/octet-stream"),
         (Vec<u8> = "application/gzip"),
+        (Vec<u8> = "application/zip"),
         (Vec<u8> = "application/dicom"),
         (Vec<u8> = "application/nifti"),
         (openapi::UploadForm = "multipart/form-data"),

@@ -1,5 +1,6 @@
 //! How ids and times are written in answers, and what answers that something was added.
 
+use super::public_base::public_path;
 use crate::jobs::Resource;
 pub use crate::jobs::rfc3339;
 use axum::Json;
@@ -10,7 +11,7 @@ use serde::Serialize;
 /// The path of the thing that has that id.
 pub fn path_of(id: &str) -> String {
     let resource = Resource::of(id).unwrap_or(Resource::Job);
-    format!("/v1/{}/{id}", resource.plural())
+    public_path(&format!("/v1/{}/{id}", resource.plural()))
 }
 
 /// 201 if the thing of that id is new, 200 if it was there already; with its path.

@@ -13,6 +13,7 @@ use super::openapi::{self, LookupProblems};
 use super::problem::{Answer, Problem, ProblemBody, body, shorten};
 use super::request::{PathSegments, bytes_of, charge_parsed, query_pairs, refuse_unknown};
 use crate::export::dicom::is_uid;
+use crate::http::public_base::public_path;
 use crate::jobs::{Timestamp, random_id, rfc3339};
 use crate::progress::{Monitor, Stage};
 use crate::worklist::{
@@ -442,7 +443,7 @@ pub fn new_uid() -> String {
 }
 
 fn path(uid: &str) -> String {
-    format!("/dicom-web/workitems/{uid}")
+    public_path(&format!("/dicom-web/workitems/{uid}"))
 }
 
 fn require_uid(field: &str, uid: &str) -> Answer<()> {

@@ -162,12 +162,12 @@ async fn admit<'a>(
     if request.application_context_name.trim_end_matches('\0') != APPLICATION_CONTEXT {
         return Err(user(User::ApplicationContextNameNotSupported));
     }
-    let called = request.called_ae_title.parse::<AeTitle>();
+    let called = AeTitle::of_pdu(&request.called_ae_title);
     if called.as_ref() != Ok(&service.settings.ae_title) {
         tracing::info!(%peer, "an association for another AE title was rejected");
         return Err(user(User::CalledAETitleNotRecognized));
     }
-    let calling = request.calling_ae_title.parse::<AeTitle>().ok();
+    let calling = AeTitle::of_pdu(&request.calling_ae_title).ok();
     let tenant = calling
         .as_ref()
         .and_then(|calling| service.settings.senders.tenant_of(calling, peer));

@@ -1,5 +1,6 @@
 //! Which presentation contexts of an association are accepted (PS3.8, 9.3.3).
 
+use super::senders::AeTitle;
 use dicom_ul::pdu::{
     AssociationAC, AssociationRQ, PresentationContextResult, PresentationContextResultReason,
     UserVariableItem,
@@ -76,8 +77,8 @@ pub fn negotiate(request: &AssociationRQ, offer: &Offer) -> (AssociationAC, Cont
     }
     let answer = AssociationAC {
         protocol_version: 1,
-        calling_ae_title: request.calling_ae_title.clone(),
-        called_ae_title: request.called_ae_title.clone(),
+        calling_ae_title: echo(&request.calling_ae_title),
+        called_ae_title: echo(&request.called_ae_title),
         application_context_name: APPLICATION_CONTEXT.to_owned(),
         presentation_contexts: results,
         user_variables: vec![
@@ -89,6 +90,11 @@ pub fn negotiate(request: &AssociationRQ, offer: &Offer) -> (AssociationAC, Cont
         ],
     };
     (answer, contexts)
+}
+
+/// A title as it is sent back: without what cannot be written.
+fn echo(title: &str) -> String {
+    AeTitle::of_pdu(title).map_or_else(|_| title.to_owned(), String::from)
 }
 
 /// Longest P-DATA-TF PDU that the other side reads; `None` if any.

@@ -21,6 +21,16 @@ impl AeTitle {
     pub fn as_str(&self) -> &str {
         &self.0
     }
+
+    /// The title in a PDU. PS3.8 pads titles with spaces at the end; older systems also pad at the start,
+    /// with NUL, or copy a C string and whatever lies behind its end.
+    ///
+    /// # Errors
+    /// If nothing is left, or it is no title.
+    pub fn of_pdu(field: &str) -> Result<Self, &'static str> {
+        let title = field.trim_start_matches([' ', '\0']);
+        title.split('\0').next().unwrap_or_default().parse()
+    }
 }
 
 impl FromStr for AeTitle {
@@ -173,5 +183,27 @@ mod tests {
             assert!(title.parse::<AeTitle>().is_err(), "{title:?}");
         }
         assert_eq!(" A B ".parse::<AeTitle>().unwrap().as_str(), "A B");
+    }
+
+    #[test]
+    fn titles_in_pdus_are_padded_in_many_ways() {
+        for field in [
+            "CAMERA          ",
+            "          CAMERA",
+            "CAMERA\0\0\0\0\0\0\0\0\0\0",
+            "\0\0\0\0\0\0\0\0\0\0CAMERA",
+            " \0 \0CAMERA \0 \0 ",
+            "CAMERA\0\u{fffd}x~\n\\",
+            "CAMERA",
+        ] {
+            assert_eq!(
+                AeTitle::of_pdu(field).unwrap().as_str(),
+                "CAMERA",
+                "{field:?}"
+            );
+        }
+        for none in ["", "                ", "\0\0", " \0 ", "A\nB", "A\\B"] {
+            assert!(AeTitle::of_pdu(none).is_err(), "{none:?}");
+        }
     }
 }

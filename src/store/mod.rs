@@ -402,6 +402,11 @@ pub async fn open_database(
     }
 }
 
+/// How long a command beside the service waits for a service that starts to make the database.
+const FIRST_START: Duration = Duration::from_secs(10);
+/// How often it looks.
+const LOOK_AGAIN: Duration = Duration::from_millis(50);
+
 /// The database of a data folder, for commands beside a service that may be running on it. Creates
 /// folder and database if they are missing.
 ///
@@ -410,29 +415,33 @@ pub async fn open_database(
 pub async fn open_rows(folder: &Path) -> Result<Arc<SqlStore>, OpenError> {
     let wait = StoreSettings::default().write_wait;
     let gauge = DiskGauge::new(folder, None);
-    match locked(folder) {
-        Ok(mut lock) => {
-            let rows = in_file(folder, &mut lock, wait, gauge).await?;
-            Ok(Arc::new(rows))
-        }
-        Err(OpenError::InUse(_)) => {
-            let database = folder.join(DATABASE);
-            let unusable = |reason: String| OpenError::Unusable {
-                path: database.clone(),
-                reason,
-            };
-            if !is_migrated(&database)
-                .await
-                .map_err(|e| unusable(e.to_string()))?
-            {
-                return Err(unusable(
-                    "the service that runs on it has another version than this command".into(),
-                ));
+    let deadline = Instant::now() + FIRST_START;
+    let database = folder.join(DATABASE);
+    loop {
+        match locked(folder) {
+            Ok(mut lock) => {
+                let rows = in_file(folder, &mut lock, wait, gauge).await?;
+                return Ok(Arc::new(rows));
             }
-            let rows = SqlStore::open(&database, wait, gauge).await;
-            rows.map(Arc::new).map_err(|e| unusable(e.to_string()))
+            Err(OpenError::InUse(_)) => {}
+            Err(error) => return Err(error),
         }
-        Err(error) => Err(error),
+        // A service that starts has the lock before it has made or migrated the database.
+        let migrated = is_migrated(&database).await;
+        if matches!(migrated, Ok(true)) {
+            let rows = SqlStore::open(&database, wait, gauge).await;
+            return rows.map(Arc::new).map_err(|e| unusable(&database, &e));
+        }
+        if Instant::now() >= deadline {
+            return Err(match migrated {
+                Err(error) => unusable(&database, &error),
+                Ok(_) => unusable(
+                    &database,
+                    &"the service that runs on it has another version than this command",
+                ),
+            });
+        }
+        tokio::time::sleep(LOOK_AGAIN).await;
     }
 }
 
@@ -575,8 +584,9 @@ struct FolderLock {
 }
 
 /// How long the lock of a process that was just killed may outlast it: children that it was starting have
-/// the file open until they run their own program.
-const LOCK_WAIT: Duration = Duration::from_secs(1);
+/// the file open until they run their own program. A command beside the service may have it as long, while it makes
+/// the database.
+const LOCK_WAIT: Duration = Duration::from_secs(3);
 
 impl FolderLock {
     /// Tries to take the lock until no process that ended can hold it any more.
@@ -585,7 +595,7 @@ impl FolderLock {
         loop {
             match take() {
                 Err(OpenError::InUse(_)) if Instant::now() < deadline => {
-                    tokio::time::sleep(LOCK_WAIT / 100).await;
+                    tokio::time::sleep(LOCK_WAIT / 300).await;
                 }
                 taken => return taken,
             }

@@ -9,6 +9,11 @@
 //! commit closes its connection, so nothing can fall into it later. The commit asks the server whether
 //! the transaction is still whole, as `COMMIT` alone reports success for one that failed.
 //!
+//! **A pooler in between** (PgBouncer) must give each connection a session of its own (`pool_mode = session`):
+//! locks, limits, `LISTEN` and prepared statements belong to a session. Such poolers refuse startup parameters that
+//! they do not know, so the limits of a session are set by a statement after connecting, and read back by another.
+//! At the start, two connections show whether sessions are shared ([`check_sessions`]).
+//!
 //! **The tables change.** During a rolling upgrade a process of the next version adds columns and tables while this
 //! one runs. A statement that the server has prepared before is refused then, once on each connection, before it
 //! has done anything ([`faults::plan_is_stale`]): outside a transaction it is prepared anew, inside of one the
@@ -24,8 +29,9 @@ use crate::jobs::{StoreError, StoreFault, StoreResult};
 use sqlx::migrate::MigrateError;
 use sqlx::pool::PoolConnection;
 use sqlx::postgres::{PgConnectOptions, PgConnection, PgPool, PgPoolOptions};
-use sqlx::{ConnectOptions, Connection, Postgres, Row};
+use sqlx::{AssertSqlSafe, ConnectOptions, Connection, Postgres, Row};
 use std::ops::{Deref, DerefMut};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Pause between two attempts to reach the server at the start.
@@ -34,6 +40,13 @@ const AGAIN: Duration = Duration::from_secs(1);
 const CONNECT: Duration = Duration::from_secs(5);
 /// Longest time of one statement.
 const STATEMENT: Duration = Duration::from_secs(30);
+/// The parameter of a session that names the process.
+const RUN: &str = "ventriform.run";
+/// What is wrong with a pooler that hands out sessions for transactions.
+const SHARED_SESSION: &str =
+    "a pooler between this program and PostgreSQL lets several connections share one session";
+/// What to do about it.
+const USE_SESSIONS: &str = "Set `pool_mode = session` for this database in PgBouncer, or give the address of PostgreSQL itself";
 /// Oldest version of the server that is tested.
 const OLDEST: i32 = 150_000;
 
@@ -112,7 +125,7 @@ impl std::fmt::Debug for PostgresUrl {
 pub enum PostgresError {
     /// It was not reached in the time set.
     #[error(
-        "{url} was not reached within {waited:?} (database_wait): {reason}. Check host and port, and \
+        "{reason}: {url} was not reached within {waited:?} (database_wait). Check host and port, and \
          that PostgreSQL runs and accepts connections from this machine"
     )]
     Unreachable {
@@ -124,7 +137,7 @@ pub enum PostgresError {
         reason: String,
     },
     /// It refuses this user, or lacks something.
-    #[error("{url}: {reason}. {fix}")]
+    #[error("{reason} ({url}). {fix}")]
     Refused {
         /// The database.
         url: PostgresUrl,
@@ -164,11 +177,14 @@ pub(super) async fn open(
     let url = &settings.url;
     let refused = |error: sqlx::Error| refusal(url, &error);
     let options = url.options().map_err(refused)?;
-    let options = options
-        .application_name("ventriform")
-        .options([("client_min_messages", "warning"), ("ventriform.run", run)]);
+    let options = with_few_parameters(options);
     let mut connection = reach(settings, &options).await?;
+    let names = session_names(run);
     let made = async {
+        check_sessions(url, &mut connection, &options, run).await?;
+        set_session(&mut connection, &names)
+            .await
+            .map_err(refused)?;
         check_server(url, &mut connection).await?;
         bring_up(&mut connection)
             .await
@@ -176,11 +192,15 @@ pub(super) async fn open(
     };
     made.await?;
     let _ = connection.close().await;
+    let session: Arc<[_]> = names.into_iter().chain(session_limits(wait)).collect();
     let pool = PgPoolOptions::new()
         .max_connections(settings.connections)
         .acquire_timeout(wait)
-        .after_connect(|connection, _| Box::pin(keep_promises(connection)))
-        .connect_lazy_with(options.options(session_limits(wait)));
+        .after_connect(move |connection, _| {
+            let session = session.clone();
+            Box::pin(async move { set_session(connection, &session).await })
+        })
+        .connect_lazy_with(options);
     let writer = PgWriter { pool: pool.clone() };
     Ok((writer, pool))
 }
@@ -203,13 +223,102 @@ async fn bring_up(connection: &mut PgConnection) -> Result<(), MigrateError> {
 pub(super) async fn connect_unlimited(
     settings: &PostgresSettings,
 ) -> Result<PgConnection, sqlx::Error> {
-    let options = settings.url.options()?.application_name("ventriform");
-    let mut connection = options
-        .options([("statement_timeout", "0")])
-        .connect()
-        .await?;
-    keep_promises(&mut connection).await?;
+    let options = with_few_parameters(settings.url.options()?);
+    let mut connection = options.connect().await?;
+    set_session(&mut connection, &[("statement_timeout", "0".into())]).await?;
     Ok(connection)
+}
+
+/// Without the startup parameters that poolers do not know. Numbers are transferred in binary form, so the digits of
+/// their text do not matter.
+fn with_few_parameters(options: PgConnectOptions) -> PgConnectOptions {
+    options
+        .application_name("ventriform")
+        .extra_float_digits(None)
+}
+
+/// What a session is told besides its limits. `run` names this process.
+fn session_names(run: &str) -> Vec<(&'static str, String)> {
+    vec![
+        ("client_min_messages", "warning".into()),
+        (RUN, run.to_owned()),
+    ]
+}
+
+/// Sets parameters of a session, and makes sure that what was acknowledged is on disk, whatever the default of the
+/// server.
+///
+/// # Errors
+/// If the server refuses one, or the next statement finds another session.
+async fn set_session(
+    connection: &mut PgConnection,
+    parameters: &[(&'static str, String)],
+) -> Result<(), sqlx::Error> {
+    let (names, values): (Vec<&str>, Vec<&str>) = parameters
+        .iter()
+        .map(|(name, value)| (*name, value.as_str()))
+        .unzip();
+    sqlx::query(
+        "SELECT set_config(name, value, false) FROM unnest($1::text[], $2::text[]) AS one(name, value)
+         UNION ALL SELECT set_config('synchronous_commit', 'on', false)
+         WHERE current_setting('synchronous_commit') = 'off'",
+    )
+    .bind(&names)
+    .bind(&values)
+    .execute(&mut *connection)
+    .await?;
+    let Some((name, value)) = parameters.iter().find(|(name, _)| *name == RUN) else {
+        return Ok(());
+    };
+    let kept = sqlx::query_scalar("SELECT current_setting($1, true) IS NOT DISTINCT FROM $2");
+    match kept.bind(name).bind(value).fetch_one(connection).await? {
+        true => Ok(()),
+        false => Err(sqlx::Error::Configuration(SHARED_SESSION.into())),
+    }
+}
+
+/// Refuses a pooler that gives each transaction, and not each connection, a session: a parameter that one connection
+/// has set shows in another one, or is lost while the other one is in a transaction.
+///
+/// # Errors
+/// If sessions are shared, or a statement is refused.
+async fn check_sessions(
+    url: &PostgresUrl,
+    first: &mut PgConnection,
+    options: &PgConnectOptions,
+    run: &str,
+) -> Result<(), PostgresError> {
+    let refused = |error| refusal(url, &error);
+    let Ok(Ok(mut second)) = tokio::time::timeout(CONNECT, options.connect()).await else {
+        // The server has no room for another connection now.
+        return Ok(());
+    };
+    let mark = format!("probe {run}").replace('\'', "");
+    // Simple statements: prepared ones would fail for a reason of their own.
+    let show = format!("SELECT coalesce(current_setting('{RUN}', true), '')");
+    let shared = async {
+        let set = format!("SELECT set_config('{RUN}', '{mark}', false)");
+        sqlx::raw_sql(AssertSqlSafe(set))
+            .execute(&mut *first)
+            .await?;
+        sqlx::raw_sql("BEGIN").execute(&mut second).await?;
+        let seen = sqlx::raw_sql(AssertSqlSafe(show.clone()));
+        let seen: String = seen.fetch_one(&mut second).await?.get(0);
+        let kept = sqlx::raw_sql(AssertSqlSafe(show)).fetch_one(&mut *first);
+        let kept: String = kept.await?.get(0);
+        sqlx::raw_sql("ROLLBACK").execute(&mut second).await?;
+        Ok(seen == mark || kept != mark)
+    };
+    let shared = shared.await.map_err(refused)?;
+    let _ = second.close().await;
+    match shared {
+        false => Ok(()),
+        true => Err(PostgresError::Refused {
+            url: url.clone(),
+            reason: SHARED_SESSION.into(),
+            fix: USE_SESSIONS,
+        }),
+    }
 }
 
 /// What the server limits of a session, so that a process that stands still or is cut off holds no lock
@@ -230,17 +339,6 @@ fn session_limits(wait: Duration) -> [(&'static str, String); 7] {
     ]
 }
 
-/// What was acknowledged is on disk, whatever the default of the server.
-async fn keep_promises(connection: &mut PgConnection) -> Result<(), sqlx::Error> {
-    sqlx::query(
-        "SELECT set_config('synchronous_commit', 'on', false)
-         WHERE current_setting('synchronous_commit') = 'off'",
-    )
-    .execute(connection)
-    .await?;
-    Ok(())
-}
-
 /// Connects as soon as the server answers.
 async fn reach(
     settings: &PostgresSettings,
@@ -252,7 +350,9 @@ async fn reach(
     loop {
         let reason = match tokio::time::timeout(CONNECT, options.connect()).await {
             Ok(Ok(connection)) => return Ok(connection),
-            Ok(Err(error)) if faults::connection_was_lost(&error) => error.to_string(),
+            Ok(Err(error)) if faults::connection_was_lost(&error) && !is_final(&error) => {
+                said_by_server(&error)
+            }
             Ok(Err(error)) => return Err(refusal(url, &error)),
             Err(_) => "it does not answer".to_owned(),
         };
@@ -323,21 +423,51 @@ async fn check_server(
     Ok(())
 }
 
+/// The server's own words where it has said something, else what happened.
+fn said_by_server(error: &sqlx::Error) -> String {
+    match error {
+        sqlx::Error::Database(said) => said.message().to_owned(),
+        sqlx::Error::Configuration(reason) => reason.to_string(),
+        error => error.to_string(),
+    }
+}
+
+/// Whether a pooler refuses what will not change by waiting.
+fn is_final(error: &sqlx::Error) -> bool {
+    let said = said_by_server(error);
+    [
+        "unsupported startup parameter",
+        "no such database",
+        "no such user",
+    ]
+    .iter()
+    .any(|text| said.starts_with(text))
+}
+
 /// Why the server refuses a connection or a statement at the start, and what to do.
 fn refusal(url: &PostgresUrl, error: &sqlx::Error) -> PostgresError {
-    let fix = match faults::sqlstate(error).as_deref() {
-        Some("28P01" | "28000") => {
-            "Correct user and password in the URL (or PGPASSWORD), or let the user in by pg_hba.conf"
+    let fix = match error {
+        error if is_final(error) => {
+            "A pooler says so: name database and user in its configuration, and leave parameters that it does not \
+             know out of the URL or list them in `ignore_startup_parameters`"
         }
-        Some("3D000") => "Make the database first: CREATE DATABASE name OWNER user",
-        Some("42501" | "3F000") => {
-            "Give the user the right to make tables: GRANT CREATE ON SCHEMA public TO user"
-        }
-        _ => "Correct the setting `database`",
+        sqlx::Error::Configuration(_) => USE_SESSIONS,
+        error => match faults::sqlstate(error).as_deref() {
+            Some("28P01" | "28000") => {
+                "Correct user and password in the URL (or PGPASSWORD), or let the user in by pg_hba.conf"
+            }
+            Some("3D000") => "Make the database first: CREATE DATABASE name OWNER user",
+            Some("42501" | "3F000") => {
+                "Give the user the right to make tables: GRANT CREATE ON SCHEMA public TO user"
+            }
+            // A prepared statement that another connection has made, or that is gone.
+            Some("26000" | "42P05") => USE_SESSIONS,
+            _ => "Correct the setting `database`",
+        },
     };
     PostgresError::Refused {
         url: url.clone(),
-        reason: error.to_string(),
+        reason: said_by_server(error),
         fix,
     }
 }

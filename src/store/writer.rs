@@ -296,7 +296,7 @@ mod tests {
     #[tokio::test]
     async fn writes_give_up_together_when_another_process_holds_the_lock() {
         let folder = tempfile::tempdir().unwrap();
-        let writer = writer(folder.path(), 300).await;
+        let writer = writer(folder.path(), 1500).await;
         let mut other = writer.options.connect().await.unwrap();
         sqlx::query("BEGIN IMMEDIATE")
             .execute(&mut other)
@@ -308,8 +308,8 @@ mod tests {
         for outcome in [outcomes.0, outcomes.1, outcomes.2, outcomes.3] {
             assert_eq!(outcome.unwrap_err().cause(), StoreFault::Busy);
         }
-        // One after the other, they would have waited 1.2 s.
-        assert!(started.elapsed() < Duration::from_millis(900));
+        // One after the other, they would have waited 6 s.
+        assert!(started.elapsed() < Duration::from_millis(4500));
         sqlx::query("ROLLBACK").execute(&mut other).await.unwrap();
         assert_eq!(write().await.unwrap(), 1);
     }

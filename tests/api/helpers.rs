@@ -30,7 +30,7 @@ use ventriform::volume::phantom::{PhantomParameters, phantom};
 use ventriform::work::{Engine, IntensityFacts, UploadFacts, UploadReader};
 
 /// How long a test waits for a job or another event before it fails.
-const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A client of one service.
 pub struct Api {
@@ -70,6 +70,21 @@ impl Api {
 /// Whether the tests of the service run on PostgreSQL: `VENTRIFORM_TEST_DATABASE=postgres`.
 fn on_postgres() -> bool {
     std::env::var("VENTRIFORM_TEST_DATABASE").is_ok_and(|engine| engine == "postgres")
+}
+
+/// A port on which nobody listens, and that stays so until the test listens there: the system hands out ports
+/// above 32767 to whoever asks for any, and to connections.
+pub fn quiet_port() -> u16 {
+    use std::sync::atomic::{AtomicU16, Ordering};
+    static NEXT: AtomicU16 = AtomicU16::new(0);
+    // Other processes of the tests begin elsewhere.
+    let first = 16_000 + (std::process::id() % 160) as u16 * 100;
+    loop {
+        let port = first + NEXT.fetch_add(1, Ordering::Relaxed) % 100;
+        if std::net::TcpListener::bind(("127.0.0.1", port)).is_ok() {
+            return port;
+        }
+    }
 }
 
 /// A running service and a client.
@@ -569,6 +584,21 @@ impl Service {
 
     /// The same, with environment variables.
     pub async fn start_with(data: &Path, arguments: &[&str], variables: &[(&str, String)]) -> Self {
+        Self::launch(data, arguments, variables, Stdio::null()).await
+    }
+
+    /// The same, with its log in a file.
+    pub async fn start_logging(data: &Path, arguments: &[&str], log: &Path) -> Self {
+        let log = std::fs::File::create(log).unwrap();
+        Self::launch(data, arguments, &[], log.into()).await
+    }
+
+    async fn launch(
+        data: &Path,
+        arguments: &[&str],
+        variables: &[(&str, String)],
+        log: Stdio,
+    ) -> Self {
         let database = match on_postgres() {
             true => Some(super::postgres::database_of(data).await.to_string()),
             false => None,
@@ -580,7 +610,7 @@ impl Service {
             .args(arguments)
             .envs(variables.iter().map(|(name, value)| (*name, value)))
             .stdout(Stdio::piped())
-            .stderr(Stdio::null())
+            .stderr(log)
             .spawn()
             .unwrap();
         let mut line = String::new();

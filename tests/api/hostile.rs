@@ -14,7 +14,7 @@ async fn connect(app: &TestApp) -> TcpStream {
 /// Everything the service sends until it closes the connection.
 async fn rest_of(stream: &mut TcpStream) -> String {
     let mut said = Vec::new();
-    let read = tokio::time::timeout(Duration::from_secs(10), stream.read_to_end(&mut said));
+    let read = tokio::time::timeout(Duration::from_secs(60), stream.read_to_end(&mut said));
     // The service may also reset the connection.
     let _ = read.await.expect("the service hangs up");
     String::from_utf8_lossy(&said).into_owned()
@@ -53,7 +53,11 @@ async fn a_request_names_its_host_once() {
 
 #[tokio::test]
 async fn idle_connections_and_partial_headers_are_closed() {
-    let app = TestApp::with(|s| s.header_timeout = "300ms".parse().unwrap()).await;
+    let app = TestApp::with(|s| {
+        s.header_timeout = "300ms".parse().unwrap();
+        s.keep_alive_timeout = "600ms".parse().unwrap();
+    })
+    .await;
     let mut silent = connect(&app).await;
     let mut slow = connect(&app).await;
     slow.write_all(b"GET /healthz HT").await.unwrap();
@@ -67,19 +71,40 @@ async fn idle_connections_and_partial_headers_are_closed() {
     app.json("/healthz").await;
 }
 
+/// Connections that do not stall, however slow the machine: they wait for the events of a job.
+async fn hold(app: &TestApp, count: usize) -> Vec<TcpStream> {
+    let mut filing = connect(app).await;
+    let body = volume("slow");
+    let head = format!(
+        "POST /v1/models HTTP/1.1\r\nhost: x\r\ncontent-length: {}\r\nconnection: close\r\n\r\n",
+        body.len()
+    );
+    filing
+        .write_all(&[head.as_bytes(), &body].concat())
+        .await
+        .unwrap();
+    let answer = rest_of(&mut filing).await;
+    let (_, events) = answer.split_once("\"events\":\"").expect("a job");
+    let (events, _) = events.split_once('"').unwrap();
+    let mut held = Vec::new();
+    for _ in 0..count {
+        let mut stream = connect(app).await;
+        let request = format!("GET {events} HTTP/1.1\r\nhost: x\r\n\r\n");
+        stream.write_all(request.as_bytes()).await.unwrap();
+        let mut first = [0; 12];
+        stream.read_exact(&mut first).await.unwrap();
+        assert_eq!(&first, b"HTTP/1.1 200");
+        held.push(stream);
+    }
+    held
+}
+
 #[tokio::test]
 async fn connections_beyond_the_limit_are_closed_at_once() {
     let app = TestApp::with(|s| s.connection_limit = 3).await;
-    let mut held = Vec::new();
-    for _ in 0..3 {
-        let mut stream = connect(&app).await;
-        stream.write_all(b"GET /healthz HT").await.unwrap();
-        held.push(stream);
-    }
-    tokio::time::sleep(Duration::from_millis(100)).await;
+    let held = hold(&app, 3).await;
     assert_eq!(rest_of(&mut connect(&app).await).await, "");
     drop(held);
-    tokio::time::sleep(Duration::from_millis(100)).await;
     app.json("/healthz").await;
 }
 
@@ -122,10 +147,7 @@ async fn a_form_with_endless_headers_is_rejected() {
         .body(reqwest::Body::wrap_stream(pieces))
         .send()
         .await;
-    // The service may close the connection while the client is still sending.
-    if let Ok(answer) = answer {
-        assert_eq!(answer.status(), 400);
-    }
+    assert_eq!(answer.unwrap().status(), 400);
     assert!(app.stored().is_empty());
 }
 
@@ -185,7 +207,7 @@ async fn clients_that_send_a_few_bytes_and_wait_occupy_no_files() {
     // The rest arrives, and the body is judged as a whole.
     let mut last = slow.pop().unwrap();
     last.write_all(&[b'.'; 86_000]).await.unwrap();
-    let answer = tokio::time::timeout(Duration::from_secs(10), async {
+    let answer = tokio::time::timeout(Duration::from_secs(60), async {
         let mut said = [0; 12];
         last.read_exact(&mut said).await.unwrap();
         String::from_utf8_lossy(&said).into_owned()
@@ -214,7 +236,7 @@ async fn a_client_that_never_reads_is_cut_off() {
             tokio::time::sleep(Duration::from_millis(50)).await;
         }
     };
-    tokio::time::timeout(Duration::from_secs(10), cut_off)
+    tokio::time::timeout(Duration::from_secs(60), cut_off)
         .await
         .expect("the service hangs up");
 }
@@ -222,11 +244,7 @@ async fn a_client_that_never_reads_is_cut_off() {
 #[tokio::test]
 async fn a_full_service_still_answers_health_checks() {
     let app = TestApp::with(|s| s.connection_limit = 2).await;
-    let mut held = [connect(&app).await, connect(&app).await];
-    for stream in &mut held {
-        stream.write_all(b"GET /healthz HT").await.unwrap();
-    }
-    tokio::time::sleep(Duration::from_millis(100)).await;
+    let _held = hold(&app, 2).await;
     app.json("/healthz").await;
     app.json("/readyz").await;
     let refused = app.get("/v1/volumes").send().await.unwrap();

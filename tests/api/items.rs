@@ -128,13 +128,13 @@ async fn run(database: &mut sqlx::SqliteConnection, statement: &'static str) {
 
 #[tokio::test]
 async fn an_upload_is_stored_to_its_end_although_the_client_hangs_up() {
-    let app = TestApp::start().await;
+    let app = TestApp::with(|s| s.write_wait = "60s".parse().unwrap()).await;
     let mut database = database(&app.data).await;
     // The record has to wait for this transaction, so the client leaves between files and record.
     run(&mut database, "BEGIN IMMEDIATE").await;
     let request = app.post("/v1/volumes").body(volume("sphere")).send();
     let client = tokio::spawn(request);
-    let deadline = Instant::now() + Duration::from_secs(5);
+    let deadline = Instant::now() + Duration::from_secs(60);
     let folders = || std::fs::read_dir(app.data.path().join("volumes")).unwrap();
     while folders().next().is_none() {
         assert!(Instant::now() < deadline, "nothing is published");

@@ -40,6 +40,7 @@ mod on_postgres;
 mod openapi;
 mod operations;
 mod postgres;
+mod proxies;
 mod readers;
 mod receiver;
 mod records;

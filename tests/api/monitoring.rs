@@ -1,7 +1,7 @@
 //! `/metrics`, and the dashboard and alert rules that use it.
 
 use crate::helpers::{TestApp, volume};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// A service that has done something of everything.
@@ -150,6 +150,34 @@ async fn the_dashboard_and_the_rules_name_metrics_that_exist() {
     let own = served.iter().filter(|name| name.starts_with("ventriform_"));
     let undocumented: Vec<_> = own.filter(|name| !used.contains(*name)).collect();
     assert!(undocumented.is_empty(), "{undocumented:?}");
+    // A rate of a gauge, or a difference of a counter, would fire for another reason or never.
+    let kinds: BTreeMap<&str, &str> = text
+        .lines()
+        .filter_map(|line| line.strip_prefix("# TYPE ")?.split_once(' '))
+        .collect();
+    for file in &files[..2] {
+        let text = std::fs::read_to_string(root.join(file)).unwrap();
+        for (functions, fitting) in [
+            (&["rate(", "increase("][..], &["counter", "histogram"][..]),
+            (&["delta(", "deriv(", "_over_time("], &["gauge"]),
+        ] {
+            for function in functions {
+                for call in text.split(*function).skip(1) {
+                    let name = call.split(['{', '[', '(']).next().unwrap();
+                    let name = name.strip_suffix("_bucket").unwrap_or(name);
+                    if let Some(kind) = kinds.get(name) {
+                        assert!(fitting.contains(kind), "{file}: {function}{name}: {kind}");
+                    }
+                }
+            }
+        }
+    }
+    // promtool runs these (scripts/test.sh).
+    let rules = std::fs::read_to_string(root.join(files[1])).unwrap();
+    let tried = std::fs::read_to_string(root.join("deploy/prometheus/alerts_test.yml")).unwrap();
+    let mut alerts = rules.lines().filter_map(|line| line.split_once("alert: "));
+    let untried = alerts.find(|(_, name)| !tried.contains(&format!("alertname=\"{name}\"")));
+    assert_eq!(untried, None);
     let board: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(root.join(files[0])).unwrap()).unwrap();
     assert!(board["panels"].as_array().unwrap().len() > 15);

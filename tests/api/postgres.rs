@@ -94,14 +94,12 @@ impl Server {
         let file = Path::new(&folder).join("postgresql.conf");
         let text = std::fs::read_to_string(&file).unwrap() + settings;
         std::fs::write(file, text).unwrap();
-        let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         let server = Self {
             programs,
             folder: folder.into(),
-            port: free.local_addr().unwrap().port(),
+            port: crate::helpers::quiet_port(),
             watch: Mutex::default(),
         };
-        drop(free);
         server.start();
         server
     }
@@ -123,7 +121,7 @@ impl Server {
             .spawn()
             .unwrap();
         *watch = Some(child);
-        for _ in 0..400 {
+        for _ in 0..2400 {
             let answers = Command::new(self.programs.join("pg_isready"))
                 .args(["-q", "-h", "127.0.0.1", "-p", &self.port.to_string()])
                 .status();

@@ -682,6 +682,17 @@ impl TestIssuer {
         Self { url, reads, ec, ed }
     }
 
+    /// A token with this header and this payload, signed by the key `ec`.
+    fn sign_head(&self, header: &Value, payload: &str) -> String {
+        use base64::Engine;
+        let header = base64::prelude::BASE64_URL_SAFE_NO_PAD.encode(header.to_string());
+        let message = format!("{header}.{payload}");
+        let key = EncodingKey::from_ec_der(self.ec.serialized_der());
+        let signature =
+            jsonwebtoken::crypto::sign(message.as_bytes(), &key, Algorithm::ES256).unwrap();
+        format!("{message}.{signature}")
+    }
+
     fn claims(&self) -> Value {
         let expires = SystemClock.now() / 1000 + 300;
         json!({"iss": self.url, "aud": ["other", "ventriform"], "sub": "dr-who", "exp": expires,
@@ -768,10 +779,44 @@ async fn tokens_of_the_issuer_open_the_service_and_forged_ones_do_not() {
     ] {
         problem(list(&forged).await.unwrap(), 401, "unauthorized").await;
     }
+    // A header that demands what nobody knows, well signed.
+    let plain = issuer.sign(Algorithm::ES256, "ec", &issuer.claims());
+    let header = json!({"alg": "ES256", "kid": "ec", "typ": "JWT", "crit": ["exp2"], "exp2": 1});
+    let signed = issuer.sign_head(&header, plain.split('.').nth(1).unwrap());
+    let said = problem(list(&signed).await.unwrap(), 401, "unauthorized").await;
+    assert!(text(&said["detail"]).contains("crit"), "{said}");
     // Unknown keys make the service ask the issuer once in a while, not each time.
     for kid in 0..5 {
         let token = issuer.sign(Algorithm::EdDSA, &format!("new-{kid}"), &issuer.claims());
         problem(list(&token).await.unwrap(), 401, "unauthorized").await;
     }
     assert!(issuer.reads.load(Ordering::Relaxed) <= 2);
+}
+
+#[tokio::test]
+async fn roles_of_a_token_are_found_by_a_path() {
+    let issuer = TestIssuer::start().await;
+    let url = issuer.url.clone();
+    let app = TestApp::with(move |settings| {
+        settings.oidc_issuer = url;
+        settings.oidc_scope_claim = "realm_access.roles".into();
+        settings.oidc_tenant_claim = "organisation.name".into();
+    })
+    .await;
+    let mut claims = issuer.claims();
+    claims["scope"] = json!("admin");
+    claims["realm_access"] = json!({"roles": ["offline_access", "submit"]});
+    claims["organisation"] = json!({"name": "clinic"});
+    let token = issuer.sign(Algorithm::ES256, "ec", &claims);
+    let upload = app.post("/v1/volumes").bearer_auth(&token);
+    assert_eq!(
+        status(upload.body(volume("sphere"))).await,
+        StatusCode::CREATED
+    );
+    let keys = app.get("/v1/keys").bearer_auth(&token);
+    assert_eq!(status(keys).await, StatusCode::FORBIDDEN);
+    claims["realm_access"] = json!(["submit"]);
+    let token = issuer.sign(Algorithm::ES256, "ec", &claims);
+    let refused = app.get("/v1/jobs").bearer_auth(&token).send().await;
+    problem(refused.unwrap(), 401, "unauthorized").await;
 }

@@ -46,6 +46,18 @@ impl Authority {
         self.0.pem()
     }
 
+    /// The connection under TLS, by a client that trusts this authority.
+    pub async fn secured(&self, stream: TcpStream) -> tokio_rustls::client::TlsStream<TcpStream> {
+        let mut roots = rustls::RootCertStore::empty();
+        roots.add(self.0.der().clone()).unwrap();
+        let config = rustls::ClientConfig::builder()
+            .with_root_certificates(roots)
+            .with_no_client_auth();
+        let name = "127.0.0.1".try_into().unwrap();
+        let connector = tokio_rustls::TlsConnector::from(std::sync::Arc::new(config));
+        connector.connect(name, stream).await.unwrap()
+    }
+
     fn identity(&self) -> Identity {
         let (certificate, key) = self.sign(&["client"], ExtendedKeyUsagePurpose::ClientAuth);
         Identity::from_pem(format!("{certificate}{key}").as_bytes()).unwrap()

@@ -115,10 +115,7 @@ async fn a_job_keeps_its_trace_over_a_restart() {
 
 #[tokio::test]
 async fn a_collector_that_is_away_costs_nothing_but_spans() {
-    // Nobody listens there.
-    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-    let endpoint = format!("http://{}", free.local_addr().unwrap());
-    drop(free);
+    let endpoint = format!("http://127.0.0.1:{}", crate::helpers::quiet_port());
     let app = TestApp::with(|settings| {
         settings.otlp_endpoint = endpoint.parse().unwrap();
     })

@@ -196,10 +196,7 @@ async fn a_receiver_that_hangs_does_not_delay_another() {
 #[tokio::test]
 async fn deliveries_survive_a_restart_and_erased_jobs() {
     let app = TestApp::with(local).await;
-    let port = {
-        let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-        free.local_addr().unwrap().port()
-    };
+    let port = crate::helpers::quiet_port();
     let url = format!("http://127.0.0.1:{port}/hook");
     let job = file(&app, "sphere", json!({"url": url, "secret": SECRET})).await;
     app.until(&job, &["succeeded"]).await;

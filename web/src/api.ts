@@ -1,5 +1,6 @@
 // Requests to the service, with the key of the caller and with problems as the service words them.
 
+import { at } from "./base";
 import { saveBlob } from "./save";
 import { Watched } from "./state";
 
@@ -150,7 +151,7 @@ export async function call(path: string, options: CallOptions = {}): Promise<Res
     const used = key.value;
     let answer: Response;
     try {
-      answer = await fetch(path, { ...options, headers: { ...options.headers, ...authorization() } });
+      answer = await fetch(at(path), { ...options, headers: { ...options.headers, ...authorization() } });
     } catch (error) {
       if (options.signal?.aborted) throw error;
       reachable.value = false;

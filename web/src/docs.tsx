@@ -2,6 +2,7 @@
 // command; operations that only read can be sent from here.
 
 import { useEffect, useMemo, useState } from "preact/hooks";
+import { at } from "./base";
 import { authorization, get, words } from "./api";
 
 interface Schema {
@@ -90,7 +91,7 @@ export function Docs() {
       <nav aria-label="Parts of the API">
         <input type="search" placeholder="Search the API" aria-label="Search the API" value={search} onInput={event => setSearch(event.currentTarget.value)} />
         <ul>{shown.map(({ tag, entries }) => <li key={tag}><a href={`#api-${tag}`}>{tag}</a> <span class="quiet">{entries.length}</span></li>)}</ul>
-        <p><a href="/openapi.json">openapi.json</a></p>
+        <p><a href={at("/openapi.json")}>openapi.json</a></p>
       </nav>
       <div class="text">
         <h1>{document_.info.title} <span class="quiet">{document_.info.version}</span></h1>
@@ -206,7 +207,7 @@ function Try({ method, path, parameters, values, body }: { method: string; path:
   const send = async () => {
     setAnswer("…");
     try {
-      const got = await fetch(address, { headers: authorization() });
+      const got = await fetch(at(address), { headers: authorization() });
       const type = got.headers.get("content-type") ?? "";
       const text = /json|text/.test(type) ? await got.text() : `${(await got.arrayBuffer()).byteLength} bytes of ${type}`;
       setAnswer(`${got.status}\n${pretty(text).slice(0, 20_000)}`);
@@ -217,7 +218,7 @@ function Try({ method, path, parameters, values, body }: { method: string; path:
   return (
     <>
       <h3>Command</h3>
-      <pre tabIndex={0} aria-label="Command">{`curl -fsS${verb}${data} '${location.origin}${address}'`}</pre>
+      <pre tabIndex={0} aria-label="Command">{`curl -fsS${verb}${data} '${location.origin}${at(address)}'`}</pre>
       {method === "get" && !/events$/.test(path) && <button type="button" disabled={/\{/.test(address)} onClick={() => void send()}>Send</button>}
       {answer && <pre tabIndex={0} aria-label="Answer">{answer}</pre>}
     </>

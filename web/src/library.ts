@@ -1,5 +1,6 @@
 // What is stored, as far as this page has read it, and the states of jobs as they change.
 
+import { at } from "./base";
 import { type Job, type Result, type Volume, authorization, call, get, page, reachable, words } from "./api";
 import { Watched } from "./state";
 import { newest } from "./words";
@@ -182,7 +183,7 @@ async function refreshJobs(): Promise<void> {
 async function follow(job: Job): Promise<void> {
   followed.add(job.id);
   try {
-    const answer = await fetch(job.links.events, { headers: { ...authorization(), accept: "text/event-stream" } });
+    const answer = await fetch(at(job.links.events), { headers: { ...authorization(), accept: "text/event-stream" } });
     if (!answer.ok || !answer.body) throw new Error("no events");
     const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
     let text = "";

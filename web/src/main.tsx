@@ -3,13 +3,14 @@
 import { type ComponentType, render } from "preact";
 import { useEffect, useState } from "preact/hooks";
 import { key, reachable, signIn, wanted } from "./api";
+import { at } from "./base";
 import { refresh } from "./library";
 import { route } from "./route";
 import { useWatched } from "./state";
 import { WorkList } from "./worklist";
 
 /** The same page serves the documentation of the API. */
-const DOCS = location.pathname.startsWith("/docs");
+const DOCS = location.pathname.startsWith(at("/docs"));
 
 function Page() {
   const { view, volume } = useWatched(route);
@@ -23,14 +24,14 @@ function Page() {
         document.getElementById("main")?.focus();
       }}>Skip to the content</a>
       <header class="top">
-        <a class="brand" href="/#/">
+        <a class="brand" href={at("/#/")}>
           <svg viewBox="0 0 32 32" aria-hidden="true"><path d="M8 6c-1.500 11 2 20 8 20s9.500-9 8-20" /><path class="inner" d="M12.500 7c-.7 6 .8 11 3.500 11s4.200-5 3.500-11" /></svg>
           ventriform
         </a>
         <nav aria-label="Pages">
-          <a href="/#/" aria-current={view === "list" && !DOCS ? "page" : undefined}>Scans</a>
-          <a href="/#/evaluation" aria-current={view === "evaluation" && !DOCS ? "page" : undefined}>Evaluation</a>
-          <a href="/docs" aria-current={DOCS ? "page" : undefined}>API</a>
+          <a href={at("/#/")} aria-current={view === "list" && !DOCS ? "page" : undefined}>Scans</a>
+          <a href={at("/#/evaluation")} aria-current={view === "evaluation" && !DOCS ? "page" : undefined}>Evaluation</a>
+          <a href={at("/docs")} aria-current={DOCS ? "page" : undefined}>API</a>
         </nav>
         <span class="research">Research software, not a medical device</span>
         {signedIn && <button type="button" class="plain" onClick={() => signIn("")}>Forget the key</button>}

@@ -1,5 +1,6 @@
 // Files chosen or dropped by a person: which of them make up one scan, and how far each has been sent.
 
+import { at } from "./base";
 import { type Problem, ProblemError, type Volume, authorization, key, nextKey, page, problemOf, uploadLimit } from "./api";
 import { pathOf } from "./drop";
 import { Watched } from "./state";
@@ -189,7 +190,7 @@ function attempt(upload: Upload): Promise<{ status: number; text: string } | nul
       resolve(null);
     };
     request.onloadend = () => requests.delete(upload.id);
-    request.open("POST", `/v1/volumes${keepNames.value ? `?${new URLSearchParams({ labels: `name:${name}` })}` : ""}`);
+    request.open("POST", at(`/v1/volumes${keepNames.value ? `?${new URLSearchParams({ labels: `name:${name}` })}` : ""}`));
     for (const [header, value] of Object.entries(authorization())) request.setRequestHeader(header, value);
     request.send(form);
   });

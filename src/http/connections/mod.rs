@@ -4,7 +4,7 @@
 //! | limit | what happens beyond it |
 //! |---|---|
 //! | connections, in all and of one client | a stalled connection is closed for the new one; if none is stalled, the new one is [reserve](registry) |
-//! | time for a TLS handshake, for a request's head, between requests | the connection is closed |
+//! | time for a TLS handshake, for a request's head, between requests | the connection is closed ([`stall`]) |
 //! | pause in reading an answer, and the rate of reading it | the connection is closed ([`stall`]) |
 //! | memory of the system for an answer that is not read | the answer waits ([`SEND_BUFFER`]) |
 //!
@@ -13,6 +13,13 @@
 //! A connection stalls while the service waits for its client: between requests, in the head or
 //! the body of a request, or in an answer that is not read. While an answer is computed, or events
 //! are awaited, it does not stall.
+//!
+//! Between requests a connection may be idle for longer than proxies keep theirs (setting
+//! `keep_alive_timeout`): a proxy that sends a request while the service closes the connection
+//! answers its client with 502.
+//!
+//! A request that is refused while its body is still arriving is answered at once, and the connection
+//! ends as [`stall`] says, so that the client gets the answer.
 //!
 //! On shutdown no connection is accepted any more. Open ones may finish the answer they are
 //! working on; those that are still open after the grace period are closed.
@@ -24,7 +31,8 @@ mod requests;
 mod stall;
 pub mod tls;
 
-use crate::config::Networks;
+use crate::config::{BasePath, Networks};
+use crate::http::public_base::ProxyPolicy;
 use axum::Router;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
@@ -33,7 +41,7 @@ use prometheus::IntGauge;
 use registry::{Registry, Ticket};
 use requests::RequestService;
 use socket2::{SockRef, TcpKeepalive};
-use stall::WatchedStream;
+use stall::{Linger, StreamLimits, WatchedStream};
 use std::io;
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -70,8 +78,12 @@ pub struct ConnectionLimits {
     pub of_one_client: usize,
     /// The proxies whose word about their clients is taken.
     pub trusted_proxies: Networks,
+    /// The path under which proxies show the service.
+    pub base_path: BasePath,
     /// Longest time for the head of a request to arrive.
     pub head: Duration,
+    /// Longest time between two requests.
+    pub idle: Duration,
     /// Longest pause in reading an answer.
     pub write: Duration,
     /// Longest time for open connections to end on shutdown.
@@ -83,6 +95,7 @@ struct Server {
     router: Router,
     limits: ConnectionLimits,
     tls: Option<Arc<Tls>>,
+    proxies: Arc<ProxyPolicy>,
     /// Closes what is still open after the grace period.
     halt: CancellationToken,
 }
@@ -102,6 +115,11 @@ pub async fn serve(
     let halt = CancellationToken::new();
     let server = Arc::new(Server {
         router,
+        proxies: Arc::new(ProxyPolicy {
+            trusted: limits.trusted_proxies.clone(),
+            base_path: limits.base_path.clone(),
+            tls: tls.is_some(),
+        }),
         limits,
         tls,
         halt: halt.clone(),
@@ -173,7 +191,16 @@ impl Server {
         ticket: &Ticket,
         end: Watcher,
     ) -> Result<(), BoxError> {
-        let stream = WatchedStream::new(stream, ticket.connection.clone(), self.limits.write);
+        let stream = WatchedStream::new(
+            stream,
+            ticket.connection.clone(),
+            StreamLimits {
+                write: self.limits.write,
+                head: self.limits.head,
+                idle: self.limits.idle,
+                linger: Linger::default(),
+            },
+        );
         let Some(tls) = &self.tls else {
             return self.serve_http(stream, peer, None, ticket, end).await;
         };
@@ -207,7 +234,7 @@ impl Server {
             connection: ticket.connection.clone(),
             reserve: ticket.reserve,
             peer,
-            trusted_proxies: self.limits.trusted_proxies.clone(),
+            proxies: self.proxies.clone(),
             lacks_certificate: certificate.is_none()
                 && self
                     .tls
@@ -217,8 +244,9 @@ impl Server {
         };
         let connection = http1::Builder::new()
             .timer(TokioTimer::new())
-            .header_read_timeout(self.limits.head)
             .max_buf_size(READ_BUFFER)
+            // The stream has limits of its own on the wait for a head.
+            .header_read_timeout(None)
             .keep_alive(!ticket.reserve)
             .serve_connection(TokioIo::new(stream), service);
         Ok(end.watch(connection).await?)

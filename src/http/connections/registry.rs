@@ -12,7 +12,7 @@ use crate::http::client::ClientAddress;
 use prometheus::IntGauge;
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::IpAddr;
-use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tokio_util::sync::CancellationToken;
@@ -194,6 +194,14 @@ pub struct OpenConnection {
     /// Milliseconds from `opened` to the last byte in either direction.
     moved_at: AtomicU64,
     phase: AtomicU8,
+    /// Requests that were answered.
+    answered: AtomicU64,
+    /// Whether a head has been received.
+    used: AtomicBool,
+    /// Whether the current request was received to its end.
+    whole: AtomicBool,
+    /// Whether bytes have come since the last request that was received to its end.
+    unread: AtomicBool,
 }
 
 impl OpenConnection {
@@ -205,7 +213,50 @@ impl OpenConnection {
             opened: Instant::now(),
             moved_at: AtomicU64::new(0),
             phase: AtomicU8::new(Phase::Head as u8),
+            answered: AtomicU64::new(0),
+            used: AtomicBool::new(false),
+            whole: AtomicBool::new(true),
+            unread: AtomicBool::new(false),
         }
+    }
+
+    /// Bytes came from the client.
+    pub fn received(&self) {
+        self.unread.store(true, Ordering::Relaxed);
+        self.moved();
+    }
+
+    /// The head of a request was received; `whole` if it has no body.
+    pub fn begin(&self, whole: bool) {
+        self.used.store(true, Ordering::Relaxed);
+        self.whole.store(whole, Ordering::Relaxed);
+    }
+
+    /// The body of the current request was received to its end.
+    pub fn received_whole(&self) {
+        self.whole.store(true, Ordering::Relaxed);
+    }
+
+    /// The current request is answered, and the next head is awaited.
+    pub fn answered(&self) {
+        if self.whole.load(Ordering::Relaxed) {
+            self.unread.store(false, Ordering::Relaxed);
+        }
+        self.answered.fetch_add(1, Ordering::Relaxed);
+        self.enter(Phase::Head);
+    }
+
+    /// If a head is awaited: the number of requests answered before it, and whether any came at all.
+    pub fn awaits_head(&self) -> Option<(u64, bool)> {
+        (self.phase.load(Ordering::Relaxed) == Phase::Head as u8).then(|| {
+            let answered = self.answered.load(Ordering::Relaxed);
+            (answered, self.used.load(Ordering::Relaxed))
+        })
+    }
+
+    /// Whether the client has sent, or may still be sending, what nobody reads.
+    pub fn has_unread(&self) -> bool {
+        self.unread.load(Ordering::Relaxed)
     }
 
     /// Bytes went over the connection.
@@ -268,7 +319,9 @@ mod tests {
             connections,
             of_one_client,
             trusted_proxies: Default::default(),
+            base_path: Default::default(),
             head: PATIENCE,
+            idle: PATIENCE,
             write: PATIENCE,
             grace: PATIENCE,
         };

@@ -2,12 +2,12 @@
 
 use super::registry::{OpenConnection, Phase};
 use super::tls::ClientCertificate;
-use crate::config::Networks;
 use crate::http::client::ClientAddress;
 use crate::http::problem::Problem;
+use crate::http::public_base::{ProxyPolicy, PublicBase};
 use axum::Router;
 use axum::body::{Body, Bytes, HttpBody};
-use axum::http::{HeaderValue, Request, Response, StatusCode, header};
+use axum::http::{HeaderValue, Method, Request, Response, StatusCode, Uri, header};
 use axum::response::IntoResponse;
 use hyper::body::{Frame, Incoming, SizeHint};
 use hyper::service::Service;
@@ -16,6 +16,7 @@ use std::net::IpAddr;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll, ready};
+use std::time::SystemTime;
 
 /// The paths that are answered on every connection.
 const FOR_OPERATORS: [&str; 2] = ["/healthz", "/readyz"];
@@ -30,8 +31,8 @@ pub struct RequestService {
     pub reserve: bool,
     /// The address of its other end.
     pub peer: IpAddr,
-    /// The proxies whose word about their clients is taken.
-    pub trusted_proxies: Networks,
+    /// The proxies whose word is taken, and the path under which they show the service.
+    pub proxies: Arc<ProxyPolicy>,
     /// The client's verified certificate.
     pub certificate: Option<Arc<ClientCertificate>>,
     /// Whether a certificate is demanded and the client has none.
@@ -43,15 +44,26 @@ impl Service<Request<Incoming>> for RequestService {
     type Error = Infallible;
     type Future = Pin<Box<dyn Future<Output = Result<Self::Response, Infallible>> + Send>>;
 
-    fn call(&self, request: Request<Incoming>) -> Self::Future {
+    fn call(&self, mut request: Request<Incoming>) -> Self::Future {
         let answering = Answering(self.connection.clone());
-        let client = ClientAddress::of_request(self.peer, request.headers(), &self.trusted_proxies);
+        self.connection.begin(request.body().is_end_stream());
+        let trusted = &self.proxies.trusted;
+        let client = ClientAddress::of_request(self.peer, request.headers(), trusted);
+        let base = PublicBase::of_request(self.peer, request.headers(), &self.proxies);
+        if let Some(rest) = self.proxies.base_path.rest_of(request.uri().path()) {
+            let rest = with_path(request.uri(), rest);
+            *request.uri_mut() = rest;
+        }
+        if request.method() != Method::GET {
+            // Ranges are defined for GET alone (RFC 9110, section 14.2).
+            request.headers_mut().remove(header::RANGE);
+        }
         if let Some(problem) = self.refusal(request.uri().path()) {
             answering.0.enter(Phase::Answer);
             let mut response = problem.into_response();
             let close = HeaderValue::from_static("close");
             response.headers_mut().insert(header::CONNECTION, close);
-            return Box::pin(async move { Ok(response.map(|body| answering.body(body))) });
+            return Box::pin(async move { Ok(dated(response).map(|body| answering.body(body))) });
         }
         let mut request = request.map(|body| {
             let body = ReceivedBody {
@@ -66,16 +78,38 @@ impl Service<Request<Incoming>> for RequestService {
         });
         let extensions = request.extensions_mut();
         extensions.insert(client);
+        extensions.insert(base.clone());
         if let Some(certificate) = &self.certificate {
             extensions.insert(certificate.clone());
         }
         let mut router = self.router.clone();
         let answer = tower::Service::call(&mut router, request);
         Box::pin(async move {
-            let response = client.scope(answer).await?;
-            Ok(response.map(|body| answering.body(body)))
+            let response = base.scope(client.scope(answer)).await?;
+            Ok(dated(response).map(|body| answering.body(body)))
         })
     }
+}
+
+/// The target of a request with another path, which is a part of its own.
+fn with_path(target: &Uri, path: &str) -> Uri {
+    let path_and_query = match target.query() {
+        Some(query) => format!("{path}?{query}"),
+        None => path.to_owned(),
+    };
+    let mut parts = target.clone().into_parts();
+    parts.path_and_query = path_and_query.parse().ok();
+    Uri::from_parts(parts).unwrap_or_else(|_| target.clone())
+}
+
+/// The answer with the time of the system's clock in `Date`. Left to itself, hyper keeps a date until
+/// its time is over: after the clock has been set back, for as long as it was ahead.
+fn dated(mut response: Response<Body>) -> Response<Body> {
+    let now = httpdate::fmt_http_date(SystemTime::now());
+    if let Ok(now) = HeaderValue::try_from(now) {
+        response.headers_mut().insert(header::DATE, now);
+    }
+    response
 }
 
 impl RequestService {
@@ -120,7 +154,7 @@ impl Answering {
 
 impl Drop for Answering {
     fn drop(&mut self) {
-        self.0.enter(Phase::Head);
+        self.0.answered();
     }
 }
 
@@ -166,6 +200,9 @@ impl HttpBody for ReceivedBody {
         context: &mut Context<'_>,
     ) -> Poll<Option<Result<Frame<Bytes>, hyper::Error>>> {
         let frame = ready!(Pin::new(&mut self.body).poll_frame(context));
+        if self.body.is_end_stream() || frame.is_none() {
+            self.connection.received_whole();
+        }
         if self.body.is_end_stream() || !matches!(frame, Some(Ok(_))) {
             self.connection.leave(Phase::Body, Phase::Answer);
         }

@@ -1,9 +1,19 @@
-//! A stream that ends when its client does not read.
+//! A stream that ends when its client does not read or send, and that ends so that the last answer
+//! is not lost.
 //!
-//! A write that the system cannot take waits for the client. It fails after the write timeout; a
-//! single byte taken ends the wait. So that a client cannot hold a connection with one byte per
-//! timeout, the bytes taken are compared with [`LEAST_RATE`] whenever the waits add up to the
+//! **Reading an answer.** A write that the system cannot take waits for the client. It fails after the
+//! write timeout; a single byte taken ends the wait. So that a client cannot hold a connection with one
+//! byte per timeout, the bytes taken are compared with [`LEAST_RATE`] whenever the waits add up to the
 //! timeout.
+//!
+//! **Sending a head.** The first head of a connection, and every head that has begun, has the head's
+//! time limit; between two requests the connection may be idle for longer.
+//!
+//! **The end.** A connection that is closed while bytes of its client are unread is reset by the
+//! system, and a reset takes back the answer that the client has not read yet. So where a request was
+//! refused before its body had come, writing ends first; then bytes are read and thrown away until
+//! the client closes, within limits ([`Linger`]). Under TLS this happens below the encryption. Meanwhile
+//! the connection stalls: another one may take its place.
 
 use super::registry::{OpenConnection, Phase};
 use std::io;
@@ -12,17 +22,58 @@ use std::sync::Arc;
 use std::task::{Context, Poll, ready};
 use std::time::{Duration, Instant};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::time::Sleep;
+use tokio::time::{Instant as TimerInstant, Sleep};
 
 /// Bytes per second that a client must read on average while the service waits for it.
 const LEAST_RATE: f64 = 1024.0;
+
+/// Bytes thrown away at once.
+const LINGER_PIECE: usize = 64 << 10;
+
+/// How long a stream whose client may still send is read at its end.
+#[derive(Debug, Clone, Copy)]
+pub struct Linger {
+    /// Longest time for the client to read the last answer and to close.
+    pub total: Duration,
+    /// Longest pause in what it still sends.
+    pub pause: Duration,
+    /// Bytes that are read and thrown away. What comes then stays with the system, so that a client
+    /// which reads only when it cannot send finds the answer.
+    pub bytes: u64,
+}
+
+impl Default for Linger {
+    fn default() -> Self {
+        Self {
+            total: Duration::from_secs(10),
+            pause: Duration::from_secs(2),
+            bytes: 512 << 20,
+        }
+    }
+}
+
+/// How long a stream waits for its client.
+#[derive(Debug, Clone, Copy)]
+pub struct StreamLimits {
+    /// For it to read.
+    pub write: Duration,
+    /// For a head.
+    pub head: Duration,
+    /// For the first byte of a head after another request.
+    pub idle: Duration,
+    /// For it to close.
+    pub linger: Linger,
+}
 
 /// A stream over `S` with the limits on waiting, which reports its bytes to its connection.
 pub struct WatchedStream<S> {
     stream: S,
     connection: Arc<OpenConnection>,
-    /// Longest wait.
-    limit: Duration,
+    limits: StreamLimits,
+    /// The wait for a head.
+    head: Option<HeadWait>,
+    /// The end, once it has begun.
+    ending: Option<Ending>,
     /// When the current wait began, and the timer of its end.
     wait: Option<(Instant, Pin<Box<Sleep>>)>,
     /// Waits since the rate was last checked, and bytes taken meanwhile.
@@ -30,13 +81,74 @@ pub struct WatchedStream<S> {
     taken: u64,
 }
 
+/// A wait for a head.
+struct HeadWait {
+    /// Requests answered before.
+    number: u64,
+    /// Whether some of it has come.
+    begun: bool,
+    timer: Pin<Box<Sleep>>,
+}
+
+/// The end of a stream whose client may still send.
+struct Ending {
+    /// Bytes that may still be thrown away.
+    left: u64,
+    piece: Vec<u8>,
+    /// Longest pause, and the timer of its end.
+    pause: (Duration, Pin<Box<Sleep>>),
+    last: Pin<Box<Sleep>>,
+}
+
+impl Ending {
+    fn begin(linger: &Linger) -> Self {
+        let timer = |time| Box::pin(tokio::time::sleep(time));
+        Self {
+            left: linger.bytes,
+            piece: vec![0; LINGER_PIECE],
+            pause: (linger.pause, timer(linger.pause)),
+            last: timer(linger.total),
+        }
+    }
+
+    /// Throws away what comes, until it ends.
+    fn poll(
+        &mut self,
+        stream: &mut (impl AsyncRead + Unpin),
+        context: &mut Context<'_>,
+    ) -> Poll<()> {
+        while self.left > 0 {
+            let mut buffer = ReadBuf::new(&mut self.piece);
+            let read = Pin::new(&mut *stream).poll_read(context, &mut buffer);
+            let bytes = buffer.filled().len() as u64;
+            match read {
+                Poll::Ready(Ok(())) if bytes > 0 => {
+                    self.left = self.left.saturating_sub(bytes);
+                    let (pause, timer) = &mut self.pause;
+                    timer.as_mut().reset(TimerInstant::now() + *pause);
+                }
+                Poll::Ready(_) => return Poll::Ready(()),
+                Poll::Pending => {
+                    if self.pause.1.as_mut().poll(context).is_ready() {
+                        return Poll::Ready(());
+                    }
+                    break;
+                }
+            }
+        }
+        self.last.as_mut().poll(context)
+    }
+}
+
 impl<S> WatchedStream<S> {
     /// Watches `stream`.
-    pub fn new(stream: S, connection: Arc<OpenConnection>, limit: Duration) -> Self {
+    pub fn new(stream: S, connection: Arc<OpenConnection>, limits: StreamLimits) -> Self {
         Self {
             stream,
             connection,
-            limit,
+            limits,
+            head: None,
+            ending: None,
             wait: None,
             waited: Duration::ZERO,
             taken: 0,
@@ -55,7 +167,7 @@ impl<S> WatchedStream<S> {
         if let Some((since, _)) = self.wait.take() {
             self.connection.leave(Phase::Reading, Phase::Answer);
             self.waited += since.elapsed();
-            if self.waited >= self.limit {
+            if self.waited >= self.limits.write {
                 if (self.taken as f64) < LEAST_RATE * self.waited.as_secs_f64() {
                     return Err(too_slow());
                 }
@@ -67,13 +179,57 @@ impl<S> WatchedStream<S> {
 
     /// The stream took nothing.
     fn wait(&mut self, context: &mut Context<'_>) -> Poll<io::Error> {
-        let (limit, connection) = (self.limit, &self.connection);
+        let (limit, connection) = (self.limits.write, &self.connection);
         let (_, timer) = self.wait.get_or_insert_with(|| {
             connection.leave(Phase::Answer, Phase::Reading);
             (Instant::now(), Box::pin(tokio::time::sleep(limit)))
         });
         ready!(timer.as_mut().poll(context));
         Poll::Ready(too_slow())
+    }
+}
+
+impl<S> WatchedStream<S> {
+    /// Bytes came, perhaps those of a head.
+    fn received(&mut self) {
+        self.connection.received();
+        if let Some((number, _)) = self.connection.awaits_head() {
+            let limit = self.limits.head;
+            let wait = self.head_wait(number, limit);
+            if !wait.begun {
+                wait.begun = true;
+                wait.timer.as_mut().reset(TimerInstant::now() + limit);
+            }
+        }
+    }
+
+    /// No bytes came.
+    fn await_head(&mut self, context: &mut Context<'_>) -> Poll<io::Error> {
+        let Some((number, used)) = self.connection.awaits_head() else {
+            return Poll::Pending;
+        };
+        let limit = match used {
+            true => self.limits.idle,
+            false => self.limits.head,
+        };
+        ready!(self.head_wait(number, limit).timer.as_mut().poll(context));
+        let late = "no request came in time";
+        Poll::Ready(io::Error::new(io::ErrorKind::TimedOut, late))
+    }
+
+    /// The wait for the head after `number` answers; a new one ends after `limit`.
+    fn head_wait(&mut self, number: u64, limit: Duration) -> &mut HeadWait {
+        let end = TimerInstant::now() + limit;
+        let wait = self.head.get_or_insert_with(|| HeadWait {
+            number,
+            begun: false,
+            timer: Box::pin(tokio::time::sleep_until(end)),
+        });
+        if wait.number != number {
+            (wait.number, wait.begun) = (number, false);
+            wait.timer.as_mut().reset(end);
+        }
+        wait
     }
 }
 
@@ -84,7 +240,7 @@ fn too_slow() -> io::Error {
     )
 }
 
-impl<S: AsyncWrite + Unpin> WatchedStream<S> {
+impl<S: AsyncRead + AsyncWrite + Unpin> WatchedStream<S> {
     /// Follows up on the outcome of a write.
     fn follow(
         &mut self,
@@ -99,7 +255,7 @@ impl<S: AsyncWrite + Unpin> WatchedStream<S> {
     }
 }
 
-impl<S: AsyncWrite + Unpin> AsyncWrite for WatchedStream<S> {
+impl<S: AsyncRead + AsyncWrite + Unpin> AsyncWrite for WatchedStream<S> {
     fn poll_write(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
@@ -127,7 +283,16 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for WatchedStream<S> {
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_shutdown(context)
+        let this = &mut *self;
+        if this.ending.is_none() {
+            ready!(Pin::new(&mut this.stream).poll_shutdown(context))?;
+            if !this.connection.has_unread() {
+                return Poll::Ready(Ok(()));
+            }
+        }
+        let limits = &this.limits.linger;
+        let ending = this.ending.get_or_insert_with(|| Ending::begin(limits));
+        ending.poll(&mut this.stream, context).map(Ok)
     }
 }
 
@@ -138,11 +303,14 @@ impl<S: AsyncRead + Unpin> AsyncRead for WatchedStream<S> {
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
         let before = buffer.filled().len();
-        ready!(Pin::new(&mut self.stream).poll_read(context, buffer))?;
-        if buffer.filled().len() > before {
-            self.connection.moved();
+        let read = Pin::new(&mut self.stream).poll_read(context, buffer);
+        if read.is_pending() {
+            return self.await_head(context).map(Err);
         }
-        Poll::Ready(Ok(()))
+        if buffer.filled().len() > before {
+            self.received();
+        }
+        read
     }
 }
 
@@ -152,12 +320,22 @@ mod tests {
     use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
 
     const LIMIT: Duration = Duration::from_millis(600);
+    const LIMITS: StreamLimits = StreamLimits {
+        write: LIMIT,
+        head: Duration::from_millis(300),
+        idle: Duration::from_secs(2),
+        linger: Linger {
+            total: Duration::from_millis(1500),
+            pause: Duration::from_millis(400),
+            bytes: 1 << 20,
+        },
+    };
 
     /// Writes 4 KiB through a pipe of 64 bytes to a client that reads `step` bytes after each
     /// `pause`.
     async fn write_to_a_reader_of(step: usize, pause: Duration) -> io::Result<()> {
         let (service, mut client): (_, DuplexStream) = duplex(64);
-        let mut service = WatchedStream::new(service, Arc::new(OpenConnection::new(None)), LIMIT);
+        let mut service = WatchedStream::new(service, Arc::new(OpenConnection::new(None)), LIMITS);
         let reader = tokio::spawn(async move {
             let mut buffer = vec![0; step];
             while matches!(client.read(&mut buffer).await, Ok(1..)) {
@@ -184,5 +362,103 @@ mod tests {
         // Never a pause as long as the limit, and 10 bytes per second.
         let drip = write_to_a_reader_of(1, Duration::from_millis(100)).await;
         assert_eq!(drip.unwrap_err().kind(), io::ErrorKind::TimedOut);
+    }
+
+    /// Reads until the stream gives up; meanwhile `sent` bytes come, one each 20 ms. Returns the time
+    /// that it took.
+    async fn waits_in_vain(connection: Arc<OpenConnection>, sent: usize) -> Duration {
+        let (service, mut client) = duplex(64);
+        let mut service = WatchedStream::new(service, connection, LIMITS);
+        let sender = tokio::spawn(async move {
+            for _ in 0..sent {
+                client.write_all(b"G").await.unwrap();
+                tokio::time::sleep(Duration::from_millis(20)).await;
+            }
+            tokio::time::sleep(Duration::from_secs(60)).await;
+            drop(client);
+        });
+        let begun = Instant::now();
+        let mut buffer = [0; 8];
+        let ended = loop {
+            match service.read(&mut buffer).await {
+                Ok(1..) => {}
+                other => break other,
+            }
+        };
+        sender.abort();
+        assert_eq!(ended.unwrap_err().kind(), io::ErrorKind::TimedOut);
+        begun.elapsed()
+    }
+
+    #[tokio::test]
+    async fn a_connection_is_idle_between_requests_for_longer_than_a_head_may_take() {
+        let used = || {
+            let used = Arc::new(OpenConnection::new(None));
+            used.begin(true);
+            used.answered();
+            used
+        };
+        assert!(waits_in_vain(used(), 0).await >= LIMITS.idle);
+        let fresh = || Arc::new(OpenConnection::new(None));
+        for (connection, sent) in [(fresh(), 0), (fresh(), 9), (used(), 9)] {
+            let waited = waits_in_vain(connection, sent).await;
+            assert!((LIMITS.head..LIMITS.idle).contains(&waited), "{waited:?}");
+        }
+    }
+
+    #[tokio::test]
+    async fn who_still_sends_when_the_answer_is_written_is_read_for_a_limited_time() {
+        let Linger { total, pause, .. } = LIMITS.linger;
+        for (whole, every, expected) in [
+            (false, Duration::from_secs(60), pause..total),
+            (false, pause / 8, total..Duration::MAX),
+            (true, pause / 8, Duration::ZERO..pause),
+        ] {
+            let connection = Arc::new(OpenConnection::new(None));
+            connection.begin(whole);
+            let (service, mut client) = duplex(64);
+            let mut service = WatchedStream::new(service, connection.clone(), LIMITS);
+            client.write_all(b"POST").await.unwrap();
+            service.read_exact(&mut [0; 4]).await.unwrap();
+            connection.answered();
+            let sender = tokio::spawn(async move {
+                loop {
+                    tokio::time::sleep(every).await;
+                    if client.write_all(b"x").await.is_err() {
+                        return;
+                    }
+                }
+            });
+            let begun = Instant::now();
+            service.shutdown().await.unwrap();
+            let took = begun.elapsed();
+            sender.abort();
+            assert!(expected.contains(&took), "{took:?} is not in {expected:?}");
+        }
+    }
+
+    #[tokio::test]
+    async fn the_end_is_over_when_the_client_closes_and_it_has_the_answer() {
+        let connection = Arc::new(OpenConnection::new(None));
+        connection.begin(false);
+        // As much as is thrown away at most, and more than the pipe holds.
+        for bytes in [1 << 10, LIMITS.linger.bytes as usize / 2] {
+            let (service, client) = duplex(4096);
+            let mut service = WatchedStream::new(service, connection.clone(), LIMITS);
+            let (mut answer, mut request) = tokio::io::split(client);
+            let sender = tokio::spawn(async move {
+                request.write_all(&vec![0; bytes]).await.unwrap();
+                request.shutdown().await.unwrap();
+            });
+            service.read_exact(&mut [0; 4]).await.unwrap();
+            connection.answered();
+            service.write_all(b"refused").await.unwrap();
+            let end = tokio::spawn(async move { service.shutdown().await });
+            sender.await.unwrap();
+            let mut text = Vec::new();
+            answer.read_to_end(&mut text).await.unwrap();
+            assert_eq!(text, b"refused");
+            end.await.unwrap().unwrap();
+        }
     }
 }

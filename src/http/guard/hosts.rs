@@ -12,12 +12,14 @@
 
 use crate::config::Words;
 use crate::http::problem::{Answer, Problem};
+use crate::http::public_base::PublicBase;
 use axum::extract::{Request, State};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, StatusCode, Version, header, uri::Authority};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use std::net::IpAddr;
+use std::sync::Arc;
 
 const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
@@ -69,7 +71,9 @@ impl HostPolicy {
     /// # Errors
     /// 403.
     pub fn check_site(&self, request: &Parts) -> Answer<()> {
-        if request.method.is_safe() || !is_foreign(&request.headers) {
+        let base = request.extensions.get::<Arc<PublicBase>>();
+        let reached = base.and_then(|base| base.host.as_deref());
+        if request.method.is_safe() || !is_foreign(&request.headers, reached) {
             return Ok(());
         }
         let origin = request.headers.get(header::ORIGIN);
@@ -92,8 +96,9 @@ fn is_local(name: &str) -> bool {
     !name.is_empty() && (!name.contains('.') || name.ends_with(".localhost"))
 }
 
-/// Whether a browser says that a page of another site sent the request.
-fn is_foreign(headers: &HeaderMap) -> bool {
+/// Whether a browser says that a page of another site sent the request. `reached` is the host under which
+/// a trusted proxy, or else the request itself, says that it was sent.
+fn is_foreign(headers: &HeaderMap, reached: Option<&str>) -> bool {
     if let Some(site) = headers.get(SEC_FETCH_SITE) {
         return site == "cross-site" || site == "same-site";
     }
@@ -107,7 +112,7 @@ fn is_foreign(headers: &HeaderMap) -> bool {
         .to_str()
         .ok()
         .and_then(|o| Some(o.split_once("://")?.1));
-    own.is_none() || own != host
+    own.is_none() || (own != host && own != reached)
 }
 
 /// The layer that answers only to known names.
@@ -208,12 +213,14 @@ mod tests {
             for (name, value) in pairs {
                 headers.insert(*name, value.parse().unwrap());
             }
-            is_foreign(&headers)
+            is_foreign(&headers, Some("heart.example"))
         };
         assert!(!foreign(&[("host", "localhost:1")]));
         assert!(!foreign(&[("host", "a:1"), ("origin", "http://a:1")]));
         assert!(foreign(&[("host", "a:1"), ("origin", "http://a:2")]));
         assert!(foreign(&[("host", "a:1"), ("origin", "null")]));
+        let proxied = [("host", "backend"), ("origin", "https://heart.example")];
+        assert!(!foreign(&proxied));
         assert!(foreign(&[("sec-fetch-site", "cross-site")]));
         assert!(!foreign(&[("sec-fetch-site", "same-origin")]));
         assert!(!foreign(&[("sec-fetch-site", "none")]));

@@ -2,6 +2,8 @@
 //!
 //! 1. [`hosts`]: the `Host` header must name this service (against DNS rebinding), and a page of
 //!    another site cannot change anything on a service that asks nobody who they are.
+//!    Headers that a request has at most once are refused if it has two ([`SINGLE`]): one part of the way
+//!    may have looked at the first, another at the last.
 //! 2. The `Authorization` header tells the caller, see [`crate::access::Gate`]; without a valid one the answer is
 //!    401. [`is_open_path`] names the paths that everybody may read.
 //! 3. The caller's requests are counted: 429 beyond the quota. Every answer carries `RateLimit` and
@@ -34,7 +36,7 @@ use crate::access::{Allowance, Identity, Refusal, Scope};
 use crate::config::Settings;
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::request::Parts;
-use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use state::Guard;
@@ -42,6 +44,33 @@ use std::time::Instant;
 
 const RATE_LIMIT: HeaderName = HeaderName::from_static("ratelimit");
 const RATE_LIMIT_POLICY: HeaderName = HeaderName::from_static("ratelimit-policy");
+
+/// The headers that a request has at most once.
+const SINGLE: [HeaderName; 9] = [
+    header::AUTHORIZATION,
+    header::CONTENT_TYPE,
+    header::CONTENT_ENCODING,
+    header::IF_RANGE,
+    header::RANGE,
+    HeaderName::from_static("idempotency-key"),
+    HeaderName::from_static("last-event-id"),
+    HeaderName::from_static("transaction-uid"),
+    HeaderName::from_static("webhook-secret"),
+];
+
+/// Refuses a request that has one of [`SINGLE`] twice.
+fn check_single(headers: &HeaderMap) -> Answer<()> {
+    let repeated = |name: &&HeaderName| headers.get_all(*name).iter().nth(1).is_some();
+    match SINGLE.iter().find(repeated) {
+        None => Ok(()),
+        Some(name) => Err(Problem::bad_request(
+            "repeated-header",
+            format!("The request has the header `{name}` more than once."),
+        )
+        .at(name.as_str())
+        .fix("Send it once; look whether a proxy adds one of its own.")),
+    }
+}
 
 /// The paths under which everything needs the scope `admin`.
 const ADMIN_PATHS: [&str; 5] = [
@@ -83,6 +112,9 @@ fn needed(method: &Method, route: Option<&str>) -> Scope {
 
 /// The layer; see the module.
 pub async fn guard(State(app): State<App>, request: Request, next: Next) -> Response {
+    if let Err(problem) = check_single(request.headers()) {
+        return problem.into_response();
+    }
     if is_open_path(request.uri().path(), &app.settings) && request.method().is_safe() {
         return next.run(request).await;
     }

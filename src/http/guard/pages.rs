@@ -25,6 +25,49 @@ const PICTURE: &str = "default-src 'none'; style-src 'unsafe-inline'; frame-ance
 /// What browsers are told where TLS is spoken: for a year, ask by https only.
 const TRANSPORT: &str = "max-age=31536000";
 
+/// The headers of requests that a page of another site may set: all that the service reads.
+pub const ACCEPTED: [&str; 16] = [
+    "accept",
+    "authorization",
+    "cache-control",
+    "content-type",
+    "idempotency-key",
+    "if-match",
+    "if-none-match",
+    "if-range",
+    "last-event-id",
+    "prefer",
+    "range",
+    "traceparent",
+    "tracestate",
+    "transaction-uid",
+    "webhook-secret",
+    "x-request-id",
+];
+
+/// The headers of answers that such a page may read: all that the service sets for clients.
+pub const EXPOSED: [&str; 19] = [
+    "accept-ranges",
+    "allow",
+    "content-disposition",
+    "content-encoding",
+    "content-length",
+    "content-location",
+    "content-range",
+    "date",
+    "etag",
+    "location",
+    "preference-applied",
+    "ratelimit",
+    "ratelimit-policy",
+    "retry-after",
+    "traceparent",
+    "upload-limit",
+    "warning",
+    "www-authenticate",
+    "x-request-id",
+];
+
 /// How long browsers may remember the answer to a preflight.
 const PREFLIGHT: Duration = Duration::from_secs(600);
 
@@ -69,28 +112,6 @@ pub async fn protect(State(tls): State<bool>, request: Request, next: Next) -> R
 /// The layer that lets pages of other sites use the service; `None` if no site may.
 pub fn cors(settings: &Settings) -> Option<CorsLayer> {
     let origins = allowed(&settings.cors_origins)?;
-    let exposed = [
-        "content-location",
-        "etag",
-        "location",
-        "preference-applied",
-        "ratelimit",
-        "ratelimit-policy",
-        "retry-after",
-        "x-request-id",
-    ];
-    let accepted = [
-        "accept",
-        "authorization",
-        "content-type",
-        "idempotency-key",
-        "if-none-match",
-        "last-event-id",
-        "prefer",
-        "range",
-        "traceparent",
-        "x-request-id",
-    ];
     Some(
         CorsLayer::new()
             .allow_origin(origins)
@@ -102,8 +123,8 @@ pub fn cors(settings: &Settings) -> Option<CorsLayer> {
                 Method::PATCH,
                 Method::DELETE,
             ])
-            .allow_headers(accepted.map(HeaderName::from_static))
-            .expose_headers(exposed.map(HeaderName::from_static))
+            .allow_headers(ACCEPTED.map(HeaderName::from_static))
+            .expose_headers(EXPOSED.map(HeaderName::from_static))
             .max_age(PREFLIGHT),
     )
 }

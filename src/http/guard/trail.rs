@@ -10,6 +10,7 @@ use crate::access::{Activity, AuditEvent, Identity, Outcome, Refusal};
 use crate::export::dicom::is_uid;
 use crate::http::app::App;
 use crate::http::problem::Problem;
+use crate::http::public_base::PublicBase;
 use crate::jobs::{ErasureAgent, Tenant, Timestamp};
 use axum::extract::MatchedPath;
 use axum::http::request::Parts;
@@ -221,7 +222,9 @@ fn place_of(route: &str) -> Option<String> {
 /// The id of what the answer's `Location` names.
 fn location(response: &Response) -> Option<String> {
     let path = response.headers().get(header::LOCATION)?.to_str().ok()?;
-    item_of(path)
+    let base = PublicBase::current();
+    let prefix = base.as_ref().map_or("", |base| base.prefix());
+    item_of(path.strip_prefix(prefix)?)
 }
 
 fn not_recorded() -> Problem {

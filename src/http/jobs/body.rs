@@ -311,7 +311,7 @@ fn body(job: Job, context: &Context) -> JobBody {
     let (model, segmentation) = (made(Resource::Model), made(Resource::Segmentation));
     let result = job.result.as_deref().map(path_of);
     let below = |name: &str| result.as_ref().map(|path| format!("{path}/{name}"));
-    let itself = format!("/v1/jobs/{}", job.id);
+    let itself = path_of(&job.id);
     let source = job.source.map(|source| {
         let pull = context.pulls.get(&job.id);
         SourceBody::of(source, pull)

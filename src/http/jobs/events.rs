@@ -10,6 +10,7 @@ use crate::http::app::App;
 use crate::http::caller::Caller;
 use crate::http::openapi::{self, LookupProblems};
 use crate::http::problem::{Answer, Problem, ProblemBody};
+use crate::http::public_base::PublicBase;
 use crate::http::request::{PathSegments, query_pairs, refuse_unknown};
 use crate::http::streams::StreamPlace;
 use crate::jobs::Job;
@@ -86,11 +87,12 @@ fn stream(
         app,
         seen,
         changes,
+        base: PublicBase::current(),
         _place: place,
     };
-    Sse::new(follower.events())
-        .keep_alive(KeepAlive::new().interval(KEEP_ALIVE))
-        .into_response()
+    let events = Sse::new(follower.events()).keep_alive(KeepAlive::new().interval(KEEP_ALIVE));
+    // nginx would keep events back until its buffer is full.
+    ([("x-accel-buffering", "no")], events).into_response()
 }
 
 struct Follower {
@@ -99,6 +101,8 @@ struct Follower {
     next: Option<Job>,
     seen: i64,
     changes: Receiver<Arc<Job>>,
+    /// The address for links: the answer's body is made after the request was answered.
+    base: Option<Arc<PublicBase>>,
     _place: StreamPlace,
 }
 
@@ -110,7 +114,12 @@ impl Follower {
             follower.seen = job.revision;
             let last = job.state.is_final();
             let event = Event::default().event("job").id(job.revision.to_string());
-            let wire = describe(&follower.app, job).await.ok()?;
+            let wire = describe(&follower.app, job);
+            let wire = match &follower.base {
+                Some(base) => base.clone().scope(wire).await,
+                None => wire.await,
+            };
+            let wire = wire.ok()?;
             let event = event.json_data(wire).ok()?;
             Some((Ok(event), (!last).then_some(follower)))
         })

@@ -343,7 +343,7 @@ pub async fn accepted(app: &App, job: Job) -> Answer {
         _ => None,
     };
     let headers = [
-        (header::LOCATION, format!("/v1/jobs/{}", job.id)),
+        (header::LOCATION, path_of(&job.id)),
         (
             header::RETRY_AFTER,
             retry_after(starts_in_ms.unwrap_or_default() / 1000.0),

@@ -11,6 +11,7 @@
 
 use super::answers::media_type_of;
 use crate::export::dicom::DicomObject;
+use crate::http::files::PAGE;
 use crate::http::problem::MEDIA_TYPE;
 use serde_json::{Map, Value, json};
 

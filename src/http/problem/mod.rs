@@ -18,6 +18,7 @@ mod failure;
 
 pub use failure::from_panic;
 
+use crate::http::public_base::public_path;
 use axum::Json;
 use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -154,7 +155,7 @@ impl Problem {
     #[must_use]
     pub fn of_job(mut self, id: &str) -> Self {
         self.body.job = Some(id.to_owned());
-        self.header(header::LOCATION, format!("/v1/jobs/{id}"))
+        self.header(header::LOCATION, public_path(&format!("/v1/jobs/{id}")))
     }
 
     /// Adds a header to the answer.

@@ -22,15 +22,36 @@ use axum::http::{HeaderMap, header};
 use futures::TryStreamExt;
 use std::collections::BTreeMap;
 
-/// Bodies of these types are the bytes of a volume. `x-www-form-urlencoded` is what curl sends
-/// unless told otherwise.
-const RAW_TYPES: [&str; 7] = [
+/// Bodies of these types are the bytes of a volume; what they hold is told by their content. Browsers,
+/// operating systems and old clients have names of their own for the same formats.
+/// `x-www-form-urlencoded` is what curl and urllib send unless told otherwise.
+const RAW_TYPES: [&str; 27] = [
     "application/octet-stream",
+    "application/x-octet-stream",
+    "application/binary",
+    "application/x-binary",
+    "binary/octet-stream",
     "application/gzip",
     "application/x-gzip",
+    "application/gzip-compressed",
+    "application/x-gzip-compressed",
+    "application/x-gunzip",
+    "application/x-compressed",
+    "application/x-compress",
+    "application/zip",
+    "application/x-zip",
+    "application/x-zip-compressed",
+    "application/zip-compressed",
+    "multipart/x-zip",
+    "multipart/x-gzip",
     "application/dicom",
+    "application/x-dicom",
+    "application/dicom+zip",
     "application/nifti",
     "application/x-nifti",
+    "application/x-nifti-gz",
+    "image/nifti",
+    "image/x-nifti",
     "application/x-www-form-urlencoded",
 ];
 
@@ -77,7 +98,8 @@ pub async fn receive(app: &App, request: Request, apart: &[&'static str]) -> Ans
         Some("multipart/related") => {
             form::receive_related(app, request, limits.size, &mut upload).await?;
         }
-        Some(other) if !RAW_TYPES.contains(&other) => {
+        // An empty header says as much as none.
+        Some(other) if !other.is_empty() && !RAW_TYPES.contains(&other) => {
             let wanted = format!(
                 "{}, multipart/form-data, or multipart/related of application/dicom",
                 RAW_TYPES[0]

@@ -1,5 +1,6 @@
 // What was measured, beside what it is compared with; the reasons to doubt it; and every file of it.
 
+import { at } from "../base";
 import { useState } from "preact/hooks";
 import { type Result, type Volume, key, save, words } from "../api";
 import { fileNameOf, saveResult } from "../bundle";
@@ -113,7 +114,7 @@ export function Downloads({ result, volume }: { result: Result; volume: Volume }
         <button type="button" onClick={() => print()}>Print</button>
         {page && (key.value
           ? <button type="button" onClick={() => void save(page, `${name}_report.html`).catch(failed)}>Report</button>
-          : <a class="button" href={page} target="_blank" rel="noopener">Report</a>)}
+          : <a class="button" href={at(page)} target="_blank" rel="noopener">Report</a>)}
       </div>
       <p role="status" class="quiet">{state}</p>
       <details>
