@@ -134,7 +134,7 @@ def archive(entries, plain):
     return local + directory + record + locator + end
 
 
-def held(service, requests, count, seconds=3):
+def held(service, requests, count, seconds=2):
     """Sends `count` requests, one on each connection, that are not completed or whose answers are not read."""
     open_ones, refused = [], 0
     for number in range(count):
@@ -174,7 +174,7 @@ def half_uploads(service):
 def half_json(service):
     body = b"[" + b" " * 230_000
     paths = ["/v1/jobs", "/v1/keys", "/v1/templates?name=t", "/v1/readers", "/dicom-web/workitems", "/v1/webhooks"]
-    return held(service, lambda n: head("POST", paths[n % len(paths)], 250_000, "application/json") + body, 1500)
+    return held(service, lambda n: head("POST", paths[n % len(paths)], 250_000, "application/json") + body, 1000)
 
 
 def dense_json(service):
@@ -185,13 +185,13 @@ def dense_json(service):
 def half_forms(service):
     start = b"--B\r\nContent-Disposition: form-data; name=\"f\"; filename=\"a\"\r\n\r\n" + bytes(400_000)
     kind = "multipart/form-data; boundary=B"
-    return held(service, lambda _: head("POST", "/v1/volumes", 900_000, kind) + start, 1200)
+    return held(service, lambda _: head("POST", "/v1/volumes", 900_000, kind) + start, 800)
 
 
 def half_objects(service):
     start = b"--B\r\nContent-Type: application/dicom\r\n\r\n" + bytes(400_000)
     kind = 'multipart/related; type="application/dicom"; boundary=B'
-    return held(service, lambda _: head("POST", "/dicom-web/studies", 900_000, kind) + start, 1200)
+    return held(service, lambda _: head("POST", "/dicom-web/studies", 900_000, kind) + start, 800)
 
 
 def labelled(service):
@@ -203,7 +203,7 @@ def labelled(service):
         order = {"kind": "model", "volume": volume, "priority": "bulk", "labels": labels, "parameters": {"points": 67, "seed": seed}}
         status, body = service.ask("POST", "/v1/jobs", json.dumps(order).encode(), {"content-type": "application/json"})
         assert status == 202, (status, body)
-    return held(service, lambda _: head("GET", "/v1/jobs?limit=100"), 1200)
+    return held(service, lambda _: head("GET", "/v1/jobs?limit=100"), 800)
 
 
 def work_items(service):
@@ -218,7 +218,7 @@ def work_items(service):
 def slow_downloads(service):
     _, body = service.ask("POST", "/v1/volumes", nifti(64), {"content-type": "application/octet-stream"})
     volume = json.loads(body)["id"]
-    return held(service, lambda _: head("GET", f"/v1/volumes/{volume}/content"), 1200)
+    return held(service, lambda _: head("GET", f"/v1/volumes/{volume}/content"), 800)
 
 
 ATTACKS = [zip64, half_uploads, half_json, dense_json, half_forms, half_objects, labelled, work_items, slow_downloads]

@@ -722,7 +722,8 @@ async fn jobs_end_in_every_way(on: &Stores) {
 async fn holds_keep_what_they_name(on: &Stores) {
     let volume = on.volume(&tenant()).await;
     let result = model(&volume);
-    let added = on.a.add_product(&result, &tenant(), Some(&volume), ROOM);
+    let owner = tenant();
+    let added = on.a.add_product(&result, &owner, Some(&volume), ROOM);
     assert_eq!(added.await.unwrap(), AddedProduct::New);
     let hold = LegalHold {
         reason: "a trial".into(),
@@ -1965,8 +1966,8 @@ async fn a_full_queue_and_a_full_intake_keep_a_share_for_others(on: &Stores) {
     assert_eq!(accepted, [6, 3, 2]);
     for group in on.b.unfinished().await.unwrap() {
         if group.origin.tenant == tenants[0] {
-            let failed =
-                on.a.failed(&group.id, group.revision, &failure("no"), now());
+            let why = failure("no");
+            let failed = on.a.failed(&group.id, group.revision, &why, now());
             failed.await.unwrap();
         }
     }
@@ -2000,8 +2001,9 @@ async fn work_items_are_read_in_batches_of_few_bytes(on: &Stores) {
     }
     // Each ends with the item that exceeds the bound.
     assert_eq!(batches, [3, 3, 1]);
-    let few =
-        on.b.workitems(&tenant(), Some(WorkitemState::Scheduled), 0, 2);
+    let owner = tenant();
+    let scheduled = Some(WorkitemState::Scheduled);
+    let few = on.b.workitems(&owner, scheduled, 0, 2);
     assert_eq!(few.await.unwrap().len(), 2);
     assert_eq!(on.b.scheduled_workitems(0, 100).await.unwrap().len(), 3);
 }

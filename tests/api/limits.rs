@@ -286,7 +286,7 @@ async fn a_key_gets_no_more_than_its_maker_and_the_operator_allow() {
         .json()
         .await
         .unwrap();
-    assert_eq!(child["expires_at"], "2100-01-01T00:00:00Z");
+    assert!(text(&child["expires_at"]).starts_with("2100-01-01T00:00:00"));
     let later = json!({"expires_at": "2100-01-01T00:00:01Z"});
     problem(make(&mortal, later).await.unwrap(), 422, "invalid-field").await;
 }
