@@ -6,7 +6,7 @@
 //! let strangers keep the processor busy.
 
 use super::{Quota, Scope};
-use crate::jobs::{Tenant, Timestamp, hex};
+use crate::jobs::{Tenant, Timestamp, hex, is_unprintable};
 use base64::Engine;
 use base64::prelude::BASE64_URL_SAFE_NO_PAD;
 use sha2::{Digest, Sha256};
@@ -104,7 +104,7 @@ impl ApiKey {
     /// If the name or the expiry cannot be used.
     pub fn make(request: KeyRequest, now: Timestamp) -> Result<(Self, String), KeyError> {
         let length = request.name.chars().count();
-        if !(1..=LONGEST_NAME).contains(&length) || request.name.chars().any(char::is_control) {
+        if !(1..=LONGEST_NAME).contains(&length) || request.name.chars().any(is_unprintable) {
             return Err(KeyError::Name);
         }
         if request.expires_at.is_some_and(|at| at <= now) {

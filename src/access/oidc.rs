@@ -14,7 +14,7 @@
 //! used as they are, for at most [`STALE_AFTER`], and read anew beside the requests.
 
 use super::{Identity, Quota, Scope};
-use crate::jobs::{Tenant, content_id};
+use crate::jobs::{Tenant, content_id, is_unprintable};
 use base64::Engine;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use jsonwebtoken::jwk::{AlgorithmParameters, EllipticCurve, Jwk};
@@ -174,7 +174,7 @@ impl Known {
             .ok_or_else(|| refused(&format!("its claim `{name}` holds no scope")))?;
         let name: String = subject
             .chars()
-            .filter(|c| !c.is_control())
+            .filter(|c| !is_unprintable(*c))
             .take(LONGEST_NAME)
             .collect();
         Ok(Identity {

@@ -4,7 +4,7 @@
 use super::data_args::DataArgs;
 use crate::access::{AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Quota, Scope};
 use crate::config::{Size, Span};
-use crate::jobs::{Clock, ListRequest, SystemClock, Tenant, Timestamp, rfc3339};
+use crate::jobs::{Clock, ListRequest, SystemClock, Tenant, Timestamp, printed, rfc3339};
 use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
 use tokio::runtime::Runtime;
@@ -127,7 +127,7 @@ async fn list(args: &DataArgs) -> Result<()> {
                 key.tenant,
                 rfc3339(key.created_at),
                 key.expires_at.map_or_else(|| "never".to_owned(), rfc3339),
-                key.name,
+                printed(&key.name),
             );
         }
         before = page.next;

@@ -106,7 +106,8 @@ pub fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            // It may quote a file.
+            eprintln!("error: {}", crate::jobs::printed(&format!("{error:#}")));
             ExitCode::FAILURE
         }
     }

@@ -9,6 +9,7 @@ use super::problem::{Answer, Problem};
 use super::request::{PathSegments, json_object, query_pairs, refuse_unknown, unknown};
 use super::volumes::{LegalHoldBody, Volumes};
 use crate::jobs::LegalHold;
+use crate::jobs::is_unprintable;
 use axum::Json;
 use axum::extract::{RawQuery, Request, State};
 use axum::http::StatusCode;
@@ -76,7 +77,7 @@ async fn set(app: &App, caller: &Caller, id: &str, hold: Option<&LegalHold>) -> 
 
 fn reason(value: Option<&Value>) -> Answer<String> {
     let text = value.and_then(Value::as_str).unwrap_or_default().trim();
-    let control = |c: char| c.is_control() && c != '\n';
+    let control = |c: char| is_unprintable(c) && c != '\n';
     match (1..=LegalHold::REASON_LENGTH).contains(&text.chars().count()) && !text.contains(control)
     {
         true => Ok(text.to_owned()),

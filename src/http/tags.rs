@@ -7,7 +7,7 @@
 use super::app::App;
 use super::problem::{Answer, Problem, shorten};
 use super::request::{merge_patch, unknown};
-use crate::jobs::{TagFilter, Tags, Tenant};
+use crate::jobs::{TagFilter, Tags, Tenant, is_unprintable};
 use axum::extract::Request;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -186,7 +186,7 @@ fn label_value(text: &str) -> Answer<String> {
 
 fn printable(field: &str, what: &str, text: &str, longest: usize) -> Answer<String> {
     let length = text.chars().count();
-    match (1..=longest).contains(&length) && !text.chars().any(char::is_control) {
+    match (1..=longest).contains(&length) && !text.chars().any(is_unprintable) {
         true => Ok(text.to_owned()),
         false => Err(Problem::invalid_field(
             field,

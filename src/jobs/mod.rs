@@ -56,6 +56,7 @@ mod queue;
 mod resource;
 mod storage;
 mod tenant;
+mod text;
 mod work;
 mod worker;
 
@@ -82,6 +83,7 @@ pub use storage::{
     StoreError, StoreFault, StoreResult, StoredVolume, TagFilter, Tags, UnreadScan,
 };
 pub use tenant::{InvalidTenant, Tenant};
+pub use text::{is_unprintable, printed};
 pub use work::{
     GivenParameters, Needs, OutputFile, StoredItem, StoredResult, Work, WorkError, WorkInput,
     WorkOutput, Works,

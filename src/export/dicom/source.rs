@@ -205,9 +205,12 @@ fn check(field: &'static str, value: &str) -> Result<(), DicomError> {
             && (1..=12).contains(&month)
             && (1..=31).contains(&day)
     };
+    // Control characters, ends of lines, and marks that turn the direction of what follows.
+    let hidden =
+        |c: char| c.is_control() || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     let plain = |longest: usize| {
         let length = value.chars().count();
-        (1..=longest).contains(&length) && !value.chars().any(|c| c.is_control() || c == '\\')
+        (1..=longest).contains(&length) && !value.chars().any(|c| hidden(c) || c == '\\')
     };
     let (valid, expected) = match field {
         "study_uid" | "frame_of_reference_uid" => (
