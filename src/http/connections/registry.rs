@@ -194,10 +194,9 @@ pub struct OpenConnection {
     /// Milliseconds from `opened` to the last byte in either direction.
     moved_at: AtomicU64,
     phase: AtomicU8,
-    /// Requests that were answered.
+    /// Requests that were answered, and the milliseconds from `opened` to the end of the last answer.
     answered: AtomicU64,
-    /// Whether a head has been received.
-    used: AtomicBool,
+    answered_at: AtomicU64,
     /// Whether the current request was received to its end.
     whole: AtomicBool,
     /// Whether bytes have come since the last request that was received to its end.
@@ -214,7 +213,7 @@ impl OpenConnection {
             moved_at: AtomicU64::new(0),
             phase: AtomicU8::new(Phase::Head as u8),
             answered: AtomicU64::new(0),
-            used: AtomicBool::new(false),
+            answered_at: AtomicU64::new(0),
             whole: AtomicBool::new(true),
             unread: AtomicBool::new(false),
         }
@@ -228,7 +227,6 @@ impl OpenConnection {
 
     /// The head of a request was received; `whole` if it has no body.
     pub fn begin(&self, whole: bool) {
-        self.used.store(true, Ordering::Relaxed);
         self.whole.store(whole, Ordering::Relaxed);
     }
 
@@ -242,16 +240,23 @@ impl OpenConnection {
         if self.whole.load(Ordering::Relaxed) {
             self.unread.store(false, Ordering::Relaxed);
         }
+        let now = self.milliseconds();
+        self.answered_at.store(now, Ordering::Relaxed);
         self.answered.fetch_add(1, Ordering::Relaxed);
         self.enter(Phase::Head);
     }
 
-    /// If a head is awaited: the number of requests answered before it, and whether any came at all.
-    pub fn awaits_head(&self) -> Option<(u64, bool)> {
+    /// If a head is awaited: the number of requests answered before it, and since when.
+    pub fn awaits_head(&self) -> Option<(u64, Instant)> {
         (self.phase.load(Ordering::Relaxed) == Phase::Head as u8).then(|| {
-            let answered = self.answered.load(Ordering::Relaxed);
-            (answered, self.used.load(Ordering::Relaxed))
+            let since = self.answered_at.load(Ordering::Relaxed);
+            let since = self.opened + Duration::from_millis(since);
+            (self.answered.load(Ordering::Relaxed), since)
         })
+    }
+
+    fn milliseconds(&self) -> u64 {
+        u64::try_from(self.opened.elapsed().as_millis()).unwrap_or(u64::MAX)
     }
 
     /// Whether the client has sent, or may still be sending, what nobody reads.
@@ -261,8 +266,7 @@ impl OpenConnection {
 
     /// Bytes went over the connection.
     pub fn moved(&self) {
-        let now = u64::try_from(self.opened.elapsed().as_millis()).unwrap_or(u64::MAX);
-        self.moved_at.store(now, Ordering::Relaxed);
+        self.moved_at.store(self.milliseconds(), Ordering::Relaxed);
     }
 
     /// It waits for something else from now on.

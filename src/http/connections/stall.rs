@@ -30,6 +30,9 @@ const LEAST_RATE: f64 = 1024.0;
 /// Bytes thrown away at once.
 const LINGER_PIECE: usize = 64 << 10;
 
+/// Stands for the number of a wait while no head is awaited.
+const UNAWAITED: u64 = u64::MAX;
+
 /// How long a stream whose client may still send is read at its end.
 #[derive(Debug, Clone, Copy)]
 pub struct Linger {
@@ -194,32 +197,37 @@ impl<S> WatchedStream<S> {
     fn received(&mut self) {
         self.connection.received();
         if let Some((number, _)) = self.connection.awaits_head() {
-            let limit = self.limits.head;
-            let wait = self.head_wait(number, limit);
+            let end = TimerInstant::now() + self.limits.head;
+            let wait = self.head_wait(number, end);
             if !wait.begun {
                 wait.begun = true;
-                wait.timer.as_mut().reset(TimerInstant::now() + limit);
+                wait.timer.as_mut().reset(end);
             }
         }
     }
 
     /// No bytes came.
     fn await_head(&mut self, context: &mut Context<'_>) -> Poll<io::Error> {
-        let Some((number, used)) = self.connection.awaits_head() else {
-            return Poll::Pending;
-        };
-        let limit = match used {
-            true => self.limits.idle,
-            false => self.limits.head,
-        };
-        ready!(self.head_wait(number, limit).timer.as_mut().poll(context));
-        let late = "no request came in time";
-        Poll::Ready(io::Error::new(io::ErrorKind::TimedOut, late))
+        loop {
+            let awaited = self.connection.awaits_head();
+            let (number, end) = match awaited {
+                Some((0, since)) => (0, TimerInstant::from_std(since) + self.limits.head),
+                Some((number, since)) => (number, TimerInstant::from_std(since) + self.limits.idle),
+                // The answer may end without another look at the stream, so this is looked at again
+                // before a head that is awaited from now on could be late.
+                None => (UNAWAITED, TimerInstant::now() + self.limits.idle),
+            };
+            ready!(self.head_wait(number, end).timer.as_mut().poll(context));
+            if awaited.is_some() {
+                let late = "no request came in time";
+                return Poll::Ready(io::Error::new(io::ErrorKind::TimedOut, late));
+            }
+            self.head = None;
+        }
     }
 
-    /// The wait for the head after `number` answers; a new one ends after `limit`.
-    fn head_wait(&mut self, number: u64, limit: Duration) -> &mut HeadWait {
-        let end = TimerInstant::now() + limit;
+    /// The wait for the head after `number` answers; a new one ends at `end`.
+    fn head_wait(&mut self, number: u64, end: TimerInstant) -> &mut HeadWait {
         let wait = self.head.get_or_insert_with(|| HeadWait {
             number,
             begun: false,
@@ -399,6 +407,18 @@ mod tests {
             used
         };
         assert!(waits_in_vain(used(), 0).await >= LIMITS.idle);
+        // An answer that ends while the stream is being waited for is not looked at again by hyper.
+        let busy = Arc::new(OpenConnection::new(None));
+        busy.begin(true);
+        busy.enter(Phase::Answer);
+        let ending = busy.clone();
+        let answer = tokio::spawn(async move {
+            tokio::time::sleep(LIMITS.head).await;
+            ending.answered();
+        });
+        let waited = waits_in_vain(busy, 0).await;
+        assert!(waited >= LIMITS.head + LIMITS.idle, "{waited:?}");
+        answer.await.unwrap();
         let fresh = || Arc::new(OpenConnection::new(None));
         for (connection, sent) in [(fresh(), 0), (fresh(), 9), (used(), 9)] {
             let waited = waits_in_vain(connection, sent).await;
