@@ -125,6 +125,7 @@ if wait "${running[install]}"; then
   cargo build --quiet --bins --examples --test layering
   start formats scripts/check_formats.sh
   start geodesics scripts/check_geodesics.sh
+  start codecs scripts/check_codecs.sh
   start api scripts/check_api.sh
   start contract env SERVICE_FLAGS='--webhook-allow 127.0.0.1' scripts/with_service.sh "$PYTHON" scripts/check_contract.py
   start clients scripts/check_clients.sh
@@ -142,6 +143,7 @@ if wait "${running[install]}"; then
   start dependencies "$PYTHON" scripts/dependencies.py check
   collect formats "formats read by trimesh, vtk and the glTF validator"
   collect geodesics "geodesics against pygeodesic"
+  collect codecs "codecs of compressed DICOM against libjpeg-turbo, GDCM, CharLS and OpenJPEG"
   collect api "service tested by schemathesis"
   collect contract "service answers as its document says"
   collect clients "generated Python and TypeScript clients"

@@ -303,6 +303,11 @@ settings! {
     /// Largest number of uploads and previews that wait to be decoded; more are answered with
     /// status 503
     decoding_queue: usize = "256";
+    /// Longest computation for reading one upload or drawing one preview, beside that of
+    /// decoding_rate; longer ones are ended
+    decoding_time: Span = "10s";
+    /// Bytes of an upload for which decoding_time grows by one second
+    decoding_rate: Size = "1MiB";
     /// Memory for answers about volumes, models, segmentations, templates and ended jobs, which are
     /// kept until something is written; `0B` keeps none
     answer_memory: Size = "8MiB";

@@ -27,6 +27,9 @@ tokio::task_local! {
 pub struct ClientAddress(IpAddr);
 
 impl ClientAddress {
+    /// The unspecified address, of work that belongs to no request.
+    pub const NONE: Self = Self(IpAddr::V4(Ipv4Addr::UNSPECIFIED));
+
     /// The address of the other end of a connection.
     pub fn of_peer(peer: IpAddr) -> Self {
         Self(match peer.to_canonical() {
@@ -58,8 +61,7 @@ impl ClientAddress {
     /// The client of the request that the current task answers. Work that belongs to no request
     /// counts as that of the unspecified address.
     pub fn current() -> Self {
-        let unspecified = Self(IpAddr::V4(Ipv4Addr::UNSPECIFIED));
-        CURRENT.try_with(|client| *client).unwrap_or(unspecified)
+        CURRENT.try_with(|client| *client).unwrap_or(Self::NONE)
     }
 
     /// Runs the answering of a request of this client.

@@ -5,14 +5,19 @@
 //!
 //! 1. Admission. Each piece of work states the memory that it needs at most. It is admitted when
 //!    that much of the budget is free (setting `decoding_memory`). What waits is admitted client by
-//!    client in turn, so that one client's queue does not delay another's work. The queue is
-//!    bounded (setting `decoding_queue`); beyond that the answer is 503, except for a client that has less
-//!    than its equal share of the queue.
+//!    client in turn, and one client holds at most half of the budget, so that one client's queue does
+//!    not delay another's work. The queue is bounded (setting `decoding_queue`); beyond that the answer
+//!    is 503, except for a client that has less than its equal share of the queue.
 //! 2. Turns. As many pieces of work as the machine has cores compute at the same time, on blocking
 //!    threads. Each gives its turn to the next one after [`SLICE`] and queues again, so that short
-//!    work does not wait until long work ends.
+//!    work does not wait until long work ends. Work that has not reported for [`STALL`], and work whose
+//!    client hung up, loses its turn without being asked; it goes on beside the others until it reports,
+//!    as one of at most [`OVERRUNS`] per core.
+//! 3. Time. Work computes for at most `decoding_time`, and one second more for every `decoding_rate`
+//!    bytes of its file; it is then ended, and the answer is 422. While other work has waited for
+//!    [`PATIENCE`] for memory, work that has used a [`SHARE`] of its time is ended with 503.
 //!
-//! Memory and turn belong to the computation and not to the request that waits for it: they are
+//! Memory and turn belong to the computation and not to the request that waits for it: the memory is
 //! free when the computation has ended. If the client hangs up, the computation is cancelled and
 //! ends at its next report.
 
@@ -24,13 +29,26 @@ use axum::http::{StatusCode, header};
 use prometheus::Histogram;
 use std::collections::{BTreeMap, VecDeque};
 use std::num::NonZeroUsize;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 use tokio::runtime::Handle;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
+use tokio_util::sync::CancellationToken;
 
 /// How long work computes before others that wait get their turn.
 const SLICE: Duration = Duration::from_millis(10);
+
+/// How long work keeps its turn without a report, and how often that is looked at.
+const STALL: Duration = Duration::from_millis(50);
+
+/// Pieces of work for each core that go on after they lost their turn.
+const OVERRUNS: usize = 4;
+
+/// How long work waits for memory before costly work is ended for it.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// The part of its time after which work is costly: one in so many.
+const SHARE: u32 = 20;
 
 /// Memory of work that needs little, bytes. It bounds the number of threads.
 pub const LITTLE_MEMORY: u64 = 8 << 20;
@@ -39,6 +57,11 @@ pub const LITTLE_MEMORY: u64 = 8 << 20;
 pub struct Decoding {
     admission: Arc<Admission>,
     turns: Arc<Semaphore>,
+    overruns: Arc<Semaphore>,
+    /// Time of any piece of work.
+    time: Duration,
+    /// Bytes of a file for which a second is added.
+    rate: u64,
     waits: Histogram,
 }
 
@@ -52,10 +75,14 @@ impl Decoding {
                 longest: settings.decoding_queue,
                 queue: Mutex::new(AdmissionQueue {
                     free: settings.decoding_memory.0,
+                    share: settings.decoding_memory.0 / 2,
                     ..AdmissionQueue::default()
                 }),
             }),
             turns: Arc::new(Semaphore::new(cores)),
+            overruns: Arc::new(Semaphore::new(cores * OVERRUNS)),
+            time: settings.decoding_time.0,
+            rate: settings.decoding_rate.0.max(1),
             waits,
         }
     }
@@ -64,9 +91,22 @@ impl Decoding {
     /// Dropping the future cancels the work.
     ///
     /// # Errors
-    /// 503 if too much waits, 500 if the work panics.
+    /// 503 if too much waits, 422 if the work takes too long, 500 if it panics.
     pub async fn run<T: Send + 'static>(
         &self,
+        memory: u64,
+        work: impl FnOnce(&Monitor<'_>) -> T + Send + 'static,
+    ) -> Answer<T> {
+        self.run_on(memory, memory, work).await
+    }
+
+    /// As [`Decoding::run`], for work on files of `bytes` bytes as they are stored.
+    ///
+    /// # Errors
+    /// As [`Decoding::run`].
+    pub async fn run_on<T: Send + 'static>(
+        &self,
+        bytes: u64,
         memory: u64,
         work: impl FnOnce(&Monitor<'_>) -> T + Send + 'static,
     ) -> Answer<T> {
@@ -77,48 +117,174 @@ impl Decoding {
             .await?;
         let turn = self.turns.clone().acquire_owned().await;
         self.waits.observe(asked.elapsed().as_secs_f64());
-        let turns = TurnTaker {
+        let extra = Duration::from_secs_f64(bytes as f64 / self.rate as f64);
+        let task = Arc::new(Task {
             turns: self.turns.clone(),
+            overruns: self.overruns.clone(),
+            cancel: CancelToken::new(),
+            stopped: CancellationToken::new(),
+            limit: self.time.saturating_add(extra),
+            state: Mutex::new(TaskState {
+                turn: turn.ok(),
+                since: Some(Instant::now()),
+                ..TaskState::default()
+            }),
+        });
+        admitted.begins(&task);
+        let _ended = StopOnDrop(task.clone());
+        let observer = TurnTaker {
+            task: task.clone(),
             runtime: Handle::current(),
-            current: Mutex::new((turn.ok(), Instant::now())),
         };
-        let cancel = CancelToken::new();
-        let _ended = CancelOnDrop(cancel.clone());
         let run = move || {
-            let result = work(&Monitor::new(&turns, cancel));
-            drop((turns, admitted));
+            let result = work(&Monitor::new(&observer, observer.task.cancel.clone()));
+            observer.task.pause();
+            drop((observer, admitted));
             result
         };
-        tokio::task::spawn_blocking(run)
-            .await
-            .map_err(Problem::internal)
+        let mut running = tokio::task::spawn_blocking(run);
+        let mut look = tokio::time::interval(STALL);
+        let result = loop {
+            tokio::select! {
+                result = &mut running => break result,
+                _ = look.tick() => task.look(),
+                // The work goes on until its next report; its client is answered at once.
+                () = task.stopped.cancelled() => return Err(task.problem()),
+            }
+        };
+        match task.stopped.is_cancelled() {
+            true => Err(task.problem()),
+            false => result.map_err(Problem::internal),
+        }
     }
 }
 
-struct CancelOnDrop(CancelToken);
+/// A piece of work that computes.
+struct Task {
+    turns: Arc<Semaphore>,
+    overruns: Arc<Semaphore>,
+    cancel: CancelToken,
+    /// Cancelled together with `cancel`, for what waits.
+    stopped: CancellationToken,
+    /// Longest time that it may compute.
+    limit: Duration,
+    state: Mutex<TaskState>,
+}
 
-impl Drop for CancelOnDrop {
+#[derive(Default)]
+struct TaskState {
+    /// Its turn.
+    turn: Option<OwnedSemaphorePermit>,
+    /// Its place among those that go on without a turn.
+    overrun: Option<OwnedSemaphorePermit>,
+    /// Since when it computes; `None` while it waits.
+    since: Option<Instant>,
+    /// How long it computed before.
+    before: Duration,
+    /// Whether it was ended for others that wait.
+    displaced: bool,
+}
+
+impl TaskState {
+    /// How long it has computed.
+    fn computed(&self) -> Duration {
+        self.before + self.since.map_or(Duration::ZERO, |since| since.elapsed())
+    }
+}
+
+impl Task {
+    fn state(&self) -> MutexGuard<'_, TaskState> {
+        // A panic cannot leave the state half changed: each change is a few plain statements.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn stop(&self) {
+        self.cancel.cancel();
+        self.stopped.cancel();
+    }
+
+    /// Gives up its turn: it waits, or has ended.
+    fn pause(&self) {
+        let mut state = self.state();
+        state.before = state.computed();
+        (state.turn, state.overrun, state.since) = (None, None, None);
+    }
+
+    /// Takes its turn away if it has not reported for too long, and ends it after its time.
+    fn look(&self) {
+        let mut state = self.state();
+        if state.since.is_some_and(|since| since.elapsed() >= STALL) {
+            self.take_turn(&mut state);
+        }
+        if state.computed() > self.limit {
+            drop(state);
+            self.stop();
+        }
+    }
+
+    /// Gives its turn to the next one while it computes on, if few do so.
+    fn take_turn(&self, state: &mut TaskState) {
+        if state.turn.is_some()
+            && let Ok(place) = self.overruns.clone().try_acquire_owned()
+        {
+            (state.turn, state.overrun) = (None, Some(place));
+        }
+    }
+
+    /// Why it was stopped.
+    fn problem(&self) -> Problem {
+        if self.state().displaced {
+            return busy();
+        }
+        let seconds = self.limit.as_secs_f64();
+        Problem::new(
+            StatusCode::UNPROCESSABLE_ENTITY,
+            "decoding-time",
+            format!(
+                "Reading the file takes longer than the {seconds:.1} s that are allowed for its size."
+            ),
+        )
+        .fix("Send the image uncompressed, or ask the operator to raise `decoding_time`.")
+    }
+}
+
+/// Stops the work of a request that has ended, for example because its client hung up.
+struct StopOnDrop(Arc<Task>);
+
+impl Drop for StopOnDrop {
     fn drop(&mut self) {
-        self.0.cancel();
+        self.0.stop();
+        let mut state = self.0.state();
+        self.0.take_turn(&mut state);
     }
 }
 
 /// Gives up the turn at the first report after [`SLICE`], and waits for the next one.
 struct TurnTaker {
-    turns: Arc<Semaphore>,
+    task: Arc<Task>,
     runtime: Handle,
-    current: Mutex<(Option<OwnedSemaphorePermit>, Instant)>,
 }
 
 impl Observer for TurnTaker {
     fn progress(&self, _: Stage, _: f64) {
-        let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
-        if current.1.elapsed() > SLICE {
-            // The semaphore is fair: whoever waits goes first.
-            current.0 = None;
-            let next = self.runtime.block_on(self.turns.clone().acquire_owned());
-            *current = (next.ok(), Instant::now());
+        let task = &self.task;
+        let long = task
+            .state()
+            .since
+            .is_none_or(|since| since.elapsed() > SLICE);
+        if !long || task.cancel.is_cancelled() {
+            return;
         }
+        task.pause();
+        // The semaphore is fair: whoever waits goes first.
+        let next = self.runtime.block_on(async {
+            tokio::select! {
+                turn = task.turns.clone().acquire_owned() => turn.ok(),
+                () = task.stopped.cancelled() => None,
+            }
+        });
+        let mut state = task.state();
+        (state.turn, state.since) = (next, Some(Instant::now()));
     }
 }
 
@@ -135,6 +301,14 @@ struct Admission {
 struct AdmissionQueue {
     /// Bytes of the budget that nobody holds.
     free: u64,
+    /// Most bytes that one client holds, unless it is one piece of work that needs more.
+    share: u64,
+    /// Bytes that each client holds; none is 0.
+    held: BTreeMap<ClientAddress, u64>,
+    /// The work that computes.
+    running: Vec<Weak<Task>>,
+    /// When work was last ended for others that wait.
+    displaced: Option<Instant>,
     /// Waiting work by client, in order of arrival; no list is empty.
     waiting: BTreeMap<ClientAddress, VecDeque<Waiting>>,
     /// The clients in `waiting`; the first is next.
@@ -149,17 +323,39 @@ struct Waiting {
 /// The memory that admitted work holds.
 struct Admitted {
     admission: Arc<Admission>,
+    client: ClientAddress,
     memory: u64,
+}
+
+impl Admitted {
+    /// Enters its work as that which computes.
+    fn begins(&self, task: &Arc<Task>) {
+        let mut queue = self.admission.queue();
+        queue.running.retain(|task| task.strong_count() > 0);
+        queue.running.push(Arc::downgrade(task));
+    }
 }
 
 impl Drop for Admitted {
     fn drop(&mut self) {
-        self.admission.queue().free += self.memory;
+        let mut queue = self.admission.queue();
+        queue.free += self.memory;
+        if let Some(held) = queue.held.get_mut(&self.client) {
+            *held -= self.memory;
+            if *held == 0 {
+                queue.held.remove(&self.client);
+            }
+        }
+        drop(queue);
         self.admission.advance();
     }
 }
 
 impl Admission {
+    fn take_next(&self) -> Option<(ClientAddress, Waiting)> {
+        self.queue().next()
+    }
+
     fn queue(&self) -> MutexGuard<'_, AdmissionQueue> {
         // A panic cannot leave the queue half changed: nothing between its changes can panic.
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
@@ -182,14 +378,44 @@ impl Admission {
             queue.add(client, Waiting { memory, admit });
         }
         self.advance();
-        admitted.await.map_err(Problem::internal)
+        let mut admitted = std::pin::pin!(admitted);
+        loop {
+            tokio::select! {
+                admitted = &mut admitted => return admitted.map_err(Problem::internal),
+                () = tokio::time::sleep(PATIENCE) => self.displace(),
+            }
+        }
+    }
+
+    /// Ends the costliest piece of work for others that wait, one at a time.
+    fn displace(&self) {
+        let mut queue = self.queue();
+        if queue
+            .displaced
+            .is_some_and(|last| last.elapsed() < PATIENCE)
+        {
+            return;
+        }
+        let running: Vec<Arc<Task>> = queue.running.iter().filter_map(Weak::upgrade).collect();
+        let used = |task: &Task| {
+            let computed = task.state().computed();
+            computed.as_secs_f64() / task.limit.as_secs_f64().max(f64::MIN_POSITIVE)
+        };
+        let going = running.iter().filter(|task| !task.cancel.is_cancelled());
+        let costliest = going.max_by(|a, b| used(a).total_cmp(&used(b)));
+        if let Some(task) = costliest.filter(|task| used(task) * f64::from(SHARE) >= 1.0) {
+            queue.displaced = Some(Instant::now());
+            task.state().displaced = true;
+            task.stop();
+        }
     }
 
     /// Admits what fits.
     fn advance(self: &Arc<Self>) {
-        while let Some(next) = self.queue().next() {
+        while let Some((client, next)) = self.take_next() {
             let admitted = Admitted {
                 admission: self.clone(),
+                client,
                 memory: next.memory,
             };
             // Without a receiver, `admitted` is dropped and the memory is free again.
@@ -217,22 +443,32 @@ impl AdmissionQueue {
     }
 
     /// Takes the next piece of work if its memory is free. Nothing overtakes it, or large work
-    /// would wait for ever.
-    fn next(&mut self) -> Option<Waiting> {
+    /// would wait for ever; only clients that hold their share are passed over.
+    fn next(&mut self) -> Option<(ClientAddress, Waiting)> {
         self.forget_gone();
-        let client = *self.order.front()?;
+        let fits = |client: &ClientAddress| {
+            let held = self.held.get(client).copied().unwrap_or(0);
+            let asked = self.waiting.get(client).and_then(VecDeque::front);
+            let asked = asked.map_or(0, |work| work.memory);
+            held == 0 || *client == ClientAddress::NONE || held + asked <= self.share
+        };
+        let place = self.order.iter().position(fits)?;
+        let client = self.order[place];
         let list = self.waiting.get_mut(&client)?;
         if list.front()?.memory > self.free {
             return None;
         }
         let work = list.pop_front()?;
         self.free -= work.memory;
-        self.order.pop_front();
+        if work.memory > 0 {
+            *self.held.entry(client).or_default() += work.memory;
+        }
+        self.order.remove(place);
         match list.is_empty() {
             true => drop(self.waiting.remove(&client)),
             false => self.order.push_back(client),
         }
-        Some(work)
+        Some((client, work))
     }
 
     /// Drops the work that no client waits for any more.

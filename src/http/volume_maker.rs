@@ -1,6 +1,7 @@
 //! Volumes and jobs of what other systems have sent: stored as an upload is, filed as a request is.
 
 use super::app::App;
+use super::client::ClientAddress;
 use super::guard::Counting;
 use super::jobs::Filing;
 use super::jobs::archives::{send_of, source_of};
@@ -37,7 +38,13 @@ impl VolumeMaker for App {
             bundle.write(pieces).await?;
         }
         let tenant = &group.origin.tenant;
-        let stored = bundle.store(self, tenant, &Tags::default()).await?;
+        let tags = Tags::default();
+        let stored = bundle.store(self, tenant, &tags);
+        // Decoding is shared out between the senders.
+        let stored = match group.origin.address.parse() {
+            Ok(address) => ClientAddress::of_peer(address).scope(stored).await?,
+            Err(_) => stored.await?,
+        };
         Ok(stored.volume.item.id)
     }
 

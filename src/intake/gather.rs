@@ -1,21 +1,32 @@
 //! Making volumes of complete groups, and starting the jobs that rules ask for.
 //!
+//! Several groups are made at the same time, of one sender only some of them, so that a sender's costly
+//! objects do not keep those of others waiting.
+//!
 //! Each step is written down before the next one begins, and can be done again: a volume is known by
 //! its content, a job by its idempotency key. What fails for a passing reason (a full disk, a full
 //! queue) is tried again; a group that cannot be read is kept with the reason for a set time.
 
 use super::observer::IntakeObserver;
-use super::record::{GroupState, IntakeGroup, IntakeStore, ReceivedFiles};
+use super::record::{GroupState, IntakeGroup, IntakeStore, Origin, ReceivedFiles};
 use super::rules::Rule;
 use super::session::Sessions;
 use crate::jobs::{
     BlobError, Failure, Fault, LocalFile, Queue, StoreError, StoreFault, StoreResult, Timestamp,
 };
 use async_trait::async_trait;
+use futures::StreamExt;
+use futures::stream::FuturesUnordered;
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 
+/// Groups that are made at the same time, and those of one sender.
+const AT_ONCE: usize = 8;
+const AT_ONCE_OF_SENDER: usize = 2;
+/// Pause before a group is looked at again that changed while it was made.
+const AGAIN: Duration = Duration::from_secs(1);
 /// Pause after a failure that may pass.
 const RETRY: Duration = Duration::from_secs(10);
 /// How often a process looks for groups that others have left, and how long these are late then.
@@ -57,6 +68,53 @@ fn damaged() -> Failure {
         "A stored file of the series no longer holds what was received.",
     )
     .fix("Erase the volume of the series, then send the series again.")
+}
+
+/// Who sent the objects of a group. A title can be made up, an address hardly.
+fn sender_of(origin: &Origin) -> String {
+    format!("{} {}", origin.tenant, origin.address)
+}
+
+/// The groups that are complete: which are being made, and which wait for their turn.
+#[derive(Default)]
+struct Turns {
+    /// Sender and group of each.
+    making: Vec<(String, String)>,
+    waiting: VecDeque<(String, String)>,
+}
+
+impl Turns {
+    /// Whether a group is being made; `None` if it does not wait either.
+    fn knows(&self, group: &str) -> Option<bool> {
+        let is = |(_, known): &(String, String)| known == group;
+        match self.making.iter().any(is) {
+            true => Some(true),
+            false => self.waiting.iter().any(is).then_some(false),
+        }
+    }
+
+    fn wait(&mut self, sender: String, group: String) {
+        self.waiting.push_back((sender, group));
+    }
+
+    /// Takes the first group that waits and whose sender has not too many being made.
+    fn start(&mut self) -> Option<(String, String)> {
+        if self.making.len() >= AT_ONCE {
+            return None;
+        }
+        let of = |sender: &String| self.making.iter().filter(|(s, _)| s == sender).count();
+        let place = self
+            .waiting
+            .iter()
+            .position(|(sender, _)| of(sender) < AT_ONCE_OF_SENDER)?;
+        let next = self.waiting.remove(place)?;
+        self.making.push(next.clone());
+        Some(next)
+    }
+
+    fn end(&mut self, group: &str) {
+        self.making.retain(|(_, made)| made != group);
+    }
 }
 
 /// Makes volumes and files jobs.
@@ -152,11 +210,33 @@ impl Gatherer {
             tracing::error!(%error, "what was received before the start could not be listed");
             tokio::time::sleep(RETRY).await;
         }
+        let mut turns = Turns::default();
+        let mut making = FuturesUnordered::new();
         loop {
-            let group = self.sessions.next().await;
-            if let Err(error) = self.advance(&group).await {
-                tracing::warn!(group, error, "a received series waits: {error}");
-                self.sessions.retry(&group, RETRY);
+            while let Some((sender, group)) = turns.start() {
+                making.push(async move {
+                    if let Err(error) = self.advance(&group).await {
+                        tracing::warn!(group, error, "a received series waits: {error}");
+                        self.sessions.retry(&group, RETRY);
+                    }
+                    (sender, group)
+                });
+            }
+            tokio::select! {
+                Some((_, group)) = making.next() => turns.end(&group),
+                group = self.sessions.next() => match turns.knows(&group) {
+                    // Two at a time would file two volumes; one that still waits is made as it is then.
+                    Some(true) => self.sessions.retry(&group, AGAIN),
+                    Some(false) => {}
+                    None => match self.store.group(&group).await {
+                        Ok(Some(found)) => turns.wait(sender_of(&found.origin), group),
+                        Ok(None) => {}
+                        Err(error) => {
+                            tracing::warn!(group, %error, "a received series waits: {error}");
+                            self.sessions.retry(&group, RETRY);
+                        }
+                    },
+                },
             }
         }
     }
@@ -328,5 +408,36 @@ impl Gatherer {
             );
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_sender_leaves_places_for_others() {
+        let mut turns = Turns::default();
+        for n in 0..20 {
+            turns.wait("busy".into(), format!("busy {n}"));
+        }
+        turns.wait("quiet".into(), "quiet 0".into());
+        let mut started = Vec::new();
+        while let Some((_, group)) = turns.start() {
+            started.push(group);
+        }
+        assert_eq!(started, ["busy 0", "busy 1", "quiet 0"]);
+        assert_eq!(turns.knows("busy 1"), Some(true));
+        assert_eq!(turns.knows("busy 2"), Some(false));
+        assert_eq!(turns.knows("new"), None);
+        turns.end("busy 0");
+        assert_eq!(turns.start().map(|(_, group)| group), Some("busy 2".into()));
+        assert_eq!(turns.start(), None);
+        for n in 0..9 {
+            turns.wait(format!("sender {n}"), format!("group {n}"));
+        }
+        let more = std::iter::from_fn(|| turns.start()).count();
+        assert_eq!(turns.making.len(), AT_ONCE);
+        assert_eq!(more, AT_ONCE - 3);
     }
 }

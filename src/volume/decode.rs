@@ -41,6 +41,11 @@ impl DataType {
         }
     }
 
+    /// Whether values may be negative.
+    pub(super) fn is_signed(self) -> bool {
+        !matches!(self, Self::U8 | Self::U16 | Self::U32 | Self::U64)
+    }
+
     /// The name that numpy uses.
     pub(super) fn name(self) -> &'static str {
         match self {

@@ -25,7 +25,12 @@ pub fn element(group: u16, number: u16, vr: &str, value: &[u8]) -> Vec<u8> {
 
 /// A file with these elements, which rise by their tags.
 pub fn file(elements: &[Vec<u8>]) -> Vec<u8> {
-    let syntax = element(2, 0x10, "UI", b"1.2.840.10008.1.2.1");
+    file_in("1.2.840.10008.1.2.1", elements)
+}
+
+/// The same in another transfer syntax, whose encoding the elements have.
+pub fn file_in(syntax: &str, elements: &[Vec<u8>]) -> Vec<u8> {
+    let syntax = element(2, 0x10, "UI", syntax.as_bytes());
     let length = u32::try_from(syntax.len()).unwrap().to_le_bytes();
     let group_length = element(2, 0, "UL", &length);
     [

@@ -642,6 +642,16 @@ impl Service {
         ids.iter().filter_map(|id| id.trim().parse().ok()).collect()
     }
 
+    /// Processor time that the process has used, seconds.
+    #[cfg(target_os = "linux")]
+    pub fn processor_seconds(&self) -> f64 {
+        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.process.id())).unwrap();
+        let (_, fields) = stat.rsplit_once(") ").unwrap();
+        let ticks = fields.split(' ').skip(11).take(2);
+        // Linux counts 100 ticks a second for every program.
+        ticks.map(|n| n.parse::<f64>().unwrap() / 100.0).sum()
+    }
+
     /// Kills the process without warning, as a power cut would.
     pub fn kill(mut self) {
         self.process.kill().unwrap();

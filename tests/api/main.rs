@@ -13,6 +13,8 @@ mod helpers;
 
 mod archives;
 mod blobs;
+#[cfg(target_os = "linux")]
+mod bombs;
 mod canary;
 mod command;
 mod config;

@@ -272,13 +272,15 @@ impl Bundle {
             Ok::<_, Failure>((facts, reader.scan(&files, monitor)?))
         };
         // The disk and the processor work at the same time.
-        let inspected = async { Ok(app.decoding.run(INSPECTION_MEMORY, inspect).await??) };
+        let bytes = received.iter().map(|file| file.bytes).sum();
+        let decoding = app.decoding.run_on(bytes, INSPECTION_MEMORY, inspect);
+        let inspected = async { Ok(decoding.await??) };
         let settled = async { Ok::<(), Problem>(staged.settle(&id).await?) };
         let ((facts, scan), ()) = tokio::try_join!(inspected, settled)?;
         let volume = StoredVolume {
             sequence: 0,
             created_at: app.queue.clock.now(),
-            bytes: received.iter().map(|f| f.bytes).sum(),
+            bytes,
             files: records,
             facts: facts.to_json(),
             id,

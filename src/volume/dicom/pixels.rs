@@ -13,7 +13,7 @@ use super::attributes::{
     PADDING, PADDING_LIMIT, PHOTOMETRIC, PIXEL_REPRESENTATION, REAL_WORLD_INTERCEPT,
     REAL_WORLD_SLOPE, RESCALE_INTERCEPT, RESCALE_SLOPE, ROWS, SAMPLES,
 };
-use super::codec::{self, FrameLayout};
+use super::codec::{self, FrameError, FrameLayout};
 use super::fragments::frames_of;
 use super::kind::{Kind, is_ct};
 use super::scan::{Fragment, PixelElement, PixelPlace, Scan};
@@ -120,6 +120,16 @@ impl Pixels {
                             what: "pixels in a compressed frame",
                             asked: pixels as u64,
                             limit: codec::MOST_PIXELS as u64,
+                        });
+                    }
+                    // Frames of which each is small can be many: all are counted.
+                    let bytes = voxels.saturating_mul(data_type.size() as u64);
+                    if bytes > limits.unpacked_bytes {
+                        return Err(VolumeError::TooLarge {
+                            file: a.file.clone(),
+                            what: "bytes of pixels after decompression",
+                            asked: bytes,
+                            limit: limits.unpacked_bytes,
                         });
                     }
                     let frames = frames_of(offsets, fragments, frames);
@@ -241,7 +251,7 @@ impl FrameReader<'_> {
                 (&mut unpacked, 0)
             }
             Storage::Frames(frames) => {
-                let bytes = self.decompress(&frames[frame])?;
+                let bytes = self.decompress(&frames[frame], &mut || report(0.0))?;
                 unpacked = Source::plain(&pixels.file, bytes);
                 (&mut unpacked, 0)
             }
@@ -251,14 +261,20 @@ impl FrameReader<'_> {
         Ok(reader.into_figures())
     }
 
-    /// Reads and decodes a compressed frame.
-    fn decompress(&mut self, fragments: &[Fragment]) -> Result<Vec<u8>, VolumeError> {
+    /// Reads and decodes a compressed frame. `report` is called regularly.
+    fn decompress(
+        &mut self,
+        fragments: &[Fragment],
+        report: &mut dyn FnMut() -> Result<(), Cancelled>,
+    ) -> Result<Vec<u8>, VolumeError> {
         let pixels = self.pixels;
         let [columns, rows] = pixels.extent;
         let layout = FrameLayout {
             columns,
             rows,
             size: pixels.data_type.size(),
+            bits: 8 * pixels.data_type.size() as u32 - pixels.unused_bits,
+            signed: pixels.data_type.is_signed(),
         };
         // No encoder makes more of the numbers than twice their size.
         let most = 2 * columns * rows * layout.size + (64 << 10);
@@ -282,8 +298,12 @@ impl FrameReader<'_> {
             self.source.fill_all(&mut packed[filled..end], needed)?;
             filled = end;
         }
-        codec::decode(pixels.syntax.compression, &packed, layout)
-            .map_err(|reason| corrupt(begin, reason))
+        codec::decode(pixels.syntax.compression, &packed, layout, report).map_err(|error| {
+            match error {
+                FrameError::Wrong(reason) => corrupt(begin, reason),
+                FrameError::Cancelled(cancelled) => cancelled.into(),
+            }
+        })
     }
 }
 

@@ -11,6 +11,7 @@ use super::super::VolumeError;
 use super::super::limits::ReadLimits;
 use super::super::source::{Source, VolumeFile};
 use super::attributes::clip;
+use super::codec::Process;
 use dicom_encoding::transfer_syntax::{Endianness, TransferSyntax, TransferSyntaxIndex};
 use dicom_transfer_syntax_registry::TransferSyntaxRegistry;
 use std::fmt;
@@ -41,23 +42,44 @@ pub(super) enum Compression {
     /// Run lengths, PS3.5 annex G.
     Rle,
     /// JPEG (ISO 10918-1): baseline, or lossless with any predictor.
-    Jpeg,
-    /// JPEG-LS (ISO 14495-1).
-    JpegLs,
-    /// JPEG 2000 (ISO 15444-1).
-    Jpeg2000,
+    Jpeg(Process),
+    /// JPEG-LS (ISO 14495-1), near-lossless or only lossless.
+    JpegLs { near: bool },
+    /// JPEG 2000 (ISO 15444-1), irreversible or only reversible.
+    Jpeg2000 { irreversible: bool },
 }
 
-/// The transfer syntaxes with compressed pixels that are read.
+/// The transfer syntaxes with compressed pixels that are read. A lossless one never holds numbers that
+/// were changed.
 const COMPRESSED: [(&str, Compression); 8] = [
     ("1.2.840.10008.1.2.5", Compression::Rle),
-    ("1.2.840.10008.1.2.4.50", Compression::Jpeg),
-    ("1.2.840.10008.1.2.4.57", Compression::Jpeg),
-    ("1.2.840.10008.1.2.4.70", Compression::Jpeg),
-    ("1.2.840.10008.1.2.4.80", Compression::JpegLs),
-    ("1.2.840.10008.1.2.4.81", Compression::JpegLs),
-    ("1.2.840.10008.1.2.4.90", Compression::Jpeg2000),
-    ("1.2.840.10008.1.2.4.91", Compression::Jpeg2000),
+    (
+        "1.2.840.10008.1.2.4.50",
+        Compression::Jpeg(Process::Baseline),
+    ),
+    (
+        "1.2.840.10008.1.2.4.57",
+        Compression::Jpeg(Process::Lossless),
+    ),
+    (
+        "1.2.840.10008.1.2.4.70",
+        Compression::Jpeg(Process::Lossless),
+    ),
+    (
+        "1.2.840.10008.1.2.4.80",
+        Compression::JpegLs { near: false },
+    ),
+    ("1.2.840.10008.1.2.4.81", Compression::JpegLs { near: true }),
+    (
+        "1.2.840.10008.1.2.4.90",
+        Compression::Jpeg2000 {
+            irreversible: false,
+        },
+    ),
+    (
+        "1.2.840.10008.1.2.4.91",
+        Compression::Jpeg2000 { irreversible: true },
+    ),
 ];
 
 /// Start and encoding of a data set.

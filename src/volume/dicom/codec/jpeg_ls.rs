@@ -4,7 +4,7 @@
 //! above right `rd`) are those of the standard, as are the numbers of its sections in the comments.
 //! No crate without C++ code decodes JPEG-LS.
 
-use super::FrameLayout;
+use super::{FrameError, FrameLayout, Numbers, Pace};
 
 /// Contexts of the regular mode; two more for interrupted runs follow.
 const REGULAR: usize = 365;
@@ -15,19 +15,28 @@ const RUN_ORDERS: [u32; 32] = [
     14, 15,
 ];
 
-/// Decodes the frame in `bytes`.
-///
-/// # Errors
-/// What is wrong with the bytes.
-pub(super) fn decode(bytes: &[u8], layout: FrameLayout) -> Result<Vec<u8>, String> {
+/// Decodes the frame in `bytes`; `near` if the transfer syntax allows near-lossless coding.
+pub(super) fn decode(
+    near: bool,
+    bytes: &[u8],
+    layout: FrameLayout,
+    pace: &mut Pace<'_>,
+) -> Result<Numbers, FrameError> {
     let header = Header::read(bytes)?;
     layout.check(header.columns.into(), header.rows.into(), header.components)?;
-    if header.bits > 8 * layout.size as u32 {
-        return Err(super::too_wide(header.bits, layout));
+    layout.check_bits(header.bits)?;
+    if !near && header.near > 0 {
+        return Err(FrameError::Wrong(format!(
+            "the JPEG-LS frame is up to {} off; the transfer syntax allows lossless only",
+            header.near
+        )));
     }
-    let shift = header.shift;
-    let values = Scan::new(&header, &bytes[header.data..])?.decode(layout)?;
-    Ok(layout.pack(values.into_iter().map(|v| v << shift)))
+    let mut values = Scan::new(&header, &bytes[header.data..])?.decode(layout, pace)?;
+    values.iter_mut().for_each(|value| *value <<= header.shift);
+    Ok(Numbers {
+        values,
+        bits: header.bits,
+    })
 }
 
 /// The marker segments before the coded numbers.
@@ -225,7 +234,7 @@ impl<'a> Scan<'a> {
         })
     }
 
-    fn decode(mut self, layout: FrameLayout) -> Result<Vec<i32>, String> {
+    fn decode(mut self, layout: FrameLayout, pace: &mut Pace<'_>) -> Result<Vec<i32>, FrameError> {
         let width = layout.columns;
         let mut values = Vec::with_capacity(layout.pixels());
         // Lines with the neighbours left and right of them.
@@ -247,6 +256,7 @@ impl<'a> Scan<'a> {
             }
             values.extend_from_slice(&line[1..=width]);
             std::mem::swap(&mut above, &mut line);
+            pace.step(width)?;
         }
         Ok(values)
     }

@@ -88,6 +88,8 @@ mod tests {
             columns: 3,
             rows: 2,
             size: 2,
+            bits: 16,
+            signed: false,
         };
         // High bytes 1 1 1 1 2 3; low bytes 9 8 7 7 7 7, then padding.
         let high = [253, 1, 1, 2, 3];
