@@ -33,7 +33,10 @@ const USES: &[(&str, &[&str])] = &[
         ],
     ),
     ("decimate", &["geometry", "mesh", "progress"]),
-    ("export", &["geometry", "mesh", "grid", "volume"]),
+    (
+        "export",
+        &["geometry", "mesh", "progress", "grid", "volume"],
+    ),
     ("model", &["geometry", "mesh", "progress", "grid", "locate"]),
     (
         "deform",
@@ -71,6 +74,7 @@ const USES: &[(&str, &[&str])] = &[
             "retile",
             "optimise",
             "export",
+            "model",
             "report",
             "parameters",
         ],
@@ -146,6 +150,7 @@ const USES: &[(&str, &[&str])] = &[
             "export",
             "model",
             "deform",
+            "polar",
             "reader",
             "report",
             "parameters",
