@@ -6,8 +6,9 @@ Vertices must come back in the same order, equal to the last bit of the precisio
 reader keep. STL stores no shared vertices; there the distinct positions and the triangles over them
 are compared.
 
-Figures of vertices (`uncertainty_mm` and `fields` of the JSON) must be the point arrays of the VTP file,
-by their names, lengths and values, and no others; the uncertainty also the attribute `_UNCERTAINTY` of
+Figures of vertices (`uncertainty_mm` and `fields` of the JSON) must be the point arrays of the VTP and the VTK file,
+by their names, lengths and values, and no others, and properties of the PLY file; the part of each triangle (`part`)
+their cell array and face property, the groups of the OBJ file and the primitives of the glTF files; the uncertainty also the attribute `_UNCERTAINTY` of
 glTF files, whose vertices have a colour where there is a field.
 """
 import json
@@ -27,10 +28,11 @@ def by_trimesh(path):
     """Vertices and triangles as stored, and the node's matrix (None except for glTF)."""
     if path.suffix in (".glb", ".gltf"):
         scene = trimesh.load(path, process=False)
-        (name,) = scene.graph.nodes_geometry
-        matrix, geometry = scene.graph[name]
-        mesh = scene.geometry[geometry]
-        return mesh.vertices, mesh.faces, matrix
+        # One geometry for each primitive; all share the vertices.
+        meshes = list(scene.geometry.values())
+        assert all(np.array_equal(mesh.vertices, meshes[0].vertices) for mesh in meshes)
+        matrix, _ = scene.graph[scene.graph.nodes_geometry[0]]
+        return meshes[0].vertices, np.concatenate([mesh.faces for mesh in meshes]), matrix
     mesh = trimesh.load(path, process=False, maintain_order=True)
     return mesh.vertices, mesh.faces, None
 
@@ -40,7 +42,10 @@ READERS = {
     ".ply": vtk.vtkPLYReader,
     ".obj": vtk.vtkOBJReader,
     ".vtp": vtk.vtkXMLPolyDataReader,
+    ".vtk": vtk.vtkPolyDataReader,
 }
+
+PARTS = {1: "endocardium", 2: "epicardium", 3: "base"}
 
 
 def by_vtk(path):
@@ -95,12 +100,17 @@ def figures(document):
     return {name: np.array(values, np.float64) for name, values in named.items()}
 
 
-def arrays_by_vtk(path, expected):
-    """The first difference of the point arrays of a VTP file, as text; None if there is none."""
-    reader = vtk.vtkXMLPolyDataReader()
+def arrays_by_vtk(path, expected, parts):
+    """The first difference of the arrays of a VTP or VTK file, as text; None if there is none."""
+    reader = READERS[path.suffix]()
     reader.SetFileName(str(path))
     reader.Update()
     data = reader.GetOutput().GetPointData()
+    cells = reader.GetOutput().GetCellData().GetArray("Part")
+    if (cells is None) != (parts is None):
+        return "one of the files has no parts"
+    if parts is not None and not np.array_equal(vtk_to_numpy(cells), parts):
+        return "Part differs"
     names = {data.GetArrayName(n) for n in range(data.GetNumberOfArrays())}
     if names != {"Normals", *expected}:
         return f"arrays {sorted(names)} instead of {sorted({'Normals', *expected})}"
@@ -116,7 +126,7 @@ def arrays_by_vtk(path, expected):
 def figures_by_trimesh(path, expected, painted):
     """The same of the attributes of a glTF file."""
     scene = trimesh.load(path, process=False)
-    (mesh,) = scene.geometry.values()
+    mesh = next(iter(scene.geometry.values()))
     if "Uncertainty" in expected:
         found = mesh.vertex_attributes.get("_UNCERTAINTY")
         if found is None or not np.array_equal(np.ravel(found), expected["Uncertainty"].astype(np.float32)):
@@ -130,10 +140,62 @@ def figures_by_trimesh(path, expected, painted):
     return None if len(np.unique(colours, axis=0)) > 9 else "all vertices have nearly the same colour"
 
 
+def figures_of_ply(path, expected, parts):
+    """The same of the properties of a PLY file, read by its header."""
+    head, body = path.read_bytes().split(b"\nend_header\n", 1)
+    types = {"double": "<f8", "uchar": "u1"}
+    columns, faces = [], []
+    for line in head.decode().splitlines():
+        words = line.split()
+        if words[:2] == ["element", "vertex"]:
+            count, into = int(words[2]), columns
+        elif words[:2] == ["element", "face"]:
+            triangles, into = int(words[2]), faces
+        elif words[:2] == ["property", "list"]:
+            into += [("n", "u1"), ("corners", "<i4", 3)]
+        elif words[:1] == ["property"]:
+            into.append((words[2], types[words[1]]))
+    points = np.frombuffer(body, columns, count)
+    rows = np.frombuffer(body, faces, triangles, offset=points.nbytes)
+    for name, values in expected.items():
+        if not np.array_equal(points[name.lower()], values, equal_nan=True):
+            return f"{name} differs"
+    if ("part" in rows.dtype.names) != (parts is not None):
+        return "one of the files has no parts"
+    return None if parts is None or np.array_equal(rows["part"], parts) else "part differs"
+
+
+def groups_of(path, document):
+    """The first difference of the groups of an OBJ file, or the materials of a glTF file, to the parts of the JSON."""
+    parts = document.get("part")
+    if parts is None:
+        return None
+    counts = {name: parts.count(number) for number, name in PARTS.items() if number in parts}
+    if path.suffix == ".obj":
+        found, group = {}, None
+        for line in path.read_text().splitlines():
+            if line.startswith("g "):
+                group = line[2:]
+            elif line.startswith("f "):
+                found[group] = found.get(group, 0) + 1
+    else:
+        scene = trimesh.load(path, process=False)
+        found = {mesh.visual.material.name: len(mesh.faces) for mesh in scene.geometry.values()}
+    return None if found == counts else f"{found} instead of {counts}"
+
+
 def check_figures(path, document):
     expected = figures(document)
-    if path.suffix == ".vtp":
-        reader, difference = "vtk", arrays_by_vtk(path, expected)
+    parts = np.array(document["part"]) if "part" in document else None
+    if path.suffix in (".obj", ".glb", ".gltf"):
+        difference = groups_of(path, document)
+        print(f"{path.name}: parts: {difference or 'identical'}")
+        if difference or path.suffix == ".obj":
+            return difference is None
+    if path.suffix in (".vtp", ".vtk"):
+        reader, difference = "vtk", arrays_by_vtk(path, expected, parts)
+    elif path.suffix == ".ply":
+        reader, difference = "header", figures_of_ply(path, expected, parts)
     elif path.suffix in (".glb", ".gltf"):
         reader, difference = "trimesh", figures_by_trimesh(path, expected, "fields" in document)
     else:
@@ -143,7 +205,7 @@ def check_figures(path, document):
 
 
 def check(path, expected):
-    ways = [("trimesh", by_trimesh)] if path.suffix != ".vtp" else []
+    ways = [("trimesh", by_trimesh)] if path.suffix not in (".vtp", ".vtk") else []
     ways += [("vtk", by_vtk)] if path.suffix in READERS else []
     passed = True
     for reader, read in ways:
@@ -161,9 +223,13 @@ def main(folder):
             continue  # a report, not a mesh
         assert document["frame"] == "LPS" and document["unit"] == "mm", original.name
         expected = np.array(document["vertices"]), np.array(document["triangles"])
-        for suffix in (".glb", ".gltf", ".stl", ".ply", ".obj", ".vtp"):
+        # OBJ and glTF files have the triangles part by part.
+        order = np.argsort(document["part"], kind="stable") if "part" in document else slice(None)
+        by_part = expected[0], expected[1][order]
+        for suffix in (".glb", ".gltf", ".stl", ".ply", ".obj", ".vtp", ".vtk"):
             path = original.with_suffix(suffix)
-            if path.exists() and check(path, expected) and check_figures(path, document):
+            grouped = suffix in (".glb", ".gltf", ".obj")
+            if path.exists() and check(path, by_part if grouped else expected) and check_figures(path, document):
                 passed += 1
             elif path.exists():
                 failed += 1

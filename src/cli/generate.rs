@@ -3,7 +3,8 @@
 use super::output::{note, write_file};
 use super::volume_args::volume_files;
 use super::{Bar, ModelArgs};
-use crate::export::{self, Format};
+use crate::export::open_part::open_part;
+use crate::export::{self, Format, Part};
 use crate::pipeline::{self, Model};
 use crate::progress::{CancelToken, Monitor};
 use crate::report::{MeasuredSurface, ModelReport};
@@ -27,8 +28,8 @@ pub struct GenerateArgs {
     /// MR file, all files of one series, or a zip or folder of them)
     #[arg(value_name = "IN", required = true, num_args = 1..)]
     input: Vec<PathBuf>,
-    /// File to write the model to; the extension chooses the format: glb, gltf, stl, ply, obj, vtp
-    /// or json (repeatable)
+    /// File to write the model to; the extension chooses the format: glb, gltf, stl, ply, obj, vtp,
+    /// vtk or json (repeatable)
     #[arg(short, long = "output", value_name = "OUT", required = true)]
     output: Vec<PathBuf>,
     /// File to write the quality report to: .json or .html (repeatable)
@@ -37,6 +38,9 @@ pub struct GenerateArgs {
     /// Leave patient, study and series out of the HTML report
     #[arg(long)]
     deidentify: bool,
+    /// Write only this part of a left ventricle's wall, as an open surface
+    #[arg(long, value_name = "PART", value_parser = parse_part)]
+    part: Option<Part>,
     /// Print only errors
     #[arg(short, long)]
     quiet: bool,
@@ -64,8 +68,17 @@ pub fn run(args: &GenerateArgs) -> Result<()> {
     let model = made.map_err(|error| anyhow::anyhow!(error.with_advice()))?;
     let surface = model.measured_surface();
     let metadata = model.metadata_with_distance(&surface, &monitor)?;
+    let (mesh, metadata) = match args.part {
+        Some(part) => open_part(&model.mesh, &metadata, part).with_context(|| {
+            format!(
+                "the model has no {}: only models of a left ventricle's wall have parts; leave out --part",
+                part.as_str()
+            )
+        })?,
+        None => (model.mesh.clone(), metadata),
+    };
     for (path, format) in args.output.iter().zip(formats) {
-        let bytes = export::encode(format, &model.mesh, &metadata)?;
+        let bytes = export::encode(format, &mesh, &metadata)?;
         write_file(path, &bytes)?;
     }
     let options = ReadOptions {
@@ -85,14 +98,20 @@ pub fn run(args: &GenerateArgs) -> Result<()> {
     Ok(())
 }
 
+/// Reads the name of a part of the wall.
+pub(super) fn parse_part(text: &str) -> Result<Part, String> {
+    Part::named(text)
+        .ok_or_else(|| format!("give one of {}", Part::ALL.map(Part::as_str).join(", ")))
+}
+
 fn output_formats(outputs: &[PathBuf]) -> Result<Vec<Format>> {
     outputs
         .iter()
         .map(|path| {
             Format::from_extension(&extension(path)).with_context(|| {
                 format!(
-                    "{}: the extension is not a known format; use glb, gltf, stl, ply, obj, vtp \
-                     or json",
+                    "{}: the extension is not a known format; use glb, gltf, stl, ply, obj, vtp, \
+                     vtk or json",
                     path.display()
                 )
             })

@@ -1,10 +1,11 @@
 //! `ventriform segment`: fits a model to a patient's volume.
 
 use super::dicom_args::DicomArgs;
+use super::generate::parse_part;
 use super::output::{create_folder, note, write_file};
 use super::volume_args::volume_files;
 use super::{Bar, FitArgs};
-use crate::export::{self, Format};
+use crate::export::{self, Format, Part};
 use crate::parameters::FitParameters;
 use crate::progress::{CancelToken, Monitor, Plan};
 use crate::reader::ReaderProfile;
@@ -22,7 +23,7 @@ use std::path::{Path, PathBuf};
   ventriform segment scan.nii.gz --model lv.json -o out
   ventriform segment scan.dcm --model a.json --model b.json -o out --expert mask.nii.gz
   ventriform segment scan.nii.gz --model auto -o out --seed-point 60,70,55 --format ply
-Writes mask.nii.gz, mesh.glb, mesh.stl, mesh.json (or the formats given by --format), report.json,
+Writes mask.nii.gz, labels.nii.gz and labels.seg.nrrd (wall 1, cavity 2), mesh.glb, mesh.stl, mesh.json (or the formats given by --format), report.json,
 report.html, slices.png, region.nii.gz (the scan about the organ, which the report shows) and, for the
 left ventricle, polar.json, polar.svg, polar.png, and mask and mesh of the anatomical wall: mask_anatomical.nii.gz, mesh_anatomical.glb, ... (with --edge anatomical:
 mask_apparent.nii.gz, mesh_apparent.glb, ...); with --dicom also mask.dcm, contours.dcm, mesh.dcm,
@@ -53,6 +54,9 @@ pub struct SegmentArgs {
         default_values = ["glb", "stl", "json"]
     )]
     formats: Vec<Format>,
+    /// Also write this part of the wall as an open surface, mesh_PART.glb ... (repeatable; left ventricles only)
+    #[arg(long = "part", value_name = "PART", value_parser = parse_part)]
+    parts: Vec<Part>,
     #[command(flatten)]
     dicom: DicomArgs,
     #[command(flatten)]
@@ -103,6 +107,16 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
         .and_then(|made| Ok((made.files(&args.formats, None, &monitor)?, made)));
     bar.finish();
     let (mut files, made) = made?;
+    for part in &args.parts {
+        let cut = made.part_files(*part, &args.formats, &monitor)?;
+        if cut.is_empty() {
+            return Err(anyhow!(
+                "the fitted mesh has no {}: only those of left ventricles have parts; leave out --part",
+                part.as_str()
+            ));
+        }
+        files.extend(cut);
+    }
     files.push(made.page(&files, whose.as_ref()));
     if let Some(order) = dicom {
         let scan = order.of(&made);
@@ -111,6 +125,9 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
     }
     write_all(&args.output, &files)?;
     note!("{}", headline(&made.segmentation));
+    for warning in made.warnings() {
+        note!("warning: {warning}");
+    }
     for flag in &made.segmentation.fit.flags {
         note!("warning: {flag}");
     }

@@ -1,4 +1,5 @@
-//! glTF 2.0 with one node, one mesh and one buffer.
+//! glTF 2.0 with one node, one mesh and one buffer. The mesh is one primitive, or one for each part of the
+//! wall where these are known: they share the vertices, and have a material and `extras` with the part's name.
 //!
 //! The vertices are in patient coordinates, so a program that reads the accessor directly has
 //! medical coordinates. The node's matrix converts them to the world frame of glTF, metres with
@@ -17,6 +18,7 @@ use serde_json::{Value, json};
 
 use super::{ExportError, FRAME, Metadata, UNIT, single};
 use crate::mesh::TriMesh;
+use crate::mesh::part::Part;
 
 /// The matrix from LPS millimetres to glTF metres, by columns.
 const PATIENT_TO_WORLD: [f64; 16] = [
@@ -56,7 +58,13 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
     let normals = single::normals(&mesh.vertex_normals());
     // The index 65535 is reserved for restarting a primitive.
     let narrow = positions.len() <= 65535;
-    let mut buffer = bytes_of(&positions, &normals, &mesh.triangles, narrow);
+    let groups = groups(mesh, metadata);
+    let triangles: Vec<[u32; 3]> = groups
+        .iter()
+        .flat_map(|group| &group.triangles)
+        .copied()
+        .collect();
+    let mut buffer = bytes_of(&positions, &normals, &triangles, narrow);
     let indices_end = buffer.len();
     buffer.resize(indices_end.next_multiple_of(4), 0);
 
@@ -103,7 +111,7 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
             },
         }],
         "materials": [{
-            "name": "myocardium",
+            "name": groups[0].name,
             "pbrMetallicRoughness": {
                 "baseColorFactor": base_colour,
                 "metallicFactor": 0.0,
@@ -141,27 +149,84 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
         ],
         "buffers": [{ "byteLength": buffer.len() }],
     });
+    if groups.len() > 1 {
+        let index_bytes = if narrow { 2 } else { 4 };
+        let mut start = 0;
+        let mut primitives = Vec::new();
+        let mut materials = Vec::new();
+        for (number, group) in groups.iter().enumerate() {
+            let mut material = document["materials"][0].clone();
+            material["name"] = group.name.into();
+            materials.push(material);
+            let mut accessor = document["accessors"][2].clone();
+            accessor["count"] = (3 * group.triangles.len()).into();
+            accessor["byteOffset"] = start.into();
+            start += 3 * group.triangles.len() * index_bytes;
+            let mut primitive = document["meshes"][0]["primitives"][0].clone();
+            primitive["material"] = number.into();
+            primitive["extras"] = json!({ "part": group.name });
+            primitive["indices"] = match number {
+                0 => {
+                    document["accessors"][2] = accessor;
+                    2.into()
+                }
+                _ => push(&mut document["accessors"], accessor).into(),
+            };
+            primitives.push(primitive);
+        }
+        document["meshes"][0]["primitives"] = primitives.into();
+        document["materials"] = materials.into();
+    }
     for (attribute, start) in more.into_iter().zip(more_starts) {
         let view = json!({
             "buffer": 0, "target": ARRAY_BUFFER,
             "byteOffset": start, "byteLength": attribute.bytes.len(),
         });
         let mut accessor = attribute.accessor;
-        accessor["bufferView"] = json_length(&document["bufferViews"]).into();
+        accessor["bufferView"] = push(&mut document["bufferViews"], view).into();
         accessor["count"] = positions.len().into();
-        document["meshes"][0]["primitives"][0]["attributes"][attribute.name] =
-            json_length(&document["accessors"]).into();
-        for (list, entry) in [("accessors", accessor), ("bufferViews", view)] {
-            if let Some(list) = document[list].as_array_mut() {
-                list.push(entry);
-            }
+        let index = push(&mut document["accessors"], accessor);
+        let primitives = document["meshes"][0]["primitives"].as_array_mut();
+        for primitive in primitives.into_iter().flatten() {
+            primitive["attributes"][attribute.name] = index.into();
         }
     }
     Ok((document, buffer))
 }
 
-fn json_length(list: &Value) -> usize {
-    list.as_array().map_or(0, Vec::len)
+/// Appends `entry` to a list; returns its place.
+fn push(list: &mut Value, entry: Value) -> usize {
+    let list = list.as_array_mut();
+    list.map_or(0, |list| {
+        list.push(entry);
+        list.len() - 1
+    })
+}
+
+/// Triangles with one material.
+struct Group {
+    name: &'static str,
+    triangles: Vec<[u32; 3]>,
+}
+
+/// The triangles of each part of the wall, in their order; all in one group where parts are not known.
+fn groups(mesh: &TriMesh, metadata: &Metadata) -> Vec<Group> {
+    let Some(parts) = metadata.parts_of(mesh) else {
+        return vec![Group {
+            name: "myocardium",
+            triangles: mesh.triangles.clone(),
+        }];
+    };
+    let group = |part: Part| {
+        let of_part = mesh.triangles.iter().zip(parts);
+        let of_part = of_part.filter(|(_, of)| **of == part);
+        let triangles: Vec<[u32; 3]> = of_part.map(|(triangle, _)| *triangle).collect();
+        (!triangles.is_empty()).then_some(Group {
+            name: part.as_str(),
+            triangles,
+        })
+    };
+    Part::ALL.into_iter().filter_map(group).collect()
 }
 
 /// What glTF calls the colours of vertices.

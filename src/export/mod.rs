@@ -11,16 +11,22 @@
 //! | [`Format::Ply`] | double | comments |
 //! | [`Format::Obj`] | double, shortest decimal | comments |
 //! | [`Format::Vtp`] | double | field data `SPACE`, `UNIT` |
+//! | [`Format::Vtk`] | double | the title line |
 //! | [`Format::Json`] | double, shortest decimal | `frame`, `unit` |
 //!
-//! 3D Slicer recognises the frame of STL, PLY and OBJ files by the text `SPACE=LPS`.
+//! 3D Slicer recognises the frame of STL, PLY, OBJ and VTK files by the text `SPACE=LPS`.
 //!
 //! Where it is known, the uncertainty of each vertex is the attribute `_UNCERTAINTY` of glTF files, the
-//! property `uncertainty` of PLY files, the array `Uncertainty` of VTP files and `uncertainty_mm` of
+//! property `uncertainty` of PLY files, the array `Uncertainty` of VTP and VTK files and `uncertainty_mm` of
 //! JSON files, millimetres.
 //!
-//! GLB and glTF files show a figure of each vertex ([`VertexField`]) as vertex colours, VTP files hold it as an
-//! array of its name and JSON files as the entry of `fields` with that name: the uptake of a fitted wall, the distance of a model to the surface it was made of.
+//! GLB and glTF files show a figure of each vertex ([`VertexField`]) as vertex colours, VTP and VTK files hold it as an
+//! array of its name, PLY files as a property of its name in lower case beside `red`, `green` and `blue`, and JSON files as the entry of `fields` with that name: the uptake of a fitted wall, the distance of a model to the surface it was made of.
+//!
+//! Where the parts of a ventricle's wall are known ([`Metadata::parts`]), each triangle says which it is of: 1
+//! endocardium, 2 epicardium, 3 base. That is the cell array `Part` of VTP and VTK files, the face property `part` of
+//! PLY files, `part` of JSON files; OBJ files have a group and glTF files a primitive of each part, named
+//! after it. STL files cannot hold it. [`mod@open_part`] cuts a part out as an open surface.
 //!
 //! Guaranteed: the same mesh and metadata give the same bytes; vertices stay distinct in single
 //! precision (see `single.rs`). Not checked: whether the mesh is a manifold; see
@@ -31,13 +37,18 @@ mod glb;
 mod gltf;
 mod json;
 mod obj;
+pub mod open_part;
 mod ply;
 pub mod read_json;
+pub mod seg_nrrd;
 mod single;
 mod stl;
+mod vtk;
 mod vtp;
 
 use serde_json::{Map, Value};
+
+pub use crate::mesh::part::Part;
 
 use crate::mesh::TriMesh;
 
@@ -62,19 +73,22 @@ pub enum Format {
     Obj,
     /// VTK XML PolyData.
     Vtp,
+    /// Legacy VTK PolyData, binary.
+    Vtk,
     /// Plain JSON: vertices, triangles, normals.
     Json,
 }
 
 impl Format {
     /// All formats.
-    pub const ALL: [Format; 7] = [
+    pub const ALL: [Format; 8] = [
         Format::Glb,
         Format::Gltf,
         Format::Stl,
         Format::Ply,
         Format::Obj,
         Format::Vtp,
+        Format::Vtk,
         Format::Json,
     ];
 
@@ -87,12 +101,13 @@ impl Format {
             Format::Ply => "ply",
             Format::Obj => "obj",
             Format::Vtp => "vtp",
+            Format::Vtk => "vtk",
             Format::Json => "json",
         }
     }
 
-    /// The media type. All are registered with IANA except those of PLY and VTP:
-    /// `application/x-ply` is customary, and `application/x-vtp` follows its pattern.
+    /// The media type. All are registered with IANA except those of PLY, VTP and VTK:
+    /// `application/x-ply` is customary, and the others follow its pattern.
     pub fn media_type(self) -> &'static str {
         match self {
             Format::Glb => "model/gltf-binary",
@@ -101,6 +116,7 @@ impl Format {
             Format::Ply => "application/x-ply",
             Format::Obj => "model/obj",
             Format::Vtp => "application/x-vtp",
+            Format::Vtk => "application/x-vtk",
             Format::Json => "application/json",
         }
     }
@@ -123,6 +139,7 @@ impl Format {
             }
             "model/ply" | "model/x-ply" | "application/ply" => Some(Format::Ply),
             "application/x-tgif" | "text/prs.wavefront-obj" => Some(Format::Obj),
+            "model/vtk" | "model/x-vtk" | "application/vtk" => Some(Format::Vtk),
             "model/vtp" | "model/x-vtp" | "application/vtp" => Some(Format::Vtp),
             _ => None,
         };
@@ -146,19 +163,26 @@ pub struct Metadata {
     /// Standard deviation of each vertex's distance from the true surface, mm; empty if it is not known.
     /// STL and OBJ files cannot hold it.
     pub uncertainty: Vec<f64>,
-    /// A figure of every vertex that GLB and glTF files show as colours, VTP and JSON files hold as an array.
+    /// A figure of every vertex that GLB and glTF files show as colours, other formats hold as an array.
     pub field: Option<VertexField>,
+    /// The part of the wall that each triangle is of; empty if it is not known.
+    pub parts: Vec<Part>,
 }
 
 /// A figure of every vertex and the colour that shows it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct VertexField {
-    /// Its name in VTP and JSON files: `Uptake` (per cent), `Distance` (mm).
+    /// Its name in VTP, VTK and JSON files: `Uptake` (per cent), `Distance` (mm).
     pub name: &'static str,
     /// Its values; NaN where it is not known.
     pub values: Vec<f64>,
     /// Red, green and blue of each vertex, sRGB, 0..=1.
     pub colours: Vec<[f64; 3]>,
+}
+
+impl VertexField {
+    /// All names that a field may have.
+    pub const NAMES: [&'static str; 2] = ["Uptake", "Distance"];
 }
 
 impl Metadata {
@@ -213,6 +237,12 @@ impl Metadata {
         self.field.as_ref().filter(|_| count > 0).filter(suits)
     }
 
+    /// The part of each triangle of `mesh`, if it is known.
+    fn parts_of(&self, mesh: &TriMesh) -> Option<&[Part]> {
+        (!mesh.triangles.is_empty() && self.parts.len() == mesh.triangles.len())
+            .then_some(&self.parts)
+    }
+
     /// The metadata as comment lines, in ASCII without control characters.
     fn comments(&self) -> Vec<String> {
         let mut lines = vec![format!("SPACE={FRAME} UNIT={UNIT}")];
@@ -260,7 +290,7 @@ pub enum ExportError {
     },
     /// The vertex coincides with others in single precision, even if moved slightly.
     #[error(
-        "vertex {vertex} coincides with others in single precision; PLY, OBJ, VTP and JSON have double precision"
+        "vertex {vertex} coincides with others in single precision; PLY, OBJ, VTP, VTK and JSON have double precision"
     )]
     Inseparable {
         /// Index of the vertex.
@@ -287,6 +317,7 @@ pub fn encode(format: Format, mesh: &TriMesh, metadata: &Metadata) -> Result<Vec
         Format::Ply => ply::encode(mesh, metadata),
         Format::Obj => Ok(obj::encode(mesh, metadata)),
         Format::Vtp => Ok(vtp::encode(mesh, metadata)),
+        Format::Vtk => vtk::encode(mesh, metadata),
         Format::Json => Ok(json::encode(mesh, metadata)),
     }
 }

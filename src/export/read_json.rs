@@ -4,9 +4,12 @@
 //! vertices. Whether it is closed is not checked.
 
 use serde::Deserialize;
+use serde_json::{Map, Value};
 
+use super::{Metadata, VertexField};
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
+use crate::mesh::part::Part;
 
 /// Size of the largest file that is read, bytes: about 100 000 vertices with normals.
 const MAX_BYTES: usize = 32 << 20;
@@ -83,6 +86,54 @@ pub fn uncertainty(bytes: &[u8]) -> Vec<f64> {
     }
     serde_json::from_slice(bytes)
         .map_or_else(|_| Vec::new(), |read: ReadUncertainty| read.uncertainty_mm)
+}
+
+/// The mesh in `bytes` with what [`super::json`] wrote of it: title, origin, figures, and what is known of each
+/// vertex and triangle. `colours` gives the colours that show a field, by its name and values.
+///
+/// # Errors
+/// See [`ReadMeshError`].
+pub fn document(
+    bytes: &[u8],
+    colours: &dyn Fn(&str, &[f64]) -> Vec<[f64; 3]>,
+) -> Result<(TriMesh, Metadata), ReadMeshError> {
+    #[derive(Default, Deserialize)]
+    #[serde(default)]
+    struct Written {
+        title: String,
+        volume: Option<String>,
+        frame_of_reference_uid: Option<String>,
+        software: String,
+        quality: Map<String, Value>,
+        uncertainty_mm: Vec<f64>,
+        fields: Map<String, Value>,
+        part: Vec<u64>,
+    }
+    let mesh = decode(bytes)?;
+    let written: Written =
+        serde_json::from_slice(bytes).map_err(|e| ReadMeshError::Json(e.to_string()))?;
+    let field = written.fields.iter().find_map(|(name, values)| {
+        let name = VertexField::NAMES.into_iter().find(|known| known == name)?;
+        let values = values.as_array()?.iter();
+        let values: Vec<f64> = values.map(|x| x.as_f64().unwrap_or(f64::NAN)).collect();
+        Some(VertexField {
+            name,
+            colours: colours(name, &values),
+            values,
+        })
+    });
+    let parts: Option<Vec<Part>> = written.part.iter().map(|n| Part::numbered(*n)).collect();
+    let metadata = Metadata {
+        title: written.title,
+        volume_id: written.volume,
+        frame_of_reference_uid: written.frame_of_reference_uid,
+        software: written.software,
+        quality: written.quality,
+        uncertainty: written.uncertainty_mm,
+        field,
+        parts: parts.unwrap_or_default(),
+    };
+    Ok((mesh, metadata))
 }
 
 fn demand(

@@ -9,6 +9,7 @@ use base64::engine::general_purpose::STANDARD;
 use super::{FRAME, Metadata, UNIT};
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
+use crate::mesh::part::Part;
 
 /// A VTP file.
 pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Vec<u8> {
@@ -25,7 +26,7 @@ pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Vec<u8> {
 <PointData Normals="Normals">
 <DataArray type="Float64" Name="Normals" NumberOfComponents="3" format="binary">{normals}</DataArray>
 {uncertainty}{field}</PointData>
-<CellData></CellData>
+<CellData>{parts}</CellData>
 <Points>
 <DataArray type="Float64" Name="Points" NumberOfComponents="3" format="binary">{positions}</DataArray>
 </Points>
@@ -37,7 +38,7 @@ pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Vec<u8> {
 </PolyData>
 </VTKFile>
 "#,
-        fields = fields(metadata),
+        fields = fields(mesh, metadata),
         points = mesh.vertices.len(),
         normals = vectors(&mesh.vertex_normals()),
         uncertainty = metadata
@@ -46,6 +47,13 @@ pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Vec<u8> {
         field = metadata
             .field_of(mesh)
             .map_or_else(String::new, |field| scalars(field.name, &field.values)),
+        parts = metadata.parts_of(mesh).map_or_else(String::new, |parts| {
+            let numbers = array(parts.iter().map(|part| part.number()).collect());
+            format!(
+                "\n<DataArray type=\"UInt8\" Name=\"Part\" NumberOfComponents=\"1\" \
+                 format=\"binary\">{numbers}</DataArray>\n"
+            )
+        }),
         positions = vectors(&mesh.vertices),
         connectivity = array(connectivity.flat_map(i64::to_le_bytes).collect()),
         offsets = array(offsets.flat_map(i64::to_le_bytes).collect()),
@@ -61,7 +69,7 @@ fn scalars(name: &str, values: &[f64]) -> String {
     )
 }
 
-fn fields(metadata: &Metadata) -> String {
+fn fields(mesh: &TriMesh, metadata: &Metadata) -> String {
     let mut fields = vec![
         ("SPACE".to_owned(), FRAME.to_owned()),
         ("UNIT".to_owned(), UNIT.to_owned()),
@@ -72,6 +80,10 @@ fn fields(metadata: &Metadata) -> String {
     if !metadata.quality.is_empty() {
         let quality = serde_json::Value::from(metadata.quality.clone());
         fields.push(("quality".to_owned(), quality.to_string()));
+    }
+    if metadata.parts_of(mesh).is_some() {
+        let names = Part::ALL.map(|part| format!("{} {}", part.number(), part.as_str()));
+        fields.push(("parts".to_owned(), names.join(", ")));
     }
     fields
         .iter()

@@ -106,6 +106,56 @@ impl VoxelToPatient {
         [0, 1, 2].map(|axis| self.linear.column(axis).norm())
     }
 
+    /// The greatest cosine of the angle between two axes: 0 where i, j and k are at right angles, as a
+    /// quaternion with spacings (NIfTI's qform) demands, 1 where two are parallel.
+    pub fn shear(&self) -> f64 {
+        let axes = [0, 1, 2].map(|axis| self.linear.column(axis).normalize());
+        let cosine = |a: usize, b: usize| axes[a].dot(&axes[b]).abs();
+        cosine(0, 1).max(cosine(0, 2)).max(cosine(1, 2))
+    }
+
+    /// A grid at right angles that covers the grid of `shape` on this map, and its shape: i keeps direction and
+    /// spacing, j and k lose the part along the axes before them (k becomes the normal of the slices,
+    /// and its spacing their distance). A voxel of it lies at the first voxel of this grid.
+    ///
+    /// `None` if it would have more than `most` voxels, as a strong shear over many slices makes it.
+    pub fn orthogonal_cover(
+        &self,
+        shape: [usize; 3],
+        most: usize,
+    ) -> Option<(VoxelToPatient, [usize; 3])> {
+        /// Share of a voxel by which rounding may exceed a whole number of voxels.
+        const SLACK: f64 = 1e-3;
+        let mut steps = [0, 1, 2].map(|axis| self.linear.column(axis).into_owned());
+        for axis in 1..3 {
+            for before in 0..axis {
+                let along = steps[before]
+                    * (steps[axis].dot(&steps[before]) / steps[before].norm_squared());
+                steps[axis] -= along;
+            }
+        }
+        let mut cover = Self::new(Matrix3::from_columns(&steps), self.origin).ok()?;
+        let (mut low, mut high) = ([0.0_f64; 3], [0.0_f64; 3]);
+        for corner in 0..8_usize {
+            let index = Vec3::from_fn(|axis, _| match (corner >> axis) & 1 {
+                0 => 0.0,
+                _ => shape[axis].saturating_sub(1) as f64,
+            });
+            let at = cover.to_voxel(&self.to_patient(&index));
+            for axis in 0..3 {
+                low[axis] = low[axis].min((at[axis] + SLACK).floor());
+                high[axis] = high[axis].max((at[axis] - SLACK).ceil());
+            }
+        }
+        let sizes = [0, 1, 2].map(|axis| high[axis] - low[axis] + 1.0);
+        // A product of whole numbers as f64: NaN and infinity fail as well.
+        if !(sizes.iter().product::<f64>() <= most as f64) {
+            return None;
+        }
+        cover.origin = cover.to_patient(&Vec3::from(low));
+        Some((cover, sizes.map(|size| size as usize)))
+    }
+
     /// The volume of one voxel, mm³.
     pub fn voxel_volume(&self) -> f64 {
         self.linear.determinant().abs()
@@ -141,5 +191,41 @@ mod tests {
         flat.set_column(2, &Vec3::new(1.0, 1.0, 0.0));
         assert!(VoxelToPatient::new(flat, Vec3::zeros()).is_err());
         assert!(VoxelToPatient::new(Matrix3::identity() * f64::NAN, Vec3::zeros()).is_err());
+    }
+
+    #[test]
+    fn the_orthogonal_cover_has_right_angles_and_every_voxel_of_the_grid() {
+        let shape = [7, 5, 6];
+        for (row, column, tilt) in [(0, 1, 0.4), (0, 2, -0.9), (1, 2, 0.6), (2, 0, 0.3)] {
+            for flip in [1.0, -1.0] {
+                let turn = nalgebra::Rotation3::from_euler_angles(0.3, -0.2, 1.1);
+                let mut linear = Matrix3::from_diagonal(&Vec3::new(2.0, 3.0, 4.0 * flip));
+                linear[(row, column)] += tilt * 4.0;
+                let map = VoxelToPatient::new(turn * linear, Vec3::new(5.0, -7.0, 90.0)).unwrap();
+                assert!(map.shear() > 0.1);
+                let (cover, size) = map.orthogonal_cover(shape, 10_000).unwrap();
+                assert!(cover.shear() < 1e-12);
+                assert_eq!(cover.is_left_handed(), map.is_left_handed());
+                for corner in 0..8_usize {
+                    let index =
+                        Vec3::from_fn(|axis, _| ((corner >> axis & 1) * (shape[axis] - 1)) as f64);
+                    let at = cover.to_voxel(&map.to_patient(&index));
+                    for axis in 0..3 {
+                        let last = (size[axis] - 1) as f64;
+                        assert!((-0.01..=last + 0.01).contains(&at[axis]), "{at:?} {size:?}");
+                    }
+                }
+                // The first voxel of the grid is the centre of one of the cover.
+                let at = cover.to_voxel(&map.to_patient(&Vec3::zeros()));
+                assert!((at - at.map(f64::round)).norm() < 1e-9);
+                assert!(map.orthogonal_cover(shape, 200).is_none());
+            }
+        }
+        let square = VoxelToPatient::centred(shape, [2.0, 3.0, 4.0], Vec3::zeros()).unwrap();
+        assert_eq!(square.shear(), 0.0);
+        assert_eq!(
+            square.orthogonal_cover(shape, 210),
+            Some((square.clone(), shape))
+        );
     }
 }

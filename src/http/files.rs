@@ -76,6 +76,11 @@ pub async fn send_page(product: &Product, page: String, headers: &HeaderMap) -> 
     send_made(product, file, OBJECT_CACHE_CONTROL, false, headers).await
 }
 
+/// Answers with a file that is made of a product's files in the same way.
+pub async fn send_derived(product: &Product, file: OutputFile, headers: &HeaderMap) -> Answer {
+    send_made(product, file, PAGE_CACHE_CONTROL, false, headers).await
+}
+
 /// Answers with a DICOM object of a product in the same way.
 pub async fn send_object(product: &Product, object: OutputFile, headers: &HeaderMap) -> Answer {
     send_made(product, object, OBJECT_CACHE_CONTROL, true, headers).await

@@ -13,7 +13,7 @@ use super::memory::charge;
 use super::negotiate;
 use super::openapi::{
     ConditionalHeaders, DeidentifyParameter, DicomProblems, Documented, DownloadAnswers,
-    LookupProblems, MeshAnswer, ReportAnswer,
+    LookupProblems, MeshAnswer, PartParameter, ReportAnswer,
 };
 use super::problem::not_found::{missing, no_such_file};
 use super::problem::{Answer, Problem};
@@ -21,13 +21,13 @@ use super::request::{PathSegments, flag, query_pairs, refuse_unknown};
 use super::scans::{self, ScanUidsBody};
 use super::wire::path_of;
 use crate::access::Scope;
-use crate::export::Format;
 use crate::export::dicom::DicomObject;
+use crate::export::{Format, Part};
 use crate::jobs::{
     Catalogue, Held, ItemFilter, ListPage, ListRequest, Product, Resource, StoreError, Tenant,
 };
 use crate::progress::Monitor;
-use crate::work::{UploadFacts, dicom};
+use crate::work::{UploadFacts, dicom, part};
 use axum::extract::{RawQuery, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::routing::get;
@@ -137,6 +137,7 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
         format!("Download a {noun}'s mesh"),
     )
     .description("In the format that `Accept` asks for; GLB if it allows any.")
+    .parameters::<PartParameter>()
     .parameters::<ConditionalHeaders>()
     .answers::<MeshAnswer>();
     let mut file = download(
@@ -150,6 +151,9 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
         .segment("file", "The file's name".into(), names)
         .parameters::<ConditionalHeaders>()
         .answers::<P::FileAnswer>();
+    if !P::MESHES.is_empty() {
+        file = file.parameters::<PartParameter>();
+    }
     if !dicom::objects(P::RESOURCE).is_empty() {
         file = file
             .parameters::<DeidentifyParameter>()
@@ -431,8 +435,84 @@ async fn get_mesh<P: ProductCollection>(
     query: RawQuery,
     headers: HeaderMap,
 ) -> Answer {
-    get_offered::<P>(state, caller, id, query, headers, &Offer::meshes()).await
+    let PathSegments(id_text) = &id;
+    let pairs = query_pairs(query.0.as_deref());
+    let Some(part) = wanted_part(&pairs)? else {
+        return get_offered::<P>(state, caller, id, query, headers, &Offer::meshes()).await;
+    };
+    refuse_unknown(&pairs, &[PART])?;
+    let State(app) = &state;
+    let product = kept::<P>(app, &caller.tenant, id_text).await?;
+    let offers = Offer::meshes();
+    let offer = choose(&headers, &offers)?;
+    let mut response = send_part(app, &product, &offer.file, part, &headers).await?;
+    response
+        .headers_mut()
+        .insert(header::VARY, HeaderValue::from_static("accept"));
+    Ok(response)
 }
+
+/// The query parameter that asks for one part of a mesh.
+const PART: &str = "part";
+
+/// The part that a request asks for.
+fn wanted_part(pairs: &[(String, String)]) -> Answer<Option<Part>> {
+    let Some((_, name)) = pairs.iter().find(|(name, _)| name == PART) else {
+        return Ok(None);
+    };
+    let part = Part::named(name).ok_or_else(|| {
+        let names = Part::ALL.map(Part::as_str).join(", ");
+        Problem::bad_request(
+            "invalid-parameter",
+            "`part` names no part of a ventricle's wall.",
+        )
+        .at(PART)
+        .fix(format!(
+            "Give one of {names}, or leave it out for the closed mesh."
+        ))
+    });
+    part.map(Some)
+}
+
+/// Answers with one part of the mesh `name` of `product`, cut out of it now.
+async fn send_part(
+    app: &App,
+    product: &Product,
+    name: &str,
+    part: Part,
+    headers: &HeaderMap,
+) -> Answer {
+    let (stem, extension) = name.rsplit_once('.').unwrap_or((name, ""));
+    let stem = stem.to_owned();
+    let source = format!("{stem}.json");
+    let format = Format::from_extension(extension);
+    let (Some(format), Some(size)) = (format, product.file(&source).map(|file| file.bytes)) else {
+        let names: Vec<_> = product.files.iter().map(|file| file.name.clone()).collect();
+        return Err(no_such_file(product.resource(), name, &names));
+    };
+    let stored = app
+        .queue
+        .with_files(product.clone(), &[source.as_str()])
+        .await?;
+    let memory = LITTLE_MEMORY + MEMORY_PER_MESH_BYTE * size;
+    let make = move |_: &Monitor<'_>| part::part_file(&stored, &stem, part, format);
+    match app.decoding.run(memory, make).await?? {
+        Some(file) => files::send_derived(product, file, headers).await,
+        None => Err(Problem::new(
+            StatusCode::NOT_FOUND,
+            "not-found",
+            format!("The triangles of this mesh do not say which are {}.", part.as_str()),
+        )
+        .at(PART)
+        .fix(
+            "Leave out `part`. Meshes of left ventricles have parts; those of older versions get them when the same \
+             job is started again.",
+        )),
+    }
+}
+
+/// Memory for a byte of a JSON mesh: numbers as text, parsed, and as a file.
+const MEMORY_PER_MESH_BYTE: u64 = 16;
 
 async fn get_report<P: ProductCollection>(
     state: State<App>,
@@ -472,8 +552,10 @@ async fn get_file<P: ProductCollection>(
 ) -> Answer {
     let pairs = query_pairs(query.as_deref());
     let object = dicom::object_named(P::RESOURCE, &name);
+    let mesh = mesh_names::<P>().any(|mesh| mesh == name);
     let known: &[&str] = match object.is_some() || name == files::PAGE {
         true => &["deidentify"],
+        false if mesh => &[PART],
         false => &[],
     };
     refuse_unknown(&pairs, known)?;
@@ -482,6 +564,9 @@ async fn get_file<P: ProductCollection>(
         return Err(no_such_file(P::RESOURCE, &name, &names));
     }
     let product = kept::<P>(&app, &caller.tenant, &id).await?;
+    if let Some(part) = wanted_part(&pairs)?.filter(|_| mesh) {
+        return send_part(&app, &product, &name, part, &headers).await;
+    }
     let deidentify = match pairs.first() {
         Some((_, value)) => flag("deidentify", value)?,
         None => false,
@@ -629,12 +714,17 @@ async fn send_named(
     }
 }
 
-/// All names of files that a product of that kind may have.
-fn file_names<P: ProductCollection>() -> Vec<String> {
-    let meshes = P::MESHES.iter().flat_map(|name| {
+/// The names of the meshes that a product of that kind may have, in every format.
+fn mesh_names<P: ProductCollection>() -> impl Iterator<Item = String> {
+    P::MESHES.iter().flat_map(|name| {
         let named = |format: Format| format!("{name}.{}", format.extension());
         Format::ALL.map(named)
-    });
+    })
+}
+
+/// All names of files that a product of that kind may have.
+fn file_names<P: ProductCollection>() -> Vec<String> {
+    let meshes = mesh_names::<P>();
     let others = P::FILES.iter().map(|name| (*name).to_owned());
     let objects = dicom::objects(P::RESOURCE).iter();
     let objects = objects.map(|object| object.file_name().to_owned());

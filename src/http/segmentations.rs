@@ -27,6 +27,8 @@ impl ProductCollection for Segmentations {
         MASK,
         "mask_anatomical.nii.gz",
         "mask_apparent.nii.gz",
+        "labels.nii.gz",
+        "labels.seg.nrrd",
         "report.json",
         files::PAGE,
         "slices.png",
@@ -36,7 +38,7 @@ impl ProductCollection for Segmentations {
         "polar.png",
     ];
     const FILE_SCHEMA: &'static str = "SegmentationFileName";
-    const FILE_HELP: &'static str = "`mask.nii.gz`, the mesh in each format, `report.json`, \
+    const FILE_HELP: &'static str = "`mask.nii.gz`, `labels.nii.gz` and `labels.seg.nrrd` (wall 1, cavity 2, with names and colours; the second for 3D Slicer), the mesh in each format, `report.json`, \
         `report.html` (made on request; it names patient, study and series as far as the key may \
         see them), `slices.png` (three slices with the contour of the \
         fit) and `region.nii.gz` (the scan about the organ, in 256 steps); for a left ventricle also `polar.json`, `polar.svg` and `polar.png`, and mask and \

@@ -7,12 +7,14 @@
 //! - [`half_edges`]: neighbours, and edge flips;
 //! - [`topology`]: whether it is a closed manifold, with how many components and handles;
 //! - [`intersections`]: which of its triangles intersect, decided exactly;
+//! - [`part`]: the parts of a ventricle's wall;
 //! - [`shapes`]: meshes with known properties, for tests and examples.
 
 mod defect;
 pub mod half_edges;
 pub mod ids;
 pub mod intersections;
+pub mod part;
 pub mod shapes;
 pub mod topology;
 

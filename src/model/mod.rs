@@ -5,7 +5,7 @@
 //!   pairs across its wall ([`struts`]);
 //! - [`pose`]: how a template is placed in a patient as a whole;
 //! - [`wall`]: a ventricle's wall seen from its long axis: thickness, cavity, and the rays that
-//!   a polar map samples.
+//!   a polar map samples; [`fn@wall_parts`]: which of its triangles are endocardium, epicardium, base.
 //!
 //! Lengths are millimetres, positions LPS.
 
@@ -14,9 +14,11 @@ pub mod pose;
 pub mod struts;
 pub mod template;
 pub mod wall;
+mod wall_parts;
 
 pub use organ::Organ;
 pub use template::{Template, TemplateError};
+pub use wall_parts::wall_parts;
 
 use crate::mesh::TriMesh;
 

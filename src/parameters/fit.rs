@@ -29,6 +29,19 @@ pub struct FitParameters {
     pub deform: DeformParameters,
     /// Parameters of the polar map.
     pub polar: PolarParameters,
+    /// The grid on which masks and labels are written.
+    pub mask_grid: MaskGrid,
+}
+
+/// The grid on which masks and labels are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MaskGrid {
+    /// The scan's.
+    #[default]
+    Scan,
+    /// The scan's if its axes are at right angles, otherwise a grid at right angles that covers it
+    /// ([`VoxelToPatient::orthogonal_cover`](crate::geometry::frame::VoxelToPatient::orthogonal_cover)).
+    Orthogonal,
 }
 
 impl Default for FitParameters {
@@ -42,6 +55,7 @@ impl Default for FitParameters {
             place: KnownPlace::default(),
             deform: DeformParameters::default(),
             polar: PolarParameters::default(),
+            mask_grid: MaskGrid::default(),
         }
     }
 }

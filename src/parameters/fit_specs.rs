@@ -1,7 +1,7 @@
 //! The table of the parameters of a fit.
 
 use super::table::{choice, integer, number, optional};
-use super::{FitParameters, Kind, ParameterError, ParameterSpec, Parameters};
+use super::{FitParameters, Kind, MaskGrid, ParameterError, ParameterSpec, Parameters};
 use crate::deform::WallEdge;
 use crate::deform::sensors::SensorKind;
 use crate::geometry::Vec3;
@@ -258,6 +258,16 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
          has the volumes of both",
         "apparent" => WallEdge::Apparent,
         "anatomical" => WallEdge::Anatomical,
+    ),
+    choice!(
+        "mask_grid",
+        mask_grid,
+        "scan",
+        "Grid of the masks and labels that are written: scan (the scan's own) or orthogonal (of a scan whose \
+         axes are not at right angles, as of a tilted gantry, a grid at right angles that covers it; \
+         NIfTI's qform and ITK know no other)",
+        "scan" => MaskGrid::Scan,
+        "orthogonal" => MaskGrid::Orthogonal,
     ),
     optional!(
         Number f64,

@@ -15,7 +15,7 @@ mod model;
 mod specs;
 mod table;
 
-pub use fit::{FitParameters, KnownPlace};
+pub use fit::{FitParameters, KnownPlace, MaskGrid};
 pub use fit_specs::FIT_SPECS;
 pub use input::RawValue;
 pub use kind::Kind;

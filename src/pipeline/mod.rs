@@ -15,12 +15,14 @@ pub mod starts;
 
 use crate::export::{Metadata, VertexField};
 use crate::mesh::TriMesh;
+use crate::mesh::part::Part;
+use crate::model::{Organ, Template, TemplateError, wall_parts};
 use crate::optimise::{OptimiseError, Reference};
 use crate::parameters::{ModelParameters, Parameters};
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, Closeness, MeasuredSurface, ModelReport, ReportInput};
 use crate::retile::RetileError;
-use crate::surface::{self, SurfaceError};
+use crate::surface::{self, Isolate, SurfaceError};
 use crate::volume::dicom::Provenance;
 use crate::volume::{
     self, ReadLimits, ReadOptions, Reading, Volume, VolumeError, VolumeFacts, VolumeFile,
@@ -33,6 +35,8 @@ pub struct Model {
     pub mesh: TriMesh,
     /// The iso-surface that the model approximates, LPS millimetres.
     pub reference: TriMesh,
+    /// The part of the wall that each triangle of `mesh` is of; empty unless the model shows a left ventricle.
+    pub parts: Vec<Part>,
     /// Figures about the model and how it was made.
     pub report: ModelReport,
     /// DICOM Frame of Reference UID of the volume, if it lies in one.
@@ -45,6 +49,7 @@ impl Model {
         Metadata {
             frame_of_reference_uid: self.frame_of_reference_uid.clone(),
             quality: self.report.quality_summary(),
+            parts: self.parts.clone(),
             ..Metadata::new("Left ventricle")
         }
     }
@@ -229,12 +234,38 @@ fn from_volume(
         });
     }
     report.warnings.splice(0..0, facts.warnings.iter().cloned());
+    let mesh = made.optimised.mesh;
     Ok(Model {
-        mesh: made.optimised.mesh,
+        parts: parts(&mesh, parameters, facts, monitor)?,
+        mesh,
         reference: surface.mesh,
         report,
         frame_of_reference_uid: None,
     })
+}
+
+/// The parts of the wall of a left ventricle, which a model of a volume of intensities shows unless the caller
+/// chose another structure.
+fn parts(
+    mesh: &TriMesh,
+    parameters: &ModelParameters,
+    facts: &VolumeFacts,
+    monitor: &Monitor,
+) -> Result<Vec<Part>, Cancelled> {
+    if parameters.surface.isolate != Isolate::Auto || facts.intensity.labels.is_some() {
+        return Ok(Vec::new());
+    }
+    // The long axis is found in the model alone, as that of a template is. A model without one has no parts.
+    let cup = match Template::new(mesh.clone(), Organ::LeftVentricle, monitor) {
+        Ok(template) => template.cup,
+        Err(TemplateError::Cancelled(cancelled)) => return Err(cancelled),
+        Err(_) => None,
+    };
+    let parts = match &cup {
+        Some(cup) => wall_parts(mesh, cup, monitor)?,
+        None => None,
+    };
+    Ok(parts.unwrap_or_default())
 }
 
 /// Durations of the stages by the observer's clock.

@@ -2,26 +2,36 @@
 
 use super::cavity::cavity;
 use super::from_files::SegmentedVolume;
+use super::mask_place::MaskPlace;
 use super::region::region;
 use super::report::report_json;
 use crate::deform::WallEdge;
 use crate::export::dicom::{DicomError, DicomObject, DicomResults, Moment, SourceScan, Structure};
-use crate::export::{self, ExportError, Format, Metadata, VertexField};
+use crate::export::open_part::open_part;
+use crate::export::{self, ExportError, Format, Metadata, VertexField, seg_nrrd};
 use crate::grid::voxelise::Mask;
 use crate::mesh::TriMesh;
+use crate::mesh::part::Part;
+use crate::model::wall_parts;
 use crate::parameters::Parameters;
 use crate::polar;
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, SegmentationPage, SegmentationReport};
 use crate::volume::dicom::Provenance;
-use crate::volume::nifti::{self, MaskError, StoredType};
+use crate::volume::nifti::{self, LabelEntry, MaskError, StoredType};
 use crate::volume::{AffineSource, Reading};
 use serde_json::{Map, Value, json};
 
+/// The mask of the wall that was asked for.
+const MASK: &str = "mask.nii.gz";
 /// The mask of the anatomical wall, where `mask.nii.gz` shows the apparent one.
 const ANATOMICAL_MASK: &str = "mask_anatomical.nii.gz";
 /// The mask of the apparent wall, where `mask.nii.gz` shows the anatomical one.
 const APPARENT_MASK: &str = "mask_apparent.nii.gz";
+/// The wall as 1 and the cavity as 2.
+const LABELS: &str = "labels.nii.gz";
+/// The same for 3D Slicer.
+const SEGMENTS: &str = "labels.seg.nrrd";
 /// The scan about the organ, which the page shows.
 const REGION: &str = "region.nii.gz";
 
@@ -56,7 +66,7 @@ pub enum SegmentationFilesError {
 }
 
 impl SegmentedVolume {
-    /// The mask on the input's grid, the mesh in `formats`, the report, slices, the scan about the organ
+    /// Mask and labels on the input's grid, or at right angles if the parameters say so, the mesh in `formats`, the report, slices, the scan about the organ
     /// in 256 steps and, of a ventricle, the polar map. `volume_id` names the volume in the mesh files.
     ///
     /// # Errors
@@ -70,37 +80,30 @@ impl SegmentedVolume {
         monitor.report(Stage::Export, 0.0)?;
         let segmentation = &self.segmentation;
         let edge = self.parameters.deform.edge;
-        let mut files = vec![self.mask("mask.nii.gz", &segmentation.mask, monitor)?];
-        if let Some(mask) = &segmentation.other_mask {
+        let place = MaskPlace::of(&self.reading, self.parameters.mask_grid).ok_or_else(|| {
+            SegmentationFilesError::Other {
+                what: MASK,
+                reason: "a grid at right angles that covers so skewed a scan has too many voxels; \
+                         leave out mask_grid, or resample the scan first"
+                    .into(),
+            }
+        })?;
+        let mask = place.mask(&segmentation.mask, &segmentation.fit.mesh);
+        let mut files = vec![self.mask(MASK, &mask, &place, monitor)?];
+        if let (Some(mask), Some(surface)) = (
+            &segmentation.other_mask,
+            segmentation.fit.other_surface(edge),
+        ) {
             let name = match edge {
                 WallEdge::Apparent => ANATOMICAL_MASK,
                 WallEdge::Anatomical => APPARENT_MASK,
             };
-            files.push(self.mask(name, mask, monitor)?);
+            files.push(self.mask(name, &place.mask(mask, &surface.mesh), &place, monitor)?);
         }
+        files.extend(self.labels(&mask, &place, monitor)?);
         monitor.report(Stage::Export, 0.5)?;
-        let metadata = Metadata {
-            volume_id,
-            frame_of_reference_uid: self.reading.frame_of_reference().map(str::to_owned),
-            quality: self.summary(),
-            ..Metadata::new("Fitted model")
-        };
         let fit = &segmentation.fit;
-        let shown = fit.shown_uncertainty(edge).unwrap_or_default();
-        let mut meshes = vec![("mesh", &fit.mesh, shown)];
-        if let Some(other) = segmentation.fit.other_surface(edge) {
-            let name = match edge {
-                WallEdge::Apparent => "mesh_anatomical",
-                WallEdge::Anatomical => "mesh_apparent",
-            };
-            meshes.push((name, &other.mesh, &other.uncertainty));
-        }
-        for (name, mesh, uncertainty) in meshes {
-            let metadata = Metadata {
-                uncertainty: uncertainty.to_vec(),
-                field: self.uptake(mesh),
-                ..metadata.clone()
-            };
+        for (name, mesh, metadata) in self.meshes(volume_id, monitor)? {
             for format in formats {
                 monitor.check()?;
                 files.push(NamedFile {
@@ -129,6 +132,78 @@ impl SegmentedVolume {
         Ok(files)
     }
 
+    /// One part of the wall in `formats` as open surfaces, `mesh_endocardium.glb` ..., also of the wall
+    /// that is not shown; empty for other organs.
+    ///
+    /// # Errors
+    /// See [`SegmentationFilesError`].
+    pub fn part_files(
+        &self,
+        part: Part,
+        formats: &[Format],
+        monitor: &Monitor<'_>,
+    ) -> Result<Vec<NamedFile>, SegmentationFilesError> {
+        let mut files = Vec::new();
+        for (name, mesh, metadata) in self.meshes(None, monitor)? {
+            let Some((mesh, metadata)) = open_part(mesh, &metadata, part) else {
+                continue;
+            };
+            for format in formats {
+                files.push(NamedFile {
+                    name: format!("{name}_{}.{}", part.as_str(), format.extension()),
+                    media_type: format.media_type(),
+                    bytes: export::encode(*format, &mesh, &metadata)?,
+                });
+            }
+        }
+        Ok(files)
+    }
+
+    /// The meshes with their names and what is known of them: that of the wall that is shown, and of a ventricle
+    /// that of the other.
+    fn meshes<'a>(
+        &'a self,
+        volume_id: Option<String>,
+        monitor: &Monitor<'_>,
+    ) -> Result<Vec<(&'static str, &'a TriMesh, Metadata)>, Cancelled> {
+        let edge = self.parameters.deform.edge;
+        let fit = &self.segmentation.fit;
+        let metadata = Metadata {
+            volume_id,
+            frame_of_reference_uid: self.reading.frame_of_reference().map(str::to_owned),
+            quality: self.summary(),
+            ..Metadata::new("Fitted model")
+        };
+        let shown = fit.shown_uncertainty(edge).unwrap_or_default();
+        let mut meshes = vec![("mesh", &fit.mesh, shown)];
+        if let Some(other) = fit.other_surface(edge) {
+            let name = match edge {
+                WallEdge::Apparent => "mesh_anatomical",
+                WallEdge::Anatomical => "mesh_apparent",
+            };
+            meshes.push((name, &other.mesh, &other.uncertainty));
+        }
+        let described = |(name, mesh, uncertainty): (&'static str, &'a TriMesh, &[f64])| {
+            let metadata = Metadata {
+                parts: self.parts(mesh, monitor)?,
+                uncertainty: uncertainty.to_vec(),
+                field: self.uptake(mesh),
+                ..metadata.clone()
+            };
+            Ok((name, mesh, metadata))
+        };
+        meshes.into_iter().map(described).collect()
+    }
+
+    /// The part of the wall that each triangle of `mesh` is of; empty for other organs.
+    fn parts(&self, mesh: &TriMesh, monitor: &Monitor<'_>) -> Result<Vec<Part>, Cancelled> {
+        let parts = match &self.segmentation.fit.cup {
+            Some(cup) => wall_parts(mesh, cup, monitor)?,
+            None => None,
+        };
+        Ok(parts.unwrap_or_default())
+    }
+
     /// The uptake of the wall at every vertex of `mesh`; ventricles only.
     fn uptake(&self, mesh: &TriMesh) -> Option<VertexField> {
         let surfaces = self.segmentation.fit.surfaces.as_ref()?;
@@ -142,6 +217,14 @@ impl SegmentedVolume {
         })
     }
 
+    /// What is odd about the input, and about the place of masks of it.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = self.reading.facts.warnings.clone();
+        let frame = &self.reading.volume.frame;
+        warnings.extend(MaskPlace::warning(frame, self.parameters.mask_grid));
+        warnings
+    }
+
     /// The report, with the parameters used, the facts of the input and warnings.
     pub fn report(&self) -> Value {
         let mut report = report_json(&self.segmentation);
@@ -149,8 +232,7 @@ impl SegmentedVolume {
             let parameters = self.parameters.to_json();
             object.insert("parameters".into(), parameters.into());
             object.insert("input".into(), report::input(&self.reading.facts));
-            let warnings = self.reading.facts.warnings.clone();
-            object.insert("warnings".into(), warnings.into());
+            object.insert("warnings".into(), self.warnings().into());
         }
         report
     }
@@ -248,18 +330,47 @@ impl SegmentedVolume {
         &self,
         name: &'static str,
         mask: &Mask,
+        place: &MaskPlace<'_>,
         monitor: &Monitor<'_>,
     ) -> Result<NamedFile, SegmentationFilesError> {
-        let frame = &self.reading.volume.frame;
-        let bytes = nifti::write_mask(&mask.voxels, mask.shape, frame, monitor);
-        Ok(NamedFile {
-            name: name.into(),
-            media_type: "application/gzip",
-            bytes: bytes.map_err(|error| match error {
-                MaskError::Cancelled(cancelled) => cancelled.into(),
-                MaskError::TooLong(error) => other(name, &error),
-            })?,
-        })
+        let bytes = nifti::write_mask(
+            &mask.voxels,
+            mask.shape,
+            &place.frame,
+            place.stated,
+            monitor,
+        );
+        nifti_file(name, bytes)
+    }
+
+    /// The wall as 1 and, of a ventricle, the cavity as 2, for programs that read labels.
+    fn labels(
+        &self,
+        wall: &Mask,
+        place: &MaskPlace<'_>,
+        monitor: &Monitor<'_>,
+    ) -> Result<[NamedFile; 2], SegmentationFilesError> {
+        let report = report_json(&self.segmentation);
+        let mesh = &self.segmentation.fit.mesh;
+        let cavity = cavity(&report, mesh, (wall, &place.frame), monitor)?;
+        let mut labels: Vec<u8> = wall.voxels.iter().map(|inside| u8::from(*inside)).collect();
+        if let Some(cavity) = &cavity {
+            let inside = labels.iter_mut().zip(&cavity.voxels);
+            inside
+                .filter(|(_, inside)| **inside)
+                .for_each(|(label, _)| *label = 2);
+        }
+        let structure = Structure::of(self.parameters.organ.as_str());
+        let segments = structure.segments(cavity.is_some());
+        let entries: Vec<LabelEntry> = segments.iter().map(|segment| segment.entry).collect();
+        let grid = (place.shape, &place.frame);
+        let nifti = nifti::write_labels(&labels, &entries, grid, place.stated, monitor);
+        let nrrd = NamedFile {
+            name: SEGMENTS.into(),
+            media_type: seg_nrrd::MEDIA_TYPE,
+            bytes: seg_nrrd::encode(&labels, &segments, grid, monitor)?,
+        };
+        Ok([nifti_file(LABELS, nifti)?, nrrd])
     }
 
     fn polar(&self, monitor: &Monitor<'_>) -> Result<Vec<NamedFile>, SegmentationFilesError> {
@@ -279,6 +390,20 @@ impl SegmentedVolume {
         };
         Ok(vec![json_file("polar.json", &polar::json(map)), svg, png])
     }
+}
+
+fn nifti_file(
+    name: &'static str,
+    bytes: Result<Vec<u8>, MaskError>,
+) -> Result<NamedFile, SegmentationFilesError> {
+    Ok(NamedFile {
+        name: name.into(),
+        media_type: "application/gzip",
+        bytes: bytes.map_err(|error| match error {
+            MaskError::Cancelled(cancelled) => cancelled.into(),
+            MaskError::TooLong(error) => other(name, &error),
+        })?,
+    })
 }
 
 fn json_file(name: &str, value: &Value) -> NamedFile {

@@ -39,6 +39,7 @@ mod report;
 
 mod cavity;
 mod files;
+mod mask_place;
 mod region;
 
 mod error;

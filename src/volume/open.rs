@@ -8,6 +8,7 @@ use super::facts::{
     AffineSource, ByteOrder, FileFormat, IntensitySummary, LengthUnit, VolumeFacts,
 };
 use super::limits::ReadOptions;
+use super::nifti::grid::StatedGrid;
 use super::preview::MiddlePlanes;
 use super::summary::{Coherence, LabelCounts, Tally, judge, summarise};
 use super::{Volume, VolumeError};
@@ -24,6 +25,8 @@ pub struct Reading {
     pub facts: VolumeFacts,
     /// Whose scan it is; `None` unless the file is DICOM.
     pub provenance: Option<Provenance>,
+    /// The place of the grid as the file states it; `None` unless the file is NIfTI.
+    pub stated_grid: Option<StatedGrid>,
 }
 
 impl Reading {
@@ -42,6 +45,11 @@ pub(super) trait OpenVolume {
 
     /// Whose scan volume number `frame`, from 0, is; `None` where the format does not say.
     fn provenance(&self, _frame: usize) -> Option<Provenance> {
+        None
+    }
+
+    /// The place of the grid in the words of NIfTI; `None` for other formats.
+    fn stated_grid(&self) -> Option<StatedGrid> {
         None
     }
 
@@ -140,6 +148,7 @@ pub(super) fn read(
         volume,
         facts,
         provenance,
+        stated_grid: file.stated_grid(),
     })
 }
 

@@ -115,6 +115,12 @@ pub fn object(
     let item = &result.files;
     let mesh = mesh(item)?;
     let mask = match Resource::of(&item.id) {
+        // A mask that is stored on another grid than the scan's.
+        Some(Resource::Segmentation)
+            if item.parameters.get("mask_grid") == Some(&"orthogonal".into()) =>
+        {
+            voxelise(&mesh, facts.shape, &frame)
+        }
         Some(Resource::Segmentation) => stored_mask(item, limits)?,
         _ => voxelise(&mesh, facts.shape, &frame),
     };

@@ -19,6 +19,7 @@ mod files;
 mod model;
 mod page;
 mod parameters;
+pub mod part;
 pub mod problems;
 mod profile;
 mod segmentation;

@@ -4,7 +4,7 @@ use super::files::mesh_file;
 use super::problems::{Explain, unknown_organ, unsuitable_mesh};
 use crate::export::{Format, Metadata, read_json};
 use crate::jobs::{Failure, OutputFile, WorkOutput};
-use crate::model::{Organ, Template};
+use crate::model::{Organ, Template, wall_parts};
 use crate::progress::Monitor;
 use serde_json::json;
 
@@ -19,6 +19,15 @@ pub(super) fn make(mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure> {
     let template =
         Template::new(mesh, organ, &Monitor::silent()).map_err(|error| error.explain())?;
     let metadata = Metadata::new(format!("Template of a {}", organ.as_str()));
+    let parts = match &template.cup {
+        // A silent monitor is never cancelled.
+        Some(cup) => wall_parts(&template.mesh, cup, &Monitor::silent()).unwrap_or_default(),
+        None => None,
+    };
+    let metadata = Metadata {
+        parts: parts.unwrap_or_default(),
+        ..metadata
+    };
     let files: Vec<OutputFile> = Format::ALL
         .into_iter()
         .map(|format| mesh_file(format, &template.mesh, &metadata))

@@ -357,3 +357,81 @@ async fn a_scan_that_cannot_be_segmented_is_reported_with_the_reason() {
     assert!(dice > 0.9, "{dice}");
     assert!(fitted["polar"].is_null());
 }
+
+/// A fit's labels and the parts of its wall, as clients fetch them.
+#[tokio::test]
+async fn a_fit_has_labels_and_parts_of_its_wall() {
+    let data = tempfile::tempdir().unwrap();
+    let service = Service::start(data.path(), &[]).await;
+    let answer = service
+        .post("/v1/segmentations?model=auto")
+        .header("prefer", "wait=60")
+        .header("accept", "application/json")
+        .body(scan())
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(answer.status(), 200);
+    let fit = answer.headers()["location"].to_str().unwrap().to_owned();
+    let get = async |path: &str| {
+        let answer = service.get(&format!("{fit}/{path}")).send().await.unwrap();
+        assert_eq!(answer.status(), 200, "{path}");
+        let media_type = answer.headers()["content-type"]
+            .to_str()
+            .unwrap()
+            .to_owned();
+        (media_type, answer.bytes().await.unwrap().to_vec())
+    };
+    let voxels = |bytes: Vec<u8>| {
+        let files = [ventriform::VolumeFile::in_memory("labels", bytes)];
+        let (options, limits) = Default::default();
+        let quiet = ventriform::Monitor::silent();
+        let reading = ventriform::volume::read(&files, &options, &limits, &quiet).unwrap();
+        reading.volume.voxels
+    };
+    let (_, mask) = get("mask.nii.gz").await;
+    let (_, labels) = get("labels.nii.gz").await;
+    let (mask, labels) = (voxels(mask), voxels(labels));
+    assert_eq!(mask.len(), labels.len());
+    for (wall, label) in mask.iter().zip(&labels) {
+        assert_eq!(*wall == 1.0, *label == 1.0);
+        assert!([0.0, 1.0, 2.0].contains(label));
+    }
+    assert!(labels.contains(&2.0));
+    let (media_type, segments) = get("labels.seg.nrrd").await;
+    assert_eq!(media_type, "application/x-nrrd");
+    assert!(segments.starts_with(b"NRRD0004\n"));
+
+    let mesh: Value = serde_json::from_slice(&get("mesh.json").await.1).unwrap();
+    let triangles = |mesh: &Value| mesh["triangles"].as_array().unwrap().len();
+    let mut sum = 0;
+    for (number, part) in [(1, "endocardium"), (2, "epicardium"), (3, "base")] {
+        let (_, open) = get(&format!("mesh.json?part={part}")).await;
+        let open: Value = serde_json::from_slice(&open).unwrap();
+        let stated = mesh["part"].as_array().unwrap().iter();
+        assert_eq!(triangles(&open), stated.filter(|n| **n == number).count());
+        sum += triangles(&open);
+        for name in ["uncertainty_mm", "vertices"] {
+            let count = open[name].as_array().unwrap().len();
+            assert_eq!(count, open["normals"].as_array().unwrap().len(), "{name}");
+        }
+        let (media_type, vtk) = get(&format!("mesh_anatomical.vtk?part={part}")).await;
+        assert_eq!(media_type, "application/x-vtk");
+        assert!(vtk.starts_with(b"# vtk DataFile Version 3.0\n"));
+        // The format by Accept is the same file.
+        let chosen = service.get(&format!("{fit}/mesh?part={part}"));
+        let chosen = chosen
+            .header("accept", "application/x-ply")
+            .send()
+            .await
+            .unwrap();
+        assert_eq!(chosen.headers()["vary"], "accept");
+        let named = get(&format!("mesh.ply?part={part}")).await.1;
+        assert_eq!(chosen.bytes().await.unwrap(), named);
+    }
+    assert_eq!(sum, triangles(&mesh));
+    let wrong = service.get(&format!("{fit}/mesh.ply?part=septum"));
+    problem(wrong.send().await.unwrap(), 400, "invalid-parameter").await;
+    let other = service.get(&format!("{fit}/report.json?part=base"));
+    problem(other.send().await.unwrap(), 400, "unknown-parameter").await;
+}

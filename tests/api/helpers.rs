@@ -490,6 +490,7 @@ pub fn sphere() -> WorkOutput {
         "mesh.ply",
         "mesh.obj",
         "mesh.vtp",
+        "mesh.vtk",
         "mesh.json",
     ];
     let mut files: Vec<OutputFile> = names

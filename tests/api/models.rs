@@ -49,6 +49,7 @@ async fn the_mesh_format_is_chosen_by_accept_or_by_extension() {
         ("ply", "application/x-ply", b"ply"),
         ("obj", "model/obj", b"#"),
         ("vtp", "application/x-vtp", b"<"),
+        ("vtk", "application/x-vtk", b"# vtk DataFile Version 3.0\n"),
         ("json", "application/json", b"{"),
     ] {
         let by_name = app
@@ -296,4 +297,20 @@ async fn a_wait_that_times_out_is_answered_with_the_job() {
     let answer = answer.send().await.unwrap();
     assert_eq!(answer.status(), StatusCode::ACCEPTED);
     assert!(answer.headers().contains_key("retry-after"));
+}
+
+#[tokio::test]
+async fn a_mesh_that_is_no_wall_has_no_parts() {
+    let app = TestApp::start().await;
+    let model = app.model("sphere").await;
+    let base = text(&model["links"]["self"]);
+    for path in ["mesh?part=base", "mesh.vtk?part=endocardium"] {
+        let answer = app.get(&format!("{base}/{path}")).send().await.unwrap();
+        let body = problem(answer, 404, "not-found").await;
+        assert_eq!(body["field"], "part");
+    }
+    let wrong = app.get(&format!("{base}/mesh?part=wall"));
+    problem(wrong.send().await.unwrap(), 400, "invalid-parameter").await;
+    let twice = app.get(&format!("{base}/mesh?part=base&part=base"));
+    problem(twice.send().await.unwrap(), 400, "repeated-parameter").await;
 }

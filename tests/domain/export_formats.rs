@@ -10,7 +10,8 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde_json::{Value, json};
-use ventriform::export::{ExportError, Format, Metadata, VertexField, encode};
+use ventriform::export::open_part::open_part;
+use ventriform::export::{ExportError, Format, Metadata, Part, VertexField, encode, read_json};
 use ventriform::geometry::Vec3;
 use ventriform::mesh::{TriMesh, shapes};
 
@@ -37,9 +38,19 @@ fn bytes(format: Format) -> Vec<u8> {
     encode(format, &cup(), &metadata()).unwrap()
 }
 
-/// The same mesh with a figure of each vertex, which is not known of the first.
+/// The same mesh with a figure of each vertex, which is not known of the first, and with its parts.
 fn painted(format: Format) -> Vec<u8> {
     let mesh = cup();
+    encode(format, &mesh, &painted_metadata(&mesh)).unwrap()
+}
+
+/// The parts in an order that no format may assume.
+fn parts(mesh: &TriMesh) -> Vec<Part> {
+    let part = |n: usize| Part::ALL[(n / 3 + n % 2) % 3];
+    (0..mesh.triangles.len()).map(part).collect()
+}
+
+fn painted_metadata(mesh: &TriMesh) -> Metadata {
     let shares = (0..mesh.vertices.len()).map(|n| n as f64 / mesh.vertices.len() as f64);
     let field = VertexField {
         name: "Uptake",
@@ -49,11 +60,11 @@ fn painted(format: Format) -> Vec<u8> {
             .collect(),
         colours: shares.map(|x| [x, 0.5, 1.0 - x]).collect(),
     };
-    let metadata = Metadata {
+    Metadata {
         field: Some(field),
+        parts: parts(mesh),
         ..metadata()
-    };
-    encode(format, &mesh, &metadata).unwrap()
+    }
 }
 
 fn floats(bytes: &[u8]) -> Vec<f32> {
@@ -109,6 +120,10 @@ fn all_formats_are_written_for_the_other_readers() {
         assert_eq!(bytes(format), bytes(format), "{format:?} varies");
         let path = folder.join(format!("painted.{}", format.extension()));
         std::fs::write(path, painted(format)).unwrap();
+        let mesh = cup();
+        let (open, about) = open_part(&mesh, &painted_metadata(&mesh), Part::Epicardium).unwrap();
+        let path = folder.join(format!("open.{}", format.extension()));
+        std::fs::write(path, encode(format, &open, &about).unwrap()).unwrap();
     }
 }
 
@@ -449,4 +464,209 @@ fn a_figure_of_each_vertex_is_a_colour_in_glb_and_an_array_in_vtp() {
     for format in [Format::Stl, Format::Ply, Format::Obj] {
         assert_eq!(painted(format), bytes(format), "{format:?}");
     }
+}
+
+/// The triangles of each part, in their order.
+fn of_part(mesh: &TriMesh, part: Part) -> Vec<[u32; 3]> {
+    let both = mesh.triangles.iter().zip(parts(mesh));
+    both.filter(|(_, of)| *of == part)
+        .map(|(t, _)| *t)
+        .collect()
+}
+
+#[test]
+fn every_format_that_can_says_which_part_each_triangle_is_of() {
+    let mesh = cup();
+    let numbers: Vec<u8> = parts(&mesh).iter().map(|part| part.number()).collect();
+    let tagged = |format| {
+        let metadata = Metadata {
+            parts: parts(&mesh),
+            ..metadata()
+        };
+        encode(format, &mesh, &metadata).unwrap()
+    };
+
+    let glb = tagged(Format::Glb);
+    let (document, buffer) = chunks(&glb);
+    let (untagged, _) = chunks(&bytes(Format::Glb));
+    assert_eq!(
+        document["accessors"][0], untagged["accessors"][0],
+        "vertices"
+    );
+    let primitives = document["meshes"][0]["primitives"].as_array().unwrap();
+    assert_eq!(primitives.len(), 3);
+    for (primitive, part) in primitives.iter().zip(Part::ALL) {
+        assert_eq!(primitive["extras"]["part"], part.as_str());
+        assert_eq!(primitive["attributes"]["POSITION"], 0);
+        let material = primitive["material"].as_u64().unwrap() as usize;
+        assert_eq!(document["materials"][material]["name"], part.as_str());
+        let accessor = &document["accessors"][primitive["indices"].as_u64().unwrap() as usize];
+        let number = |value: &Value| value.as_u64().unwrap() as usize;
+        let view = &document["bufferViews"][number(&accessor["bufferView"])];
+        let start = number(&view["byteOffset"]) + number(&accessor["byteOffset"]);
+        let indices: Vec<u32> = buffer[start..start + 2 * number(&accessor["count"])]
+            .chunks_exact(2)
+            .map(|w| u32::from(u16::from_le_bytes([w[0], w[1]])))
+            .collect();
+        assert_eq!(indices.as_chunks::<3>().0, of_part(&mesh, part));
+    }
+
+    let ply = tagged(Format::Ply);
+    let faces = ply[ply.len() - 14 * mesh.triangles.len()..].chunks_exact(14);
+    let read: Vec<u8> = faces.map(|face| face[13]).collect();
+    assert_eq!(read, numbers);
+    assert!(
+        String::from_utf8_lossy(&ply)
+            .contains("property list uchar int vertex_indices\nproperty uchar part\n")
+    );
+
+    let obj = String::from_utf8(tagged(Format::Obj)).unwrap();
+    for part in Part::ALL {
+        let group = obj.split(&format!("g {}\n", part.as_str())).nth(1).unwrap();
+        let faces = group.lines().take_while(|line| line.starts_with("f "));
+        let faces: Vec<[u32; 3]> = faces
+            .map(|line| {
+                let corner = |n: usize| line.split(' ').nth(n).unwrap().split("//").next().unwrap();
+                [1, 2, 3].map(|n| corner(n).parse::<u32>().unwrap() - 1)
+            })
+            .collect();
+        assert_eq!(faces, of_part(&mesh, part));
+    }
+
+    let vtp = String::from_utf8(tagged(Format::Vtp)).unwrap();
+    let cells = vtp.split("<CellData>").nth(1).unwrap();
+    let array = cells.split("Name=\"Part\"").nth(1).unwrap();
+    let array = array.split(['>', '<']).nth(1).unwrap();
+    assert_eq!(decode_base64(array)[8..], numbers);
+
+    let json: Value = serde_json::from_slice(&tagged(Format::Json)).unwrap();
+    assert_eq!(json["part"], json!(numbers));
+    // With the parts of another mesh, files are as they were.
+    for format in Format::ALL {
+        let metadata = Metadata {
+            parts: parts(&mesh)[1..].to_vec(),
+            ..metadata()
+        };
+        assert_eq!(encode(format, &mesh, &metadata).unwrap(), bytes(format));
+    }
+}
+
+#[test]
+fn legacy_vtk_has_the_same_mesh_and_figures() {
+    let mesh = cup();
+    let vtk = painted(Format::Vtk);
+    let after = |mark: &str| {
+        let found = vtk.windows(mark.len()).position(|w| w == mark.as_bytes());
+        let start = found.unwrap_or_else(|| panic!("{mark}")) + mark.len();
+        &vtk[start..]
+    };
+    let doubles = |bytes: &[u8], count: usize| -> Vec<f64> {
+        let words = bytes[..8 * count].chunks_exact(8);
+        words
+            .map(|w| f64::from_be_bytes(w.try_into().unwrap()))
+            .collect()
+    };
+    let (points, triangles) = (mesh.vertices.len(), mesh.triangles.len());
+    let lines: Vec<&[u8]> = vtk.splitn(4, |byte| *byte == b'\n').collect();
+    assert_eq!(lines[0], b"# vtk DataFile Version 3.0");
+    assert!(lines[1].starts_with(b"SPACE=LPS UNIT=mm") && lines[1].len() < 256);
+    assert_eq!(lines[2], b"BINARY");
+    let positions = after(&format!("POINTS {points} double\n"));
+    assert_eq!(doubles(positions, 3 * points), flat(&mesh.vertices));
+    let polygons = after(&format!("POLYGONS {triangles} {}\n", 4 * triangles));
+    let words: Vec<u32> = polygons[..16 * triangles]
+        .chunks_exact(4)
+        .map(|w| u32::from_be_bytes(w.try_into().unwrap()))
+        .collect();
+    let rows: Vec<u32> = (mesh.triangles.iter())
+        .flat_map(|&[a, b, c]| [3, a, b, c])
+        .collect();
+    assert_eq!(words, rows);
+    let numbers: Vec<u8> = parts(&mesh).iter().map(|part| part.number()).collect();
+    let head =
+        format!("CELL_DATA {triangles}\nFIELD FieldData 1\nPart 1 {triangles} unsigned_char\n");
+    assert_eq!(after(&head)[..triangles], numbers);
+    let normals = after("NORMALS Normals double\n");
+    assert_eq!(doubles(normals, 3 * points), flat(&mesh.vertex_normals()));
+    let uptake = doubles(
+        after(&format!("FIELD FieldData 1\nUptake 1 {points} double\n")),
+        points,
+    );
+    assert!(uptake[0].is_nan());
+    assert_eq!(uptake[1], 100.0 * (1.0 / points as f64));
+}
+
+#[test]
+fn ply_has_the_figure_of_each_vertex_and_its_colour() {
+    let ply = painted(Format::Ply);
+    let end = b"\nend_header\n";
+    let at = ply.windows(end.len()).position(|w| w == end).unwrap() + end.len();
+    let header = String::from_utf8_lossy(&ply[..at]).into_owned();
+    assert!(
+        header.contains("property double uptake\nproperty uchar red\n"),
+        "{header}"
+    );
+    let count = cup().vertices.len();
+    for (n, row) in ply[at..at + 59 * count].chunks_exact(59).enumerate() {
+        let share = n as f64 / count as f64;
+        let value = doubles(&row[48..56])[0];
+        assert!(if n == 0 {
+            value.is_nan()
+        } else {
+            value == 100.0 * share
+        });
+        let blue = (255.0 * (1.0 - share)).round() as u8;
+        assert_eq!(row[56..], [(255.0 * share).round() as u8, 128, blue]);
+    }
+}
+
+#[test]
+fn open_parts_are_the_triangles_and_figures_of_the_whole() {
+    let mesh = cup();
+    let about = Metadata {
+        uncertainty: (0..mesh.vertices.len()).map(|n| n as f64).collect(),
+        ..painted_metadata(&mesh)
+    };
+    // A mesh that was written and read again is cut in the same way.
+    let bytes = encode(Format::Json, &mesh, &about).unwrap();
+    let colours = |name: &str, values: &[f64]| {
+        assert_eq!((name, values.len()), ("Uptake", mesh.vertices.len()));
+        about.field.as_ref().unwrap().colours.clone()
+    };
+    let (read, about_read) = read_json::document(&bytes, &colours).unwrap();
+    let mut area = 0.0;
+    for part in Part::ALL {
+        let (open, of_open) = open_part(&mesh, &about, part).unwrap();
+        area += open.area();
+        let corners = |mesh: &TriMesh, triangles: &[[u32; 3]]| -> Vec<[Vec3; 3]> {
+            let at = |v: u32| mesh.vertices[v as usize];
+            triangles.iter().map(|t| t.map(at)).collect()
+        };
+        assert_eq!(
+            corners(&open, &open.triangles),
+            corners(&mesh, &of_part(&mesh, part))
+        );
+        let used: BTreeSet<u32> = open.triangles.iter().flatten().copied().collect();
+        assert_eq!(
+            used.len(),
+            open.vertices.len(),
+            "no vertex without triangles"
+        );
+        for (vertex, value) in open.vertices.iter().zip(&of_open.uncertainty) {
+            assert_eq!(*vertex, mesh.vertices[*value as usize]);
+        }
+        assert_eq!(
+            of_open.field.as_ref().unwrap().values.len(),
+            open.vertices.len()
+        );
+        for format in Format::ALL {
+            let again = open_part(&read, &about_read, part).unwrap();
+            assert_eq!(
+                encode(format, &again.0, &again.1).unwrap(),
+                encode(format, &open, &of_open).unwrap()
+            );
+        }
+    }
+    assert!((area - mesh.area()).abs() < 1e-9 * area);
+    assert!(open_part(&mesh, &metadata(), Part::Base).is_none());
 }

@@ -34,7 +34,10 @@ const USES: &[(&str, &[&str])] = &[
         ],
     ),
     ("decimate", &["geometry", "mesh", "progress"]),
-    ("export", &["text", "geometry", "mesh", "grid", "volume"]),
+    (
+        "export",
+        &["text", "geometry", "mesh", "progress", "grid", "volume"],
+    ),
     ("model", &["geometry", "mesh", "progress", "grid", "locate"]),
     (
         "deform",
@@ -72,6 +75,7 @@ const USES: &[(&str, &[&str])] = &[
             "retile",
             "optimise",
             "export",
+            "model",
             "report",
             "parameters",
         ],
@@ -147,6 +151,7 @@ const USES: &[(&str, &[&str])] = &[
             "export",
             "model",
             "deform",
+            "polar",
             "reader",
             "report",
             "parameters",

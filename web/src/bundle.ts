@@ -1,6 +1,6 @@
 // Everything of a scan, or of one result, as one zip.
 
-import { type Result, type Volume, call } from "./api";
+import { ProblemError, type Result, type Volume, call } from "./api";
 import { loadScan, resultsOf } from "./library";
 import { saveBlob } from "./save";
 import { isFit, nameOf } from "./words";
@@ -14,23 +14,42 @@ export function fileNameOf(volume: Volume): string {
 interface Wanted {
   name: string;
   path: string;
+  /** Whether the service may refuse it: a DICOM object names the patient. */
+  object?: boolean;
 }
 
 function filesOf(result: Result, folder: string): Wanted[] {
   const page = result.links["page"];
   const files = result.files.map(file => ({ name: `${folder}/${file.name}`, path: file.href }));
-  return page ? [...files, { name: `${folder}/report.html`, path: page }] : files;
+  // DICOM objects are made when they are asked for.
+  const objects = [(result.links as Record<string, string | string[]>)["dicom"] ?? []].flat();
+  const made = objects.map(path => ({ name: `${folder}/${path.slice(path.lastIndexOf("/") + 1)}`, path, object: true }));
+  return [...files, ...(page ? [{ name: `${folder}/report.html`, path: page }] : []), ...made];
 }
 
 async function saved(name: string, wanted: Wanted[], told: (text: string) => void): Promise<void> {
   const files = [];
-  for (const [n, { name: inside, path }] of wanted.entries()) {
+  const leftOut: string[] = [];
+  for (const [n, { name: inside, path, object }] of wanted.entries()) {
     told(`File ${n + 1} of ${wanted.length} …`);
-    const answer = await call(path);
-    files.push({ name: `${name}/${inside.replace(/^\.\//, "")}`, bytes: new Uint8Array(await answer.arrayBuffer()) });
+    const place = inside.replace(/^\.\//, "");
+    let answer: Response;
+    try {
+      answer = await call(path);
+    } catch (error) {
+      // 403: the key may not read whose scan it is. 404 and 409: nobody stated it, or it was erased.
+      if (!object || !(error instanceof ProblemError) || ![403, 404, 409].includes(error.problem.status)) throw error;
+      leftOut.push(`${place}: ${error.problem.detail}`);
+      continue;
+    }
+    files.push({ name: `${name}/${place}`, bytes: new Uint8Array(await answer.arrayBuffer()) });
+  }
+  if (leftOut.length > 0) {
+    const text = ["These DICOM objects are not in this zip:", "", ...leftOut, ""].join("\n");
+    files.push({ name: `${name}/left_out.txt`, bytes: new TextEncoder().encode(text) });
   }
   saveBlob(zip(files), `${name}.zip`);
-  told("");
+  told(leftOut.length > 0 ? `Saved without ${leftOut.length} DICOM objects: left_out.txt in the zip says why.` : "");
 }
 
 /** Saves every file of a result, with its report. */

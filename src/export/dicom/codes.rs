@@ -1,5 +1,7 @@
 //! The coded concepts of the objects, from DICOM PS3.16.
 
+use crate::volume::nifti::LabelEntry;
+
 /// A coded concept: value, coding scheme and meaning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Code {
@@ -51,6 +53,29 @@ pub(super) const SOURCE_FOR_PROCESSING: Code =
     dcm("121322", "Source image for image processing operation");
 pub(super) const MILLIMETRE: Code = ucum("mm", "mm");
 
+/// The colour of the structure, sRGB: the CIELab colour of its segment.
+const COLOUR: [u8; 3] = [255, 150, 0];
+/// The colour of the cavity, sRGB.
+const CAVITY_COLOUR: [u8; 3] = [60, 120, 220];
+
+/// A label of a map of labels with its terms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LabelSegment {
+    /// Value, name and colour.
+    pub entry: LabelEntry,
+    /// Category of the segmented property (CID 7150).
+    category: Code,
+    /// Its type.
+    kind: Code,
+}
+
+impl LabelSegment {
+    /// Category and type as coding scheme, value and meaning.
+    pub fn terms(&self) -> [[&'static str; 3]; 2] {
+        [self.category, self.kind].map(|code| [code.scheme, code.value, code.meaning])
+    }
+}
+
 /// What is segmented: its codes and the words for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Structure {
@@ -79,6 +104,35 @@ impl Structure {
             "kidney" => Self::whole(sct("64033007", "Kidney"), "KIDNEY", "Kidney"),
             _ => Self::whole(sct("85756007", "Tissue"), "", "Tissue"),
         }
+    }
+
+    /// The name of the structure, for people.
+    pub fn label(&self) -> &'static str {
+        self.label
+    }
+
+    /// The segments of a map of labels: the structure as 1, and its cavity as 2 if there is one, with the
+    /// colours and codes that the Segmentation has.
+    pub fn segments(&self, cavity: bool) -> Vec<LabelSegment> {
+        let whole = LabelSegment {
+            entry: LabelEntry {
+                value: 1,
+                name: self.label,
+                colour: COLOUR,
+            },
+            category: ANATOMICAL_STRUCTURE,
+            kind: self.kind,
+        };
+        let cavity = cavity.then_some(LabelSegment {
+            entry: LabelEntry {
+                value: 2,
+                name: CAVITY.meaning,
+                colour: CAVITY_COLOUR,
+            },
+            category: ANATOMICAL_STRUCTURE,
+            kind: CAVITY,
+        });
+        [Some(whole), cavity].into_iter().flatten().collect()
     }
 
     fn whole(code: Code, body_part: &'static str, label: &'static str) -> Self {

@@ -35,7 +35,7 @@ mod uid;
 #[cfg(test)]
 mod tests;
 
-pub use codes::Structure;
+pub use codes::{LabelSegment, Structure};
 pub use data_set::{IMPLEMENTATION, IMPLEMENTATION_NAME, file_start};
 pub use source::{Deidentification, Moment, SourceScan, StatedIdentity, identity, legible};
 pub use uid::is_uid;

@@ -1,8 +1,8 @@
 //! Answers and problems that several handlers share.
 
 use super::bodies::MeshDocument;
-use crate::export::Format;
 use crate::export::dicom::DicomObject;
+use crate::export::{Format, seg_nrrd};
 use crate::http::problem::{MEDIA_TYPE, ProblemBody};
 use std::collections::BTreeMap;
 use utoipa::openapi::header::HeaderBuilder;
@@ -238,7 +238,7 @@ files! {
     /// 200 with the mask, mesh or report of a segmentation.
     SegmentationAnswer: "The mask, the mesh or the report", [meshes(), masks(), report_alone()];
     /// 200 with any of a segmentation's files.
-    SegmentationFileAnswer: "The file", [meshes(), masks(), pictures(), reports(), objects()];
+    SegmentationFileAnswer: "The file", [meshes(), masks(), labels(), pictures(), reports(), objects()];
     /// 200 with a reader's profile.
     ReaderFileAnswer: "The profile", [profiles()];
     /// 200 with any of a model's files.
@@ -314,6 +314,10 @@ fn masks() -> Contents {
         "application/nifti",
         "application/x-nifti",
     ])
+}
+
+fn labels() -> Contents {
+    files_of([seg_nrrd::MEDIA_TYPE])
 }
 
 fn pictures() -> Contents {

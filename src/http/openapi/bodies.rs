@@ -497,6 +497,15 @@ impl PartialSchema for MeshDocument {
                     )),
             )
             .property(
+                "part",
+                ArrayBuilder::new()
+                    .description(Some(
+                        "The part of a left ventricle's wall that each triangle is of: 1 endocardium, 2 epicardium, 3 \
+                         base",
+                    ))
+                    .items(Object::with_type(Type::Integer)),
+            )
+            .property(
                 "triangles",
                 triples(
                     Type::Integer,

@@ -1,5 +1,6 @@
 //! Parameters that several handlers share, and those that come from the tables of parameters.
 
+use crate::export::Part;
 use crate::jobs::Priority;
 use crate::parameters::{
     FIT_SPECS, FitParameters, Kind, ModelParameters, ParameterSpec, Parameters,
@@ -261,6 +262,19 @@ impl IntoParams for ScanParameters {
             query(name, help).schema(Some(Schema::from(text))).build()
         })
         .into()
+    }
+}
+
+/// `part`.
+pub struct PartParameter;
+
+impl IntoParams for PartParameter {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let part = ObjectBuilder::new()
+            .schema_type(Type::String)
+            .enum_values(Some(Part::ALL.map(Part::as_str)));
+        let help = "Of meshes of a left ventricle: only this part of the wall, as an open surface";
+        vec![query("part", help).schema(Some(part)).build()]
     }
 }
 

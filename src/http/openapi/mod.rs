@@ -36,8 +36,9 @@ pub use bodies::{
 pub use inputs::{
     CachedHeaders, CascadeParameter, ConditionalHeaders, DeidentifyParameter, ErasureParameters,
     EventHeader, IdempotencyHeader, ModelParametersObject, ModelQuery, PageParameters,
-    PreferHeader, PriorityParameter, ReaderQuery, ScanParameters, SegmentationParametersObject,
-    SegmentationQuery, TagParameters, TemplateQuery, TransactionParameters, WebhookInputs,
+    PartParameter, PreferHeader, PriorityParameter, ReaderQuery, ScanParameters,
+    SegmentationParametersObject, SegmentationQuery, TagParameters, TemplateQuery,
+    TransactionParameters, WebhookInputs,
 };
 pub use operation::Documented;
 pub use reports::{

@@ -34,6 +34,8 @@ pub(super) struct Header {
     pub scaling: Option<(f64, f64)>,
     /// The unit of all lengths below.
     pub unit: LengthUnit,
+    /// `xyzt_units` as stated.
+    pub xyzt_units: i32,
     /// `pixdim`, entry 0 being qfac.
     pub pixdim: [f64; 8],
     /// 0 if there is no qform.
@@ -90,6 +92,7 @@ impl Header {
             vox_offset: stated.first_voxel()?,
             scaling: stated.scaling(&mut warnings)?,
             unit: stated.unit(&mut warnings),
+            xyzt_units: stated.xyzt_units,
             pixdim: stated.pixdim,
             qform_code: stated.qform_code,
             sform_code: stated.sform_code,

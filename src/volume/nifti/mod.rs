@@ -2,12 +2,14 @@
 //!
 //! After the NIfTI-1.1 header file `nifti1.h` (NIfTI DFWG 2004) and `nifti2.h` (2011), whose field
 //! names are used throughout. `stated` reads the fields of either version, NIfTI-1 through the
-//! `nifti` crate; `header` checks them; `place` computes the affine; [`mod@write`] writes files.
+//! `nifti` crate; `header` checks them; `place` computes the affine; [`mod@write`] writes files, and
+//! [`grid`] carries the place of a scan's grid to the masks that are written of it.
 //!
 //! Colour and complex data types are rejected, because the uptake cannot be told from their parts.
 //! CIFTI files, which store matrices in a NIfTI-2 file, are rejected too.
 
 mod bare;
+pub mod grid;
 mod header;
 mod place;
 mod stated;
@@ -17,7 +19,8 @@ pub mod write;
 mod tests;
 
 pub use bare::is_bare;
-pub use write::{MaskError, StoredType, TooLong, write, write_mask};
+pub use grid::StatedGrid;
+pub use write::{LabelEntry, MaskError, StoredType, TooLong, write, write_labels, write_mask};
 
 use self::header::Header;
 use self::place::place;
@@ -67,6 +70,10 @@ impl NiftiFile {
 }
 
 impl OpenVolume for NiftiFile {
+    fn stated_grid(&self) -> Option<StatedGrid> {
+        Some(StatedGrid::of(&self.header))
+    }
+
     fn header(&self) -> HeaderFacts<'_> {
         HeaderFacts {
             file: &self.header.file,

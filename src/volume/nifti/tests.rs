@@ -780,7 +780,7 @@ fn a_mask_written_by_slices_is_the_mask_written_whole() {
         integral: true,
     };
     let mask: Vec<bool> = volume.voxels.iter().map(|v| *v > 0.5).collect();
-    let written = write_mask(&mask, volume.shape, &volume.frame, &Monitor::silent()).unwrap();
+    let written = write_mask(&mask, volume.shape, &volume.frame, None, &Monitor::silent()).unwrap();
     let unpacked = |bytes: &[u8]| {
         let mut plain = Vec::new();
         std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(bytes), &mut plain).unwrap();
@@ -789,6 +789,117 @@ fn a_mask_written_by_slices_is_the_mask_written_whole() {
     let whole = write(&volume, StoredType::Uint8, true).unwrap();
     assert_eq!(unpacked(&written), unpacked(&whole));
     volume.shape = [40_000, 1, 1];
-    let long = write_mask(&mask, volume.shape, &volume.frame, &Monitor::silent());
+    let long = write_mask(&mask, volume.shape, &volume.frame, None, &Monitor::silent());
     assert!(matches!(long, Err(MaskError::TooLong(_))));
+}
+
+fn unpacked(bytes: &[u8]) -> Vec<u8> {
+    let mut plain = Vec::new();
+    std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(bytes), &mut plain).unwrap();
+    plain
+}
+
+/// The mask of every voxel of `reading`, unpacked.
+fn mask_of(reading: &Reading) -> Vec<u8> {
+    let volume = &reading.volume;
+    let mask: Vec<bool> = volume.voxels.iter().map(|v| *v > 0.5).collect();
+    let grid = reading.stated_grid.as_ref();
+    let bytes = write_mask(&mask, volume.shape, &volume.frame, grid, &Monitor::silent());
+    unpacked(&bytes.unwrap())
+}
+
+/// The fields of a header that state the place: pixdim, xyzt_units, both codes, quaternion, offset, srow.
+const PLACE: [std::ops::Range<usize>; 4] = [76..108, 123..124, 252..280, 280..328];
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// Whatever the fields say of the place, and however they contradict each other: the mask says the same.
+    #[test]
+    fn a_mask_states_the_place_of_its_scan_field_by_field(
+        codes in (0_i16..=5, 0_i16..=5),
+        unit in 0_u8..=3,
+        quatern in prop::array::uniform3(-0.57_f32..0.57),
+        offset in prop::array::uniform3(-900.0_f32..900.0),
+        turn in prop::array::uniform3(-3.0_f64..3.0),
+        shift in prop::array::uniform3(-900.0_f32..900.0),
+        spacing in prop::array::uniform3(0.5_f32..9.0),
+        qfac in prop::sample::select(vec![-1.0_f32, 0.0, 1.0]),
+        trailing in 0_usize..=4,
+    ) {
+        let mut file = File::new(false);
+        let mut dim = vec![4_i16, 3, 2];
+        dim.resize(3 + trailing, 1);
+        file.dim(&dim);
+        file.bytes[123] = unit + 8;
+        file.reals(76, &[qfac, spacing[0], spacing[1], spacing[2], 2.5, 1.0, 0.0, 1.0]);
+        file.put(252, codes.0.to_le_bytes());
+        file.put(254, codes.1.to_le_bytes());
+        file.reals(256, &quatern);
+        file.reals(268, &offset);
+        let rotation = nalgebra::Rotation3::from_euler_angles(turn[0], turn[1], turn[2]);
+        for axis in 0..3 {
+            let row: Vec<f32> = (0..3).map(|c| rotation[(axis, c)] as f32 * spacing[c]).collect();
+            file.reals(280 + 16 * axis, &row);
+            file.reals(280 + 16 * axis + 12, &[shift[axis]]);
+        }
+        let reading = file.read().unwrap();
+        let mask = mask_of(&reading);
+        for range in PLACE {
+            prop_assert_eq!(&mask[range.clone()], &file.bytes[range.clone()], "bytes {:?}", range);
+        }
+        prop_assert_eq!(&mask[40..56], &file.bytes[40..56], "dim");
+        let back = read_bytes(&mask).unwrap();
+        prop_assert_eq!(back.volume.frame, reading.volume.frame);
+        prop_assert_eq!(back.facts.file_shape, reading.facts.file_shape);
+    }
+}
+
+#[test]
+fn a_mask_of_one_of_several_volumes_has_their_grid_in_three_dimensions() {
+    let mut file = File::new(true);
+    file.dim(&[4, 3, 1, 2]);
+    file.put(252, 3_i16.to_le_bytes());
+    file.reals(268, &[1.0, 2.0, 3.0]);
+    let reading = read_files(&[&file.bytes], Some(1)).unwrap();
+    let mask = mask_of(&reading);
+    let short = |at: usize| i16::from_le_bytes([mask[at], mask[at + 1]]);
+    assert_eq!([40, 42, 44, 46, 48].map(short), [3, 4, 3, 1, 1]);
+    assert_eq!([252, 254].map(short), [3, 1], "codes");
+    let real = |at: usize| f32::from_le_bytes(mask[at..at + 4].try_into().unwrap());
+    assert_eq!([268, 272, 276].map(real), [1.0, 2.0, 3.0]);
+}
+
+#[test]
+fn labels_have_names_and_colours_that_readers_without_them_skip() {
+    let volume = oblique();
+    let labels: Vec<u8> = (0..60).map(|n| n % 3).collect();
+    let entry = |value, name, colour| LabelEntry {
+        value,
+        name,
+        colour,
+    };
+    let entries = [
+        entry(1, "wall", [255, 0, 51]),
+        entry(2, "cavity", [0, 255, 0]),
+    ];
+    let grid = (volume.shape, &volume.frame);
+    let bytes = write_labels(&labels, &entries, grid, None, &Monitor::silent()).unwrap();
+    let back = read_bytes(&bytes).unwrap();
+    let read: Vec<u8> = back.volume.voxels.iter().map(|v| *v as u8).collect();
+    assert_eq!(read, labels);
+    assert_eq!(back.facts.warnings, Vec::<String>::new());
+    let plain = unpacked(&bytes);
+    let int = |at: usize| i32::from_le_bytes(plain[at..at + 4].try_into().unwrap());
+    // The extension: flag, length (a multiple of 16), code 30, text, and the voxels after it.
+    let length = int(352) as usize;
+    assert_eq!((plain[348], length % 16, int(356)), (1, 0, 30));
+    assert_eq!(plain.len(), 352 + length + 60);
+    let text = String::from_utf8_lossy(&plain[360..352 + length]);
+    for label in [
+        r#"<Label Key="1" Red="1.0000" Green="0.0000" Blue="0.2000" Alpha="1"><![CDATA[wall]]></Label>"#,
+        r#"<Label Key="2" Red="0.0000" Green="1.0000" Blue="0.0000" Alpha="1"><![CDATA[cavity]]></Label>"#,
+    ] {
+        assert!(text.contains(label), "{text}");
+    }
 }

@@ -1,13 +1,19 @@
-//! Writes volumes and masks as NIfTI-1 files.
+//! Writes volumes, masks and maps of labels as NIfTI-1 files.
 //!
-//! The affine is written as the sform, rounded to `f32`, and also as the qform if it is a rotation
+//! Masks and labels of a NIfTI scan state its grid as it does ([`StatedGrid`]): qform, sform, their codes,
+//! `pixdim` and units are copied, and so are trailing dimensions of length 1. Everything else states its affine
+//! as the sform, rounded to `f32`, and also as the qform if it is a rotation
 //! with spacing, which is all that a quaternion can express. The bytes depend on the volume alone:
 //! the gzip header contains neither name nor time.
+//!
+//! Names and colours of labels are a header extension of code 30 (Caret): the XML table of labels of Connectome
+//! Workbench, which TotalSegmentator reads and writes too. Programs that do not know it skip it.
 //!
 //! The header is a [`NiftiHeader`] of the `nifti` crate. It is serialised here because the crate's
 //! writer writes to paths only, and always with slope 1 and intercept 0.
 
 use super::super::Volume;
+use super::grid::StatedGrid;
 use crate::geometry::frame::VoxelToPatient;
 use crate::progress::{Cancelled, Monitor};
 use ::nifti::header::MAGIC_CODE_NIP1;
@@ -69,7 +75,7 @@ pub enum MaskError {
 
 /// The bytes of a `.nii.gz` file with `mask` as 0 and 1 on the grid of `shape` and `frame`.
 /// Compresses slice by slice: needs little memory beyond the result, and checks for cancellation
-/// between slices.
+/// between slices. `grid` is how the scan's file states that grid, if it is NIfTI.
 ///
 /// # Errors
 /// [`MaskError`].
@@ -77,9 +83,10 @@ pub fn write_mask(
     mask: &[bool],
     shape: [usize; 3],
     frame: &VoxelToPatient,
+    grid: Option<&StatedGrid>,
     monitor: &Monitor<'_>,
 ) -> Result<Vec<u8>, MaskError> {
-    let header = header(shape, frame, StoredType::Uint8, Scaling::NONE)?;
+    let header = mask_header(shape, frame, grid)?;
     let mut encoder = GzEncoder::new(Vec::new(), Compression::new(6));
     put(&mut encoder, &to_bytes(&header));
     for slice in mask.chunks((shape[0] * shape[1]).max(1)) {
@@ -88,6 +95,101 @@ pub fn write_mask(
         put(&mut encoder, &bytes);
     }
     Ok(finish(encoder))
+}
+
+/// A label of a map of labels, for people and screens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LabelEntry {
+    /// The value of its voxels.
+    pub value: u8,
+    /// Its name.
+    pub name: &'static str,
+    /// Its colour: red, green, blue, sRGB.
+    pub colour: [u8; 3],
+}
+
+/// The bytes of a `.nii.gz` file with `labels` on the grid of `shape` and `frame`, and with the names and
+/// colours of `entries`. `grid` as for [`write_mask`].
+///
+/// # Errors
+/// [`MaskError`].
+pub fn write_labels(
+    labels: &[u8],
+    entries: &[LabelEntry],
+    (shape, frame): ([usize; 3], &VoxelToPatient),
+    grid: Option<&StatedGrid>,
+    monitor: &Monitor<'_>,
+) -> Result<Vec<u8>, MaskError> {
+    /// NIFTI_INTENT_LABEL
+    const LABELS: i16 = 1002;
+    let extension = extension(entries);
+    let mut header = mask_header(shape, frame, grid)?;
+    header.intent_code = LABELS;
+    header.vox_offset = (VOX_OFFSET + extension.len()) as f32;
+    let mut bytes = to_bytes(&header);
+    // The four bytes after the header: extensions follow.
+    bytes[VOX_OFFSET - 4] = 1;
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::new(6));
+    put(&mut encoder, &bytes);
+    put(&mut encoder, &extension);
+    for slice in labels.chunks((shape[0] * shape[1]).max(1)) {
+        monitor.check()?;
+        put(&mut encoder, slice);
+    }
+    Ok(finish(encoder))
+}
+
+/// The extension with the table of `entries`: its length, a multiple of 16, its code and the text.
+fn extension(entries: &[LabelEntry]) -> Vec<u8> {
+    /// NIFTI_ECODE_CARET
+    const CARET: i32 = 30;
+    let mut text = String::from(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<CaretExtension>\n<VolumeInformation \
+         Index=\"0\">\n<LabelTable>\n",
+    );
+    let background = "<Label Key=\"0\" Red=\"0\" Green=\"0\" Blue=\"0\" Alpha=\"0\"><![CDATA[background]]></Label>\n";
+    text.push_str(background);
+    for entry in entries {
+        let [red, green, blue] = entry.colour.map(|part| f64::from(part) / 255.0);
+        text.push_str(&format!(
+            "<Label Key=\"{}\" Red=\"{red:.4}\" Green=\"{green:.4}\" Blue=\"{blue:.4}\" \
+             Alpha=\"1\"><![CDATA[{}]]></Label>\n",
+            entry.value, entry.name
+        ));
+    }
+    text.push_str(
+        "</LabelTable>\n<StudyMetaDataLinkSet>\n</StudyMetaDataLinkSet>\n\
+         <VolumeType><![CDATA[Label]]></VolumeType>\n</VolumeInformation>\n</CaretExtension>\n",
+    );
+    let length = (8 + text.len()).next_multiple_of(16);
+    let mut bytes = (length as i32).to_le_bytes().to_vec();
+    bytes.extend(CARET.to_le_bytes());
+    bytes.extend(text.into_bytes());
+    bytes.resize(length, 0);
+    bytes
+}
+
+/// The header of a mask on the grid of `shape` and `frame`, which the scan's file states as `grid`.
+fn mask_header(
+    shape: [usize; 3],
+    frame: &VoxelToPatient,
+    grid: Option<&StatedGrid>,
+) -> Result<NiftiHeader, TooLong> {
+    let mut header = header(shape, frame, StoredType::Uint8, Scaling::NONE)?;
+    let Some(grid) = grid else {
+        return Ok(header);
+    };
+    let reals = |numbers: &[f64; 3]| numbers.map(|x| x as f32);
+    header.dim[0] = grid.rank as u16;
+    header.pixdim = grid.pixdim.map(|x| x as f32);
+    // NIfTI-2 has wider numbers, but no other codes.
+    header.xyzt_units = (grid.xyzt_units & 0xff) as u8;
+    header.qform_code = i16::try_from(grid.qform_code).unwrap_or_default();
+    header.sform_code = i16::try_from(grid.sform_code).unwrap_or_default();
+    [header.quatern_b, header.quatern_c, header.quatern_d] = reals(&grid.quatern);
+    [header.quatern_x, header.quatern_y, header.quatern_z] = reals(&grid.qoffset);
+    [header.srow_x, header.srow_y, header.srow_z] = grid.srow.map(|row| row.map(|x| x as f32));
+    Ok(header)
 }
 
 /// The bytes of a `.nii` file with `volume`, or of a `.nii.gz` file if `gzip` is set.

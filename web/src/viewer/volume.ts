@@ -134,6 +134,37 @@ const TYPES: Record<number, [number, Reader]> = {
   16: [4, (view, at) => view.getFloat32(at, true)],
 };
 
+/** Millimetres per unit of length, by the code in `xyzt_units`. */
+const UNITS: Record<number, number> = { 1: 1000, 3: 0.001 };
+
+/**
+ * From voxel to patient, LPS mm, as the header states it: by the sform, else the qform, else the spacing
+ * (`nifti1.h`, methods 3, 2 and 1, and nibabel's origin in the middle of the array).
+ */
+function placeOf(view: DataView, shape: [number, number, number]): [Row, Row, Row] {
+  const real = (at: number): number => view.getFloat32(at, true);
+  const unit = UNITS[view.getUint8(123) & 7] ?? 1;
+  // NIfTI states x to the right and y to anterior.
+  const row = (axis: number, ras: number[]): Row => ras.map(part => (axis < 2 ? -unit : unit) * part) as unknown as Row;
+  if (view.getInt16(254, true) > 0) {
+    const stated = (axis: number): Row => row(axis, [0, 1, 2, 3].map(column => real(280 + 16 * axis + 4 * column)));
+    return [stated(0), stated(1), stated(2)];
+  }
+  const [dx, dy, dz] = [80, 84, 88].map(at => Math.abs(real(at))) as [number, number, number];
+  if (view.getInt16(252, true) > 0) {
+    const [b, c, d] = [256, 260, 264].map(real) as [number, number, number];
+    const a = Math.sqrt(Math.max(0, 1 - b * b - c * c - d * d));
+    const k = real(76) < 0 ? -dz : dz;
+    return [
+      row(0, [(a * a + b * b - c * c - d * d) * dx, 2 * (b * c - a * d) * dy, 2 * (b * d + a * c) * k, real(268)]),
+      row(1, [2 * (b * c + a * d) * dx, (a * a + c * c - b * b - d * d) * dy, 2 * (c * d - a * b) * k, real(272)]),
+      row(2, [2 * (b * d - a * c) * dx, 2 * (c * d + a * b) * dy, (a * a + d * d - b * b - c * c) * k, real(276)]),
+    ];
+  }
+  const middle = (axis: number, step: number): number => (-step * (shape[axis]! - 1)) / 2;
+  return [row(0, [-dx, 0, 0, middle(0, -dx)]), row(1, [0, dy, 0, middle(1, dy)]), row(2, [0, 0, dz, middle(2, dz)])];
+}
+
 /** Reads a NIfTI-1 file of one frame in little-endian order. */
 function parseNifti(bytes: ArrayBuffer): Voxels {
   const view = new DataView(bytes);
@@ -145,11 +176,10 @@ function parseNifti(bytes: ArrayBuffer): Voxels {
   const start = view.getFloat32(108, true);
   const slope = view.getFloat32(112, true) || 1;
   const intercept = view.getFloat32(116, true);
-  // NIfTI states x to the right and y to anterior.
-  const row = (axis: number): Row => [0, 1, 2, 3].map(column => (axis < 2 ? -1 : 1) * view.getFloat32(280 + 16 * axis + 4 * column, true)) as unknown as Row;
+  const rows = placeOf(view, shape);
   const values = new Float32Array(shape[0] * shape[1] * shape[2]);
   for (let n = 0; n < values.length; n++) values[n] = slope * read(view, start + n * size) + intercept;
-  return new Voxels(shape, [row(0), row(1), row(2)], values);
+  return new Voxels(shape, rows, values);
 }
 
 /** Reads such a file, packed by gzip or not. */
