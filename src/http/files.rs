@@ -22,6 +22,9 @@ const CACHE_CONTROL: &str = "private, max-age=31536000, immutable";
 /// Of pages and objects: whose scan it is may be stated otherwise, or erased, and not every key sees it.
 const OBJECT_CACHE_CONTROL: &str = "private, no-cache";
 
+/// Of files made of results: another version of the program may make them otherwise.
+const DERIVED_CACHE_CONTROL: &str = "private, max-age=3600";
+
 /// Memory of a download: a slow client has one portion waiting and one on its way.
 const SENT_MEMORY: u64 = 512 << 10;
 
@@ -78,7 +81,7 @@ pub async fn send_page(product: &Product, page: String, headers: &HeaderMap) -> 
 
 /// Answers with a file that is made of a product's files in the same way.
 pub async fn send_derived(product: &Product, file: OutputFile, headers: &HeaderMap) -> Answer {
-    send_made(product, file, PAGE_CACHE_CONTROL, false, headers).await
+    send_made(product, file, DERIVED_CACHE_CONTROL, false, headers).await
 }
 
 /// Answers with a DICOM object of a product in the same way.
