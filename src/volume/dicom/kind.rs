@@ -197,17 +197,24 @@ fn check_slices(attributes: &Attributes, image_type: &[String]) -> Result<(), Vo
             });
         }
     }
-    let series_type = attributes.texts(SERIES_TYPE).join("\\");
-    if series_type.ends_with("REPROJECTION") {
-        let reason = "the images are projections, not slices".into();
-        return Err(attributes.wrong(SERIES_TYPE.name, &series_type, reason));
+    let refuse = |found: String, reason| {
+        Err(VolumeError::NotVolume {
+            file: attributes.file.clone(),
+            found,
+            reason,
+            fix: READABLE,
+        })
+    };
+    let series_type = attributes.texts(SERIES_TYPE);
+    if series_type.iter().any(|value| value == "REPROJECTION") {
+        let found = format!("an image with the {} REPROJECTION", SERIES_TYPE.name);
+        return refuse(found, "it is a projection, not a slice");
     }
     match attributes.text(UNITS).as_deref() {
-        Some(units @ ("1CM" | "CM-1")) => {
-            let reason = "it is a transmission map in 1/cm, which shows attenuation and no uptake; \
-                          send the emission images";
-            Err(attributes.wrong(UNITS.name, units, reason.into()))
-        }
+        Some(units @ ("1CM" | "CM-1")) => refuse(
+            format!("an image with the {} {units}", UNITS.name),
+            "it is a transmission map, which shows attenuation and no uptake",
+        ),
         _ => Ok(()),
     }
 }
@@ -218,15 +225,19 @@ fn nuclear(attributes: &Attributes, image_type: &[String]) -> Result<Kind, Volum
         return Err(attributes.missing(IMAGE_TYPE));
     }
     let shown = image_type.get(2).map_or("", String::as_str);
+    let is_map = shown.starts_with("RECON") && image_type.iter().any(|v| v == "TRANSMISSION");
+    let named = match shown.is_empty() || is_map {
+        true => image_type.join("\\"),
+        false => shown.to_owned(),
+    };
     let refuse = |reason| {
         Err(VolumeError::NotSlices {
             file: attributes.file.clone(),
-            image_type: clip(&image_type.join("\\")),
+            image_type: clip(&named),
             reason,
         })
     };
-    let is_map = image_type.iter().skip(2).any(|v| v == "TRANSMISSION");
-    if is_map && shown.starts_with("RECON") {
+    if is_map {
         return refuse(
             "it is a transmission map, which shows attenuation and no uptake; send the emission \
              images",

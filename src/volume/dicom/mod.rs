@@ -203,8 +203,10 @@ impl DicomFile {
                 let located: Vec<Located> = located.collect::<Result<_, VolumeError>>()?;
                 let stated = a.shorts(NUMBER_OF_SLICES).first().copied().unwrap_or(1);
                 if scan.kind == Kind::Slice && stated > 1 {
-                    let reason = "the file holds one of them; send all files of the series".into();
-                    return Err(a.wrong(NUMBER_OF_SLICES.name, &stated.to_string(), reason));
+                    warnings.push(format!(
+                        "{} is {stated}, and the file holds one of them.",
+                        NUMBER_OF_SLICES.name
+                    ));
                 }
                 let gap = stated_gap(a)?;
                 if located.len() == 1 && gap.is_none() {
