@@ -578,6 +578,7 @@ mod tests {
             polar: None,
             polar_map: None,
             region: None,
+            scan: None,
         })
     }
 

@@ -148,14 +148,14 @@ fn broken_promises_are_reported() {
     crossed.vertices[far].x = 0.0;
     let crossed = report(&crossed);
     assert!(crossed.mesh.self_intersections > 0 && !crossed.is_sound());
-    let page = model_page(&crossed, &model(), None);
+    let page = model_page(&crossed, &model(), None, None);
     assert!(page.contains("promises are broken"));
 }
 
 #[test]
 fn the_page_fetches_nothing_and_lets_no_text_become_markup() {
     let model = model();
-    let page = model_page(&report(&model), &model, Some(&closeness(&model)));
+    let page = model_page(&report(&model), &model, Some(&closeness(&model)), None);
     // Names of markup languages are no addresses to fetch.
     let page = page.replace("http://www.w3.org/", "");
     for outside in ["http:", "https:", "src=\"/", "url(h", "@import", "<link"] {
@@ -175,7 +175,7 @@ fn the_page_fetches_nothing_and_lets_no_text_become_markup() {
 #[test]
 fn the_policy_allows_the_pages_own_style_and_script_alone() {
     let model = model();
-    let page = model_page(&report(&model), &model, None);
+    let page = model_page(&report(&model), &model, None, None);
     let policy = ventriform::draw::document::content_security_policy(true);
     assert!(page.contains(&policy) && policy.starts_with("default-src 'none'"));
     let mut hashed = 0;
@@ -197,7 +197,7 @@ fn the_policy_allows_the_pages_own_style_and_script_alone() {
 #[test]
 fn the_script_is_given_the_model_and_its_distances() {
     let model = model();
-    let page = model_page(&report(&model), &model, Some(&closeness(&model)));
+    let page = model_page(&report(&model), &model, Some(&closeness(&model)), None);
     let open = "<script type=\"application/json\" id=\"data\">";
     let from = page.find(open).unwrap() + open.len();
     let data = &page[from..from + page[from..].find("</script>").unwrap()];
@@ -224,7 +224,7 @@ fn measures_do_not_depend_on_the_number_of_threads() {
             .unwrap();
         pool.install(|| {
             let report = report(&model);
-            let page = model_page(&report, &model, Some(&closeness(&model)));
+            let page = model_page(&report, &model, Some(&closeness(&model)), None);
             (serde_json::to_string(&report).unwrap(), page)
         })
     };
