@@ -891,9 +891,9 @@ fn labels_have_names_and_colours_that_readers_without_them_skip() {
     assert_eq!(back.facts.warnings, Vec::<String>::new());
     let plain = unpacked(&bytes);
     let int = |at: usize| i32::from_le_bytes(plain[at..at + 4].try_into().unwrap());
-    // The extension: flag, length (a multiple of 16), code 30, text, and the voxels after it.
+    // The extension: flag, length (a multiple of 16), code 0, text, and the voxels after it.
     let length = int(352) as usize;
-    assert_eq!((plain[348], length % 16, int(356)), (1, 0, 30));
+    assert_eq!((plain[348], length % 16, int(356)), (1, 0, 0));
     assert_eq!(plain.len(), 352 + length + 60);
     let text = String::from_utf8_lossy(&plain[360..352 + length]);
     for label in [

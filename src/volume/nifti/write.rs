@@ -6,8 +6,8 @@
 //! with spacing, which is all that a quaternion can express. The bytes depend on the volume alone:
 //! the gzip header contains neither name nor time.
 //!
-//! Names and colours of labels are a header extension of code 30 (Caret): the XML table of labels of Connectome
-//! Workbench, which TotalSegmentator reads and writes too. Programs that do not know it skip it.
+//! Names and colours of labels are a header extension of code 0 with the XML table of labels of Caret, as
+//! TotalSegmentator writes and reads it. Programs that do not know it skip it.
 //!
 //! The header is a [`NiftiHeader`] of the `nifti` crate. It is serialised here because the crate's
 //! writer writes to paths only, and always with slope 1 and intercept 0.
@@ -141,8 +141,8 @@ pub fn write_labels(
 
 /// The extension with the table of `entries`: its length, a multiple of 16, its code and the text.
 fn extension(entries: &[LabelEntry]) -> Vec<u8> {
-    /// NIFTI_ECODE_CARET
-    const CARET: i32 = 30;
+    /// NIFTI_ECODE_IGNORE: nibabel gives the content of no other code that fits as it is.
+    const PLAIN: i32 = 0;
     let mut text = String::from(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<CaretExtension>\n<VolumeInformation \
          Index=\"0\">\n<LabelTable>\n",
@@ -163,7 +163,7 @@ fn extension(entries: &[LabelEntry]) -> Vec<u8> {
     );
     let length = (8 + text.len()).next_multiple_of(16);
     let mut bytes = (length as i32).to_le_bytes().to_vec();
-    bytes.extend(CARET.to_le_bytes());
+    bytes.extend(PLAIN.to_le_bytes());
     bytes.extend(text.into_bytes());
     bytes.resize(length, 0);
     bytes
