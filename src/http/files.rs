@@ -23,7 +23,7 @@ const CACHE_CONTROL: &str = "private, max-age=31536000, immutable";
 const OBJECT_CACHE_CONTROL: &str = "private, no-cache";
 
 /// Of files made of results: another version of the program may make them otherwise.
-const DERIVED_CACHE_CONTROL: &str = "private, max-age=3600";
+const DERIVED_CACHE_CONTROL: &str = "private, max-age=86400";
 
 /// Memory of a download: a slow client has one portion waiting and one on its way.
 const SENT_MEMORY: u64 = 512 << 10;
