@@ -133,7 +133,7 @@ fn of_one_file(folder: &str, name: &str, any: &Value) -> Value {
         }
     }
     if !is_object
-        && name != "report.html"
+        && name != PAGE
         && let Some(parameters) = one["parameters"].as_array_mut()
     {
         parameters.retain(|parameter| parameter["name"] != "deidentify");
