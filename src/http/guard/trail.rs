@@ -259,7 +259,7 @@ mod tests {
         for uid in ["1.2.3.99", "2.25.340282366920938463463374607431768211455"] {
             for rest in ["", "/state", "/cancelrequest"] {
                 let path = format!("/dicom-web/workitems/{uid}{rest}");
-                assert_eq!(item(&path).as_deref(), Some(uid), "{path}");
+                assert_eq!(item_of(&path).as_deref(), Some(uid), "{path}");
             }
         }
         assert_eq!(
