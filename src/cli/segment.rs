@@ -8,8 +8,10 @@ use crate::parameters::FitParameters;
 use crate::progress::{CancelToken, Monitor, Plan};
 use crate::reader::ReaderProfile;
 use crate::segmentation::Segmentation;
-use crate::segmentation::{NamedFile, NamedMesh, NamedReader, SegmentationOrder, from_files};
-use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeFile};
+use crate::segmentation::{
+    ExpertFacts, NamedFile, NamedMesh, NamedReader, SegmentationOrder, from_files,
+};
+use crate::volume::{ReadLimits, VolumeFile};
 use crate::work::problems::Explain;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
@@ -85,7 +87,7 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
         .collect();
     let volume: Vec<VolumeFile> = args.input.iter().map(VolumeFile::at).collect();
     let dicom = args.dicom.order(&volume, parameters.frame)?;
-    let expert = args.expert.as_ref().map(|path| [VolumeFile::at(path)]);
+    let expert = args.expert.as_ref().map(VolumeFile::with_other_half);
     let order = SegmentationOrder {
         volume: &volume,
         expert: expert.as_ref().map(|files| &files[..]),
@@ -109,22 +111,13 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
     }
     write_all(&args.output, &files)?;
     eprintln!("{}", headline(&made.segmentation));
+    for warning in made.expert.iter().flat_map(ExpertFacts::warnings) {
+        eprintln!("warning: {warning}");
+    }
     for flag in &made.segmentation.fit.flags {
         eprintln!("warning: {flag}");
     }
     Ok(())
-}
-
-/// Reads one volume.
-pub(super) fn read(paths: &[PathBuf], frame: Option<usize>, monitor: &Monitor) -> Result<Reading> {
-    let files: Vec<VolumeFile> = paths.iter().map(VolumeFile::at).collect();
-    volume::read(
-        &files,
-        &ReadOptions { frame },
-        &ReadLimits::default(),
-        monitor,
-    )
-    .with_context(|| format!("{}", paths[0].display()))
 }
 
 /// Reads a model.

@@ -1,7 +1,7 @@
 //! The files of a segmentation.
 
 use super::cavity::cavity;
-use super::from_files::SegmentedVolume;
+use super::from_files::{ExpertFacts, SegmentedVolume};
 use super::region::region;
 use super::report::report_json;
 use crate::deform::WallEdge;
@@ -149,7 +149,8 @@ impl SegmentedVolume {
             let parameters = self.parameters.to_json();
             object.insert("parameters".into(), parameters.into());
             object.insert("input".into(), report::input(&self.reading.facts));
-            let warnings = self.reading.facts.warnings.clone();
+            let mut warnings = self.reading.facts.warnings.clone();
+            warnings.extend(self.expert.iter().flat_map(ExpertFacts::warnings));
             object.insert("warnings".into(), warnings.into());
         }
         report

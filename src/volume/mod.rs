@@ -19,6 +19,8 @@
 //! Not guaranteed: that the file's statements about the patient are true. Contradictions inside a
 //! file appear as warnings.
 //!
+//! [`given_mask`] reads masks: one structure of a label map, a segmentation or a binary volume.
+//!
 //! [`mod@phantom`] makes volumes with known ground truth, [`nifti::write()`] writes volumes to files,
 //! and [`mod@preview`] draws them.
 //!
@@ -44,6 +46,7 @@ mod decode;
 pub mod dicom;
 pub mod error;
 pub mod facts;
+pub mod given_mask;
 mod limits;
 pub mod nifti;
 mod open;
@@ -64,6 +67,9 @@ pub use limits::{ReadLimits, ReadOptions};
 pub use open::{Reading, describe};
 pub use phantom::{Phantom, PhantomParameters, phantom};
 pub use preview::{preview, preview_png};
-pub use read::{inspect, preview_files, provenance, read};
+pub use read::{
+    inspect, labels_are_rounded, preview_files, provenance, read, read_segment, segments,
+    voxels_of_label,
+};
 pub use source::VolumeFile;
 pub use summary::summarise;

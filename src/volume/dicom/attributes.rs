@@ -40,6 +40,9 @@ const SHARED: Tag = Tag(0x5200, 0x9229);
 /// Per-frame Functional Groups Sequence. In a path it stands for the shared groups too.
 const FRAME: Tag = Tag(0x5200, 0x9230);
 
+/// Segment Sequence, whose items are counted like frames.
+const SEGMENT: Tag = Tag(0x0062, 0x0002);
+
 const DETECTOR: &[Tag] = &[Tag(0x0054, 0x0022)];
 const REAL_WORLD: &[Tag] = &[Tag(0x0040, 0x9096)];
 const PHARMACEUTICAL: &[Tag] = &[Tag(0x0054, 0x0016)];
@@ -54,6 +57,8 @@ const FRAME_RESCALE: &[Tag] = &[FRAME, Tag(0x0028, 0x9145)];
 const FRAME_REAL_WORLD: &[Tag] = &[FRAME, Tag(0x0040, 0x9096)];
 const FRAME_CONTENT: &[Tag] = &[FRAME, Tag(0x0020, 0x9111)];
 const FRAME_SEGMENT_PATH: &[Tag] = &[FRAME, Tag(0x0062, 0x000a)];
+const SEGMENT_TYPE_PATH: &[Tag] = &[SEGMENT, Tag(0x0062, 0x000f)];
+const SEGMENT_REGION_PATH: &[Tag] = &[SEGMENT, Tag(0x0008, 0x2218)];
 
 attributes! {
     CHARACTER_SET = &[], 0x0008, 0x0005, "Specific Character Set (0008,0005)";
@@ -143,6 +148,12 @@ attributes! {
         "Real World Value Slope (0040,9225)";
     FRAME_DATE_TIME = FRAME_CONTENT, 0x0018, 0x9074, "Frame Acquisition DateTime (0018,9074)";
     FRAME_TEMPORAL_INDEX = FRAME_CONTENT, 0x0020, 0x9128, "Temporal Position Index (0020,9128)";
+    SEGMENT_NUMBER = &[SEGMENT], 0x0062, 0x0004, "Segment Number (0062,0004)";
+    SEGMENT_LABEL = &[SEGMENT], 0x0062, 0x0005, "Segment Label (0062,0005)";
+    SEGMENT_TYPE_VALUE = SEGMENT_TYPE_PATH, 0x0008, 0x0100, "Code Value (0008,0100)";
+    SEGMENT_TYPE_MEANING = SEGMENT_TYPE_PATH, 0x0008, 0x0104, "Code Meaning (0008,0104)";
+    SEGMENT_REGION_VALUE = SEGMENT_REGION_PATH, 0x0008, 0x0100, "Code Value (0008,0100)";
+    SEGMENT_REGION_MEANING = SEGMENT_REGION_PATH, 0x0008, 0x0104, "Code Meaning (0008,0104)";
     FRAME_SEGMENT = FRAME_SEGMENT_PATH, 0x0062, 0x000b, "Referenced Segment Number (0062,000B)";
 }
 
@@ -153,22 +164,22 @@ impl Attribute {
     }
 
     /// The needed attribute with `tag` inside the sequences `open`, each with the number of items
-    /// begun, and the frame to which the value belongs, from 0; `None` for a value that belongs to
-    /// the data set or to all frames.
+    /// begun, and the frame or segment to which the value belongs, from 0; `None` for a value that
+    /// belongs to the data set or to all frames.
     pub(super) fn find(open: &[(Tag, usize)], tag: Tag) -> Option<(Self, Option<usize>)> {
-        let (frame, first) = match open.first() {
-            Some((FRAME, items)) => (Some(items.checked_sub(1)?), 1),
-            Some((SHARED, 1)) => (None, 1),
-            _ => (None, 0),
+        let (frame, outer) = match open.first() {
+            Some((many @ (FRAME | SEGMENT), items)) => (Some(items.checked_sub(1)?), Some(*many)),
+            Some((SHARED, 1)) => (None, Some(FRAME)),
+            _ => (None, None),
         };
+        let first = usize::from(outer.is_some());
         if open[first..].iter().any(|(_, items)| *items != 1) {
             return None;
         }
-        let is_frame = first == 1;
         let wanted = WANTED.iter().find(|a| {
-            let outer = a.path.first() == Some(&FRAME);
+            let own = a.path.first().filter(|t| [FRAME, SEGMENT].contains(t));
             a.tag == tag
-                && outer == is_frame
+                && own == outer.as_ref()
                 && a.path.len() == open.len()
                 && a.path[first..]
                     .iter()
@@ -289,7 +300,12 @@ impl Attributes {
 
     /// The whole text of an attribute in the data set's character set, for people to read.
     pub(super) fn prose(&self, attribute: Attribute) -> Option<String> {
-        let bytes = self.bytes_of(attribute, None)?;
+        self.prose_of(attribute, None)
+    }
+
+    /// As [`Attributes::prose`], for frame or segment number `item`, from 0.
+    pub(super) fn prose_of(&self, attribute: Attribute, item: Option<usize>) -> Option<String> {
+        let bytes = self.bytes_of(attribute, item)?;
         let code = self.text(CHARACTER_SET);
         let set = code.and_then(|code| SpecificCharacterSet::from_code(&code));
         let decoded = set.and_then(|set| set.decode(bytes).ok());

@@ -34,6 +34,10 @@ pub(super) struct Header {
     pub scaling: Option<(f64, f64)>,
     /// The unit of all lengths below.
     pub unit: LengthUnit,
+    /// What the file is meant to hold.
+    pub intent_code: i32,
+    /// The bits of `xyzt_units` for the unit of the fourth dimension.
+    pub time_unit: i32,
     /// `pixdim`, entry 0 being qfac.
     pub pixdim: [f64; 8],
     /// 0 if there is no qform.
@@ -85,6 +89,8 @@ impl Header {
             vox_offset: stated.first_voxel()?,
             scaling: stated.scaling(&mut warnings)?,
             unit: stated.unit(&mut warnings),
+            intent_code: stated.intent_code,
+            time_unit: stated.xyzt_units & 0x38,
             pixdim: stated.pixdim,
             qform_code: stated.qform_code,
             sform_code: stated.sform_code,
