@@ -18,9 +18,8 @@ use ventriform::deform::{Evidence, Flag, WallEdge};
 use ventriform::grid::agreement::compare;
 use ventriform::parameters::FitParameters;
 use ventriform::progress::Monitor;
-use ventriform::segmentation::{
-    SegmentationOrder, SegmentedVolume, from_files, on_grid, report_json,
-};
+use ventriform::segmentation::{SegmentationOrder, SegmentedVolume, from_files, report_json};
+use ventriform::volume::given_mask::{MaskChoice, read_mask};
 use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
 
 type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
@@ -70,8 +69,8 @@ fn line(case: &Path) -> Result<String> {
     };
     let judged = |segmented: &SegmentedVolume, gold: &str| -> Result<(f64, Value)> {
         let (scan, made) = (&segmented.reading.volume, &segmented.segmentation);
-        let gold = volume::read(&file(gold), &ReadOptions::default(), &limits, &monitor)?.volume;
-        let gold = on_grid(&gold, scan, &monitor)?;
+        let gold = read_mask(&file(gold), &MaskChoice::default(), &limits, &monitor)?;
+        let gold = gold.on((scan.shape, &scan.frame), false, &monitor)?.mask;
         let agreement = compare(&made.mask, &gold, scan.frame.spacing(), &monitor)?;
         let flags: Vec<&str> = made.fit.flags.iter().map(Flag::code).collect();
         Ok((

@@ -1,6 +1,7 @@
 //! The arguments of the commands that work on a cohort's folder.
 
 use crate::evaluate::{Cohort, CohortError};
+use crate::volume::given_mask::MaskChoice;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -18,6 +19,13 @@ pub struct CohortArgs {
     /// Template whose model is made from its expert's mask [default: the third, if it has one]
     #[arg(long, value_name = "CASE")]
     manual: Option<String>,
+    /// Structure of the masks, where their files hold several: number of a label or segment, or name of a
+    /// segment
+    #[arg(long, value_name = "LABEL", allow_hyphen_values = true)]
+    label: Option<String>,
+    /// Resample masks that lie on another grid than their scan; without it they are not used
+    #[arg(long)]
+    resample: bool,
 }
 
 impl CohortArgs {
@@ -26,6 +34,14 @@ impl CohortArgs {
     /// # Errors
     /// [`CohortError`].
     pub fn open(&self) -> Result<Cohort, CohortError> {
-        Cohort::open(&self.cohort, self.manual.as_deref())
+        let mut cohort = Cohort::open(&self.cohort, self.manual.as_deref())?;
+        cohort.masks = MaskChoice {
+            label: self.label.as_deref().map(|text| {
+                let Ok(label) = text.parse();
+                label
+            }),
+            resample: self.resample,
+        };
+        Ok(cohort)
     }
 }

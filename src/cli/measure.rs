@@ -1,50 +1,135 @@
 //! `ventriform measure`: the agreement of two masks.
 
-use super::output::json;
-use super::segment::read;
+use super::output::{json, note};
 use crate::grid::agreement::compare;
-use crate::grid::voxelise::Mask;
 use crate::progress::Monitor;
-use crate::segmentation::{agreement_json, on_grid};
-use anyhow::{Context, Result, bail};
+use crate::segmentation::agreement_json;
+use crate::volume::given_mask::{GivenMask, GivenMaskError, MaskChoice, MaskLabel, read_mask};
+use crate::volume::{ReadLimits, VolumeFile};
+use crate::work::problems::Explain;
+use anyhow::{Result, anyhow};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Compare two masks: Jaccard E_J, mean contour distance E_CD, Dice, Hausdorff
 #[derive(Debug, Args)]
-#[command(after_help = "Example:
+#[command(after_help = "Examples:
   ventriform measure out/mask.nii.gz expert.nii.gz
-Prints JSON. If the masks lie on different grids, B is resampled to the grid of A by its position
-in the patient.")]
+  ventriform measure out/mask.nii.gz organs.nii.gz --label 2
+  ventriform measure out/mask.nii.gz seg.dcm --label-b 'Left ventricle' --resample
+Prints JSON. A mask is a volume of 0 and another value, a label map, a DICOM Segmentation, or
+probabilities of which those above 0.5 count. Of several structures one must be named, unless it is
+the only segment coded as myocardium. Masks of one lattice of voxels are compared however they are
+stored; another lattice is refused without --resample.")]
 pub struct MeasureArgs {
-    /// Mask to judge; voxels above 0.5 belong to it
+    /// Mask to judge
     #[arg(value_name = "A")]
     a: PathBuf,
     /// Reference mask
     #[arg(value_name = "B")]
     b: PathBuf,
+    /// Structure to compare, of each file that holds several: number of a label or segment, or name of a
+    /// segment
+    #[arg(long, value_name = "LABEL", allow_hyphen_values = true)]
+    label: Option<String>,
+    /// Structure of A
+    #[arg(long, value_name = "LABEL", allow_hyphen_values = true)]
+    label_a: Option<String>,
+    /// Structure of B
+    #[arg(long, value_name = "LABEL", allow_hyphen_values = true)]
+    label_b: Option<String>,
+    /// Resample B to the grid of A by the nearest voxel if they are different grids
+    #[arg(long)]
+    resample: bool,
 }
 
 /// Runs the command.
 ///
 /// # Errors
-/// If a file cannot be read, a mask is empty, or the masks do not overlap in space.
+/// If a file cannot be read, which structure is meant cannot be told, a mask is empty, or the masks lie
+/// on different grids.
 pub fn run(args: &MeasureArgs) -> Result<()> {
     let monitor = Monitor::silent();
-    let a = read(std::slice::from_ref(&args.a), None, &monitor)?.volume;
-    let b = read(std::slice::from_ref(&args.b), None, &monitor)?.volume;
-    let judged = Mask {
-        shape: a.shape,
-        voxels: a.voxels.iter().map(|v| *v > 0.5).collect(),
-    };
-    if !judged.voxels.contains(&true) {
-        bail!(
-            "{}: the mask is empty, as no voxel is above 0.5; give a mask with values 0 and 1",
-            args.a.display()
-        );
+    let [a, b] = [(&args.a, &args.label_a), (&args.b, &args.label_b)]
+        .map(|(path, own)| read(path, own.as_deref(), args.label.as_deref()));
+    let (a, b) = (a?, b?);
+    if let Some(label) = &args.label
+        && [&a, &b].iter().all(|read| !read.by_common_label)
+        && args.label_a.is_none()
+        && args.label_b.is_none()
+    {
+        let paths = [&args.a, &args.b].map(|path| path.display().to_string());
+        return Err(anyhow!(
+            "--label {label}: neither {} nor {} has such a structure; leave it out",
+            paths[0],
+            paths[1]
+        ));
     }
-    let reference = on_grid(&b, &a, &monitor).with_context(|| format!("{}", args.b.display()))?;
-    let agreement = compare(&judged, &reference, a.frame.spacing(), &monitor)?;
+    for (path, read) in [(&args.a, &a), (&args.b, &b)] {
+        if let Some(structure) = &read.mask.structure {
+            note!("{}: {structure} was compared", path.display());
+        }
+    }
+    let in_b = |error: GivenMaskError| anyhow!("{}: {}", args.b.display(), error.with_advice());
+    // No voxel of either is lost beyond the other's border.
+    let judged = match b
+        .mask
+        .on((a.mask.mask.shape, &a.mask.frame), true, &monitor)
+    {
+        Ok(placed) if placed.outside == 0 => a.mask,
+        Err(
+            error @ (GivenMaskError::Cancelled(_) | GivenMaskError::Elsewhere { inside: 0, .. }),
+        ) => {
+            return Err(in_b(error));
+        }
+        _ => a.mask.holding(&b.mask, &monitor).map_err(in_b)?,
+    };
+    let grid = (judged.mask.shape, &judged.frame);
+    let reference = b.mask.on(grid, args.resample, &monitor).map_err(in_b)?;
+    if reference.resampled {
+        note!("{}: resampled to the grid of A", args.b.display());
+    }
+    let spacing = judged.frame.spacing();
+    let agreement = compare(&judged.mask, &reference.mask, spacing, &monitor)?;
     json(&serde_json::to_string_pretty(&agreement_json(&agreement))?);
     Ok(())
+}
+
+/// A mask that was read.
+struct ReadMask {
+    mask: GivenMask,
+    /// Whether the label for both files named its structure.
+    by_common_label: bool,
+}
+
+/// Reads the mask at `path`: the structure `own`, otherwise the one that `common` names, otherwise the
+/// only one.
+fn read(path: &Path, own: Option<&str>, common: Option<&str>) -> Result<ReadMask> {
+    let files = VolumeFile::with_other_half(path);
+    let read = |label: Option<&str>| {
+        let label = label.map(|text| {
+            let Ok(label) = text.parse::<MaskLabel>();
+            label
+        });
+        let choice = MaskChoice {
+            label,
+            resample: false,
+        };
+        read_mask(&files, &choice, &ReadLimits::default(), &Monitor::silent())
+    };
+    let named = read(own.or(common));
+    // A file with one structure needs no label for both files.
+    let mask = match (named, own) {
+        (Err(error @ GivenMaskError::NoSuchStructure { .. }), None) => {
+            read(None).map(|mask| (mask, false)).map_err(|_| error)
+        }
+        (named, _) => named.map(|mask| (mask, own.is_none() && common.is_some())),
+    };
+    match mask {
+        Ok((mask, by_common_label)) => Ok(ReadMask {
+            mask,
+            by_common_label,
+        }),
+        Err(error) => Err(anyhow!("{}: {}", path.display(), error.with_advice())),
+    }
 }

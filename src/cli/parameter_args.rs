@@ -96,6 +96,11 @@ fn flag<P: Parameters>(spec: &'static ParameterSpec<P>) -> Arg {
                 .map(|word| clap::builder::PossibleValue::new(*word).alias(word.replace('_', "-")));
             arg.value_parser(clap::builder::PossibleValuesParser::new(words))
         }
+        Kind::Switch => arg
+            .num_args(0..=1)
+            .require_equals(true)
+            .default_missing_value("true")
+            .allow_hyphen_values(false),
         _ => arg,
     }
 }
@@ -104,6 +109,7 @@ fn value_name(kind: &Kind) -> &'static str {
     match kind {
         Kind::Integer { .. } => "N",
         Kind::Number { .. } => "X",
+        Kind::Switch => "true|false",
         Kind::Choice(_) => "WORD",
         Kind::Direction(_) => "WORD|X,Y,Z",
         Kind::Integers { count: 1 } => "N",

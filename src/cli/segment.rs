@@ -10,8 +10,10 @@ use crate::parameters::FitParameters;
 use crate::progress::{CancelToken, Monitor, Plan};
 use crate::reader::ReaderProfile;
 use crate::segmentation::Segmentation;
-use crate::segmentation::{NamedFile, NamedMesh, NamedReader, SegmentationOrder, from_files};
-use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeFile};
+use crate::segmentation::{
+    ExpertFacts, NamedFile, NamedMesh, NamedReader, SegmentationOrder, from_files,
+};
+use crate::volume::{ReadLimits, VolumeFile};
 use crate::work::problems::Explain;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
@@ -91,7 +93,7 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
     let volume = volume_files(&args.input)?;
     let dicom = args.dicom.order(&volume, parameters.frame)?;
     let whose = args.dicom.whose(&volume, parameters.frame)?;
-    let expert = args.expert.as_ref().map(|path| [VolumeFile::at(path)]);
+    let expert = args.expert.as_ref().map(VolumeFile::with_other_half);
     let order = SegmentationOrder {
         volume: &volume,
         expert: expert.as_ref().map(|files| &files[..]),
@@ -132,18 +134,6 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
         note!("warning: {flag}");
     }
     Ok(())
-}
-
-/// Reads one volume.
-pub(super) fn read(paths: &[PathBuf], frame: Option<usize>, monitor: &Monitor) -> Result<Reading> {
-    let files = volume_files(paths)?;
-    volume::read(
-        &files,
-        &ReadOptions { frame },
-        &ReadLimits::default(),
-        monitor,
-    )
-    .with_context(|| format!("{}", paths[0].display()))
 }
 
 /// Reads a model.

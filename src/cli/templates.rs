@@ -2,7 +2,6 @@
 
 use super::cohort_args::CohortArgs;
 use super::output::{create_folder, note, write_file};
-use crate::evaluate::cohort::read_volume;
 use crate::evaluate::parameters::ascending;
 use crate::export::{self, Format};
 use crate::parameters::ModelParameters;
@@ -56,7 +55,8 @@ fn build(args: &BuildArgs) -> Result<()> {
         let (path, what) = cohort.source(case).with_context(|| {
             format!("the files of case {case} are missing from the cohort's folder")
         })?;
-        let reading = read_volume(&path).with_context(|| path.display().to_string())?;
+        let reading = cohort.read_source(case, &path);
+        let reading = reading.with_context(|| path.display().to_string())?;
         for n in ascending(&args.cohort.points) {
             let context = || format!("the model of {case} with {n} points");
             let pairs = [("points", n.to_string())];

@@ -9,7 +9,7 @@
 //!
 //! Guaranteed: the same files give the same profile and figures, on any number of threads.
 
-use super::cohort::{case_file, read_volume};
+use super::cohort::{case_file, mask_on};
 use super::paired::PairedDifference;
 use super::sample::Sample;
 use crate::deform::Fit;
@@ -19,7 +19,7 @@ use crate::grid::voxelise::{Mask, voxelise};
 use crate::parameters::FitParameters;
 use crate::progress::Monitor;
 use crate::reader::{self, LearntOn, ReaderOffset, ReaderOffsets, ReaderProfile};
-use crate::segmentation::{SegmentationOrder, from_files, on_grid};
+use crate::segmentation::{SegmentationOrder, from_files};
 use crate::volume::{ReadLimits, VolumeFile};
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
@@ -233,8 +233,8 @@ impl ReadCase {
         let made = from_files(&order, &ReadLimits::default(), &monitor);
         let made = made.map_err(|error| error.to_string())?;
         let volume = &made.reading.volume;
-        let mask = read_volume(&case.mask).map_err(|error| format!("its mask: {error}"))?;
-        let drawn = on_grid(&mask.volume, volume, &monitor).map_err(|error| error.to_string())?;
+        let drawn = mask_on(&case.mask, &parameters.mask, volume);
+        let drawn = drawn.map_err(|error| format!("its mask: {error}"))?;
         let fit = made.segmentation.fit;
         let frame = volume.frame.clone();
         let measured = reader::measure(&fit, &made.segmentation.mask, &drawn, &frame)

@@ -7,8 +7,10 @@
 //! file does not end the run: it is noted in [`Cohort::problems`].
 
 use super::rows::Gold;
+use crate::grid::voxelise::Mask;
 use crate::progress::Monitor;
-use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeFile};
+use crate::volume::given_mask::{GivenMask, GivenMaskError, MaskChoice, read_mask};
+use crate::volume::{self, ReadLimits, ReadOptions, Reading, Volume, VolumeError, VolumeFile};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io;
@@ -56,6 +58,8 @@ pub struct Cohort {
     pub patients: Vec<String>,
     /// The template whose model comes from its expert's mask, if any.
     pub manual: Option<String>,
+    /// Which structure of the masks is meant, and whether masks on other grids are resampled.
+    pub masks: MaskChoice,
     /// Cases, and what is wrong with each.
     pub problems: Vec<(String, String)>,
 }
@@ -76,6 +80,7 @@ impl Cohort {
             templates: Vec::new(),
             patients: Vec::new(),
             manual: None,
+            masks: MaskChoice::default(),
             problems: Vec::new(),
         };
         let roles = cohort.roles();
@@ -222,6 +227,38 @@ impl Cohort {
             Some((self.scan(template)?, "the scan, by threshold"))
         }
     }
+
+    /// Reads the file that a template's model is made of; of a mask, the structure of
+    /// [`Cohort::masks`].
+    ///
+    /// # Errors
+    /// [`GivenMaskError`], of a scan always [`GivenMaskError::File`].
+    pub fn read_source(&self, template: &str, path: &Path) -> Result<Reading, GivenMaskError> {
+        let mut reading = read_volume(path).map_err(GivenMaskError::File)?;
+        if self.manual.as_deref() == Some(template) {
+            reading.volume = read_mask_file(path, &self.masks)?.to_volume();
+        }
+        Ok(reading)
+    }
+}
+
+/// Reads the structure of the mask at `path` that `choice` means.
+///
+/// # Errors
+/// [`GivenMaskError`].
+pub fn read_mask_file(path: &Path, choice: &MaskChoice) -> Result<GivenMask, GivenMaskError> {
+    let (files, limits) = ([VolumeFile::at(path)], ReadLimits::default());
+    read_mask(&files, choice, &limits, &Monitor::silent())
+}
+
+/// Reads the mask at `path` and brings it to the grid of `volume`.
+///
+/// # Errors
+/// [`GivenMaskError`].
+pub fn mask_on(path: &Path, choice: &MaskChoice, volume: &Volume) -> Result<Mask, GivenMaskError> {
+    let grid = (volume.shape, &volume.frame);
+    let given = read_mask_file(path, choice)?;
+    Ok(given.on(grid, choice.resample, &Monitor::silent())?.mask)
 }
 
 /// The file `stem` of the folder `case` in `folder`, in the first format that exists.

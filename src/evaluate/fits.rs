@@ -4,7 +4,7 @@
 //! [`crate::segmentation`]. The result of every fit is written to a [`record`]; a result whose
 //! record has the right key is read and not computed again.
 
-use super::cohort::{Cohort, read_volume};
+use super::cohort::{Cohort, mask_on, read_volume};
 use super::cohort_fit::CohortFit;
 use super::error::EvaluateError;
 use super::files::write_whole;
@@ -18,8 +18,9 @@ use crate::export::{self, Format, Metadata};
 use crate::grid::agreement::compare;
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::progress::Monitor;
-use crate::segmentation::{OrganSearch, built_in, fit_built_in, on_grid};
+use crate::segmentation::{OrganSearch, built_in, fit_built_in};
 use crate::volume::Volume;
+use crate::volume::given_mask::MaskChoice;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -48,6 +49,8 @@ pub struct FitRun<'a> {
     pub program: &'a [u8],
     /// Where records and fitted meshes go.
     pub folder: &'a Path,
+    /// Which structure of the gold standards is meant.
+    pub masks: &'a MaskChoice,
 }
 
 /// Fits all `models` to all patients of `cohort`.
@@ -76,7 +79,8 @@ pub fn fit_all(
             let files = PatientFiles::read(cohort, case);
             let key = files
                 .add_to(key.clone())
-                .and(format!("{:?}", run.parameters).as_bytes());
+                .and(format!("{:?}", run.parameters).as_bytes())
+                .and(format!("{:?}", run.masks).as_bytes());
             let work = PatientWork { case, run, key };
             work.fit_all(&files, models, &advance)
         })
@@ -149,7 +153,8 @@ impl PatientWork<'_> {
             let fit = match record::read(&path, &key) {
                 Some(kept) => kept,
                 None => {
-                    let images = images.get_or_insert_with(|| PatientImages::read(files));
+                    let images =
+                        images.get_or_insert_with(|| PatientImages::read(files, self.run.masks));
                     let fit = images.fit(model, self.run.parameters);
                     self.write_mesh(&name, model, &fit)?;
                     record::write(&path, &key, &fit)?;
@@ -165,7 +170,8 @@ impl PatientWork<'_> {
             let kept = record::read(&path, &key);
             let computed = kept.is_none();
             let fit = kept.unwrap_or_else(|| {
-                let images = images.get_or_insert_with(|| PatientImages::read(files));
+                let images =
+                    images.get_or_insert_with(|| PatientImages::read(files, self.run.masks));
                 images.fit_auto(self.run.parameters)
             });
             if computed {
@@ -173,6 +179,16 @@ impl PatientWork<'_> {
             }
             patient.auto = Some(fit);
             advance();
+        }
+        let golds = images
+            .iter()
+            .flat_map(|images| Gold::ALL.into_iter().zip(&images.golds));
+        for (gold, mask) in golds {
+            if let Some(Err(reason)) = mask {
+                patient
+                    .problems
+                    .push(format!("{} cannot be used: {reason}", gold.file()));
+            }
         }
         patient.note_problems(models);
         Ok(patient)
@@ -240,8 +256,14 @@ impl PatientFits {
                 let unusable = self.golds[gold as usize]
                     && fit.agreed[gold as usize].is_none()
                     && matches!(fit.outcome, FitOutcome::Fitted(_));
-                unusable.then(|| format!("{} cannot be used", gold.file()))
+                let what = format!("{} cannot be used", gold.file());
+                let told = self
+                    .problems
+                    .iter()
+                    .any(|problem| problem.starts_with(&what));
+                (unusable && !told).then_some(what)
             });
+            let gold: Vec<String> = gold.collect();
             for problem in problem.into_iter().chain(gold) {
                 if !self.problems.contains(&problem) {
                     self.problems.push(problem);
@@ -254,12 +276,13 @@ impl PatientFits {
 /// A patient's volume, and the gold standards on its grid.
 struct PatientImages {
     volume: Result<Volume, String>,
-    golds: [Option<Mask>; 2],
+    /// What is wrong with a gold standard, where it cannot be used.
+    golds: [Option<Result<Mask, String>>; 2],
     search: OrganSearch,
 }
 
 impl PatientImages {
-    fn read(files: &PatientFiles) -> Self {
+    fn read(files: &PatientFiles, masks: &MaskChoice) -> Self {
         let [scan, golds @ ..] = &files.paths;
         let volume = match (scan, &files.scan) {
             (Some(path), Ok(_)) => read_volume(path)
@@ -269,8 +292,8 @@ impl PatientImages {
             (None, Ok(_)) => Err("its scan is gone".to_owned()),
         };
         let golds = golds.each_ref().map(|path| {
-            let mask = read_volume(path.as_ref()?).ok()?.volume;
-            on_grid(&mask, volume.as_ref().ok()?, &Monitor::silent()).ok()
+            let mask = mask_on(path.as_ref()?, masks, volume.as_ref().ok()?);
+            Some(mask.map_err(|error| error.to_string()))
         });
         Self {
             volume,
@@ -310,7 +333,7 @@ impl PatientImages {
         let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
         let spacing = volume.frame.spacing();
         let agreements = (self.golds.each_ref())
-            .map(|gold| compare(&mask, gold.as_ref()?, spacing, &silent).ok());
+            .map(|gold| compare(&mask, gold.as_ref()?.as_ref().ok()?, spacing, &silent).ok());
         CohortFit::of(&fit, agreements)
     }
 }

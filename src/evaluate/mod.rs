@@ -90,6 +90,7 @@ pub fn evaluate(
         auto: parameters.variants.contains(&Variant::Auto),
         program,
         folder: &fits_folder,
+        masks: &cohort.masks,
     };
     let patients = fits::fit_all(cohort, &models, &run, observer)?;
     observer.progress(EvaluationStep::Pictures, 1.0);
@@ -154,6 +155,7 @@ fn reader(cohort: &Cohort, parameters: &EvaluationParameters) -> Option<Calibrat
         .collect();
     let fit = FitParameters {
         deform: parameters.deform.clone(),
+        mask: cohort.masks.clone(),
         ..FitParameters::default()
     };
     calibrate(&cases, &fit, &|_| ()).ok()

@@ -1,7 +1,7 @@
 //! The models of a cohort's templates: ours at every number of points, before and after fit
 //! and flips, and the reference model. For Figure 3, flips and fit are also judged each without the other.
 
-use super::cohort::{Cohort, read_volume};
+use super::cohort::Cohort;
 use super::parameters::{EvaluationParameters, ascending};
 use super::rows::{ModelKind, ModelRow, Variant, average};
 use crate::decimate::decimate;
@@ -15,7 +15,7 @@ use crate::parameters::{ModelParameters, ParameterError};
 use crate::pipeline::starts;
 use crate::progress::Monitor;
 use crate::surface::{self, Surface, SurfaceError};
-use crate::volume::VolumeError;
+use crate::volume::given_mask::GivenMaskError;
 use rayon::prelude::*;
 use std::path::PathBuf;
 
@@ -53,7 +53,7 @@ enum ModelError {
     #[error("{}: {error}", path.display())]
     Read {
         path: PathBuf,
-        error: Box<VolumeError>,
+        error: Box<GivenMaskError>,
     },
     #[error(transparent)]
     Surface(#[from] SurfaceError),
@@ -105,7 +105,8 @@ fn of_template(
     parameters: &EvaluationParameters,
 ) -> Result<Vec<Result<CohortModel, ModelError>>, ModelError> {
     let (path, _) = cohort.source(case).ok_or(ModelError::Gone)?;
-    let reading = read_volume(&path).map_err(|error| ModelError::Read {
+    let reading = cohort.read_source(case, &path);
+    let reading = reading.map_err(|error| ModelError::Read {
         path,
         error: Box::new(error),
     })?;

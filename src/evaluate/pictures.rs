@@ -4,7 +4,7 @@
 //! it, at the number of points with the greatest mean E_J; of several templates the first by
 //! name.
 
-use super::cohort::{Cohort, read_volume};
+use super::cohort::{Cohort, mask_on, read_volume};
 use super::cohort_fit::CohortFit;
 use super::error::EvaluateError;
 use super::fits::PatientFits;
@@ -13,7 +13,7 @@ use super::parameters::InSample;
 use super::rows::{self, FitRow, Gold, ModelKind};
 use super::table::Picture;
 use crate::progress::Monitor;
-use crate::segmentation::{on_grid, slices};
+use crate::segmentation::slices;
 use rayon::prelude::*;
 
 /// The pictures of all patients that have a fit of the kind that is shown.
@@ -80,10 +80,9 @@ fn png(
         error: Box::new(error),
     })?;
     let volume = reading.volume;
-    let expert = cohort.gold(case, Gold::Expert).and_then(|path| {
-        let mask = read_volume(&path).ok()?.volume;
-        on_grid(&mask, &volume, &monitor).ok()
-    });
+    let expert = cohort
+        .gold(case, Gold::Expert)
+        .and_then(|path| mask_on(&path, &cohort.masks, &volume).ok());
     let mesh = fit.mesh(model);
     let png = slices::png(&volume, &mesh, &cut, expert.as_ref(), &monitor)?;
     Ok(Some(png))

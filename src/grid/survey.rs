@@ -7,8 +7,16 @@ use rayon::prelude::*;
 use crate::grid::volume::Volume;
 use crate::progress::{Cancelled, Monitor};
 
+/// More distinct values than this are intensities, unless they are a label map beyond doubt.
+const FEW_LABELS: usize = 256;
 /// More distinct values than this are intensities.
-const MOST_LABELS: usize = 256;
+pub const MOST_LABELS: usize = 1 << 16;
+/// Least share of the voxels of the labels, without those of the most frequent one, whose next voxel
+/// along i carries the same label, in a map of more than [`FEW_LABELS`] labels. The most frequent one
+/// is left out because the air of a CT is as even as a label.
+const PIECEWISE_OF_MANY: f64 = 0.8;
+/// Labelled voxels from which the share says something.
+const ENOUGH: usize = 1000;
 /// Least share of labelled voxels whose next voxel along i carries the same label: a label map
 /// consists of pieces, an image with few counts does not.
 const PIECEWISE: f64 = 0.5;
@@ -106,7 +114,31 @@ fn range_of_part(values: &[f32]) -> (f32, f32, usize) {
     (minimum, maximum, not_finite)
 }
 
-/// Counts the voxels of every label; `None` if the values are intensities.
+/// Voxels of a label and the runs along i that they make up.
+#[derive(Debug, Clone, Copy, Default)]
+struct LabelRuns {
+    voxels: usize,
+    runs: usize,
+}
+
+/// Whether more than [`FEW_LABELS`] labels are pieces: see [`PIECEWISE_OF_MANY`]. Too few voxels tell
+/// nothing; then `undecided`.
+pub fn many_are_pieces(counts: impl Iterator<Item = (usize, usize)>, undecided: bool) -> bool {
+    let (mut voxels, mut runs, mut greatest) = (0, 0, (0, 0));
+    for label in counts {
+        voxels += label.0;
+        runs += label.1;
+        greatest = greatest.max(label);
+    }
+    let (voxels, runs) = (voxels - greatest.0, runs - greatest.1);
+    if voxels < ENOUGH {
+        return undecided;
+    }
+    (voxels - runs) as f64 >= PIECEWISE_OF_MANY * voxels as f64
+}
+
+/// Counts the voxels of every label but 0; `None` if the values are intensities. Missing values count
+/// as 0.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -114,33 +146,112 @@ pub fn label_map(
     volume: &Volume,
     monitor: &Monitor,
 ) -> Result<Option<BTreeMap<i64, usize>>, Cancelled> {
-    let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
+    let mut counts: BTreeMap<i64, LabelRuns> = BTreeMap::new();
+    let pieces = |counts: &BTreeMap<i64, LabelRuns>, undecided| {
+        many_are_pieces(counts.values().map(|l| (l.voxels, l.runs)), undecided)
+    };
     let (mut labelled, mut same) = (0usize, 0usize);
+    let mut many = false;
     for (index, row) in volume.voxels.chunks(volume.shape[0]).enumerate() {
         if index.is_multiple_of(1024) {
             monitor.check()?;
+            if many && !pieces(&counts, true) {
+                return Ok(None);
+            }
         }
-        for run in row.chunk_by(|a, b| a == b) {
+        for run in row.chunk_by(|a, b| a == b || a.is_nan() && b.is_nan()) {
             let value = run[0];
-            if value == 0.0 {
+            if value == 0.0 || value.is_nan() {
                 continue;
             }
-            if value.fract() != 0.0 || !(value.abs() < 16_777_216.0) {
+            // Beyond 2^63 there are no labels.
+            if value.fract() != 0.0 || !(value.abs() < 9.2e18) {
                 return Ok(None);
             }
-            *counts.entry(value as i64).or_default() += run.len();
+            let label = counts.entry(value as i64).or_default();
+            label.voxels += run.len();
+            label.runs += 1;
             labelled += run.len();
             same += run.len() - 1;
-            let grainy = labelled > 1000 && (same as f64) < 0.25 * labelled as f64;
+            let grainy = labelled > ENOUGH && (same as f64) < 0.25 * labelled as f64;
             if counts.len() > MOST_LABELS || grainy {
                 return Ok(None);
+            }
+            if counts.len() > FEW_LABELS && !many {
+                many = true;
+                if !pieces(&counts, true) {
+                    return Ok(None);
+                }
             }
         }
     }
     // A constant volume is no label map.
     let everything = labelled == volume.voxels.len() && counts.len() == 1;
-    let piecewise = counts.len() <= 1 || same as f64 >= PIECEWISE * labelled as f64;
-    Ok((labelled > 0 && piecewise && !everything).then_some(counts))
+    let piecewise = match many {
+        true => pieces(&counts, false),
+        false => counts.len() <= 1 || same as f64 >= PIECEWISE * labelled as f64,
+    };
+    let counts = counts.into_iter().map(|(label, l)| (label, l.voxels));
+    Ok((labelled > 0 && piecewise && !everything).then(|| counts.collect()))
+}
+
+/// The voxels of every value if all are whole numbers, 0 and the background among them; `None` for
+/// intensities. Unlike [`label_map`] it asks nothing of how they lie. Missing values are not counted.
+pub fn whole_values(volume: &Volume) -> Option<BTreeMap<i64, usize>> {
+    let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
+    for run in volume.voxels.chunk_by(|a, b| a == b) {
+        let value = run[0];
+        if value.is_nan() {
+            continue;
+        }
+        if value.fract() != 0.0 || !(value.abs() < 9.2e18) || counts.len() > MOST_LABELS {
+            return None;
+        }
+        *counts.entry(value as i64).or_default() += run.len();
+    }
+    (!counts.is_empty() && counts.len() <= MOST_LABELS).then_some(counts)
+}
+
+/// The objects of a map with the label counts `labels` (0 left out), and the value of its background.
+///
+/// The background is 0, unless most of the volume's border has another value that cannot be an object:
+/// a negative one, one of a map without any 0, or one that nine tenths of the border have. Then 0 is
+/// an object like any other.
+pub fn objects(volume: &Volume, labels: &BTreeMap<i64, usize>) -> (BTreeMap<i64, usize>, i64) {
+    let value = |v: f32| if v.is_nan() { 0 } else { v as i64 };
+    let [nx, ny, nz] = volume.shape;
+    let mut border: BTreeMap<i64, usize> = BTreeMap::new();
+    let mut all = 0;
+    for (row, voxels) in volume.voxels.chunks(nx).enumerate() {
+        let (j, k) = (row % ny, row / ny);
+        let whole = j == 0 || k == 0 || j + 1 == ny || k + 1 == nz;
+        let ends = [voxels[0], voxels[nx - 1]];
+        let seen = if whole { voxels } else { &ends[..] };
+        all += seen.len();
+        for run in seen.chunk_by(|a, b| a == b) {
+            *border.entry(value(run[0])).or_default() += run.len();
+        }
+    }
+    let most = border
+        .iter()
+        .max_by_key(|(label, n)| (**n, std::cmp::Reverse(**label)));
+    let (outer, share) = most.map_or((0, 0.0), |(l, n)| (*l, *n as f64 / all as f64));
+    let zeros = volume.voxels.len() - labels.values().sum::<usize>();
+    let surrounds = match zeros {
+        0 => share > 0.5,
+        _ => outer < 0 && share > 0.5 || share >= 0.9,
+    };
+    let mut objects = labels.clone();
+    if outer == 0 || !surrounds {
+        return (objects, 0);
+    }
+    objects.remove(&outer);
+    // Missing values are no object.
+    let zeros = volume.voxels.iter().filter(|v| **v == 0.0).count();
+    if zeros > 0 {
+        objects.insert(0, zeros);
+    }
+    (objects, outer)
 }
 
 /// Otsu's threshold of the values in `rows` (IEEE SMC 1979), 256 bins between minimum and
@@ -218,6 +329,64 @@ mod tests {
                 .labels,
             None
         );
+    }
+
+    #[test]
+    fn many_labels_are_told_from_counts() {
+        // 512 and 8000 blocks, numbered from 1 and beyond 2^24.
+        for (across, first) in [(8, 1_usize), (20, 1), (8, 1 << 25)] {
+            let side = 3 * across;
+            let blocks = volume([side; 3], |n| {
+                let [i, j, k] = [n % side, n / side % side, n / side / side].map(|x| x / 3);
+                // Steps of 4: 32-bit floats tell them apart up to 2^26.
+                (first + 4 * (i + across * (j + across * k))) as f32
+            });
+            let labels = survey(&blocks, &Monitor::silent()).unwrap().labels.unwrap();
+            assert_eq!(labels.len(), across.pow(3));
+            assert!(labels.values().all(|n| *n == 27));
+        }
+        // Counts of more than 256 kinds, smooth ones, and tissue in even air.
+        for of in [
+            |n: usize| ((n * 7919) % 997) as f32,
+            |n: usize| (n % 60 + n / 60 % 60 + n / 3600) as f32 * 3.0,
+            |n: usize| {
+                if n % 60 < 45 {
+                    -1024.0
+                } else {
+                    ((n * 31) % 1511) as f32
+                }
+            },
+        ] {
+            let scan = volume([60, 60, 60], of);
+            assert_eq!(survey(&scan, &Monitor::silent()).unwrap().labels, None);
+        }
+    }
+
+    #[test]
+    fn the_background_is_what_surrounds() {
+        let ball = |inside: f32, outside: f32| {
+            volume([21; 3], move |n| {
+                let centre = [n % 21, n / 21 % 21, n / 441].map(|x| x as f64 - 10.0);
+                let within = centre.iter().map(|x| x * x).sum::<f64>() < 49.0;
+                if within { inside } else { outside }
+            })
+        };
+        let found = |v: &Volume| {
+            let labels = label_map(v, &Monitor::silent()).unwrap().unwrap();
+            let (objects, background) = objects(v, &labels);
+            (objects.into_keys().collect::<Vec<_>>(), background)
+        };
+        assert_eq!(found(&ball(1.0, 0.0)), (vec![1], 0));
+        assert_eq!(found(&ball(255.0, f32::NAN)), (vec![255], 0));
+        assert_eq!(found(&ball(-1.0, 0.0)), (vec![-1], 0));
+        assert_eq!(found(&ball(1.0, -1.0)), (vec![1], -1));
+        assert_eq!(found(&ball(0.0, -1.0)), (vec![0], -1));
+        assert_eq!(found(&ball(7.0, -1024.0)), (vec![7], -1024));
+        assert_eq!(found(&ball(0.0, 255.0)), (vec![0], 255));
+        assert_eq!(found(&ball(2.0, 1.0)), (vec![2], 1));
+        // An object that is cut off at the border stays one.
+        let slab = volume([20, 20, 20], |n| f32::from(u8::from(n % 20 < 12)));
+        assert_eq!(found(&slab), (vec![1], 0));
     }
 
     #[test]

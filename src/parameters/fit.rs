@@ -8,6 +8,7 @@ use crate::locate::Hints;
 use crate::model::Organ;
 use crate::polar::PolarParameters;
 use crate::volume::Volume;
+use crate::volume::given_mask::MaskChoice;
 
 /// Everything that determines a segmentation, apart from the files.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +20,8 @@ pub struct FitParameters {
     pub model: String,
     /// Id of an expert's mask, if there is one.
     pub expert: Option<String>,
+    /// Which structure of a mask's file is meant, and whether a mask on another grid is resampled.
+    pub mask: MaskChoice,
     /// Id of the reader's profile to draw the wall by, if there is one.
     pub reader: Option<String>,
     /// The organ that the model shows.
@@ -50,6 +53,7 @@ impl Default for FitParameters {
             frame: None,
             model: FitParameters::AUTO.into(),
             expert: None,
+            mask: MaskChoice::default(),
             reader: None,
             organ: Organ::LeftVentricle,
             place: KnownPlace::default(),
@@ -177,7 +181,8 @@ mod tests {
     use super::super::{FIT_SPECS, Kind, Parameters, checks};
     use super::*;
     use crate::geometry::frame::VoxelToPatient;
-    use serde_json::json;
+    use crate::volume::given_mask::MaskLabel;
+    use serde_json::{Value, json};
 
     fn pairs(list: &[(&str, &str)]) -> Result<FitParameters, ParameterError> {
         FitParameters::from_pairs(list.iter().copied())
@@ -219,6 +224,11 @@ mod tests {
             &[("superior", "0,-2,1e-1"), ("anterior", "0,-1,0")],
             &[("superior", "frame")],
             &[("model", "auto,tpl_0123,mdl_4")],
+            &[("label", "-2"), ("resample", "true")],
+            &[
+                ("label", "Left Ventricle Myocardium"),
+                ("resample", "false"),
+            ],
         ]);
     }
 
@@ -278,6 +288,31 @@ mod tests {
         // `seed` is the random seed of a model; a fit has none.
         let seed = refusal(&[("seed", "1,2,3")]);
         assert!(seed.fix.contains("`seed_point`"), "{}", seed.fix);
+    }
+
+    #[test]
+    fn a_structure_has_a_number_or_a_name_and_a_switch_is_true_or_false() {
+        let label = |text: &str| pairs(&[("label", text)]).map(|p| p.mask.label);
+        assert_eq!(label("-3").unwrap(), Some(MaskLabel::Number(-3)));
+        assert_eq!(
+            label(" wall ").unwrap(),
+            Some(MaskLabel::Name("wall".into()))
+        );
+        assert_eq!(label(" ").unwrap_err().field, "label");
+        let json = |value: Value| {
+            let object = json!({ "label": value });
+            FitParameters::from_json(object.as_object().unwrap()).map(|p| p.mask.label)
+        };
+        assert_eq!(json(json!(2)).unwrap(), Some(MaskLabel::Number(2)));
+        assert_eq!(json(json!("2")).unwrap(), Some(MaskLabel::Number(2)));
+        assert!(json(json!(2.5)).is_err());
+        assert!(pairs(&[("resample", "true")]).unwrap().mask.resample);
+        assert!(!pairs(&[("resample", "false")]).unwrap().mask.resample);
+        for bad in ["", "1", "yes", "TRUE"] {
+            assert!(refusal(&[("resample", bad)]).fix.contains("true or false"));
+        }
+        let text = json!({"resample": "true"});
+        assert!(FitParameters::from_json(text.as_object().unwrap()).is_err());
     }
 
     #[test]

@@ -8,6 +8,7 @@ use crate::geometry::Vec3;
 use crate::locate::patient_orientation::Superior;
 use crate::model::Organ;
 use crate::polar::Projection;
+use crate::volume::given_mask::MaskLabel;
 use serde_json::{Value, json};
 
 impl Parameters for FitParameters {
@@ -51,12 +52,54 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
             more: 0,
         },
         default: "",
-        summary: "Id of a volume with an expert's mask (values above 0.5) to compare with",
+        summary: "Id of a volume with an expert's mask to compare with: a mask, a label map, a DICOM \
+                  Segmentation, or probabilities of which those above 0.5 count",
         read: |d, v| {
             d.expert = Some(v.text().into());
             Ok(())
         },
         write: |p| json!(p.expert),
+    },
+    ParameterSpec {
+        name: "label",
+        kind: Kind::Text {
+            pattern: r"^.{1,64}$",
+            example: "2, or the name of a DICOM segment",
+        },
+        default: "",
+        summary: "Which structure of the expert's mask is meant, if the file holds several: the number of \
+                  a label or segment, or the name or code of a segment. Default: the only one; of \
+                  segments, the one coded as myocardium",
+        read: |d, v| {
+            let Ok(label) = v.text().parse();
+            match v.text().trim().is_empty() {
+                true => Err("a label has a number or a name".into()),
+                false => {
+                    d.mask.label = Some(label);
+                    Ok(())
+                }
+            }
+        },
+        write: |p| match &p.mask.label {
+            None => Value::Null,
+            Some(MaskLabel::Number(number)) => json!(number.to_string()),
+            Some(MaskLabel::Name(name)) => json!(name),
+        },
+    },
+    ParameterSpec {
+        name: "resample",
+        kind: Kind::Switch,
+        default: "false",
+        summary: "Whether an expert's mask on another grid of voxels is resampled by the nearest voxel; \
+                  without it, such a mask is refused",
+        read: |d, v| {
+            d.mask.resample = v.switch();
+            Ok(())
+        },
+        write: |p| match p.mask.resample {
+            true => json!(true),
+            false => Value::Null,
+        },
     },
     ParameterSpec {
         name: "reader",
@@ -80,8 +123,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "frame",
         frame => frame,
         0..=1_000_000,
-        "Frame of a 4-D volume or gate, counted from 0; without it, the gates of a DICOM file are \
-         summed"
+        "Frame of a 4-D volume or gate, counted from 0 (0 is the first); without it, the gates of a \
+         heart beat are summed"
     ),
     choice!(
         "organ",

@@ -17,6 +17,7 @@ pub enum RawValue<'a> {
 pub enum Checked {
     Integer(u64),
     Number(f64),
+    Switch(bool),
     Integers(Vec<i64>),
     Numbers(Vec<f64>),
     Text(String),
@@ -40,6 +41,13 @@ impl Checked {
         match self {
             Checked::Number(x) => *x,
             _ => unreachable!("checked against Kind::Number"),
+        }
+    }
+
+    pub(super) fn switch(&self) -> bool {
+        match self {
+            Checked::Switch(on) => *on,
+            _ => unreachable!("checked against Kind::Switch"),
         }
     }
 
@@ -110,6 +118,15 @@ impl RawValue<'_> {
                 }
                 Ok(Checked::Number(x))
             }
+            Kind::Switch => match self {
+                RawValue::Text("true") | RawValue::Json(Value::Bool(true)) => {
+                    Ok(Checked::Switch(true))
+                }
+                RawValue::Text("false") | RawValue::Json(Value::Bool(false)) => {
+                    Ok(Checked::Switch(false))
+                }
+                _ => Err(format!("{self} is neither true nor false")),
+            },
             Kind::Choice(words) => match self.as_text() {
                 Some(word) if words.contains(&word) => Ok(Checked::Text(word.into())),
                 _ => Err(format!("{self} is not one of the choices")),
@@ -152,10 +169,14 @@ impl RawValue<'_> {
                 }
                 _ => Err(format!("{self} is not an id of this kind")),
             },
-            Kind::Text { .. } => self
-                .as_text()
-                .map(|t| Checked::Text(t.into()))
-                .ok_or(format!("{self} is not text")),
+            // A label may be a number: 2 and "2" are the same.
+            Kind::Text { .. } => match self {
+                RawValue::Json(Value::Number(n)) if n.is_i64() => Ok(Checked::Text(n.to_string())),
+                _ => self
+                    .as_text()
+                    .map(|t| Checked::Text(t.into()))
+                    .ok_or(format!("{self} is not text")),
+            },
         }
     }
 

@@ -17,6 +17,8 @@ pub enum Kind {
         /// Largest value.
         max: f64,
     },
+    /// `true` or `false` (in JSON a boolean; on the command line the flag alone is `true`).
+    Switch,
     /// One of the listed words.
     Choice(&'static [&'static str]),
     /// `count` whole numbers, separated by commas (in JSON also an array).

@@ -164,6 +164,7 @@ mod tests {
             &[("iso", "absolute:0.47"), ("box", "1,2,3,40,50,60")],
             &[("method", "paper"), ("label", "-3"), ("w2", "0.5")],
             &[("seed_point", "3,4,5"), ("guard", "0"), ("frame", "2")],
+            &[("label", "0"), ("iso", "below:0")],
         ]);
     }
 
@@ -198,12 +199,23 @@ mod tests {
     }
 
     #[test]
-    fn iso_takes_three_forms() {
+    fn iso_takes_four_forms() {
         let iso = |text: &str| pairs(&[("iso", text)]).map(|p| p.surface.iso);
         assert_eq!(iso("auto").unwrap(), IsoLevel::Auto);
         assert_eq!(iso("50%").unwrap(), IsoLevel::Fraction(0.5));
         assert_eq!(iso("absolute:-4e2").unwrap(), IsoLevel::Absolute(-400.0));
-        for bad in ["0.5", "0%", "100%", "absolute:nan", "absolute:", "half", ""] {
+        assert_eq!(iso("below:-1.5").unwrap(), IsoLevel::Below(-1.5));
+        for bad in [
+            "0.5",
+            "0%",
+            "100%",
+            "absolute:nan",
+            "absolute:",
+            "below:inf",
+            "below",
+            "half",
+            "",
+        ] {
             assert_eq!(iso(bad).unwrap_err().field, "iso", "{bad}");
         }
     }

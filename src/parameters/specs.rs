@@ -54,18 +54,19 @@ pub const SPECS: &[ParameterSpec<ModelParameters>] = &[
         "frame",
         frame => frame,
         0..=1_000_000,
-        "Frame of a 4-D volume or gate, counted from 0; without it, the gates of a DICOM file are \
-         summed"
+        "Frame of a 4-D volume or gate, counted from 0 (0 is the first); without it, the gates of a \
+         heart beat are summed"
     ),
     ParameterSpec {
         name: "iso",
         kind: Kind::Text {
-            pattern: r"^(auto|[0-9.]+%|absolute:[-+0-9.eE]+)$",
-            example: "auto, 50% (of the ventricle's maximum) or absolute:0.47",
+            pattern: r"^(auto|[0-9.]+%|(absolute|below):[-+0-9.eE]+)$",
+            example: "auto, 50% (of the ventricle's maximum), absolute:0.47 or below:0",
         },
         default: "auto",
-        summary: "Iso-value of the surface: auto, a percentage of the ventricle's maximum (50%), or \
-                  an intensity (absolute:0.47)",
+        summary: "Iso-value of the surface: auto, a percentage of the ventricle's maximum (50%), an \
+                  intensity (absolute:0.47), or an intensity below which the object lies (below:0, for \
+                  signed distances and objects darker than their surroundings)",
         read: |d, v| {
             d.surface.iso = parse_iso(v.text())?;
             Ok(())
@@ -75,6 +76,7 @@ pub const SPECS: &[ParameterSpec<ModelParameters>] = &[
                 IsoLevel::Auto => "auto".to_owned(),
                 IsoLevel::Fraction(f) => format!("{}%", f * 100.0),
                 IsoLevel::Absolute(x) => format!("absolute:{x}"),
+                IsoLevel::Below(x) => format!("below:{x}"),
             })
         },
     },
@@ -136,7 +138,7 @@ pub const SPECS: &[ParameterSpec<ModelParameters>] = &[
         name: "label",
         kind: Kind::Integers { count: 1 },
         default: "",
-        summary: "Label of the object in a label map",
+        summary: "Label of the object in a label map; 0 and negative ones too",
         read: |d, v| {
             d.set_isolate("label", Isolate::Label(v.integers()[0]));
             Ok(())
@@ -159,7 +161,8 @@ pub const SPECS: &[ParameterSpec<ModelParameters>] = &[
         surface.mask_smoothing,
         0.0..=3.0,
         "0.8",
-        "Sigma in voxels of the Gaussian that smooths label maps before the surface is extracted"
+        "Sigma of the Gaussian that smooths label maps before the surface is extracted, in voxels (edges of \
+         a cube of a voxel's volume): the same length along every axis"
     ),
     optional_choice!(
         "denoise",
@@ -376,11 +379,14 @@ fn parse_iso(text: &str) -> Result<IsoLevel, String> {
     if let Some(value) = text.strip_prefix("absolute:").and_then(finite) {
         return Ok(IsoLevel::Absolute(value));
     }
+    if let Some(value) = text.strip_prefix("below:").and_then(finite) {
+        return Ok(IsoLevel::Below(value));
+    }
     match text.strip_suffix('%').and_then(finite) {
         Some(percent) if percent > 0.0 && percent < 100.0 => {
             Ok(IsoLevel::Fraction(percent / 100.0))
         }
         Some(percent) => Err(format!("{percent} % is not between 0 % and 100 %")),
-        None => Err(format!("`{text}` has none of the three forms")),
+        None => Err(format!("`{text}` has none of the four forms")),
     }
 }

@@ -224,6 +224,7 @@ impl<P: Parameters> ParameterSpec<P> {
             Kind::Integer { min, max: u64::MAX } => format!("a whole number from {min}"),
             Kind::Integer { min, max } => format!("a whole number from {min} to {max}"),
             Kind::Number { min, max } => format!("a number from {min} to {max}"),
+            Kind::Switch => "true or false".into(),
             Kind::Choice(words) => format!("one of {}", words.join(", ")),
             Kind::Direction(words) => {
                 let words = words.join(", ");

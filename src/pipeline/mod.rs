@@ -22,7 +22,7 @@ use crate::parameters::{ModelParameters, Parameters};
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, Closeness, MeasuredSurface, ModelReport, ReportInput};
 use crate::retile::RetileError;
-use crate::surface::{self, Isolate, SurfaceError};
+use crate::surface::{self, IsoLevel, Isolate, SurfaceError};
 use crate::volume::dicom::Provenance;
 use crate::volume::{
     self, ReadLimits, ReadOptions, Reading, Volume, VolumeError, VolumeFacts, VolumeFile,
@@ -159,9 +159,52 @@ pub fn generate(
     let options = ReadOptions {
         frame: parameters.frame,
     };
-    let reading = volume::read(files, &options, limits, monitor).map_err(PipelineError::Volume)?;
+    let mut reading =
+        volume::read(files, &options, limits, monitor).map_err(PipelineError::Volume)?;
+    let told_apart = tell_apart(files, &mut reading, parameters, limits, monitor)?;
     let read_ms = monitor.now_ms() - start;
-    from_reading(&reading, parameters, read_ms, monitor)
+    let (volume, facts) = (&reading.volume, &reading.facts);
+    Ok(Model {
+        frame_of_reference_uid: reading.frame_of_reference().map(str::to_owned),
+        ..from_volume(volume, facts, parameters, told_apart, read_ms, monitor)?
+    })
+}
+
+/// Replaces labels beyond 2^24, which the volume's 32-bit floats do not tell apart, by 1 for the voxels
+/// of the object's label and 0 for all others, and returns that label. Other volumes stay as they are.
+fn tell_apart(
+    files: &[VolumeFile],
+    reading: &mut Reading,
+    parameters: &ModelParameters,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Option<i64>, PipelineError> {
+    if !volume::labels_are_rounded(reading) {
+        return Ok(None);
+    }
+    let labels = reading.facts.intensity.labels.iter().flatten();
+    let present: Vec<(i64, usize)> = labels.map(|l| (l.label, l.voxels as usize)).collect();
+    let surface = &parameters.surface;
+    let label = match (surface.isolate, &present[..]) {
+        (Isolate::Label(label), _) => label,
+        (Isolate::Auto, [(label, _)]) if surface.iso == IsoLevel::Auto => *label,
+        (Isolate::Auto, [_, ..]) if surface.iso == IsoLevel::Auto => {
+            return Err(PipelineError::Surface(SurfaceError::LabelNeeded {
+                present,
+            }));
+        }
+        _ => return Ok(None),
+    };
+    let carries = volume::voxels_of_label(files, reading, label, limits, monitor);
+    let carries = carries.map_err(PipelineError::Volume)?;
+    if !carries.contains(&true) {
+        let error = SurfaceError::NoSuchLabel { label, present };
+        return Err(PipelineError::Surface(error));
+    }
+    for (voxel, carries) in reading.volume.voxels.iter_mut().zip(carries) {
+        *voxel = f32::from(u8::from(carries));
+    }
+    Ok(Some(label))
 }
 
 /// Makes a model of a volume in memory, for example one made by [`Volume::from_array`]. For a volume
@@ -175,10 +218,11 @@ pub fn generate_from(
     monitor: &Monitor,
 ) -> Result<Model, PipelineError> {
     let facts = volume::describe(volume).map_err(PipelineError::Volume)?;
-    from_volume(volume, &facts, parameters, 0.0, monitor)
+    from_volume(volume, &facts, parameters, None, 0.0, monitor)
 }
 
 /// Makes a model of a volume that was read; `read_ms` is the time that reading took, for the report.
+/// Labels beyond 2^24 are told apart by [`generate`] alone.
 ///
 /// # Errors
 /// [`PipelineError`].
@@ -191,20 +235,31 @@ pub fn from_reading(
     let (volume, facts) = (&reading.volume, &reading.facts);
     Ok(Model {
         frame_of_reference_uid: reading.frame_of_reference().map(str::to_owned),
-        ..from_volume(volume, facts, parameters, read_ms, monitor)?
+        ..from_volume(volume, facts, parameters, None, read_ms, monitor)?
     })
 }
 
+/// As [`from_reading`]. `told_apart` is the label for which a 1 stands in `volume`, if it is not the
+/// volume of `facts` itself.
 fn from_volume(
     volume: &Volume,
     facts: &VolumeFacts,
     parameters: &ModelParameters,
+    told_apart: Option<i64>,
     read_ms: f64,
     monitor: &Monitor,
 ) -> Result<Model, PipelineError> {
     let mut laps = Laps::new(read_ms, monitor);
-    let surface =
-        surface::extract(volume, &parameters.surface, monitor).map_err(PipelineError::Surface)?;
+    let mut extracted = parameters.surface.clone();
+    if told_apart.is_some() {
+        extracted.isolate = Isolate::Label(1);
+    }
+    let surface = surface::extract(volume, &extracted, monitor);
+    let mut surface = surface.map_err(PipelineError::Surface)?;
+    if let Some(label) = told_apart {
+        surface.facts.label = Some(label);
+        surface.facts.range = [facts.intensity.minimum, facts.intensity.maximum].map(f64::from);
+    }
     laps.end(Stage::Surface);
     // The two are independent.
     let (tiled, reference) = rayon::join(

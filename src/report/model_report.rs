@@ -13,7 +13,7 @@ use super::sections::{
 use super::stage_facts;
 use crate::optimise::{FitnessSummary, OptimiseParameters, Optimised};
 use crate::retile::Tiled;
-use crate::surface::Surface;
+use crate::surface::{Surface, SurfaceFacts};
 
 /// The report of a model. `serde_json::to_value(&report)` is what the service answers.
 ///
@@ -83,6 +83,7 @@ impl ModelReport {
         let mut warnings = stage_facts::warnings(input.surface, input.tiled, input.optimised);
         warnings.extend(doubts(&measures.mesh, &surface, input.tiled));
         warnings.extend(coarseness(&measures));
+        warnings.extend(volume_lost(&input.surface.facts, &measures.mesh));
         Self {
             software: Program::this(),
             input: input.input,
@@ -126,7 +127,14 @@ impl ModelReport {
     /// The main figures, one sentence a line.
     pub fn headlines(&self) -> Vec<String> {
         let (mesh, shape, distance) = (&self.mesh, &self.shape, &self.distance);
-        vec![
+        let mask = self.surface.facts.get("mask_ml").and_then(Value::as_f64);
+        let mask = mask.map(|mask| {
+            let model = self.mesh.volume_ml;
+            let off = 100.0 * (model / mask - 1.0);
+            let [mask, model] = [mask, model].map(millilitres);
+            format!("mask {mask} ml, model {model} ml ({off:+.2} %)")
+        });
+        let lines = vec![
             format!(
                 "{} points, {} triangles, Euler characteristic {}, {} self-intersections",
                 mesh.vertices, mesh.triangles, mesh.euler_characteristic, mesh.self_intersections
@@ -143,7 +151,8 @@ impl ModelReport {
                 "{:.2} mm mean and {:.2} mm largest distance to the surface, volume {:+.2} %",
                 distance.mean_mm, distance.hausdorff_mm, distance.volume_error_percent
             ),
-        ]
+        ];
+        lines.into_iter().chain(mask).collect()
     }
 
     /// The figures that mesh files carry.
@@ -166,6 +175,32 @@ impl ModelReport {
         summary.extend(figures.map(|(name, x)| (name.to_owned(), x.into())));
         summary
     }
+}
+
+/// Deviation of a model's volume from its mask's above which there is a warning.
+const VOLUME_SLACK: f64 = 0.02;
+
+/// A volume with enough digits for objects of any size.
+fn millilitres(volume: f64) -> String {
+    match (1e-2..1e6).contains(&volume) {
+        true => format!("{volume:.3}"),
+        false => format!("{volume:.3e}"),
+    }
+}
+
+/// A sentence if the model of a mask does not have the volume of the mask's voxels.
+fn volume_lost(surface: &SurfaceFacts, mesh: &MeshFacts) -> Option<String> {
+    let mask = surface.mask_ml?;
+    let off = mesh.volume_ml / mask - 1.0;
+    (off.abs() > VOLUME_SLACK).then(|| {
+        format!(
+            "The model encloses {} ml and the mask's voxels have {} ml ({:+.1} %): parts left out, cavities \
+             and handles removed, an `iso` of one's own, or too few `points`.",
+            millilitres(mesh.volume_ml),
+            millilitres(mask),
+            100.0 * off
+        )
+    })
 }
 
 /// Sentences about the promises that a model breaks.

@@ -59,6 +59,7 @@ fn surface_facts(facts: &SurfaceFacts) -> Map<String, Value> {
             "correlation_mm": noise.correlation_mm,
             "moved_mm": noise.moved_mm,
         })),
+        "mask_ml": facts.mask_ml,
         "region_ml": facts.region_ml,
         "touches_border": facts.touches_border,
         "not_finite_voxels": facts.not_finite,

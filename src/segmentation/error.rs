@@ -1,6 +1,5 @@
 //! Why there is no segmentation.
 
-use super::expert_mask::ExpertMaskError;
 use crate::deform::DeformError;
 use crate::export::read_json::ReadMeshError;
 use crate::locate::LocateError;
@@ -8,6 +7,7 @@ use crate::model::TemplateError;
 use crate::parameters::ParameterError;
 use crate::progress::Cancelled;
 use crate::volume::VolumeError;
+use crate::volume::given_mask::GivenMaskError;
 
 /// Why there is no segmentation: one variant for each step that can fail, with that step's error.
 /// Cancellation is [`SegmentationError::Cancelled`], whichever step met it.
@@ -16,9 +16,6 @@ pub enum SegmentationError {
     /// The files hold no usable volume.
     #[error(transparent)]
     Volume(VolumeError),
-    /// The files of the expert's mask hold no usable volume.
-    #[error("the expert's mask: {0}")]
-    ExpertVolume(VolumeError),
     /// A parameter does not suit the volume.
     #[error("`{}`: {}", .0.field, .0.message)]
     Parameter(#[from] ParameterError),
@@ -75,9 +72,9 @@ pub enum SegmentationError {
         /// The wall that was asked for.
         asked: &'static str,
     },
-    /// The expert's mask cannot be compared with the volume's.
-    #[error(transparent)]
-    ExpertMask(ExpertMaskError),
+    /// The expert's mask cannot be used.
+    #[error("the expert's mask: {0}")]
+    ExpertMask(GivenMaskError),
     /// The organ is not found in the volume.
     #[error(transparent)]
     NotFound(LocateError),
@@ -96,10 +93,10 @@ impl SegmentationError {
     }
 }
 
-impl From<ExpertMaskError> for SegmentationError {
-    fn from(error: ExpertMaskError) -> Self {
+impl From<GivenMaskError> for SegmentationError {
+    fn from(error: GivenMaskError) -> Self {
         match error {
-            ExpertMaskError::Cancelled(cancelled) => cancelled.into(),
+            GivenMaskError::Cancelled(cancelled) => cancelled.into(),
             error => SegmentationError::ExpertMask(error),
         }
     }

@@ -1,7 +1,7 @@
 //! The files of a segmentation.
 
 use super::cavity::cavity;
-use super::from_files::SegmentedVolume;
+use super::from_files::{ExpertFacts, SegmentedVolume};
 use super::mask_place::MaskPlace;
 use super::region::region;
 use super::report::report_json;
@@ -222,6 +222,7 @@ impl SegmentedVolume {
         let mut warnings = self.reading.facts.warnings.clone();
         let frame = &self.reading.volume.frame;
         warnings.extend(MaskPlace::warning(frame, self.parameters.mask_grid));
+        warnings.extend(self.expert.iter().flat_map(ExpertFacts::warnings));
         warnings
     }
 

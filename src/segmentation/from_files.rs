@@ -1,13 +1,13 @@
 //! A segmentation from files: read, segment, keep what the output needs.
 
 use super::error::SegmentationError;
-use super::expert_mask;
 use super::order::{NamedReader, SegmentationOrder};
 use super::segment::{Segmentation, SegmentationParameters, segment};
 use super::templates::prepare;
 use crate::model::Organ;
 use crate::parameters::FitParameters;
 use crate::progress::Monitor;
+use crate::volume::given_mask::{GivenMask, PlacedMask, read_mask};
 use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeFile};
 
 /// A volume's segmentation with what it was made from.
@@ -15,10 +15,55 @@ use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeF
 pub struct SegmentedVolume {
     /// The volume and the facts of its header.
     pub reading: Reading,
+    /// What was taken of the expert's mask, if one was given.
+    pub expert: Option<ExpertFacts>,
     /// The segmentation.
     pub segmentation: Segmentation,
     /// The parameters used.
     pub parameters: FitParameters,
+}
+
+/// What was taken of an expert's mask.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExpertFacts {
+    /// The structure; `None` if the file holds nothing else.
+    pub structure: Option<String>,
+    /// Whether it was resampled to the volume's grid.
+    pub resampled: bool,
+    /// Voxels outside the volume, which were left out.
+    pub outside: usize,
+}
+
+impl ExpertFacts {
+    fn of(given: &GivenMask, placed: &PlacedMask) -> Self {
+        Self {
+            structure: given.structure.clone(),
+            resampled: placed.resampled,
+            outside: placed.outside,
+        }
+    }
+
+    /// What a person needs to know of the comparison, in sentences.
+    pub fn warnings(&self) -> Vec<String> {
+        let structure = self.structure.as_ref().map(|structure| {
+            format!(
+                "Of the expert's mask, {structure} was compared; it holds other structures too."
+            )
+        });
+        let resampled = self.resampled.then(|| {
+            "The expert's mask lies on another grid and was resampled by the nearest voxel.".into()
+        });
+        let outside = (self.outside > 0).then(|| {
+            format!(
+                "{} voxels of the expert's mask lie outside the volume and were left out.",
+                self.outside
+            )
+        });
+        [structure, resampled, outside]
+            .into_iter()
+            .flatten()
+            .collect()
+    }
 }
 
 /// Segments the volume of `order`.
@@ -34,12 +79,17 @@ pub fn from_files(
     let parts = 1 + usize::from(order.expert.is_some());
     let reading = read(order.volume, frame, limits, &monitor.part(0, parts))
         .map_err(|error| unusable(error, SegmentationError::Volume))?;
+    let parameters = order.parameters.clone();
+    let choice = &parameters.mask;
     let expert = order
         .expert
-        .map(|files| read(files, None, limits, &monitor.part(1, parts)))
-        .transpose()
-        .map_err(|error| unusable(error, SegmentationError::ExpertVolume))?;
-    let parameters = order.parameters.clone();
+        .map(|files| {
+            let given = read_mask(files, choice, limits, &monitor.part(1, parts))?;
+            let grid = (reading.volume.shape, &reading.volume.frame);
+            let placed = given.on(grid, choice.resample, monitor)?;
+            Ok::<_, SegmentationError>((ExpertFacts::of(&given, &placed), placed.mask))
+        })
+        .transpose()?;
     let fit = SegmentationParameters {
         deform: parameters.on(&reading.volume)?,
         polar: parameters.polar,
@@ -47,10 +97,11 @@ pub fn from_files(
     };
     check_reader(order)?;
     let (templates, refused) = prepare(order, monitor)?;
-    let expert = expert.map(expert_mask::of_file);
-    let mut segmentation = segment(&reading.volume, &templates, &fit, expert.as_ref(), monitor)?;
+    let (expert, mask) = expert.unzip();
+    let mut segmentation = segment(&reading.volume, &templates, &fit, mask.as_ref(), monitor)?;
     segmentation.refused.splice(0..0, refused);
     Ok(SegmentedVolume {
+        expert,
         reading,
         segmentation,
         parameters,

@@ -9,7 +9,7 @@
 //! 3. The models are checked and prepared; with `auto`, the built-in hearts join them. A model
 //!    that was named must be usable; of those that are merely available, unusable ones are left
 //!    out, and the report says why.
-//! 4. The expert's mask is brought to the volume's grid ([`on_grid`]).
+//! 4. The expert's mask is read and brought to the volume's grid ([`given_mask`](crate::volume::given_mask)).
 //! 5. Every template is fitted, with one search for the organ ([`OrganSearch`]), and the fit with
 //!    the greatest [`Fit::confidence`](crate::deform::Fit::confidence) is chosen, of equals the one with
 //!    the greatest [`Fit::merit`](crate::deform::Fit::merit). A template whose fit fails is left out,
@@ -28,8 +28,6 @@ pub mod built_in;
 mod named_template;
 mod templates;
 
-mod expert_mask;
-
 mod fitting;
 
 mod segment;
@@ -46,10 +44,9 @@ mod error;
 
 pub use cavity::cavity;
 pub use error::SegmentationError;
-pub use expert_mask::{ExpertMaskError, on_grid};
 pub use files::{NamedFile, SegmentationFilesError};
 pub use fitting::{OrganSearch, RankedTemplate, fit_built_in};
-pub use from_files::{SegmentedVolume, from_files};
+pub use from_files::{ExpertFacts, SegmentedVolume, from_files};
 pub use named_template::{NamedTemplate, RefusedTemplate};
 pub use order::{NamedMesh, NamedReader, SegmentationOrder};
 pub use report::{agreement_json, report_json};

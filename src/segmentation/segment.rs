@@ -1,7 +1,6 @@
 //! From a volume and templates to the fit, its mask, measures, polar map and slices.
 
 use super::error::SegmentationError;
-use super::expert_mask::on_grid;
 use super::fitting::{OrganSearch, RankedTemplate, Trials, try_all};
 use super::named_template::{NamedTemplate, RefusedTemplate};
 use super::order::NamedReader;
@@ -87,7 +86,8 @@ impl ImageResolution {
     }
 }
 
-/// Segments `volume` by the best of `templates` and compares the mask with `expert` if given.
+/// Segments `volume` by the best of `templates` and compares the mask with `expert`, on the same grid, if
+/// given ([`GivenMask::on`](crate::volume::given_mask::GivenMask::on)).
 ///
 /// # Errors
 /// [`SegmentationError`].
@@ -95,10 +95,9 @@ pub fn segment(
     volume: &Volume,
     templates: &[NamedTemplate],
     parameters: &SegmentationParameters,
-    expert: Option<&Volume>,
+    expert: Option<&Mask>,
     monitor: &Monitor,
 ) -> Result<Segmentation, SegmentationError> {
-    let expert = expert.map(|e| on_grid(e, volume, monitor)).transpose()?;
     let mut search = OrganSearch::default();
     let trials = try_all(volume, templates, &parameters.deform, &mut search, monitor)?;
     let (chosen, fit) = trials
@@ -131,13 +130,13 @@ pub fn segment(
         .other_surface(parameters.deform.edge)
         .map(|other| voxelise(&other.mesh, volume.shape, &volume.frame));
     monitor.report(Stage::Report, 0.5)?;
-    let agreement = match &expert {
+    let agreement = match expert {
         // Both masks are on the volume's grid, so this fails only when cancelled.
         Some(expert) => compare(&mask, expert, volume.frame.spacing(), monitor).ok(),
         None => None,
     };
     monitor.report(Stage::Report, 0.8)?;
-    let slices = slices::png(volume, &fit.mesh, &Cut::of(&fit), expert.as_ref(), monitor)?;
+    let slices = slices::png(volume, &fit.mesh, &Cut::of(&fit), expert, monitor)?;
     monitor.report(Stage::Report, 1.0)?;
     Ok(Segmentation {
         resolution: ImageResolution::of(&fit, parameters.deform.resolution),

@@ -56,8 +56,26 @@ pub enum SurfaceError {
     NoSuchLabel {
         /// The label asked for.
         label: i64,
-        /// The labels present and their voxel counts; empty if it is not a label map.
+        /// The values present and their voxel counts; empty if they are intensities.
         present: Vec<(i64, usize)>,
+    },
+    /// A label map of so many labels that none can be guessed, or of labels that 32-bit floats do not
+    /// tell apart.
+    #[error(
+        "the volume is a label map with {}: which is the object cannot be told",
+        describe_labels(present)
+    )]
+    LabelNeeded {
+        /// The labels present and their voxel counts.
+        present: Vec<(i64, usize)>,
+    },
+    /// The voxels are 32-bit floats, which cannot hold the label.
+    #[error(
+        "isolate: the label {label} is beyond 2^24 and no 32-bit float, of which the volume consists"
+    )]
+    InexactLabel {
+        /// The label asked for.
+        label: i64,
     },
     /// The seed or the box leaves the volume.
     #[error("isolate: voxel {voxel:?} is outside the volume of {shape:?} voxels")]
@@ -116,7 +134,9 @@ impl SurfaceError {
         match self {
             SurfaceError::NoSurface { .. } | SurfaceError::BadIso { .. } => Some("iso"),
             SurfaceError::BadSmoothing { .. } => Some("mask_smoothing"),
-            SurfaceError::NoSuchLabel { .. } => Some("label"),
+            SurfaceError::NoSuchLabel { .. }
+            | SurfaceError::LabelNeeded { .. }
+            | SurfaceError::InexactLabel { .. } => Some("label"),
             SurfaceError::EmptyBox { .. } => Some("box"),
             SurfaceError::OutsideVolume { .. } => Some("isolate"),
             SurfaceError::SeedOutside { .. } => Some("seed_point"),

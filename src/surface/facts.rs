@@ -35,6 +35,9 @@ pub struct SurfaceFacts {
     /// How much like a left ventricle the found region looks, 0..1; `None` where it was not
     /// searched.
     pub ventricle_score: Option<f64>,
+    /// Volume of the voxels that carry the label, ml; `None` for intensities. The surface is made to
+    /// enclose it.
+    pub mask_ml: Option<f64>,
     /// Volume of the voxels enclosed by the surface, ml.
     pub region_ml: f64,
     /// Voxels cut from the region where a neighbour touches it at the iso-value.

@@ -39,6 +39,8 @@ pub(super) fn choose(
         IsoLevel::Auto => 0.5 * reference,
         IsoLevel::Fraction(f) => f as f32 * reference,
         IsoLevel::Absolute(v) => v as f32,
+        // `extract` turns the volume over first.
+        IsoLevel::Below(v) => -v as f32,
     };
     if iso > survey.maximum || iso <= survey.minimum {
         return Err(no_surface(iso, survey));

@@ -1,42 +1,57 @@
 //! The voxels that carry one label of a label map.
 
-use super::object::Object;
-use super::{IsoLevel, SurfaceError, SurfaceFacts, SurfaceParameters, VolumeKind, masks};
+use super::object::{MaskObject, Object};
+use super::{
+    IsoLevel, SurfaceError, SurfaceFacts, SurfaceParameters, TopologyMode, VolumeKind, masks,
+};
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
 use crate::grid::labels::Labels;
+use crate::progress::Monitor;
 use crate::volume::Volume;
 
 /// Selects the voxels of `label`, smoothed so that their surface has no staircase.
 ///
 /// # Errors
-/// [`SurfaceError::NoSurface`] if none of them reaches the iso-value.
+/// [`SurfaceError::NoSurface`] if none of them reaches the iso-value, [`SurfaceError::Cancelled`].
 pub(super) fn select<'a>(
     volume: &Volume,
     parameters: &SurfaceParameters,
     label: i64,
     facts: &mut SurfaceFacts,
+    monitor: &Monitor,
 ) -> Result<Object<'a>, SurfaceError> {
     if facts.kind == VolumeKind::Intensity {
         facts.kind = VolumeKind::Labels;
     }
     facts.label = Some(label);
-    let mask = mask_of(volume, label);
-    let smoothed = masks::smooth(&mask, parameters.mask_smoothing);
+    let mut mask = mask_of(volume, label);
+    let asked = parameters.mask_smoothing;
+    let voxel_ml = volume.frame.voxel_volume() / 1000.0;
+    facts.mask_ml = Some(mask.count() as f64 * voxel_ml);
+    let mut smoothed = masks::smooth(&mask, asked, &volume.frame, monitor)?;
+    let mut dropped = [0; 2];
+    if parameters.topology == TopologyMode::Genus0
+        && let Some((kept, parts, voxels)) = masks::largest_part(&mask, &smoothed)
+    {
+        // The level has to suit the volume of what remains.
+        smoothed = masks::smooth(&kept, asked, &volume.frame, monitor)?;
+        (mask, dropped) = (kept, [parts, voxels]);
+    }
     if smoothed.sigma < parameters.mask_smoothing {
         facts.warnings.push(format!(
-            "thin parts of the mask would be lost: smoothed with {} instead of {} voxels",
+            "thin parts of the mask would be lost: smoothed with {:.2} instead of {} voxels",
             smoothed.sigma, parameters.mask_smoothing
         ));
     }
     let level = match parameters.iso {
         IsoLevel::Auto => smoothed.level,
-        IsoLevel::Fraction(f) | IsoLevel::Absolute(f) => f as f32,
+        IsoLevel::Fraction(f) | IsoLevel::Absolute(f) | IsoLevel::Below(f) => f as f32,
     };
     facts.reference = 1.0;
     facts.iso_fraction = f64::from(level);
     let shape = smoothed.shape;
-    let labels = Labels::threshold(&smoothed.values, shape, [0; 3], shape, level);
+    let labels = masks::at_level(&smoothed, level);
     if labels.count() == 0 || !(level > 0.0) {
         return Err(SurfaceError::NoSurface {
             iso: f64::from(level),
@@ -60,7 +75,10 @@ pub(super) fn select<'a>(
         shape,
         frame,
         iso: level,
-        is_mask: true,
+        mask: Some(MaskObject {
+            passes: smoothed.passes,
+            dropped,
+        }),
     })
 }
 

@@ -85,8 +85,6 @@ impl Surface {
 
 /// Passes of Taubin's smoothing that make the working surface.
 const WORKING_PASSES: usize = 15;
-/// Passes that smooth the rest of the staircase off a mask's surface.
-const MASK_PASSES: usize = 10;
 /// Share of the region's voxels from which a change of topology is warned of.
 const LARGE_CHANGE: f64 = 0.02;
 
@@ -101,6 +99,9 @@ pub fn extract(
 ) -> Result<Surface, SurfaceError> {
     monitor.report(Stage::Surface, 0.0)?;
     parameters.check(volume)?;
+    if let IsoLevel::Below(level) = parameters.iso {
+        return below(volume, level, parameters, monitor);
+    }
     let survey = crate::grid::survey::survey(volume, monitor)?;
     let mut facts = SurfaceFacts::default();
     let mut object = select::select(volume, parameters, &survey, &mut facts, monitor)?;
@@ -110,22 +111,22 @@ pub fn extract(
     look_at_border(&object, &mut facts);
     facts.region_ml = object.labels.count() as f64 * object.frame.voxel_volume() / 1000.0;
 
-    let samples = Samples {
-        values: &object.values,
-        shape: object.shape,
-        beyond: beyond(object.iso, &survey, object.is_mask),
+    let (labels, frame, iso) = (&object.labels, &object.frame, object.iso);
+    let mut mesh = match &object.mask {
+        Some(mask) => {
+            let level = (iso, mask.passes);
+            masks::surface_of(labels, &object.values, object.shape, level, frame, monitor)?
+        }
+        None => {
+            let samples = Samples {
+                values: &object.values,
+                shape: object.shape,
+                beyond: beyond(iso, &survey),
+            };
+            marching_cubes::marching_cubes(labels, &samples, iso, frame, monitor)?
+        }
     };
-    let mut mesh = marching_cubes::marching_cubes(
-        &object.labels,
-        &samples,
-        object.iso,
-        &object.frame,
-        monitor,
-    )?;
     monitor.report(Stage::Surface, 0.9)?;
-    if object.is_mask {
-        mesh.vertices = smoothing::taubin(&mesh.vertices, &mesh.triangles, MASK_PASSES);
-    }
     facts.iso_value = f64::from(object.iso);
     let spacing = object
         .frame
@@ -135,7 +136,7 @@ pub fn extract(
     let (census, working) = rayon::join(|| topology::check(&mesh), || working_surface(&mesh));
     let census = census?;
     let mut tree = None;
-    if parameters.denoise == Denoise::Auto && !object.is_mask {
+    if parameters.denoise == Denoise::Auto && object.mask.is_none() {
         let intensity = |p: &Vec3| object.at(p);
         let found = denoise::denoise(&mut mesh, &working, intensity, spacing, monitor)?;
         if let Some((noise, search)) = found {
@@ -148,6 +149,51 @@ pub fn extract(
         ..finish(mesh, working, census, spacing, facts)
     };
     monitor.report(Stage::Surface, 1.0)?;
+    Ok(surface)
+}
+
+/// The surface of what lies below `level`: the one at `-level` of the volume turned over. Nothing below a
+/// value is searched for a ventricle.
+fn below(
+    volume: &Volume,
+    level: f64,
+    parameters: &SurfaceParameters,
+    monitor: &Monitor,
+) -> Result<Surface, SurfaceError> {
+    let over = Volume {
+        voxels: volume.voxels.iter().map(|v| -v).collect(),
+        frame: volume.frame.clone(),
+        ..*volume
+    };
+    let above = SurfaceParameters {
+        iso: IsoLevel::Absolute(-level),
+        isolate: match parameters.isolate {
+            Isolate::Auto => Isolate::Largest,
+            isolate => isolate,
+        },
+        ..parameters.clone()
+    };
+    let mut surface = extract(&over, &above, monitor).map_err(|error| match error {
+        SurfaceError::NoSurface {
+            minimum, maximum, ..
+        } => SurfaceError::NoSurface {
+            iso: level,
+            minimum: -maximum,
+            maximum: -minimum,
+        },
+        SurfaceError::SeedOutside { seed, value, .. } => SurfaceError::SeedOutside {
+            seed,
+            value: -value,
+            iso: level,
+        },
+        error => error,
+    })?;
+    let facts = &mut surface.facts;
+    let [low, high] = facts.range;
+    facts.range = [-high, -low];
+    facts.iso_value = level;
+    facts.reference = -facts.reference;
+    facts.otsu = facts.otsu.map(|otsu| -otsu);
     Ok(surface)
 }
 
@@ -200,10 +246,7 @@ fn finish(
 }
 
 /// The value that closes the object beyond the border.
-fn beyond(iso: f32, survey: &Survey, is_mask: bool) -> f32 {
-    if is_mask {
-        return 0.0;
-    }
+fn beyond(iso: f32, survey: &Survey) -> f32 {
     let range = survey.maximum - survey.minimum;
     let value = iso - range;
     // The range may vanish against the iso-value or overflow f32; a value below is still needed.
@@ -223,7 +266,8 @@ fn control_topology(
     let parts = Components::of_inside(&object.labels);
     let cavities = Components::of_outside(&object.labels).sizes.len() - 1;
     let chi = object.labels.euler_characteristic();
-    facts.components_before = parts.sizes.len();
+    let [parts_before, voxels_before] = object.mask.map_or([0; 2], |mask| mask.dropped);
+    facts.components_before = parts.sizes.len() + parts_before;
     facts.cavities_before = cavities;
     facts.handles_before = (parts.sizes.len() as i64 + cavities as i64 - chi).max(0) as usize;
     monitor.check()?;
@@ -231,7 +275,7 @@ fn control_topology(
         return Ok(());
     }
     let largest = parts.sizes.iter().copied().max().unwrap_or(0);
-    facts.voxels_dropped = parts.sizes.iter().sum::<usize>() - largest;
+    facts.voxels_dropped = voxels_before + parts.sizes.iter().sum::<usize>() - largest;
     let (values, shape, origin) = (&object.values, object.shape, object.labels.origin);
     let value = |p: [usize; 3]| {
         let [i, j, k] = [0, 1, 2].map(|r| p[r] + origin[r]);
@@ -274,8 +318,11 @@ fn warn_of_topology(facts: &mut SurfaceFacts, largest: usize) {
     });
 }
 
+/// Share of the volume's border from which the object at an iso-value is likely its surroundings.
+const SURROUNDINGS: f64 = 0.5;
+
 fn look_at_border(object: &Object, facts: &mut SurfaceFacts) {
-    if !object.is_mask {
+    if object.mask.is_none() {
         facts.touches_border = object.labels.bounds().is_some_and(|(low, extent)| {
             (0..3).any(|r| {
                 let first = low[r] + object.labels.origin[r];
@@ -283,9 +330,36 @@ fn look_at_border(object: &Object, facts: &mut SurfaceFacts) {
             })
         });
     }
-    if facts.touches_border {
-        facts.warnings.push(
-            "the region touches the volume's border and was closed there; part of the object may lie outside the volume".into(),
-        );
+    if !facts.touches_border {
+        return;
     }
+    facts.warnings.push(
+        "the region touches the volume's border and was closed there; part of the object may lie outside the volume".into(),
+    );
+    let share = match object.mask {
+        None => share_of_border(object),
+        Some(_) => 0.0,
+    };
+    if share > SURROUNDINGS {
+        facts.warnings.push(format!(
+            "the region takes {:.0} % of the volume's border: an object darker than its surroundings is taken by `iso` = below:{}",
+            100.0 * share,
+            object.iso
+        ));
+    }
+}
+
+/// Share of the voxels at the volume's border that are of the object.
+fn share_of_border(object: &Object) -> f64 {
+    let shape = object.shape;
+    let inner: usize = shape.iter().map(|n| n.saturating_sub(2)).product();
+    let all = shape.iter().product::<usize>() - inner;
+    let origin = object.labels.origin;
+    let at_border = |p: &[usize; 3]| {
+        (0..3).any(|r| {
+            let place = p[r] + origin[r];
+            place == 0 || place + 1 == shape[r]
+        })
+    };
+    object.labels.voxels().filter(at_border).count() as f64 / all as f64
 }

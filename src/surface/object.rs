@@ -14,7 +14,17 @@ pub(super) struct Object<'a> {
     pub shape: [usize; 3],
     pub frame: VoxelToPatient,
     pub iso: f32,
-    pub is_mask: bool,
+    /// `None` for intensities.
+    pub mask: Option<MaskObject>,
+}
+
+/// What is special about the surface of a mask.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MaskObject {
+    /// Passes of Taubin's smoothing.
+    pub passes: usize,
+    /// Parts left out before smoothing, and their voxels.
+    pub dropped: [usize; 2],
 }
 
 impl<'a> Object<'a> {
@@ -26,7 +36,7 @@ impl<'a> Object<'a> {
             shape: volume.shape,
             frame: volume.frame.clone(),
             iso,
-            is_mask: false,
+            mask: None,
         }
     }
 

@@ -14,6 +14,9 @@ pub enum IsoLevel {
     Fraction(f64),
     /// An intensity in the volume's own units.
     Absolute(f64),
+    /// An intensity in the volume's own units, below which the object lies: for objects darker than their
+    /// surroundings, and distances that are negative inside.
+    Below(f64),
 }
 
 /// Which part of the volume is the object.
@@ -63,8 +66,8 @@ pub struct SurfaceParameters {
     pub hints: Hints,
     /// Default [`TopologyMode::Genus0`].
     pub topology: TopologyMode,
-    /// Gaussian sigma in voxels that smooths binary masks before surfacing, 0..=3. Default
-    /// 0.8 (measured best of the range on a known surface).
+    /// Sigma of the Gaussian that smooths binary masks before surfacing, 0..=3: a length, the same along
+    /// every axis, in edges of a cube of a voxel's volume. Default 0.8 (measured best of the range on a known surface).
     pub mask_smoothing: f64,
     /// Default [`Denoise::Auto`].
     pub denoise: Denoise,
@@ -94,8 +97,11 @@ impl SurfaceParameters {
             IsoLevel::Fraction(f) if !(f > 0.0 && f < 1.0) => {
                 return bad_iso(f, "a fraction between 0 and 1 (0 % and 100 %)");
             }
-            IsoLevel::Absolute(v) if !(v as f32).is_finite() => {
+            IsoLevel::Absolute(v) | IsoLevel::Below(v) if !(v as f32).is_finite() => {
                 return bad_iso(v, "a finite intensity");
+            }
+            IsoLevel::Below(v) if matches!(self.isolate, Isolate::Label(_)) => {
+                return bad_iso(v, "auto for a label, whose voxels are not below a value");
             }
             _ => {}
         }

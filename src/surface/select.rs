@@ -6,9 +6,13 @@ use super::object::Object;
 use super::{
     IsoLevel, Isolate, SurfaceError, SurfaceFacts, SurfaceParameters, VolumeKind, intensity, label,
 };
-use crate::grid::survey::Survey;
+use crate::grid::survey::{self, Survey};
 use crate::progress::Monitor;
 use crate::volume::Volume;
+use std::cmp::Reverse;
+
+/// Labels from which none is taken for the object because it is the largest.
+const MOST_TO_CHOOSE_FROM: usize = 256;
 
 /// Chooses voxels and iso-value by `parameters`, and notes in `facts` what `volume` holds.
 ///
@@ -34,36 +38,45 @@ pub(super) fn select<'a>(
             volume.voxels.len()
         ));
     }
-    if survey.minimum == survey.maximum {
+    if survey.minimum == survey.maximum && (survey.not_finite == 0 || survey.labels.is_none()) {
         let value = survey.minimum;
         return Err(SurfaceError::Constant { value });
     }
     match (parameters.isolate, &survey.labels) {
-        (Isolate::Label(label), present) => {
-            let count = present.as_ref().and_then(|p| p.get(&label)).copied();
-            if count.is_none() {
-                let present = present.iter().flatten().map(|(&l, &n)| (l, n)).collect();
+        (Isolate::Label(label), _) => {
+            if (label as f32) as i64 != label {
+                return Err(SurfaceError::InexactLabel { label });
+            }
+            if !volume.voxels.contains(&(label as f32)) {
+                let present = survey::whole_values(volume).into_iter().flatten().collect();
                 return Err(SurfaceError::NoSuchLabel { label, present });
             }
-            label::select(volume, parameters, label, facts)
+            label::select(volume, parameters, label, facts, monitor)
         }
         // An explicit iso-value applies to the values themselves, not to a smoothed mask.
         (Isolate::Auto, Some(present)) if parameters.iso == IsoLevel::Auto => {
-            let largest = present
-                .iter()
-                .max_by_key(|&(&label, &n)| (n, std::cmp::Reverse(label)));
-            let label = largest.map_or(0, |(&label, _)| label);
-            facts.kind = if present.len() == 1 {
+            let (objects, background) = survey::objects(volume, present);
+            if background != 0 {
+                facts.warnings.push(format!(
+                    "the value {background}, which surrounds the rest, was taken for the background"
+                ));
+            }
+            let all: Vec<_> = objects.iter().map(|(&l, &n)| (l, n)).collect();
+            if all.len() > MOST_TO_CHOOSE_FROM {
+                return Err(SurfaceError::LabelNeeded { present: all });
+            }
+            let largest = all.iter().max_by_key(|&&(label, n)| (n, Reverse(label)));
+            let label = largest.map_or(0, |&(label, _)| label);
+            facts.kind = if all.len() == 1 {
                 VolumeKind::Mask
             } else {
-                let all: Vec<_> = present.iter().map(|(&l, &n)| (l, n)).collect();
                 facts.warnings.push(format!(
                     "the volume is a label map with {}; the largest, {label}, was taken: name another one by isolate: label",
                     describe_labels(&all)
                 ));
                 VolumeKind::Labels
             };
-            label::select(volume, parameters, label, facts)
+            label::select(volume, parameters, label, facts, monitor)
         }
         _ => intensity::select(volume, parameters, survey, facts, monitor),
     }

@@ -3,7 +3,7 @@
 use super::VolumeError;
 use super::facts::ByteOrder;
 use super::source::Source;
-use super::summary::Tally;
+use super::summary::{NO_LABEL, Tally};
 use crate::progress::{Cancelled, Monitor, Stage};
 use std::cell::Cell;
 
@@ -262,6 +262,30 @@ impl<'a> VoxelReader<'a> {
         })
     }
 
+    /// As [`VoxelReader::stream`], with the exact whole number of every voxel: 32-bit floats do not tell
+    /// labels beyond 2^24 apart. Fractions and what exceeds 64 bits are [`NO_LABEL`].
+    ///
+    /// # Errors
+    /// As [`VoxelReader::append`].
+    pub(super) fn stream_exact(
+        &mut self,
+        begin: u64,
+        count: usize,
+        take: &mut dyn FnMut(usize, &[i64]),
+        report: &mut dyn FnMut(f64) -> Result<(), Cancelled>,
+    ) -> Result<(), VolumeError> {
+        let end = begin + count as u64 * self.decoder.format.data_type.size() as u64;
+        self.source.prepare(end)?;
+        self.source.skip_to(begin)?;
+        let mut labels = Vec::with_capacity(PORTION.min(count));
+        self.portions(end, count, report, |decoder, bytes, done| {
+            labels.clear();
+            exact_labels(bytes, &decoder.format, &mut labels);
+            take(done, &labels);
+            Ok(())
+        })
+    }
+
     /// Calls `decode` with the bytes of every portion of the next `count` voxels, which end at byte
     /// `end`, and with the number of voxels before it.
     fn portions(
@@ -453,6 +477,8 @@ trait Stored: Copy {
     fn trim(self, unused: u32) -> Self;
     fn single(self) -> f32;
     fn double(self) -> f64;
+    /// The whole number, or [`NO_LABEL`].
+    fn label(self) -> i64;
 }
 
 macro_rules! trim {
@@ -467,6 +493,30 @@ macro_rules! trim {
     ($t:ident, $v:expr, $unused:expr) => {
         ($v << $unused) >> $unused
     };
+}
+
+macro_rules! label {
+    (f32, $v:expr) => {
+        whole(f64::from($v))
+    };
+    (f64, $v:expr) => {
+        whole($v)
+    };
+    (u64, $v:expr) => {
+        i64::try_from($v).unwrap_or(NO_LABEL)
+    };
+    ($t:ident, $v:expr) => {
+        $v as i64
+    };
+}
+
+/// The whole number that `value` is, or [`NO_LABEL`].
+fn whole(value: f64) -> i64 {
+    // From 2^53 on, not every whole number is representable.
+    match value.fract() == 0.0 && value.abs() <= 9_007_199_254_740_992.0 {
+        true => value as i64,
+        false => NO_LABEL,
+    }
 }
 
 macro_rules! stored {
@@ -486,6 +536,7 @@ macro_rules! stored {
             fn trim(self, unused: u32) -> Self { trim!($t, self, unused) }
             fn single(self) -> f32 { self as f32 }
             fn double(self) -> f64 { self as f64 }
+            fn label(self) -> i64 { label!($t, self) }
         }
     )*};
 }
@@ -537,6 +588,17 @@ fn decode(bytes: &[u8], format: &VoxelFormat, voxels: &mut Vec<f32>) -> u64 {
         }
     });
     padded.get()
+}
+
+/// Appends the whole numbers in `bytes`, slope and intercept applied, to `labels`.
+fn exact_labels(bytes: &[u8], format: &VoxelFormat, labels: &mut Vec<i64>) {
+    let (order, unused) = (format.byte_order, format.unused_bits);
+    with_type!(format.data_type, T => match format.scaling {
+        None => T::each(bytes, order, labels, |v| v.trim(unused).label()),
+        Some((slope, inter)) => {
+            T::each(bytes, order, labels, |v| whole(v.trim(unused).double() * slope + inter));
+        }
+    });
 }
 
 /// The first number in `bytes` in double precision, which distinguishes large from infinite values.

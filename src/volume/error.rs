@@ -111,10 +111,16 @@ pub enum VolumeError {
         limit: u64,
     },
     /// The file holds several volumes, and none was chosen.
-    #[error("the file holds {frames} frames, of which one must be chosen")]
+    #[error(
+        "the file holds {frames} frames, of which one must be chosen{}",
+        .why.as_ref().map(|why| format!(", since they are no gates of one heart beat: {why}"))
+            .unwrap_or_default()
+    )]
     FrameNeeded {
         /// Number of volumes; valid numbers are 0..frames.
         frames: usize,
+        /// Why they are not summed as gates of one heart beat, if the file says that they are none.
+        why: Option<String>,
     },
     /// The chosen volume does not exist.
     #[error("the file holds {frames} frames, counted from 0; there is no frame {frame}")]

@@ -7,7 +7,7 @@ use super::VolumeError;
 pub struct ReadOptions {
     /// Number of the volume, from 0, in a file that holds several: for NIfTI the dimensions beyond
     /// the third, the fourth fastest; for DICOM the gates, those of the first R-R interval first.
-    /// Default `None`: the only volume, or the sum of the gates of a gated DICOM image, which is what
+    /// Default `None`: the only volume, or the sum of the gates of a gated image, which is what
     /// the camera counted over the whole heart beat.
     pub frame: Option<usize>,
 }
@@ -23,7 +23,7 @@ impl ReadOptions {
         match self.frame {
             None if frames == 1 => Ok(Some(0)),
             None if gated => Ok(None),
-            None => Err(VolumeError::FrameNeeded { frames }),
+            None => Err(VolumeError::FrameNeeded { frames, why: None }),
             Some(frame) if frame < frames => Ok(Some(frame)),
             Some(frame) => Err(VolumeError::FrameOutOfRange { frame, frames }),
         }

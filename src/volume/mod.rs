@@ -20,6 +20,8 @@
 //! Not guaranteed: that the file's statements about the patient are true. Contradictions inside a
 //! file appear as warnings.
 //!
+//! [`given_mask`] reads masks: one structure of a label map, a segmentation or a binary volume.
+//!
 //! [`mod@phantom`] makes volumes with known ground truth, [`nifti::write()`] writes volumes to files,
 //! and [`mod@preview`] draws them.
 //!
@@ -46,6 +48,7 @@ pub mod dicom;
 pub mod error;
 pub mod facts;
 mod folder;
+pub mod given_mask;
 mod limits;
 pub mod nifti;
 mod open;
@@ -66,6 +69,9 @@ pub use limits::{ReadLimits, ReadOptions};
 pub use open::{Reading, describe};
 pub use phantom::{Phantom, PhantomParameters, phantom};
 pub use preview::{preview, preview_png};
-pub use read::{inspect, preview_files, provenance, read};
+pub use read::{
+    inspect, labels_are_rounded, preview_files, provenance, read, read_segment, segments,
+    voxels_of_label,
+};
 pub use source::VolumeFile;
 pub use summary::summarise;

@@ -3,18 +3,21 @@
 //! A format implements [`OpenVolume`]; [`read`] and [`inspect`] do the rest.
 
 use super::decode::DataType;
-use super::dicom::Provenance;
+use super::dicom::{Provenance, Segment};
 use super::facts::{
     AffineSource, ByteOrder, FileFormat, IntensitySummary, LengthUnit, VolumeFacts,
 };
 use super::limits::ReadOptions;
 use super::nifti::grid::StatedGrid;
 use super::preview::MiddlePlanes;
-use super::summary::{Coherence, LabelCounts, Tally, judge, summarise};
+use super::summary::{Coherence, LabelCounts, NO_LABEL, Tally, judge, summarise};
 use super::{Volume, VolumeError};
 use crate::draw::Image;
 use crate::geometry::frame::VoxelToPatient;
 use crate::progress::Monitor;
+
+/// Above this size 32-bit floats do not tell all whole numbers apart.
+const EXACT: f32 = 16_777_216.0;
 
 /// A volume and the facts about the file it was read from.
 #[derive(Debug, Clone)]
@@ -38,6 +41,13 @@ impl Reading {
     }
 }
 
+/// Whether `intensity` is of whole numbers of which 32-bit floats do not tell all apart.
+pub(super) fn is_rounded(intensity: &IntensitySummary, data_type: &str) -> bool {
+    let wide = !matches!(data_type, "uint8" | "int8" | "uint16" | "int16" | "float32");
+    let size = intensity.maximum.max(-intensity.minimum);
+    wide && intensity.integral && size >= EXACT
+}
+
 /// A file whose header has been read and checked.
 pub(super) trait OpenVolume {
     /// Everything the header says about the volumes.
@@ -53,6 +63,20 @@ pub(super) trait OpenVolume {
         None
     }
 
+    /// Why several volumes are not gates of one heart beat, in words that continue a sentence; `None` if
+    /// the format does not say.
+    fn why_not_gated(&self) -> Option<&str> {
+        None
+    }
+
+    /// The segments of a DICOM Segmentation; empty for all others.
+    fn segments(&self) -> &[Segment] {
+        &[]
+    }
+
+    /// Reads of a DICOM Segmentation no other segment from now on.
+    fn keep_segment(&mut self, _number: u16) {}
+
     /// Decodes volume number `frame`, from 0.
     fn decode_frame(&mut self, frame: usize, monitor: &Monitor) -> Result<Decoded, VolumeError>;
 
@@ -64,6 +88,27 @@ pub(super) trait OpenVolume {
         take: &mut dyn FnMut(usize, &[f32]),
         monitor: &Monitor,
     ) -> Result<(), VolumeError>;
+
+    /// As [`OpenVolume::stream_frame`], with the exact whole numbers of the voxels; fractions and missing
+    /// values are [`NO_LABEL`].
+    fn stream_labels(
+        &mut self,
+        frame: usize,
+        take: &mut dyn FnMut(usize, &[i64]),
+        monitor: &Monitor,
+    ) -> Result<(), VolumeError> {
+        let label = |v: &f32| match v.fract() == 0.0 && v.abs() <= EXACT {
+            true => *v as i64,
+            false => NO_LABEL,
+        };
+        let mut labels = Vec::new();
+        let mut portion = |first: usize, voxels: &[f32]| {
+            labels.clear();
+            labels.extend(voxels.iter().map(label));
+            take(first, &labels);
+        };
+        self.stream_frame(frame, &mut portion, monitor)
+    }
 
     /// Decodes all volumes one after the other without keeping their voxels: `take` is called with
     /// every portion and the number of voxels before it in its volume, slices in stored order.
@@ -128,7 +173,8 @@ pub(super) fn read(
     monitor: &Monitor,
 ) -> Result<Reading, VolumeError> {
     let header = file.header();
-    let frame = options.choose(header.frames, header.gated)?;
+    let frame = options.choose(header.frames, header.gated);
+    let frame = frame.map_err(|error| because(error, file.why_not_gated()))?;
     let decoded = match frame {
         Some(frame) => file.decode_frame(frame, monitor)?,
         None => sum(file, monitor)?,
@@ -152,6 +198,17 @@ pub(super) fn read(
     })
 }
 
+/// `error` with the reason why the volumes are not summed.
+pub(super) fn because(error: VolumeError, why: Option<&str>) -> VolumeError {
+    match (error, why) {
+        (VolumeError::FrameNeeded { frames, .. }, Some(why)) => VolumeError::FrameNeeded {
+            frames,
+            why: Some(why.to_owned()),
+        },
+        (error, _) => error,
+    }
+}
+
 /// The sum of all volumes of `file`.
 fn sum(file: &mut dyn OpenVolume, monitor: &Monitor) -> Result<Decoded, VolumeError> {
     let frames = file.header().frames;
@@ -167,7 +224,8 @@ fn sum(file: &mut dyn OpenVolume, monitor: &Monitor) -> Result<Decoded, VolumeEr
     tally.add_portion(&sum.voxels);
     sum.tally = tally;
     sum.warnings.push(format!(
-        "The {frames} gates were summed. Set `frame` to a number from 0 to {} for one of them.",
+        "The {frames} gates were summed. Set `frame` to a number from 0 (the first) to {} (the last) for \
+         one of them.",
         frames - 1
     ));
     Ok(sum)
@@ -191,8 +249,15 @@ pub(super) fn inspect<'a>(
     let (tally, warnings) = file.decode_all(&mut compare, monitor)?;
     let mut labels = None;
     if tally.is_whole() && coherence.suits_labels() {
+        let rounded = is_rounded(&tally.summary(None), file.header().data_type);
         let mut counts = LabelCounts::new();
-        open()?.decode_all(&mut |_, voxels| counts.add(voxels), monitor)?;
+        let mut again = open()?;
+        match rounded {
+            true => again.stream_labels(0, &mut |_, labels| counts.add_exact(labels), monitor)?,
+            false => {
+                again.decode_all(&mut |_, voxels| counts.add(voxels), monitor)?;
+            }
+        }
         labels = counts.labels();
     }
     facts(file.header(), Some(0), tally.summary(labels), warnings)

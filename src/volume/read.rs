@@ -1,11 +1,12 @@
 //! The two entry points: a volume to compute with, or only the facts about a file.
 
-use super::dicom::{DicomFile, Provenance};
+use super::dicom::{DicomFile, Provenance, Segment};
 use super::limits::{ReadLimits, ReadOptions};
-use super::open::{self, OpenVolume, Reading};
+use super::open::{self, OpenVolume, Reading, is_rounded};
 use super::recognise::{Recognised, recognise};
 use super::source::VolumeFile;
-use super::{VolumeError, VolumeFacts, archive, nifti};
+use super::summary::LabelCounts;
+use super::{LabelCount, VolumeError, VolumeFacts, archive, nifti};
 use crate::draw::Image;
 use crate::progress::Monitor;
 use std::cell::RefCell;
@@ -26,7 +27,82 @@ pub fn read(
     let mut opened = open(files, limits, monitor)?;
     let mut reading = open::read(&mut *opened.file, *options, monitor)?;
     reading.facts.warnings.extend(opened.notes);
+    let intensity = &reading.facts.intensity;
+    if intensity.labels.is_some() && is_rounded(intensity, reading.facts.data_type) {
+        reading.facts.intensity.labels = exact_labels(files, &reading, limits, monitor)?;
+    }
     Ok(reading)
+}
+
+/// The exact labels of the volume that was read as `reading`; `None` if there are too many.
+fn exact_labels(
+    files: &[VolumeFile],
+    reading: &Reading,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Option<Vec<LabelCount>>, VolumeError> {
+    let mut counts = LabelCounts::new();
+    let mut file = open(files, limits, monitor)?.file;
+    let frame = reading.facts.frame.unwrap_or(0);
+    file.stream_labels(frame, &mut |_, labels| counts.add_exact(labels), monitor)?;
+    Ok(counts.labels())
+}
+
+/// Whether voxels of `reading` are whole numbers beyond 2^24, which its 32-bit floats do not tell
+/// apart. [`voxels_of_label`] does.
+pub fn labels_are_rounded(reading: &Reading) -> bool {
+    is_rounded(&reading.facts.intensity, reading.facts.data_type) && reading.facts.frame.is_some()
+}
+
+/// Which voxels of the volume that was read from `files` as `reading` carry exactly `label`, whatever
+/// the size of the number.
+///
+/// # Errors
+/// [`VolumeError`], as for [`read()`].
+pub fn voxels_of_label(
+    files: &[VolumeFile],
+    reading: &Reading,
+    label: i64,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Vec<bool>, VolumeError> {
+    let mut carries = vec![false; reading.volume.voxels.len()];
+    let mut take = |first: usize, labels: &[i64]| {
+        for (carries, found) in carries[first..].iter_mut().zip(labels) {
+            *carries = *found == label;
+        }
+    };
+    let mut file = open(files, limits, monitor)?.file;
+    file.stream_labels(reading.facts.frame.unwrap_or(0), &mut take, monitor)?;
+    Ok(carries)
+}
+
+/// The segments that a DICOM Segmentation describes; empty for other files. Only headers are read.
+///
+/// # Errors
+/// [`VolumeError`], as for [`read()`].
+pub fn segments(
+    files: &[VolumeFile],
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Vec<Segment>, VolumeError> {
+    Ok(open(files, limits, monitor)?.file.segments().to_vec())
+}
+
+/// Reads one segment of a DICOM Segmentation: its voxels have its number, all others 0. Where it
+/// overlaps others, its voxels are its own.
+///
+/// # Errors
+/// [`VolumeError`], as for [`read()`].
+pub fn read_segment(
+    files: &[VolumeFile],
+    number: u16,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Reading, VolumeError> {
+    let mut file = open(files, limits, monitor)?.file;
+    file.keep_segment(number);
+    open::read(&mut *file, ReadOptions::default(), monitor)
 }
 
 /// Whose scan the volume in `files` is; `None` unless they are DICOM. Only headers are read.
@@ -42,7 +118,8 @@ pub fn provenance(
 ) -> Result<Option<Provenance>, VolumeError> {
     let file = open(files, limits, monitor)?.file;
     let header = file.header();
-    let frame = options.choose(header.frames, header.gated)?;
+    let frame = options.choose(header.frames, header.gated);
+    let frame = frame.map_err(|error| open::because(error, file.why_not_gated()))?;
     Ok(file.provenance(frame.unwrap_or(0)))
 }
 

@@ -9,13 +9,18 @@
 
 use super::VolumeError;
 use super::facts::{IntensitySummary, LabelCount};
+use crate::grid::survey::many_are_pieces;
 use std::collections::BTreeMap;
 
 /// Voxels per partial sum.
 const PORTION: usize = 1 << 16;
 
-/// Largest number of different values in a label map.
-const MOST_LABELS: usize = 256;
+/// Largest number of different values in a label map that is not one beyond doubt
+/// ([`many_are_pieces`]).
+const FEW_LABELS: usize = 256;
+
+/// Largest number of labels that are listed.
+const MOST_LABELS: usize = 4096;
 
 /// Smallest share of labelled voxels in a label map whose neighbour along i has the same label. Organs
 /// with coarse voxels reach 0.7 and more; noisy counts stay below 0.2.
@@ -244,6 +249,9 @@ fn is_labelled(voxel: f32) -> bool {
     (voxel < 0.0) | (voxel > 0.0)
 }
 
+/// The exact value of a voxel that carries no label: a missing value or a fraction.
+pub(super) const NO_LABEL: i64 = i64::MIN;
+
 /// How often neighbours along i have different labels. Exact for volumes of whole numbers.
 pub(super) struct Coherence {
     /// Voxels per row.
@@ -302,61 +310,84 @@ impl Coherence {
 /// Labels below this number are counted in an array.
 const SMALL_LABELS: usize = 4096;
 
+/// Voxels of a label and the runs that they make up in array order.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct LabelRuns {
+    voxels: u64,
+    runs: u64,
+}
+
 /// Voxels of each label.
 pub(super) struct LabelCounts {
-    small: Vec<u64>,
-    other: BTreeMap<i64, u64>,
+    small: Vec<LabelRuns>,
+    other: BTreeMap<i64, LabelRuns>,
     /// Number of different labels.
     different: usize,
+    /// The last voxel added.
+    last: Option<i64>,
 }
 
 impl LabelCounts {
     /// No voxel yet.
     pub(super) fn new() -> Self {
         Self {
-            small: vec![0; SMALL_LABELS],
+            small: vec![LabelRuns::default(); SMALL_LABELS],
             other: BTreeMap::new(),
             different: 0,
+            last: None,
         }
     }
 
     /// Adds voxels, which are whole. After too many different labels nothing is counted any more.
     pub(super) fn add(&mut self, voxels: &[f32]) {
         for run in voxels.chunk_by(|a, b| a == b) {
-            if self.different > MOST_LABELS {
-                return;
-            }
-            if !is_labelled(run[0]) {
-                continue;
-            }
-            let label = run[0] as i64;
-            let small = usize::try_from(label).ok();
-            let count = match small.and_then(|label| self.small.get_mut(label)) {
-                Some(count) => count,
-                None => self.other.entry(label).or_default(),
-            };
-            self.different += usize::from(*count == 0);
-            *count += run.len() as u64;
+            let label = is_labelled(run[0]).then_some(run[0] as i64);
+            self.add_run(label, run.len());
         }
     }
 
-    /// The labels in rising order; `None` if there are too many.
+    /// Adds voxels by their exact labels; [`NO_LABEL`] and 0 are none.
+    pub(super) fn add_exact(&mut self, labels: &[i64]) {
+        for run in labels.chunk_by(|a, b| a == b) {
+            let label = Some(run[0]).filter(|label| !matches!(*label, 0 | NO_LABEL));
+            self.add_run(label, run.len());
+        }
+    }
+
+    fn add_run(&mut self, label: Option<i64>, length: usize) {
+        let continues = self.last == label;
+        self.last = label;
+        let Some(label) = label else {
+            return;
+        };
+        if self.different > MOST_LABELS {
+            return;
+        }
+        let small = usize::try_from(label).ok();
+        let count = match small.and_then(|label| self.small.get_mut(label)) {
+            Some(count) => count,
+            None => self.other.entry(label).or_default(),
+        };
+        self.different += usize::from(count.voxels == 0);
+        count.voxels += length as u64;
+        count.runs += u64::from(!continues);
+    }
+
+    /// The labels in rising order; `None` if there are too many, or so many that they are intensities.
     pub(super) fn labels(self) -> Option<Vec<LabelCount>> {
-        let negative = self
-            .other
-            .range(..0)
-            .map(|(label, voxels)| (*label, *voxels));
+        let of = |(label, count): (&i64, &LabelRuns)| (*label, *count);
+        let negative = self.other.range(..0).map(of);
         let small = (0..).zip(self.small.iter().copied());
-        let large = self
-            .other
-            .range(0..)
-            .map(|(label, voxels)| (*label, *voxels));
+        let large = self.other.range(0..).map(of);
         let all = negative.chain(small).chain(large);
-        let present = all.filter(|(_, voxels)| *voxels > 0);
-        (self.different <= MOST_LABELS).then(|| {
-            present
-                .map(|(label, voxels)| LabelCount { label, voxels })
-                .collect()
+        let present: Vec<_> = all.filter(|(_, count)| count.voxels > 0).collect();
+        let runs = present
+            .iter()
+            .map(|(_, c)| (c.voxels as usize, c.runs as usize));
+        let pieces = self.different <= FEW_LABELS || many_are_pieces(runs, false);
+        (self.different <= MOST_LABELS && pieces).then(|| {
+            let count = |(label, LabelRuns { voxels, .. })| LabelCount { label, voxels };
+            present.into_iter().map(count).collect()
         })
     }
 }
@@ -419,6 +450,21 @@ mod tests {
         assert!(summarise(&counts, 20).labels.is_none());
     }
 
+    /// Whether labels beyond 256 are pieces, by the definition: of the runs in array order, without those
+    /// of the most frequent label.
+    fn many_by_definition(voxels: &[f32], counts: &BTreeMap<i64, u64>) -> bool {
+        let most = counts.iter().max_by_key(|(label, n)| (**n, **label));
+        let (mut labelled, mut same) = (0_u64, 0_u64);
+        for (n, &voxel) in voxels.iter().enumerate() {
+            if voxel.is_nan() || voxel == 0.0 || Some(&(voxel as i64)) == most.map(|(l, _)| l) {
+                continue;
+            }
+            labelled += 1;
+            same += u64::from(n > 0 && voxels[n - 1] as i64 == voxel as i64);
+        }
+        labelled >= 1000 && same as f64 >= 0.8 * labelled as f64
+    }
+
     /// The definition of labels, without regard to speed.
     fn labels_by_definition(voxels: &[f32], row: usize) -> Option<Vec<LabelCount>> {
         let mut counts: BTreeMap<i64, u64> = BTreeMap::new();
@@ -437,7 +483,9 @@ mod tests {
             }
         }
         let coherent = alike as f64 >= LEAST_COHERENCE * labelled as f64;
-        (labelled > 0 && counts.len() <= MOST_LABELS && coherent).then(|| {
+        let few = counts.len() <= FEW_LABELS
+            || counts.len() <= MOST_LABELS && many_by_definition(voxels, &counts);
+        (labelled > 0 && few && coherent).then(|| {
             let count = |(label, voxels)| LabelCount { label, voxels };
             counts.into_iter().map(count).collect()
         })

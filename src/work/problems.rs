@@ -16,9 +16,10 @@ use crate::parameters::ParameterError;
 use crate::pipeline::PipelineError;
 use crate::reader::ProfileError;
 use crate::retile::RetileError;
-use crate::segmentation::{ExpertMaskError, SegmentationError};
+use crate::segmentation::SegmentationError;
 use crate::surface::SurfaceError;
 use crate::volume::VolumeError;
+use crate::volume::given_mask::GivenMaskError;
 use std::error::Error;
 use std::fmt::Display;
 
@@ -172,7 +173,6 @@ impl Explain for SegmentationError {
     fn explain(&self) -> Failure {
         let (code, field, advice) = match self {
             SegmentationError::Volume(volume) => return volume.explain(),
-            SegmentationError::ExpertVolume(volume) => return volume.explain().at("expert"),
             SegmentationError::Parameter(parameter) => return parameter.explain(),
             SegmentationError::NotFound(error) => return error.explain(),
             SegmentationError::Fit(error) => return error.explain(),
@@ -205,19 +205,12 @@ impl Explain for SegmentationError {
                      --edge {asked}`."
                 ),
             ),
-            SegmentationError::ExpertMask(ExpertMaskError::Empty) => (
-                (Fault::Content, "empty-mask"),
-                "expert",
-                "Give a mask whose voxels are above 0.5 inside the organ.".into(),
-            ),
-            SegmentationError::ExpertMask(ExpertMaskError::Elsewhere { .. }) => (
-                (Fault::Content, "mask-elsewhere"),
-                "expert",
-                "Give a mask of the same scan whose header places it correctly in the patient."
-                    .into(),
-            ),
-            SegmentationError::ExpertMask(ExpertMaskError::Cancelled(_))
-            | SegmentationError::Cancelled(_) => {
+            SegmentationError::ExpertMask(mask) => {
+                let failure = mask.explain();
+                let named = failure.field.is_some() && !matches!(mask, GivenMaskError::File(_));
+                return if named { failure } else { failure.at("expert") };
+            }
+            SegmentationError::Cancelled(_) => {
                 return failure(CANCELLED, self, None, START_AGAIN.into());
             }
         };
@@ -226,6 +219,62 @@ impl Explain for SegmentationError {
 
     fn is_cancelled(&self) -> bool {
         SegmentationError::is_cancelled(self)
+    }
+}
+
+impl Explain for GivenMaskError {
+    fn explain(&self) -> Failure {
+        let (kind, field, advice) = match self {
+            GivenMaskError::File(error) => return error.explain(),
+            GivenMaskError::Volumes { .. } => (
+                (Fault::Content, "unusable-volume"),
+                None,
+                "Give a mask of one volume.".into(),
+            ),
+            GivenMaskError::Empty => (
+                (Fault::Content, "empty-mask"),
+                None,
+                "Give a mask with voxels inside the organ.".into(),
+            ),
+            GivenMaskError::NotMask { .. } => (
+                (Fault::Content, "not-a-mask"),
+                None,
+                "Give a mask of 0 and 1, a label map, a DICOM Segmentation, or probabilities from 0 to 1."
+                    .into(),
+            ),
+            GivenMaskError::SeveralStructures { .. } => (
+                (Fault::Request, "label-needed"),
+                Some("label"),
+                "Set `label` to the number or the name of the one that is meant.".into(),
+            ),
+            GivenMaskError::OnlyCavity { .. } => (
+                (Fault::Request, "label-needed"),
+                Some("label"),
+                "Give a mask of the wall, or set `label` to this structure if it is meant.".into(),
+            ),
+            GivenMaskError::NoSuchStructure { .. } => (
+                (Fault::Request, "no-such-label"),
+                Some("label"),
+                "Set `label` to a structure of the mask, or leave it out.".into(),
+            ),
+            GivenMaskError::OtherGrid { .. } => (
+                (Fault::Content, "other-grid"),
+                Some("resample"),
+                "Give a mask on the same grid, or resample it by `resample`.".into(),
+            ),
+            GivenMaskError::Elsewhere { .. } | GivenMaskError::TooFarApart { .. } => (
+                (Fault::Content, "mask-elsewhere"),
+                None,
+                "Give a mask of the same scan whose header places it correctly in the patient."
+                    .into(),
+            ),
+            GivenMaskError::Cancelled(_) => (CANCELLED, None, START_AGAIN.into()),
+        };
+        failure(kind, self, field, advice)
+    }
+
+    fn is_cancelled(&self) -> bool {
+        matches!(self, GivenMaskError::Cancelled(_))
     }
 }
 
@@ -508,9 +557,9 @@ fn volume_advice(error: &VolumeError) -> String {
             "Crop or resample the volume to at most {limit} {what}, or ask the operator to raise \
              the limit."
         ),
-        VolumeError::FrameNeeded { frames } | VolumeError::FrameOutOfRange { frames, .. } => {
+        VolumeError::FrameNeeded { frames, .. } | VolumeError::FrameOutOfRange { frames, .. } => {
             let last = frames.saturating_sub(1);
-            format!("Set `frame` to a number from 0 to {last}.")
+            format!("Set `frame` to a number from 0 (the first) to {last} (the last).")
         }
         VolumeError::ImageMissing { .. } => {
             "Give the .hdr and the .img together, or a single .nii.".into()
@@ -537,7 +586,12 @@ fn surface_advice(error: &SurfaceError) -> String {
         } => format!("Set `iso` to auto or to an absolute value between {minimum} and {maximum}."),
         SurfaceError::BadIso { expected, .. } => format!("Set `iso` to {expected}."),
         SurfaceError::BadSmoothing { .. } => "Set `mask_smoothing` to a number from 0 to 3.".into(),
-        SurfaceError::NoSuchLabel { .. } => "Set `label` to a label of the volume.".into(),
+        SurfaceError::NoSuchLabel { .. } | SurfaceError::LabelNeeded { .. } => {
+            "Set `label` to a label of the volume.".into()
+        }
+        SurfaceError::InexactLabel { .. } => {
+            "Give the map as a file of whole numbers, or number its labels below 2^24.".into()
+        }
         SurfaceError::OutsideVolume { shape, .. } => {
             format!("Give voxel indices below {shape:?}, counted from 0.")
         }

@@ -312,6 +312,32 @@ async fn a_scan_that_cannot_be_segmented_is_reported_with_the_reason() {
     let refused = service.report("", scan.clone(), Some(elsewhere)).await;
     let refused = problem(refused, 422, "mask-elsewhere").await;
     assert_eq!(refused["field"], "expert");
+    // Several structures and another grid: refused by what to send, and taken with it.
+    let shells = |p: &Vec3| match p.norm() {
+        r if r < 30.0 => 3.0,
+        r if r < 45.0 => 2.0,
+        _ => 0.0,
+    };
+    let map = cube(64, 3.2, Vec3::zeros(), shells);
+    let refused = service.report("", scan.clone(), Some(map)).await;
+    let refused = problem(refused, 422, "label-needed").await;
+    assert_eq!(refused["field"], "label");
+    assert!(text(&refused["detail"]).contains("2 ("), "{refused}");
+    let beside = Vec3::new(1.0, 0.0, 0.0);
+    let shifted = cube(64, 3.2, beside, |p| shells(&(p - beside)));
+    let refused = service
+        .report("label=2", scan.clone(), Some(shifted.clone()))
+        .await;
+    let refused = problem(refused, 422, "other-grid").await;
+    assert_eq!(refused["field"], "resample");
+    assert!(text(&refused["detail"]).contains("64 x 64 x 64 voxels of 3.2 x 3.2 x 3.2 mm"));
+    let taken = service
+        .report("label=2&resample=true", scan.clone(), Some(shifted))
+        .await;
+    assert_eq!(taken.status(), 200);
+    let taken: Value = taken.json().await.unwrap();
+    assert_eq!(taken["parameters"]["resample"], true);
+    assert!(taken["measures"]["jaccard"].is_number(), "{taken}");
     let blank = cube(32, 4.0, Vec3::zeros(), |_| 7.0);
     let refused = service.report("", blank, None).await;
     assert_eq!(refused.status(), 422);

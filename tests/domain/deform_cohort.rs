@@ -7,11 +7,13 @@
 
 use std::path::{Path, PathBuf};
 
+use ventriform::grid::voxelise::Mask;
 use ventriform::model::{Organ, Template};
 use ventriform::parameters::ModelParameters;
 use ventriform::pipeline;
 use ventriform::progress::Monitor;
 use ventriform::segmentation::{NamedTemplate, SegmentationParameters, segment};
+use ventriform::volume::given_mask::{MaskChoice, read_mask};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::{self, ReadLimits, ReadOptions, Reading, Volume, VolumeFile};
 
@@ -53,7 +55,7 @@ fn no_patient_of_the_cohort_is_lost() {
     // Three defects beside a hot liver; small; large with defects; gut twice as hot.
     for case in ["p06", "p03", "p14", "p08"] {
         let scan = read(&cohort.join(case).join("spect.nii.gz")).volume;
-        let expert = read(&cohort.join(case).join("lv_expert_img.nii.gz")).volume;
+        let expert = expert_on(&scan, &cohort.join(case).join("lv_expert_img.nii.gz"));
         let made = segment(
             &scan,
             std::slice::from_ref(&template),
@@ -68,6 +70,19 @@ fn no_patient_of_the_cohort_is_lost() {
     }
 }
 
+/// The expert's mask in the file at `path`, on the grid of `scan`.
+fn expert_on(scan: &Volume, path: &Path) -> Mask {
+    let (choice, silent) = (MaskChoice::default(), Monitor::silent());
+    let given = read_mask(
+        &[VolumeFile::at(path)],
+        &choice,
+        &ReadLimits::default(),
+        &silent,
+    );
+    let placed = given.unwrap().on((scan.shape, &scan.frame), false, &silent);
+    placed.unwrap().mask
+}
+
 #[test]
 fn a_clinical_scan_is_segmented_where_its_expert_drew_alike_in_every_container() {
     let (Some(clinical), Some(cohort)) = (data("clinical"), data("cohort")) else {
@@ -75,7 +90,7 @@ fn a_clinical_scan_is_segmented_where_its_expert_drew_alike_in_every_container()
     };
     let name = "1.2.840.4267.32.118564058634314627767242469443335771432";
     let scan = read(&clinical.join(format!("{name}.dcm"))).volume;
-    let expert = read(&clinical.join(format!("{name}_mask.nii.gz"))).volume;
+    let expert = expert_on(&scan, &clinical.join(format!("{name}_mask.nii.gz")));
     let template = [template(&cohort.join("t1/spect.nii.gz"))];
     let segmented = |scan: &Volume| {
         let parameters = SegmentationParameters::default();

@@ -4,13 +4,15 @@
 
 use std::sync::OnceLock;
 use ventriform::export::{self, Format};
+use ventriform::geometry::Vec3;
+use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::mesh::{intersections, topology};
 use ventriform::parameters::ModelParameters;
 use ventriform::pipeline::{self, Model, PipelineError};
 use ventriform::progress::{CancelToken, Monitor, Observer, Stage};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
-use ventriform::volume::{ReadLimits, VolumeFile};
+use ventriform::volume::{self, ReadLimits, Volume, VolumeFile};
 use ventriform::work::problems::advice;
 
 /// A simulated scan, small enough for many runs.
@@ -67,6 +69,113 @@ fn a_model_stands_for_the_volume_of_its_surface() {
     assert!(error.abs() < 0.0005, "{error}");
     let distance = model.report.distance.mean_mm / model.report.surface.voxel_mm;
     assert!(distance < 0.04, "{distance} voxels");
+}
+
+/// Two cups, each with a label that 32-bit floats do not tell from the other's, in a NIfTI file of 32-bit
+/// integers with `spacing` mm.
+fn atlas(spacing: [f64; 3], labels: [i32; 2]) -> (Vec<u8>, [f64; 2]) {
+    let shape = spacing.map(|s| (120.0 / s) as usize);
+    let frame = VoxelToPatient::centred(shape, spacing, Vec3::zeros()).unwrap();
+    let cup = |p: &Vec3, scale: f64| {
+        let within =
+            |a: f64, c: f64| p.xy().norm_squared() / (a * a) + p.z * p.z / (c * c) < scale * scale;
+        within(30.0, 45.0) && !within(20.0, 35.0) && p.z < 25.0 * scale
+    };
+    let kind = |p: &Vec3| {
+        let second = p - Vec3::new(30.0, 30.0, 0.0);
+        match (
+            cup(&(p + Vec3::new(20.0, 20.0, 0.0)), 1.0),
+            cup(&second, 0.6),
+        ) {
+            (true, _) => 1.0,
+            (_, true) => 2.0,
+            _ => 0.0,
+        }
+    };
+    let kinds = Volume::sampled(shape, frame, kind);
+    let mut bytes = nifti::write(&kinds, StoredType::Float32, false).unwrap();
+    bytes[70..74].copy_from_slice(&[8, 0, 32, 0]);
+    bytes.truncate(352);
+    let mut millilitres = [0.0; 2];
+    for kind in &kinds.voxels {
+        let label = match *kind as usize {
+            0 => 0,
+            kind => {
+                millilitres[kind - 1] += spacing.iter().product::<f64>() / 1000.0;
+                labels[kind - 1]
+            }
+        };
+        bytes.extend(label.to_le_bytes());
+    }
+    (bytes, millilitres)
+}
+
+/// The model of a mask has the volume of the mask's voxels, whatever their shape, and of a label beyond
+/// 2^24 those of no other; the report has both volumes.
+#[test]
+fn a_model_of_a_label_has_the_volume_of_its_voxels_alone() {
+    let labels = [576_073_729, 576_073_732];
+    for spacing in [[3.0; 3], [2.0, 2.0, 10.0], [2.0, 10.0, 2.0], [7.0; 3]] {
+        let (bytes, millilitres) = atlas(spacing, labels);
+        let file = [VolumeFile::in_memory("atlas.nii", bytes)];
+        let make = |pairs: &[(&str, &str)]| {
+            let (limits, silent) = (ReadLimits::default(), Monitor::silent());
+            pipeline::generate(&file, &parameters(pairs), &limits, &silent)
+        };
+        for (label, wanted) in labels.iter().zip(millilitres) {
+            let label = label.to_string();
+            let model = make(&[("label", &label), ("points", "400")]).unwrap();
+            let found = model.mesh.volume() / 1000.0;
+            assert!(
+                (found / wanted - 1.0).abs() < 0.02,
+                "{spacing:?} {label}: {found} {wanted}"
+            );
+            let facts = &model.report.surface.facts;
+            assert_eq!(facts["label"].to_string(), label);
+            assert!((facts["mask_ml"].as_f64().unwrap() / wanted - 1.0).abs() < 1e-6);
+            let surface = model.report.surface.volume_ml;
+            assert!(
+                (surface / wanted - 1.0).abs() < 0.01,
+                "{spacing:?} {label}: {surface}"
+            );
+            let lost = model
+                .report
+                .warnings
+                .iter()
+                .any(|w| w.contains("the mask's voxels have"));
+            assert!(!lost, "{:?}", model.report.warnings);
+        }
+        for pairs in [&[][..], &[("label", "576073728")], &[("label", "1")]] {
+            let refused = make(pairs).unwrap_err();
+            assert_eq!(refused.field(), Some("label"), "{refused}");
+            for label in labels {
+                assert!(
+                    refused.to_string().contains(&label.to_string()),
+                    "{refused}"
+                );
+            }
+        }
+        let listed = volume::inspect(&file, &ReadLimits::default(), &Monitor::silent()).unwrap();
+        let listed = listed.intensity.labels.unwrap();
+        let listed: Vec<i64> = listed.iter().map(|l| l.label).collect();
+        assert_eq!(listed, labels.map(i64::from));
+    }
+}
+
+/// A level of one's own does not keep the volume, and the report says so.
+#[test]
+fn a_model_that_lost_its_masks_volume_says_so() {
+    let (bytes, _) = atlas([3.0; 3], [1, 2]);
+    let file = [VolumeFile::in_memory("labels.nii", bytes)];
+    let pairs = [("label", "1"), ("iso", "absolute:0.8"), ("points", "300")];
+    let (limits, silent) = (ReadLimits::default(), Monitor::silent());
+    let model = pipeline::generate(&file, &parameters(&pairs), &limits, &silent).unwrap();
+    let told = model
+        .report
+        .warnings
+        .iter()
+        .find(|w| w.contains("the mask's voxels have"));
+    assert!(told.is_some(), "{:?}", model.report.warnings);
 }
 
 #[test]

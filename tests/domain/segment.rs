@@ -18,7 +18,7 @@ use ventriform::progress::{CancelToken, Monitor, Observer, Plan, Stage, TotalPro
 use ventriform::segmentation::{SegmentationFilesError, SegmentationOrder, from_files};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
-use ventriform::volume::{ReadLimits, Volume, VolumeFile};
+use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
 
 /// A folder with `scan.nii.gz`, its `truth.nii.gz`, and masks that do not match it.
 fn folder() -> TempDir {
@@ -190,6 +190,115 @@ fn errors_name_the_field_and_what_to_do() {
         assert!(said.contains(words), "{line}: {said}");
     }
     assert!(!here.join("out").exists(), "nothing is written");
+}
+
+/// The same masks to `measure`, `segment --expert` and `calibrate`: the structure is chosen by its number,
+/// never guessed; what is on another grid is refused with both geometries, or resampled if asked.
+#[test]
+fn masks_are_read_alike_by_every_command() {
+    let folder = folder();
+    let here = folder.path();
+    let read = |name: &str| {
+        let file = VolumeFile::at(here.join(name));
+        let (options, limits) = (ReadOptions::default(), ReadLimits::default());
+        volume::read(&[file], &options, &limits, &Monitor::silent())
+            .unwrap()
+            .volume
+    };
+    let write = |name: &str, volume: &Volume| {
+        let bytes = nifti::write(volume, StoredType::Uint8, true).unwrap();
+        std::fs::write(here.join(name), bytes).unwrap();
+    };
+    let truth = read("truth.nii.gz");
+    // The wall as 2, and as 3 all that lies within 40 mm of it along i, on one side.
+    let mut map = truth.clone();
+    for v in 0..map.voxels.len() {
+        let near = (1..12).any(|n| truth.voxels.get(v + n).is_some_and(|t| *t > 0.0));
+        map.voxels[v] = match (truth.voxels[v] > 0.0, near) {
+            (true, _) => 2.0,
+            (_, true) => 3.0,
+            _ => 0.0,
+        };
+    }
+    write("map.nii.gz", &map);
+    let mut fine = truth.clone();
+    let shift = fine.frame.linear().column(0) * 0.3;
+    let origin = fine.frame.to_patient(&Vec3::zeros()) + shift;
+    fine.frame = VoxelToPatient::new(*fine.frame.linear(), origin).unwrap();
+    write("shifted.nii.gz", &fine);
+    let jaccard = |line: &str| {
+        let measured: Value = serde_json::from_str(&succeeds(here, line)).unwrap();
+        number(&measured["jaccard"])
+    };
+    assert_eq!(jaccard("measure truth.nii.gz map.nii.gz --label 2"), 1.0);
+    assert_eq!(jaccard("measure truth.nii.gz map.nii.gz --label-b 2"), 1.0);
+    assert_eq!(
+        jaccard("measure map.nii.gz truth.nii.gz --label-a 2 --label-b 1"),
+        1.0
+    );
+    assert!(jaccard("measure truth.nii.gz map.nii.gz --label-b 3") < 0.01);
+    assert_eq!(
+        jaccard("measure truth.nii.gz shifted.nii.gz --resample"),
+        1.0
+    );
+    let several = ["2 (", "3 (", "`label`"];
+    let other = ["64 x 64 x 64 voxels of", "different grids", "`resample`"];
+    for (line, words) in [
+        ("measure truth.nii.gz map.nii.gz", &several[..]),
+        (
+            "segment scan.nii.gz -o out --model auto --expert map.nii.gz",
+            &several,
+        ),
+        (
+            "measure truth.nii.gz map.nii.gz --label 4",
+            &["no structure 4", "2 ("],
+        ),
+        ("measure truth.nii.gz scan.nii.gz", &["no mask"]),
+        ("measure truth.nii.gz shifted.nii.gz", &other),
+        (
+            "segment scan.nii.gz -o out --model auto --expert shifted.nii.gz",
+            &other,
+        ),
+        ("measure truth.nii.gz truth.nii.gz --label 7", &["neither"]),
+        (
+            "measure truth.nii.gz truth.nii.gz --label-a 7",
+            &["no structure 7"],
+        ),
+    ] {
+        let said = refusal(here, line);
+        for word in words {
+            assert!(said.contains(word), "{line}: {said}");
+        }
+    }
+    // The agreement is the one with the wall alone, and the report says what was compared.
+    let compared = |name: &str, line: &str| {
+        succeeds(
+            here,
+            &format!("segment scan.nii.gz -o {name} --model auto {line}"),
+        );
+        let report = std::fs::read(here.join(name).join("report.json")).unwrap();
+        let report: Value = serde_json::from_slice(&report).unwrap();
+        (report["measures"].clone(), report["warnings"].to_string())
+    };
+    let (alone, quiet) = compared("alone", "--expert truth.nii.gz");
+    let (named, told) = compared("named", "--expert map.nii.gz --label 2");
+    assert_eq!(named, alone);
+    assert!(
+        !quiet.contains("label 2") && told.contains("label 2"),
+        "{told}"
+    );
+    let (resampled, told) = compared("resampled", "--expert shifted.nii.gz --resample");
+    assert_eq!(resampled, alone);
+    assert!(told.contains("resampled"), "{told}");
+    for (case, scan) in [("a", "scan.nii.gz"), ("b", "scan.nii.gz")] {
+        let case = here.join("cohort").join(case);
+        std::fs::create_dir_all(&case).unwrap();
+        std::fs::copy(here.join(scan), case.join("spect.nii.gz")).unwrap();
+        std::fs::copy(here.join("map.nii.gz"), case.join("lv_expert_img.nii.gz")).unwrap();
+    }
+    let said = refusal(here, "calibrate cohort -o reader.json");
+    assert!(said.contains("2 (") && said.contains("its mask"), "{said}");
+    succeeds(here, "calibrate cohort -o reader.json --label 2");
 }
 
 #[test]

@@ -184,6 +184,121 @@ fn labels_are_taken_by_number_or_by_size() {
     assert!(missing.to_string().contains("4 (") && missing.to_string().contains("label 5"));
 }
 
+/// A ball of `inside` in `outside`, as whole numbers of a label map.
+fn ball_of(inside: f32, outside: f32) -> Volume {
+    let mut map = volume([24; 3], [3.0; 3], |p| f64::from(u8::from(p.norm() < 20.0)));
+    for v in &mut map.voxels {
+        *v = if *v > 0.0 { inside } else { outside };
+    }
+    map.integral = true;
+    map
+}
+
+#[test]
+fn the_object_is_what_the_background_surrounds_whatever_their_numbers() {
+    let plain = run(&ball_of(1.0, 0.0), &SurfaceParameters::default()).unwrap();
+    for (inside, outside) in [
+        (1.0, -1.0),
+        (0.0, -1.0),
+        (3.0, -1024.0),
+        (0.0, 255.0),
+        (2.0, 1.0),
+        (-1.0, 0.0),
+        (1.0, f32::NAN),
+        (576_073_728.0, 0.0),
+    ] {
+        let map = ball_of(inside, outside);
+        let found = run(&map, &SurfaceParameters::default()).unwrap();
+        assert_eq!(found.mesh, plain.mesh, "{inside} in {outside}");
+        assert_eq!(found.facts.label, Some(inside as i64));
+        assert_eq!(found.facts.kind, VolumeKind::Mask);
+        let named = run(&map, &with(Isolate::Label(inside as i64), IsoLevel::Auto)).unwrap();
+        assert_eq!(named.mesh, plain.mesh);
+        let background = found
+            .facts
+            .warnings
+            .iter()
+            .any(|w| w.contains("background"));
+        assert_eq!(background, outside != 0.0 && !outside.is_nan());
+    }
+    // A float cannot hold this number, so the voxels are not it.
+    let refused = run(
+        &ball_of(576_073_728.0, 0.0),
+        &with(Isolate::Label(576_073_729), IsoLevel::Auto),
+    );
+    assert!(matches!(
+        refused,
+        Err(SurfaceError::InexactLabel { label: 576_073_729 })
+    ));
+}
+
+#[test]
+fn of_many_labels_any_can_be_named_and_none_is_guessed() {
+    let mut map = volume([24; 3], [2.0; 3], |_| 0.0);
+    for (n, v) in map.voxels.iter_mut().enumerate() {
+        let [i, j, k] = [n % 24, n / 24 % 24, n / 576].map(|x| x / 3);
+        *v = (1 + i + 8 * (j + 8 * k)) as f32;
+    }
+    map.integral = true;
+    for label in [1, 300, 512] {
+        let one = run(&map, &with(Isolate::Label(label), IsoLevel::Auto)).unwrap();
+        let off = one.mesh.volume() / (27.0 * 8.0) - 1.0;
+        assert!(off.abs() < 0.01, "{label}: {off}");
+    }
+    let refused = run(&map, &with(Isolate::Label(9999), IsoLevel::Auto)).unwrap_err();
+    assert!(refused.to_string().contains("1 (27 voxels)"), "{refused}");
+    assert!(refused.to_string().contains("472 more"), "{refused}");
+    let refused = run(&map, &SurfaceParameters::default()).unwrap_err();
+    assert!(
+        matches!(refused, SurfaceError::LabelNeeded { .. }),
+        "{refused}"
+    );
+    assert_eq!(refused.field(), Some("label"));
+}
+
+/// A distance that is negative inside, an object darker than its surroundings: the surface of the volume
+/// turned over, with the figures of the volume itself.
+#[test]
+fn what_lies_below_an_iso_value_is_an_object_too() {
+    let distance = |p: Vec3| (p - Vec3::new(3.0, -2.0, 1.0)).norm() - 19.0;
+    let inside = volume([30; 3], [2.5; 3], |p| -distance(p));
+    let outside = volume([30; 3], [2.5; 3], distance);
+    for (isolate, level) in [
+        (Isolate::Auto, 0.0),
+        (Isolate::Largest, -2.0),
+        (Isolate::None, 1.5),
+        (Isolate::Seed([15, 14, 15]), 0.0),
+    ] {
+        let above = Isolate::Largest;
+        let above = if isolate == Isolate::Auto {
+            above
+        } else {
+            isolate
+        };
+        let expected = run(&inside, &with(above, IsoLevel::Absolute(-level))).unwrap();
+        let found = run(&outside, &with(isolate, IsoLevel::Below(level))).unwrap();
+        assert_eq!(found.mesh, expected.mesh);
+        assert_eq!(found.facts.iso_value, level);
+        assert!(found.facts.range[0] < 0.0 && found.facts.range[1] > 15.0);
+        let radius = 19.0 + level;
+        let sphere = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
+        assert!((found.mesh.volume() / sphere - 1.0).abs() < 0.02);
+    }
+    let refused = run(&outside, &with(Isolate::Largest, IsoLevel::Below(-30.0))).unwrap_err();
+    assert!(
+        matches!(refused, SurfaceError::NoSurface { iso, .. } if iso == -30.0),
+        "{refused}"
+    );
+    let refused = run(
+        &ball_of(1.0, 0.0),
+        &with(Isolate::Label(1), IsoLevel::Below(0.5)),
+    );
+    assert!(matches!(refused, Err(SurfaceError::BadIso { .. })));
+    // Taken for bright, the distance's object is the surroundings, and a warning says how to turn that over.
+    let turned = run(&outside, &with(Isolate::Largest, IsoLevel::Absolute(0.0))).unwrap();
+    assert!(turned.facts.warnings.iter().any(|w| w.contains("below:0")));
+}
+
 #[test]
 fn box_seed_largest_and_none_choose_what_they_say() {
     let two = volume([50, 30, 30], [2.0; 3], |p| {

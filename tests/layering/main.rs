@@ -60,8 +60,8 @@ const USES: &[(&str, &[&str])] = &[
     (
         "parameters",
         &[
-            "geometry", "grid", "locate", "surface", "retile", "optimise", "model", "deform",
-            "polar",
+            "geometry", "grid", "volume", "locate", "surface", "retile", "optimise", "model",
+            "deform", "polar",
         ],
     ),
     (

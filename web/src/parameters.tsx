@@ -55,7 +55,7 @@ const UNITS: [RegExp, string][] = [
   [/square millimetres/, "mm²"],
   [/millimetres|LPS mm/, "mm"],
   [/degrees/, "°"],
-  [/[Ss]igma in voxels/, "voxels"],
+  [/, in voxels/, "voxels"],
 ];
 
 function read(operation?: Operation): Spec[] {
@@ -83,6 +83,7 @@ const GROUPS: Record<Kind, [string, string[]][]> = {
     ["Triangles", ["fitness", "w1", "w2", "w3", "w4", "gain", "guard"]],
   ],
   segmentation: [
+    ["The expert's mask", ["label", "resample"]],
     ["Where the heart is", ["organ", "center", "axis", "base", "seed_point", "box", "roll", "superior", "anterior"]],
     ["Edge of the wall", ["sensor", "blur", "reach", "last_reach", "narrowing", "margin", "resolution"]],
     ["Springs", ["spring_stiffness", "torsion_stiffness", "body_stiffness", "thickness_stiffness", "mass", "damping", "time_step", "tolerance", "max_iterations"]],
@@ -115,6 +116,7 @@ export function valuesOf(draft: Draft, all: Spec[]): Record<string, ParameterVal
     if (!text) continue;
     if (schema.type === "array") values[name] = text.split(/[\s,;]+/).map(part => (Number.isFinite(Number(part)) ? Number(part) : part));
     else if (schema.type === "integer" || schema.type === "number") values[name] = Number.isFinite(Number(text)) ? Number(text) : text;
+    else if (schema.type === "boolean") values[name] = text === "true";
     else values[name] = text;
   }
   return values;
@@ -270,7 +272,14 @@ function Field({ spec, volume, text, onText, error }: FieldProps) {
   if (name === "model") input = <ModelChoice common={common} text={text} onText={onText} volume={volume} />;
   else if (name === "expert") input = <ExpertChoice common={common} text={text} onText={onText} volume={volume} />;
   else if (name === "reader") input = <ReaderChoice common={common} text={text} onText={onText} />;
-  else if (schema.enum) {
+  else if (schema.type === "boolean") {
+    input = (
+      <select {...common} value={text || standard} onChange={event => onText(event.currentTarget.value === standard ? "" : event.currentTarget.value)}>
+        <option value="false">no</option>
+        <option value="true">yes</option>
+      </select>
+    );
+  } else if (schema.enum) {
     input = (
       <select {...common} value={text || (schema.default as string | undefined) || ""} onChange={event => onText(event.currentTarget.value === schema.default ? "" : event.currentTarget.value)}>
         {schema.default === undefined && <option value="">automatic</option>}

@@ -106,6 +106,7 @@ fn schema_of<P: Parameters>(spec: &ParameterSpec<P>) -> Schema {
             .minimum(Some(min))
             .maximum(Some(max))
             .into(),
+        Kind::Switch => object.schema_type(Type::Boolean).into(),
         Kind::Choice(words) => object
             .schema_type(Type::String)
             .enum_values(Some(words.iter().copied()))

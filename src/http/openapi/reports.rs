@@ -258,6 +258,9 @@ schemas! {
         ventricle_score: Option<f64>,
         /// The noise that was measured and taken off the surface; null for masks and with denoise=off.
         noise: Option<SurfaceNoiseSchema>,
+        /// Volume of the voxels that carry the label, millilitres, which the surface is made to enclose;
+        /// null for intensities.
+        mask_ml: Option<f64>,
         /// Volume of the object's voxels, millilitres.
         region_ml: f64,
         /// Whether the object touches the volume's border.

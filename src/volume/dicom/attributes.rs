@@ -43,6 +43,9 @@ const SHARED: Tag = Tag(0x5200, 0x9229);
 /// Per-frame Functional Groups Sequence. In a path it stands for the shared groups too.
 const FRAME: Tag = Tag(0x5200, 0x9230);
 
+/// Segment Sequence, whose items are counted like frames.
+const SEGMENT: Tag = Tag(0x0062, 0x0002);
+
 const DETECTOR: &[Tag] = &[Tag(0x0054, 0x0022)];
 const REAL_WORLD: &[Tag] = &[Tag(0x0040, 0x9096)];
 const PHARMACEUTICAL: &[Tag] = &[Tag(0x0054, 0x0016)];
@@ -68,6 +71,8 @@ const FRAME_TYPE_CT: &[Tag] = &[FRAME, Tag(0x0018, 0x9329)];
 const FRAME_TYPE_PET: &[Tag] = &[FRAME, Tag(0x0018, 0x9751)];
 /// Attributes of single-frame images for which Legacy Converted Enhanced images have no group.
 const FRAME_UNASSIGNED: &[Tag] = &[FRAME, Tag(0x0020, 0x9171)];
+const SEGMENT_TYPE_PATH: &[Tag] = &[SEGMENT, Tag(0x0062, 0x000f)];
+const SEGMENT_REGION_PATH: &[Tag] = &[SEGMENT, Tag(0x0008, 0x2218)];
 
 attributes! {
     CHARACTER_SET = &[], 0x0008, 0x0005, "Specific Character Set (0008,0005)";
@@ -220,6 +225,12 @@ attributes! {
     OLD_ACQUISITION_TIME = FRAME_UNASSIGNED, 0x0008, 0x0032, "Acquisition Time (0008,0032)";
     OLD_IMAGE_INDEX = FRAME_UNASSIGNED, 0x0054, 0x1330, "Image Index (0054,1330)";
     OLD_INSTANCE_NUMBER = FRAME_UNASSIGNED, 0x0020, 0x0013, "Instance Number (0020,0013)";
+    SEGMENT_NUMBER = &[SEGMENT], 0x0062, 0x0004, "Segment Number (0062,0004)";
+    SEGMENT_LABEL = &[SEGMENT], 0x0062, 0x0005, "Segment Label (0062,0005)";
+    SEGMENT_TYPE_VALUE = SEGMENT_TYPE_PATH, 0x0008, 0x0100, "Code Value (0008,0100)";
+    SEGMENT_TYPE_MEANING = SEGMENT_TYPE_PATH, 0x0008, 0x0104, "Code Meaning (0008,0104)";
+    SEGMENT_REGION_VALUE = SEGMENT_REGION_PATH, 0x0008, 0x0100, "Code Value (0008,0100)";
+    SEGMENT_REGION_MEANING = SEGMENT_REGION_PATH, 0x0008, 0x0104, "Code Meaning (0008,0104)";
     FRAME_SEGMENT = FRAME_SEGMENT_PATH, 0x0062, 0x000b, "Referenced Segment Number (0062,000B)";
 }
 
@@ -230,22 +241,22 @@ impl Attribute {
     }
 
     /// The needed attribute with `tag` inside the sequences `open`, each with the number of items
-    /// begun, and the frame to which the value belongs, from 0; `None` for a value that belongs to
-    /// the data set or to all frames.
+    /// begun, and the frame or segment to which the value belongs, from 0; `None` for a value that
+    /// belongs to the data set or to all frames.
     pub(super) fn find(open: &[(Tag, usize)], tag: Tag) -> Option<(Self, Option<usize>)> {
-        let (frame, first) = match open.first() {
-            Some((FRAME, items)) => (Some(items.checked_sub(1)?), 1),
-            Some((SHARED, 1)) => (None, 1),
-            _ => (None, 0),
+        let (frame, outer) = match open.first() {
+            Some((many @ (FRAME | SEGMENT), items)) => (Some(items.checked_sub(1)?), Some(*many)),
+            Some((SHARED, 1)) => (None, Some(FRAME)),
+            _ => (None, None),
         };
+        let first = usize::from(outer.is_some());
         if open[first..].iter().any(|(_, items)| *items != 1) {
             return None;
         }
-        let is_frame = first == 1;
         let wanted = WANTED.iter().find(|a| {
-            let outer = a.path.first() == Some(&FRAME);
+            let own = a.path.first().filter(|t| [FRAME, SEGMENT].contains(t));
             a.tag == tag
-                && outer == is_frame
+                && own == outer.as_ref()
                 && a.path.len() == open.len()
                 && a.path[first..]
                     .iter()
@@ -395,7 +406,12 @@ impl Attributes {
     /// The whole text of an attribute, for people to read; `None` if it is absent, empty, or cannot
     /// be decoded.
     pub(super) fn prose(&self, attribute: Attribute) -> Option<String> {
-        self.decoded(attribute).ok().flatten()
+        self.prose_of(attribute, None)
+    }
+
+    /// As [`Attributes::prose`], for frame or segment number `item`, from 0.
+    pub(super) fn prose_of(&self, attribute: Attribute, item: Option<usize>) -> Option<String> {
+        self.decoded_of(attribute, item).ok().flatten()
     }
 
     /// The whole text of an attribute, decoded by the character sets that the data set, or the item
@@ -404,7 +420,15 @@ impl Attributes {
     /// # Errors
     /// Why the text cannot be told, without any of it.
     pub(super) fn decoded(&self, attribute: Attribute) -> Result<Option<String>, String> {
-        let Some(bytes) = self.bytes_of(attribute, None) else {
+        self.decoded_of(attribute, None)
+    }
+
+    fn decoded_of(
+        &self,
+        attribute: Attribute,
+        item: Option<usize>,
+    ) -> Result<Option<String>, String> {
+        let Some(bytes) = self.bytes_of(attribute, item) else {
             return Ok(None);
         };
         // These texts are stored with every volume, and listed.

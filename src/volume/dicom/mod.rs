@@ -45,6 +45,7 @@ mod tests;
 
 pub use header::{DicomHeader, read_header, storage_classes, transfer_syntaxes};
 pub use provenance::Provenance;
+pub use segments::{Segment, SegmentCode};
 pub(super) use syntax::is_dicom;
 
 use self::attributes::{
@@ -747,6 +748,19 @@ impl OpenVolume for DicomFile {
             }
         }
         Some(provenance)
+    }
+
+    fn segments(&self) -> &[Segment] {
+        match &self.content {
+            Content::Labels(segments) => &segments.described,
+            Content::Slices(_) => &[],
+        }
+    }
+
+    fn keep_segment(&mut self, number: u16) {
+        if let Content::Labels(segments) = &mut self.content {
+            segments.only = Some(number);
+        }
     }
 
     fn decode_frame(&mut self, frame: usize, monitor: &Monitor) -> Result<Decoded, VolumeError> {

@@ -36,6 +36,8 @@ pub(super) struct Header {
     pub unit: LengthUnit,
     /// `xyzt_units` as stated.
     pub xyzt_units: i32,
+    /// What the file is meant to hold.
+    pub intent_code: i32,
     /// `pixdim`, entry 0 being qfac.
     pub pixdim: [f64; 8],
     /// 0 if there is no qform.
@@ -93,6 +95,7 @@ impl Header {
             scaling: stated.scaling(&mut warnings)?,
             unit: stated.unit(&mut warnings),
             xyzt_units: stated.xyzt_units,
+            intent_code: stated.intent_code,
             pixdim: stated.pixdim,
             qform_code: stated.qform_code,
             sform_code: stated.sform_code,

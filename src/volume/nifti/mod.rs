@@ -2,13 +2,15 @@
 //!
 //! After the NIfTI-1.1 header file `nifti1.h` (NIfTI DFWG 2004) and `nifti2.h` (2011), whose field
 //! names are used throughout. `stated` reads the fields of either version, NIfTI-1 through the
-//! `nifti` crate; `header` checks them; `place` computes the affine; [`mod@write`] writes files, and
-//! [`grid`] carries the place of a scan's grid to the masks that are written of it.
+//! `nifti` crate; `header` checks them; `place` computes the affine; `gates` tells gates of a heart
+//! beat from other volumes; [`mod@write`] writes files, and [`grid`] carries the place of a scan's grid
+//! to the masks that are written of it.
 //!
 //! Colour and complex data types are rejected, because the uptake cannot be told from their parts.
 //! CIFTI files, which store matrices in a NIfTI-2 file, are rejected too.
 
 mod bare;
+mod gates;
 pub mod grid;
 mod header;
 mod place;
@@ -44,6 +46,8 @@ pub(super) struct NiftiFile {
     header: Header,
     placement: Placement,
     source: Source,
+    /// Why several volumes cannot be gates of one heart beat.
+    not_gates: Option<String>,
 }
 
 impl NiftiFile {
@@ -54,8 +58,16 @@ impl NiftiFile {
         limits: &ReadLimits,
     ) -> Result<Self, VolumeError> {
         let mut start = Source::open(header_file, limits.unpacked_bytes)?;
-        let header = Header::read(&mut start)?;
+        let mut header = Header::read(&mut start)?;
         let placement = place(&header)?;
+        let not_gates = gates::contradiction(&header);
+        if header.frames > 1 && not_gates.is_none() {
+            header.warnings.push(format!(
+                "Nothing in the header says what the {} volumes are: they are taken for gates of one \
+                 heart beat.",
+                header.frames
+            ));
+        }
         let mut source = match header.pair {
             true => Source::open(voxel_file, limits.unpacked_bytes)?,
             false => start,
@@ -65,6 +77,7 @@ impl NiftiFile {
             header,
             placement,
             source,
+            not_gates,
         })
     }
 }
@@ -84,12 +97,16 @@ impl OpenVolume for NiftiFile {
             scaling: self.header.scaling,
             file_shape: self.header.dim.clone(),
             frames: self.header.frames,
-            gated: false,
+            gated: self.header.frames > 1 && self.not_gates.is_none(),
             shape: self.header.shape,
             placement: &self.placement,
             unit: self.header.unit,
             warnings: &self.header.warnings,
         }
+    }
+
+    fn why_not_gated(&self) -> Option<&str> {
+        self.not_gates.as_deref()
     }
 
     fn decode_frame(&mut self, frame: usize, monitor: &Monitor) -> Result<Decoded, VolumeError> {
@@ -122,6 +139,18 @@ impl OpenVolume for NiftiFile {
         let mut reader = VoxelReader::new(header.voxel_format(), &mut self.source);
         let report = &mut |done| monitor.report(Stage::Read, done);
         reader.stream(header.frame_begin(frame), header.voxels(), take, report)
+    }
+
+    fn stream_labels(
+        &mut self,
+        frame: usize,
+        take: &mut dyn FnMut(usize, &[i64]),
+        monitor: &Monitor,
+    ) -> Result<(), VolumeError> {
+        let header = &self.header;
+        let mut reader = VoxelReader::new(header.voxel_format(), &mut self.source);
+        let report = &mut |done| monitor.report(Stage::Read, done);
+        reader.stream_exact(header.frame_begin(frame), header.voxels(), take, report)
     }
 
     fn decode_all(

@@ -1,13 +1,17 @@
 //! The affine of a header: from the sform, otherwise the qform, otherwise `pixdim`.
 //!
 //! After `nifti1.h`, "METHOD 1" to "METHOD 3", in the order of preference of the standard's
-//! reference library and of nibabel. If sform and qform disagree, the sform is used and a warning
-//! gives their distance. If the file has neither, the standard leaves the orientation open; then
+//! reference library and of nibabel. The three are compared with each other, since a file states its
+//! voxel size up to three times. What is used stays the sform, and a warning gives both figures of
+//! every difference: size of the voxels, direction of the axes, handedness, place. Sizes that differ
+//! by more than half are refused: no alignment with another space scales a body so much, and which
+//! of both is true cannot be told (an sform of unit size beside a `pixdim` of 5 mm is a known fault
+//! of converters). If the file has neither, the standard leaves the orientation open; then
 //! nibabel's convention is used (left-handed storage, i toward the patient's left, the centre of
 //! the array at the origin), with a warning.
 
 use super::super::VolumeError;
-use super::super::facts::AffineSource;
+use super::super::facts::{AffineSource, LengthUnit};
 use super::super::open::Placement;
 use super::header::Header;
 use crate::geometry::Vec3;
@@ -16,6 +20,16 @@ use nalgebra::{Matrix4, Vector4};
 
 /// Distance between sform and qform, as a share of a voxel, above which there is a warning.
 const TOLERANCE: f64 = 0.1;
+
+/// Relative difference of two voxel sizes above which there is a warning. Sizes are stated in 32-bit
+/// floats, and some writers round them to three decimals.
+const SIZE_SLACK: f64 = 1e-3;
+
+/// Ratio of two voxel sizes above which the file is refused.
+const SIZE_RATIO: f64 = 1.5;
+
+/// Angle between the axes of sform and qform above which a warning names it, degrees.
+const ANGLE_SLACK: f64 = 0.1;
 
 /// Largest excess of `b^2 + c^2 + d^2` over 1 that rounding can explain.
 const QUATERNION_SLACK: f64 = 1e-3;
@@ -28,6 +42,7 @@ pub(super) fn place(header: &Header) -> Result<Placement, VolumeError> {
     let mut warnings = Vec::new();
     let (ras, source) = if header.sform_code > 0 {
         let sform = sform(header)?;
+        warnings.extend(sizes(header, &sform)?);
         if header.qform_code > 0 {
             warnings.extend(disagreement(header, &sform));
         }
@@ -157,7 +172,70 @@ fn spacing(header: &Header) -> Result<[f64; 3], VolumeError> {
     Ok(spacing)
 }
 
-/// A warning if the qform puts a corner of the volume at another position than `sform` does.
+/// A warning if the voxels of `sform` have other sizes than `pixdim` states. The sizes of the qform
+/// are those of `pixdim`.
+///
+/// # Errors
+/// [`VolumeError::Field`] if they differ by more than half.
+fn sizes(header: &Header, sform: &Matrix4<f64>) -> Result<Option<String>, VolumeError> {
+    let axes: Vec<usize> = (0..header.dim.len().min(3))
+        .filter(|axis| header.shape[*axis] > 1)
+        .collect();
+    let columns = [0, 1, 2].map(|axis| sform.fixed_view::<3, 1>(0, axis).norm());
+    let stated = [1, 2, 3].map(|n| header.pixdim[n].abs());
+    let unit = match header.unit {
+        LengthUnit::Unknown => "mm",
+        unit => unit.as_str(),
+    };
+    let list = |sizes: [f64; 3]| {
+        let sizes: Vec<String> = axes.iter().map(|axis| figure(sizes[*axis])).collect();
+        format!("{} {unit}", sizes.join(" x "))
+    };
+    let known = |axis: &usize| stated[*axis].is_finite() && stated[*axis] > 0.0;
+    if !axes.iter().all(known) {
+        // Fields that were never filled in. No transform is computed from them.
+        return Ok((header.qform_code <= 0).then(|| {
+            format!(
+                "pixdim states no voxel size ({}): the sform's {} was used.",
+                list(stated),
+                list(columns)
+            )
+        }));
+    }
+    let ratio = |axis: &usize| {
+        let ratio = columns[*axis] / stated[*axis];
+        ratio.max(1.0 / ratio)
+    };
+    let most = axes.iter().map(ratio).fold(1.0, f64::max);
+    // Also the default of a field that was never filled in, if no qform is computed from it.
+    let unfilled = header.qform_code <= 0 && axes.iter().all(|axis| stated[*axis] == 1.0);
+    if most > SIZE_RATIO && !unfilled {
+        let reason = format!(
+            "the sform (srow_x, srow_y, srow_z) states voxels of {}; which size is true cannot be told",
+            list(columns)
+        );
+        return Err(wrong(header, "pixdim", list(stated), &reason));
+    }
+    Ok((most > 1.0 + SIZE_SLACK).then(|| {
+        format!(
+            "The sform states voxels of {} and pixdim of {}: the sform was used.",
+            list(columns),
+            list(stated)
+        )
+    }))
+}
+
+/// A length with as many digits as tell two sizes apart, without trailing zeros.
+fn figure(length: f64) -> String {
+    let rounded = format!("{length:.4}");
+    match rounded.parse::<f64>() {
+        Ok(value) if value != 0.0 => value.to_string(),
+        _ => length.to_string(),
+    }
+}
+
+/// A warning if the qform puts a corner of the volume at another position than `sform` does, with
+/// all that differs.
 fn disagreement(header: &Header, sform: &Matrix4<f64>) -> Option<String> {
     let qform = match qform(header) {
         Ok(qform) => qform,
@@ -172,12 +250,39 @@ fn disagreement(header: &Header, sform: &Matrix4<f64>) -> Option<String> {
     };
     let apart = (0..8).map(|c| ((sform - qform) * corner(c)).norm());
     let apart = apart.fold(0.0, f64::max);
-    let voxel = (0..3).map(|c| sform.fixed_view::<3, 1>(0, c).norm());
+    let axis = |m: &Matrix4<f64>, c: usize| m.fixed_view::<3, 1>(0, c).into_owned();
+    let voxel = (0..3).map(|c| axis(sform, c).norm());
     let voxel = voxel.fold(f64::INFINITY, f64::min);
-    (apart > TOLERANCE * voxel).then(|| {
-        let apart = apart * header.unit.in_millimetres();
-        format!("sform and qform put voxels up to {apart:.4} mm apart: the sform was used.")
-    })
+    let hands = [sform, &qform].map(|m| m.fixed_view::<3, 3>(0, 0).determinant() > 0.0);
+    if apart <= TOLERANCE * voxel && hands[0] == hands[1] {
+        return None;
+    }
+    let scale = header.unit.in_millimetres();
+    let mut differences = Vec::new();
+    let origins = [sform, &qform].map(|m| axis(m, 3) * scale);
+    if (origins[0] - origins[1]).norm() > TOLERANCE * voxel * scale {
+        let [s, q] = origins.map(|o| format!("({:.3}, {:.3}, {:.3})", o.x, o.y, o.z));
+        differences.push(format!("origins {s} and {q} mm, RAS"));
+    }
+    let angle = (0..3).map(|c| axis(sform, c).angle(&axis(&qform, c)).to_degrees());
+    let angle = angle.fold(0.0, f64::max);
+    if angle > ANGLE_SLACK {
+        differences.push(format!("axes up to {angle:.1} degrees apart"));
+    }
+    if hands[0] != hands[1] {
+        let [s, q] = hands.map(|right| if right { "right" } else { "left" });
+        differences.push(format!(
+            "a {s}-handed and a {q}-handed grid: one mirrors the other"
+        ));
+    }
+    let differences = match differences.is_empty() {
+        true => String::new(),
+        false => format!(" ({})", differences.join("; ")),
+    };
+    let apart = apart * scale;
+    Some(format!(
+        "sform and qform put voxels up to {apart:.4} mm apart{differences}: the sform was used."
+    ))
 }
 
 /// A warning if the voxel size is outside the range of any scanner.

@@ -281,9 +281,16 @@ fn dimensions_are_checked() {
 fn of_several_volumes_one_must_be_named() {
     let mut file = File::new(false);
     file.dim(&[4, 3, 1, 2]);
-    assert_eq!(
-        file.read().err(),
-        Some(VolumeError::FrameNeeded { frames: 2 })
+    // A vector's components are no gates.
+    file.put(68, 1007_i16.to_le_bytes());
+    let refused = file.read().unwrap_err();
+    assert!(matches!(
+        refused,
+        VolumeError::FrameNeeded { frames: 2, .. }
+    ));
+    assert!(
+        refused.to_string().contains("intent_code 1007"),
+        "{refused}"
     );
     let second = |bytes: &[u8]| read_files(&[bytes], Some(1)).unwrap();
     for bytes in [file.bytes.clone(), gzip(&file.bytes)] {
@@ -304,6 +311,253 @@ fn of_several_volumes_one_must_be_named() {
         (facts.frames, facts.frame, facts.intensity.sum),
         (2, None, 276.0)
     );
+}
+
+/// sform, qform and `pixdim` in both versions and as a pair: what agrees is read in silence, what
+/// differs is refused or warned of with both figures.
+#[test]
+fn geometry_that_contradicts_itself_is_told_with_both_figures() {
+    /// Columns of the sform, origin.
+    struct Sform([[f32; 3]; 3], [f32; 3]);
+    /// Quaternion, offset, qfac.
+    struct Qform([f32; 3], [f32; 3], f32);
+    #[derive(Clone, Copy, Debug)]
+    enum Form {
+        First,
+        Pair,
+        Second,
+    }
+    let read = |form: Form, s: Option<&Sform>, q: Option<&Qform>, sizes: [f32; 3]| {
+        let mut file = File::new(false);
+        file.put(254, i16::from(s.is_some()).to_le_bytes());
+        file.put(252, i16::from(q.is_some()).to_le_bytes());
+        file.reals(76, &[q.map_or(1.0, |q| q.2), sizes[0], sizes[1], sizes[2]]);
+        let srow = |r: usize| {
+            let s = s.unwrap_or(&Sform([[0.0; 3]; 3], [0.0; 3]));
+            [s.0[0][r], s.0[1][r], s.0[2][r], s.1[r]]
+        };
+        for r in 0..3 {
+            file.reals(280 + 16 * r, &srow(r));
+        }
+        if let Some(q) = q {
+            file.reals(256, &q.0);
+            file.reals(268, &q.1);
+        }
+        let voxels = file.bytes[352..].to_vec();
+        match form {
+            Form::First => file.read(),
+            Form::Pair => {
+                file.bytes[344..348].copy_from_slice(b"ni1\0");
+                file.reals(108, &[0.0]);
+                read_files(&[&file.bytes[..348], &voxels], None)
+            }
+            Form::Second => {
+                let first = file;
+                let mut file = File {
+                    bytes: vec![0; 544],
+                    big_endian: false,
+                };
+                file.put(0, 540_i32.to_le_bytes());
+                file.bytes[4..12].copy_from_slice(b"n+2\0\r\n\x1a\n");
+                file.put(12, 4_i16.to_le_bytes());
+                file.put(14, 16_i16.to_le_bytes());
+                for (n, d) in [3_i64, 4, 3, 2].iter().enumerate() {
+                    file.put(16 + 8 * n, d.to_le_bytes());
+                }
+                let real = |at: usize| {
+                    let bytes = first.bytes[at..at + 4].try_into().unwrap();
+                    f64::from(f32::from_le_bytes(bytes)).to_le_bytes()
+                };
+                for n in 0..4 {
+                    file.put(104 + 8 * n, real(76 + 4 * n));
+                }
+                file.put(168, 544_i64.to_le_bytes());
+                file.put(344, i32::from(q.is_some()).to_le_bytes());
+                file.put(348, i32::from(s.is_some()).to_le_bytes());
+                for n in 0..6 {
+                    file.put(352 + 8 * n, real(256 + 4 * n));
+                }
+                for n in 0..12 {
+                    file.put(400 + 8 * n, real(280 + 4 * n));
+                }
+                file.put(500, 2_i32.to_le_bytes());
+                file.bytes.extend(&voxels);
+                file.read()
+            }
+        }
+    };
+    let along = |x: f32, y: f32, z: f32| [[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]];
+    let origin = [10.0, 20.0, 30.0];
+    let sform = |columns| Sform(columns, origin);
+    let upright = Qform([0.0; 3], origin, 1.0);
+    let (cosine, sine) = (5.0 * 0.8_f32, 5.0 * 0.6_f32);
+    let turned = [[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 6.0]];
+    for form in [Form::First, Form::Pair, Form::Second] {
+        let quiet = |s: Option<&Sform>, q: Option<&Qform>, sizes| {
+            let reading = read(form, s, q, sizes).unwrap();
+            assert_eq!(reading.facts.warnings, Vec::<String>::new(), "{form:?}");
+            reading.facts.spacing_mm
+        };
+        let told = |s: &Sform, q: Option<&Qform>, sizes, words: &[&str]| {
+            let text = match read(form, Some(s), q, sizes) {
+                Ok(reading) => reading.facts.warnings.join(" "),
+                Err(VolumeError::Field { field, .. }) => panic!("{form:?} refused for {field}"),
+                Err(error) => panic!("{error}"),
+            };
+            for word in words {
+                assert!(text.contains(word), "{form:?}: {text}: {word}");
+            }
+        };
+        let refused = |s: &Sform, q: Option<&Qform>, sizes, words: &[&str]| {
+            let error = read(form, Some(s), q, sizes).unwrap_err();
+            assert_eq!(error.field(), Some("pixdim"));
+            for word in words {
+                assert!(error.to_string().contains(word), "{error}: {word}");
+            }
+        };
+        let plain = sform(along(5.0, 5.5, 6.0));
+        let sizes = [5.0, 5.5, 6.0];
+        assert_eq!(quiet(Some(&plain), None, sizes), [5.0, 5.5, 6.0]);
+        assert_eq!(quiet(Some(&plain), Some(&upright), sizes), [5.0, 5.5, 6.0]);
+        assert_eq!(quiet(None, Some(&upright), sizes), [5.0, 5.5, 6.0]);
+        quiet(Some(&plain), None, [5.002, 5.498, 6.0]);
+        // An sform of unit size beside the voxels' true size, with and without a qform, and the reverse.
+        let unit = sform(along(-1.0, -1.0, 1.0));
+        refused(&unit, None, [5.0; 3], &["5 x 5 x 5 mm", "1 x 1 x 1 mm"]);
+        refused(
+            &unit,
+            Some(&upright),
+            sizes,
+            &["5 x 5.5 x 6 mm", "1 x 1 x 1 mm"],
+        );
+        refused(
+            &plain,
+            Some(&upright),
+            [1.0; 3],
+            &["1 x 1 x 1 mm", "5 x 5.5 x 6 mm"],
+        );
+        refused(&plain, None, [5.0, 5.5, 60.0], &["60", "6 mm"]);
+        // Sizes that an alignment may scale, and fields that were never filled in.
+        told(
+            &plain,
+            None,
+            [5.0, 5.0, 6.0],
+            &["5 x 5.5 x 6 mm", "5 x 5 x 6 mm", "sform was used"],
+        );
+        told(
+            &plain,
+            None,
+            [1.0; 3],
+            &["5 x 5.5 x 6 mm", "1 x 1 x 1 mm", "sform was used"],
+        );
+        told(&plain, None, [0.0; 3], &["5 x 5.5 x 6 mm", "sform's"]);
+        // Place, direction and handedness between sform and qform.
+        let moved = Qform([0.0; 3], [14.0, 20.0, 27.0], 1.0);
+        told(
+            &plain,
+            Some(&moved),
+            sizes,
+            &[
+                "5.0000 mm apart",
+                "(10.000, 20.000, 30.000)",
+                "(14.000, 20.000, 27.000)",
+            ],
+        );
+        let square = [5.0, 5.0, 6.0];
+        told(
+            &sform(turned),
+            Some(&upright),
+            square,
+            &["36.9 degrees", "sform was used"],
+        );
+        let mirrored = sform(along(5.0, 5.5, -6.0));
+        told(
+            &mirrored,
+            Some(&upright),
+            sizes,
+            &["left-handed", "right-handed", "mirrors"],
+        );
+        let other_hand = Qform([0.0; 3], origin, -1.0);
+        told(&plain, Some(&other_hand), sizes, &["mirrors"]);
+        quiet(Some(&mirrored), Some(&other_hand), sizes);
+        let half_turn = Qform([0.0, 0.0, (0.1_f32).sqrt()], origin, 1.0);
+        quiet(Some(&sform(turned)), Some(&half_turn), square);
+    }
+}
+
+/// What of 12 voxels each is read of a file with these volumes along the fourth dimension: the sum
+/// unless the header contradicts that they are gates of one heart beat.
+#[test]
+fn gates_are_summed_and_what_is_none_needs_a_frame() {
+    /// Unit of time, step, intent.
+    type Time = (u8, f32, i16);
+    let file = |dim: &[i16], (unit, step, intent): Time| {
+        let mut file = File::new(false);
+        file.dim(dim);
+        file.bytes[123] = 2 | unit;
+        file.reals(92, &[step]);
+        file.put(68, intent.to_le_bytes());
+        let count: usize = dim.iter().map(|d| *d as usize).product();
+        file.bytes.truncate(352);
+        for n in 0..count {
+            file.push((n as i16 % 7).to_le_bytes());
+        }
+        file
+    };
+    let gated: [(i16, Time); 8] = [
+        (8, (0, 1.0, 0)),
+        (3, (0, 0.0, 0)),
+        (16, (8, 0.05, 0)),
+        (8, (16, 110.0, 2001)),
+        (8, (24, 110_000.0, 0)),
+        // One unit of time is the default of writers.
+        (16, (8, 1.0, 0)),
+        (32, (0, 30.0, 0)),
+        (2, (8, 0.0, 0)),
+    ];
+    for (gates, time) in gated {
+        let file = file(&[4, 3, 1, gates], time);
+        let reading = file.read().unwrap();
+        let value = |v: usize, gate: usize| ((v + 12 * gate) % 7) as f32;
+        let sums: Vec<f32> = (0..12)
+            .map(|v| (0..gates as usize).map(|gate| value(v, gate)).sum())
+            .collect();
+        assert_eq!(reading.volume.voxels, sums, "{gates} {time:?}");
+        assert_eq!(reading.facts.frame, None);
+        let told = reading.facts.warnings.join(" ");
+        assert!(
+            told.contains(&format!("The {gates} gates were summed")),
+            "{told}"
+        );
+        assert!(told.contains("taken for gates"), "{told}");
+        // A single one is still read by its number, from 0.
+        let second = read_files(&[&file.bytes], Some(1)).unwrap().volume.voxels;
+        let expected: Vec<f32> = (0..12).map(|v| value(v, 1)).collect();
+        assert_eq!(second, expected);
+    }
+    let others: [(&[i16], Time, &str); 8] = [
+        // A dynamic study: 12 volumes of 10 s.
+        (&[4, 3, 1, 12], (8, 10.0, 0), "120 s"),
+        (&[4, 3, 1, 8], (16, 5000.0, 0), "40 s"),
+        (&[4, 3, 1, 8], (8, 0.5, 0), "4 s"),
+        (&[4, 3, 1, 33], (0, 0.0, 0), "33"),
+        (&[4, 3, 1, 3], (0, 0.0, 1005), "1005"),
+        (&[4, 3, 1, 8], (32, 1.0, 0), "unit 32"),
+        (&[4, 3, 1, 1, 3], (0, 0.0, 0), "dim"),
+        (&[4, 3, 1, 4, 2], (0, 0.0, 0), "dim"),
+    ];
+    for (dim, time, word) in others {
+        let refused = file(dim, time).read().unwrap_err();
+        assert!(
+            matches!(refused, VolumeError::FrameNeeded { .. }),
+            "{refused}"
+        );
+        assert!(refused.to_string().contains(word), "{refused}: {word}");
+    }
+    // One volume is one volume, whatever the header says of time.
+    let single = file(&[4, 3, 1, 1], (8, 30.0, 0)).read().unwrap();
+    assert_eq!(single.facts.frame, Some(0));
+    assert_eq!(single.facts.warnings, Vec::<String>::new());
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Series, Enhanced images, Segmentations, archives, and objects that hold no slices.
 
+use super::super::super::given_mask::{GivenMaskError, MaskChoice, read_mask};
 use super::super::super::{FileFormat, ReadLimits, VolumeFile, provenance};
 use super::super::Provenance;
 use super::*;
@@ -165,7 +166,13 @@ fn several_slices_at_one_place_are_several_volumes() {
         ct("0", 0),
     ];
     let needed = read_files(&files(&four)).unwrap_err();
-    assert_eq!(needed, VolumeError::FrameNeeded { frames: 2 });
+    assert_eq!(
+        needed,
+        VolumeError::FrameNeeded {
+            frames: 2,
+            why: None
+        }
+    );
     let options = ReadOptions { frame: Some(1) };
     let limits = ReadLimits::default();
     let second = read_volume(&files(&four), &options, &limits, &Monitor::silent()).unwrap();
@@ -309,6 +316,113 @@ fn segments_become_labels() {
     }
     let (field, _) = complaint(read_elements(&far));
     assert_eq!(field, "Per-frame Functional Groups Sequence (5200,9230)");
+}
+
+/// [`segmentation`] with a description of each segment: number, label, code and its meaning.
+fn described(segments: [(u16, &'static str, &'static str, &'static str); 2]) -> Elements {
+    let items = segments.map(|(number, label, value, meaning)| {
+        let code = BTreeMap::from([
+            ((0x08, 0x100), ("SH", Text(value))),
+            ((0x08, 0x102), ("SH", Text("SCT"))),
+            ((0x08, 0x104), ("LO", Text(meaning))),
+        ]);
+        BTreeMap::from([
+            ((0x62, 0x04), ("US", Shorts(vec![number]))),
+            ((0x62, 0x05), ("LO", Text(label))),
+            ((0x62, 0x0f), ("SQ", Items(vec![code]))),
+        ])
+    });
+    let mut elements = segmentation();
+    elements.insert((0x62, 0x02), ("SQ", Items(items.to_vec())));
+    elements
+}
+
+/// The pixels of [`segmentation`] by slice, of each segment alone: the shared one is of both.
+const OF_SEGMENT: [&[(usize, usize)]; 2] = [&[(3, 0), (3, 1), (0, 1), (0, 3)], &[(0, 2), (0, 3)]];
+
+/// A mask is the segment whose code says myocardium, wherever it stands in the file, or the one that is
+/// named; where neither tells, all are listed.
+#[test]
+fn a_segment_is_chosen_by_its_code_or_name_and_never_by_its_place() {
+    let read = |elements: &Elements, label: Option<&str>| {
+        let files = [VolumeFile::in_memory(
+            "seg",
+            Encoding::Explicit.file(elements),
+        )];
+        let choice = MaskChoice {
+            label: label.map(|text| text.parse().unwrap()),
+            resample: false,
+        };
+        read_mask(&files, &choice, &ReadLimits::default(), &Monitor::silent())
+    };
+    let is_segment = |elements: &Elements, label: Option<&str>, segment: usize| {
+        let given = read(elements, label).unwrap();
+        let mut wanted = vec![false; 36];
+        for (slice, pixel) in OF_SEGMENT[segment - 1] {
+            wanted[9 * slice + pixel] = true;
+        }
+        assert_eq!(given.mask.voxels, wanted, "{label:?}");
+        let told = given.structure.unwrap();
+        assert!(told.starts_with(&format!("segment {segment}")), "{told}");
+    };
+    let muscle = [
+        ("49848007", "Left Ventricle Myocardium"),
+        ("T-32020", "Myocardium"),
+        ("X", "LV myocardium"),
+    ];
+    let others = [
+        ("LV-CAVITY", "Cavity of left ventricle"),
+        ("87878005", "Left Ventricle"),
+        ("70335002", "Myocardium of right ventricle"),
+    ];
+    for (code, meaning) in muscle {
+        for (other, named) in others {
+            let first = described([(1, "a", code, meaning), (2, "b", other, named)]);
+            let last = described([(1, "a", other, named), (2, "b", code, meaning)]);
+            is_segment(&first, None, 1);
+            is_segment(&last, None, 2);
+            // In the order of the file the second comes first.
+            let turned = described([(2, "b", code, meaning), (1, "a", other, named)]);
+            is_segment(&turned, None, 2);
+            for (label, segment) in [
+                ("1", 1),
+                ("2", 2),
+                ("A", 1),
+                ("b", 2),
+                (code, 1),
+                (named, 2),
+            ] {
+                is_segment(&first, Some(label), segment);
+            }
+        }
+    }
+    let heart = ("80891009", "Heart");
+    let unclear = described([(1, "one", heart.0, heart.1), (2, "two", "123", "Liver")]);
+    let both = described([
+        (1, "one", muscle[0].0, muscle[0].1),
+        (2, "two", muscle[1].0, muscle[1].1),
+    ]);
+    for several in [&unclear, &both] {
+        let refused = read(several, None).unwrap_err();
+        assert!(
+            matches!(refused, GivenMaskError::SeveralStructures { .. }),
+            "{refused}"
+        );
+        for text in ["1 (one)", "2 (two)"] {
+            assert!(refused.to_string().contains(text), "{refused}");
+        }
+    }
+    let absent = read(&unclear, Some("3")).unwrap_err();
+    assert!(absent.to_string().contains("1 (one)"), "{absent}");
+    let same_name = described([(1, "wall", heart.0, heart.1), (2, "Wall", "123", "Liver")]);
+    assert!(read(&same_name, Some("wall")).is_err());
+    is_segment(&same_name, Some("liver"), 2);
+    // Without descriptions, as the standard does not allow, segments are labels.
+    let bare = read(&segmentation(), None).unwrap_err();
+    assert!(
+        matches!(bare, GivenMaskError::SeveralStructures { .. }),
+        "{bare}"
+    );
 }
 
 #[test]

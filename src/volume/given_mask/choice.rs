@@ -1,0 +1,99 @@
+//! Which structure of a mask's file is meant.
+
+use super::error::GivenMaskError;
+use super::structures::{HeldKind, HeldStructures, MaskStructure};
+use std::convert::Infallible;
+use std::str::FromStr;
+
+/// What the caller says of a mask.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct MaskChoice {
+    /// The structure. Default: the only one, or the myocardium among segments.
+    pub label: Option<MaskLabel>,
+    /// Whether a mask on another lattice of voxels is resampled. Default: it is refused.
+    pub resample: bool,
+}
+
+/// A structure by number or name.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum MaskLabel {
+    /// Label of a map, or Segment Number.
+    Number(i64),
+    /// Segment Label, or meaning or value of a segment's code; upper and lower case are the same.
+    Name(String),
+}
+
+impl FromStr for MaskLabel {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        let text = text.trim();
+        Ok(match text.parse() {
+            Ok(number) => MaskLabel::Number(number),
+            Err(_) => MaskLabel::Name(text.to_owned()),
+        })
+    }
+}
+
+impl std::fmt::Display for MaskLabel {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            MaskLabel::Number(number) => write!(f, "{number}"),
+            MaskLabel::Name(name) => write!(f, "\"{name}\""),
+        }
+    }
+}
+
+/// The number of the structure among `held` that `choice` means.
+///
+/// # Errors
+/// [`GivenMaskError`] if there is none, or several may be meant.
+pub(super) fn choose(held: &HeldStructures, choice: &MaskChoice) -> Result<i64, GivenMaskError> {
+    if held.kind == HeldKind::None {
+        let [minimum, maximum] = held.range;
+        return Err(GivenMaskError::NotMask { minimum, maximum });
+    }
+    let Some(label) = &choice.label else {
+        return unnamed(held);
+    };
+    let name = match label {
+        MaskLabel::Number(number) => number.to_string(),
+        MaskLabel::Name(name) => name.to_lowercase(),
+    };
+    let number = |s: &&MaskStructure| *label == MaskLabel::Number(s.number);
+    // A code may look like a number.
+    let called = |s: &&MaskStructure| s.names.iter().any(|own| own.to_lowercase() == name);
+    let mut named: Vec<&MaskStructure> = held.all.iter().filter(number).collect();
+    if named.is_empty() {
+        named = held.all.iter().filter(called).collect();
+    }
+    match named[..] {
+        [one] => Ok(one.number),
+        [] => Err(GivenMaskError::NoSuchStructure {
+            label: label.clone(),
+            present: held.all.clone(),
+        }),
+        _ => Err(several(&named)),
+    }
+}
+
+/// The structure that is meant where none is named.
+fn unnamed(held: &HeldStructures) -> Result<i64, GivenMaskError> {
+    let muscle: Vec<&MaskStructure> = held.objects.iter().filter(|s| s.myocardium).collect();
+    match (&held.objects[..], &muscle[..]) {
+        ([], _) => Err(GivenMaskError::Empty),
+        ([one], _) if one.cavity => Err(GivenMaskError::OnlyCavity {
+            present: held.objects.clone(),
+        }),
+        ([one], _) => Ok(one.number),
+        (_, [one]) => Ok(one.number),
+        (objects, []) => Err(several(&objects.iter().collect::<Vec<_>>())),
+        (_, muscle) => Err(several(muscle)),
+    }
+}
+
+fn several(structures: &[&MaskStructure]) -> GivenMaskError {
+    GivenMaskError::SeveralStructures {
+        present: structures.iter().map(|s| (*s).clone()).collect(),
+    }
+}

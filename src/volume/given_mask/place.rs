@@ -1,0 +1,230 @@
+//! A mask on the grid of a volume.
+//!
+//! Two grids are of one lattice if the map from the voxel indices of one to those of the other is a
+//! permutation of axes with signs and whole steps, within [`SAME`] of a voxel everywhere on the mask.
+//! Such a mask is carried over voxel by voxel, exactly.
+
+use super::GivenMask;
+use super::error::GivenMaskError;
+use crate::geometry::Vec3;
+use crate::geometry::frame::VoxelToPatient;
+use crate::grid::voxelise::Mask;
+use crate::progress::Monitor;
+use nalgebra::Matrix3;
+
+/// Largest distance of corresponding voxel centres of one lattice, in voxels.
+const SAME: f64 = 1e-3;
+
+/// Voxels between two checks of the cancel token.
+const PORTION: usize = 1 << 14;
+
+/// Most voxels of the box that holds two masks.
+const MOST_VOXELS: u64 = 1 << 28;
+
+/// Where a grid of voxels lies, for people to compare.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GridGeometry {
+    /// Voxels along i, j, k.
+    pub shape: [usize; 3],
+    /// Distances of voxel centres along i, j, k, mm.
+    pub spacing: [f64; 3],
+    /// Centre of the first voxel, LPS mm.
+    pub origin: [f64; 3],
+    /// Directions of i, j, k, LPS.
+    pub axes: [[f64; 3]; 3],
+}
+
+impl GridGeometry {
+    fn of(shape: [usize; 3], frame: &VoxelToPatient) -> Self {
+        let axis = |a: usize| frame.linear().column(a).normalize().into();
+        Self {
+            shape,
+            spacing: frame.spacing(),
+            origin: frame.to_patient(&Vec3::zeros()).into(),
+            axes: [0, 1, 2].map(axis),
+        }
+    }
+}
+
+impl std::fmt::Display for GridGeometry {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [i, j, k] = self.shape;
+        let list = |numbers: &[f64; 3]| {
+            // Adding 0 turns negative zeros into positive ones.
+            let round = |x: &f64| ((x * 1e4).round() / 1e4 + 0.0).to_string();
+            numbers.iter().map(round).collect::<Vec<_>>().join(", ")
+        };
+        let axes = self.axes.iter().map(|axis| format!("({})", list(axis)));
+        write!(
+            f,
+            "{i} x {j} x {k} voxels of {} mm from ({}) mm along {}",
+            list(&self.spacing).replace(", ", " x "),
+            list(&self.origin),
+            axes.collect::<Vec<_>>().join(" ")
+        )
+    }
+}
+
+/// A mask on the grid of a volume.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlacedMask {
+    /// The mask.
+    pub mask: Mask,
+    /// Whether it is not of the same lattice and was resampled by the nearest voxel.
+    pub resampled: bool,
+    /// Voxels of the given mask that lie outside the grid and are lost; at most a hundredth.
+    pub outside: usize,
+}
+
+impl GivenMask {
+    /// The mask on the grid of `shape` at `frame`. With `resample`, one of another lattice takes the
+    /// value of the nearest voxel.
+    ///
+    /// # Errors
+    /// [`GivenMaskError::Elsewhere`] if more than a hundredth of the mask lies outside the grid,
+    /// [`GivenMaskError::OtherGrid`] for another lattice without `resample`,
+    /// [`GivenMaskError::Empty`] if no voxel of the grid is hit.
+    pub fn on(
+        &self,
+        (shape, frame): ([usize; 3], &VoxelToPatient),
+        resample: bool,
+        monitor: &Monitor,
+    ) -> Result<PlacedMask, GivenMaskError> {
+        let lattice = self.lattice(frame);
+        let mut mask = Mask::empty(shape);
+        let (mut inside, mut all) = (0, 0);
+        for (v, _) in self.mask.voxels.iter().enumerate().filter(|(_, set)| **set) {
+            if all % PORTION == 0 {
+                monitor.check()?;
+            }
+            all += 1;
+            let index = frame.to_voxel(&self.centre(v));
+            let Some(place) = voxel(&index, shape) else {
+                continue;
+            };
+            inside += 1;
+            if lattice.is_some() {
+                mask.voxels[place] = true;
+            }
+        }
+        let [own, other] = [(self.mask.shape, &self.frame), (shape, frame)]
+            .map(|(shape, frame)| Box::new(GridGeometry::of(shape, frame)));
+        if inside * 100 < all * 99 {
+            return Err(GivenMaskError::Elsewhere {
+                inside,
+                all,
+                mask: own,
+                grid: other,
+            });
+        }
+        if lattice.is_none() && !resample {
+            return Err(GivenMaskError::OtherGrid {
+                mask: own,
+                grid: other,
+            });
+        }
+        if lattice.is_none() {
+            let [nx, ny, _] = shape;
+            for (v, set) in mask.voxels.iter_mut().enumerate() {
+                if v % PORTION == 0 {
+                    monitor.check()?;
+                }
+                let index = [v % nx, v / nx % ny, v / (nx * ny)].map(|x| x as f64);
+                let own = self.frame.to_voxel(&frame.to_patient(&Vec3::from(index)));
+                *set = voxel(&own, self.mask.shape).is_some_and(|own| self.mask.voxels[own]);
+            }
+        }
+        if !mask.voxels.contains(&true) {
+            return Err(GivenMaskError::Empty);
+        }
+        Ok(PlacedMask {
+            mask,
+            resampled: lattice.is_none(),
+            outside: all - inside,
+        })
+    }
+
+    /// The mask on a grid of the same lattice that holds `other`, too.
+    ///
+    /// # Errors
+    /// [`GivenMaskError::TooFarApart`].
+    pub fn holding(&self, other: &Self, monitor: &Monitor) -> Result<Self, GivenMaskError> {
+        let (mut low, mut high) = ([0_i64; 3], self.mask.shape.map(|n| n as i64 - 1));
+        for (n, (v, _)) in (other.mask.voxels.iter().enumerate())
+            .filter(|(_, set)| **set)
+            .enumerate()
+        {
+            if n % PORTION == 0 {
+                monitor.check()?;
+            }
+            let index = self.frame.to_voxel(&other.centre(v));
+            for axis in 0..3 {
+                // A cast of a float beyond the integers ends at their bounds.
+                low[axis] = low[axis].min(index[axis].round() as i64);
+                high[axis] = high[axis].max(index[axis].round() as i64);
+            }
+        }
+        let extent = [0, 1, 2].map(|a| high[a].saturating_sub(low[a]).saturating_add(1) as u64);
+        let voxels = extent.iter().fold(1_u64, |n, e| n.saturating_mul(*e));
+        let limit = MOST_VOXELS.max(self.mask.voxels.len() as u64);
+        if voxels > limit {
+            return Err(GivenMaskError::TooFarApart { voxels, limit });
+        }
+        let shape = extent.map(|e| e as usize);
+        let mut mask = Mask::empty(shape);
+        let before = low.map(|l| -l as usize);
+        let [nx, ny, _] = self.mask.shape;
+        for (row, values) in self.mask.voxels.chunks(nx).enumerate() {
+            let (j, k) = (row % ny + before[1], row / ny + before[2]);
+            let begin = before[0] + shape[0] * (j + shape[1] * k);
+            mask.voxels[begin..begin + nx].copy_from_slice(values);
+        }
+        let corner = Vec3::from(low.map(|l| l as f64));
+        let frame = VoxelToPatient::new(*self.frame.linear(), self.frame.to_patient(&corner));
+        Ok(Self {
+            mask,
+            frame: frame.expect("a moved frame is as invertible as the mask's own"),
+            structure: self.structure.clone(),
+        })
+    }
+
+    /// The patient's point at a voxel's centre.
+    fn centre(&self, v: usize) -> Vec3 {
+        let [nx, ny, _] = self.mask.shape;
+        let index = [v % nx, v / nx % ny, v / (nx * ny)];
+        self.frame.to_patient(&Vec3::from(index.map(|x| x as f64)))
+    }
+
+    /// The map between the axes, if the mask is of the lattice of `frame`.
+    fn lattice(&self, frame: &VoxelToPatient) -> Option<Matrix3<f64>> {
+        let at = |index: [f64; 3]| frame.to_voxel(&self.frame.to_patient(&Vec3::from(index)));
+        let origin = at([0.0; 3]);
+        let steps = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let turn = Matrix3::from_columns(&steps.map(|step| at(step) - origin)).map(f64::round);
+        let whole = |m: &Matrix3<f64>| {
+            let lines = (0..3).flat_map(|n| [m.row(n).transpose(), m.column(n).into_owned()]);
+            lines.into_iter().all(|line| line.abs().sum() == 1.0)
+        };
+        if !whole(&turn) {
+            return None;
+        }
+        let first = origin.map(f64::round);
+        let near = |c: usize| {
+            let end = [0, 1, 2].map(|a| match c >> a & 1 {
+                0 => 0.0,
+                _ => self.mask.shape[a] as f64 - 1.0,
+            });
+            (at(end) - (turn * Vec3::from(end) + first)).amax() <= SAME
+        };
+        (0..8).all(near).then_some(turn)
+    }
+}
+
+/// The voxel of a grid of `shape` that holds the fractional index; `None` outside.
+fn voxel(index: &Vec3, shape: [usize; 3]) -> Option<usize> {
+    let inside = (0..3).all(|a| index[a] > -0.5 && index[a] < shape[a] as f64 - 0.5);
+    inside.then(|| {
+        let [i, j, k] = [0, 1, 2].map(|a| index[a].round().max(0.0) as usize);
+        i + shape[0] * (j + shape[1] * k)
+    })
+}

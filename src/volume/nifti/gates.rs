@@ -1,0 +1,62 @@
+//! Whether the volumes of a file with a fourth dimension are gates of one heart beat.
+//!
+//! NIfTI has no field that says so. What its header can say is the opposite: that the fourth dimension
+//! is not time (`intent_code`, the unit of `pixdim[4]`), that the file has further dimensions, that there
+//! are more volumes than a study is gated into, or that they last longer than a heart beat. Where
+//! nothing contradicts, the volumes are taken for gates, whose sum is what the camera counted over
+//! the whole beat, and a warning says what was taken for what.
+
+use super::header::Header;
+
+/// Most gates of a study: 8 and 16 are usual, 32 the most that scanners offer.
+const MOST_GATES: usize = 32;
+
+/// Longest R-R interval, seconds: 24 beats per minute.
+const LONGEST_BEAT: f64 = 2.5;
+
+/// `intent_code` of a time series.
+const TIME_SERIES: i32 = 2001;
+
+/// Why the volumes of a file with `header` cannot be gates of one heart beat, in words that continue a
+/// sentence; `None` if nothing contradicts it.
+pub(super) fn contradiction(header: &Header) -> Option<String> {
+    let along = |axis: usize| header.dim.get(axis).copied().unwrap_or(1);
+    let volumes = along(3);
+    if header.frames != volumes {
+        return Some(format!(
+            "dim is {:?}: the volumes differ in more than time",
+            header.dim
+        ));
+    }
+    if !matches!(header.intent_code, 0 | TIME_SERIES) {
+        return Some(format!(
+            "intent_code {} says that the fourth dimension is not time",
+            header.intent_code
+        ));
+    }
+    if volumes > MOST_GATES {
+        return Some(format!(
+            "dim[4] is {volumes}, more than the {MOST_GATES} gates of a heart beat"
+        ));
+    }
+    let step = header.pixdim[4].abs();
+    let seconds = match header.time_unit {
+        0 => return None,
+        8 => step,
+        16 => step * 1e-3,
+        24 => step * 1e-6,
+        other => {
+            return Some(format!(
+                "xyzt_units states the unit {other} for the fourth dimension, which is not one of time"
+            ));
+        }
+    };
+    // A step of one unit is what writers state who know of none.
+    let whole = seconds * volumes as f64;
+    (step != 1.0 && whole > LONGEST_BEAT).then(|| {
+        format!(
+            "{volumes} volumes of {seconds} s (pixdim[4], xyzt_units) last {whole} s, longer than a \
+             heart beat"
+        )
+    })
+}
