@@ -516,7 +516,7 @@ mod tests {
             leeway: Duration::ZERO,
         })
         .unwrap();
-        *issuer.keys.write().unwrap() = Some(Keys {
+        *issuer.0.keys.write().unwrap() = Some(Keys {
             keys: Arc::new(vec![TokenKey::read(&jwk).unwrap()]),
             read: Instant::now(),
         });
