@@ -10,9 +10,7 @@ use crate::parameters::FitParameters;
 use crate::progress::{CancelToken, Monitor, Plan};
 use crate::reader::ReaderProfile;
 use crate::segmentation::Segmentation;
-use crate::segmentation::{
-    ExpertFacts, NamedFile, NamedMesh, NamedReader, SegmentationOrder, from_files,
-};
+use crate::segmentation::{NamedFile, NamedMesh, NamedReader, SegmentationOrder, from_files};
 use crate::volume::{ReadLimits, VolumeFile};
 use crate::work::problems::Explain;
 use anyhow::{Context, Result, anyhow};

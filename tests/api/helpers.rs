@@ -462,7 +462,11 @@ impl Work for FakeWork {
         Ok(output)
     }
 
-    fn page(&self, stored: &StoredItem) -> Result<String, Failure> {
+    fn page(
+        &self,
+        stored: &StoredItem,
+        _scan: &serde_json::Map<String, serde_json::Value>,
+    ) -> Result<String, Failure> {
         let report = stored.read("report.json").unwrap().unwrap();
         let report = String::from_utf8(report).unwrap();
         Ok(format!("<!doctype html><title>report</title>{report}"))

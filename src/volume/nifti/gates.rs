@@ -40,7 +40,7 @@ pub(super) fn contradiction(header: &Header) -> Option<String> {
         ));
     }
     let step = header.pixdim[4].abs();
-    let seconds = match header.time_unit {
+    let seconds = match header.xyzt_units & 0x38 {
         0 => return None,
         8 => step,
         16 => step * 1e-3,
