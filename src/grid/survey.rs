@@ -121,8 +121,9 @@ struct LabelRuns {
     runs: usize,
 }
 
-/// Whether more than [`FEW_LABELS`] labels are pieces: see [`PIECEWISE_OF_MANY`]. Too few voxels tell
-/// nothing; then `undecided`.
+/// Whether the labels of a map of more than 256 are pieces: of their voxels, without those of the most
+/// frequent label, four fifths continue a run. `counts` has the voxels and runs of each label. Too few
+/// voxels tell nothing; then `undecided`.
 pub fn many_are_pieces(counts: impl Iterator<Item = (usize, usize)>, undecided: bool) -> bool {
     let (mut voxels, mut runs, mut greatest) = (0, 0, (0, 0));
     for label in counts {

@@ -22,6 +22,7 @@
 
 mod attributes;
 mod codec;
+mod described;
 mod fragments;
 mod frames;
 mod geometry;
@@ -38,9 +39,9 @@ mod unknown;
 #[cfg(test)]
 mod tests;
 
+pub use described::{Segment, SegmentCode};
 pub use header::{DicomHeader, read_header, storage_classes, transfer_syntaxes};
 pub use provenance::Provenance;
-pub use segments::{Segment, SegmentCode};
 pub(super) use syntax::is_dicom;
 
 use self::attributes::{Attributes, SERIES_NUMBER, SERIES_UID, SLICE_THICKNESS, SOP_INSTANCE};
