@@ -20,7 +20,7 @@ use ventriform::parameters::FitParameters;
 use ventriform::progress::Monitor;
 use ventriform::segmentation::{SegmentationOrder, SegmentedVolume, from_files, report_json};
 use ventriform::volume::given_mask::{MaskChoice, read_mask};
-use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
+use ventriform::volume::{ReadLimits, VolumeFile};
 
 type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
 

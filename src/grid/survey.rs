@@ -14,7 +14,7 @@ pub const MOST_LABELS: usize = 1 << 16;
 /// Least share of the voxels of the labels, without those of the most frequent one, whose next voxel
 /// along i carries the same label, in a map of more than [`FEW_LABELS`] labels. The most frequent one
 /// is left out because the air of a CT is as even as a label.
-const PIECEWISE_OF_MANY: f64 = 0.8;
+const PIECEWISE_OF_MANY: f64 = 0.6;
 /// Labelled voxels from which the share says something.
 const ENOUGH: usize = 1000;
 /// Least share of labelled voxels whose next voxel along i carries the same label: a label map
@@ -121,8 +121,9 @@ struct LabelRuns {
     runs: usize,
 }
 
-/// Whether more than [`FEW_LABELS`] labels are pieces: see [`PIECEWISE_OF_MANY`]. Too few voxels tell
-/// nothing; then `undecided`.
+/// Whether the labels of a map of more than 256 are pieces: of their voxels, without those of the most
+/// frequent label, three fifths continue a run. `counts` has the voxels and runs of each label. Too few
+/// voxels tell nothing; then `undecided`.
 pub fn many_are_pieces(counts: impl Iterator<Item = (usize, usize)>, undecided: bool) -> bool {
     let (mut voxels, mut runs, mut greatest) = (0, 0, (0, 0));
     for label in counts {

@@ -225,10 +225,7 @@ mod tests {
             &[("superior", "frame")],
             &[("model", "auto,tpl_0123,mdl_4")],
             &[("label", "-2"), ("resample", "true")],
-            &[
-                ("label", "Left Ventricle Myocardium"),
-                ("resample", "false"),
-            ],
+            &[("label", "Left Ventricle Myocardium")],
         ]);
     }
 

@@ -26,6 +26,7 @@ mod attributes;
 mod characters;
 mod codec;
 mod company;
+mod described;
 mod fragments;
 mod frames;
 mod geometry;
@@ -43,9 +44,9 @@ mod volumes;
 #[cfg(test)]
 mod tests;
 
+pub use described::{Segment, SegmentCode};
 pub use header::{DicomHeader, read_header, storage_classes, transfer_syntaxes};
 pub use provenance::Provenance;
-pub use segments::{Segment, SegmentCode};
 pub(super) use syntax::is_dicom;
 
 use self::attributes::{

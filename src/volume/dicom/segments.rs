@@ -8,11 +8,8 @@ use super::super::VolumeError;
 use super::super::decode::Figures;
 use super::super::facts::AffineSource;
 use super::super::open::Placement;
-use super::attributes::{
-    Attributes, FRAME_SEGMENT, MAXIMUM_FRACTION, SEGMENT_LABEL, SEGMENT_NUMBER,
-    SEGMENT_REGION_MEANING, SEGMENT_REGION_VALUE, SEGMENT_TYPE_MEANING, SEGMENT_TYPE_VALUE,
-    SEGMENTATION_TYPE,
-};
+use super::attributes::{Attributes, FRAME_SEGMENT, MAXIMUM_FRACTION, SEGMENTATION_TYPE};
+use super::described::Segment;
 use super::pixels::{Pixels, too_many_voxels};
 use super::stack::{Located, heights, stated_gap};
 use crate::progress::{Monitor, Stage};
@@ -35,56 +32,6 @@ enum Meaning {
     Fraction(f32),
     /// The number is the label.
     Label,
-}
-
-/// A segment of a segmentation, as its file describes it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Segment {
-    /// Segment Number: the value of its voxels.
-    pub number: u16,
-    /// Segment Label.
-    pub label: Option<String>,
-    /// What is segmented: the code of its type, then of its anatomic region, as far as stated.
-    pub codes: Vec<SegmentCode>,
-}
-
-/// A coded concept of a segment.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SegmentCode {
-    /// Code Value.
-    pub value: String,
-    /// Code Meaning.
-    pub meaning: String,
-}
-
-impl Segment {
-    /// The segments that `a` describes, in the order of the file.
-    fn all(a: &Attributes) -> Vec<Self> {
-        let number = |item| a.shorts_of(SEGMENT_NUMBER, Some(item)).first().copied();
-        let code = |item, value, meaning| {
-            let [value, meaning] =
-                [value, meaning].map(|attribute| a.prose_of(attribute, Some(item)));
-            (value.is_some() || meaning.is_some()).then(|| SegmentCode {
-                value: value.unwrap_or_default(),
-                meaning: meaning.unwrap_or_default(),
-            })
-        };
-        (0..)
-            .map_while(|item| {
-                Some(Self {
-                    number: number(item)?,
-                    label: a.prose_of(SEGMENT_LABEL, Some(item)),
-                    codes: [
-                        code(item, SEGMENT_TYPE_VALUE, SEGMENT_TYPE_MEANING),
-                        code(item, SEGMENT_REGION_VALUE, SEGMENT_REGION_MEANING),
-                    ]
-                    .into_iter()
-                    .flatten()
-                    .collect(),
-                })
-            })
-            .collect()
-    }
 }
 
 /// The frames of a segmentation on a grid.

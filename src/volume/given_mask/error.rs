@@ -1,7 +1,7 @@
 //! Why a mask cannot be used.
 
-use super::choice::MaskLabel;
-use super::place::GridGeometry;
+use super::geometry::GridGeometry;
+use super::label::MaskLabel;
 use super::structures::MaskStructure;
 use crate::progress::Cancelled;
 use crate::volume::VolumeError;

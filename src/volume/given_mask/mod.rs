@@ -4,13 +4,13 @@
 //! says of them ([`MaskChoice`]); out comes one structure on a grid of its own ([`GivenMask`]), and
 //! from that the mask on the grid of a volume ([`GivenMask::on`]).
 //!
-//! 1. [`structures`](mod@structures): what the file holds: the segments of a DICOM Segmentation, the
+//! 1. `structures`: what the file holds: the segments of a DICOM Segmentation, the
 //!    labels of a map, the one object of a binary volume, or the voxels above one half of a
 //!    probability map.
-//! 2. [`choice`](mod@choice): which of them is meant. A number or a name that the caller gives;
+//! 2. `choice`: which of them is meant. A number or a name that the caller gives;
 //!    otherwise the only one, or of the segments the one whose property codes say myocardium. Where
 //!    several remain, they are refused with their list: the order in a file says nothing.
-//! 3. [`place`](mod@place): the grids are compared by their frames. Voxels of one lattice are carried
+//! 3. `place`: the grids are compared by their frames. Voxels of one lattice are carried
 //!    over one by one, however they are stored (turned, mirrored, cropped, padded); another lattice is
 //!    refused with both geometries, or resampled if the caller asks.
 //!
@@ -18,15 +18,19 @@
 
 mod choice;
 mod error;
+mod geometry;
+mod label;
 mod place;
 mod structures;
 
 #[cfg(test)]
 mod tests;
 
-pub use choice::{MaskChoice, MaskLabel};
+pub use choice::MaskChoice;
 pub use error::GivenMaskError;
-pub use place::{GridGeometry, PlacedMask};
+pub use geometry::GridGeometry;
+pub use label::MaskLabel;
+pub use place::PlacedMask;
 pub use structures::MaskStructure;
 
 use super::read;

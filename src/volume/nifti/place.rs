@@ -192,6 +192,10 @@ fn sizes(header: &Header, sform: &Matrix4<f64>) -> Result<Option<String>, Volume
         format!("{} {unit}", sizes.join(" x "))
     };
     let known = |axis: &usize| stated[*axis].is_finite() && stated[*axis] > 0.0;
+    if columns.contains(&0.0) {
+        // No affine; refused as such.
+        return Ok(None);
+    }
     if !axes.iter().all(known) {
         // Fields that were never filled in. No transform is computed from them.
         return Ok((header.qform_code <= 0).then(|| {
