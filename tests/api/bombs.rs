@@ -103,7 +103,7 @@ fn run_lengths() -> Vec<u8> {
     let mut frame = vec![0; 64];
     frame[0] = 2;
     frame[4] = 64;
-    let plane = [0x81, 0].repeat((1 << 20) / 128);
+    let plane = [0x81_u8, 0].repeat((1 << 20) / 128);
     frame[8..12].copy_from_slice(&(64 + plane.len() as u32).to_le_bytes());
     frame.extend(&plane);
     frame.extend(&plane);
@@ -115,9 +115,22 @@ fn jpeg_ls() -> Vec<u8> {
     let mut frame = vec![0xff, 0xd8, 0xff, 0xf7, 0, 11, 16, 4, 0, 4, 0, 1, 1, 0x11, 0];
     frame.extend([0xff, 0xda, 0, 8, 1, 1, 0, 0, 0, 0]);
     // Ones: whole runs. After 0xFF a byte has seven bits.
-    frame.extend([0xff, 0x7f].repeat(20_000));
+    frame.extend([0xff_u8, 0x7f].repeat(20_000));
     frame.extend([0xff, 0xd9]);
     frame
+}
+
+/// The bits of a packet header: a byte after 0xFF has seven.
+fn stuffed(bits: &str) -> Vec<u8> {
+    let mut bytes: Vec<u8> = Vec::new();
+    let mut left = bits;
+    while !left.is_empty() {
+        let width = if bytes.last() == Some(&0xff) { 7 } else { 8 };
+        let (next, rest) = left.split_at(width.min(left.len()));
+        bytes.push(u8::from_str_radix(&format!("{next:0<width$}"), 2).unwrap());
+        left = rest;
+    }
+    bytes
 }
 
 /// A JPEG 2000 frame whose code blocks have as many coding passes as there can be, without any data.
@@ -132,36 +145,18 @@ fn jpeg_2000() -> Vec<u8> {
     frame.extend([0xff, 0x52, 0, 12, 0, 0, 0, 1, 0, 0, 4, 4, 0, 1]);
     frame.extend([0xff, 0x5c, 0, 4, 0x20, 31 << 3]);
     // One packet: every block is included, has no empty bit-plane, and 91 passes of no bytes.
-    let mut packet: Vec<u8> = Vec::new();
-    let (mut held, mut count) = (0_u8, 0);
-    let mut put = |bits: &str| {
-        for bit in bits.chars() {
-            held = held << 1 | u8::from(bit == '1');
-            count += 1;
-            let after_ff = packet.last() == Some(&0xff);
-            if count == if after_ff { 7 } else { 8 } {
-                packet.push(held);
-                (held, count) = (0, 0);
-            }
-        }
-    };
-    put("1");
+    let mut bits = String::from("1");
     let blocks = u32::from(SIDE) / 64;
     for y in 0..blocks {
         for x in 0..blocks {
             // A node of a tag tree is met for the first time at its first leaf.
-            let levels = blocks.ilog2();
-            let new = (0..=levels)
-                .filter(|level| (x | y) % (1 << level) == 0)
-                .count();
-            put(&"1".repeat(2 * new));
-            put("111111111");
-            put(&format!("{:07b}", 91 - 37));
-            put("0");
-            put(&"0".repeat(3 + 6));
+            let first = |level: &u32| (x | y).is_multiple_of(1 << level);
+            let new = (0..=blocks.ilog2()).filter(first).count();
+            bits.push_str(&"1".repeat(2 * new));
+            bits.push_str(&format!("111111111{:07b}0{}", 91 - 37, "0".repeat(3 + 6)));
         }
     }
-    put(&"0".repeat(8));
+    let packet = stuffed(&bits);
     let [a, b, c, d] = (14 + packet.len() as u32).to_be_bytes();
     frame.extend([0xff, 0x90, 0, 10, 0, 0, a, b, c, d, 0, 1, 0xff, 0x93]);
     frame.extend(packet);
