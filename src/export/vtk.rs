@@ -36,9 +36,8 @@ pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Result<Vec<u8>, ExportErro
     put(&mut bytes, polygons);
     // Arrays of a field: the reader of VTK reads all of them, of SCALARS the first only unless told otherwise.
     if let Some(parts) = metadata.parts_of(mesh) {
-        let head = format!(
-            "CELL_DATA {triangles}\nFIELD FieldData 1\nPart 1 {triangles} unsigned_char\n"
-        );
+        let head =
+            format!("CELL_DATA {triangles}\nFIELD FieldData 1\nPart 1 {triangles} unsigned_char\n");
         bytes.extend(head.into_bytes());
         put(&mut bytes, parts.iter().map(|part| part.number()));
     }

@@ -479,7 +479,10 @@ async fn send_part(
         let names: Vec<_> = product.files.iter().map(|file| file.name.clone()).collect();
         return Err(no_such_file(product.resource(), name, &names));
     };
-    let stored = app.queue.with_files(product.clone(), &[source.as_str()]).await?;
+    let stored = app
+        .queue
+        .with_files(product.clone(), &[source.as_str()])
+        .await?;
     let memory = LITTLE_MEMORY + MEMORY_PER_MESH_BYTE * size;
     let make = move |_: &Monitor<'_>| part::part_file(&stored, &stem, part, format);
     match app.decoding.run(memory, make).await?? {
