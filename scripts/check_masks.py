@@ -79,7 +79,7 @@ def check(name, program, folder, image, flags):
     affine = np.column_stack([fields["space directions"].T, fields["space origin"]])
     if not np.allclose(np.diag([-1, -1, 1]) @ affine, stated.affine[:3], atol=1e-4):
         problems.append("pynrrd's affine differs")
-    if len(labels.header.extensions) != 1 or b"Cavity" not in labels.header.extensions[0].get_content():
+    if len(labels.header.extensions) != 1 or b"Cavity" not in labels.header.extensions[0].content:
         problems.append("labels.nii.gz names no labels")
     return [problem for problem in problems if problem]
 

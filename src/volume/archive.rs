@@ -425,7 +425,7 @@ mod tests {
         let mut library = ZipArchive::new(io::Cursor::new(bytes)).unwrap();
         let others = (0..library.len()).map(|n| {
             let mut entry = library.by_index(n).unwrap();
-            let name = entry.name().unwrap().rsplit('/').next().unwrap().to_owned();
+            let name = entry.name().unwrap().into_owned();
             let mut content = Vec::new();
             entry.read_to_end(&mut content).unwrap();
             (name, content)

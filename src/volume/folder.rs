@@ -13,6 +13,26 @@ use std::path::{Path, PathBuf};
 /// Deepest folders that are read, counted from the one given.
 const DEEPEST: usize = 16;
 
+impl VolumeFile {
+    /// The files that a person names by `paths`: each file, all files in a folder
+    /// ([`files_in`]), and the other half of a single `.hdr` or `.img`.
+    ///
+    /// # Errors
+    /// [`VolumeError`] if a folder cannot be read, is empty, or holds too many files.
+    pub fn given(paths: &[impl AsRef<Path>]) -> Result<Vec<Self>, VolumeError> {
+        let mut files = Vec::new();
+        for path in paths {
+            let path = path.as_ref();
+            match path.is_dir() {
+                true => files.extend(files_in(path)?),
+                false if paths.len() == 1 => files.extend(Self::with_other_half(path)),
+                false => files.push(Self::at(path)),
+            }
+        }
+        Ok(files)
+    }
+}
+
 /// The files in `folder`.
 ///
 /// # Errors

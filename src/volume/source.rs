@@ -5,7 +5,6 @@
 //! member are unpacked [at once](super::unpack), which is faster.
 
 use super::VolumeError;
-use super::folder;
 use super::unpack::{self, Unpacked};
 use crate::text::escaped;
 use flate2::bufread::{DeflateDecoder, GzDecoder};
@@ -136,24 +135,6 @@ impl VolumeFile {
     /// Whether the file was found in an archive or a folder, and not named by a person.
     pub(super) fn was_found(&self) -> bool {
         self.found
-    }
-
-    /// The files that a person names by `paths`: each file, all files in a folder
-    /// ([`folder::files_in`]), and the other half of a single `.hdr` or `.img`.
-    ///
-    /// # Errors
-    /// [`VolumeError`] if a folder cannot be read, is empty, or holds too many files.
-    pub fn given(paths: &[impl AsRef<Path>]) -> Result<Vec<Self>, VolumeError> {
-        let mut files = Vec::new();
-        for path in paths {
-            let path = path.as_ref();
-            match path.is_dir() {
-                true => files.extend(folder::files_in(path)?),
-                false if paths.len() == 1 => files.extend(Self::with_other_half(path)),
-                false => files.push(Self::at(path)),
-            }
-        }
-        Ok(files)
     }
 
     /// The file at `path` and, if it is one of a `.hdr`/`.img` pair, the other file of the pair, if

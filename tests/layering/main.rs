@@ -123,7 +123,7 @@ const USES: &[(&str, &[&str])] = &[
             "segmentation",
         ],
     ),
-    ("jobs", &["progress"]),
+    ("jobs", &["text", "progress"]),
     ("access", &["text", "jobs"]),
     ("pem", &[]),
     ("hooks", &["jobs"]),

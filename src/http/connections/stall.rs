@@ -419,8 +419,12 @@ mod tests {
         let waited = waits_in_vain(busy, 0).await;
         assert!(waited >= LIMITS.head + LIMITS.idle, "{waited:?}");
         answer.await.unwrap();
-        let fresh = || Arc::new(OpenConnection::new(None));
-        for (connection, sent) in [(fresh(), 0), (fresh(), 9), (used(), 9)] {
+        // Connections are made as they are needed, since their wait begins then.
+        for (before, sent) in [(false, 0), (false, 9), (true, 9)] {
+            let connection = match before {
+                true => used(),
+                false => Arc::new(OpenConnection::new(None)),
+            };
             let waited = waits_in_vain(connection, sent).await;
             assert!((LIMITS.head..LIMITS.idle).contains(&waited), "{waited:?}");
         }

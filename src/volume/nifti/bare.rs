@@ -154,6 +154,7 @@ mod tests {
     fn scan(gzip: bool) -> Vec<u8> {
         let parameters = PhantomParameters {
             shape: [16; 3],
+            spacing_mm: [12.0; 3],
             ..PhantomParameters::default()
         };
         let scan = phantom(&parameters, &Monitor::silent()).unwrap().volume;

@@ -1102,7 +1102,8 @@ proptest! {
         for range in PLACE {
             prop_assert_eq!(&mask[range.clone()], &file.bytes[range.clone()], "bytes {:?}", range);
         }
-        prop_assert_eq!(&mask[40..56], &file.bytes[40..56], "dim");
+        let dim = 40..40 + 2 * (1 + 3 + trailing);
+        prop_assert_eq!(&mask[dim.clone()], &file.bytes[dim], "dim");
         let back = read_bytes(&mask).unwrap();
         prop_assert_eq!(back.volume.frame, reading.volume.frame);
         prop_assert_eq!(back.facts.file_shape, reading.facts.file_shape);

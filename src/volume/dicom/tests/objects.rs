@@ -140,6 +140,7 @@ fn files_that_are_not_one_series_are_named() {
     );
     let mut wide = ct("3", 0);
     wide.insert((0x28, 0x10), ("US", Shorts(vec![1])));
+    wide.insert((0x7fe0, 0x10), ("OW", Shorts(vec![0; 3])));
     assert!(complain(&[ct("0", 0), wide]).contains("3 x 1"));
     let volume = complain(&[ct("0", 0), slices()]);
     assert!(volume.contains("a volume of its own"), "{volume}");
