@@ -490,10 +490,7 @@ async fn send_part(
         let names: Vec<_> = product.files.iter().map(|file| file.name.clone()).collect();
         return Err(no_such_file(product.resource(), name, &names));
     };
-<<<<<<< HEAD
     charge(size).await?;
-=======
->>>>>>> h-outputs
     let stored = app
         .queue
         .with_files(product.clone(), &[source.as_str()])

@@ -168,6 +168,7 @@ const USES: &[(&str, &[&str])] = &[
         "http",
         &[
             "text",
+            "mesh",
             "progress",
             "volume",
             "export",

@@ -3,12 +3,13 @@
 //! A NIfTI file can name a patient: in a DICOM header or another extension, in one of its fields of text (`descrip`,
 //! `aux_file`, `db_name`, `intent_name`), in the name that gzip keeps of the packed file, and in bytes that no
 //! reader asks for: between the header and the voxels, after them, after the packed data. Whether text that is there
-//! names somebody cannot be told, so a file is bare only if there is none.
+//! names somebody cannot be told, so a file is bare only if there is none but the `descrip` that this program writes.
 
 use super::super::VolumeError;
 use super::super::limits::ReadLimits;
 use super::super::source::{ReadSeek, Source, VolumeFile};
 use super::header::Header;
+use super::write::DESCRIPTION;
 use crate::progress::{Monitor, Stage};
 use flate2::bufread::GzDecoder;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek};
@@ -122,12 +123,18 @@ impl Content {
     }
 
     fn is_bare(&self, header: &Header) -> bool {
-        let (size, texts) = match header.is_second() {
-            true => (SECOND, SECOND_TEXT),
-            false => (FIRST, FIRST_TEXT),
+        let (size, texts, descrip) = match header.is_second() {
+            true => (SECOND, SECOND_TEXT, 240),
+            false => (FIRST, FIRST_TEXT, 148),
         };
         let blank = |bytes: Option<&[u8]>| bytes.is_some_and(|bytes| bytes.iter().all(|b| *b == 0));
-        let texts = texts.into_iter().all(|text| blank(self.0.get(text)));
+        let own = |text: &Range<usize>| {
+            let rest = self.0.get(text.clone())?.strip_prefix(DESCRIPTION);
+            (text.start == descrip).then_some(rest?)
+        };
+        let texts = texts
+            .iter()
+            .all(|text| blank(self.0.get(text.clone())) || blank(own(text)));
         // Four bytes announce extensions, which the rest holds.
         let voxels = usize::try_from(header.vox_offset).unwrap_or(usize::MAX);
         texts && blank(self.0.get(size..voxels))
