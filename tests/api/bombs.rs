@@ -338,5 +338,8 @@ async fn bombs_whose_clients_wait_are_ended_and_keep_no_upload_waiting() {
     let answer = service.post("/v1/volumes").body(bomb).send().await.unwrap();
     assert_eq!(answer.status(), 422);
     let problem: serde_json::Value = answer.json().await.unwrap();
-    assert_eq!(problem["code"], "decoding-time", "{problem}");
+    assert_eq!(
+        problem["type"], "urn:ventriform:problem:decoding-time",
+        "{problem}"
+    );
 }
