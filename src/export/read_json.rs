@@ -88,6 +88,9 @@ pub fn uncertainty(bytes: &[u8]) -> Vec<f64> {
         .map_or_else(|_| Vec::new(), |read: ReadUncertainty| read.uncertainty_mm)
 }
 
+/// The colours that show a field of that name and with those values: red, green, blue from 0 to 1.
+pub type Colouring<'a> = dyn Fn(&str, &[f64]) -> Vec<[f64; 3]> + 'a;
+
 /// The mesh in `bytes` with what [`super::json`] wrote of it: title, origin, figures, and what is known of each
 /// vertex and triangle. `colours` gives the colours that show a field, by its name and values.
 ///
@@ -95,7 +98,7 @@ pub fn uncertainty(bytes: &[u8]) -> Vec<f64> {
 /// See [`ReadMeshError`].
 pub fn document(
     bytes: &[u8],
-    colours: &dyn Fn(&str, &[f64]) -> Vec<[f64; 3]>,
+    colours: &Colouring<'_>,
 ) -> Result<(TriMesh, Metadata), ReadMeshError> {
     #[derive(Default, Deserialize)]
     #[serde(default)]

@@ -23,12 +23,15 @@ pub struct PublishedDocument {
     gzip: Variant,
 }
 
+/// A prefix, and the document for those who reach the service under it.
+type Prefixed = (String, Arc<PublishedDocument>);
+
 /// The document, also for those who reach the service under a path.
 #[derive(Clone)]
 pub struct PublishedDocuments {
     document: Arc<Value>,
     plain: Arc<PublishedDocument>,
-    prefixed: Arc<Mutex<Option<(String, Arc<PublishedDocument>)>>>,
+    prefixed: Arc<Mutex<Option<Prefixed>>>,
 }
 
 impl PublishedDocuments {

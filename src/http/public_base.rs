@@ -143,9 +143,8 @@ fn outermost(headers: &HeaderMap, trusted: &Networks) -> String {
         let client = client.and_then(|node| super::client::node_address(&node));
         client.is_some_and(|address| trusted.contain(address.to_canonical()))
     };
-    let mut nearest = elements.iter().rev().peekable();
     let mut chosen = "";
-    while let Some(element) = nearest.next() {
+    for element in elements.iter().rev() {
         chosen = element;
         if !is_trusted(element) {
             break;

@@ -510,8 +510,7 @@ mod tests {
     fn sets_are_restored_at_every_delimiter_and_kept_elsewhere() {
         let greek = "\\ISO 2022 IR 126";
         let after = |between: &str, division| {
-            let text = format!("{between}");
-            let bytes = [b"\x1b-F\xc4", text.as_bytes(), b"\xc4"].concat();
+            let bytes = [b"\x1b-F\xc4", between.as_bytes(), b"\xc4"].concat();
             read(greek, &bytes, division).is_ok()
         };
         for (between, lines, values, names) in [

@@ -368,7 +368,7 @@ const UNTOLD: &[(Said, &str)] = &[
     ),
     (
         says!((0x20, 0x13), "IS", |v, s| written(
-            s * VOLUMES + if s % 2 == 0 { v } else { VOLUMES - v }
+            s * VOLUMES + if s.is_multiple_of(2) { v } else { VOLUMES - v }
         )),
         "Instance Number",
     ),
