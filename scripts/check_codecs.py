@@ -282,7 +282,7 @@ def baseline():
     arithmetic = stream.replace(b"\xff\xc0", b"\xff\xc9", 1)
     case("arithmetic JPEG", BASELINE, [arithmetic], (image, 8, False), refused="arithmetic JPEG")
     cut = stream[: -len(stream) // 3] + b"\xff\xd9"
-    case("JPEG baseline, cut", BASELINE, [cut], (image, 8, False), refused="cut off")
+    case("JPEG baseline, cut", BASELINE, [cut], (image, 8, False), refused="cut off|baseline JPEG does not allow")
     scan = stream[stream.index(b"\xff\xda") : -2]
     case("JPEG baseline, two scans", BASELINE, [stream[:-2] + scan + b"\xff\xd9"], (image, 8, False), refused="follows the scan")
     colour = pillow(np.stack([image] * 3, -1), "JPEG", quality=75)
@@ -312,6 +312,11 @@ def jpeg_ls():
     case("JPEG-LS with restarts", LS, [restart], (image, 8, False), refused="restart")
 
 
+def irreversible_tolerance(bits):
+    """How far two decoders may be apart: both compute in 32-bit floats, through up to six levels of filters."""
+    return max(1, 2 ** (bits - 14))
+
+
 def jpeg_2000():
     options = [{}]
     options += [{"tile_size": t} for t in ((16, 16), (25, 13), (64, 64))]
@@ -332,7 +337,9 @@ def jpeg_2000():
                     except (OSError, ValueError):
                         continue  # OpenJPEG writes no such image.
                     label = f"JPEG 2000 {size} {bits} bits {name} {option}"
-                    case(label, J2K_REVERSIBLE, [stream], (image, bits, signed), image)
+                    # Pillow 13.0 puts pixels of 16 bits into wrong tiles: what OpenJPEG reads of its stream counts.
+                    same = imagecodecs.jpeg2k_decode(stream) if bits == 16 and "tile_size" in option else image
+                    case(label, J2K_REVERSIBLE, [stream], (image, bits, signed), same)
     # Layers: all of them, and irreversible at rates at which edges overshoot.
     for bits in (8, 16):
         for name, image in images(64, 50, bits).items():
@@ -345,7 +352,7 @@ def jpeg_2000():
                         stream = j2k(image, quality_mode="rates", quality_layers=[rate], irreversible=irreversible, **option)
                         same = imagecodecs.jpeg2k_decode(stream)
                         case(f"JPEG 2000 {bits} bits {name} rate {rate} {option} {irreversible}", J2K, [stream],
-                             (image, bits, False), same, 1)
+                             (image, bits, False), same, irreversible_tolerance(bits))
     # 12 bits and signed numbers, by another binding of OpenJPEG.
     for bits, signed in [(8, True), (10, False), (12, False), (12, True), (16, True)]:
         for name, image in images(48, 61, bits, signed).items():
@@ -354,7 +361,8 @@ def jpeg_2000():
             for ratio in (2, 4, 10):
                 stream = encode_array(image, bits_stored=bits, photometric_interpretation=2, compression_ratios=[ratio])
                 same = imagecodecs.jpeg2k_decode(stream)
-                case(f"JPEG 2000 {bits} bits {signed} {name} ratio {ratio}", J2K, [stream], (image, bits, signed), same, 1)
+                case(f"JPEG 2000 {bits} bits {signed} {name} ratio {ratio}", J2K, [stream], (image, bits, signed), same,
+                     irreversible_tolerance(bits))
     image = images(40, 40, 16)["noise"].astype(np.uint32) << 4
     stream = imagecodecs.jpeg2k_encode(image, reversible=True, level=0, bitspersample=20, codecformat="j2k")
     case("JPEG 2000 of 20 bits", J2K_REVERSIBLE, [stream], (image, 20, False), image)
