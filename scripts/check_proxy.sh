@@ -9,6 +9,8 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
+# The workers of nginx, which are not root, keep bodies there.
+chmod 711 "$out"
 
 # shellcheck source=scripts/dicom_tools.sh
 . scripts/dicom_tools.sh

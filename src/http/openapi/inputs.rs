@@ -165,6 +165,7 @@ fn default_of<P: Parameters>(spec: &ParameterSpec<P>) -> Option<Value> {
         Kind::Integer { .. } | Kind::Number { .. } => {
             serde_json::from_str(spec.default).unwrap_or(json!(spec.default))
         }
+        Kind::Switch => json!(spec.default == "true"),
         _ => json!(spec.default),
     })
 }
