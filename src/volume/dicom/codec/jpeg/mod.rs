@@ -1,5 +1,5 @@
-//! JPEG (ISO 10918-1, ITU-T T.81) for one component: the [baseline](baseline) process and the
-//! [lossless](lossless) one with every predictor, both Huffman coded, with or without restarts.
+//! JPEG (ISO 10918-1, ITU-T T.81) for one component: the [`baseline`] process and the
+//! [`lossless`] one with every predictor, both Huffman coded, with or without restarts.
 //!
 //! The marker segments are read first. A process that the transfer syntax does not allow is refused by
 //! its name, so that a frame has exactly one scan and is decoded in a time that its pixels bound: every
