@@ -358,6 +358,7 @@ pub fn media_type_of(name: &str) -> &'static str {
     match extension {
         "dcm" => DicomObject::MEDIA_TYPE,
         "gz" => "application/gzip",
+        "nrrd" => seg_nrrd::MEDIA_TYPE,
         "html" => "text/html",
         "png" => "image/png",
         "svg" => "image/svg+xml",
