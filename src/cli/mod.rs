@@ -80,7 +80,11 @@ enum Command {
 
 /// Runs the command that the arguments of the process name.
 pub fn main() -> ExitCode {
-    let outcome = match Cli::parse().command {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return refuse(&error),
+    };
+    let outcome = match cli.command {
         Command::Generate(args) => generate::run(&args),
         Command::Segment(args) => segment::run(&args),
         Command::Inspect(args) => inspect::run(&args),
@@ -114,6 +118,18 @@ pub fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Prints help and version as clap lays them out, and refusals of arguments with the arguments' control
+/// characters escaped.
+fn refuse(error: &clap::Error) -> ExitCode {
+    if error.use_stderr() {
+        note!("{}", error.render().to_string().trim_end());
+    } else {
+        // A reader that has closed the pipe has read enough.
+        error.print().ok();
+    }
+    ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
 }
 
 #[cfg(test)]

@@ -29,13 +29,18 @@ pub(super) fn select<'a>(
     let asked = parameters.mask_smoothing;
     let voxel_ml = volume.frame.voxel_volume() / 1000.0;
     facts.mask_ml = Some(mask.count() as f64 * voxel_ml);
-    let mut smoothed = masks::smooth(&mask, asked, &volume.frame, monitor)?;
+    let ball = parameters.topology == TopologyMode::Genus0;
+    let mut count = mask.count();
+    let mut joined = 0;
+    if ball {
+        (mask, joined) = masks::joined(&mask);
+    }
+    let mut smoothed = masks::smooth(&mask, count, asked, &volume.frame, monitor)?;
     let mut dropped = [0; 2];
-    if parameters.topology == TopologyMode::Genus0
-        && let Some((kept, parts, voxels)) = masks::largest_part(&mask, &smoothed)
-    {
+    if ball && let Some((kept, parts, voxels)) = masks::largest_part(&mask, &smoothed) {
         // The level has to suit the volume of what remains.
-        smoothed = masks::smooth(&kept, asked, &volume.frame, monitor)?;
+        count = count.saturating_sub(voxels).max(1);
+        smoothed = masks::smooth(&kept, count, asked, &volume.frame, monitor)?;
         (mask, dropped) = (kept, [parts, voxels]);
     }
     if smoothed.sigma < parameters.mask_smoothing {
@@ -44,7 +49,14 @@ pub(super) fn select<'a>(
             smoothed.sigma, parameters.mask_smoothing
         ));
     }
+    let torn = || {
+        let labels = masks::at_level(&smoothed, smoothed.level);
+        labels.euler_characteristic() != 1
+    };
     let level = match parameters.iso {
+        IsoLevel::Auto if ball && torn() => {
+            masks::level_as_ball(&smoothed, count, &volume.frame, monitor)?
+        }
         IsoLevel::Auto => smoothed.level,
         IsoLevel::Fraction(f) | IsoLevel::Absolute(f) | IsoLevel::Below(f) => f as f32,
     };
@@ -78,6 +90,7 @@ pub(super) fn select<'a>(
         mask: Some(MaskObject {
             passes: smoothed.passes,
             dropped,
+            joined,
         }),
     })
 }

@@ -11,9 +11,14 @@
 //! tenth of the mask, or falls into another number of parts (crumbs of less than 1 % aside), sigma
 //! is halved, down to the raw mask. Taubin's passes are as many as change the volume little: a
 //! single voxel gets none.
+//!
+//! Coarse voxels of a thin wall may touch along edges or at corners only. Where parts of a mask do,
+//! [`joined`] adds the voxels between them, which the level takes off elsewhere: thick slices of a curved
+//! wall would lose the apex. Where such a surface has handles, closing them ([`topology_control`]) adds or
+//! takes voxels; [`level_as_ball`] then searches the level once more, of the closed surface.
 
 use super::marching_cubes::{MarchingCubesError, Samples, marching_cubes};
-use super::smoothing;
+use super::{smoothing, topology_control};
 use crate::geometry::frame::VoxelToPatient;
 use crate::grid::blur::{Kernel, blur};
 use crate::grid::components::Components;
@@ -51,13 +56,14 @@ pub struct Smoothed {
     pub sigma: f64,
 }
 
-/// Smooths `mask` with `sigma` or less, in lengths of a cube of a voxel's volume. `frame` is the
-/// volume's.
+/// Smooths `mask` with `sigma` or less, in lengths of a cube of a voxel's volume, for a surface that
+/// encloses the volume of `count` voxels. `frame` is the volume's.
 ///
 /// # Errors
 /// [`MarchingCubesError`].
 pub fn smooth(
     mask: &Labels,
+    count: usize,
     sigma: f64,
     frame: &VoxelToPatient,
     monitor: &Monitor,
@@ -65,7 +71,7 @@ pub fn smooth(
     let wanted = parts(mask);
     let mut used = sigma;
     while used > 0.1 {
-        let candidate = levelled(with_sigma(mask, used, frame), mask, frame, monitor)?;
+        let candidate = levelled(with_sigma(mask, used, frame), count, frame, monitor)?;
         let labels = at_level(&candidate, candidate.level);
         let margin = margin(mask, &candidate);
         let kept = mask
@@ -77,7 +83,84 @@ pub fn smooth(
         }
         used /= 2.0;
     }
-    levelled(with_sigma(mask, 0.0, frame), mask, frame, monitor)
+    levelled(with_sigma(mask, 0.0, frame), count, frame, monitor)
+}
+
+/// `mask` with the voxels that join its 6-connected parts face to face where they touch along edges, and at
+/// corners where they do only that; and the number of voxels added.
+pub fn joined(mask: &Labels) -> (Labels, usize) {
+    let mut joined = mask.clone();
+    let mut axes = 2;
+    while axes <= 3 {
+        let parts = Components::of_inside(&joined);
+        if parts.sizes.len() < 2 {
+            break;
+        }
+        let mut added = Vec::new();
+        for (p, part) in joined.voxels().zip(parts.of_voxels()) {
+            for q in touching(p, axes, joined.extent) {
+                if joined.get(q) && parts.containing(&joined, q) != Some(part) {
+                    added.extend(path(&joined, p, q));
+                }
+            }
+        }
+        // What was added may touch a further part along an edge.
+        axes = if added.is_empty() { axes + 1 } else { 2 };
+        for p in added {
+            joined.set(p, true);
+        }
+    }
+    let added = joined.count() - mask.count();
+    (joined, added)
+}
+
+/// The voxels of a box of `extent` that differ from `p` by one step along each of exactly `axes` axes, after
+/// `p` in array order.
+fn touching(p: [usize; 3], axes: usize, extent: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
+    (14..27).filter_map(move |n| {
+        let step = [n % 3, n / 3 % 3, n / 9].map(|s| s as i64 - 1);
+        if step.iter().filter(|s| **s != 0).count() != axes {
+            return None;
+        }
+        let q = [0, 1, 2].map(|r| p[r] as i64 + step[r]);
+        let within = (0..3).all(|r| (0..extent[r] as i64).contains(&q[r]));
+        within.then(|| q.map(|x| x as usize))
+    })
+}
+
+/// The voxels of a shortest path by faces from `p` to `q`, both left out: of the first steps the one
+/// with most neighbours in `mask`.
+fn path(mask: &Labels, p: [usize; 3], q: [usize; 3]) -> Vec<[usize; 3]> {
+    let mut path = Vec::new();
+    let mut here = p;
+    loop {
+        let steps = (0..3).filter(|&r| here[r] != q[r]).map(|r| {
+            let mut next = here;
+            next[r] = q[r];
+            next
+        });
+        let best = steps.rev().max_by_key(|next| neighbours(mask, *next));
+        match best {
+            Some(next) if next != q => {
+                path.push(next);
+                here = next;
+            }
+            _ => return path,
+        }
+    }
+}
+
+/// Number of voxels of `mask` that share a face with `p`.
+fn neighbours(mask: &Labels, p: [usize; 3]) -> usize {
+    (0..3)
+        .flat_map(|r| [(r, -1), (r, 1)])
+        .filter(|&(r, step)| {
+            let mut near = p.map(|x| x as i64);
+            near[r] += step;
+            let within = (0..mask.extent[r] as i64).contains(&near[r]);
+            within && mask.get(near.map(|x| x as usize))
+        })
+        .count()
 }
 
 /// `mask` without the parts that smoothing leaves apart from the largest, and their number and voxels.
@@ -172,22 +255,26 @@ fn with_sigma(mask: &Labels, sigma: f64, frame: &VoxelToPatient) -> Smoothed {
     }
 }
 
-/// Sets level and passes of `smoothed` so that the surface encloses the volume of `mask`.
+/// Sets level and passes of `smoothed` so that the surface encloses the volume of `count` voxels.
 fn levelled(
     mut smoothed: Smoothed,
-    mask: &Labels,
+    count: usize,
     frame: &VoxelToPatient,
     monitor: &Monitor,
 ) -> Result<Smoothed, MarchingCubesError> {
-    let wanted = mask.count() as f64 * frame.voxel_volume();
+    let wanted = count as f64 * frame.voxel_volume();
     if wanted == 0.0 {
         return Ok(smoothed);
     }
     let start = smoothed.level;
     let mut best = (f64::INFINITY, start, 0);
     for passes in PASSES {
-        let (level, off) = level_of(&smoothed, start, passes, wanted, frame, monitor)?;
-        let (raw, _) = volume_at(&smoothed, level, 0, frame, monitor)?;
+        let off = |level| {
+            let volume = volume_at(&smoothed, level, passes, frame, monitor)?;
+            Ok::<f64, MarchingCubesError>(volume / wanted - 1.0)
+        };
+        let (level, off) = level_of(start, top(&smoothed), off)?;
+        let raw = volume_at(&smoothed, level, 0, frame, monitor)?;
         let smoothing = if passes == 0 {
             0.0
         } else {
@@ -204,24 +291,17 @@ fn levelled(
     Ok(smoothed)
 }
 
-/// The level, searched from `start`, at which the surface encloses the volume `wanted`, mm³, and by which
-/// share the volume is off.
+/// The level, searched from `start` to `top`, at which `off` is least, and `off` there: the share by which
+/// the surface's volume at a level differs from the one wanted.
 ///
 /// The volume falls as the level rises. False position with halved weights (Illinois; Dowell and
 /// Jarratt 1971) keeps both ends about the root.
-fn level_of(
-    smoothed: &Smoothed,
+fn level_of<E>(
     start: f32,
-    passes: usize,
-    wanted: f64,
-    frame: &VoxelToPatient,
-    monitor: &Monitor,
-) -> Result<(f32, f64), MarchingCubesError> {
-    let off = |level: f64| {
-        let (volume, _) = volume_at(smoothed, level as f32, passes, frame, monitor)?;
-        Ok::<f64, MarchingCubesError>(volume / wanted - 1.0)
-    };
-    let top = f64::from(smoothed.values.iter().copied().fold(0.0, f32::max));
+    top: f64,
+    mut off_at: impl FnMut(f32) -> Result<f64, E>,
+) -> Result<(f32, f64), E> {
+    let mut off = |level: f64| off_at(level as f32);
     let first = f64::from(start);
     let at_first = off(first)?;
     let mut best = (first, at_first);
@@ -276,18 +356,47 @@ fn level_of(
     Ok((best.0 as f32, best.1))
 }
 
-/// Volume that the surface at `level` encloses, mm³, and its number of triangles.
+/// The level at which the surface of the largest ball in `smoothed` ([`topology_control::make_ball`])
+/// encloses the volume of `count` voxels. The volume of a closed surface jumps where a handle appears, so that the
+/// nearest level found may be off by more than one of [`smooth`].
+///
+/// # Errors
+/// [`MarchingCubesError`].
+pub fn level_as_ball(
+    smoothed: &Smoothed,
+    count: usize,
+    frame: &VoxelToPatient,
+    monitor: &Monitor,
+) -> Result<f32, MarchingCubesError> {
+    let wanted = count as f64 * frame.voxel_volume();
+    let (values, shape) = (&smoothed.values, smoothed.shape);
+    let value = |[i, j, k]: [usize; 3]| values[i + shape[0] * (j + shape[1] * k)];
+    let off = |level: f32| {
+        let mut labels = at_level(smoothed, level);
+        topology_control::make_ball(&mut labels, value, monitor)?;
+        let how = (level, smoothed.passes);
+        let mesh = surface_of(&labels, values, shape, how, frame, monitor)?;
+        Ok::<f64, MarchingCubesError>(mesh.volume() / wanted - 1.0)
+    };
+    Ok(level_of(smoothed.level, top(smoothed), off)?.0)
+}
+
+fn top(smoothed: &Smoothed) -> f64 {
+    f64::from(smoothed.values.iter().copied().fold(0.0, f32::max))
+}
+
+/// Volume that the surface at `level` encloses, mm³.
 fn volume_at(
     smoothed: &Smoothed,
     level: f32,
     passes: usize,
     frame: &VoxelToPatient,
     monitor: &Monitor,
-) -> Result<(f64, usize), MarchingCubesError> {
+) -> Result<f64, MarchingCubesError> {
     let labels = at_level(smoothed, level);
     let (values, shape) = (&smoothed.values, smoothed.shape);
     let mesh = surface_of(&labels, values, shape, (level, passes), frame, monitor)?;
-    Ok((mesh.volume(), mesh.triangles.len()))
+    Ok(mesh.volume())
 }
 
 /// The level that `count` of the values reach: half-way between neighbours in order, so that
@@ -315,7 +424,7 @@ mod tests {
     /// Volumes of mask and surface, mm³, and the smoothed mask.
     fn volumes(mask: &Labels, sigma: f64, spacing: [f64; 3]) -> (f64, f64, Smoothed) {
         let (frame, silent) = (frame(spacing), Monitor::silent());
-        let smoothed = smooth(mask, sigma, &frame, &silent).unwrap();
+        let smoothed = smooth(mask, mask.count(), sigma, &frame, &silent).unwrap();
         let level = (smoothed.level, smoothed.passes);
         let labels = at_level(&smoothed, smoothed.level);
         let (values, shape) = (&smoothed.values, smoothed.shape);
@@ -407,12 +516,50 @@ mod tests {
         }
     }
 
+    /// Against the definition: after it no two parts touch along an edge or at a corner, nothing is lost, and
+    /// what is added has a face in common with the mask.
+    fn is_joined(mask: &Labels) -> bool {
+        let (whole, added) = joined(mask);
+        let parts = Components::of_inside(&whole);
+        let mut apart = true;
+        for (p, part) in whole.voxels().zip(parts.of_voxels()) {
+            for axes in [2, 3] {
+                for q in touching(p, axes, whole.extent) {
+                    apart &= !whole.get(q) || parts.containing(&whole, q) == Some(part);
+                }
+            }
+        }
+        let of_mask = mask.voxels().filter(|p| whole.get(*p)).count();
+        apart && of_mask == mask.count() && whole.count() == of_mask + added
+    }
+
+    proptest! {
+        #[test]
+        fn parts_that_touch_are_joined(bits in prop::collection::vec(prop::bool::weighted(0.2), 6 * 5 * 4)) {
+            let mask = Labels::of_shape([6, 5, 4], |p| bits[p[0] + 6 * (p[1] + 5 * p[2])]);
+            prop_assert!(is_joined(&mask));
+        }
+    }
+
+    #[test]
+    fn parts_that_do_not_touch_stay_apart() {
+        let mask = Labels::of_shape([7, 3, 3], |p| p[0] < 3 || p[0] > 4);
+        assert_eq!(joined(&mask), (mask, 0));
+    }
+
     #[test]
     fn thin_sheets_and_rods_survive() {
         let rod = Labels::of_shape([30, 9, 9], |p| p[1] == 4 && p[2] == 4 || p[0] > 20);
         let sheet = Labels::of_shape([20, 20, 1], |_| true);
         for thin in [rod, sheet, Labels::of_shape([1; 3], |_| true)] {
-            let smoothed = smooth(&thin, 3.0, &frame([1.0; 3]), &Monitor::silent()).unwrap();
+            let smoothed = smooth(
+                &thin,
+                thin.count(),
+                3.0,
+                &frame([1.0; 3]),
+                &Monitor::silent(),
+            )
+            .unwrap();
             let labels = at_level(&smoothed, smoothed.level);
             assert_eq!(labels.euler_characteristic(), thin.euler_characteristic());
             assert!(10 * labels.count() >= 9 * thin.count());
@@ -425,7 +572,14 @@ mod tests {
         let object = Labels::of_shape([20, 9, 9], |p| {
             p.iter().all(|&x| x < 7) || p == [7, 7, 3] || p[0] > 17 && p[1] < 2 && p[2] < 2
         });
-        let smoothed = smooth(&object, 0.8, &frame([1.0; 3]), &Monitor::silent()).unwrap();
+        let smoothed = smooth(
+            &object,
+            object.count(),
+            0.8,
+            &frame([1.0; 3]),
+            &Monitor::silent(),
+        )
+        .unwrap();
         let (kept, parts, voxels) = largest_part(&object, &smoothed).unwrap();
         assert!(parts >= 1 && voxels >= 8, "{parts} {voxels}");
         assert_eq!(kept.count() + voxels, object.count());

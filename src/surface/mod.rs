@@ -285,6 +285,14 @@ fn control_topology(
     facts.voxels_cut = changes.cut;
     facts.voxels_filled = changes.filled;
     warn_of_topology(facts, largest);
+    if let Some(mask) = object.mask.filter(|mask| mask.joined > 0) {
+        facts.voxels_filled += mask.joined;
+        facts.warnings.push(format!(
+            "parts of the mask touch along edges or at corners only: {} voxels were added to join them, and \
+             the surface was drawn in to keep the volume; topology: keep leaves them apart",
+            mask.joined
+        ));
+    }
     Ok(())
 }
 

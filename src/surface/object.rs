@@ -25,6 +25,8 @@ pub(super) struct MaskObject {
     pub passes: usize,
     /// Parts left out before smoothing, and their voxels.
     pub dropped: [usize; 2],
+    /// Voxels added between parts that touch along edges or at corners only.
+    pub joined: usize,
 }
 
 impl<'a> Object<'a> {

@@ -137,10 +137,12 @@ pub enum VolumeError {
         file: String,
     },
     /// Several files that do not form one volume.
-    #[error("{count} files were given that are not a .hdr/.img pair")]
+    #[error("{place} holds {held}, which are not one volume")]
     NotOneVolume {
-        /// Number of files.
-        count: usize,
+        /// Where they were found: a folder, an archive, or what was given.
+        place: String,
+        /// How many files there are of each kind.
+        held: String,
     },
     /// The value of a voxel exceeds the range of 32-bit floats.
     #[error("{file}: voxel ({}, {}, {}) is {value}, beyond the range of 32-bit floats", .voxel[0], .voxel[1], .voxel[2])]

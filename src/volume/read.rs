@@ -172,19 +172,17 @@ fn open(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Opened, VolumeError> {
-    let mut inside = None;
+    let in_folder = files.iter().any(VolumeFile::was_found);
+    let mut inside = in_folder.then_some("the folder");
     let mut members = Vec::with_capacity(files.len());
     for file in files {
         match archive::files_in(file, limits)? {
             Some(packed) => {
-                inside = Some(file.name());
+                inside = inside.or(Some(file.name()));
                 members.extend(packed);
             }
             None => members.push(file.clone()),
         }
-    }
-    if inside.is_none() && files.iter().any(VolumeFile::was_found) {
-        inside = Some("the folder");
     }
     // Archives list their files in any order.
     if inside.is_some() {

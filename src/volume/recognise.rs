@@ -74,7 +74,7 @@ pub(super) fn recognise<'a>(
             Err(error) => return Err(error),
         }
     }
-    let volume = sorted.volume(files.len(), inside, limits)?;
+    let volume = sorted.volume(inside, limits)?;
     Ok(Found {
         notes: sorted.notes(&volume),
         volume,
@@ -85,7 +85,6 @@ impl<'a> Sorted<'a> {
     /// The one volume among the files.
     fn volume(
         &self,
-        count: usize,
         inside: Option<&str>,
         limits: &ReadLimits,
     ) -> Result<Recognised<'a>, VolumeError> {
@@ -95,26 +94,24 @@ impl<'a> Sorted<'a> {
                 header: self.singles[0],
                 voxels: self.singles[0],
             }),
-            ([0, 1, _], _) => self.pair(self.headers[0], count, limits),
+            ([0, 1, _], _) => self.pair(self.headers[0], inside, limits),
             ([0, 0, dicom], _) if dicom > 0 => Ok(Recognised::Dicom(self.dicom.clone())),
-            ([0, 0, 0], []) if count == 0 => Err(VolumeError::NoFile),
+            ([0, 0, 0], []) if self.empty.is_empty() => Err(VolumeError::NoFile),
             ([0, 0, 0], others) => {
                 let analyze = others.iter().find(|(_, start)| is_analyze(start));
                 Err(match (analyze, others, inside) {
-                    (Some((file, start)), ..) | (None, [(file, start)], None) if count == 1 => {
-                        refuse(file, start)
-                    }
                     (Some((file, start)), ..) => refuse(file, start),
+                    (None, [(file, start)], None) if self.empty.is_empty() => refuse(file, start),
                     (_, _, Some(name)) => VolumeError::Unsupported {
                         file: name.into(),
                         format: "an archive or folder without DICOM or NIfTI files".into(),
                         fix: "Give the files of one DICOM series, or one NIfTI file.",
                     },
                     (_, [], None) => VolumeError::NoFile,
-                    _ => VolumeError::NotOneVolume { count },
+                    _ => self.not_one(inside),
                 })
             }
-            _ => Err(VolumeError::NotOneVolume { count }),
+            _ => Err(self.not_one(inside)),
         }
     }
 
@@ -123,7 +120,7 @@ impl<'a> Sorted<'a> {
     fn pair(
         &self,
         header: &'a VolumeFile,
-        count: usize,
+        inside: Option<&str>,
         limits: &ReadLimits,
     ) -> Result<Recognised<'a>, VolumeError> {
         // A file of voxels may start with any bytes.
@@ -143,12 +140,33 @@ impl<'a> Sorted<'a> {
                     file: header.name().into(),
                 });
             }
-            _ => return Err(VolumeError::NotOneVolume { count }),
+            _ => return Err(self.not_one(inside)),
         };
         let rest = self.dicom.iter().any(|file| !std::ptr::eq(*file, voxels));
         match rest {
-            true => Err(VolumeError::NotOneVolume { count }),
+            true => Err(self.not_one(inside)),
             false => Ok(Recognised::Nifti { header, voxels }),
+        }
+    }
+
+    /// The refusal of files that are several volumes, or none.
+    fn not_one(&self, inside: Option<&str>) -> VolumeError {
+        let named = |count: usize, kind: &str| match count {
+            0 => None,
+            1 => Some(format!("1 {kind}")),
+            count => Some(format!("{count} {kind}s")),
+        };
+        let kinds = [
+            named(self.singles.len(), "NIfTI file"),
+            named(self.headers.len(), "NIfTI header"),
+            named(self.dicom.len(), "DICOM file"),
+            named(self.others.len(), "other file"),
+            named(self.empty.len(), "empty file"),
+        ];
+        let kinds: Vec<String> = kinds.into_iter().flatten().collect();
+        VolumeError::NotOneVolume {
+            place: inside.unwrap_or("the upload").to_owned(),
+            held: kinds.join(", "),
         }
     }
 

@@ -95,6 +95,16 @@ fn what_files_say_is_printed_without_control_characters() {
         (&["inspect", "series"], 0),
         (&["inspect"], 2),
         (&["inspect", "--unknown"], 2),
+        (&["inspect", "--un\u{1b}[2Jknown\u{202e}"], 2),
+        (&["in\u{9b}spect"], 2),
+        (
+            &["generate", "series", "-o", "a.stl", "--points", "\u{1b}[5"],
+            2,
+        ),
+        (
+            &["generate", "series", "-o", "a.stl", "--method", "\u{1b}[5"],
+            2,
+        ),
     ] {
         let ended = program(folder.path(), arguments).output().unwrap();
         let printed = [ended.stdout, ended.stderr].concat();

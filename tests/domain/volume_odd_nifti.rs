@@ -1,5 +1,7 @@
 //! Odd and broken NIfTI files of other projects, against what nibabel 5 reads of them.
 
+#![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
+
 use std::path::{Path, PathBuf};
 use ventriform::progress::Monitor;
 use ventriform::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeFile};
@@ -149,11 +151,7 @@ const REFUSED: &[(&[&str], &str)] = &[
     ),
     (
         &["nifti-rs/minimal.hdr", "nifti-rs/27/int8.nii"],
-        "not a .hdr/.img pair",
-    ),
-    (
-        &["nifti-rs/minimal.nii", "nifti-rs/minimal.img"],
-        "not a .hdr/.img pair",
+        "1 NIfTI file, 1 NIfTI header, which are not one volume",
     ),
 ];
 
@@ -168,4 +166,20 @@ fn other_files_are_refused_by_field_and_value() {
         assert!(message.contains(part), "{names:?}: {message}");
         assert!(!advice(&error).is_empty());
     }
+}
+
+/// A whole volume does not need the file of voxels beside it, and the reader says that it left it out.
+#[test]
+fn a_file_beside_a_whole_volume_is_left_out_with_a_note() {
+    let Some(alone) = read(&["nifti-rs/minimal.nii"], None) else {
+        return;
+    };
+    let beside = read(&["nifti-rs/minimal.nii", "nifti-rs/minimal.img"], None);
+    let (alone, beside) = (alone.unwrap(), beside.unwrap().unwrap());
+    assert_eq!(alone.volume.voxels, beside.volume.voxels);
+    let warnings = beside.facts.warnings;
+    assert!(
+        warnings.iter().any(|w| w.contains("minimal.img")),
+        "{warnings:?}"
+    );
 }

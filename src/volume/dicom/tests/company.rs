@@ -131,7 +131,7 @@ fn two_volumes_and_headers_without_voxels_are_refused() {
     let two = [("a.nii", single.clone()), ("b.nii", single.clone())];
     assert!(matches!(
         refuse(&two),
-        VolumeError::NotOneVolume { count: 2 }
+        VolumeError::NotOneVolume { held, .. } if held == "2 NIfTI files"
     ));
     let mixed = [("a.nii", single.clone()), ("b.dcm", slice.clone())];
     assert!(matches!(refuse(&mixed), VolumeError::NotOneVolume { .. }));
