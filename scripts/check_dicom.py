@@ -10,8 +10,8 @@ C.8.4.15, and the objects are compared with mask.nii.gz and mesh.json of the sam
   cavity, has the volume of report.json and shares no voxel;
 - contours.dcm: voxel centres inside the polygons of every slice;
 - mesh.dcm: every vertex of the STL within 0.01 mm, also of the glTF's; surface.dcm: points and triangles;
-- measurements.dcm, read by highdicom and by dcmqi: the volumes of report.json, those of the apparent and of the
-  anatomical wall each in a group whose method says which it is;
+- measurements.dcm, read by highdicom and by dcmqi: the volumes of report.json, each of wall, cavity, and the apparent
+  and anatomical ones in a group whose site and method say which it is;
 - all: patient, study, Frame of Reference, source; no private attribute, none that is not of the IOD, none
   missing that it asks for (tables of highdicom); codes have the meaning of PS3.16 (tables of pydicom).
 """
@@ -245,26 +245,32 @@ def check_measurements(out, report, seg):
     (group,) = sr.content.get_volumetric_roi_measurement_groups()
     assert group.referenced_segment is not None
     assert group.tracking_uid == seg.SegmentSequence[0].TrackingUID
-    volumes = [m.value for m in group.get_measurements() if m.name.meaning == "Volume"]
-    assert report["volumes_ml"]["wall"] in volumes and report["volumes_ml"]["cavity"] in volumes
-    groups = sr.content.get_image_measurement_groups()
-    walls = {group.method.value: group for group in groups if group.method is not None}
-    assert set(walls) == {"APPARENT", "ANATOMICAL"} and len(groups) == 17 + 2, (walls, len(groups))
+    volumes = [float(m.value) for m in group.get_measurements() if m.name.meaning == "Volume"]
+    assert np.allclose(volumes, [report["volumes_ml"]["wall"]]), volumes
+    groups = {g.tracking_identifier: g for g in sr.content.get_image_measurement_groups()}
     program = Path(sys.executable).parent / "tid1500reader"
     read = out / "measurements.json"
     subprocess.run([program, "--inputDICOM", out / "measurements.dcm", "--outputMetadata", read],
                    check=True, capture_output=True)
     named = {g["TrackingIdentifier"]: g for g in json.loads(read.read_text())["Measurements"]}
-    for wall in "apparent", "anatomical":
-        wanted = [report["volumes_ml"][wall][part] for part in ("wall", "cavity")]
-        group = walls[wall.upper()]
-        found = [float(m.value) for m in group.get_measurements() if m.name.meaning == "Volume"]
-        assert np.allclose(found, wanted), (wall, found, wanted)
-        other = named[group.tracking_identifier]
+    parts = {"cavity": report["volumes_ml"]["cavity"]}
+    for way in "apparent", "anatomical":
+        parts |= {f"{way} {part}": report["volumes_ml"][way][part] for part in ("wall", "cavity")}
+    assert len(groups) == 17 + len(parts), sorted(groups)
+    for part, wanted in parts.items():
+        name = f"{group.tracking_identifier}, {part}"
+        found = [float(m.value) for m in groups[name].get_measurements() if m.name.meaning == "Volume"]
+        assert np.allclose(found, [wanted]), (part, found, wanted)
+        other = named[name]
         found = [float(m["value"]) for m in other["measurementItems"]
                  if m["quantity"]["CodeMeaning"] == "Volume"]
-        assert np.allclose(found, wanted), (wall, found, wanted)
-        assert other["MeasurementMethod"]["CodeValue"] == wall.upper(), other
+        assert np.allclose(found, [wanted]), (part, found, wanted)
+        cavity = part.endswith("cavity")
+        assert (other["FindingSite"]["CodeValue"] == "LV-CAVITY") == cavity, other["FindingSite"]
+        if " " in part:
+            method = part.split()[0].upper()
+            assert groups[name].method.value == method, part
+            assert other["MeasurementMethod"]["CodeValue"] == method, other
 
 
 def check_object(data):

@@ -18,11 +18,11 @@ interface Wanted {
   object?: boolean;
 }
 
-function filesOf(result: Result, folder: string): Wanted[] {
+function filesOf(volume: Volume, result: Result, folder: string): Wanted[] {
   const page = result.links["page"];
   const files = result.files.map(file => ({ name: `${folder}/${file.name}`, path: file.href }));
-  // DICOM objects are made when they are asked for.
-  const objects = [(result.links as Record<string, string | string[]>)["dicom"] ?? []].flat();
+  // DICOM objects are made when they are asked for. Of a scan that is not DICOM nobody knows whose they would be.
+  const objects = !volume.dicom ? [] : [(result.links as Record<string, string | string[]>)["dicom"] ?? []].flat();
   const made = objects.map(path => ({ name: `${folder}/${path.slice(path.lastIndexOf("/") + 1)}`, path, object: true }));
   return [...files, ...(page ? [{ name: `${folder}/report.html`, path: page }] : []), ...made];
 }
@@ -55,7 +55,7 @@ async function saved(name: string, wanted: Wanted[], told: (text: string) => voi
 /** Saves every file of a result, with its report. */
 export function saveResult(volume: Volume, result: Result, told: (text: string) => void): Promise<void> {
   const name = `${fileNameOf(volume)}_${result.id.slice(0, 12)}`;
-  return saved(name, filesOf(result, "."), told);
+  return saved(name, filesOf(volume, result, "."), told);
 }
 
 /** Saves the scan as it was sent, and every file of every result. */
@@ -64,6 +64,6 @@ export async function saveScan(volume: Volume, told: (text: string) => void): Pr
   await loadScan(volume.id);
   const results = resultsOf(volume.id);
   const scan = volume.originals.map(file => ({ name: `scan/${file.name}`, path: file.href }));
-  const made = results.flatMap(result => filesOf(result, `${isFit(result.id) ? "fit" : "model"}_${result.id.slice(0, 12)}`));
+  const made = results.flatMap(result => filesOf(volume, result, `${isFit(result.id) ? "fit" : "model"}_${result.id.slice(0, 12)}`));
   await saved(fileNameOf(volume), [...scan, ...made], told);
 }

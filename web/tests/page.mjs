@@ -234,7 +234,7 @@ async function main() {
 
   await check("packed files hold what the plain ones do", async () => {
     const read = async (path, coding) => Buffer.from(await (await fetch(address + path, { headers: { accept: "text/html", "accept-encoding": coding } })).arrayBuffer());
-    const names = [...(await read("/", "identity")).toString().matchAll(/"(\/assets\/[^"]+)"/g)].map(match => match[1]);
+    const names = [...(await read("/", "identity")).toString().matchAll(/"[.\/]*(assets\/[^"]+)"/g)].map(match => `/${match[1]}`);
     const program = (await read(names.find(name => name.endsWith(".js")), "identity")).toString();
     for (const [, chunk] of program.matchAll(/["'`]\.\/([\w-]+\.js)["'`]/g)) names.push(`/assets/${chunk}`);
     assert.ok(names.some(name => name.includes("viewer")) && names.some(name => name.includes("docs")), names.join());
@@ -443,6 +443,10 @@ async function main() {
     await drawn(page);
     await page.waitForSelector(".wall canvas");
     await look(page, "dicom-1280");
+    const [zip] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "Everything as zip" }).click()]);
+    const packed = namesIn(await zip.path());
+    assert.match(packed, /\.dcm/);
+    assert.doesNotMatch(packed, /left_out/);
     await page.goto(`${address}/#/`);
     await page.waitForFunction(() => /Phantom Fritz/.test(document.querySelector(".scans")?.textContent ?? ""));
     assert.deepEqual(faults, []);

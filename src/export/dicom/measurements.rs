@@ -3,9 +3,10 @@
 //!
 //! One measurement group holds what was measured of the whole structure ([`FIGURES`]). It is a
 //! group of TID 1411 that refers to the segment of `mask.dcm`, or of TID 1501 where the source is no
-//! DICOM image that the template could name. For a ventricle the apparent and the anatomical wall
-//! have a group of TID 1501 each ([`WALLS`]), and so has each of the 17 segments of the heart
-//! association ([`WALL_SEGMENTS`]). A figure that the report lacks is left out.
+//! DICOM image that the template could name. For a ventricle the cavity, and the apparent and the anatomical
+//! wall and cavity have a group of TID 1501 each ([`PARTS`]), and so has each of the 17 segments of the heart
+//! association ([`WALL_SEGMENTS`]): readers of the template look at the group for where and how a figure was
+//! measured, not at the figure. A figure that the report lacks is left out.
 
 use super::codes::{CAVITY, Code, MILLIMETRE, OWN_SCHEME, dcm, own, sct, ucum};
 use super::data_set::{DataSet, reference};
@@ -20,8 +21,6 @@ struct Figure {
     pointer: &'static str,
     concept: Code,
     unit: Code,
-    /// Where it was measured, if not in the whole structure.
-    site: Option<Code>,
     /// How it was derived from the single values.
     derivation: Option<Code>,
 }
@@ -46,19 +45,11 @@ const fn figure(pointer: &'static str, concept: Code, unit: Code) -> Figure {
         pointer,
         concept,
         unit,
-        site: None,
         derivation: None,
     }
 }
 
 impl Figure {
-    const fn of(self, site: Code) -> Self {
-        Self {
-            site: Some(site),
-            ..self
-        }
-    }
-
     const fn mean(self) -> Self {
         Self {
             derivation: Some(MEAN),
@@ -70,7 +61,6 @@ impl Figure {
 /// What is measured of the whole structure. A new figure of the report is a new line here.
 const FIGURES: &[Figure] = &[
     figure("/volumes_ml/wall", VOLUME, MILLILITRE),
-    figure("/volumes_ml/cavity", VOLUME, MILLILITRE).of(CAVITY),
     figure("/mass_g", MASS, GRAM),
     figure("/wall_thickness_mm", THICKNESS, MILLIMETRE).mean(),
     figure("/polar/extent_percent", DEFECT, PERCENT),
@@ -96,32 +86,56 @@ const FIGURES: &[Figure] = &[
     ),
 ];
 
-/// One of the two walls that a fit of a ventricle gives, and what is measured of it.
-struct Wall {
+/// A part of a ventricle that has volumes of its own, and what is measured of it.
+struct Part {
     /// What it is called, after the name of the structure.
     name: &'static str,
-    method: Code,
-    figures: [Figure; 3],
+    /// How it was measured, if in several ways.
+    method: Option<Code>,
+    /// Where it was measured, if not in the whole structure.
+    site: Option<Code>,
+    figures: &'static [Figure],
 }
 
-const WALLS: [Wall; 2] = [
-    Wall {
+const APPARENT: Code = own("APPARENT", "Wall with the blur of the image");
+const ANATOMICAL: Code = own("ANATOMICAL", "Wall without the blur of the image");
+
+const PARTS: [Part; 5] = [
+    Part {
+        name: "cavity",
+        method: None,
+        site: Some(CAVITY),
+        figures: &[figure("/volumes_ml/cavity", VOLUME, MILLILITRE)],
+    },
+    Part {
         name: "apparent wall",
-        method: own("APPARENT", "Wall with the blur of the image"),
-        figures: [
+        method: Some(APPARENT),
+        site: None,
+        figures: &[
             figure("/volumes_ml/apparent/wall", VOLUME, MILLILITRE),
-            figure("/volumes_ml/apparent/cavity", VOLUME, MILLILITRE).of(CAVITY),
             figure("/thickness_mm/apparent/mean", THICKNESS, MILLIMETRE).mean(),
         ],
     },
-    Wall {
+    Part {
+        name: "apparent cavity",
+        method: Some(APPARENT),
+        site: Some(CAVITY),
+        figures: &[figure("/volumes_ml/apparent/cavity", VOLUME, MILLILITRE)],
+    },
+    Part {
         name: "anatomical wall",
-        method: own("ANATOMICAL", "Wall without the blur of the image"),
-        figures: [
+        method: Some(ANATOMICAL),
+        site: None,
+        figures: &[
             figure("/volumes_ml/anatomical/wall", VOLUME, MILLILITRE),
-            figure("/volumes_ml/anatomical/cavity", VOLUME, MILLILITRE).of(CAVITY),
             figure("/thickness_mm/anatomical/mean", THICKNESS, MILLIMETRE).mean(),
         ],
+    },
+    Part {
+        name: "anatomical cavity",
+        method: Some(ANATOMICAL),
+        site: Some(CAVITY),
+        figures: &[figure("/volumes_ml/anatomical/cavity", VOLUME, MILLILITRE)],
     },
 ];
 
@@ -238,7 +252,7 @@ fn image_library(results: &DicomResults<'_>) -> Option<DataSet> {
 
 fn groups(results: &DicomResults<'_>) -> Vec<DataSet> {
     let mut groups = vec![whole(results)];
-    groups.extend(WALLS.iter().filter_map(|wall| of_wall(results, wall)));
+    groups.extend(PARTS.iter().filter_map(|part| of_part(results, part)));
     let segments = results.report.pointer("/polar/segments");
     for segment in segments.and_then(Value::as_array).into_iter().flatten() {
         let number = segment["number"].as_u64().unwrap_or(0) as usize;
@@ -296,24 +310,23 @@ fn whole(results: &DicomResults<'_>) -> DataSet {
     group(if images.is_some() { "1411" } else { "1501" }, content)
 }
 
-/// The group of one wall; `None` where the report tells nothing of it. How it was measured is said of
-/// the group, where readers of the template look for it, and not of each figure.
-fn of_wall(results: &DicomResults<'_>, wall: &Wall) -> Option<DataSet> {
-    let figures = measured(results.report, &wall.figures);
+/// The group of one part; `None` where the report tells nothing of it.
+fn of_part(results: &DicomResults<'_>, part: &Part) -> Option<DataSet> {
+    let figures = measured(results.report, part.figures);
     if figures.is_empty() {
         return None;
     }
     let structure = results.structure;
-    let name = format!("{}, {}", structure.label, wall.name);
-    let mut content = tracking(&name, &results.uids.uid(wall.name));
+    let name = format!("{}, {}", structure.label, part.name);
+    let mut content = tracking(&name, &results.uids.uid(part.name));
     let finding = dcm("121071", "Finding");
     content.push(concept("CONTAINS", finding, structure.kind));
-    content.push(concept(
-        "HAS CONCEPT MOD",
-        sct("370129005", "Measurement Method"),
-        wall.method,
-    ));
-    content.push(finding_site(structure.site));
+    let method = sct("370129005", "Measurement Method");
+    content.extend(
+        part.method
+            .map(|code| concept("HAS CONCEPT MOD", method, code)),
+    );
+    content.push(finding_site(part.site.unwrap_or(structure.site)));
     content.extend(figures);
     Some(group("1501", content))
 }
@@ -334,14 +347,12 @@ fn measured(report: &Value, figures: &[Figure]) -> Vec<DataSet> {
         value.code(tags::MEASUREMENT_UNITS_CODE_SEQUENCE, figure.unit);
         let mut item = item("CONTAINS", "NUM", Some(figure.concept));
         item.item(tags::MEASURED_VALUE_SEQUENCE, value);
-        let site = figure.site.map(finding_site);
-        let modifier = |name: Code, code: Option<Code>| {
-            code.map(|code| concept("HAS CONCEPT MOD", name, code))
-        };
-        let derivation = modifier(dcm("121401", "Derivation"), figure.derivation);
-        let modifiers: Vec<DataSet> = [derivation, site].into_iter().flatten().collect();
-        if !modifiers.is_empty() {
-            item.items(tags::CONTENT_SEQUENCE, modifiers);
+        if let Some(code) = figure.derivation {
+            let derivation = dcm("121401", "Derivation");
+            item.item(
+                tags::CONTENT_SEQUENCE,
+                concept("HAS CONCEPT MOD", derivation, code),
+            );
         }
         Some(item)
     };
