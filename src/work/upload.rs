@@ -4,15 +4,12 @@ use super::files::volume_files;
 use super::problems::Explain;
 use super::{profile, template};
 use crate::jobs::{Failure, Fault, LocalFile, ScanFields, StoreError, StoredVolume, WorkOutput};
+use crate::mesh_files::MeshStatement;
 use crate::progress::Monitor;
 use crate::volume::nifti::{self, StoredType};
 use crate::volume::{self, ReadLimits, ReadOptions, VolumeFile};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-
-/// Largest mesh of a template: a model to be fitted has at most 5000 points of about 200 bytes, and as many
-/// bytes of triangles.
-pub const TEMPLATE_BYTES: u64 = 4 << 20;
 
 /// Most memory that [`UploadReader::inspect`] takes, bytes: that of the largest DICOM Segmentation. The
 /// largest JPEG 2000 frame takes 40 MiB. A gzipped file of 16 MiB is unpacked in memory if it holds at
@@ -72,12 +69,17 @@ pub trait UploadReader: Send + Sync + 'static {
         monitor: &Monitor<'_>,
     ) -> Result<Vec<u8>, Failure>;
 
-    /// Reads and validates a JSON mesh that is to serve as a template of `organ`. Returns its main
-    /// figures and every download.
+    /// Reads and validates a mesh that is to serve as a template of `organ`; `stated` is what the caller says of its unit
+    /// and frame. Returns its main figures and every download.
     ///
     /// # Errors
     /// Why the mesh cannot be fitted.
-    fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure>;
+    fn template(
+        &self,
+        mesh: &[u8],
+        organ: &str,
+        stated: &MeshStatement,
+    ) -> Result<WorkOutput, Failure>;
 
     /// Whether a stored file holds voxels, where they lie and nothing else, so that it cannot name a patient.
     ///
@@ -222,8 +224,13 @@ impl UploadReader for DomainReader {
         })
     }
 
-    fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure> {
-        template::make(mesh, organ)
+    fn template(
+        &self,
+        mesh: &[u8],
+        organ: &str,
+        stated: &MeshStatement,
+    ) -> Result<WorkOutput, Failure> {
+        template::make(mesh, organ, stated)
     }
 
     fn is_bare(&self, file: &LocalFile, monitor: &Monitor<'_>) -> Result<bool, Failure> {

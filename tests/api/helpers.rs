@@ -22,6 +22,7 @@ use ventriform::jobs::{
 };
 use ventriform::mesh::TriMesh;
 use ventriform::mesh::shapes::icosphere;
+use ventriform::mesh_files::MeshStatement;
 use ventriform::progress::{Monitor, Plan, Stage};
 use ventriform::store::{open_database, open_rows};
 use ventriform::volume::ReadLimits;
@@ -391,8 +392,13 @@ impl UploadReader for FakeReader {
         }
     }
 
-    fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure> {
-        self.0.template(mesh, organ)
+    fn template(
+        &self,
+        mesh: &[u8],
+        organ: &str,
+        stated: &MeshStatement,
+    ) -> Result<WorkOutput, Failure> {
+        self.0.template(mesh, organ, stated)
     }
 
     fn is_bare(&self, file: &LocalFile, _: &Monitor<'_>) -> Result<bool, Failure> {

@@ -39,7 +39,7 @@ fn cavity([i, j, k]: [usize; 3]) -> bool {
 fn named(label: &str) -> MaskChoice {
     MaskChoice {
         label: Some(label.parse().unwrap()),
-        resample: false,
+        ..MaskChoice::default()
     }
 }
 
@@ -213,6 +213,7 @@ fn one_lattice_in_any_storage_gives_the_same_voxels() {
                     mask,
                     frame: VoxelToPatient::new(Matrix3::from_columns(&steps), origin).unwrap(),
                     structure: None,
+                    surface: None,
                 };
                 assert_eq!(centres(&turned), centres(&original));
                 let placed = turned.on(grid, false, &silent).unwrap();
@@ -290,6 +291,7 @@ fn other_lattices_are_refused_with_both_geometries_or_resampled() {
         )
         .unwrap(),
         structure: None,
+        surface: None,
     };
     assert!(fine.on((SHAPE, &original.frame), false, &silent).is_err());
     let placed = fine.on((SHAPE, &original.frame), true, &silent).unwrap();
@@ -313,6 +315,7 @@ fn a_swapped_cube_is_compared_by_its_voxels() {
         mask: half(0),
         frame: VoxelToPatient::new(swapped, cube.to_patient(&Vec3::zeros())).unwrap(),
         structure: None,
+        surface: None,
     };
     let placed = given
         .on(([9; 3], &cube), false, &Monitor::silent())
