@@ -8,7 +8,9 @@ use super::openapi::{self, LookupProblems, UploadProblems};
 use super::problem::not_found::field_names_nothing;
 use super::problem::{Answer, Problem, ProblemBody};
 use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody, refuse_when_full};
-use super::request::{PathSegments, bytes_of, merge_patch, query_pairs, refuse_unknown, unknown};
+use super::request::{
+    PathSegments, bytes_of, merge_patch, query_pairs, refuse_unknown, unknown, word,
+};
 use super::wire::{added, path_of, rfc3339};
 use crate::config::Size;
 use crate::jobs::{ProductRoom, Resource, TemplateSource, Tenant, check_name};
@@ -258,25 +260,6 @@ pub async fn update_template(
     }
     let template = find::<Templates>(&app, tenant, &id).await?;
     Ok(Json(Presented::of(&app, template).into()))
-}
-
-/// The value that `text` names, if it is given.
-fn word<T>(
-    text: Option<&str>,
-    field: &str,
-    named: impl Fn(&str) -> Option<T>,
-    known: &str,
-) -> Answer<Option<T>> {
-    let Some(text) = text else {
-        return Ok(None);
-    };
-    named(text).map(Some).ok_or_else(|| {
-        Problem::bad_request("invalid-parameter", format!("`{field}` must be {known}."))
-            .at(field)
-            .fix(format!(
-                "Give {known}, or leave it out if the file says it."
-            ))
-    })
 }
 
 /// The setting that [`TemplateBody`] shows.

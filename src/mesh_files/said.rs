@@ -53,10 +53,10 @@ impl Said {
     /// [`MeshFileError::UnknownWord`] for another word, [`MeshFileError::Contradiction`] if an earlier comment
     /// said otherwise.
     pub fn hear(&mut self, comment: &[u8]) -> Result<(), MeshFileError> {
-        if let Some(word) = after(comment, b"SPACE=") {
+        for word in after(comment, b"SPACE=") {
             self.frame("SPACE", word)?;
         }
-        if let Some(word) = after(comment, b"UNIT=") {
+        for word in after(comment, b"UNIT=") {
             self.unit("UNIT", word)?;
         }
         Ok(())
@@ -99,11 +99,14 @@ fn unknown(field: &'static str, word: &[u8], known: &'static str) -> MeshFileErr
     }
 }
 
-/// The word after `key`, up to white space or punctuation.
-fn after<'a>(comment: &'a [u8], key: &[u8]) -> Option<&'a [u8]> {
-    let at = comment.windows(key.len()).position(|w| w == key)?;
-    let rest = &comment[at + key.len()..];
-    let word = |b: &u8| b.is_ascii_alphanumeric() || *b == b'-' || *b == b'_';
-    let end = rest.iter().position(|b| !word(b)).unwrap_or(rest.len());
-    Some(&rest[..end])
+/// The words after `key`, each up to white space or punctuation.
+fn after<'a>(comment: &'a [u8], key: &'static [u8]) -> impl Iterator<Item = &'a [u8]> {
+    let places = comment.windows(key.len()).enumerate();
+    let places = places.filter(move |(_, seen)| *seen == key);
+    places.map(move |(at, _)| {
+        let rest = &comment[at + key.len()..];
+        let word = |b: &u8| b.is_ascii_alphanumeric() || *b == b'-' || *b == b'_';
+        let end = rest.iter().position(|b| !word(b)).unwrap_or(rest.len());
+        &rest[..end]
+    })
 }

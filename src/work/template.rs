@@ -9,7 +9,7 @@ use crate::jobs::{Failure, OutputFile, WorkOutput};
 use crate::mesh_files::{self, MeshStatement};
 use crate::model::{Organ, Template, wall_parts};
 use crate::progress::Monitor;
-use serde_json::{Value, json};
+use serde_json::json;
 
 /// Largest mesh of a template: a model to be fitted has at most 5000 points of about 200 bytes, and as many
 /// bytes of triangles.
@@ -45,15 +45,13 @@ pub(super) fn make(
         .map(|format| mesh_file(format, &template.mesh, &metadata))
         .collect::<Result<_, _>>()
         .map_err(|error| unsuitable_mesh(&error))?;
-    let mut summary: Vec<(&str, Value)> = vec![
+    let summary = [
         ("vertices", json!(template.mesh.vertices.len())),
         ("triangles", json!(template.mesh.triangles.len())),
         ("volume_ml", json!(template.mesh.volume() / 1000.0)),
         ("length_mm", json!(template.cup.map(|cup| cup.length))),
+        ("warnings", json!(notes)),
     ];
-    if !notes.is_empty() {
-        summary.push(("warnings", json!(notes)));
-    }
     Ok(WorkOutput {
         summary: (summary.into_iter())
             .map(|(name, figure)| (name.to_owned(), figure))

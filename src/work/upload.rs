@@ -6,8 +6,9 @@ use super::{profile, template};
 use crate::jobs::{Failure, Fault, LocalFile, ScanFields, StoreError, StoredVolume, WorkOutput};
 use crate::mesh_files::MeshStatement;
 use crate::progress::Monitor;
+use crate::volume::given_mask::{MaskChoice, read_mask};
 use crate::volume::nifti::{self, StoredType};
-use crate::volume::{self, ReadLimits, ReadOptions, VolumeFile};
+use crate::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -66,6 +67,17 @@ pub trait UploadReader: Send + Sync + 'static {
         &self,
         files: &[LocalFile],
         frame: Option<usize>,
+        monitor: &Monitor<'_>,
+    ) -> Result<Vec<u8>, Failure>;
+
+    /// The structure that `choice` names in an expert's mask, as a `.nii.gz` file: 1 inside, 0 outside.
+    ///
+    /// # Errors
+    /// As [`UploadReader::inspect`], or why the structure cannot be told.
+    fn mask(
+        &self,
+        files: &[LocalFile],
+        choice: &MaskChoice,
         monitor: &Monitor<'_>,
     ) -> Result<Vec<u8>, Failure>;
 
@@ -218,10 +230,18 @@ impl UploadReader for DomainReader {
         let options = ReadOptions { frame };
         let reading = volume::read(&volume_files(files), &options, &self.limits, monitor)
             .map_err(|error| error.explain())?;
-        nifti::write(&reading.volume, StoredType::Int16, true).map_err(|error| {
-            Failure::new(Fault::Content, "axis-too-long", error.to_string())
-                .fix("Download the upload itself instead.")
-        })
+        packed(&reading.volume)
+    }
+
+    fn mask(
+        &self,
+        files: &[LocalFile],
+        choice: &MaskChoice,
+        monitor: &Monitor<'_>,
+    ) -> Result<Vec<u8>, Failure> {
+        let mask = read_mask(&volume_files(files), choice, &self.limits, monitor)
+            .map_err(|error| error.explain())?;
+        packed(&mask.to_volume())
     }
 
     fn template(
@@ -241,4 +261,12 @@ impl UploadReader for DomainReader {
     fn profile(&self, profile: &[u8]) -> Result<WorkOutput, Failure> {
         profile::make(profile)
     }
+}
+
+/// The voxels as a packed file of 16-bit integers.
+fn packed(volume: &Volume) -> Result<Vec<u8>, Failure> {
+    nifti::write(volume, StoredType::Int16, true).map_err(|error| {
+        Failure::new(Fault::Content, "axis-too-long", error.to_string())
+            .fix("Download the upload itself instead.")
+    })
 }

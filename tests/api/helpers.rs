@@ -26,6 +26,7 @@ use ventriform::mesh_files::MeshStatement;
 use ventriform::progress::{Monitor, Plan, Stage};
 use ventriform::store::{open_database, open_rows};
 use ventriform::volume::ReadLimits;
+use ventriform::volume::given_mask::MaskChoice;
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
 use ventriform::work::{Engine, IntensityFacts, UploadFacts, UploadReader};
@@ -390,6 +391,15 @@ impl UploadReader for FakeReader {
                 Err(Failure::new(Fault::Request, "frame-out-of-range", "one frame").at("frame"))
             }
         }
+    }
+
+    fn mask(
+        &self,
+        files: &[LocalFile],
+        _: &MaskChoice,
+        monitor: &Monitor<'_>,
+    ) -> Result<Vec<u8>, Failure> {
+        self.voxels(files, None, monitor)
     }
 
     fn template(

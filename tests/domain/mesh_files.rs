@@ -626,9 +626,13 @@ fn ras_comes_to_lps_whoever_states_it() {
         );
     }
     for strange in ["SPACE=LAS", "SPACE=", "UNIT=inch"] {
-        let refused = refusal(&obj(&format!("SPACE=LPS {strange}"), false)).to_string();
-        let first = refusal(&ply_text(strange)).to_string();
-        assert!(first.contains("are known"), "{first} {refused}");
+        for bytes in [
+            obj(&format!("SPACE=LPS {strange}"), false),
+            ply_text(strange),
+        ] {
+            let refused = refusal(&bytes).to_string();
+            assert!(refused.contains("are known"), "{refused}");
+        }
     }
 }
 

@@ -308,8 +308,24 @@ fn folders_are_bounded_and_links_are_not_followed() {
         assert_eq!(files.len(), 1);
         assert!(read_files(&files).is_ok());
     }
-    let limits = ReadLimits::default();
-    assert!(limits.unpacked_bytes > 0);
+    let limited = |files, folder_levels| ReadLimits {
+        files,
+        folder_levels,
+        ..ReadLimits::DEFAULT
+    };
+    let given = |limits| VolumeFile::given(&[deep.path()], &limits);
+    assert!(matches!(
+        given(limited(16, 18)),
+        Err(VolumeError::TooLarge {
+            what: "files",
+            limit: 16,
+            ..
+        })
+    ));
+    assert!(matches!(
+        given(limited(17, 18)),
+        Err(VolumeError::Empty { .. })
+    ));
 }
 
 #[test]
