@@ -272,7 +272,8 @@ impl Explain for GivenMaskError {
             GivenMaskError::Elsewhere { .. } | GivenMaskError::TooFarApart { .. } => (
                 (Fault::Content, "mask-elsewhere"),
                 None,
-                "Give a mask of the same scan whose header places it correctly in the patient."
+                "Give a mask of the same scan whose header places it correctly in the patient; of a mesh, state its frame \
+                 by `mesh_frame` (lps or ras)."
                     .into(),
             ),
             GivenMaskError::Cancelled(_) => (CANCELLED, None, START_AGAIN.into()),
