@@ -6,7 +6,7 @@
 #
 # scripts/check_dicom.py writes NM files of one simulated scan (both signs of Spacing Between Slices, oblique,
 # gated), segments them and reads the objects with pydicom, highdicom and dcmqi. dciodvfy (dicom3tools) checks
-# every object, dcmdump (dcmtk) reads it. Exits with 1 if anything is wrong.
+# every object, dcmdump (dcmtk) reads it. scripts/check_names.py compares every character set with pydicom. Exits with 1 if anything is wrong.
 #
 # PYTHON: an interpreter that has numpy, nibabel, pydicom, highdicom and dcmqi. Without it the script installs
 # them under target/. Debian packages that are missing are installed.
@@ -25,6 +25,7 @@ python_with "nibabel, highdicom"
 
 target/debug/ventriform phantom -o "$out/phantom" --size 64 --spacing 6.4 --seed 2 2>/dev/null
 "$PYTHON" scripts/check_dicom.py target/debug/ventriform "$out" "$@"
+"$PYTHON" scripts/check_names.py target/debug/ventriform "$out/names"
 
 wrong=0
 for file in "$out"/*/out/*.dcm; do

@@ -7,7 +7,8 @@
 # For every NAME.json in a folder, Khronos' glTF validator, trimesh and VTK read
 # NAME.{glb,gltf,stl,ply,obj,vtp,vtk} and the result is compared with NAME.json: the mesh, the figures of
 # its vertices and the parts of its triangles. SimpleITK, nibabel and pynrrd must find mask and labels of the fit where the
-# scan is (scripts/check_masks.py). Prints the number of files that passed and failed; exits with 1 if any failed.
+# scan is (scripts/check_masks.py). Meshes that trimesh and VTK write in every way must be the masks they enclose
+# (scripts/check_meshes.py). Prints the number of files that passed and failed; exits with 1 if any failed.
 #
 # PROGRAM: the program that makes fit and model (default: target/debug/ventriform).
 # PYTHON: an interpreter that has nibabel, numpy, pynrrd, SimpleITK, trimesh and vtk. NODE_PATH: a folder that has gltf-validator.
@@ -47,6 +48,7 @@ fi
 status=0
 if [ -n "${made:-}" ]; then
     "$PYTHON" "$root/scripts/check_masks.py" "$program" "$tools/masks" || status=1
+    "$PYTHON" "$root/scripts/check_meshes.py" "$program" "$made/fit" "$tools/meshes" || status=1
 fi
 for folder; do
     node "$root/scripts/check_formats.js" "$folder" || status=1

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs the fuzzers of fuzz/ with libFuzzer and the address sanitiser, one after the other, on one core.
 #
-#   scripts/fuzz.sh [SECONDS] [TARGET...]     60 seconds each of nifti, dicom, parameters, multipart and association
+#   scripts/fuzz.sh [SECONDS] [TARGET...]     60 seconds each of nifti, dicom, mesh, parameters, multipart and association
 #
 # Needs cargo-fuzz's compiler flags, which only a nightly compiler takes; RUSTC_BOOTSTRAP=1 makes the stable one
 # take them. New inputs go to fuzz/corpus/, inputs that fail to fuzz/artifacts/; neither is committed.
@@ -10,7 +10,7 @@ cd "$(dirname "$0")/../fuzz"
 seconds=${1:-60}
 shift || true
 targets=("$@")
-[ ${#targets[@]} -gt 0 ] || targets=(nifti dicom parameters multipart association)
+[ ${#targets[@]} -gt 0 ] || targets=(nifti dicom mesh parameters multipart association)
 host=$(rustc -vV | sed -n 's/^host: //p')
 features=()
 case " ${targets[*]} " in *" multipart "* | *" association "*) features=(--features service) ;; esac

@@ -105,6 +105,7 @@ pub mod geometry;
 pub mod numeric;
 
 pub mod mesh;
+pub mod mesh_files;
 
 pub mod progress;
 

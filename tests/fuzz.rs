@@ -105,6 +105,11 @@ fn damaged_dicom_files_never_panic() {
 }
 
 #[test]
+fn damaged_meshes_never_panic() {
+    drive("mesh", 20_000, targets::mesh);
+}
+
+#[test]
 fn damaged_parameters_never_panic() {
     drive("parameters", 20_000, targets::parameters);
 }

@@ -6,7 +6,7 @@
 #[path = "targets.rs"]
 mod targets;
 
-pub use targets::{corpus, dicom, nifti, parameters};
+pub use targets::{corpus, dicom, mesh, nifti, parameters};
 
 #[cfg(feature = "service")]
 #[path = "service.rs"]

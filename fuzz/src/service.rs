@@ -36,6 +36,7 @@ impl Target {
         let limits = ReadLimits {
             voxels: 1 << 16,
             unpacked_bytes: 1 << 20,
+            ..ReadLimits::DEFAULT
         };
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let running = runtime

@@ -1,10 +1,13 @@
 //! Targets that need no service, and the files that damage starts from. All files are made here.
 
 use std::io::Write as _;
+use ventriform::export::{Format, Metadata, encode};
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
+use ventriform::mesh_files::{self, MeshStatement};
 use ventriform::parameters::{FitParameters, ModelParameters, Parameters};
 use ventriform::progress::Monitor;
+use ventriform::volume::given_mask::{MaskChoice, read_mask};
 use ventriform::volume::nifti::{self as nifti_files, StoredType};
 use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
 
@@ -12,6 +15,8 @@ use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
 const LIMITS: ReadLimits = ReadLimits {
     voxels: 1 << 16,
     unpacked_bytes: 1 << 20,
+    mesh_bytes: 1 << 20,
+    ..ReadLimits::DEFAULT
 };
 
 /// Reads the bytes as a NIfTI file; what is read keeps its promises.
@@ -22,6 +27,25 @@ pub fn nifti(data: &[u8]) {
 /// Reads the bytes as a DICOM file; what is read keeps its promises.
 pub fn dicom(data: &[u8]) {
     read("volume.dcm", data);
+}
+
+/// Reads the bytes as a mesh, and as an expert's mask; what is read is a closed surface.
+pub fn mesh(data: &[u8]) {
+    let stated = MeshStatement::default();
+    if let Ok(read) = mesh_files::look(data, &stated, LIMITS.mesh_bytes) {
+        let mesh = &read.mesh;
+        assert!(
+            mesh.vertices
+                .iter()
+                .all(|p| p.iter().all(|x| x.is_finite()))
+        );
+        assert!(mesh.volume() > 0.0);
+    }
+    let files = [VolumeFile::in_memory("mesh", data)];
+    let monitor = Monitor::silent();
+    if let Ok(mask) = read_mask(&files, &MaskChoice::default(), &LIMITS, &monitor) {
+        assert!(mask.mask.voxels.contains(&true));
+    }
 }
 
 fn read(name: &str, data: &[u8]) {
@@ -85,10 +109,51 @@ pub fn corpus(target: &str) -> Vec<Vec<u8>> {
         ]
         .map(|text| text.as_bytes().to_vec())
         .to_vec(),
+        "mesh" => mesh_corpus(),
         "multipart" => multipart_corpus(),
         "association" => association_corpus(),
         other => panic!("no target `{other}`"),
     }
+}
+
+/// A small body in every format that we write, and some that we do not.
+fn mesh_corpus() -> Vec<Vec<u8>> {
+    let mesh = ventriform::mesh::shapes::tetrahedron(40.0);
+    let metadata = Metadata::new("t");
+    let ours = Format::ALL.map(|format| encode(format, &mesh, &metadata).unwrap_or_default());
+    let points = mesh
+        .vertices
+        .iter()
+        .map(|p| format!("{} {} {}\n", p.x, p.y, p.z));
+    let points: String = points.collect();
+    let faces = mesh
+        .triangles
+        .iter()
+        .map(|[a, b, c]| format!("3 {a} {b} {c}\n"));
+    let faces: String = faces.collect();
+    let corners = mesh.triangles.iter().map(|t| {
+        let corner = |v: u32| {
+            let p = mesh.vertices[v as usize];
+            format!("vertex {} {} {}\n", p.x, p.y, p.z)
+        };
+        let corners = t.map(corner).concat();
+        format!("facet normal 0 0 0\nouter loop\n{corners}endloop\nendfacet\n")
+    });
+    let corners: String = corners.collect();
+    let others = [
+        format!("solid t\n{corners}endsolid t\n"),
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+             element face 4\nproperty list uchar int vertex_index\nend_header\n{points}{faces}"
+        ),
+        format!(
+            "# vtk DataFile Version 5.1\nSPACE=RAS\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n{points}POLYGONS 5 12\n\
+             OFFSETS vtktypeint64\n0 3 6 9 12\nCONNECTIVITY vtktypeint64\n{}",
+            faces.replace("3 ", " ")
+        ),
+    ];
+    let others = others.into_iter().map(String::into_bytes);
+    ours.into_iter().chain(others).collect()
 }
 
 /// A PDU or an item of one: type, length, content.

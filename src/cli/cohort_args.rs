@@ -1,5 +1,6 @@
 //! The arguments of the commands that work on a cohort's folder.
 
+use super::mesh_args::MeshArgs;
 use crate::evaluate::{Cohort, CohortError};
 use crate::volume::given_mask::MaskChoice;
 use clap::Args;
@@ -26,6 +27,8 @@ pub struct CohortArgs {
     /// Resample masks that lie on another grid than their scan; without it they are not used
     #[arg(long)]
     resample: bool,
+    #[command(flatten)]
+    mesh: MeshArgs,
 }
 
 impl CohortArgs {
@@ -41,6 +44,7 @@ impl CohortArgs {
                 label
             }),
             resample: self.resample,
+            mesh: self.mesh.into(),
         };
         Ok(cohort)
     }

@@ -80,13 +80,13 @@ impl DicomArgs {
         &self,
         files: &[VolumeFile],
         frame: Option<usize>,
+        limits: &ReadLimits,
     ) -> Result<Option<DicomOrder>> {
         if !self.dicom {
             return Ok(None);
         }
         let stated = self.stated();
-        let limits = ReadLimits::default();
-        let found = volume::provenance(files, &ReadOptions { frame }, &limits, &Monitor::silent())
+        let found = volume::provenance(files, &ReadOptions { frame }, limits, &Monitor::silent())
             .map_err(|error| anyhow!(error.with_advice()))?;
         // The new identity of a DICOM scan is not meant to be the one in its file.
         let known = match self.deidentify && found.is_some() {
@@ -125,12 +125,13 @@ impl DicomArgs {
         &self,
         files: &[VolumeFile],
         frame: Option<usize>,
+        limits: &ReadLimits,
     ) -> Result<Option<Provenance>> {
         if self.deidentify {
             return Ok(None);
         }
-        let (options, limits) = (ReadOptions { frame }, ReadLimits::default());
-        let found = volume::provenance(files, &options, &limits, &Monitor::silent())
+        let options = ReadOptions { frame };
+        let found = volume::provenance(files, &options, limits, &Monitor::silent())
             .map_err(|error| anyhow!(error.with_advice()))?;
         let stated = self.stated();
         Ok(identity(found.as_ref(), &stated).ok().or(found))

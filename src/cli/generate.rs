@@ -1,5 +1,6 @@
 //! `ventriform generate`: a surface model from a volume.
 
+use super::limit_args::LimitArgs;
 use super::output::{note, write_file};
 use super::volume_args::volume_files;
 use super::{Bar, ModelArgs};
@@ -9,7 +10,7 @@ use crate::pipeline::{self, Model};
 use crate::progress::{CancelToken, Monitor};
 use crate::report::{MeasuredSurface, ModelReport};
 use crate::volume::dicom::Provenance;
-use crate::volume::{self, ReadLimits, ReadOptions};
+use crate::volume::{self, ReadOptions};
 use crate::work::problems::Explain;
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -46,6 +47,8 @@ pub struct GenerateArgs {
     quiet: bool,
     #[command(flatten)]
     model: ModelArgs,
+    #[command(flatten)]
+    limits: LimitArgs,
 }
 
 /// Runs the command.
@@ -60,10 +63,11 @@ pub fn run(args: &GenerateArgs) -> Result<()> {
         .model
         .parameters()
         .map_err(|error| anyhow::anyhow!(error.with_advice()))?;
-    let files = volume_files(&args.input)?;
+    let limits = args.limits.limits()?;
+    let files = volume_files(&args.input, &limits)?;
     let bar = Bar::start();
     let monitor = Monitor::new(&bar, CancelToken::new());
-    let made = pipeline::generate(&files, &parameters, &ReadLimits::default(), &monitor);
+    let made = pipeline::generate(&files, &parameters, &limits, &monitor);
     bar.finish();
     let model = made.map_err(|error| anyhow::anyhow!(error.with_advice()))?;
     let surface = model.measured_surface();
@@ -85,7 +89,7 @@ pub fn run(args: &GenerateArgs) -> Result<()> {
         frame: parameters.frame,
     };
     let whose = match args.deidentify {
-        false => volume::provenance(&files, &options, &ReadLimits::default(), &monitor)?,
+        false => volume::provenance(&files, &options, &limits, &monitor)?,
         true => None,
     };
     for path in &args.report {

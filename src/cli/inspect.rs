@@ -1,10 +1,11 @@
 //! `ventriform inspect`: what a file says about itself.
 
+use super::limit_args::LimitArgs;
 use super::output::json;
 use super::volume_args::volume_files;
 use crate::progress::Monitor;
 use crate::report;
-use crate::volume::{self, ReadLimits, ReadOptions};
+use crate::volume::{self, ReadOptions};
 use crate::work::problems::Explain;
 use anyhow::Result;
 use clap::Args;
@@ -22,6 +23,8 @@ pub struct InspectArgs {
     /// series, or a zip or folder of them)
     #[arg(value_name = "IN", required = true, num_args = 1..)]
     input: Vec<PathBuf>,
+    #[command(flatten)]
+    limits: LimitArgs,
 }
 
 /// Runs the command.
@@ -29,8 +32,8 @@ pub struct InspectArgs {
 /// # Errors
 /// If the volume cannot be read.
 pub fn run(args: &InspectArgs) -> Result<()> {
-    let files = volume_files(&args.input)?;
-    let (limits, monitor) = (ReadLimits::default(), Monitor::silent());
+    let (limits, monitor) = (args.limits.limits()?, Monitor::silent());
+    let files = volume_files(&args.input, &limits)?;
     let facts = volume::inspect(&files, &limits, &monitor);
     let facts = facts.map_err(|error| anyhow::anyhow!(error.with_advice()))?;
     let first = ReadOptions { frame: Some(0) };

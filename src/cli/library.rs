@@ -1,5 +1,6 @@
 //! `ventriform templates import`: adds models to the library in a service's data folder.
 
+use super::mesh_args::{MeshArgs, mesh_bytes};
 use super::output::say;
 use super::serve::settings_beside;
 use crate::config::{DatabaseUrl, Settings};
@@ -9,9 +10,8 @@ use crate::jobs::{
 use crate::store::{Store, StoreSettings};
 use crate::volume::ReadLimits;
 use crate::work::{Engine, TEMPLATE_BYTES};
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, anyhow};
 use clap::Args;
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tokio::runtime::Runtime;
@@ -25,8 +25,8 @@ While the service runs, send the models to it instead:
   curl --data-binary @templates/t1_150.json -H 'content-type: application/json' \\
        'http://127.0.0.1:8080/v1/templates?name=t1_150'")]
 pub struct ImportArgs {
-    /// JSON meshes written by `templates build` or `generate`; a file's name becomes the
-    /// template's name
+    /// Closed meshes: JSON as `templates build` or `generate` write it, STL, PLY, OBJ, VTK, VTP or glTF; a
+    /// file's name becomes the template's name
     #[arg(value_name = "MODEL", required = true)]
     models: Vec<PathBuf>,
     /// Data folder of the service (created if missing)
@@ -43,6 +43,8 @@ pub struct ImportArgs {
     /// Organ that the models show: left_ventricle, liver, kidney or generic
     #[arg(long, value_name = "WORD", default_value = "left_ventricle")]
     organ: String,
+    #[command(flatten)]
+    mesh: MeshArgs,
 }
 
 /// Runs the command.
@@ -90,10 +92,10 @@ async fn add(
     room: ProductRoom,
 ) -> Result<String> {
     let organ = &args.organ;
-    let mesh = read_mesh(path)?;
+    let mesh = mesh_bytes(path, TEMPLATE_BYTES)?;
     let output = engine
         .reader
-        .template(&mesh, organ)
+        .template(&mesh, organ, &args.mesh.into())
         .map_err(|failure| refused(&failure))?;
     let name = name(path);
     let source = TemplateSource {
@@ -114,18 +116,6 @@ async fn add(
 
 fn refused(failure: &Failure) -> anyhow::Error {
     anyhow!("{failure} {}", failure.fix.clone().unwrap_or_default())
-}
-
-/// The bytes of a mesh that is no larger than `POST /v1/templates` takes.
-fn read_mesh(path: &Path) -> Result<Vec<u8>> {
-    let mut mesh = Vec::new();
-    let file = std::fs::File::open(path)?;
-    file.take(TEMPLATE_BYTES + 1).read_to_end(&mut mesh)?;
-    ensure!(
-        mesh.len() as u64 <= TEMPLATE_BYTES,
-        "the file has more than the {TEMPLATE_BYTES} bytes that a model may have. Give one of fewer points."
-    );
-    Ok(mesh)
 }
 
 fn name(path: &Path) -> String {

@@ -1,14 +1,18 @@
 //! `ventriform measure`: the agreement of two masks.
 
+use super::limit_args::LimitArgs;
+use super::mesh_args::MeshArgs;
 use super::output::{json, note};
 use crate::grid::agreement::compare;
+use crate::mesh_files::{MeshFileError, MeshStatement};
 use crate::progress::Monitor;
 use crate::segmentation::agreement_json;
 use crate::volume::given_mask::{GivenMask, GivenMaskError, MaskChoice, MaskLabel, read_mask};
-use crate::volume::{ReadLimits, VolumeFile};
+use crate::volume::{VolumeError, VolumeFile};
 use crate::work::problems::Explain;
 use anyhow::{Result, anyhow};
 use clap::Args;
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
 
 /// Compare two masks: Jaccard E_J, mean contour distance E_CD, Dice, Hausdorff
@@ -19,7 +23,8 @@ use std::path::{Path, PathBuf};
   ventriform measure out/mask.nii.gz seg.dcm --label-b 'Left ventricle' --resample
 Prints JSON. A mask is a volume of 0 and another value, a label map, a DICOM Segmentation, or
 probabilities of which those above 0.5 count. Of several structures one must be named, unless it is
-the only segment coded as myocardium. Masks of one lattice of voxels are compared however they are
+the only segment coded as myocardium. A closed mesh (STL, PLY, OBJ, VTK, VTP, glTF, JSON) is a mask, too:
+its inside, voxelised on the grid of the other. Masks of one lattice of voxels are compared however they are
 stored; another lattice is refused without --resample.")]
 pub struct MeasureArgs {
     /// Mask to judge
@@ -41,6 +46,10 @@ pub struct MeasureArgs {
     /// Resample B to the grid of A by the nearest voxel if they are different grids
     #[arg(long)]
     resample: bool,
+    #[command(flatten)]
+    mesh: MeshArgs,
+    #[command(flatten)]
+    limits: LimitArgs,
 }
 
 /// Runs the command.
@@ -51,7 +60,7 @@ pub struct MeasureArgs {
 pub fn run(args: &MeasureArgs) -> Result<()> {
     let monitor = Monitor::silent();
     let [a, b] = [(&args.a, &args.label_a), (&args.b, &args.label_b)]
-        .map(|(path, own)| read(path, own.as_deref(), args.label.as_deref()));
+        .map(|(path, own)| read(path, own.as_deref(), args.label.as_deref(), args));
     let (a, b) = (a?, b?);
     if let Some(label) = &args.label
         && [&a, &b].iter().all(|read| !read.by_common_label)
@@ -70,27 +79,34 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
             note!("{}: {structure} was compared", path.display());
         }
     }
-    let in_b = |error: GivenMaskError| anyhow!("{}: {}", args.b.display(), error.with_advice());
+    // A surface has no grid of its own.
+    let turned = a.mask.surface.is_some() && b.mask.surface.is_none();
+    let (holder, carried, path) = match turned {
+        false => (a.mask, b.mask, &args.b),
+        true => (b.mask, a.mask, &args.a),
+    };
+    let refused = |error: GivenMaskError| anyhow!("{}: {}", path.display(), error.with_advice());
     // No voxel of either is lost beyond the other's border.
-    let judged = match b
-        .mask
-        .on((a.mask.mask.shape, &a.mask.frame), true, &monitor)
-    {
-        Ok(placed) if placed.outside == 0 => a.mask,
+    let holder = match carried.on((holder.mask.shape, &holder.frame), true, &monitor) {
+        Ok(placed) if placed.outside == 0 => holder,
         Err(
             error @ (GivenMaskError::Cancelled(_) | GivenMaskError::Elsewhere { inside: 0, .. }),
         ) => {
-            return Err(in_b(error));
+            return Err(refused(error));
         }
-        _ => a.mask.holding(&b.mask, &monitor).map_err(in_b)?,
+        _ => holder.holding(&carried, &monitor).map_err(refused)?,
     };
-    let grid = (judged.mask.shape, &judged.frame);
-    let reference = b.mask.on(grid, args.resample, &monitor).map_err(in_b)?;
-    if reference.resampled {
-        note!("{}: resampled to the grid of A", args.b.display());
+    let grid = (holder.mask.shape, &holder.frame);
+    let placed = carried.on(grid, args.resample, &monitor).map_err(refused)?;
+    if placed.resampled {
+        note!("{}: resampled to the grid of A", path.display());
     }
-    let spacing = judged.frame.spacing();
-    let agreement = compare(&judged.mask, &reference.mask, spacing, &monitor)?;
+    let spacing = holder.frame.spacing();
+    let (judged, reference) = match turned {
+        false => (&holder.mask, &placed.mask),
+        true => (&placed.mask, &holder.mask),
+    };
+    let agreement = compare(judged, reference, spacing, &monitor)?;
     json(&serde_json::to_string_pretty(&agreement_json(&agreement))?);
     Ok(())
 }
@@ -104,8 +120,16 @@ struct ReadMask {
 
 /// Reads the mask at `path`: the structure `own`, otherwise the one that `common` names, otherwise the
 /// only one.
-fn read(path: &Path, own: Option<&str>, common: Option<&str>) -> Result<ReadMask> {
+fn read(
+    path: &Path,
+    own: Option<&str>,
+    common: Option<&str>,
+    args: &MeasureArgs,
+) -> Result<ReadMask> {
     let files = VolumeFile::with_other_half(path);
+    let limits = args.limits.limits()?;
+    // What is stated counts for the file that does not state it.
+    let stated = Cell::new(MeshStatement::from(args.mesh));
     let read = |label: Option<&str>| {
         let label = label.map(|text| {
             let Ok(label) = text.parse::<MaskLabel>();
@@ -114,8 +138,25 @@ fn read(path: &Path, own: Option<&str>, common: Option<&str>) -> Result<ReadMask
         let choice = MaskChoice {
             label,
             resample: false,
+            mesh: stated.get(),
         };
-        read_mask(&files, &choice, &ReadLimits::default(), &Monitor::silent())
+        read_mask(&files, &choice, &limits, &Monitor::silent())
+    };
+    let read = |label: Option<&str>| loop {
+        match read(label) {
+            Err(GivenMaskError::File(VolumeError::Mesh {
+                error: MeshFileError::Contradiction { field, .. },
+                ..
+            })) if stated.get() != MeshStatement::default() => {
+                let mut less = stated.get();
+                match field {
+                    "unit" if less.unit.is_some() => less.unit = None,
+                    _ => less.frame = None,
+                }
+                stated.set(less);
+            }
+            other => return other,
+        }
     };
     let named = read(own.or(common));
     // A file with one structure needs no label for both files.

@@ -2,10 +2,13 @@
 
 use super::dicom_args::DicomArgs;
 use super::generate::parse_part;
+use super::limit_args::LimitArgs;
+use super::mesh_args::read_mesh;
 use super::output::{create_folder, note, write_file};
 use super::volume_args::volume_files;
 use super::{Bar, FitArgs};
-use crate::export::{self, Format, Part};
+use crate::export::{Format, Part};
+use crate::mesh_files::MeshStatement;
 use crate::parameters::FitParameters;
 use crate::progress::{CancelToken, Monitor, Plan};
 use crate::reader::ReaderProfile;
@@ -22,6 +25,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "Examples:
   ventriform segment scan.nii.gz --model lv.json -o out
   ventriform segment scan.dcm --model a.json --model b.json -o out --expert mask.nii.gz
+  ventriform segment scan.nii.gz --model heart.stl --expert drawn.vtp --mesh-frame ras -o out
   ventriform segment scan.nii.gz --model auto -o out --seed-point 60,70,55 --format ply
 Writes mask.nii.gz, labels.nii.gz and labels.seg.nrrd (wall 1, cavity 2), mesh.glb, mesh.stl, mesh.json (or the formats given by --format), report.json,
 report.html, slices.png, region.nii.gz (the scan about the organ, which the report shows) and, for the
@@ -33,14 +37,14 @@ pub struct SegmentArgs {
     /// MR file, all files of one series, or a zip or folder of them)
     #[arg(value_name = "IN", required = true, num_args = 1..)]
     input: Vec<PathBuf>,
-    /// Model to fit: a JSON mesh written by `generate`, or auto for the built-in hearts (repeatable: the
-    /// fit with the greatest confidence is kept)
+    /// Model to fit: a closed mesh (JSON as `generate` writes it, STL, PLY, OBJ, VTK, VTP, glTF), or auto for
+    /// the built-in hearts (repeatable: the fit with the greatest confidence is kept)
     #[arg(long, value_name = "MODEL", required = true)]
     model: Vec<PathBuf>,
     /// Folder to write to (created if missing)
     #[arg(short, long = "output", value_name = "OUTDIR")]
     output: PathBuf,
-    /// Expert's mask to measure the result against
+    /// Expert's mask to measure the result against: a volume, or a closed mesh
     #[arg(long, value_name = "MASK")]
     expert: Option<PathBuf>,
     /// A reader's profile, as `calibrate` writes it: the wall is drawn as that reader would
@@ -61,6 +65,8 @@ pub struct SegmentArgs {
     dicom: DicomArgs,
     #[command(flatten)]
     fit: FitArgs,
+    #[command(flatten)]
+    limits: LimitArgs,
 }
 
 /// The word that stands for the built-in hearts.
@@ -88,21 +94,25 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
         .iter()
         .filter(|m| m.as_os_str() != AUTO)
         .collect();
-    let volume = volume_files(&args.input)?;
-    let dicom = args.dicom.order(&volume, parameters.frame)?;
-    let whose = args.dicom.whose(&volume, parameters.frame)?;
+    let limits = args.limits.limits()?;
+    let volume = volume_files(&args.input, &limits)?;
+    let dicom = args.dicom.order(&volume, parameters.frame, &limits)?;
+    let whose = args.dicom.whose(&volume, parameters.frame, &limits)?;
+    let stated = parameters.mask.mesh;
     let expert = args.expert.as_ref().map(VolumeFile::with_other_half);
     let order = SegmentationOrder {
         volume: &volume,
         expert: expert.as_ref().map(|files| &files[..]),
         auto: named.len() < args.model.len(),
-        models: named.into_iter().map(|m| mesh(m)).collect::<Result<_>>()?,
+        models: (named.into_iter())
+            .map(|path| mesh(path, &stated, &limits))
+            .collect::<Result<_>>()?,
         reader: args.reader.as_deref().map(reader).transpose()?,
         parameters: &parameters,
     };
     let bar = Bar::over(Plan::SEGMENTATION);
     let monitor = Monitor::new(&bar, CancelToken::new());
-    let made = from_files(&order, &ReadLimits::default(), &monitor)
+    let made = from_files(&order, &limits, &monitor)
         .map_err(|error| anyhow!(error.with_advice()))
         .and_then(|made| Ok((made.files(&args.formats, None, &monitor)?, made)));
     bar.finish();
@@ -135,13 +145,11 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
 }
 
 /// Reads a model.
-fn mesh(path: &Path) -> Result<NamedMesh> {
-    let context = || format!("{}", path.display());
-    let bytes = std::fs::read(path).with_context(context)?;
-    let stem = path.file_stem();
+fn mesh(path: &Path, stated: &MeshStatement, limits: &ReadLimits) -> Result<NamedMesh> {
+    let stem = path.file_stem().unwrap_or(path.as_os_str());
     Ok(NamedMesh {
-        name: stem.map_or_else(context, |s| s.to_string_lossy().into_owned()),
-        mesh: export::read_json::decode(&bytes).with_context(context)?,
+        name: stem.to_string_lossy().into_owned(),
+        mesh: read_mesh(path, stated, limits)?,
         required: true,
     })
 }

@@ -165,6 +165,8 @@ fn engine(settings: &Settings) -> Engine {
     let limits = ComputeArgs {
         voxel_limit: settings.voxel_limit,
         unpacked_limit: settings.decompressed_limit.0,
+        file_limit: settings.file_limit,
+        mesh_limit: settings.mesh_limit.0,
     };
     let mut engine = limits.engine();
     if let Some(isolation) = limits.isolation() {
@@ -185,6 +187,12 @@ pub struct ComputeArgs {
     /// Largest volume after decompression, bytes
     #[arg(long)]
     unpacked_limit: u64,
+    /// Largest number of files in a zip archive
+    #[arg(long)]
+    file_limit: u64,
+    /// Largest file of a mesh, unpacked, bytes
+    #[arg(long)]
+    mesh_limit: u64,
 }
 
 impl ComputeArgs {
@@ -192,6 +200,9 @@ impl ComputeArgs {
         Engine::new(ReadLimits {
             voxels: self.voxel_limit,
             unpacked_bytes: self.unpacked_limit,
+            files: self.file_limit,
+            mesh_bytes: self.mesh_limit,
+            ..ReadLimits::DEFAULT
         })
     }
 
@@ -208,6 +219,8 @@ impl ComputeArgs {
             COMPUTE.to_owned(),
             format!("--voxel-limit={}", self.voxel_limit),
             format!("--unpacked-limit={}", self.unpacked_limit),
+            format!("--file-limit={}", self.file_limit),
+            format!("--mesh-limit={}", self.mesh_limit),
         ];
         Some(Isolation {
             program,

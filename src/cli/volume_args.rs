@@ -1,6 +1,6 @@
 //! The files of a volume, as they are named on the command line.
 
-use crate::volume::VolumeFile;
+use crate::volume::{ReadLimits, VolumeFile};
 use crate::work::problems::Explain;
 use anyhow::{Result, anyhow};
 use std::path::PathBuf;
@@ -9,6 +9,6 @@ use std::path::PathBuf;
 ///
 /// # Errors
 /// If a folder cannot be read, or holds no or too many files.
-pub(super) fn volume_files(paths: &[PathBuf]) -> Result<Vec<VolumeFile>> {
-    VolumeFile::given(paths).map_err(|error| anyhow!(error.with_advice()))
+pub(super) fn volume_files(paths: &[PathBuf], limits: &ReadLimits) -> Result<Vec<VolumeFile>> {
+    VolumeFile::given(paths, limits).map_err(|error| anyhow!(error.with_advice()))
 }

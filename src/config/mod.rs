@@ -298,6 +298,11 @@ settings! {
     voxel_limit: u64 = "268435456";
     /// Largest volume after decompression
     decompressed_limit: Size = "2GiB";
+    /// Largest number of files in one zip archive
+    file_limit: u64 = "8192";
+    /// Largest file of a mesh (an expert's, as STL, PLY ...), unpacked; reading one takes up to eight times as
+    /// much memory
+    mesh_limit: Size = "8MiB";
     /// Memory that uploads and previews being decoded take together; more of them wait
     decoding_memory: Size = "256MiB";
     /// Largest number of uploads and previews that wait to be decoded; more are answered with

@@ -9,7 +9,7 @@
 //!
 //! Guaranteed: the same files give the same profile and figures, on any number of threads.
 
-use super::cohort::{case_file, mask_on};
+use super::cohort::{case_file, mask_file, mask_on};
 use super::paired::PairedDifference;
 use super::sample::Sample;
 use crate::deform::Fit;
@@ -46,7 +46,8 @@ pub fn cases_of(folder: &Path, mask: &str) -> std::io::Result<Vec<CalibrationCas
     let mut cases = Vec::new();
     for entry in std::fs::read_dir(folder)? {
         let name = entry?.file_name().to_string_lossy().into_owned();
-        let [scan, mask] = ["spect", mask].map(|stem| case_file(folder, &name, stem));
+        let scan = case_file(folder, &name, "spect");
+        let mask = mask_file(folder, &name, mask);
         if let (Some(scan), Some(mask)) = (scan, mask) {
             cases.push(CalibrationCase { name, scan, mask });
         }

@@ -1,13 +1,14 @@
 //! A cohort's folder: who is in it, and in which files.
 //!
 //! Each case has a folder of its own with `spect.nii.gz` (or `.nii`, `.dcm`) and, where they are
-//! known, the gold standards of [`Gold`]. `manifest.json`, a list of `{"case", "role"}` (or an
+//! known, the gold standards of [`Gold`], as volumes or as meshes (`.stl`, `.ply` ...). `manifest.json`, a list of `{"case", "role"}` (or an
 //! object with such a list under `cases`), says which cases are templates: those with the role
 //! `template`. Without a manifest, cases whose names begin with `t` are templates. A missing
 //! file does not end the run: it is noted in [`Cohort::problems`].
 
 use super::rows::Gold;
 use crate::grid::voxelise::Mask;
+use crate::mesh_files::MeshFormat;
 use crate::progress::Monitor;
 use crate::volume::given_mask::{GivenMask, GivenMaskError, MaskChoice, read_mask};
 use crate::volume::{self, ReadLimits, ReadOptions, Reading, Volume, VolumeError, VolumeFile};
@@ -215,7 +216,7 @@ impl Cohort {
 
     /// A case's gold standard.
     pub fn gold(&self, case: &str, gold: Gold) -> Option<PathBuf> {
-        self.file(case, gold.file().strip_suffix(".nii.gz")?)
+        mask_file(&self.folder, case, gold.file().strip_suffix(".nii.gz")?)
     }
 
     /// What a template's model is made of: the file, and what that is.
@@ -267,6 +268,16 @@ pub fn case_file(folder: &Path, case: &str, stem: &str) -> Option<PathBuf> {
         .iter()
         .map(|ending| folder.join(case).join(format!("{stem}.{ending}")))
         .find(|path| path.is_file())
+}
+
+/// The mask `stem` of the folder `case` in `folder`: a volume, or a mesh.
+pub fn mask_file(folder: &Path, case: &str, stem: &str) -> Option<PathBuf> {
+    case_file(folder, case, stem).or_else(|| {
+        MeshFormat::ENDINGS
+            .iter()
+            .map(|ending| folder.join(case).join(format!("{stem}.{ending}")))
+            .find(|path| path.is_file())
+    })
 }
 
 /// Reads a volume of a cohort: a file of one frame.

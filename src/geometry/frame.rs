@@ -4,7 +4,7 @@
 //! *centre* of the first voxel. [`VoxelToPatient`] maps indices, fractional ones too, to
 //! millimetres in the patient frame of DICOM, LPS: x increases to the patient's left, y to
 //! posterior, z to superior. NIfTI uses RAS, in which x and y have the opposite sign;
-//! [`VoxelToPatient::from_ras`] and [`VoxelToPatient::to_ras`] are the only conversions.
+//! [`VoxelToPatient::from_ras`], [`VoxelToPatient::to_ras`] and [`lps_of_ras`] are the only conversions.
 
 use super::Vec3;
 use nalgebra::{Matrix3, Matrix4};
@@ -21,6 +21,17 @@ pub struct VoxelToPatient {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the affine is singular or not finite")]
 pub struct SingularAffine;
+
+/// The point in LPS that has the coordinates `ras` in RAS.
+pub fn lps_of_ras(ras: &Vec3) -> Vec3 {
+    Vec3::new(-ras.x, -ras.y, ras.z)
+}
+
+/// The point in LPS that has the coordinates `world` in the frame of glTF, in which the patient stands upright
+/// and faces +Z: x to the left, y to superior, z to anterior.
+pub fn lps_of_y_up(world: &Vec3) -> Vec3 {
+    Vec3::new(world.x, -world.z, world.y)
+}
 
 impl VoxelToPatient {
     /// The map with the given linear part, whose columns are the steps of i, j, k in millimetres

@@ -43,6 +43,9 @@ pub fn receiver_settings(settings: &Settings) -> ReceiverSettings {
         limits: ReadLimits {
             voxels: settings.voxel_limit,
             unpacked_bytes: settings.decompressed_limit.0,
+            files: settings.file_limit,
+            mesh_bytes: settings.mesh_limit.0,
+            ..ReadLimits::DEFAULT
         },
     }
 }

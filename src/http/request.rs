@@ -75,6 +75,28 @@ pub fn flag(name: &str, text: &str) -> Answer<bool> {
     })
 }
 
+/// What `text`, the value of the parameter `field`, names; `known` lists what it may.
+///
+/// # Errors
+/// 400 for another text.
+pub fn word<T>(
+    text: Option<&str>,
+    field: &str,
+    named: impl Fn(&str) -> Option<T>,
+    known: &str,
+) -> Answer<Option<T>> {
+    let Some(text) = text else {
+        return Ok(None);
+    };
+    named(text).map(Some).ok_or_else(|| {
+        Problem::bad_request("invalid-parameter", format!("`{field}` must be {known}."))
+            .at(field)
+            .fix(format!(
+                "Give {known}, or leave it out if the file says it."
+            ))
+    })
+}
+
 /// 400: the parameter `state` names none of the `known` states.
 pub fn unknown_state(name: &str, known: &[&str]) -> Problem {
     Problem::bad_request(

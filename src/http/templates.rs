@@ -8,10 +8,13 @@ use super::openapi::{self, LookupProblems, UploadProblems};
 use super::problem::not_found::field_names_nothing;
 use super::problem::{Answer, Problem, ProblemBody};
 use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody, refuse_when_full};
-use super::request::{PathSegments, json_bytes, merge_patch, query_pairs, refuse_unknown, unknown};
+use super::request::{
+    PathSegments, bytes_of, merge_patch, query_pairs, refuse_unknown, unknown, word,
+};
 use super::wire::{added, path_of, rfc3339};
 use crate::config::Size;
 use crate::jobs::{ProductRoom, Resource, TemplateSource, Tenant, check_name};
+use crate::mesh_files::{MeshFrame, MeshStatement, MeshUnit};
 use crate::progress::Monitor;
 use crate::work::TEMPLATE_BYTES;
 use axum::Json;
@@ -25,7 +28,43 @@ use utoipa::ToSchema;
 /// Largest mesh.
 pub const MESH_SIZE: Size = Size(TEMPLATE_BYTES);
 
-/// Memory for a byte of a JSON mesh: numbers as text, parsed, and as files of several formats.
+/// Media types of meshes, the recommended one first; the content tells the format.
+const MESH_TYPES: [&str; 32] = [
+    "application/json",
+    "application/octet-stream",
+    "application/x-octet-stream",
+    "binary/octet-stream",
+    "application/x-www-form-urlencoded",
+    "text/plain",
+    "application/xml",
+    "text/xml",
+    "model/stl",
+    "model/x.stl-ascii",
+    "model/x.stl-binary",
+    "application/sla",
+    "application/vnd.ms-pki.stl",
+    "application/x-navistyle",
+    "model/ply",
+    "model/x-ply",
+    "application/ply",
+    "application/x-ply",
+    "model/obj",
+    "model/x-obj",
+    "text/prs.wavefront-obj",
+    "application/x-tgif",
+    "model/vtk",
+    "model/x-vtk",
+    "application/x-vtk",
+    "application/vtk",
+    "model/vtp",
+    "model/x-vtp",
+    "application/x-vtp",
+    "application/vtp",
+    "model/gltf-binary",
+    "model/gltf+json",
+];
+
+/// Memory for a byte of a mesh: numbers as text, parsed, and as files of several formats.
 const MEMORY_PER_BYTE: u64 = 16;
 
 /// The collection of templates.
@@ -106,8 +145,9 @@ impl From<Presented> for TemplateBody {
 
 /// Add a template
 ///
-/// The body is a JSON mesh (`mesh.json` of a model, or a file written by `ventriform templates
-/// build`); or `model` names a stored model or segmentation whose mesh is copied. The same mesh
+/// The body is a closed mesh: JSON (`mesh.json` of a model, or a file written by `ventriform templates
+/// build`), STL, PLY, OBJ, VTK or VTP PolyData, GLB or glTF, told by its content; `mesh_unit` and `mesh_frame`
+/// state what the file does not. Or `model` names a stored model or segmentation whose mesh is copied. The same mesh
 /// for the same organ is added only once. `model=auto` fits it beside the built-in hearts where a job
 /// names it (`model=auto,tpl_...`), and in every job with `library=true`. Retention never erases
 /// templates.
@@ -130,7 +170,8 @@ pub async fn create_template(
     request: Request,
 ) -> Answer {
     let pairs = query_pairs(query.as_deref());
-    refuse_unknown(&pairs, &["name", "organ", "model", LIBRARY])?;
+    let known = ["name", "organ", "model", "mesh_unit", "mesh_frame", LIBRARY];
+    refuse_unknown(&pairs, &known)?;
     let value = |name: &str| {
         let found = pairs.iter().find(|(n, _)| n == name);
         found.map(|(_, value)| value.as_str())
@@ -144,18 +185,32 @@ pub async fn create_template(
         Some("false") => Some(false),
         Some(_) => return Err(not_a_flag()),
     };
+    let stated = MeshStatement {
+        unit: word(
+            value("mesh_unit"),
+            "mesh_unit",
+            MeshUnit::named,
+            "mm, cm or m",
+        )?,
+        frame: word(
+            value("mesh_frame"),
+            "mesh_frame",
+            MeshFrame::named,
+            "lps or ras",
+        )?,
+    };
     let tenant = &caller.tenant;
     let room = ProductRoom {
         count: app.settings.template_limit,
         bytes: caller.quota.bytes,
     };
     refuse_when_full::<Templates>(&app, tenant, room.count, "template_limit").await?;
-    let body = json_bytes(request).await?;
+    let body = bytes_of(request, &MESH_TYPES).await?;
     let (mesh, volume) = given_mesh(&app, tenant, value("model"), body).await?;
     let reader = app.engine.reader.clone();
     let shows = organ.clone();
     let memory = LITTLE_MEMORY + MEMORY_PER_BYTE * mesh.len() as u64;
-    let make = move |_: &Monitor<'_>| reader.template(&mesh, &shows);
+    let make = move |_: &Monitor<'_>| reader.template(&mesh, &shows, &stated);
     let output = app.decoding.run(memory, make).await??;
     let source = TemplateSource {
         tenant,

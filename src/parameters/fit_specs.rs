@@ -6,6 +6,7 @@ use crate::deform::WallEdge;
 use crate::deform::sensors::SensorKind;
 use crate::geometry::Vec3;
 use crate::locate::patient_orientation::Superior;
+use crate::mesh_files::{MeshFrame, MeshUnit};
 use crate::model::Organ;
 use crate::polar::Projection;
 use crate::volume::given_mask::MaskLabel;
@@ -53,7 +54,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         },
         default: "",
         summary: "Id of a volume with an expert's mask to compare with: a mask, a label map, a DICOM \
-                  Segmentation, or probabilities of which those above 0.5 count",
+                  Segmentation, probabilities of which those above 0.5 count, or a closed mesh (STL, PLY, OBJ, \
+                  VTK, VTP, glTF)",
         read: |d, v| {
             d.expert = Some(v.text().into());
             Ok(())
@@ -100,6 +102,31 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
             true => json!(true),
             false => Value::Null,
         },
+    },
+    ParameterSpec {
+        name: "mesh_unit",
+        kind: Kind::Choice(&["mm", "cm", "m"]),
+        default: "",
+        summary: "Unit of an expert's mask that is a mesh. Default: what its file states; otherwise mm (of glTF m), \
+                  if the size is that of an organ",
+        read: |d, v| {
+            d.mask.mesh.unit = MeshUnit::named(v.text());
+            Ok(())
+        },
+        write: |p| json!(p.mask.mesh.unit.map(MeshUnit::as_str)),
+    },
+    ParameterSpec {
+        name: "mesh_frame",
+        kind: Kind::Choice(&["lps", "ras"]),
+        default: "",
+        summary: "Frame of an expert's mask that is a mesh: lps (DICOM, x to the left, y to posterior) or ras \
+                  (NIfTI, x to the right, y to anterior). Default: what its file states (SPACE=LPS, SPACE=RAS); \
+                  otherwise lps",
+        read: |d, v| {
+            d.mask.mesh.frame = MeshFrame::named(v.text());
+            Ok(())
+        },
+        write: |p| json!(p.mask.mesh.frame.map(MeshFrame::as_str)),
     },
     ParameterSpec {
         name: "reader",

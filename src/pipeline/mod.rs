@@ -159,8 +159,9 @@ pub fn generate(
     let options = ReadOptions {
         frame: parameters.frame,
     };
-    let mut reading =
-        volume::read(files, &options, limits, monitor).map_err(PipelineError::Volume)?;
+    let mut reading = volume::read(files, &options, limits, monitor)
+        .and_then(Reading::usable)
+        .map_err(PipelineError::Volume)?;
     let told_apart = tell_apart(files, &mut reading, parameters, limits, monitor)?;
     let read_ms = monitor.now_ms() - start;
     let (volume, facts) = (&reading.volume, &reading.facts);

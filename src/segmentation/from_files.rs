@@ -135,7 +135,7 @@ fn read(
     limits: &ReadLimits,
     monitor: &Monitor<'_>,
 ) -> Result<Reading, VolumeError> {
-    volume::read(files, &ReadOptions { frame }, limits, monitor)
+    volume::read(files, &ReadOptions { frame }, limits, monitor)?.usable()
 }
 
 fn unusable(

@@ -1,8 +1,8 @@
 //! Files inside a zip archive (PKWARE APPNOTE 6.3.10).
 //!
 //! In: one file. Out: the files in it, to be read where they lie, without unpacking them to disk or
-//! memory. What is read is bounded before it is read: the archive's directory by [`MOST_DIRECTORY`] and
-//! [`MOST_FILES`], whichever of its end records states them; what an entry unpacks to by the size that the
+//! memory. What is read is bounded before it is read: the archive's directory by [`MOST_ENTRY`] and
+//! [`ReadLimits::files`], whichever of its end records states them; what an entry unpacks to by the size that the
 //! directory states, and the sum of those sizes by the limit of unpacked bytes.
 //!
 //! 1. The end record is looked for from the end of the file. It counts if its comment fits into the file
@@ -23,11 +23,8 @@ use super::limits::ReadLimits;
 use super::source::{ReadSeek, VolumeFile};
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// Most files in an archive.
-pub(super) const MOST_FILES: u64 = 8192;
-
-/// Most bytes of an archive's directory.
-const MOST_DIRECTORY: u64 = 4 << 20;
+/// Most bytes of an archive's directory for each of the files that it may have.
+const MOST_ENTRY: u64 = 512;
 
 /// Bytes of an end record without its comment.
 const END: usize = 22;
@@ -68,7 +65,12 @@ pub(super) fn files_in(
         return Ok(None);
     }
     let size = bytes.seek(SeekFrom::End(0)).map_err(io)?;
-    let mut archive = Archive { file, bytes, size };
+    let mut archive = Archive {
+        file,
+        bytes,
+        size,
+        most_files: limits.files,
+    };
     let directory = archive.directory()?;
     let mut files = Vec::new();
     let mut total = 0_u64;
@@ -113,6 +115,7 @@ struct Archive<'a> {
     file: &'a VolumeFile,
     bytes: Box<dyn ReadSeek>,
     size: u64,
+    most_files: u64,
 }
 
 /// What an end record says, and where it begins.
@@ -231,12 +234,13 @@ impl Archive<'_> {
         if end.count > 0 && first != *b"PK\x01\x02" {
             return Ok(None);
         }
-        if end.count > MOST_FILES {
-            return Err(self.too_large("files in the archive", end.count, MOST_FILES));
+        if end.count > self.most_files {
+            return Err(self.too_large("files in the archive", end.count, self.most_files));
         }
-        if end.directory > MOST_DIRECTORY {
+        let most = self.most_files.saturating_mul(MOST_ENTRY);
+        if end.directory > most {
             let what = "bytes in the archive's directory";
-            return Err(self.too_large(what, end.directory, MOST_DIRECTORY));
+            return Err(self.too_large(what, end.directory, most));
         }
         let agree = |plain: u64, own: u64, most: u64| plain == own || plain == most;
         if !(agree(plain.count, end.count, 0xffff)
@@ -389,6 +393,8 @@ pub(super) fn is_company(name: &str) -> bool {
 )]
 mod tests {
     use super::*;
+
+    const MOST_FILES: u64 = ReadLimits::DEFAULT.files;
     use std::io::Write as _;
     use zip::write::SimpleFileOptions;
     use zip::{CompressionMethod, ZipArchive, ZipWriter};

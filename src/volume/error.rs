@@ -1,5 +1,6 @@
 //! Errors of reading a volume.
 
+use crate::mesh_files::MeshFileError;
 use crate::progress::Cancelled;
 
 /// What is wrong with a file. [`VolumeError::field`] names the field concerned.
@@ -53,6 +54,8 @@ pub enum VolumeError {
         image_type: String,
         /// What it contains instead.
         reason: &'static str,
+        /// What can be sent.
+        fix: &'static str,
     },
     /// The format is unknown.
     #[error("{file} is not in a known volume format: it begins with {start}")]
@@ -159,6 +162,20 @@ pub enum VolumeError {
     NoFiniteVoxel {
         /// The file's name.
         file: String,
+    },
+    /// The file of a mesh holds no closed surface, or one whose size or frame cannot be told.
+    #[error("{file}: {error}")]
+    Mesh {
+        /// The file's name.
+        file: String,
+        /// Why.
+        error: MeshFileError,
+    },
+    /// A volume of one slice, of which no model can be made.
+    #[error("the volume has {} x {} x {} voxels: it is a single slice, of which no model can be made", .shape[0], .shape[1], .shape[2])]
+    SingleSlice {
+        /// Voxels along i, j, k.
+        shape: [usize; 3],
     },
     /// Memory for the voxels could not be allocated.
     #[error("{bytes} bytes of memory for the voxels could not be allocated")]

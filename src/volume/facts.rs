@@ -1,5 +1,6 @@
 //! Facts about a file, for a person to check.
 
+use crate::mesh_files::MeshFormat;
 use nalgebra::Matrix4;
 
 /// Format of a file.
@@ -21,6 +22,8 @@ pub enum FileFormat {
     DicomSeries,
     /// DICOM Segmentation, read as a volume of labels.
     DicomSeg,
+    /// A closed surface, voxelised.
+    Mesh(MeshFormat),
     /// No file: an array in memory.
     Array,
 }
@@ -37,6 +40,13 @@ impl FileFormat {
             FileFormat::DicomEnhanced => "DICOM enhanced",
             FileFormat::DicomSeries => "DICOM series",
             FileFormat::DicomSeg => "DICOM SEG",
+            FileFormat::Mesh(MeshFormat::Stl) => "STL mesh",
+            FileFormat::Mesh(MeshFormat::Ply) => "PLY mesh",
+            FileFormat::Mesh(MeshFormat::Obj) => "OBJ mesh",
+            FileFormat::Mesh(MeshFormat::Vtk) => "VTK mesh",
+            FileFormat::Mesh(MeshFormat::Vtp) => "VTP mesh",
+            FileFormat::Mesh(MeshFormat::Gltf) => "glTF mesh",
+            FileFormat::Mesh(MeshFormat::Json) => "JSON mesh",
             FileFormat::Array => "array",
         }
     }
@@ -74,12 +84,15 @@ pub enum AffineSource {
     ImagePosition,
     /// DICOM without a position or an orientation: the origin is an assumption.
     UnknownOrigin,
+    /// No field: the grid was laid about a mesh, whose vertices say where it is.
+    Mesh,
     /// The affine that came with an array.
     Caller,
 }
 
 impl AffineSource {
-    /// The name in JSON: `sform`, `qform`, `pixdim`, `image-position`, `unknown-origin`, `caller`.
+    /// The name in JSON: `sform`, `qform`, `pixdim`, `image-position`, `unknown-origin`, `mesh`,
+    /// `caller`.
     pub fn as_str(self) -> &'static str {
         match self {
             AffineSource::Sform => "sform",
@@ -87,6 +100,7 @@ impl AffineSource {
             AffineSource::Pixdim => "pixdim",
             AffineSource::ImagePosition => "image-position",
             AffineSource::UnknownOrigin => "unknown-origin",
+            AffineSource::Mesh => "mesh",
             AffineSource::Caller => "caller",
         }
     }

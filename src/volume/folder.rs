@@ -5,13 +5,11 @@
 //! not followed, so that every folder is seen once.
 
 use super::VolumeError;
-use super::archive::{MOST_FILES, is_company};
+use super::archive::is_company;
+use super::limits::ReadLimits;
 use super::source::VolumeFile;
 use std::fs;
 use std::path::{Path, PathBuf};
-
-/// Deepest folders that are read, counted from the one given.
-const DEEPEST: usize = 16;
 
 impl VolumeFile {
     /// The files that a person names by `paths`: each file, all files in a folder
@@ -19,12 +17,15 @@ impl VolumeFile {
     ///
     /// # Errors
     /// [`VolumeError`] if a folder cannot be read, is empty, or holds too many files.
-    pub fn given(paths: &[impl AsRef<Path>]) -> Result<Vec<Self>, VolumeError> {
+    pub fn given(
+        paths: &[impl AsRef<Path>],
+        limits: &ReadLimits,
+    ) -> Result<Vec<Self>, VolumeError> {
         let mut files = Vec::new();
         for path in paths {
             let path = path.as_ref();
             match path.is_dir() {
-                true => files.extend(files_in(path)?),
+                true => files.extend(files_in(path, limits)?),
                 false if paths.len() == 1 => files.extend(Self::with_other_half(path)),
                 false => files.push(Self::at(path)),
             }
@@ -37,8 +38,8 @@ impl VolumeFile {
 ///
 /// # Errors
 /// [`VolumeError`] if a folder cannot be read or holds no file, or if there are more than
-/// [`MOST_FILES`] files or folders within folders more than [`DEEPEST`] deep.
-pub(super) fn files_in(folder: &Path) -> Result<Vec<VolumeFile>, VolumeError> {
+/// [`ReadLimits::files`] files or folders within folders more than [`ReadLimits::folder_levels`] deep.
+pub(super) fn files_in(folder: &Path, limits: &ReadLimits) -> Result<Vec<VolumeFile>, VolumeError> {
     let shown = folder.display().to_string();
     let too_large = |what, asked, limit| VolumeError::TooLarge {
         file: format!("the folder {shown}"),
@@ -57,8 +58,8 @@ pub(super) fn files_in(folder: &Path) -> Result<Vec<VolumeFile>, VolumeError> {
         for entry in fs::read_dir(&folder).map_err(io)? {
             let entry = entry.map_err(io)?;
             seen += 1;
-            if seen > MOST_FILES {
-                return Err(too_large("files", seen, MOST_FILES));
+            if seen > limits.files {
+                return Err(too_large("files", seen, limits.files));
             }
             let path = entry.path();
             let name = entry.file_name();
@@ -67,8 +68,9 @@ pub(super) fn files_in(folder: &Path) -> Result<Vec<VolumeFile>, VolumeError> {
                 continue;
             }
             if kind.is_dir() {
-                if depth == DEEPEST {
-                    return Err(too_large("levels", depth as u64 + 1, DEEPEST as u64));
+                if depth >= limits.folder_levels {
+                    let levels = limits.folder_levels as u64;
+                    return Err(too_large("levels", depth as u64 + 1, levels));
                 }
                 open.push((path, depth + 1));
             } else if path.is_file() {

@@ -37,13 +37,28 @@ pub struct ReadLimits {
     pub voxels: u64,
     /// Bytes of the unpacked file up to the last voxel that is read. Default 4 GiB.
     pub unpacked_bytes: u64,
+    /// Files in a zip archive, and in a folder with those in it. Default 8192.
+    pub files: u64,
+    /// Levels of folders in a folder, the one given counted. Default 16.
+    pub folder_levels: usize,
+    /// Bytes of a file of a mesh, unpacked. Reading one takes up to eight times as much memory. Default 64 MiB: a
+    /// million triangles in binary STL.
+    pub mesh_bytes: u64,
+}
+
+impl ReadLimits {
+    /// The limits where nothing else is set.
+    pub const DEFAULT: Self = Self {
+        voxels: 1 << 28,
+        unpacked_bytes: 4 << 30,
+        files: 8192,
+        folder_levels: 16,
+        mesh_bytes: 64 << 20,
+    };
 }
 
 impl Default for ReadLimits {
     fn default() -> Self {
-        Self {
-            voxels: 1 << 28,
-            unpacked_bytes: 4 << 30,
-        }
+        Self::DEFAULT
     }
 }

@@ -20,6 +20,8 @@
 //! Not guaranteed: that the file's statements about the patient are true. Contradictions inside a
 //! file appear as warnings.
 //!
+//! `surface_file` reads a closed surface (STL, PLY, OBJ, VTK, VTP, glTF) as the voxels inside it.
+//!
 //! [`given_mask`] reads masks: one structure of a label map, a segmentation or a binary volume.
 //!
 //! [`mod@phantom`] makes volumes with known ground truth, [`nifti::write()`] writes volumes to files,
@@ -58,6 +60,7 @@ mod read;
 mod recognise;
 mod source;
 mod summary;
+mod surface_file;
 mod unpack;
 
 pub use crate::grid::Volume;
@@ -70,7 +73,7 @@ pub use open::{Reading, describe};
 pub use phantom::{Phantom, PhantomParameters, phantom};
 pub use preview::{preview, preview_png};
 pub use read::{
-    inspect, labels_are_rounded, preview_files, provenance, read, read_segment, segments,
+    inspect, labels_are_rounded, preview_files, provenance, read, read_segment, segments, surface,
     voxels_of_label,
 };
 pub use source::VolumeFile;

@@ -14,6 +14,7 @@ use super::summary::{Coherence, LabelCounts, NO_LABEL, Tally, judge, summarise};
 use super::{Volume, VolumeError};
 use crate::draw::Image;
 use crate::geometry::frame::VoxelToPatient;
+use crate::mesh::TriMesh;
 use crate::progress::Monitor;
 
 /// Above this size 32-bit floats do not tell all whole numbers apart.
@@ -30,9 +31,25 @@ pub struct Reading {
     pub provenance: Option<Provenance>,
     /// The place of the grid as the file states it; `None` unless the file is NIfTI.
     pub stated_grid: Option<StatedGrid>,
+    /// Why no model can be made of it, though it can be described.
+    pub doubt: Option<VolumeError>,
 }
 
 impl Reading {
+    /// Refuses what can be described, and of which no model can be made: a single slice, and a surface whose unit nobody
+    /// stated and whose size is not that of an organ.
+    ///
+    /// # Errors
+    /// [`VolumeError::SingleSlice`] or [`VolumeError::Mesh`].
+    pub fn usable(self) -> Result<Self, VolumeError> {
+        let shape = self.volume.shape;
+        match &self.doubt {
+            Some(doubt) => Err(doubt.clone()),
+            None if shape.contains(&1) => Err(VolumeError::SingleSlice { shape }),
+            None => Ok(self),
+        }
+    }
+
     /// The DICOM Frame of Reference UID of the volume; `None` unless its position there is known.
     pub fn frame_of_reference(&self) -> Option<&str> {
         let placed = self.facts.affine_source == AffineSource::ImagePosition;
@@ -60,6 +77,16 @@ pub(super) trait OpenVolume {
 
     /// The place of the grid in the words of NIfTI; `None` for other formats.
     fn stated_grid(&self) -> Option<StatedGrid> {
+        None
+    }
+
+    /// Why no model can be made of it.
+    fn doubt(&self) -> Option<VolumeError> {
+        None
+    }
+
+    /// The closed surface whose inside the voxels are, LPS mm; `None` for others.
+    fn surface(&self) -> Option<&TriMesh> {
         None
     }
 
@@ -195,6 +222,7 @@ pub(super) fn read(
         facts,
         provenance,
         stated_grid: file.stated_grid(),
+        doubt: file.doubt(),
     })
 }
 

@@ -6,8 +6,11 @@ use super::open::{self, OpenVolume, Reading, is_rounded};
 use super::recognise::{Recognised, recognise};
 use super::source::VolumeFile;
 use super::summary::LabelCounts;
+use super::surface_file::SurfaceFile;
 use super::{LabelCount, VolumeError, VolumeFacts, archive, nifti};
 use crate::draw::Image;
+use crate::mesh::TriMesh;
+use crate::mesh_files::MeshStatement;
 use crate::progress::Monitor;
 use std::cell::RefCell;
 
@@ -105,6 +108,24 @@ pub fn read_segment(
     open::read(&mut *file, ReadOptions::default(), monitor)
 }
 
+/// The closed surface in `files`, LPS mm, as `stated`, and the volume that is read of it; `None` if the files are no mesh.
+///
+/// # Errors
+/// [`VolumeError`], also for a surface whose unit nobody states and whose size is not that of an organ.
+pub fn surface(
+    files: &[VolumeFile],
+    stated: &MeshStatement,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Option<(TriMesh, Reading)>, VolumeError> {
+    let mut file = open_as(files, stated, limits, monitor)?.file;
+    let Some(mesh) = file.surface().cloned() else {
+        return Ok(None);
+    };
+    let reading = open::read(&mut *file, ReadOptions::default(), monitor)?.usable()?;
+    Ok(Some((mesh, reading)))
+}
+
 /// Whose scan the volume in `files` is; `None` unless they are DICOM. Only headers are read.
 /// Where gates are summed, frames and instances are those of the first gate.
 ///
@@ -172,6 +193,16 @@ fn open(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Opened, VolumeError> {
+    open_as(files, &MeshStatement::default(), limits, monitor)
+}
+
+/// As [`open`], with what the caller states of a mesh.
+fn open_as(
+    files: &[VolumeFile],
+    stated: &MeshStatement,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Opened, VolumeError> {
     let in_folder = files.iter().any(VolumeFile::was_found);
     let mut inside = in_folder.then_some("the folder");
     let mut members = Vec::with_capacity(files.len());
@@ -194,6 +225,7 @@ fn open(
             Box::new(nifti::NiftiFile::open(header, voxels, limits)?)
         }
         Recognised::Dicom(files) => Box::new(DicomFile::open(&files, limits, monitor)?),
+        Recognised::Mesh(file) => Box::new(SurfaceFile::open(file, stated, limits)?),
     };
     Ok(Opened {
         file,

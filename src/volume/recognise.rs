@@ -4,7 +4,7 @@
 
 use super::limits::ReadLimits;
 use super::source::{Source, VolumeFile};
-use super::{VolumeError, dicom, nifti};
+use super::{VolumeError, dicom, nifti, surface_file};
 
 /// Unpacked bytes that are examined.
 const EXAMINED: usize = 1024;
@@ -19,6 +19,8 @@ pub(super) enum Recognised<'a> {
     },
     /// DICOM files.
     Dicom(Vec<&'a VolumeFile>),
+    /// A closed surface.
+    Mesh(&'a VolumeFile),
 }
 
 /// What a single file is.
@@ -98,6 +100,9 @@ impl<'a> Sorted<'a> {
             ([0, 0, dicom], _) if dicom > 0 => Ok(Recognised::Dicom(self.dicom.clone())),
             ([0, 0, 0], []) if self.empty.is_empty() => Err(VolumeError::NoFile),
             ([0, 0, 0], others) => {
+                if let Some(mesh) = only_mesh(others, limits) {
+                    return Ok(Recognised::Mesh(mesh));
+                }
                 let analyze = others.iter().find(|(_, start)| is_analyze(start));
                 Err(match (analyze, others, inside) {
                     (Some((file, start)), ..) => refuse(file, start),
@@ -175,6 +180,7 @@ impl<'a> Sorted<'a> {
         let used = |file: &VolumeFile| match volume {
             Recognised::Nifti { voxels, .. } => std::ptr::eq(file, *voxels),
             Recognised::Dicom(_) => false,
+            Recognised::Mesh(mesh) => std::ptr::eq(file, *mesh),
         };
         let foreign = self.others.iter().map(|(file, _)| *file);
         let foreign: Vec<&VolumeFile> = foreign
@@ -200,6 +206,20 @@ impl<'a> Sorted<'a> {
             notes.push(format!("Files without content were left out: {list}."));
         }
         notes
+    }
+}
+
+/// The mesh among files that are no volumes, if there is one.
+fn only_mesh<'a>(
+    others: &[(&'a VolumeFile, Vec<u8>)],
+    limits: &ReadLimits,
+) -> Option<&'a VolumeFile> {
+    let mut meshes = others
+        .iter()
+        .filter(|(file, start)| surface_file::recognise(file, start, limits).is_some());
+    match (meshes.next(), meshes.next()) {
+        (Some((file, _)), None) => Some(file),
+        _ => None,
     }
 }
 
@@ -265,9 +285,6 @@ fn refuse(file: &VolumeFile, start: &[u8]) -> VolumeError {
         (0, b"\x28\xb5\x2f\xfd", "a Zstandard file"),
         (0, GZIP_AGAIN, "gzipped twice"),
         (257, b"ustar", "a tar archive"),
-        (0, b"glTF", "a glTF model"),
-        (0, b"ply\n", "a PLY model"),
-        (0, b"solid ", "an STL model"),
         (0, b"<?xml", "an XML document"),
         (0, b"<!DOCTYPE", "an HTML page"),
         (0, b"{", "a JSON document"),

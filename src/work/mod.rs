@@ -29,9 +29,10 @@ mod upload;
 pub use model::ModelWork;
 pub use page::PageError;
 pub use segmentation::SegmentationWork;
+pub use template::TEMPLATE_BYTES;
 pub use upload::{
-    DomainReader, INSPECTION_MEMORY, IntensityFacts, TEMPLATE_BYTES, UploadFacts, UploadReader,
-    preview_memory, voxels_memory,
+    DomainReader, INSPECTION_MEMORY, IntensityFacts, UploadFacts, UploadReader, preview_memory,
+    voxels_memory,
 };
 
 use crate::jobs::{Work, Works};

@@ -11,6 +11,7 @@ use crate::export::dicom::{DicomError, StatedIdentity};
 use crate::export::read_json::ReadMeshError;
 use crate::jobs::{Failure, Fault, WorkError};
 use crate::locate::LocateError;
+use crate::mesh_files::MeshFileError;
 use crate::model::{Organ, TemplateError};
 use crate::parameters::ParameterError;
 use crate::pipeline::PipelineError;
@@ -78,6 +79,12 @@ impl Explain for VolumeError {
     fn explain(&self) -> Failure {
         let kind = match self {
             VolumeError::TooLarge { .. } => (Fault::TooLarge, "volume-too-large"),
+            VolumeError::Mesh { error, .. } => {
+                let mut told = error.explain();
+                told.detail = sentence(self);
+                return told;
+            }
+            VolumeError::SingleSlice { .. } => (Fault::Content, "single-slice"),
             VolumeError::FrameNeeded { .. } => (Fault::Request, "frame-needed"),
             VolumeError::FrameOutOfRange { .. } => (Fault::Request, "frame-out-of-range"),
             VolumeError::Unsupported { .. } | VolumeError::NotVolume { .. } => {
@@ -265,7 +272,8 @@ impl Explain for GivenMaskError {
             GivenMaskError::Elsewhere { .. } | GivenMaskError::TooFarApart { .. } => (
                 (Fault::Content, "mask-elsewhere"),
                 None,
-                "Give a mask of the same scan whose header places it correctly in the patient."
+                "Give a mask of the same scan whose header places it correctly in the patient; of a mesh, state its frame \
+                 by `mesh_frame` (lps or ras)."
                     .into(),
             ),
             GivenMaskError::Cancelled(_) => (CANCELLED, None, START_AGAIN.into()),
@@ -337,6 +345,69 @@ const FINITE_NUMBERS: &str = "Give finite numbers within their ranges.";
 impl Explain for ReadMeshError {
     fn explain(&self) -> Failure {
         failure(UNSUITABLE_MODEL, self, None, GIVE_MESH_JSON.into())
+    }
+}
+
+impl Explain for MeshFileError {
+    fn explain(&self) -> Failure {
+        let (kind, field) = match self {
+            MeshFileError::TooLong { .. } => ((Fault::TooLarge, "mesh-too-large"), None),
+            MeshFileError::Size(_) => (UNSUITABLE_MODEL, Some("mesh_unit")),
+            MeshFileError::Contradiction { field: "unit", .. } => {
+                ((Fault::Request, "contradiction"), Some("mesh_unit"))
+            }
+            MeshFileError::Contradiction { .. } => {
+                ((Fault::Request, "contradiction"), Some("mesh_frame"))
+            }
+            _ => (UNSUITABLE_MODEL, None),
+        };
+        failure(kind, self, field, mesh_file_advice(self))
+    }
+}
+
+fn mesh_file_advice(error: &MeshFileError) -> String {
+    match error {
+        MeshFileError::TooLong { .. } => {
+            "Give a mesh of fewer triangles, or ask the operator to raise the limit.".into()
+        }
+        MeshFileError::Unknown { .. } | MeshFileError::Unsupported { .. } => {
+            "Give a closed triangle mesh as STL, PLY, OBJ, VTK or VTP PolyData, GLB, or JSON as `generate` \
+             writes it."
+                .into()
+        }
+        MeshFileError::Damaged { .. }
+        | MeshFileError::NotFinite { .. }
+        | MeshFileError::NoSuchVertex { .. } => {
+            "Transfer the file again; if that does not help, export it again from its source.".into()
+        }
+        MeshFileError::Empty | MeshFileError::Flat => {
+            "Give a closed surface that encloses the organ.".into()
+        }
+        MeshFileError::Open { .. } => {
+            "Close the surface (fill its holes, merge vertices that lie apart) and export it again."
+                .into()
+        }
+        MeshFileError::Orientation { .. } => {
+            "Orient the triangles alike (most programs call it `recompute normals`) and export it again."
+                .into()
+        }
+        MeshFileError::Contradiction { .. } => {
+            "Leave the statement out, or correct the one in the file.".into()
+        }
+        MeshFileError::UnknownWord { known, .. } => format!("Write the file with {known}."),
+        MeshFileError::Size(size) => match (size.likely, size.factor()) {
+            (Some(unit), Some(factor)) => format!(
+                "Multiply the coordinates by {factor} to have millimetres, or set `mesh_unit` to {}, if that is \
+                 its unit; set it to {} if the mesh is as small or large as that.",
+                unit.as_str(),
+                size.unit.as_str()
+            ),
+            _ => format!(
+                "Scale the coordinates to millimetres, or set `mesh_unit` to mm, cm or m; to {} if the mesh is as \
+                 small or large as that.",
+                size.unit.as_str()
+            ),
+        },
     }
 }
 
@@ -531,12 +602,13 @@ fn volume_advice(error: &VolumeError) -> String {
         VolumeError::NoFile | VolumeError::Empty { .. } => {
             "Give a file that contains the volume.".into()
         }
-        VolumeError::Unsupported { fix, .. } | VolumeError::NotVolume { fix, .. } => (*fix).into(),
+        VolumeError::Unsupported { fix, .. } | VolumeError::NotVolume { fix, .. } | VolumeError::NotSlices { fix, .. } => (*fix).into(),
+        VolumeError::Mesh { error, .. } => mesh_file_advice(error),
+        VolumeError::SingleSlice { .. } => {
+            "Send all slices: every file of the series, or a volume with at least two voxels along each axis.".into()
+        }
         VolumeError::NotOneSeries { .. } => {
             "Send all files of one series, each once, as several files or as one zip.".into()
-        }
-        VolumeError::NotSlices { .. } => {
-            "Give the reconstructed slices (Image Type RECON TOMO or RECON GATED TOMO).".into()
         }
         VolumeError::Unrecognised { .. } => {
             "Give NIfTI (.nii, .nii.gz, or a .hdr/.img pair) or DICOM (a multi-frame NM, PET, CT or \

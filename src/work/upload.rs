@@ -4,15 +4,13 @@ use super::files::volume_files;
 use super::problems::Explain;
 use super::{profile, template};
 use crate::jobs::{Failure, Fault, LocalFile, ScanFields, StoreError, StoredVolume, WorkOutput};
+use crate::mesh_files::MeshStatement;
 use crate::progress::Monitor;
+use crate::volume::given_mask::{MaskChoice, read_mask};
 use crate::volume::nifti::{self, StoredType};
-use crate::volume::{self, ReadLimits, ReadOptions, VolumeFile};
+use crate::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-
-/// Largest mesh of a template: a model to be fitted has at most 5000 points of about 200 bytes, and as many
-/// bytes of triangles.
-pub const TEMPLATE_BYTES: u64 = 4 << 20;
 
 /// Most memory that [`UploadReader::inspect`] takes, bytes: that of the largest DICOM Segmentation. The
 /// largest JPEG 2000 frame takes 40 MiB. A gzipped file of 16 MiB is unpacked in memory if it holds at
@@ -72,12 +70,28 @@ pub trait UploadReader: Send + Sync + 'static {
         monitor: &Monitor<'_>,
     ) -> Result<Vec<u8>, Failure>;
 
-    /// Reads and validates a JSON mesh that is to serve as a template of `organ`. Returns its main
-    /// figures and every download.
+    /// The structure that `choice` names in an expert's mask, as a `.nii.gz` file: 1 inside, 0 outside.
+    ///
+    /// # Errors
+    /// As [`UploadReader::inspect`], or why the structure cannot be told.
+    fn mask(
+        &self,
+        files: &[LocalFile],
+        choice: &MaskChoice,
+        monitor: &Monitor<'_>,
+    ) -> Result<Vec<u8>, Failure>;
+
+    /// Reads and validates a mesh that is to serve as a template of `organ`; `stated` is what the caller says of its unit
+    /// and frame. Returns its main figures and every download.
     ///
     /// # Errors
     /// Why the mesh cannot be fitted.
-    fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure>;
+    fn template(
+        &self,
+        mesh: &[u8],
+        organ: &str,
+        stated: &MeshStatement,
+    ) -> Result<WorkOutput, Failure>;
 
     /// Whether a stored file holds voxels, where they lie and nothing else, so that it cannot name a patient.
     ///
@@ -216,14 +230,27 @@ impl UploadReader for DomainReader {
         let options = ReadOptions { frame };
         let reading = volume::read(&volume_files(files), &options, &self.limits, monitor)
             .map_err(|error| error.explain())?;
-        nifti::write(&reading.volume, StoredType::Int16, true).map_err(|error| {
-            Failure::new(Fault::Content, "axis-too-long", error.to_string())
-                .fix("Download the upload itself instead.")
-        })
+        packed(&reading.volume)
     }
 
-    fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure> {
-        template::make(mesh, organ)
+    fn mask(
+        &self,
+        files: &[LocalFile],
+        choice: &MaskChoice,
+        monitor: &Monitor<'_>,
+    ) -> Result<Vec<u8>, Failure> {
+        let mask = read_mask(&volume_files(files), choice, &self.limits, monitor)
+            .map_err(|error| error.explain())?;
+        packed(&mask.to_volume())
+    }
+
+    fn template(
+        &self,
+        mesh: &[u8],
+        organ: &str,
+        stated: &MeshStatement,
+    ) -> Result<WorkOutput, Failure> {
+        template::make(mesh, organ, stated)
     }
 
     fn is_bare(&self, file: &LocalFile, monitor: &Monitor<'_>) -> Result<bool, Failure> {
@@ -234,4 +261,12 @@ impl UploadReader for DomainReader {
     fn profile(&self, profile: &[u8]) -> Result<WorkOutput, Failure> {
         profile::make(profile)
     }
+}
+
+/// The voxels as a packed file of 16-bit integers.
+fn packed(volume: &Volume) -> Result<Vec<u8>, Failure> {
+    nifti::write(volume, StoredType::Int16, true).map_err(|error| {
+        Failure::new(Fault::Content, "axis-too-long", error.to_string())
+            .fix("Download the upload itself instead.")
+    })
 }

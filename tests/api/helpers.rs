@@ -22,9 +22,11 @@ use ventriform::jobs::{
 };
 use ventriform::mesh::TriMesh;
 use ventriform::mesh::shapes::icosphere;
+use ventriform::mesh_files::MeshStatement;
 use ventriform::progress::{Monitor, Plan, Stage};
 use ventriform::store::{open_database, open_rows};
 use ventriform::volume::ReadLimits;
+use ventriform::volume::given_mask::MaskChoice;
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
 use ventriform::work::{Engine, IntensityFacts, UploadFacts, UploadReader};
@@ -391,8 +393,22 @@ impl UploadReader for FakeReader {
         }
     }
 
-    fn template(&self, mesh: &[u8], organ: &str) -> Result<WorkOutput, Failure> {
-        self.0.template(mesh, organ)
+    fn mask(
+        &self,
+        files: &[LocalFile],
+        _: &MaskChoice,
+        monitor: &Monitor<'_>,
+    ) -> Result<Vec<u8>, Failure> {
+        self.voxels(files, None, monitor)
+    }
+
+    fn template(
+        &self,
+        mesh: &[u8],
+        organ: &str,
+        stated: &MeshStatement,
+    ) -> Result<WorkOutput, Failure> {
+        self.0.template(mesh, organ, stated)
     }
 
     fn is_bare(&self, file: &LocalFile, _: &Monitor<'_>) -> Result<bool, Failure> {

@@ -35,6 +35,7 @@ mod isolation;
 mod items;
 mod jobs;
 mod limits;
+mod meshes;
 mod migrate;
 mod models;
 mod monitoring;

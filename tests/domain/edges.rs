@@ -11,7 +11,7 @@ use ventriform::pipeline::{self, Model, PipelineError};
 use ventriform::progress::Monitor;
 use ventriform::retile::RetileError;
 use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::{ReadLimits, Volume, VolumeFile};
+use ventriform::volume::{ReadLimits, Volume, VolumeError, VolumeFile};
 use ventriform::work::problems::advice;
 
 fn volume(shape: [usize; 3], spacing: [f64; 3], value: impl Fn(Vec3) -> f64) -> Volume {
@@ -128,7 +128,12 @@ fn a_model_that_cannot_follow_its_surface_says_so() {
 #[test]
 fn fewer_than_three_voxels_an_axis_are_a_model_or_an_error() {
     for shape in [[1, 1, 1], [2, 2, 2], [1, 30, 30], [2, 40, 9]] {
-        let _ = generate(&filling(shape, [2.0; 3]), &[HALF]);
+        let made = generate(&filling(shape, [2.0; 3]), &[HALF]);
+        let refused = matches!(
+            made,
+            Err(PipelineError::Volume(VolumeError::SingleSlice { .. }))
+        );
+        assert_eq!(refused, shape.contains(&1), "{shape:?}");
     }
 }
 

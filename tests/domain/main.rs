@@ -16,6 +16,7 @@ mod retile_refined;
 mod optimise_determinism;
 
 mod export_formats;
+mod mesh_files;
 mod report_page;
 
 mod deform_cohort;

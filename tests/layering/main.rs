@@ -14,10 +14,22 @@ const USES: &[(&str, &[&str])] = &[
     ("geometry", &[]),
     ("numeric", &["geometry"]),
     ("mesh", &["geometry", "numeric"]),
+    ("mesh_files", &["geometry", "mesh"]),
     ("progress", &[]),
     ("grid", &["geometry", "numeric", "mesh", "progress"]),
     ("draw", &["geometry", "numeric", "mesh"]),
-    ("volume", &["text", "geometry", "progress", "grid", "draw"]),
+    (
+        "volume",
+        &[
+            "text",
+            "geometry",
+            "mesh",
+            "mesh_files",
+            "progress",
+            "grid",
+            "draw",
+        ],
+    ),
     (
         "locate",
         &["geometry", "numeric", "mesh", "progress", "grid"],
@@ -60,8 +72,17 @@ const USES: &[(&str, &[&str])] = &[
     (
         "parameters",
         &[
-            "geometry", "grid", "volume", "locate", "surface", "retile", "optimise", "model",
-            "deform", "polar",
+            "geometry",
+            "mesh_files",
+            "grid",
+            "volume",
+            "locate",
+            "surface",
+            "retile",
+            "optimise",
+            "model",
+            "deform",
+            "polar",
         ],
     ),
     (
@@ -106,6 +127,7 @@ const USES: &[(&str, &[&str])] = &[
         &[
             "geometry",
             "mesh",
+            "mesh_files",
             "progress",
             "grid",
             "draw",
@@ -142,6 +164,7 @@ const USES: &[(&str, &[&str])] = &[
         &[
             "geometry",
             "mesh",
+            "mesh_files",
             "progress",
             "grid",
             "volume",
@@ -169,6 +192,7 @@ const USES: &[(&str, &[&str])] = &[
         &[
             "text",
             "mesh",
+            "mesh_files",
             "progress",
             "volume",
             "export",
@@ -190,6 +214,7 @@ const USES: &[(&str, &[&str])] = &[
         &[
             "text",
             "mesh",
+            "mesh_files",
             "progress",
             "grid",
             "volume",

@@ -237,6 +237,23 @@ pub(super) fn priority_field() -> Schema {
     Schema::from(field)
 }
 
+/// `label`, `mesh_unit` and `mesh_frame` of an expert's mask.
+pub struct MaskParameters;
+
+impl IntoParams for MaskParameters {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let names = ["label", "mesh_unit", "mesh_frame"];
+        let specs = FIT_SPECS.iter().filter(|spec| names.contains(&spec.name));
+        specs
+            .map(|spec| {
+                query(spec.name, spec.summary)
+                    .schema(Some(schema_of(spec)))
+                    .build()
+            })
+            .collect()
+    }
+}
+
 /// `priority` of a job that is filed with an upload.
 pub struct PriorityParameter;
 
@@ -482,8 +499,19 @@ impl IntoParams for TemplateQuery {
         let text = || ObjectBuilder::new().schema_type(Type::String);
         let name = text().min_length(Some(1)).max_length(Some(80));
         let model = text().pattern(Some("^(mdl_|seg_)[0-9a-f]{1,64}$"));
+        let word = |words: &[&'static str]| text().enum_values(Some(words.iter().copied()));
         let own = [
             ("name", "The name that reports show", name),
+            (
+                "mesh_unit",
+                "Unit of the mesh, if its file does not state it. Default: mm (of glTF m), if the size is that of an organ",
+                word(&["mm", "cm", "m"]),
+            ),
+            (
+                "mesh_frame",
+                "Frame of the mesh, if its file does not state it. Default: lps",
+                word(&["lps", "ras"]),
+            ),
             (
                 "model",
                 "The stored model or segmentation whose mesh is copied",

@@ -35,8 +35,8 @@ pub use bodies::{
 };
 pub use inputs::{
     CachedHeaders, CascadeParameter, ConditionalHeaders, DeidentifyParameter, ErasureParameters,
-    EventHeader, IdempotencyHeader, ModelParametersObject, ModelQuery, PageParameters,
-    PartParameter, PreferHeader, PriorityParameter, ReaderQuery, ScanParameters,
+    EventHeader, IdempotencyHeader, MaskParameters, ModelParametersObject, ModelQuery,
+    PageParameters, PartParameter, PreferHeader, PriorityParameter, ReaderQuery, ScanParameters,
     SegmentationParametersObject, SegmentationQuery, TagParameters, TemplateQuery,
     TransactionParameters, WebhookInputs,
 };

@@ -617,6 +617,8 @@ schemas! {
         volume_ml: f64,
         /// Length of its cup, mm; ventricles only.
         length_mm: Option<f64>,
+        /// What was assumed or changed of the mesh, in sentences.
+        warnings: Vec<String>,
     }
 
     /// What a reader's profile holds.

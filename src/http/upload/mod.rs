@@ -25,7 +25,7 @@ use std::collections::BTreeMap;
 /// Bodies of these types are the bytes of a volume; what they hold is told by their content. Browsers,
 /// operating systems and old clients have names of their own for the same formats.
 /// `x-www-form-urlencoded` is what curl and urllib send unless told otherwise.
-const RAW_TYPES: [&str; 27] = [
+const RAW_TYPES: [&str; 48] = [
     "application/octet-stream",
     "application/x-octet-stream",
     "application/binary",
@@ -52,6 +52,28 @@ const RAW_TYPES: [&str; 27] = [
     "application/x-nifti-gz",
     "image/nifti",
     "image/x-nifti",
+    // Meshes: an expert's.
+    "model/stl",
+    "model/x.stl-ascii",
+    "model/x.stl-binary",
+    "application/sla",
+    "application/vnd.ms-pki.stl",
+    "application/x-navistyle",
+    "model/ply",
+    "model/x-ply",
+    "application/ply",
+    "application/x-ply",
+    "model/obj",
+    "text/prs.wavefront-obj",
+    "application/x-tgif",
+    "model/vtk",
+    "application/x-vtk",
+    "application/vtk",
+    "model/vtp",
+    "application/x-vtp",
+    "application/vtp",
+    "model/gltf-binary",
+    "model/gltf+json",
     "application/x-www-form-urlencoded",
 ];
 

@@ -178,22 +178,29 @@ impl Kind {
 /// Refuses PET, CT and MR images that hold something else than slices of the scan.
 fn check_slices(attributes: &Attributes, image_type: &[String]) -> Result<(), VolumeError> {
     let others = [
-        ("LOCALIZER", "it is a projection for planning, not a slice"),
+        (
+            "LOCALIZER",
+            "it is a projection for planning, not a slice",
+            "Send the slices of the scan: all files of one series.",
+        ),
         (
             "MOSAIC",
-            "it shows many slices side by side in one picture; export the slices one by one",
+            "it shows many slices side by side in one picture",
+            "Export the series again with one image for each slice, or as an Enhanced image.",
         ),
         (
             "TRANSMISSION",
             "it is a transmission map, which shows attenuation and no uptake",
+            "Send the images of the emission scan.",
         ),
     ];
-    for (value, reason) in others {
+    for (value, reason, fix) in others {
         if image_type.iter().any(|given| given == value) {
             return Err(VolumeError::NotSlices {
                 file: attributes.file.clone(),
                 image_type: value.into(),
                 reason,
+                fix,
             });
         }
     }
@@ -235,6 +242,7 @@ fn nuclear(attributes: &Attributes, image_type: &[String]) -> Result<Kind, Volum
             file: attributes.file.clone(),
             image_type: clip(&named),
             reason,
+            fix: "Give the reconstructed slices (Image Type RECON TOMO or RECON GATED TOMO).",
         })
     };
     if is_map {

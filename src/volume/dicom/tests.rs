@@ -600,7 +600,7 @@ proptest! {
             let at = at % bytes.len();
             bytes[at] = value;
         }
-        let limits = ReadLimits { voxels: 1 << 16, unpacked_bytes: 1 << 20 };
+        let limits = ReadLimits { voxels: 1 << 16, unpacked_bytes: 1 << 20, ..ReadLimits::DEFAULT };
         let files = [VolumeFile::in_memory("damaged", bytes)];
         for frame in [None, Some(0), Some(1)] {
             let options = ReadOptions { frame };

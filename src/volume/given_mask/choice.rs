@@ -3,6 +3,7 @@
 use super::error::GivenMaskError;
 use super::label::MaskLabel;
 use super::structures::{HeldKind, HeldStructures, MaskStructure};
+use crate::mesh_files::MeshStatement;
 
 /// What the caller says of a mask.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -11,6 +12,8 @@ pub struct MaskChoice {
     pub label: Option<MaskLabel>,
     /// Whether a mask on another lattice of voxels is resampled. Default: it is refused.
     pub resample: bool,
+    /// Unit and frame of a mask that is a mesh.
+    pub mesh: MeshStatement,
 }
 
 /// The number of the structure among `held` that `choice` means.

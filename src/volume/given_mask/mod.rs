@@ -14,6 +14,9 @@
 //!    over one by one, however they are stored (turned, mirrored, cropped, padded); another lattice is
 //!    refused with both geometries, or resampled if the caller asks.
 //!
+//! A closed surface (STL, PLY, OBJ, VTK, VTP, glTF, our JSON) is a mask, too: it has one structure and no grid, and is
+//! voxelised on the volume's, a voxel being inside where its centre is.
+//!
 //! Guaranteed: no voxel of another structure counts, also where segments overlap.
 
 mod choice;
@@ -37,6 +40,7 @@ use super::read;
 use super::{ReadLimits, ReadOptions, Volume, VolumeError, VolumeFile};
 use crate::geometry::frame::VoxelToPatient;
 use crate::grid::voxelise::Mask;
+use crate::mesh::TriMesh;
 use crate::progress::Monitor;
 
 /// One structure of a file, on the file's grid.
@@ -49,6 +53,8 @@ pub struct GivenMask {
     /// Which structure it is, for reports: `label 2`, `segment 1 (Left ventricle)`; `None` if the file
     /// holds nothing else.
     pub structure: Option<String>,
+    /// The surface whose inside it is, LPS mm, if it was given as one; the voxels are then of a grid about it.
+    pub surface: Option<TriMesh>,
 }
 
 impl GivenMask {
@@ -89,6 +95,7 @@ impl GivenMask {
             },
             frame: volume.frame.clone(),
             structure,
+            surface: None,
         })
     }
 }
@@ -108,6 +115,15 @@ pub fn read_mask(
         VolumeError::FrameNeeded { frames, .. } => GivenMaskError::Volumes { frames },
         error => GivenMaskError::File(error),
     };
+    let surface = read::surface(files, &choice.mesh, limits, monitor).map_err(unreadable)?;
+    if let Some((surface, reading)) = surface {
+        let held = structures::of_volume(&reading.volume);
+        let chosen = choice::choose(&held, choice)?;
+        let voxels = held.voxels(&reading.volume, chosen);
+        let mut given = GivenMask::new(&reading.volume, voxels, held.describe(chosen))?;
+        given.surface = Some(surface).filter(|_| chosen == 1);
+        return Ok(given);
+    }
     let segments = read::segments(files, limits, monitor).map_err(unreadable)?;
     if !segments.is_empty() {
         let held = structures::of_segments(&segments);

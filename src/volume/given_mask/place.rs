@@ -9,7 +9,7 @@ use super::error::GivenMaskError;
 use super::geometry::GridGeometry;
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
-use crate::grid::voxelise::Mask;
+use crate::grid::voxelise::{Mask, voxelise};
 use crate::progress::Monitor;
 use nalgebra::Matrix3;
 
@@ -72,6 +72,17 @@ impl GivenMask {
                 all,
                 mask: own,
                 grid: other,
+            });
+        }
+        if let Some(surface) = &self.surface {
+            let mask = voxelise(surface, shape, frame);
+            if !mask.voxels.contains(&true) {
+                return Err(GivenMaskError::Empty);
+            }
+            return Ok(PlacedMask {
+                mask,
+                resampled: false,
+                outside: all - inside,
             });
         }
         if lattice.is_none() && !resample {
@@ -142,6 +153,7 @@ impl GivenMask {
             mask,
             frame: frame.expect("a moved frame is as invertible as the mask's own"),
             structure: self.structure.clone(),
+            surface: self.surface.clone(),
         })
     }
 

@@ -39,7 +39,7 @@ fn cavity([i, j, k]: [usize; 3]) -> bool {
 fn named(label: &str) -> MaskChoice {
     MaskChoice {
         label: Some(label.parse().unwrap()),
-        resample: false,
+        ..MaskChoice::default()
     }
 }
 
@@ -213,6 +213,7 @@ fn one_lattice_in_any_storage_gives_the_same_voxels() {
                     mask,
                     frame: VoxelToPatient::new(Matrix3::from_columns(&steps), origin).unwrap(),
                     structure: None,
+                    surface: None,
                 };
                 assert_eq!(centres(&turned), centres(&original));
                 let placed = turned.on(grid, false, &silent).unwrap();
@@ -290,6 +291,7 @@ fn other_lattices_are_refused_with_both_geometries_or_resampled() {
         )
         .unwrap(),
         structure: None,
+        surface: None,
     };
     assert!(fine.on((SHAPE, &original.frame), false, &silent).is_err());
     let placed = fine.on((SHAPE, &original.frame), true, &silent).unwrap();
@@ -313,6 +315,7 @@ fn a_swapped_cube_is_compared_by_its_voxels() {
         mask: half(0),
         frame: VoxelToPatient::new(swapped, cube.to_patient(&Vec3::zeros())).unwrap(),
         structure: None,
+        surface: None,
     };
     let placed = given
         .on(([9; 3], &cube), false, &Monitor::silent())
@@ -378,4 +381,83 @@ fn labels_beyond_24_bits_are_told_apart() {
     assert!(refused.to_string().contains("576073729"), "{refused}");
     assert!(refused.to_string().contains("576073732"), "{refused}");
     assert!(read_mask(&files, &named("576073728"), &limits, &silent).is_err());
+}
+
+/// A body as a surface is the mask of the voxels whose centres lie inside it, on any grid.
+#[test]
+fn a_surface_is_voxelised_on_the_grid_of_the_volume() {
+    use crate::grid::voxelise::voxelise;
+    use crate::mesh::shapes;
+    let mut mesh = shapes::icosphere(14.0, 3);
+    let grid = frame();
+    let centre = grid.to_patient(&Vec3::new(5.3, 4.1, 2.8));
+    mesh.vertices.iter_mut().for_each(|p| *p += centre);
+    let wanted = voxelise(&mesh, SHAPE, &grid);
+    let text = |mesh: &TriMesh, head: &str| {
+        let points = mesh
+            .vertices
+            .iter()
+            .map(|p| format!("v {} {} {}\n", p.x, p.y, p.z));
+        let faces = mesh
+            .triangles
+            .iter()
+            .map(|t| t.map(|v| (v + 1).to_string()).join(" "));
+        let faces = faces.map(|face| format!("f {face}\n"));
+        [head.to_owned()]
+            .into_iter()
+            .chain(points)
+            .chain(faces)
+            .collect::<String>()
+    };
+    let (limits, silent) = (ReadLimits::default(), Monitor::silent());
+    let read = |text: String, choice: &MaskChoice| {
+        let files = [VolumeFile::in_memory("drawn.obj", text.into_bytes())];
+        read_mask(&files, choice, &limits, &silent)
+    };
+    let any = MaskChoice::default();
+    let given = read(text(&mesh, "# SPACE=LPS UNIT=mm\n"), &any).unwrap();
+    assert_eq!(given.structure, None);
+    let placed = given.on((SHAPE, &grid), false, &silent).unwrap();
+    assert_eq!(placed.mask, wanted);
+    assert!(!placed.resampled);
+    // The voxels of its own grid tell its size.
+    let own_ml = given.mask.count() as f64 * given.frame.voxel_volume();
+    assert!((own_ml / mesh.volume() - 1.0).abs() < 0.01);
+    // In another frame it lies elsewhere, unless that is stated.
+    let mut turned = mesh.clone();
+    turned
+        .vertices
+        .iter_mut()
+        .for_each(|p| (p.x, p.y) = (-p.x, -p.y));
+    let lost = read(text(&turned, ""), &any).unwrap();
+    let lost = lost.on((SHAPE, &grid), false, &silent).unwrap_err();
+    assert!(matches!(lost, GivenMaskError::Elsewhere { .. }), "{lost}");
+    let mut ras = any.clone();
+    ras.mesh.frame = Some(crate::mesh_files::MeshFrame::Ras);
+    let found = read(text(&turned, ""), &ras).unwrap();
+    assert_eq!(
+        found.on((SHAPE, &grid), false, &silent).unwrap().mask,
+        wanted
+    );
+    // Metres are told by the size.
+    let mut small = mesh.clone();
+    small.vertices.iter_mut().for_each(|p| *p /= 1000.0);
+    let refused = read(text(&small, "# wavefront\n"), &any).unwrap_err();
+    assert!(refused.to_string().contains("factor 1000"), "{refused}");
+    let mut metres = any.clone();
+    metres.mesh.unit = Some(crate::mesh_files::MeshUnit::Metre);
+    let found = read(text(&small, "# wavefront\n"), &metres).unwrap();
+    let found = found.on((SHAPE, &grid), false, &silent).unwrap().mask;
+    let differ = found
+        .voxels
+        .iter()
+        .zip(&wanted.voxels)
+        .filter(|(a, b)| a != b);
+    assert!(differ.count() <= 1);
+    // An open surface, and a label that it does not have.
+    let mut open = mesh.clone();
+    open.triangles.pop();
+    let refused = read(text(&open, "# SPACE=LPS UNIT=mm\n"), &any).unwrap_err();
+    assert!(refused.to_string().contains("3 edges"), "{refused}");
+    assert!(read(text(&mesh, "# SPACE=LPS UNIT=mm\n"), &named("7")).is_err());
 }

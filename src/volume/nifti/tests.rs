@@ -653,6 +653,7 @@ fn limits_are_kept() {
     let enough = ReadLimits {
         voxels: 24,
         unpacked_bytes: 400,
+        ..ReadLimits::DEFAULT
     };
     for bytes in [file.bytes.clone(), gzip(&file.bytes)] {
         let e = limited(&bytes, few);
@@ -1003,7 +1004,7 @@ proptest! {
             bytes.truncate(cut);
         }
         let bytes = if packed { gzip(&bytes) } else { bytes };
-        let limits = ReadLimits { voxels: 1 << 16, unpacked_bytes: 1 << 20 };
+        let limits = ReadLimits { voxels: 1 << 16, unpacked_bytes: 1 << 20, ..ReadLimits::DEFAULT };
         let files = [VolumeFile::in_memory("damaged", bytes)];
         for frame in [None, Some(0), Some(3)] {
             let options = ReadOptions { frame };

@@ -50,6 +50,16 @@ function kept(path: string): Promise<Voxels> {
   return found;
 }
 
+/** The structure that a job compared with: of several in the file of its expert, the one that its parameters name. */
+function expertOf(id: string, parameters: Result["parameters"]): Promise<Voxels> {
+  const query = new URLSearchParams({ mask: "true" });
+  for (const name of ["label", "mesh_unit", "mesh_frame"]) {
+    const value = parameters[name];
+    if (value !== null && value !== undefined) query.set(name, String(value));
+  }
+  return kept(`/v1/volumes/${id}/voxels.nii.gz?${query}`);
+}
+
 /** The voxels of a stored volume, whatever its files are. */
 export function voxelsOf(volume: Pick<Volume, "id">, frame: number | null): Promise<Voxels> {
   return kept(`/v1/volumes/${volume.id}/voxels.nii.gz${frame === null ? "" : `?frame=${frame}`}`);
@@ -74,7 +84,7 @@ export async function loadLoaded(result: Result): Promise<Loaded> {
     json<PolarMap>("polar.json"),
     maskFile ? kept(maskFile.href) : null,
     // The expert's mask may have been erased since; the fit is shown all the same.
-    typeof expertId === "string" ? voxelsOf({ id: expertId }, null).catch(() => null) : null,
+    typeof expertId === "string" ? expertOf(expertId, result.parameters).catch(() => null) : null,
     fit ? null : json<{ parts: number; distances_mm: number[] }>("distance.json"),
   ]);
   const heart = report && heartOf(report);

@@ -59,7 +59,7 @@ fn folder(content: &[(&str, Vec<u8>)]) -> (tempfile::TempDir, Vec<VolumeFile>) {
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(path, bytes).unwrap();
     }
-    let files = VolumeFile::given(&[folder.path()]).unwrap();
+    let files = VolumeFile::given(&[folder.path()], &ReadLimits::DEFAULT).unwrap();
     (folder, files)
 }
 
@@ -286,7 +286,7 @@ fn objects_without_slices_are_left_out_beside_a_volume() {
 #[test]
 fn folders_are_bounded_and_links_are_not_followed() {
     let empty = tempfile::tempdir().unwrap();
-    let refused = |path: &Path| VolumeFile::given(&[path]).unwrap_err();
+    let refused = |path: &Path| VolumeFile::given(&[path], &ReadLimits::DEFAULT).unwrap_err();
     assert!(matches!(refused(empty.path()), VolumeError::Empty { .. }));
     let deep = tempfile::tempdir().unwrap();
     let levels: Vec<String> = (0..17).map(|level| level.to_string()).collect();
@@ -304,12 +304,28 @@ fn folders_are_bounded_and_links_are_not_followed() {
         )
         .unwrap();
         std::os::unix::fs::symlink(looped.path(), looped.path().join("again")).unwrap();
-        let files = VolumeFile::given(&[looped.path()]).unwrap();
+        let files = VolumeFile::given(&[looped.path()], &ReadLimits::DEFAULT).unwrap();
         assert_eq!(files.len(), 1);
         assert!(read_files(&files).is_ok());
     }
-    let limits = ReadLimits::default();
-    assert!(limits.unpacked_bytes > 0);
+    let limited = |files, folder_levels| ReadLimits {
+        files,
+        folder_levels,
+        ..ReadLimits::DEFAULT
+    };
+    let given = |limits| VolumeFile::given(&[deep.path()], &limits);
+    assert!(matches!(
+        given(limited(16, 18)),
+        Err(VolumeError::TooLarge {
+            what: "files",
+            limit: 16,
+            ..
+        })
+    ));
+    assert!(matches!(
+        given(limited(17, 18)),
+        Err(VolumeError::Empty { .. })
+    ));
 }
 
 #[test]

@@ -352,7 +352,7 @@ fn a_segment_is_chosen_by_its_code_or_name_and_never_by_its_place() {
         )];
         let choice = MaskChoice {
             label: label.map(|text| text.parse().unwrap()),
-            resample: false,
+            ..MaskChoice::default()
         };
         read_mask(&files, &choice, &ReadLimits::default(), &Monitor::silent())
     };

@@ -1,0 +1,118 @@
+//! Why a file gives no surface.
+
+use super::MeshFormat;
+use super::size::UnlikelySize;
+
+/// Why a file gives no surface.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MeshFileError {
+    /// The file, or what it unpacks to, is larger than the limit.
+    #[error("the mesh has {bytes} bytes; the limit is {limit}")]
+    TooLong {
+        /// Size of the file, or of its arrays unpacked.
+        bytes: u64,
+        /// The limit.
+        limit: u64,
+    },
+    /// The content shows no format that is read.
+    #[error("the file is not in a known format of meshes: it begins with {start}")]
+    Unknown {
+        /// Its first bytes, escaped.
+        start: String,
+    },
+    /// The content breaks the rules of its format.
+    #[error("the {} file is damaged at {place}: {reason}", format.as_str())]
+    Damaged {
+        /// The format.
+        format: MeshFormat,
+        /// Byte, line or element.
+        place: String,
+        /// What is wrong there.
+        reason: String,
+    },
+    /// The format allows it, and this program does not read it.
+    #[error("the {} file has {what}, which is not supported", format.as_str())]
+    Unsupported {
+        /// The format.
+        format: MeshFormat,
+        /// What it has.
+        what: String,
+    },
+    /// There is no triangle.
+    #[error("the mesh has no triangles")]
+    Empty,
+    /// A coordinate is NaN or infinite.
+    #[error("a coordinate of vertex {vertex} is not finite")]
+    NotFinite {
+        /// Index of the vertex.
+        vertex: usize,
+    },
+    /// A face refers to a vertex that does not exist.
+    #[error("face {face} refers to vertex {vertex}, counted from 0; there are {count}")]
+    NoSuchVertex {
+        /// Number of the face, from 0.
+        face: usize,
+        /// What it refers to.
+        vertex: String,
+        /// Number of vertices.
+        count: usize,
+    },
+    /// Edges with a triangle on one side only.
+    #[error(
+        "the surface is open: {edges} edges belong to one triangle only, the first from {from} to {to}"
+    )]
+    Open {
+        /// How many.
+        edges: usize,
+        /// One end of the first, as the file states it.
+        from: String,
+        /// The other end.
+        to: String,
+    },
+    /// Edges whose triangles do not lie on opposite sides.
+    #[error(
+        "the triangles have no common orientation: at {edges} edges they traverse the edge in the same direction, at the \
+         first from {from} to {to}"
+    )]
+    Orientation {
+        /// How many.
+        edges: usize,
+        /// One end of the first, as the file states it.
+        from: String,
+        /// The other end.
+        to: String,
+    },
+    /// The surface encloses nothing.
+    #[error("the surface encloses no volume")]
+    Flat,
+    /// Caller and file, or two places of the file, name different units or frames.
+    #[error("the file says that its {field} is {file}, and {caller} was stated")]
+    Contradiction {
+        /// `unit` or `frame`.
+        field: &'static str,
+        /// What the file says.
+        file: &'static str,
+        /// What was stated.
+        caller: &'static str,
+    },
+    /// The file names a unit or frame that is not known.
+    #[error("{field} is {word:?}; {known} are known")]
+    UnknownWord {
+        /// Name of the field in the file.
+        field: &'static str,
+        /// Its value.
+        word: String,
+        /// What is known.
+        known: &'static str,
+    },
+    /// Nobody stated the unit, and the size is not that of an organ.
+    #[error(transparent)]
+    Size(UnlikelySize),
+}
+
+/// The error for a file that begins with `start`.
+pub(super) fn unknown(start: &[u8]) -> MeshFileError {
+    MeshFileError::Unknown {
+        start: start[..start.len().min(16)].escape_ascii().to_string(),
+    }
+}
