@@ -327,6 +327,11 @@ mod tests {
             head: PATIENCE,
             idle: PATIENCE,
             write: PATIENCE,
+            linger: super::super::Linger {
+                total: PATIENCE,
+                pause: PATIENCE,
+                bytes: 0,
+            },
             grace: PATIENCE,
         };
         Registry::new(&limits, IntGauge::new("open", "Open connections.").unwrap())
