@@ -38,6 +38,7 @@ mod limits;
 mod migrate;
 mod models;
 mod monitoring;
+mod named;
 mod on_postgres;
 mod openapi;
 mod operations;
