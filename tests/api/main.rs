@@ -47,6 +47,7 @@ mod proxies;
 mod readers;
 mod receiver;
 mod records;
+mod refused;
 mod replicas;
 mod s3;
 mod s3_server;

@@ -17,8 +17,7 @@ const VOXELS: usize = 352;
 
 fn unpacked(bytes: &[u8]) -> Vec<u8> {
     let mut all = Vec::new();
-    let read = flate2::read::MultiGzDecoder::new(bytes).read_to_end(&mut all);
-    match read {
+    match flate2::read::GzDecoder::new(bytes).read_to_end(&mut all) {
         Ok(_) => all,
         Err(_) => bytes.to_vec(),
     }
@@ -102,13 +101,13 @@ fn names(bytes: &[u8]) -> bool {
     holds(bytes) || holds(&unpacked(bytes))
 }
 
-async fn body(request: reqwest::RequestBuilder) -> (u16, Vec<u8>) {
+/// The status of an answer, and whether it names the patient.
+async fn told(request: reqwest::RequestBuilder) -> (u16, bool) {
     let answer = request.send().await.unwrap();
     let head = format!("{:?}", answer.headers());
     let status = answer.status().as_u16();
-    let mut bytes = answer.bytes().await.unwrap().to_vec();
-    bytes.extend_from_slice(head.as_bytes());
-    (status, bytes)
+    let body = answer.bytes().await.unwrap();
+    (status, names(head.as_bytes()) || names(&body))
 }
 
 #[tokio::test]
@@ -216,9 +215,9 @@ async fn no_answer_to_a_key_that_reads_holds_what_a_nifti_file_says_of_a_patient
                     // The other ways of asking only without a query.
                     let ways = if query.is_empty() { 3 } else { 1 };
                     for (header, value) in &headers[..ways] {
-                        let (status, body) = body(get(&path, &read).header(*header, *value)).await;
+                        let (status, named) = told(get(&path, &read).header(*header, *value)).await;
                         assert!(status < 500, "{path}: {status}");
-                        assert!(!names(&body), "{path} of {how}, {header}: {value}");
+                        assert!(!named, "{path} of {how}, {header}: {value}");
                         asked += 1;
                         given += usize::from(status < 300);
                         let original = path.ends_with("content") || path.contains("/files/");
@@ -233,8 +232,8 @@ async fn no_answer_to_a_key_that_reads_holds_what_a_nifti_file_says_of_a_patient
     assert!(asked > 500 && given > 80, "{given} of {asked}");
     // Whoever may send them reads them.
     for (how, id) in &volumes {
-        let (status, body) = body(get(&format!("/v1/volumes/{id}/content"), &submit)).await;
+        let (status, named) = told(get(&format!("/v1/volumes/{id}/content"), &submit)).await;
         assert_eq!(status, 200);
-        assert!(*how == "an archive" || names(&body), "{how}");
+        assert!(*how == "an archive" || named, "{how}");
     }
 }

@@ -183,8 +183,13 @@ impl Server {
             }
         };
         tokio::select! {
-            outcome = ended => if let Err(error) = outcome {
-                Refused::log(peer, &error);
+            outcome = ended => match outcome {
+                Err(error) => Refused::log(peer, &error),
+                // hyper takes a connection on which nothing came for one that was closed.
+                Ok(()) if ticket.connection.is_late() => {
+                    Refused::log(peer, &Refused::NoRequest.into());
+                }
+                Ok(()) => {}
             },
             () = closed.cancelled() => {
                 tracing::info!(client = %peer, "a stalled connection was closed for another one");

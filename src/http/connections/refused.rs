@@ -20,6 +20,9 @@ pub enum Refused {
     /// The handshake of TLS took longer than `header_timeout`.
     #[error("the TLS handshake did not end in time")]
     SlowHandshake,
+    /// Nothing came within `header_timeout`.
+    #[error("no request came in time")]
+    NoRequest,
     /// It was one too many, and did not end in time.
     #[error("a connection beyond the limits did not end in time")]
     Reserve,

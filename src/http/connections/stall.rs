@@ -219,6 +219,9 @@ impl<S> WatchedStream<S> {
             ready!(wait.timer.as_mut().poll(context));
             if awaited.is_some() {
                 let idle = number > 0 && !wait.begun;
+                if !idle {
+                    self.connection.set_late();
+                }
                 return Poll::Ready(io::Error::new(io::ErrorKind::TimedOut, Late { idle }));
             }
             self.head = None;
