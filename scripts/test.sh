@@ -73,6 +73,7 @@ install_external_tools() {
   need ip iproute2
   need openssl openssl
   [ -x /usr/sbin/nginx ] || need nginx nginx-light
+  [ -x /usr/sbin/pgbouncer ] || need pgbouncer pgbouncer
   need promtool prometheus
   need kubectl kubernetes-client
   python3 -c 'import ensurepip, venv' 2>/dev/null || need no-such-command python3 python3-venv python3-pip
@@ -139,6 +140,7 @@ if wait "${running[install]}"; then
   # Beside other checks on the same processors, and without optimisation, honest requests take longer.
   start limits "$PYTHON" scripts/check_limits.py --program target/debug/ventriform --patience 4
   start proxy scripts/check_proxy.sh
+  start pgbouncer scripts/check_pgbouncer.sh
   start alerts promtool test rules deploy/prometheus/alerts_test.yml
   start dependencies "$PYTHON" scripts/dependencies.py check
   collect formats "formats read by trimesh, vtk and the glTF validator"
@@ -156,6 +158,7 @@ if wait "${running[install]}"; then
   collect kubernetes "manifests against the schemas of Kubernetes"
   collect limits "attacks of one client under a limit of memory"
   collect proxy "service behind nginx"
+  collect pgbouncer "service on PostgreSQL behind PgBouncer"
   collect alerts "alerts of Prometheus"
   collect dependencies "licences, sources and bill of materials"
 else

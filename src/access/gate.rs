@@ -1,7 +1,8 @@
 //! From the `Authorization` of a request to a caller.
 
 use super::{
-    AccessStore, ApiKey, Identity, Issuer, IssuerError, KeyState, PresentedKey, Quota, Scope,
+    AccessStore, ApiKey, Identity, Issuer, IssuerError, KeyState, Maker, Makers, PresentedKey,
+    Quota, Scope,
 };
 use crate::jobs::{Clock, StoreError, Tenant};
 use std::collections::HashMap;
@@ -15,6 +16,9 @@ pub const FRESH_FOR: Duration = Duration::from_millis(500);
 
 /// Most records in memory.
 const MOST_KEPT: usize = 1024;
+
+/// Most keys in a row of which each has made the next one.
+pub const MOST_MAKERS: usize = 8;
 
 /// Longest credentials, bytes. Tokens with many groups have a few thousand.
 const LONGEST: usize = 16 * 1024;
@@ -148,6 +152,7 @@ impl Gate {
             scope: self.anonymous,
             key: None,
             quota: Quota::default(),
+            makers: Makers::default(),
             expires_at: None,
             account: None,
         }
@@ -160,7 +165,8 @@ impl Gate {
         }
         match key.state(self.clock.now()) {
             KeyState::Active => Ok(Identity {
-                account: Some(format!("key {}", key.id)),
+                makers: self.makers(&key).await?,
+                account: Some(account(&key.id)),
                 tenant: key.tenant,
                 name: key.name,
                 scope: key.scope,
@@ -174,6 +180,28 @@ impl Gate {
                 state,
             }),
         }
+    }
+
+    /// The keys that have made a key.
+    async fn makers(&self, key: &ApiKey) -> Result<Makers, StoreError> {
+        let mut makers = Makers {
+            any: key.maker != Maker::Operator,
+            keys: Vec::new(),
+        };
+        let mut maker = key.maker.clone();
+        while let Maker::Caller(Some(id)) = maker {
+            // Rows of keys are never deleted, and a key is made before those that it makes.
+            let Some(key) = self
+                .key(&id)
+                .await?
+                .filter(|_| makers.keys.len() < MOST_MAKERS)
+            else {
+                break;
+            };
+            makers.keys.push((account(&key.id), key.quota));
+            maker = key.maker;
+        }
+        Ok(makers)
     }
 
     /// The record of a key, at most [`FRESH_FOR`] old. Unknown ids are not kept, so strangers
@@ -205,6 +233,11 @@ impl From<IssuerError> for Refusal {
             IssuerError::Unavailable(reason) => Refusal::Issuer(reason),
         }
     }
+}
+
+/// The account of a key, where requests are counted.
+fn account(key: &str) -> String {
+    format!("key {key}")
 }
 
 /// The credential of an `Authorization: Bearer CREDENTIAL` (RFC 6750; the scheme in any case).

@@ -16,8 +16,40 @@ pub struct Identity {
     pub key: Option<String>,
     /// Limits that replace the general ones.
     pub quota: Quota,
+    /// The keys that have made its key, its own maker first.
+    pub makers: Makers,
     /// When its key expires.
     pub expires_at: Option<Timestamp>,
     /// Tells callers apart where requests are counted; `None` for the anonymous caller.
     pub account: Option<String>,
+}
+
+/// The keys that have made a key, one the other.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Makers {
+    /// Whether a caller of the service has made it, with or without a key.
+    pub any: bool,
+    /// Their accounts and their own limits.
+    pub keys: Vec<(String, Quota)>,
+}
+
+impl Identity {
+    /// The limits on this caller where the operator's are `general`. Limits that the operator gave to a key replace
+    /// them; a key that a caller has made has no more than the operator allowed the first in the row.
+    pub fn limits(&self, general: Quota) -> Quota {
+        let own = self.quota.or(general);
+        match self.makers.any {
+            false => own,
+            true => {
+                let first = self.makers.keys.last().map(|(_, quota)| *quota);
+                own.within(first.unwrap_or_default().or(general))
+            }
+        }
+    }
+
+    /// The accounts, besides its own, for which its requests count, with the requests that each may send.
+    pub fn shared_accounts(&self) -> impl Iterator<Item = (&str, u64)> {
+        let makers = self.makers.keys.iter();
+        makers.filter_map(|(account, quota)| Some((account.as_str(), quota.requests?)))
+    }
 }

@@ -22,6 +22,15 @@ const SECRET_BYTES: usize = 32;
 /// Longest name, characters.
 const LONGEST_NAME: usize = 80;
 
+/// Who made a key.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Maker {
+    /// The operator, on the machine of the service.
+    Operator,
+    /// A caller of the service: the id of its key, `None` if it came with a token or without credentials.
+    Caller(Option<String>),
+}
+
 /// The record of a key.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ApiKey {
@@ -37,6 +46,8 @@ pub struct ApiKey {
     pub scope: Scope,
     /// Limits that replace the general ones.
     pub quota: Quota,
+    /// Who made it.
+    pub maker: Maker,
     /// When it was made.
     pub created_at: Timestamp,
     /// From when on it is refused.
@@ -58,6 +69,8 @@ pub struct KeyRequest {
     pub scope: Scope,
     /// See [`ApiKey::quota`].
     pub quota: Quota,
+    /// See [`ApiKey::maker`].
+    pub maker: Maker,
     /// See [`ApiKey::expires_at`].
     pub expires_at: Option<Timestamp>,
 }
@@ -122,6 +135,7 @@ impl ApiKey {
             tenant: request.tenant,
             scope: request.scope,
             quota: request.quota,
+            maker: request.maker,
             created_at: now,
             expires_at: request.expires_at,
             revoked_at: None,
@@ -190,6 +204,7 @@ mod tests {
             tenant: Tenant::default(),
             scope: Scope::Read,
             quota: Quota::default(),
+            maker: Maker::Operator,
             expires_at: Some(100),
         }
     }

@@ -36,9 +36,9 @@ pub use audit::{
     Activity, Anchor, AuditEvent, AuditFilter, AuditLink, AuditRecord, AuditReport, BrokenLink,
     NO_HASH, NotRecorded, Outcome, Recorder, chain_hash, fhir, verify,
 };
-pub use gate::{FRESH_FOR, Gate, Refusal};
-pub use identity::Identity;
-pub use key::{ApiKey, KeyError, KeyRequest, KeyState, PresentedKey};
+pub use gate::{FRESH_FOR, Gate, MOST_MAKERS, Refusal};
+pub use identity::{Identity, Makers};
+pub use key::{ApiKey, KeyError, KeyRequest, KeyState, Maker, PresentedKey};
 pub use oidc::{Issuer, IssuerError, IssuerSettings};
 pub use quota::{Allowance, Quota, RequestCounter, Usage, WINDOW};
 pub use scope::{InvalidScope, Scope};

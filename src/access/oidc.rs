@@ -13,7 +13,7 @@
 //! key at most once per [`RETRY_AFTER`]. A token whose key is known does not wait for that: the keys are
 //! used as they are, for at most [`STALE_AFTER`], and read anew beside the requests.
 
-use super::{Identity, Quota, Scope};
+use super::{Identity, Makers, Quota, Scope};
 use crate::jobs::{Tenant, content_id};
 use crate::text::is_printable;
 use base64::Engine;
@@ -188,6 +188,7 @@ impl Known {
             scope,
             key: None,
             quota: Quota::default(),
+            makers: Makers::default(),
             expires_at: None,
         })
     }

@@ -2,7 +2,8 @@
 //!
 //! Requests are counted per caller in windows of one minute that begin with the caller's first
 //! request (a quota policy of draft-ietf-httpapi-ratelimit-headers). The counts are kept in memory:
-//! a restart begins new windows. Stored bytes and waiting jobs are counted in the database, per
+//! a restart begins new windows. A request with a key that another key has made counts for both, so that
+//! all keys that a key makes have together what it has. Stored bytes and waiting jobs are counted in the database, per
 //! tenant.
 
 use std::collections::HashMap;
@@ -21,7 +22,7 @@ const MOST_CALLERS: usize = 100_000;
 pub struct Quota {
     /// Requests per minute.
     pub requests: Option<u64>,
-    /// Bytes of all volumes that the tenant stores.
+    /// Bytes of everything that the tenant stores.
     pub bytes: Option<u64>,
     /// Waiting jobs of the tenant.
     pub jobs: Option<u64>,
@@ -37,12 +38,26 @@ impl Quota {
             jobs: self.jobs.or(general.jobs),
         }
     }
+
+    /// These limits, and those of `bound` where they are lower.
+    #[must_use]
+    pub fn within(self, bound: Self) -> Self {
+        let lower = |own: Option<u64>, bound: Option<u64>| match (own, bound) {
+            (Some(own), Some(bound)) => Some(own.min(bound)),
+            (own, bound) => own.or(bound),
+        };
+        Self {
+            requests: lower(self.requests, bound.requests),
+            bytes: lower(self.bytes, bound.bytes),
+            jobs: lower(self.jobs, bound.jobs),
+        }
+    }
 }
 
 /// What a tenant uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Usage {
-    /// Bytes of its volumes.
+    /// Bytes of everything that it stores.
     pub bytes: u64,
     /// Its waiting jobs.
     pub jobs: u64,

@@ -3,7 +3,7 @@
 
 use super::data_args::DataArgs;
 use super::output::{note, say};
-use crate::access::{AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Quota, Scope};
+use crate::access::{AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Maker, Quota, Scope};
 use crate::config::{Size, Span};
 use crate::jobs::{Clock, ListRequest, SystemClock, Tenant, Timestamp, rfc3339};
 use crate::text::escaped;
@@ -99,6 +99,7 @@ async fn create(args: &CreateArgs) -> Result<()> {
             bytes: args.stored_bytes.map(|size| size.0),
             jobs: args.queued_jobs,
         },
+        maker: Maker::Operator,
         expires_at: args.expires.map(|s| now.saturating_add(span(s))),
     };
     let (key, text) = ApiKey::make(request, now)?;

@@ -414,6 +414,13 @@ settings! {
     keep_alive_timeout: Span = "620s";
     /// Longest pause of a client in reading an answer; it must also read 1 KiB per second on average
     write_timeout: Span = "30s";
+    /// Where a request was refused before its body had come: longest time for its client to go on sending,
+    /// to read the answer and to close. A proxy that cannot send on may answer with 502 instead
+    linger_time: Span = "10s";
+    /// Longest pause of such a client in sending
+    linger_pause: Span = "2s";
+    /// Bytes of such a client that are read and thrown away
+    linger_bytes: Size = "512MiB";
     /// Largest number of streams of events (/v1/jobs/ID/events); more are answered with status 429
     event_stream_limit: usize = "1024";
     /// Largest number of streams of events of one client address

@@ -21,6 +21,10 @@ pub struct Caller {
     pub quota: Quota,
     /// Limits of its own key, and when that expires.
     pub own: (Quota, Option<Timestamp>),
+    /// The id of its key.
+    pub key: Option<String>,
+    /// How many keys have made that key, one the other.
+    pub makers: usize,
 }
 
 impl Caller {
@@ -61,6 +65,8 @@ impl Caller {
             scope: identity.scope,
             quota,
             own: (identity.quota, identity.expires_at),
+            key: identity.key.clone(),
+            makers: identity.makers.keys.len(),
         }
     }
 }

@@ -9,7 +9,7 @@ use super::pagination::{list_query, next_cursor};
 use super::problem::{Answer, Problem, shorten};
 use super::request::{PathSegments, json_object, query_pairs, refuse_unknown, unknown};
 use super::wire::rfc3339;
-use crate::access::{Activity, ApiKey, KeyError, KeyRequest, Quota, Scope};
+use crate::access::{Activity, ApiKey, KeyError, KeyRequest, MOST_MAKERS, Maker, Quota, Scope};
 use crate::http::public_base::public_path;
 use crate::jobs::{Timestamp, parse_rfc3339};
 use axum::Extension;
@@ -39,6 +39,10 @@ pub struct KeyBody {
     scope: ScopeName,
     /// Whether it opens the service.
     state: KeyStateName,
+    /// The key that has made it, if a key has: its requests count as requests of that key too.
+    #[schema(example = "fedcba9876543210")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    made_by: Option<String>,
     /// When it was made (RFC 3339).
     #[schema(format = DateTime)]
     created_at: String,
@@ -130,7 +134,8 @@ const FIELDS: [&str; 6] = [
 
 /// Make a key
 ///
-/// For the caller's tenant. The answer is the only place where the key itself is shown.
+/// For the caller's tenant. The answer is the only place where the key itself is shown. Requests with it count as
+/// requests of the caller's key too, so that all keys that a key makes have together what it has.
 #[utoipa::path(post, path = "/v1/keys", tag = "access", operation_id = "create_key",
     request_body(content = NewKey, content_type = "application/json"),
     responses(
@@ -259,6 +264,10 @@ fn read(object: &Map<String, Value>, caller: &Caller) -> Answer<KeyRequest> {
     if !caller.scope.includes(scope) {
         return Err(beyond("scope", caller.scope));
     }
+    if scope == Scope::Admin && caller.makers + 1 >= MOST_MAKERS {
+        // It could make one more.
+        return Err(beyond("scope", Scope::Submit));
+    }
     // What the maker has itself, and what the operator allows everybody.
     let (own, own_end) = caller.own;
     let bounded = |field: &str, own: Option<u64>, allowed: Option<u64>| {
@@ -284,6 +293,7 @@ fn read(object: &Map<String, Value>, caller: &Caller) -> Answer<KeyRequest> {
             bytes: bounded("stored_bytes", own.bytes, caller.quota.bytes)?,
             jobs: bounded("queued_jobs", own.jobs, caller.quota.jobs)?,
         },
+        maker: Maker::Caller(caller.key.clone()),
         expires_at,
     })
 }
@@ -325,6 +335,10 @@ impl KeyBody {
             id: key.id,
             name: key.name,
             tenant: key.tenant.to_string(),
+            made_by: match key.maker {
+                Maker::Operator => None,
+                Maker::Caller(key) => key,
+            },
             created_at: rfc3339(key.created_at),
             expires_at: key.expires_at.map(rfc3339),
             revoked_at: key.revoked_at.map(rfc3339),

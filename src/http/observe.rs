@@ -192,10 +192,20 @@ pub async fn measure(State(app): State<App>, request: Request, next: Next) -> Ax
     let route = request.extensions().get::<MatchedPath>();
     let route = route.map_or(NO_ROUTE, MatchedPath::as_str).to_owned();
     let metrics = &app.metrics.requests;
-    let waiting = Waiting::begin(metrics.clone());
+    let id = request.extensions().get::<RequestId>();
+    let id = id.and_then(|id| id.header_value().to_str().ok());
+    let waiting = Waiting {
+        metrics: metrics.clone(),
+        since: Instant::now(),
+        answered: false,
+        id: id.map(str::to_owned),
+        method,
+        route: route.clone(),
+    };
+    metrics.in_flight.inc();
     let request = request.map(|body| CountedBody::around(body, &metrics.received));
     let response = next.run(request).await;
-    waiting.end(method, &route, response.status());
+    waiting.end(response.status());
     response.map(|body| CountedBody::around(body, &metrics.sent))
 }
 
@@ -204,20 +214,15 @@ struct Waiting {
     metrics: RequestMetrics,
     since: Instant,
     answered: bool,
+    id: Option<String>,
+    method: &'static str,
+    route: String,
 }
 
 impl Waiting {
-    fn begin(metrics: RequestMetrics) -> Self {
-        metrics.in_flight.inc();
-        Self {
-            metrics,
-            since: Instant::now(),
-            answered: false,
-        }
-    }
-
-    fn end(mut self, method: &str, route: &str, status: StatusCode) {
+    fn end(mut self, status: StatusCode) {
         self.answered = true;
+        let (method, route) = (self.method, self.route.as_str());
         let answers = &self.metrics.answers;
         answers
             .with_label_values(&[method, route, status.as_str()])
@@ -235,6 +240,15 @@ impl Drop for Waiting {
         self.metrics.in_flight.dec();
         if !self.answered {
             self.metrics.abandoned.inc();
+            let (id, method, path) = (&self.id, self.method, &self.route);
+            let ms = self.since.elapsed().as_millis() as u64;
+            tracing::info!(
+                id,
+                method,
+                path,
+                ms,
+                "the client went away before the answer"
+            );
         }
     }
 }

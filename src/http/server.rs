@@ -3,7 +3,7 @@
 use super::app::{App, Watching};
 use super::archives::ArchiveDesk;
 use super::connections::tls::{Tls, TlsError};
-use super::connections::{self, ConnectionLimits};
+use super::connections::{self, ConnectionLimits, Linger};
 use super::cryptography::install_cryptography;
 use super::duties::{self, UPKEEP_EVERY};
 use super::guard::hosts::HostPolicy;
@@ -187,6 +187,11 @@ pub async fn start(
         head: settings.header_timeout.0,
         idle: settings.keep_alive_timeout.0,
         write: settings.write_timeout.0,
+        linger: Linger {
+            total: settings.linger_time.0,
+            pause: settings.linger_pause.0,
+            bytes: settings.linger_bytes.0,
+        },
         grace: settings.shutdown_grace.0,
     };
     let listener = tokio::net::TcpListener::from_std(listener)?;

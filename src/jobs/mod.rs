@@ -75,7 +75,7 @@ pub use resource::Resource;
 pub use storage::{
     AddedProduct, AuditMark, BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Claimant,
     Custody, DeathLimit, Deleted, DiskSpace, Erased, ErasedFile, ErasedItem, ErasureAgent,
-    ErasureOrder, ErasureReason, Expiry, FigureStore, FileRecord, Held, Holding, Interrupted,
+    ErasureOrder, ErasureReason, Expired, FigureStore, FileRecord, Held, Holding, Interrupted,
     ItemFilter, ItemRecord, JobFilter, JobOutcome, JobStore, Lease, LegalHold, ListPage,
     ListRequest, LocalFile, News, NewsFeed, Peers, Product, ProductFile, ProductRoom, QueueFigures,
     QueueLoad, Receipt, RecordPages, ScanFields, ScanFilter, ScanIdentity, Scans, Shelved,

@@ -47,6 +47,9 @@ const SHARED_SESSION: &str =
     "a pooler between this program and PostgreSQL lets several connections share one session";
 /// What to do about it.
 const USE_SESSIONS: &str = "Set `pool_mode = session` for this database in PgBouncer, or give the address of PostgreSQL itself";
+/// What to do about a user or a password that is not accepted.
+const WRONG_PASSWORD: &str = "Correct user and password in the URL (or PGPASSWORD), or let the user in by pg_hba.conf (by auth_file, if a \
+     pooler says so)";
 /// Oldest version of the server that is tested.
 const OLDEST: i32 = 150_000;
 
@@ -435,27 +438,39 @@ fn said_by_server(error: &sqlx::Error) -> String {
 /// Whether a pooler refuses what will not change by waiting.
 fn is_final(error: &sqlx::Error) -> bool {
     let said = said_by_server(error);
+    let refused = |text: &&str| said.starts_with(*text);
     [
         "unsupported startup parameter",
         "no such database",
         "no such user",
     ]
     .iter()
-    .any(|text| said.starts_with(text))
+    .chain(&AUTHENTICATION)
+    .any(refused)
 }
+
+/// Beginnings of what PgBouncer says of a user or a password that it does not accept, under a code of its own.
+const AUTHENTICATION: [&str; 4] = [
+    "password authentication failed",
+    "SASL authentication failed",
+    "client password check failed",
+    "login rejected",
+];
 
 /// Why the server refuses a connection or a statement at the start, and what to do.
 fn refusal(url: &PostgresUrl, error: &sqlx::Error) -> PostgresError {
+    let said = said_by_server(error);
     let fix = match error {
+        // Statement mode refuses every transaction.
+        _ if said.contains("pooling mode") => USE_SESSIONS,
+        _ if AUTHENTICATION.iter().any(|text| said.starts_with(text)) => WRONG_PASSWORD,
         error if is_final(error) => {
             "A pooler says so: name database and user in its configuration, and leave parameters that it does not \
              know out of the URL or list them in `ignore_startup_parameters`"
         }
         sqlx::Error::Configuration(_) => USE_SESSIONS,
         error => match faults::sqlstate(error).as_deref() {
-            Some("28P01" | "28000") => {
-                "Correct user and password in the URL (or PGPASSWORD), or let the user in by pg_hba.conf"
-            }
+            Some("28P01" | "28000") => WRONG_PASSWORD,
             Some("3D000") => "Make the database first: CREATE DATABASE name OWNER user",
             Some("42501" | "3F000") => {
                 "Give the user the right to make tables: GRANT CREATE ON SCHEMA public TO user"
@@ -467,7 +482,7 @@ fn refusal(url: &PostgresUrl, error: &sqlx::Error) -> PostgresError {
     };
     PostgresError::Refused {
         url: url.clone(),
-        reason: said_by_server(error),
+        reason: said,
         fix,
     }
 }

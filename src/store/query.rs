@@ -287,6 +287,8 @@ impl DbRow {
 /// A statement that is put together piece by piece.
 pub(super) struct QueryBuilder {
     text: String,
+    /// The text for PostgreSQL, once it differs.
+    postgres: Option<String>,
     values: Vec<Value>,
 }
 
@@ -295,6 +297,7 @@ impl QueryBuilder {
     pub fn new(text: impl Into<String>) -> Self {
         Self {
             text: text.into(),
+            postgres: None,
             values: Vec::new(),
         }
     }
@@ -302,22 +305,43 @@ impl QueryBuilder {
     /// Adds text.
     pub fn push(&mut self, text: &str) -> &mut Self {
         self.text.push_str(text);
+        if let Some(postgres) = &mut self.postgres {
+            postgres.push_str(text);
+        }
         self
+    }
+
+    /// Adds text for SQLite alone.
+    pub fn push_sqlite(&mut self, text: &str) -> &mut Self {
+        self.postgres.get_or_insert_with(|| self.text.clone());
+        self.text.push_str(text);
+        self
+    }
+
+    /// Adds a column whose indexes SQLite is not to use. SQLite keeps no statistics here and takes any of several
+    /// indexes; PostgreSQL knows how many rows each of them finds.
+    pub fn push_unindexed(&mut self, column: &str) -> &mut Self {
+        self.push_sqlite("+").push(column)
     }
 
     /// Adds a placeholder with its value.
     pub fn push_bind(&mut self, value: impl Bound) -> &mut Self {
         self.values.push(value.value());
         let number = self.values.len();
-        self.text.push_str(&format!("${number}"));
-        self
+        self.push(&format!("${number}"))
+    }
+
+    /// The text for SQLite.
+    #[cfg(test)]
+    pub fn text(&self) -> String {
+        self.text.clone()
     }
 
     /// The statement.
     pub fn build(&mut self) -> Query {
         Query {
             text: std::mem::take(&mut self.text).into(),
-            postgres: None,
+            postgres: self.postgres.take().map(Cow::from),
             values: std::mem::take(&mut self.values),
             anew: false,
         }

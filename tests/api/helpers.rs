@@ -12,7 +12,9 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use ventriform::access::{AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Quota, Scope};
+use ventriform::access::{
+    AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Maker, Quota, Scope,
+};
 use ventriform::config::Settings;
 use ventriform::export::{self, Format, Metadata};
 use ventriform::http::{Running, install_cryptography, start};
@@ -259,6 +261,7 @@ pub async fn key(data: &Path, scope: Scope, tenant: &str, quota: Quota) -> (Stri
         tenant: tenant.parse().unwrap(),
         scope,
         quota,
+        maker: Maker::Operator,
         expires_at: None,
     };
     let (key, text) = ApiKey::make(request, now).unwrap();

@@ -393,7 +393,7 @@ async fn a_tenant_cannot_store_or_queue_beyond_its_quota() {
     let app = TestApp::start().await;
     let id = app.volume("slow").await;
     let quota = Quota {
-        bytes: Some(1000),
+        bytes: Some(100_000),
         jobs: Some(1),
         ..Quota::default()
     };
@@ -402,7 +402,7 @@ async fn a_tenant_cannot_store_or_queue_beyond_its_quota() {
     let large = app
         .post("/v1/volumes")
         .bearer_auth(&key)
-        .body(vec![0; 2000]);
+        .body(vec![0; 100_001]);
     problem(large.send().await.unwrap(), 507, "storage-quota").await;
     let file = |name: &str| {
         app.post("/v1/jobs")

@@ -21,11 +21,14 @@
 //! A request that is refused while its body is still arriving is answered at once, and the connection
 //! ends as [`stall`] says, so that the client gets the answer.
 //!
+//! What is refused before it is a request has a line in the log, at `info` ([`refused`]).
+//!
 //! On shutdown no connection is accepted any more. Open ones may finish the answer they are
 //! working on; those that are still open after the grace period are closed.
 //!
 //! HTTP/2 is left to a proxy: hyper reads its preface before the deadline runs.
 
+mod refused;
 mod registry;
 mod requests;
 mod stall;
@@ -38,10 +41,12 @@ use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::{GracefulShutdown, Watcher};
 use prometheus::IntGauge;
+use refused::Refused;
 use registry::{Registry, Ticket};
 use requests::RequestService;
 use socket2::{SockRef, TcpKeepalive};
-use stall::{Linger, StreamLimits, WatchedStream};
+pub use stall::Linger;
+use stall::{StreamLimits, WatchedStream};
 use std::io;
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -86,6 +91,8 @@ pub struct ConnectionLimits {
     pub idle: Duration,
     /// Longest pause in reading an answer.
     pub write: Duration,
+    /// How long a client may go on sending after an early answer.
+    pub linger: Linger,
     /// Longest time for open connections to end on shutdown.
     pub grace: Duration,
 }
@@ -168,7 +175,7 @@ impl Server {
             match ticket.reserve {
                 true => {
                     let served = self.serve_stream(stream, peer, &ticket, end);
-                    let late = |_| Err(io::Error::from(io::ErrorKind::TimedOut).into());
+                    let late = |_| Err(Refused::Reserve.into());
                     let served = tokio::time::timeout(RESERVE_LIFE, served).await;
                     served.unwrap_or_else(late)
                 }
@@ -176,10 +183,17 @@ impl Server {
             }
         };
         tokio::select! {
-            outcome = ended => if let Err(error) = outcome {
-                tracing::debug!(error, "a connection ended early");
+            outcome = ended => match outcome {
+                Err(error) => Refused::log(peer, &error),
+                // hyper takes a connection on which nothing came for one that was closed.
+                Ok(()) if ticket.connection.is_late() => {
+                    Refused::log(peer, &Refused::NoRequest.into());
+                }
+                Ok(()) => {}
             },
-            () = closed.cancelled() => tracing::debug!("a stalled connection was closed for another"),
+            () = closed.cancelled() => {
+                tracing::info!(client = %peer, "a stalled connection was closed for another one");
+            }
             () = self.halt.cancelled() => {}
         }
     }
@@ -198,15 +212,16 @@ impl Server {
                 write: self.limits.write,
                 head: self.limits.head,
                 idle: self.limits.idle,
-                linger: Linger::default(),
+                linger: self.limits.linger,
             },
         );
         let Some(tls) = &self.tls else {
             return self.serve_http(stream, peer, None, ticket, end).await;
         };
         let handshake = tls.accept(stream);
-        let Some(stream) = tokio::time::timeout(self.limits.head, handshake).await?? else {
-            return Ok(());
+        let handshake = tokio::time::timeout(self.limits.head, handshake).await;
+        let Some(stream) = handshake.map_err(|_| Refused::SlowHandshake)?? else {
+            return Err(Refused::PlainHttp.into());
         };
         let certificate = ClientCertificate::of(stream.get_ref().1);
         if let Some(certificate) = &certificate {

@@ -201,6 +201,8 @@ pub struct OpenConnection {
     whole: AtomicBool,
     /// Whether bytes have come since the last request that was received to its end.
     unread: AtomicBool,
+    /// Whether a head did not come in time, or not all of it.
+    late: AtomicBool,
 }
 
 impl OpenConnection {
@@ -216,7 +218,18 @@ impl OpenConnection {
             answered_at: AtomicU64::new(0),
             whole: AtomicBool::new(true),
             unread: AtomicBool::new(false),
+            late: AtomicBool::new(false),
         }
+    }
+
+    /// It is closed because a head did not come in time, or not all of it.
+    pub fn set_late(&self) {
+        self.late.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether it was closed for that.
+    pub fn is_late(&self) -> bool {
+        self.late.load(Ordering::Relaxed)
     }
 
     /// Bytes came from the client.
@@ -327,6 +340,11 @@ mod tests {
             head: PATIENCE,
             idle: PATIENCE,
             write: PATIENCE,
+            linger: super::super::Linger {
+                total: PATIENCE,
+                pause: PATIENCE,
+                bytes: 0,
+            },
             grace: PATIENCE,
         };
         Registry::new(&limits, IntGauge::new("open", "Open connections.").unwrap())

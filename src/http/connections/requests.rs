@@ -61,6 +61,8 @@ impl Service<Request<Incoming>> for RequestService {
         if let Some(problem) = self.refusal(request.uri().path()) {
             answering.0.enter(Phase::Answer);
             let mut response = problem.into_response();
+            let status = response.status().as_u16();
+            tracing::info!(%client, status, "a request was refused before it was routed");
             let close = HeaderValue::from_static("close");
             response.headers_mut().insert(header::CONNECTION, close);
             return Box::pin(async move { Ok(dated(response).map(|body| answering.body(body))) });

@@ -33,6 +33,14 @@ const LINGER_PIECE: usize = 64 << 10;
 /// Stands for the number of a wait while no head is awaited.
 const UNAWAITED: u64 = u64::MAX;
 
+/// The head of a request did not come in time.
+#[derive(Debug, Clone, Copy, thiserror::Error)]
+#[error("no request came in time")]
+pub struct Late {
+    /// Whether it was to be another request after one that was answered, and nothing of it came.
+    pub idle: bool,
+}
+
 /// How long a stream whose client may still send is read at its end.
 #[derive(Debug, Clone, Copy)]
 pub struct Linger {
@@ -43,16 +51,6 @@ pub struct Linger {
     /// Bytes that are read and thrown away. What comes then stays with the system, so that a client
     /// which reads only when it cannot send finds the answer.
     pub bytes: u64,
-}
-
-impl Default for Linger {
-    fn default() -> Self {
-        Self {
-            total: Duration::from_secs(10),
-            pause: Duration::from_secs(2),
-            bytes: 512 << 20,
-        }
-    }
 }
 
 /// How long a stream waits for its client.
@@ -217,10 +215,14 @@ impl<S> WatchedStream<S> {
                 // before a head that is awaited from now on could be late.
                 None => (UNAWAITED, TimerInstant::now() + self.limits.idle),
             };
-            ready!(self.head_wait(number, end).timer.as_mut().poll(context));
+            let wait = self.head_wait(number, end);
+            ready!(wait.timer.as_mut().poll(context));
             if awaited.is_some() {
-                let late = "no request came in time";
-                return Poll::Ready(io::Error::new(io::ErrorKind::TimedOut, late));
+                let idle = number > 0 && !wait.begun;
+                if !idle {
+                    self.connection.set_late();
+                }
+                return Poll::Ready(io::Error::new(io::ErrorKind::TimedOut, Late { idle }));
             }
             self.head = None;
         }

@@ -6,7 +6,7 @@
 //!    may have looked at the first, another at the last.
 //! 2. The `Authorization` header tells the caller, see [`crate::access::Gate`]; without a valid one the answer is
 //!    401. [`is_open_path`] names the paths that everybody may read.
-//! 3. The caller's requests are counted: 429 beyond the quota. Every answer carries `RateLimit` and
+//! 3. The caller's requests are counted, also as those of the keys that have made its key: 429 beyond the quota. Every answer carries `RateLimit` and
 //!    `RateLimit-Policy` (draft-ietf-httpapi-ratelimit-headers-10).
 //! 4. The scope must include what method and path need: 403 if not.
 //! 5. What the request may add is held against the tenant's quotas, see [`reserve`]. From here on, its memory
@@ -184,7 +184,7 @@ async fn admit(
     address: &str,
     request: &mut Parts,
 ) -> Answer<Counting> {
-    let quota = identity.quota.or(app.guard.quota);
+    let quota = identity.limits(app.guard.quota);
     let caller = Caller::of(identity, quota);
     if identity.account.is_none() {
         app.guard.hosts.check_site(request)?;
@@ -201,15 +201,26 @@ async fn admit(
     Ok(counting)
 }
 
+/// Counts a request for its caller and for the keys that have made the caller's key. Returns what is left where the
+/// least is left.
 fn count(guard: &Guard, identity: &Identity, address: &str) -> Option<Allowance> {
-    let quota = identity.quota.or(guard.quota).requests?;
-    let anonymous = || format!("address {address}");
-    let account = match &identity.account {
-        Some(account) => account.clone(),
-        None if guard.count_anonymous => anonymous(),
-        None => return None,
+    let own = match &identity.account {
+        Some(account) => Some(account.clone()),
+        None => guard.count_anonymous.then(|| format!("address {address}")),
     };
-    Some(guard.requests.count(&account, quota, Instant::now()))
+    let own = own.zip(identity.limits(guard.quota).requests);
+    let shared = identity.shared_accounts();
+    let shared = shared.map(|(account, quota)| (account.to_owned(), quota));
+    let accounts: Vec<(String, u64)> = own.into_iter().chain(shared).collect();
+    let now = Instant::now();
+    let look = |(account, quota): &(String, u64)| guard.requests.look(account, *quota, now);
+    let count = |(account, quota): &(String, u64)| guard.requests.count(account, *quota, now);
+    // A refused request counts for nobody.
+    let refused = accounts.iter().map(look).find(|one| !one.allowed);
+    refused.or_else(|| {
+        let counted = accounts.iter().map(count);
+        counted.min_by_key(|one| (one.allowed, one.remaining))
+    })
 }
 
 /// Adds `RateLimit` and `RateLimit-Policy`.
@@ -246,7 +257,8 @@ fn too_many_requests(allowance: &Allowance) -> Problem {
         StatusCode::TOO_MANY_REQUESTS,
         "too-many-requests",
         format!(
-            "This caller has sent more than the {} requests that it may send per minute.",
+            "This caller, or the key that has made its key with all keys that it has made, has sent \
+             more than the {} requests that it may send per minute.",
             allowance.quota
         ),
     )

@@ -21,6 +21,9 @@ use axum::http::request::Parts;
 use axum::http::{Method, StatusCode, header};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+/// Bytes that the record of a job counts at least; see the migrations of the jobs table.
+const JOB_RECORD: u64 = 2048;
+
 /// What a request adds, as it comes.
 #[derive(Clone, Default)]
 pub struct Counting(Option<Arc<Counted>>);
@@ -118,17 +121,13 @@ pub async fn reserve(app: &App, request: &Parts, caller: &Caller) -> Answer<Coun
         return Ok(Counting::default());
     }
     let amount = Usage {
-        bytes: adds.announced,
+        bytes: adds.announced + adds.jobs * JOB_RECORD,
         jobs: adds.jobs,
     };
     let (reservation, reserved) = app.guard.reservations.add(tenant, amount);
     let used = app.access.usage(tenant).await?;
     let bytes = quota.bytes.filter(|_| adds.stores);
-    let is_full = bytes.is_some_and(|quota| {
-        // A result needs room too, however little.
-        let least = reserved.bytes.max(u64::from(adds.jobs > 0));
-        used.bytes.saturating_add(least) > quota
-    });
+    let is_full = bytes.is_some_and(|quota| used.bytes.saturating_add(reserved.bytes) > quota);
     let too_many = quota
         .jobs
         .is_some_and(|quota| adds.jobs > 0 && used.jobs.saturating_add(reserved.jobs) > quota);

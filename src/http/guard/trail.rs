@@ -149,6 +149,7 @@ pub async fn sign_in_refused(app: &App, request: &Parts, address: &str, refusal:
         key,
         scope: crate::access::Scope::Read,
         quota: crate::access::Quota::default(),
+        makers: crate::access::Makers::default(),
         expires_at: None,
         account: None,
     };

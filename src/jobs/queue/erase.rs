@@ -8,8 +8,8 @@
 use super::Queue;
 use super::publish::to_its_end;
 use crate::jobs::{
-    Deleted, Erased, ErasureAgent, ErasureOrder, ErasureReason, Expiry, Resource, StoreError,
-    Tenant, Timestamp,
+    Deleted, Erased, ErasureAgent, ErasureOrder, ErasureReason, Resource, StoreError, Tenant,
+    Timestamp,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -18,6 +18,9 @@ use std::time::Duration;
 
 /// The name under which the upkeep erases.
 const BY_RETENTION: &str = "retention";
+
+/// What is beyond its age is erased in pages of so many.
+const PAGE: u32 = 500;
 
 /// Ages at which things are erased. `None` keeps them until somebody erases them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -31,26 +34,21 @@ pub struct RetentionAges {
 }
 
 impl RetentionAges {
-    /// What is too old at the moment `now`.
-    fn expiry(&self, now: Timestamp) -> Expiry {
-        let before = |age: Option<Duration>| age.map(|age| now.saturating_sub(milliseconds(age)));
-        Expiry {
-            volumes: before(self.volumes),
-            results: before(self.results),
-            jobs: before(self.jobs),
-        }
-    }
-
     /// When an item of that kind will be erased that was renewed at the moment `renewed`; `None`
     /// if it is kept.
     pub fn expires_at(&self, kind: Resource, renewed: Timestamp) -> Option<Timestamp> {
-        let age = match kind {
+        let age = self.of(kind);
+        age.map(|age| renewed.saturating_add(milliseconds(age)))
+    }
+
+    /// The age at which what is of that kind is erased.
+    fn of(&self, kind: Resource) -> Option<Duration> {
+        match kind {
             Resource::Volume => self.volumes,
             Resource::Model | Resource::Segmentation => self.results,
             Resource::Job => self.jobs,
             Resource::Template | Resource::Reader => None,
-        };
-        age.map(|age| renewed.saturating_add(milliseconds(age)))
+        }
     }
 }
 
@@ -146,23 +144,42 @@ impl Queue {
         Ok(erased)
     }
 
-    /// Erases what is too old.
+    /// Erases what is too old, page by page.
     pub(super) async fn erase_expired(&self, ages: &RetentionAges) -> Result<(), StoreError> {
-        if *ages == RetentionAges::default() {
-            return Ok(());
-        }
-        let expiry = ages.expiry(self.clock.now());
-        for (tenant, id) in self.catalogue.expired(&expiry).await? {
-            if Resource::of(&id) == Some(Resource::Job) {
-                self.delete_job(&id).await?;
+        let now = self.clock.now();
+        for kind in [
+            Resource::Job,
+            Resource::Volume,
+            Resource::Model,
+            Resource::Segmentation,
+        ] {
+            let Some(age) = ages.of(kind) else {
                 continue;
-            }
-            let before = match Resource::of(&id) {
-                Some(Resource::Volume) => expiry.volumes,
-                _ => expiry.results,
             };
-            let order = by_retention(tenant, id, before);
-            self.erase_item(&order).await?;
+            let before = now.saturating_sub(milliseconds(age));
+            let mut last = None;
+            loop {
+                let page = self.catalogue.expired(kind, before, last.as_ref(), PAGE);
+                let page = page.await?;
+                for found in &page {
+                    let (tenant, id) = (found.tenant.clone(), found.id.clone());
+                    match kind {
+                        Resource::Job => {
+                            self.delete_job(&id).await?;
+                        }
+                        _ => {
+                            let order = by_retention(tenant, id, Some(before));
+                            self.erase_item(&order).await?;
+                        }
+                    }
+                }
+                // What cannot be erased now is looked at again in the next round.
+                let full = page.len() >= PAGE as usize;
+                last = page.into_iter().next_back();
+                if !full {
+                    break;
+                }
+            }
         }
         Ok(())
     }

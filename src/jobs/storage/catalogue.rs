@@ -3,7 +3,7 @@
 //! Every method that takes a [`Tenant`] sees what this tenant has and nothing else.
 
 use super::{
-    Custody, Erased, ErasureOrder, Expiry, Held, ItemFilter, LegalHold, ListPage, ListRequest,
+    Custody, Erased, ErasureOrder, Expired, Held, ItemFilter, LegalHold, ListPage, ListRequest,
     Product, Receipt, ScanFields, Scans, StoreResult, StoredVolume, Tags,
 };
 use crate::jobs::{Resource, Tenant, Timestamp};
@@ -147,10 +147,17 @@ pub trait Catalogue: Custody + Scans {
         page: ListRequest,
     ) -> StoreResult<ListPage<Receipt>>;
 
-    /// The finished jobs, volumes, models and segmentations beyond their age that no legal hold
-    /// keeps, with their tenants. The age of an item counts from its last upload or computation,
-    /// that of a volume also from when a job on it was last filed or computed.
-    async fn expired(&self, expiry: &Expiry) -> StoreResult<Vec<(Tenant, String)>>;
+    /// At most `limit` items of one kind (or finished jobs) whose age counts from before a moment and that no
+    /// legal hold keeps, oldest first, after the place of `after`. The age of an item counts from its last
+    /// upload or computation, that of a volume also from when a job on it was last filed or computed, that of
+    /// a job from its end.
+    async fn expired(
+        &self,
+        kind: Resource,
+        before: Timestamp,
+        after: Option<&Expired>,
+        limit: u32,
+    ) -> StoreResult<Vec<Expired>>;
 
     /// A number that every write of this process changes, also of jobs; `None` while there may be a
     /// write under way. What was read between two equal answers is current until the answer changes.

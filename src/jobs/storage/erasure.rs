@@ -114,14 +114,15 @@ pub enum Erased {
     Unknown,
 }
 
-/// Ages beyond which things are erased, as moments: what was last used before is too old. `None`
-/// keeps things.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Expiry {
-    /// For volumes.
-    pub volumes: Option<Timestamp>,
-    /// For models and segmentations. Templates are kept.
-    pub results: Option<Timestamp>,
-    /// For the records of finished jobs.
-    pub jobs: Option<Timestamp>,
+/// What is beyond its age, and its place in the order of age, where the next page begins.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Expired {
+    /// Whose it is.
+    pub tenant: Tenant,
+    /// Its id.
+    pub id: String,
+    /// From when its age counts.
+    pub since: Timestamp,
+    /// Its position in the order of filing.
+    pub sequence: i64,
 }

@@ -25,7 +25,7 @@ pub use blobs::{
 pub use catalogue::{AddedProduct, Catalogue, Deleted, ProductRoom};
 pub use custody::{Custody, RecordPages};
 pub use erasure::{
-    AuditMark, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder, ErasureReason, Expiry,
+    AuditMark, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder, ErasureReason, Expired,
     Receipt,
 };
 pub use figures::{FigureStore, QueueFigures};

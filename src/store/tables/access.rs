@@ -1,24 +1,26 @@
 //! The tables of keys and of the audit trail.
 
+use super::pages::{Times, push_page, push_times};
 use super::rows::{self, to_json};
 use crate::access::{
-    AccessStore, Activity, Anchor, ApiKey, AuditEvent, AuditFilter, AuditLink, AuditRecord,
+    AccessStore, Activity, Anchor, ApiKey, AuditEvent, AuditFilter, AuditLink, AuditRecord, Maker,
     NO_HASH, Quota, Usage, chain_hash,
 };
 use crate::jobs::{ListPage, ListRequest, StoreResult, Tenant, Timestamp};
 use crate::store::database::{SqlStore, Transaction};
-use crate::store::query::{DbRow, query};
+use crate::store::query::{DbRow, QueryBuilder, query};
 use async_trait::async_trait;
 
 /// The bytes of everything that tenant `$1` stores: volumes, products (results, templates, readers), received
-/// objects that are not part of a volume, and work items.
+/// objects that are not part of a volume, work items, and the records of jobs.
 pub(super) const STORED_BYTES: &str = "CAST(
     (SELECT coalesce(sum(v.bytes), 0) FROM holdings AS h JOIN volumes AS v ON v.id = h.id
      WHERE h.tenant = $1 AND h.kind = 'volume')
     + (SELECT coalesce(sum(p.bytes), 0) FROM holdings AS h JOIN products AS p ON p.id = h.id
        WHERE h.tenant = $1 AND h.kind != 'volume')
     + (SELECT coalesce(sum(bytes), 0) FROM intake_objects WHERE tenant = $1 AND file IS NOT NULL)
-    + (SELECT coalesce(sum(bytes), 0) FROM workitems WHERE tenant = $1) AS BIGINT)";
+    + (SELECT coalesce(sum(bytes), 0) FROM workitems WHERE tenant = $1)
+    + (SELECT coalesce(sum(bytes), 0) FROM jobs WHERE tenant = $1) AS BIGINT)";
 
 /// The bytes of everything that a tenant stores.
 pub(super) async fn stored_bytes(of: &mut Transaction<'_>, tenant: &Tenant) -> StoreResult<u64> {
@@ -35,8 +37,8 @@ impl AccessStore for SqlStore {
         let mut transaction = self.writer.begin().await?;
         query(
             "INSERT INTO api_keys (id, name, tenant, scope, requests, bytes, jobs, created_at,
-                                   expires_at, revoked_at, digest)
-             VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11)",
+                                   expires_at, revoked_at, digest, maker)
+             VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12)",
         )
         .bind(&key.id)
         .bind(&key.name)
@@ -49,6 +51,10 @@ impl AccessStore for SqlStore {
         .bind(key.expires_at)
         .bind(key.revoked_at)
         .bind(&key.digest)
+        .bind(match &key.maker {
+            Maker::Operator => None,
+            Maker::Caller(key) => Some(key.as_deref().unwrap_or_default()),
+        })
         .execute(&mut transaction)
         .await?;
         append(&mut transaction, std::slice::from_ref(event)).await?;
@@ -69,16 +75,8 @@ impl AccessStore for SqlStore {
         tenant: Option<&Tenant>,
         page: ListRequest,
     ) -> StoreResult<ListPage<ApiKey>> {
-        let rows = query(
-            "SELECT * FROM api_keys
-             WHERE ($1 IS NULL OR tenant = $1) AND ($2 IS NULL OR sequence < $2)
-             ORDER BY sequence DESC LIMIT $3",
-        )
-        .bind(tenant.map(Tenant::as_str))
-        .bind(page.before)
-        .bind(i64::from(page.limit) + 1)
-        .fetch_all(&self.readers)
-        .await?;
+        let query = listed_keys(tenant, page).build();
+        let rows = query.fetch_all(&self.readers).await?;
         rows::page(rows, page, read_key, |key| key.sequence)
     }
 
@@ -138,22 +136,8 @@ impl AccessStore for SqlStore {
         filter: &AuditFilter,
         page: ListRequest,
     ) -> StoreResult<ListPage<AuditRecord>> {
-        let rows = query(
-            "SELECT sequence, event, hash FROM audit
-             WHERE ($1 IS NULL OR tenant = $1) AND ($2 IS NULL OR agent = $2)
-               AND ($3 IS NULL OR object = $3) AND ($4 IS NULL OR recorded >= $4)
-               AND ($5 IS NULL OR recorded < $5) AND ($6 IS NULL OR sequence < $6)
-             ORDER BY sequence DESC LIMIT $7",
-        )
-        .bind(filter.tenant.as_ref().map(Tenant::as_str))
-        .bind(&filter.agent)
-        .bind(&filter.object)
-        .bind(filter.since)
-        .bind(filter.until)
-        .bind(page.before)
-        .bind(i64::from(page.limit) + 1)
-        .fetch_all(&self.readers)
-        .await?;
+        let query = listed_events(filter, page).build();
+        let rows = query.fetch_all(&self.readers).await?;
         rows::page(rows, page, read_record, |record| record.sequence)
     }
 
@@ -226,6 +210,56 @@ impl AccessStore for SqlStore {
     }
 }
 
+/// A page of the keys of one tenant, or of all.
+pub(super) fn listed_keys(tenant: Option<&Tenant>, page: ListRequest) -> QueryBuilder {
+    let mut query = QueryBuilder::new("SELECT * FROM api_keys WHERE TRUE");
+    if let Some(tenant) = tenant {
+        query.push(" AND tenant = ").push_bind(tenant.to_string());
+    }
+    push_page(&mut query, "sequence", page);
+    query
+}
+
+/// A page of the audit trail.
+pub(super) fn listed_events(filter: &AuditFilter, page: ListRequest) -> QueryBuilder {
+    let mut query = QueryBuilder::new("SELECT sequence, event, hash FROM audit WHERE TRUE");
+    let tenant = filter.tenant.as_ref();
+    for (column, value) in [
+        ("tenant", tenant.map(Tenant::to_string)),
+        ("agent", filter.agent.clone()),
+        ("object", filter.object.clone()),
+    ] {
+        if let Some(value) = value {
+            query
+                .push(" AND ")
+                .push(column)
+                .push(" = ")
+                .push_bind(value);
+        }
+    }
+    let since = filter.since.map(|moment| (">=", moment));
+    let until = filter.until.map(|moment| ("<", moment));
+    let bounds: Vec<(&str, Timestamp)> = since.into_iter().chain(until).collect();
+    match tenant {
+        Some(tenant) if !bounds.is_empty() => {
+            let times = Times {
+                table: "audit",
+                column: "recorded",
+                bounds: &bounds,
+            };
+            push_times(&mut query, &times, tenant);
+        }
+        _ => {
+            for (than, moment) in bounds {
+                query.push(" AND recorded ").push(than).push(" ");
+                query.push_bind(moment);
+            }
+        }
+    }
+    push_page(&mut query, "sequence", page);
+    query
+}
+
 /// Appends events to the chain, within a transaction that holds the database's write lock. Returns
 /// the end of the chain.
 pub(super) async fn append(to: &mut Transaction<'_>, events: &[AuditEvent]) -> StoreResult<Anchor> {
@@ -263,6 +297,10 @@ fn read_key(row: DbRow) -> StoreResult<ApiKey> {
             requests: limit("requests")?,
             bytes: limit("bytes")?,
             jobs: limit("jobs")?,
+        },
+        maker: match row.try_get::<Option<String>, _>("maker")? {
+            None => Maker::Operator,
+            Some(key) => Maker::Caller(Some(key).filter(|key| !key.is_empty())),
         },
         id: row.try_get("id")?,
         sequence: row.try_get("sequence")?,

@@ -2,15 +2,16 @@
 //! has which of them.
 
 use super::access::stored_bytes;
+use super::pages::{push_page, push_tags};
 use super::rows::{self, SCAN_COLUMNS, to_json};
 use super::scans::{note_upload, push_scan};
 use crate::jobs::{
-    AddedProduct, Catalogue, Erased, ErasureOrder, Expiry, Held, ItemFilter, LegalHold, ListPage,
+    AddedProduct, Catalogue, Erased, ErasureOrder, Expired, Held, ItemFilter, LegalHold, ListPage,
     ListRequest, Product, ProductRoom, Receipt, Resource, ScanFields, StoreResult, StoredVolume,
-    TagFilter, Tags, Tenant, Timestamp,
+    Tags, Tenant, Timestamp,
 };
 use crate::store::database::{SqlStore, Transaction};
-use crate::store::query::{DbRow, QueryBuilder, query};
+use crate::store::query::{QueryBuilder, query};
 use async_trait::async_trait;
 
 /// A volume with the columns of its holding. `sequence` and `created_at` are the holding's.
@@ -118,7 +119,7 @@ impl Catalogue for SqlStore {
         filter: &ItemFilter,
         page: ListRequest,
     ) -> StoreResult<ListPage<Held<StoredVolume>>> {
-        let rows = listed(&HELD_VOLUME, tenant, Resource::Volume, filter, page)
+        let rows = listed_volumes(tenant, filter, page)
             .build()
             .fetch_all(&self.readers)
             .await?;
@@ -164,7 +165,7 @@ impl Catalogue for SqlStore {
         filter: &ItemFilter,
         page: ListRequest,
     ) -> StoreResult<ListPage<Held<Product>>> {
-        let rows = listed(&HELD_PRODUCT, tenant, kind, filter, page)
+        let rows = listed_products(tenant, kind, filter, page)
             .build()
             .fetch_all(&self.readers)
             .await?;
@@ -266,13 +267,8 @@ impl Catalogue for SqlStore {
         item: Option<&str>,
         page: ListRequest,
     ) -> StoreResult<ListPage<Receipt>> {
-        let mut query = QueryBuilder::new("SELECT sequence, receipt FROM erasures WHERE tenant = ");
-        query.push_bind(tenant.to_string());
-        if let Some(item) = item {
-            query.push(" AND item = ").push_bind(item.to_owned());
-        }
-        push_page(&mut query, "sequence", page);
-        let rows = query.build().fetch_all(&self.readers).await?;
+        let query = listed_receipts(tenant, item, page).build();
+        let rows = query.fetch_all(&self.readers).await?;
         let page = rows::page(rows, page, rows::receipt, |(_, sequence)| *sequence)?;
         Ok(ListPage {
             items: page.items.into_iter().map(|(receipt, _)| receipt).collect(),
@@ -280,29 +276,25 @@ impl Catalogue for SqlStore {
         })
     }
 
-    async fn expired(&self, expiry: &Expiry) -> StoreResult<Vec<(Tenant, String)>> {
-        // A comparison with NULL finds nothing.
-        let rows = query(
-            "SELECT tenant, id FROM jobs AS j WHERE finished_at < $1 AND NOT EXISTS
-                 (SELECT 1 FROM holdings AS v
-                  WHERE v.tenant = j.tenant AND v.id = j.volume AND v.held_at IS NOT NULL)
-             UNION ALL
-             SELECT tenant, id FROM holdings AS h
-             WHERE ((kind = 'volume' AND renewed_at < $2)
-                    OR (kind IN ('model', 'segmentation') AND renewed_at < $3))
-               AND held_at IS NULL AND NOT EXISTS
-                   (SELECT 1 FROM sources JOIN holdings AS s
-                        ON s.tenant = sources.tenant AND s.id = sources.volume
-                    WHERE sources.tenant = h.tenant AND sources.id = h.id
-                      AND s.held_at IS NOT NULL)",
-        )
-        .bind(expiry.jobs)
-        .bind(expiry.volumes)
-        .bind(expiry.results)
-        .fetch_all(&self.readers)
-        .await?;
-        let owned = |row: DbRow| Ok((rows::tenant(&row)?, row.try_get("id")?));
-        rows.into_iter().map(owned).collect()
+    async fn expired(
+        &self,
+        kind: Resource,
+        before: Timestamp,
+        after: Option<&Expired>,
+        limit: u32,
+    ) -> StoreResult<Vec<Expired>> {
+        let rows = expired(kind, before, after, limit)
+            .build()
+            .fetch_all(&self.readers)
+            .await?;
+        rows::all(rows, |row| {
+            Ok(Expired {
+                tenant: rows::tenant(&row)?,
+                id: row.try_get("id")?,
+                since: row.try_get("since")?,
+                sequence: row.try_get("sequence")?,
+            })
+        })
     }
 
     fn version(&self) -> Option<u64> {
@@ -324,6 +316,25 @@ fn one(select: &Select, tenant: &Tenant, id: &str) -> QueryBuilder {
     query
 }
 
+/// A page of the volumes that a tenant has.
+pub(super) fn listed_volumes(
+    tenant: &Tenant,
+    filter: &ItemFilter,
+    page: ListRequest,
+) -> QueryBuilder {
+    listed(&HELD_VOLUME, tenant, Resource::Volume, filter, page)
+}
+
+/// A page of the products of one kind that a tenant has.
+pub(super) fn listed_products(
+    tenant: &Tenant,
+    kind: Resource,
+    filter: &ItemFilter,
+    page: ListRequest,
+) -> QueryBuilder {
+    listed(&HELD_PRODUCT, tenant, kind, filter, page)
+}
+
 /// A page of the items of one kind that a tenant has.
 fn listed(
     select: &Select,
@@ -339,10 +350,10 @@ fn listed(
     query.push(" AND h.kind = ").push_bind(kind.noun());
     push_tags(&mut query, "h.", tenant, kind, &filter.tags);
     let of_scan = match kind {
-        Resource::Volume => "JOIN holdings AS x ON x.tenant = c.tenant AND x.id = c.volume",
+        Resource::Volume => "holdings AS x WHERE x.tenant = c.tenant AND x.id = c.volume",
         _ => {
-            "JOIN sources AS s ON s.tenant = c.tenant AND s.volume = c.volume
-             JOIN holdings AS x ON x.tenant = s.tenant AND x.id = s.id"
+            "sources AS s CROSS JOIN holdings AS x WHERE s.tenant = c.tenant AND s.volume = c.volume
+             AND x.tenant = s.tenant AND x.id = s.id"
         }
     };
     push_scan(&mut query, ("h.", of_scan), tenant, &filter.scan);
@@ -350,39 +361,65 @@ fn listed(
     query
 }
 
-/// Adds the conditions of a filter to a query whose columns have that prefix.
-pub(super) fn push_tags(
-    query: &mut QueryBuilder,
-    prefix: &str,
+/// A page of a tenant's receipts.
+pub(super) fn listed_receipts(
     tenant: &Tenant,
-    kind: Resource,
-    filter: &TagFilter,
-) {
-    if let Some(external_id) = &filter.external_id {
-        query.push(" AND ").push(prefix).push("external_id = ");
-        query.push_bind(external_id.clone());
+    item: Option<&str>,
+    page: ListRequest,
+) -> QueryBuilder {
+    let mut query = QueryBuilder::new("SELECT sequence, receipt FROM erasures WHERE tenant = ");
+    query.push_bind(tenant.to_string());
+    if let Some(item) = item {
+        query.push(" AND item = ").push_bind(item.to_owned());
     }
-    for (name, value) in &filter.labels {
-        query.push(" AND ").push(prefix).push("sequence IN ");
-        query.push("(SELECT sequence FROM label_index WHERE tenant = ");
-        query.push_bind(tenant.to_string());
-        query.push(" AND kind = ").push_bind(kind.noun());
-        query.push(" AND name = ").push_bind(name.clone());
-        query
-            .push(" AND value = ")
-            .push_bind(value.clone())
-            .push(")");
-    }
+    push_page(&mut query, "sequence", page);
+    query
 }
 
-/// Adds the end of a query for a page, newest first, by the column of the sequence number.
-pub(super) fn push_page(query: &mut QueryBuilder, sequence: &str, page: ListRequest) {
-    if let Some(before) = page.before {
-        query.push(" AND ").push(sequence).push(" < ");
-        query.push_bind(before);
+/// A page of what is older than `before`, see [`Catalogue::expired`]. A page is read from an index by age,
+/// however much is beyond it.
+pub(super) fn expired(
+    kind: Resource,
+    before: Timestamp,
+    after: Option<&Expired>,
+    limit: u32,
+) -> QueryBuilder {
+    // The column of the age, and the legal holds that keep an item.
+    let (table, since, kept) = match kind {
+        Resource::Job => (
+            "jobs",
+            "x.finished_at",
+            "SELECT 1 FROM holdings AS v WHERE v.tenant = x.tenant AND v.id = x.volume
+             AND v.held_at IS NOT NULL",
+        ),
+        _ => (
+            "holdings",
+            "x.renewed_at",
+            "SELECT 1 FROM sources JOIN holdings AS s
+                 ON s.tenant = sources.tenant AND s.id = sources.volume
+             WHERE sources.tenant = x.tenant AND sources.id = x.id AND s.held_at IS NOT NULL",
+        ),
+    };
+    let mut query = QueryBuilder::new(format!(
+        "SELECT x.tenant, x.id, {since} AS since, x.sequence FROM {table} AS x WHERE {since} < "
+    ));
+    query.push_bind(before);
+    if let Some(after) = after {
+        query.push(" AND (").push(since).push(", x.sequence) > (");
+        query.push_bind(after.since).push(", ");
+        query.push_bind(after.sequence).push(")");
     }
-    query.push(" ORDER BY ").push(sequence).push(" DESC LIMIT ");
-    query.push_bind(i64::from(page.limit) + 1);
+    if kind != Resource::Job {
+        query.push(" AND x.kind = ").push_bind(kind.noun());
+        query.push(" AND x.held_at IS NULL");
+    }
+    query.push(" AND NOT EXISTS (").push(kept).push(")");
+    query
+        .push(" ORDER BY ")
+        .push(since)
+        .push(", x.sequence LIMIT ");
+    query.push_bind(limit);
+    query
 }
 
 /// Why a tenant that does not have a product yet cannot have it.

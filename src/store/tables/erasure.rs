@@ -128,8 +128,8 @@ async fn legal_hold(
     id: &str,
 ) -> StoreResult<Option<String>> {
     let row = query(
-        "SELECT id FROM holdings WHERE tenant = $1 AND held_at IS NOT NULL AND
-             (id = $2 OR id IN (SELECT volume FROM sources WHERE tenant = $1 AND id = $2))",
+        "SELECT id FROM holdings WHERE tenant = $1 AND held_at IS NOT NULL AND id IN
+             (SELECT $2 UNION ALL SELECT volume FROM sources WHERE tenant = $1 AND id = $2)",
     )
     .bind(tenant.as_str())
     .bind(id)

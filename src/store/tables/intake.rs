@@ -1,6 +1,7 @@
 //! The tables of received objects.
 
 use super::access::stored_bytes;
+use super::pages::push_page;
 use super::rows;
 use crate::intake::{
     Added, GROUP_PREFIX, GroupState, IntakeGroup, IntakeRoom, IntakeStore, NewObject, Origin,
@@ -183,8 +184,8 @@ impl IntakeStore for SqlStore {
 
     async fn releasable(&self) -> StoreResult<Vec<String>> {
         let rows = query(
-            "SELECT file FROM intake_objects JOIN intake_groups AS g ON g.id = group_id
-             WHERE file IS NOT NULL AND state = 'stored'",
+            "SELECT file FROM intake_objects WHERE file IS NOT NULL AND EXISTS
+                 (SELECT 1 FROM intake_groups WHERE id = group_id AND state = 'stored')",
         )
         .fetch_all(&self.readers)
         .await?;
@@ -197,17 +198,8 @@ impl IntakeStore for SqlStore {
         state: Option<GroupState>,
         page: ListRequest,
     ) -> StoreResult<ListPage<IntakeGroup>> {
-        let mut query = QueryBuilder::new(GROUPS);
-        query.push(" WHERE tenant = ").push_bind(tenant.as_str());
-        if let Some(state) = state {
-            query.push(" AND state = ").push_bind(state.as_str());
-        }
-        if let Some(before) = page.before {
-            query.push(" AND sequence < ").push_bind(before);
-        }
-        query.push(" ORDER BY sequence DESC LIMIT ");
-        query.push_bind(i64::from(page.limit) + 1);
-        let rows = query.build().fetch_all(&self.readers).await?;
+        let query = listed(tenant, state, page).build();
+        let rows = query.fetch_all(&self.readers).await?;
         rows::page(rows, page, group, |group| group.sequence)
     }
 
@@ -287,6 +279,21 @@ async fn roll_back<T>(transaction: Transaction<'_>, answer: T) -> StoreResult<T>
     // A commit keeps the connection; there is nothing to undo.
     transaction.commit().await?;
     Ok(answer)
+}
+
+/// A page of a tenant's groups.
+pub(super) fn listed(
+    tenant: &Tenant,
+    state: Option<GroupState>,
+    page: ListRequest,
+) -> QueryBuilder {
+    let mut query = QueryBuilder::new(GROUPS);
+    query.push(" WHERE tenant = ").push_bind(tenant.as_str());
+    if let Some(state) = state {
+        query.push(" AND state = ").push_bind(state.as_str());
+    }
+    push_page(&mut query, "sequence", page);
+    query
 }
 
 /// The group of an object with the same SOP Instance UID, whether it is the same object, and, if it

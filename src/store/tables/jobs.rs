@@ -18,14 +18,15 @@
 //! minute that index is full of entries of ended versions, and each of them is read.
 
 use super::access::stored_bytes;
-use super::catalogue::{insert_product, push_page, push_tags};
+use super::catalogue::insert_product;
 use super::erasure::record_deletion;
+use super::pages::{Times, push_page, push_tags, push_times};
 use super::rows::{self, to_json};
 use super::scans::push_scan;
 use crate::jobs::{
     Claimant, DeathLimit, Deleted, Failure, Fault, Filed, Interrupted, Job, JobFilter, JobOutcome,
-    JobState, JobStore, Lease, ListPage, ListRequest, NewJob, Product, QueueLoad, Resource,
-    StoreResult, Tenant, Timestamp, random_id,
+    JobState, JobStore, Lease, ListPage, ListRequest, NewJob, Priority, Product, QueueLoad,
+    Resource, ScanFilter, StoreResult, TagFilter, Tenant, Timestamp, random_id,
 };
 use crate::store::database::{SqlStore, Transaction};
 use crate::store::query::{QueryBuilder, query};
@@ -211,28 +212,8 @@ impl JobStore for SqlStore {
     }
 
     async fn jobs(&self, filter: &JobFilter, page: ListRequest) -> StoreResult<ListPage<Job>> {
-        let mut query = QueryBuilder::new("SELECT * FROM jobs WHERE tenant = ");
-        query.push_bind(filter.tenant.to_string());
-        if let Some(state) = filter.state {
-            query.push(" AND state = ").push_bind(state.as_str());
-        }
-        if let Some(priority) = filter.priority {
-            query.push(" AND priority = ").push_bind(priority.rank());
-        }
-        for (column, value) in [("volume", &filter.volume), ("kind", &filter.kind)] {
-            if let Some(value) = value {
-                query.push(" AND ").push(column).push(" = ");
-                query.push_bind(value.clone());
-            }
-        }
-        if let Some(moment) = filter.created_after {
-            query.push(" AND created_at > ").push_bind(moment);
-        }
-        push_tags(&mut query, "", &filter.tenant, Resource::Job, &filter.tags);
-        let of_scan = "JOIN jobs AS x ON x.tenant = c.tenant AND x.volume = c.volume";
-        push_scan(&mut query, ("", of_scan), &filter.tenant, &filter.scan);
-        push_page(&mut query, "sequence", page);
-        let rows = query.build().fetch_all(&self.readers).await?;
+        let query = listed(filter, page).build();
+        let rows = query.fetch_all(&self.readers).await?;
         rows::page(rows, page, rows::job, |job| job.sequence)
     }
 
@@ -421,15 +402,20 @@ impl JobStore for SqlStore {
     }
 
     async fn abandon(&self, token: &str) -> StoreResult<Option<Job>> {
-        let row = query(
-            "UPDATE jobs SET state = 'queued', attempts = attempts - 1, started_at = NULL,
-                    lease_token = NULL, lease_run = NULL, lease_expires_at = NULL,
-                    revision = revision + 1
-             WHERE lease_token = $1 RETURNING *",
-        )
-        .bind(token)
-        .write_optional(&self.writer)
-        .await?;
+        let abandon = |running: &str| {
+            format!(
+                "UPDATE jobs SET state = 'queued', attempts = attempts - 1, started_at = NULL,
+                        lease_token = NULL, lease_run = NULL, lease_expires_at = NULL,
+                        revision = revision + 1
+                 WHERE lease_token = $1 {running} RETURNING *"
+            )
+        };
+        // PostgreSQL has an index of leases.
+        let row = query(abandon("AND state = 'running'"))
+            .on_postgres(abandon(""))
+            .bind(token)
+            .write_optional(&self.writer)
+            .await?;
         row.map(rows::job).transpose()
     }
 
@@ -582,6 +568,66 @@ impl SqlStore {
         let earlier = self.filed_under(&job.tenant, &promise.key).await?;
         Ok(earlier.map(|(job, fingerprint)| promise.judge(job, &fingerprint)))
     }
+}
+
+/// A page of a tenant's jobs.
+pub(super) fn listed(filter: &JobFilter, page: ListRequest) -> QueryBuilder {
+    let mut query = QueryBuilder::new("SELECT * FROM jobs WHERE tenant = ");
+    query.push_bind(filter.tenant.to_string());
+    if let Some(volume) = &filter.volume {
+        query.push(" AND volume = ").push_bind(volume.clone());
+    }
+    // The jobs are found by a filter that lets few through, else by the one of the others that usually lets the
+    // fewest through.
+    let narrow = filter.volume.is_some()
+        || filter.tags != TagFilter::default()
+        || filter.scan != ScanFilter::default();
+    let mut finds = !narrow;
+    let mut compare = |query: &mut QueryBuilder, column: &str| {
+        query.push(" AND ");
+        match std::mem::take(&mut finds) {
+            true => query.push(column),
+            false => query.push_unindexed(column),
+        };
+        query.push(" = ");
+    };
+    for rare in [true, false] {
+        let is_rare = |state: &JobState| *state != JobState::Succeeded;
+        if let Some(state) = filter.state.filter(|state| is_rare(state) == rare) {
+            compare(&mut query, "state");
+            query.push_bind(state.as_str());
+        }
+        let is_rare = |priority: &Priority| *priority != Priority::Routine;
+        if let Some(priority) = filter.priority.filter(|p| is_rare(p) == rare) {
+            compare(&mut query, "priority");
+            query.push_bind(priority.rank());
+        }
+        if let Some(kind) = filter.kind.as_ref().filter(|_| rare) {
+            compare(&mut query, "kind");
+            query.push_bind(kind.clone());
+        }
+    }
+    if let Some(moment) = filter.created_after {
+        match narrow {
+            true => {
+                query.push(" AND ").push_unindexed("created_at");
+                query.push(" > ").push_bind(moment);
+            }
+            false => {
+                let times = Times {
+                    table: "jobs",
+                    column: "created_at",
+                    bounds: &[(">", moment)],
+                };
+                push_times(&mut query, &times, &filter.tenant);
+            }
+        }
+    }
+    push_tags(&mut query, "", &filter.tenant, Resource::Job, &filter.tags);
+    let of_scan = "jobs AS x WHERE x.tenant = c.tenant AND x.volume = c.volume";
+    push_scan(&mut query, ("", of_scan), &filter.tenant, &filter.scan);
+    push_page(&mut query, "sequence", page);
+    query
 }
 
 /// Why a product cannot be added, if the tenant may store no more than `limit` bytes.

@@ -10,6 +10,7 @@ mod figures;
 mod hooks;
 mod intake;
 mod jobs;
+mod pages;
 mod peers;
 mod rows;
 mod scans;

@@ -143,8 +143,9 @@ pub(super) async fn note_upload(
     Ok(())
 }
 
-/// Adds the conditions of a filter to a query whose column `sequence` has that prefix. `listed`
-/// joins the table that is listed, as `x`, to the scans `c`.
+/// Adds the conditions of a filter to a query whose column `sequence` has that prefix. `listed` is the table that is
+/// listed, as `x`, and how its rows belong to the scans `c`. The scans are few, and are looked up first: a join whose
+/// order is left to SQLite may begin with all rows of the tenant.
 pub(super) fn push_scan(
     query: &mut QueryBuilder,
     (prefix, listed): (&str, &str),
@@ -154,19 +155,25 @@ pub(super) fn push_scan(
     if *filter == ScanFilter::default() {
         return;
     }
+    let columns = [
+        ("study_uid", "scans_by_study", &filter.study),
+        ("series_uid", "scans_by_series", &filter.series),
+        ("accession_number", "scans_by_accession", &filter.accession),
+    ];
+    let given = columns
+        .iter()
+        .filter_map(|(column, index, value)| Some((column, index, value.as_ref()?)));
     query.push(" AND ").push(prefix);
-    query.push("sequence IN (SELECT x.sequence FROM scans AS c ");
-    query.push(listed).push(" WHERE c.tenant = ");
-    query.push_bind(tenant.to_string());
-    for (column, value) in [
-        ("study_uid", &filter.study),
-        ("series_uid", &filter.series),
-        ("accession_number", &filter.accession),
-    ] {
-        if let Some(value) = value {
-            query.push(" AND c.").push(column).push(" = ");
-            query.push_bind(value.clone());
-        }
+    query.push("sequence IN (SELECT x.sequence FROM scans AS c");
+    // SQLite takes the key, of which the tenant alone is given, for as good as these indexes.
+    if let Some((_, index, _)) = given.clone().next() {
+        query.push_sqlite(" INDEXED BY ").push_sqlite(index);
+    }
+    query.push(" CROSS JOIN ").push(listed);
+    query.push(" AND c.tenant = ").push_bind(tenant.to_string());
+    for (column, _, value) in given {
+        query.push(" AND c.").push(column).push(" = ");
+        query.push_bind(value.clone());
     }
     query.push(")");
 }
