@@ -221,7 +221,84 @@ def slow_downloads(service):
     return held(service, lambda _: head("GET", f"/v1/volumes/{volume}/content"), 800)
 
 
-ATTACKS = [zip64, half_uploads, half_json, dense_json, half_forms, half_objects, labelled, work_items, slow_downloads]
+def wavelet_frame(side):
+    """A JPEG 2000 frame whose code blocks have as many coding passes as there can be, without any data: the costliest for its
+    size, and not to be interrupted (tests/api/bombs.rs)."""
+    out = b"\xff\x4f\xff\x51" + struct.pack(">HH8I", 41, 0, side, side, 0, 0, side, side, 0, 0) + bytes([0, 1, 15, 1, 1])
+    # No levels, blocks of 64 x 64, reversible; 31 bit-planes.
+    out += bytes([0xFF, 0x52, 0, 12, 0, 0, 0, 1, 0, 0, 4, 4, 0, 1, 0xFF, 0x5C, 0, 4, 0x20, 31 << 3])
+    blocks = side // 64
+    bits = "1"
+    for y in range(blocks):
+        for x in range(blocks):
+            new = sum((x | y) % (1 << level) == 0 for level in range(blocks.bit_length()))
+            bits += "1" * (2 * new) + f"111111111{91 - 37:07b}0" + "0" * 9
+    packet = bytearray()
+    while bits:
+        width = 7 if packet and packet[-1] == 0xFF else 8
+        packet.append(int(bits[:width].ljust(width, "0"), 2))
+        bits = bits[width:]
+    return out + struct.pack(">HHHIBB", 0xFF90, 10, 0, 14 + len(packet), 0, 1) + b"\xff\x93" + bytes(packet) + b"\xff\xd9"
+
+
+def dicom_image(syntax, side, frames, frame):
+    """A Nuclear Medicine Image whose frames are all `frame`, of 16 bits."""
+    def element(group, number, vr, value):
+        value += (b"\0" if vr in (b"UI", b"SQ", b"AT", b"US") else b" ") * (len(value) % 2)
+        length = struct.pack("<HI", 0, len(value)) if vr == b"SQ" else struct.pack("<H", len(value))
+        return struct.pack("<HH", group, number) + vr + length + value
+
+    def item(content):
+        content += b"\0" * (len(content) % 2)
+        return b"\xfe\xff\x00\xe0" + struct.pack("<I", len(content)) + content
+
+    us = lambda *numbers: struct.pack(f"<{len(numbers)}H", *numbers)
+    place = element(0x20, 0x32, b"DS", b"0\\0\\0") + element(0x20, 0x37, b"DS", b"1\\0\\0\\0\\1\\0")
+    meta = b"".join([element(2, 2, b"UI", b"1.2.840.10008.5.1.4.1.1.20"), element(2, 3, b"UI", b"1.2.3.4"), element(2, 0x10, b"UI", syntax)])
+    data = [element(8, 8, b"CS", b"ORIGINAL\\PRIMARY\\RECON TOMO\\EMISSION"), element(8, 0x16, b"UI", b"1.2.840.10008.5.1.4.1.1.20"),
+            element(8, 0x18, b"UI", b"1.2.3.4"), element(8, 0x60, b"CS", b"NM"), element(0x18, 0x50, b"DS", b"4"), element(0x18, 0x88, b"DS", b"4"),
+            element(0x28, 2, b"US", us(1)), element(0x28, 8, b"IS", str(frames).encode()), element(0x28, 9, b"AT", b"\x54\0\x80\0"),
+            element(0x28, 0x10, b"US", us(side)), element(0x28, 0x11, b"US", us(side)), element(0x28, 0x30, b"DS", b"4\\4"),
+            element(0x28, 0x100, b"US", us(16)), element(0x28, 0x101, b"US", us(16)), element(0x28, 0x102, b"US", us(15)),
+            element(0x28, 0x103, b"US", us(0)), element(0x54, 0x22, b"SQ", item(place)), element(0x54, 0x80, b"US", us(*range(1, frames + 1)))]
+    pixels = struct.pack("<HH", 0x7FE0, 0x10) + b"OB\0\0\xff\xff\xff\xff" + item(b"") + item(frame) * frames + b"\xfe\xff\xdd\xe0" + bytes(4)
+    return bytes(128) + b"DICM" + element(2, 0, b"UL", struct.pack("<I", len(meta))) + meta + b"".join(data) + pixels
+
+
+def wavelets(service, count=24, seconds=8):
+    """As many costly images as one client may send, each sent again when it is answered."""
+    body = dicom_image(b"1.2.840.10008.1.2.4.90", 1024, 200, wavelet_frame(1024))
+    end, answers = time.time() + seconds, {}
+
+    def send():
+        while time.time() < end:
+            headers = {"content-type": "application/dicom", "X-Forwarded-For": "192.0.2.66"}
+            try:
+                status = service.ask("POST", "/v1/volumes", body, headers, 60)[0]
+            except OSError as error:
+                status = type(error).__name__
+            answers[status] = answers.get(status, 0) + 1
+            time.sleep(0.05)
+
+    senders = [threading.Thread(target=send, daemon=True) for _ in range(count)]
+    for sender in senders:
+        sender.start()
+    time.sleep(seconds)
+    return f"{len(body) >> 10} KiB each, answers so far {answers}"
+
+
+def wavelet_voxels(service, count=40, seconds=8):
+    """Voxels of a costly image, asked for again and again."""
+    body = dicom_image(b"1.2.840.10008.1.2.4.90", 1024, 4, wavelet_frame(1024))
+    headers = {"content-type": "application/dicom", "X-Forwarded-For": "192.0.2.66"}
+    status, answer = service.ask("POST", "/v1/volumes", body, headers, 60)
+    assert status == 201, (status, answer[:300])
+    volume = json.loads(answer)["id"]
+    requests = [head("GET", f"/v1/volumes/{volume}/voxels.nii.gz"), head("GET", f"/v1/volumes/{volume}/preview.png")]
+    return held(service, lambda number: requests[number % 2], count, seconds)
+
+
+ATTACKS = [wavelets, wavelet_voxels, zip64, half_uploads, half_json, dense_json, half_forms, half_objects, labelled, work_items, slow_downloads]
 
 
 def attempt(attack, program, patience):

@@ -52,7 +52,7 @@ struct CreateArgs {
     /// Requests per minute, instead of the setting quota_requests
     #[arg(long, value_name = "NUMBER")]
     requests_per_minute: Option<u64>,
-    /// Size of all volumes of the tenant, such as 10GiB, instead of the setting quota_bytes
+    /// Size of all that the tenant stores, such as 10GiB, instead of the setting quota_bytes
     #[arg(long, value_name = "SIZE")]
     stored_bytes: Option<Size>,
     /// Waiting jobs of the tenant, instead of the setting quota_jobs

@@ -453,8 +453,8 @@ settings! {
     cors_origins: Words = "";
     /// Requests per minute of each caller; a key can have a limit of its own; `off` is none
     quota_requests: Limit<u64> = "60000";
-    /// Size of all that one tenant stores: volumes, results, templates, readers, received objects and work
-    /// items; `off` is none
+    /// Size of all that one tenant stores: volumes, results, templates, readers, received objects, work
+    /// items and the records of jobs (2 KiB each and their texts); `off` is none
     quota_bytes: Limit<Size> = "off";
     /// Waiting jobs of one tenant; `off` is none but queue_limit
     quota_jobs: Limit<u64> = "off";

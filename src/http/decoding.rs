@@ -9,13 +9,15 @@
 //!    not delay another's work. The queue is bounded (setting `decoding_queue`); beyond that the answer
 //!    is 503, except for a client that has less than its equal share of the queue.
 //! 2. Turns. As many pieces of work as the machine has cores compute at the same time, on blocking
-//!    threads. Each gives its turn to the next one after [`SLICE`] and queues again, so that short
-//!    work does not wait until long work ends. Work that has not reported for [`STALL`], and work whose
-//!    client hung up, loses its turn without being asked; it goes on beside the others until it reports,
-//!    as one of at most [`OVERRUNS`] per core.
+//!    threads. Each gives up its turn after [`SLICE`] if other work goes before it, that of clients that have
+//!    computed less ([`Turns`]), and queues again: short work does not wait until long work ends, nor that of
+//!    one client for that of another. Work that has not reported for [`STALL`], and work whose client hung up,
+//!    loses its turn without being asked; it goes on beside the others until it reports, as one of at
+//!    most [`OVERRUNS`] per core.
 //! 3. Time. Work computes for at most `decoding_time`, and one second more for every `decoding_rate`
-//!    bytes of its file; it is then ended, and the answer is 422. While other work has waited for
-//!    [`PATIENCE`] for memory, work that has used a [`SHARE`] of its time is ended with 503.
+//!    bytes of its file; it is then ended, and the answer is 422. For how long a thread waits for a processor
+//!    does not count ([`ThreadClock`]). While other work has waited for [`PATIENCE`] for memory, work that has
+//!    used a [`SHARE`] of its time is ended with 503.
 //!
 //! Memory and turn belong to the computation and not to the request that waits for it: the memory is
 //! free when the computation has ended. If the client hangs up, the computation is cancelled and
@@ -23,6 +25,8 @@
 
 use super::client::ClientAddress;
 use super::problem::{Answer, Problem};
+use super::thread_clock::{Moment, ThreadClock};
+use super::turns::{Turn, Turns};
 use crate::config::Settings;
 use crate::progress::{CancelToken, Monitor, Observer, Stage};
 use axum::http::{StatusCode, header};
@@ -41,8 +45,9 @@ const SLICE: Duration = Duration::from_millis(10);
 /// How long work keeps its turn without a report, and how often that is looked at.
 const STALL: Duration = Duration::from_millis(50);
 
-/// Pieces of work for each core that go on after they lost their turn.
-const OVERRUNS: usize = 4;
+/// Pieces of work for each core that go on after they lost their turn. The more there are, the slower is the work
+/// that has the turn.
+const OVERRUNS: usize = 2;
 
 /// How long work waits for memory before costly work is ended for it.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -56,7 +61,7 @@ pub const LITTLE_MEMORY: u64 = 8 << 20;
 /// The queue and the limits of decoding.
 pub struct Decoding {
     admission: Arc<Admission>,
-    turns: Arc<Semaphore>,
+    turns: Arc<Turns>,
     overruns: Arc<Semaphore>,
     /// Time of any piece of work.
     time: Duration,
@@ -79,7 +84,7 @@ impl Decoding {
                     ..AdmissionQueue::default()
                 }),
             }),
-            turns: Arc::new(Semaphore::new(cores)),
+            turns: Turns::new(cores),
             overruns: Arc::new(Semaphore::new(cores * OVERRUNS)),
             time: settings.decoding_time.0,
             rate: settings.decoding_rate.0.max(1),
@@ -110,23 +115,20 @@ impl Decoding {
         memory: u64,
         work: impl FnOnce(&Monitor<'_>) -> T + Send + 'static,
     ) -> Answer<T> {
-        let asked = Instant::now();
-        let admitted = self
-            .admission
-            .enter(ClientAddress::current(), memory)
-            .await?;
-        let turn = self.turns.clone().acquire_owned().await;
+        let (asked, client) = (Instant::now(), ClientAddress::current());
+        let admitted = self.admission.enter(client, memory).await?;
+        let turn = self.turns.take(client).await;
         self.waits.observe(asked.elapsed().as_secs_f64());
         let extra = Duration::from_secs_f64(bytes as f64 / self.rate as f64);
         let task = Arc::new(Task {
+            client,
             turns: self.turns.clone(),
             overruns: self.overruns.clone(),
             cancel: CancelToken::new(),
             stopped: CancellationToken::new(),
             limit: self.time.saturating_add(extra),
             state: Mutex::new(TaskState {
-                turn: turn.ok(),
-                since: Some(Instant::now()),
+                turn,
                 ..TaskState::default()
             }),
         });
@@ -137,6 +139,7 @@ impl Decoding {
             runtime: Handle::current(),
         };
         let run = move || {
+            observer.task.begin();
             let result = work(&Monitor::new(&observer, observer.task.cancel.clone()));
             observer.task.pause();
             drop((observer, admitted));
@@ -161,7 +164,8 @@ impl Decoding {
 
 /// A piece of work that computes.
 struct Task {
-    turns: Arc<Semaphore>,
+    client: ClientAddress,
+    turns: Arc<Turns>,
     overruns: Arc<Semaphore>,
     cancel: CancelToken,
     /// Cancelled together with `cancel`, for what waits.
@@ -174,13 +178,17 @@ struct Task {
 #[derive(Default)]
 struct TaskState {
     /// Its turn.
-    turn: Option<OwnedSemaphorePermit>,
+    turn: Option<Turn>,
     /// Its place among those that go on without a turn.
     overrun: Option<OwnedSemaphorePermit>,
+    /// The clock of its thread, once it has begun.
+    clock: Option<ThreadClock>,
     /// Since when it computes; `None` while it waits.
-    since: Option<Instant>,
+    since: Option<(Instant, Moment)>,
     /// How long it computed before.
     before: Duration,
+    /// How much of that its client was charged with.
+    counted: Duration,
     /// Whether it was ended for others that wait.
     displaced: bool,
 }
@@ -188,7 +196,16 @@ struct TaskState {
 impl TaskState {
     /// How long it has computed.
     fn computed(&self) -> Duration {
-        self.before + self.since.map_or(Duration::ZERO, |since| since.elapsed())
+        let now = match (&self.clock, self.since) {
+            (Some(clock), Some((_, then))) => clock.since(then),
+            _ => Duration::ZERO,
+        };
+        self.before + now
+    }
+
+    /// How much time has passed since it got its turn, or the last one ended.
+    fn passed(&self) -> Option<Duration> {
+        self.since.map(|(since, _)| since.elapsed())
     }
 }
 
@@ -196,6 +213,22 @@ impl Task {
     fn state(&self) -> MutexGuard<'_, TaskState> {
         // A panic cannot leave the state half changed: each change is a few plain statements.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// It begins, on the thread that calls.
+    fn begin(&self) {
+        let clock = ThreadClock::of_this_thread();
+        let mut state = self.state();
+        state.since = Some((Instant::now(), clock.now()));
+        state.clock = Some(clock);
+    }
+
+    /// Charges its client with what it has computed.
+    fn count(&self, state: &mut TaskState) {
+        let computed = state.computed();
+        let new = computed.saturating_sub(state.counted);
+        state.counted = computed;
+        self.turns.count(self.client, new);
     }
 
     fn stop(&self) {
@@ -206,14 +239,20 @@ impl Task {
     /// Gives up its turn: it waits, or has ended.
     fn pause(&self) {
         let mut state = self.state();
+        self.count(&mut state);
         state.before = state.computed();
-        (state.turn, state.overrun, state.since) = (None, None, None);
+        let left = (state.turn.take(), state.overrun.take());
+        state.since = None;
+        drop(state);
+        // The next one begins with the state free.
+        drop(left);
     }
 
     /// Takes its turn away if it has not reported for too long, and ends it after its time.
     fn look(&self) {
         let mut state = self.state();
-        if state.since.is_some_and(|since| since.elapsed() >= STALL) {
+        self.count(&mut state);
+        if state.passed().is_some_and(|passed| passed >= STALL) {
             self.take_turn(&mut state);
         }
         if state.computed() > self.limit {
@@ -268,23 +307,35 @@ struct TurnTaker {
 impl Observer for TurnTaker {
     fn progress(&self, _: Stage, _: f64) {
         let task = &self.task;
-        let long = task
-            .state()
-            .since
-            .is_none_or(|since| since.elapsed() > SLICE);
-        if !long || task.cancel.is_cancelled() {
-            return;
+        {
+            let mut state = task.state();
+            if state.passed().is_some_and(|passed| passed <= SLICE) || task.cancel.is_cancelled() {
+                return;
+            }
+            task.count(&mut state);
+            // It goes on where nobody goes before it.
+            if state.turn.is_some() && !task.turns.others_wait(task.client) {
+                state.before = state.computed();
+                state.since = state
+                    .clock
+                    .as_ref()
+                    .map(|clock| (Instant::now(), clock.now()));
+                return;
+            }
         }
         task.pause();
-        // The semaphore is fair: whoever waits goes first.
         let next = self.runtime.block_on(async {
             tokio::select! {
-                turn = task.turns.clone().acquire_owned() => turn.ok(),
+                turn = task.turns.take(task.client) => turn,
                 () = task.stopped.cancelled() => None,
             }
         });
         let mut state = task.state();
-        (state.turn, state.since) = (next, Some(Instant::now()));
+        state.turn = next;
+        state.since = state
+            .clock
+            .as_ref()
+            .map(|clock| (Instant::now(), clock.now()));
     }
 }
 
@@ -507,7 +558,7 @@ mod tests {
             ..Settings::default()
         };
         let mut decoding = Decoding::new(&settings, Metrics::new().requests.decoding_waits);
-        decoding.turns = Arc::new(Semaphore::new(2));
+        decoding.turns = Turns::new(2);
         Arc::new(decoding)
     }
 
@@ -638,7 +689,7 @@ mod tests {
                 decoding.run(1, work).await.unwrap();
             }));
         }
-        until(|| decoding.turns.available_permits() == 0).await;
+        until(|| decoding.turns.free() == 0).await;
         // The long work would never end before this.
         decoding.run(1, |_| ()).await.unwrap();
         done.cancel();

@@ -84,6 +84,8 @@ mod stow;
 mod streams;
 mod tags;
 mod templates;
+mod thread_clock;
+mod turns;
 mod upload;
 mod validators;
 mod volume_maker;
