@@ -4,9 +4,11 @@ usage: check_names.py PROGRAM DIR
 
 The example files (which pydicom brings along) hold the names of PS3.5, annexes H to K, as the standard encodes them; the names
 they stand for are below, as pydicom's own tests have them. Beside them, every character of every set is
-encoded by pydicom, by its term alone and as a code extension, and must come back from `inspect` as it was.
+encoded by pydicom, by its term alone and as a code extension, and must come back from `inspect` as it was (of Unicode and
+GB18030, sixty values).
 """
 import json
+import re
 import subprocess
 import sys
 import warnings
@@ -37,11 +39,17 @@ EXAMPLES = {
     "chrX1": "Wang^XiaoDong=王^小東",
     "chrX2": "Wang^XiaoDong=王^小东",
 }
+# Longest text of the VR LO, characters.
+LONGEST = 64
 # Where Python's codecs and the registered sets differ, and ours follows the set.
 DIFFERENT = {
     # JIS X 0201: 5C is the yen sign, 7E the overline; a backslash divides values in DICOM.
     "ISO_IR 13": "\\~",
     "ISO 2022 IR 13": "\\~",
+    # GB 2312 has an em dash and a middle dot; Python's codec a horizontal bar and a katakana dot.
+    "ISO 2022 IR 58": "―・",
+    # Moved to two bytes in the edition of 2005.
+    "GB18030": "ḿ",
 }
 
 
@@ -85,7 +93,7 @@ for path in sorted(get_charset_files("*.dcm")):
     example = pydicom.dcmread(path, force=True)
     terms = example.SpecificCharacterSet
     terms = [terms] if isinstance(terms, str) else list(terms)
-    name = next(e for e in [example.PatientName.original_string])
+    name = example.PatientName.original_string
     found = EXAMPLES[stem]
     # Groups of a name are kept by a text of another kind, too, but sets are restored at `^` and `=` in names only: read
     # as a name.
@@ -123,7 +131,8 @@ def characters(codec):
 
 
 for term, codec in sorted(python_encoding.items()):
-    if term in ("", "ISO_IR 6", "ISO 2022 IR 6") or not term.startswith(("ISO", "GB")):
+    # Not the plain set, and not the misspelt terms that pydicom knows as well.
+    if term in ("", "ISO_IR 6", "ISO 2022 IR 6") or not re.fullmatch(r"ISO_IR \d+|ISO 2022 IR \d+|GB18030|GBK", term):
         continue
     letters = [letter for letter in characters(codec) if letter not in DIFFERENT.get(term, "")]
     multi = term in ("ISO 2022 IR 87", "ISO 2022 IR 159", "ISO 2022 IR 149", "ISO 2022 IR 58")
@@ -132,12 +141,23 @@ for term, codec in sorted(python_encoding.items()):
         letters = [x for x in letters if x.encode(codec).startswith(b"\x1b$(D")]
     if term == "ISO 2022 IR 87":
         letters = [x for x in letters if x.encode(codec).startswith(b"\x1b$B")]
+    if term == "ISO 2022 IR 149":
+        # Beyond KS X 1001 the codec composes syllables of eight bytes, which DICOM does not know.
+        letters = [x for x in letters if len(x.encode(codec)) == 2]
     if term in ("ISO_IR 13", "ISO 2022 IR 13"):
         letters = [x for x in letters if len(x.encode(codec)) == 1]
     terms = ["", term] if multi else [term]
-    for start in range(0, len(letters), 2000):
-        text = "".join(letters[start:start + 2000])
-        raw = encode_string(text, [python_encoding[t] for t in terms if t] if not multi else ["iso8859", codec])
+    # As many as the standard allows in one value. Of the sets that hold all of Unicode, sixty values spread over them.
+    starts = range(0, len(letters), LONGEST)
+    for start in starts[::1 if len(letters) < 10000 else -(-len(starts) // 60)]:
+        text = "".join(letters[start:start + LONGEST])
+        raw = encode_string(text, ["iso8859", codec] if multi else [codec])
+        if term == "ISO 2022 IR 159":
+            # pydicom writes letters of Latin 1 as such, where the file names no such set.
+            raw = text.encode(codec)
+        if term == "ISO 2022 IR 58":
+            # pydicom writes this set without its escape sequence.
+            raw = b"\x1b$)A" + text.encode("gb2312")
         check(f"{term}, from {start}", terms, raw, text)
     # As a code extension of Latin 1.
     if term.startswith("ISO 2022") and not multi and term != "ISO 2022 IR 100":

@@ -398,7 +398,8 @@ mod tests {
         read(terms, bytes, Division::Names)
     }
 
-    /// PS3.5 annexes H, I, J and K.
+    /// PS3.5 annexes H, I, J and K, byte by byte as in David Clunie's example files, which pydicom brings along
+    /// (`scripts/check_names.py` reads those files themselves).
     #[test]
     fn the_examples_of_the_standard_are_read() {
         let yamada: &[u8] = b"Yamada^Tarou=\x1b$B;3ED\x1b(B^\x1b$BB@O:\x1b(B=\
@@ -424,6 +425,23 @@ mod tests {
                 "ﾔﾏﾀﾞ^ﾀﾛｳ=山田^太郎=やまだ^たろう",
             ),
             ("\\ISO 2022 IR 149", hong, "Hong^Gildong=洪^吉洞=홍^길동"),
+            (
+                "\\ISO 2022 IR 149",
+                b"\x1b$)C\xb1\xe8\xc8\xf1\xc1\xdf",
+                "김희중",
+            ),
+            ("ISO_IR 100", b"\xc4neas^R\xfcdiger", "Äneas^Rüdiger"),
+            (
+                "ISO_IR 127",
+                b"\xe2\xc8\xc7\xe6\xea^\xe4\xe6\xd2\xc7\xd1",
+                "قباني^لنزار",
+            ),
+            (
+                "ISO_IR 138",
+                b"\xf9\xf8\xe5\xef^\xe3\xe1\xe5\xf8\xe4",
+                "שרון^דבורה",
+            ),
+            ("ISO_IR 144", b"\xbb\xee\xdace\xdc\xd1yp\xd3", "Люкceмбypг"),
             (
                 "ISO_IR 192",
                 b"Wang^XiaoDong=\xe7\x8e\x8b^\xe5\xb0\x8f\xe4\xb8\x9c=",
