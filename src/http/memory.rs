@@ -15,15 +15,13 @@
 //! has ended, the ledger goes with the body of the answer ([`Ledger::answered`]), and ends with it.
 
 use super::client::ClientAddress;
+use super::held_body::HeldBody;
 use super::problem::{Answer, Problem};
-use axum::body::{Body, Bytes, HttpBody};
+use axum::body::Body;
 use axum::http::{StatusCode, header};
 use axum::response::Response;
-use hyper::body::{Frame, SizeHint};
 use std::collections::BTreeMap;
-use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::task::{Context, Poll};
 use std::time::Duration;
 use tokio::sync::Notify;
 use tokio::time::{Instant, timeout_at};
@@ -222,12 +220,7 @@ impl Ledger {
             return Ok(response);
         }
         let ledger = self.clone();
-        Ok(response.map(|body| {
-            Body::new(HeldBody {
-                body,
-                _ledger: ledger,
-            })
-        }))
+        Ok(response.map(|body| Body::new(HeldBody::new(body, ledger))))
     }
 }
 
@@ -240,32 +233,6 @@ pub async fn charge(bytes: u64) -> Answer<()> {
     match LEDGER.try_with(Ledger::clone) {
         Ok(ledger) => ledger.0.lock().await.grow(bytes).await,
         Err(_) => Ok(()),
-    }
-}
-
-/// The body of an answer, with what is held for it.
-struct HeldBody {
-    body: Body,
-    _ledger: Ledger,
-}
-
-impl HttpBody for HeldBody {
-    type Data = Bytes;
-    type Error = axum::Error;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
-        Pin::new(&mut self.body).poll_frame(context)
-    }
-
-    fn is_end_stream(&self) -> bool {
-        self.body.is_end_stream()
-    }
-
-    fn size_hint(&self) -> SizeHint {
-        self.body.size_hint()
     }
 }
 

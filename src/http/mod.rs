@@ -49,6 +49,7 @@ mod front_page;
 mod given_webhook;
 mod guard;
 mod health;
+mod held_body;
 mod hooks;
 mod idempotency;
 mod identities;

@@ -3,6 +3,7 @@
 use super::registry::{OpenConnection, Phase};
 use super::tls::ClientCertificate;
 use crate::http::client::ClientAddress;
+use crate::http::held_body::HeldBody;
 use crate::http::problem::Problem;
 use crate::http::public_base::{ProxyPolicy, PublicBase};
 use axum::Router;
@@ -40,7 +41,7 @@ pub struct RequestService {
 }
 
 impl Service<Request<Incoming>> for RequestService {
-    type Response = Response<AnswerBody>;
+    type Response = Response<HeldBody<Answering>>;
     type Error = Infallible;
     type Future = Pin<Box<dyn Future<Output = Result<Self::Response, Infallible>> + Send>>;
 
@@ -65,7 +66,9 @@ impl Service<Request<Incoming>> for RequestService {
             tracing::info!(%client, status, "a request was refused before it was routed");
             let close = HeaderValue::from_static("close");
             response.headers_mut().insert(header::CONNECTION, close);
-            return Box::pin(async move { Ok(dated(response).map(|body| answering.body(body))) });
+            return Box::pin(async move {
+                Ok(dated(response).map(|body| HeldBody::new(body, answering)))
+            });
         }
         let mut request = request.map(|body| {
             let body = ReceivedBody {
@@ -88,7 +91,7 @@ impl Service<Request<Incoming>> for RequestService {
         let answer = tower::Service::call(&mut router, request);
         Box::pin(async move {
             let response = base.scope(client.scope(answer)).await?;
-            Ok(dated(response).map(|body| answering.body(body)))
+            Ok(dated(response).map(|body| HeldBody::new(body, answering)))
         })
     }
 }
@@ -145,44 +148,9 @@ impl RequestService {
 /// While this exists, the connection's request is not answered completely.
 pub struct Answering(Arc<OpenConnection>);
 
-impl Answering {
-    fn body(self, body: Body) -> AnswerBody {
-        AnswerBody {
-            body,
-            _answering: self,
-        }
-    }
-}
-
 impl Drop for Answering {
     fn drop(&mut self) {
         self.0.answered();
-    }
-}
-
-/// The body of an answer.
-pub struct AnswerBody {
-    body: Body,
-    _answering: Answering,
-}
-
-impl HttpBody for AnswerBody {
-    type Data = Bytes;
-    type Error = axum::Error;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
-        Pin::new(&mut self.body).poll_frame(context)
-    }
-
-    fn is_end_stream(&self) -> bool {
-        self.body.is_end_stream()
-    }
-
-    fn size_hint(&self) -> SizeHint {
-        self.body.size_hint()
     }
 }
 
