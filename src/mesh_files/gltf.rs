@@ -417,6 +417,10 @@ impl Reader<'_> {
                 format!("its type is {:?}, not {wanted}", accessor.kind),
             ));
         }
+        // Single bytes number 256 vertices.
+        if kind == NumberType::U8 && accessor.count > 1 << 16 {
+            return Err(unsupported("more than 65536 indices of one byte".into()));
+        }
         let view = accessor
             .buffer_view
             .and_then(|v| self.document.buffer_views.0.get(v));

@@ -263,6 +263,8 @@ fn finish(
         mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
         notes.push("The triangles faced inward and were turned.".into());
     }
+    mesh.vertices.shrink_to_fit();
+    mesh.triangles.shrink_to_fit();
     let unlikely = match unit {
         Some(_) => None,
         None => size::unlikely(&mesh, used_unit),

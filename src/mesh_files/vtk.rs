@@ -62,6 +62,12 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
             b"POINTS" => {
                 let count = reader.count()?;
                 let kind = reader.kind()?;
+                if kind.bytes() == 1 {
+                    return Err(MeshFileError::Unsupported {
+                        format: FORMAT,
+                        what: "coordinates of one byte".into(),
+                    });
+                }
                 let count = reader.require(count, 3, kind)?;
                 vertices.reserve_exact(count);
                 for _ in 0..count {

@@ -241,6 +241,13 @@ impl File<'_> {
             }
             return Ok(numbers);
         }
+        // Numbers take eight bytes of memory each.
+        if kind.bytes() == 1 {
+            return Err(MeshFileError::Unsupported {
+                format: FORMAT,
+                what: "points or cells of one byte".into(),
+            });
+        }
         let bytes = self.bytes(array.content)?;
         let numbers = bytes.chunks_exact(kind.bytes());
         match numbers.remainder() {
