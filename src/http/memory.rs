@@ -17,7 +17,7 @@
 use super::client::ClientAddress;
 use super::held_body::HeldBody;
 use super::problem::{Answer, Problem};
-use axum::body::Body;
+use axum::body::{Body, HttpBody};
 use axum::http::{StatusCode, header};
 use axum::response::Response;
 use std::collections::BTreeMap;
