@@ -1671,6 +1671,41 @@ async fn both_engines_have_the_same_tables() {
     assert!(sqlite.len() > 150, "{}", sqlite.len());
 }
 
+/// The indexes that begin with the tenant, by which lists are read: their names and columns.
+fn indexes(rows: Vec<(String, String)>) -> BTreeSet<(String, String)> {
+    let columns = rows.into_iter().filter_map(|(name, statement)| {
+        let (_, rest) = statement.split_once('(')?;
+        let (columns, _) = rest.split_once(')')?;
+        Some((name, columns.to_owned()))
+    });
+    columns
+        .filter(|(_, columns)| columns.starts_with("tenant, "))
+        .collect()
+}
+
+#[tokio::test]
+async fn both_engines_have_the_same_indexes_of_tenants() {
+    use sqlx::{ConnectOptions, Connection};
+    let (file, on_server) = (Stores::sqlite().await, Stores::postgres().await);
+    let path = file.folder.path().join("contract.db");
+    let options = sqlx::sqlite::SqliteConnectOptions::new().filename(path);
+    let mut connection = options.connect().await.unwrap();
+    let sqlite = sqlx::query_as(
+        "SELECT name, sql FROM sqlite_schema WHERE type = 'index' AND sql IS NOT NULL",
+    );
+    let sqlite = indexes(sqlite.fetch_all(&mut connection).await.unwrap());
+    let mut connection = sqlx::PgConnection::connect(&on_server.url.unwrap())
+        .await
+        .unwrap();
+    let postgres = sqlx::query_as(
+        "SELECT indexname::text, indexdef FROM pg_indexes
+         WHERE schemaname = 'public' AND indexname NOT LIKE '%_key' AND indexname NOT LIKE '%_pkey'",
+    );
+    let postgres = indexes(postgres.fetch_all(&mut connection).await.unwrap());
+    assert_eq!(sqlite, postgres);
+    assert!(sqlite.len() > 20, "{}", sqlite.len());
+}
+
 async fn connect(url: &str) -> Result<SqlStore, PostgresError> {
     let gauge = DiskGauge::new(std::path::Path::new("/tmp"), Some(0));
     SqlStore::connect(&reached(url), WAIT, gauge).await
