@@ -196,7 +196,7 @@ fn open(
     open_as(files, &MeshStatement::default(), limits, monitor)
 }
 
-/// As [`open`], with what the caller states of a mesh.
+/// As [`open()`], with what the caller states of a mesh.
 fn open_as(
     files: &[VolumeFile],
     stated: &MeshStatement,
