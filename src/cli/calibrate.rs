@@ -1,15 +1,14 @@
 //! `ventriform calibrate`: [`crate::evaluate::calibration`] on the command line.
 
 use super::output::{note, say, write_file};
-use super::{Bar, FitArgs};
+use super::{Bar, FitArgs, UnusableArgument};
 use crate::evaluate::calibration::{
     Calibration, CalibrationError, CaseFigures, calibrate, cases_of,
 };
 use crate::evaluate::sample::Sample;
 use crate::progress::Plan;
 use crate::reader::ReaderOffset;
-use crate::work::problems::Explain;
-use anyhow::{Result, anyhow};
+use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -42,8 +41,7 @@ pub struct CalibrateArgs {
 /// # Errors
 /// If no mask can be learnt from, or the profile cannot be written.
 pub fn run(args: &CalibrateArgs) -> Result<()> {
-    let parameters = args.fit.parameters();
-    let parameters = parameters.map_err(|error| anyhow!(error.with_advice()))?;
+    let parameters = args.fit.parameters().map_err(UnusableArgument::from)?;
     let cases = cases_of(&args.cohort, &args.mask).map_err(|error| CalibrationError::Folder {
         folder: args.cohort.clone(),
         error,

@@ -1,8 +1,8 @@
 //! `ventriform evaluate`: [`crate::evaluate`] on the command line.
 
-use super::Bar;
 use super::cohort_args::CohortArgs;
 use super::output::note;
+use super::{Bar, UnusableArgument};
 use crate::deform::DeformParameters;
 use crate::deform::elastic::{Stiffness, SupportScaling};
 use crate::evaluate::parameters::InSample;
@@ -12,8 +12,7 @@ use crate::evaluate::table::Evaluation;
 use crate::evaluate::{
     EvaluateError, EvaluationObserver, EvaluationParameters, EvaluationStep, evaluate,
 };
-use crate::work::problems::Explain;
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -186,7 +185,7 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
 
 fn with_advice(error: EvaluateError) -> anyhow::Error {
     match error {
-        EvaluateError::ModelParameter(error) => anyhow!(error.with_advice()),
+        EvaluateError::ModelParameter(error) => UnusableArgument::from(error).into(),
         error => error.into(),
     }
 }

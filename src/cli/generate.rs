@@ -3,7 +3,7 @@
 use super::limit_args::LimitArgs;
 use super::output::{note, write_file};
 use super::volume_args::volume_files;
-use super::{Bar, ModelArgs};
+use super::{Bar, ModelArgs, UnusableArgument};
 use crate::export::open_part::open_part;
 use crate::export::{self, Format, Part};
 use crate::pipeline::{self, Model};
@@ -59,10 +59,7 @@ pub struct GenerateArgs {
 pub fn run(args: &GenerateArgs) -> Result<()> {
     let formats = output_formats(&args.output)?;
     check_report_names(&args.report)?;
-    let parameters = args
-        .model
-        .parameters()
-        .map_err(|error| anyhow::anyhow!(error.with_advice()))?;
+    let parameters = args.model.parameters().map_err(UnusableArgument::from)?;
     let limits = args.limits.limits()?;
     let files = volume_files(&args.input, &limits)?;
     let bar = Bar::start();

@@ -27,7 +27,7 @@ mod templates;
 mod volume_args;
 
 pub use bar::Bar;
-pub use parameter_args::{FitArgs, ModelArgs};
+pub use parameter_args::{FitArgs, ModelArgs, UnusableArgument};
 
 use self::output::note;
 use clap::{CommandFactory, Parser, Subcommand};
@@ -80,6 +80,9 @@ enum Command {
     },
 }
 
+/// Exit status of a command whose arguments cannot be used, as clap has it.
+const USAGE_STATUS: u8 = 2;
+
 /// Runs the command that the arguments of the process name.
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
@@ -117,7 +120,10 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             note!("error: {error:#}");
-            ExitCode::FAILURE
+            match error.is::<UnusableArgument>() {
+                true => ExitCode::from(USAGE_STATUS),
+                false => ExitCode::FAILURE,
+            }
         }
     }
 }
@@ -131,7 +137,7 @@ fn refuse(error: &clap::Error) -> ExitCode {
         // A reader that has closed the pipe has read enough.
         error.print().ok();
     }
-    ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
+    ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(USAGE_STATUS))
 }
 
 #[cfg(test)]

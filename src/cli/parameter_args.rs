@@ -3,6 +3,7 @@
 use crate::parameters::{
     FitParameters, Kind, ModelParameters, ParameterError, ParameterSpec, Parameters,
 };
+use crate::work::problems::Explain;
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 use std::marker::PhantomData;
 
@@ -11,6 +12,17 @@ pub type ModelArgs = TableArgs<ModelParameters>;
 /// The flags of the parameters of a fit. `model` and `expert` are ids of stored files; the command
 /// has flags of its own for them, which take paths.
 pub type FitArgs = TableArgs<FitParameters>;
+
+/// Arguments that cannot be used: the command ends as it does when clap refuses them.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct UnusableArgument(String);
+
+impl From<ParameterError> for UnusableArgument {
+    fn from(error: ParameterError) -> Self {
+        Self(error.with_advice())
+    }
+}
 
 /// The flags that were given, as names and texts.
 #[derive(Debug, Clone)]

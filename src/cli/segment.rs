@@ -6,7 +6,7 @@ use super::limit_args::LimitArgs;
 use super::mesh_args::read_mesh;
 use super::output::{create_folder, note, write_file};
 use super::volume_args::volume_files;
-use super::{Bar, FitArgs};
+use super::{Bar, FitArgs, UnusableArgument};
 use crate::export::{Format, Part};
 use crate::mesh_files::MeshStatement;
 use crate::parameters::FitParameters;
@@ -85,10 +85,7 @@ fn parse_format(text: &str) -> Result<Format, String> {
 /// If a file cannot be read, the model cannot be fitted, or a file cannot be written. Nothing is
 /// written unless the fit is complete.
 pub fn run(args: &SegmentArgs) -> Result<()> {
-    let parameters = args
-        .fit
-        .parameters()
-        .map_err(|error| anyhow!(error.with_advice()))?;
+    let parameters = args.fit.parameters().map_err(UnusableArgument::from)?;
     let named: Vec<&PathBuf> = args
         .model
         .iter()
