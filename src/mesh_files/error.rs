@@ -112,7 +112,14 @@ pub enum MeshFileError {
 
 /// The error for a file that begins with `start`.
 pub(super) fn unknown(start: &[u8]) -> MeshFileError {
-    MeshFileError::Unknown {
-        start: start[..start.len().min(16)].escape_ascii().to_string(),
-    }
+    let first = &start[..start.len().min(8)];
+    let is_text = first.iter().all(|b| (b' '..=b'~').contains(b));
+    let start = match is_text {
+        true => format!("{:?}", String::from_utf8_lossy(first)),
+        false => {
+            let bytes: Vec<String> = first.iter().map(|b| format!("{b:02x}")).collect();
+            format!("the bytes {}", bytes.join(" "))
+        }
+    };
+    MeshFileError::Unknown { start }
 }

@@ -1,6 +1,6 @@
 //! A closed surface in a file of a mesh, read as a volume: 1 inside, 0 outside.
 //!
-//! In: a file that [`mesh_files`](crate::mesh_files) reads. Out: the surface, and a grid about it whose voxels tell
+//! In: a file that [`crate::mesh_files`] reads. Out: the surface, and a grid about it whose voxels tell
 //! inside from outside. Who has a grid of his own (an expert's mask on the scan's) voxelises the surface there and not
 //! these voxels ([`GivenMask::on`](super::given_mask::GivenMask::on)).
 //!

@@ -177,7 +177,7 @@ fn errors_name_the_field_and_what_to_do() {
         ),
         (
             "segment truth.nii.gz -o out --model scan.nii.gz".into(),
-            "not a JSON mesh",
+            "not in a known format of meshes: it begins with the bytes 1f 8b",
         ),
         ("measure empty.nii.gz truth.nii.gz".into(), "mask is empty"),
         ("measure truth.nii.gz empty.nii.gz".into(), "mask is empty"),
