@@ -270,7 +270,7 @@ def check_measurements(out, report, seg):
         if " " in part:
             method = part.split()[0].upper()
             assert groups[name].method.value == method, part
-            assert other["MeasurementMethod"]["CodeValue"] == method, other
+            assert other["measurementMethod"]["CodeValue"] == method, other
 
 
 def check_object(data):

@@ -97,8 +97,8 @@ struct Part {
     figures: &'static [Figure],
 }
 
-const APPARENT: Code = own("APPARENT", "Wall with the blur of the image");
-const ANATOMICAL: Code = own("ANATOMICAL", "Wall without the blur of the image");
+const APPARENT: Code = own("APPARENT", "With the blur of the image");
+const ANATOMICAL: Code = own("ANATOMICAL", "Without the blur of the image");
 
 const PARTS: [Part; 5] = [
     Part {
