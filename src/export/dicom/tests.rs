@@ -475,3 +475,258 @@ fn each_volume_has_a_group_that_says_which_it_is() {
     figures(&set, &mut all, "");
     assert_eq!(all.len(), 4 + 2 + 3 + 2 * 17);
 }
+
+#[test]
+fn what_could_not_be_decoded_makes_no_object() {
+    let lost = |fields: &[&str]| Provenance {
+        patient_name: None,
+        undecoded: fields.iter().map(|f| (*f).to_owned()).collect(),
+        ..provenance()
+    };
+    let of = |scan: Provenance| Scene::new(Matrix3::identity(), scan, true);
+    for field in StatedIdentity::FIELDS
+        .iter()
+        .chain(&["study_time", "series_uid"])
+    {
+        let scene = of(lost(&[field]));
+        for object in DicomObject::ALL {
+            let refused = scene.results().write(object);
+            assert!(
+                matches!(refused, Err(DicomError::Undecoded { field: named }) if named == *field),
+                "{field}: {refused:?}"
+            );
+        }
+    }
+    // Descriptions are in no object.
+    assert!(legible(&lost(&["series_description"])).is_ok());
+    let scan = lost(&["patient_name", "protocol_name"]);
+    let stated = StatedIdentity {
+        patient_name: Some("Doe^Jane".into()),
+        ..StatedIdentity::default()
+    };
+    let known = identity(Some(&scan), &stated).unwrap();
+    assert!(legible(&known).is_ok());
+    let scene = of(known);
+    assert_eq!(
+        text(&scene.read(DicomObject::Mesh), tags::PATIENT_NAME),
+        "Doe^Jane"
+    );
+    let how = Deidentification {
+        secret: b"s".to_vec(),
+    };
+    let mut scene = of(scan);
+    scene.scan = scene.scan.deidentified(&how, &StatedIdentity::default());
+    assert_eq!(text(&scene.read(DicomObject::Mesh), tags::PATIENT_NAME), "");
+}
+
+/// Calls `visit` with every element of `set` and of its sequences.
+fn walk(set: &InMemDicomObject, visit: &mut dyn FnMut(Tag, &str)) {
+    for element in set.iter() {
+        match element.items() {
+            Some(items) => items.iter().for_each(|item| walk(item, visit)),
+            None => {
+                let shown = element.to_str().unwrap_or_default();
+                visit(element.header().tag, &shown);
+            }
+        }
+    }
+}
+
+#[test]
+fn all_belong_to_the_patient_and_have_no_private_attribute() {
+    let scene = straight();
+    let mut instances = BTreeSet::new();
+    for object in DicomObject::ALL {
+        let set = scene.read(object);
+        assert_eq!(text(&set, tags::PATIENT_NAME), "Müller^Jürgen");
+        assert_eq!(text(&set, tags::PATIENT_ID), "P-17");
+        assert_eq!(text(&set, tags::STUDY_INSTANCE_UID), "1.2.3.4");
+        assert_eq!(text(&set, tags::ACCESSION_NUMBER), "ACC1");
+        if let Some(frame) = set.get(tags::FRAME_OF_REFERENCE_UID) {
+            assert_eq!(frame.to_str().unwrap().trim_end_matches('\0'), "1.2.3.4.9");
+        }
+        let mut uids = Vec::new();
+        walk(&set, &mut |tag, value| {
+            assert_eq!(tag.group() % 2, 0, "{tag} of {object:?} is private");
+            if value.starts_with("2.25.") {
+                uids.push(value.trim_end_matches('\0').to_owned());
+            }
+        });
+        assert!(uids.iter().all(|uid| is_uid(uid)));
+        assert!(instances.insert(text(&set, tags::SOP_INSTANCE_UID)));
+        assert_eq!(
+            set.meta()
+                .media_storage_sop_instance_uid()
+                .trim_end_matches('\0'),
+            text(&set, tags::SOP_INSTANCE_UID)
+        );
+    }
+}
+
+#[test]
+fn equal_input_gives_equal_bytes_and_other_input_other_uids() {
+    let (scene, again) = (straight(), straight());
+    for object in DicomObject::ALL {
+        assert_eq!(scene.write(object), again.write(object), "{object:?}");
+    }
+    let uid = |scene: &Scene| text(&scene.read(DicomObject::Mask), tags::SOP_INSTANCE_UID);
+    let mut other = straight();
+    other.report = json!({});
+    assert_ne!(uid(&scene), uid(&other));
+    let mut other = straight();
+    other.mask.voxels[0] ^= true;
+    assert_ne!(uid(&scene), uid(&other));
+    let later = Provenance {
+        patient_id: Some("P-18".into()),
+        ..provenance()
+    };
+    assert_ne!(
+        uid(&scene),
+        uid(&Scene::new(Matrix3::identity(), later, true))
+    );
+}
+
+#[test]
+fn without_a_position_no_frame_of_reference_is_claimed() {
+    let scene = Scene::new(Matrix3::identity(), provenance(), false);
+    let own = text(&scene.read(DicomObject::Mask), tags::FRAME_OF_REFERENCE_UID);
+    assert!(own != "1.2.3.4.9" && is_uid(&own));
+    for object in [
+        DicomObject::Mesh,
+        DicomObject::Surface,
+        DicomObject::Contours,
+    ] {
+        let set = scene.read(object);
+        assert_eq!(text(&set, tags::FRAME_OF_REFERENCE_UID), own);
+    }
+}
+
+#[test]
+fn deidentified_objects_hold_nothing_of_the_patient() {
+    let how = Deidentification {
+        secret: b"secret".to_vec(),
+    };
+    let stated = StatedIdentity {
+        patient_id: Some("TRIAL-1".into()),
+        ..StatedIdentity::default()
+    };
+    let mut scene = straight();
+    scene.scan = scene.scan.deidentified(&how, &stated);
+    let mut studies = BTreeMap::new();
+    for object in DicomObject::ALL {
+        let bytes = scene.write(object);
+        let set = from_reader(&bytes[..]).unwrap();
+        walk(&set, &mut |tag, value| {
+            let secret = [
+                "ller", "P-17", "195002", "ACC1", "House", "20250115", "20261123", "1.2.3.4",
+            ];
+            for part in secret {
+                assert!(!value.contains(part), "{part} in {tag} of {object:?}");
+            }
+        });
+        assert_eq!(text(&set, tags::PATIENT_ID), "TRIAL-1");
+        assert_eq!(text(&set, tags::PATIENT_IDENTITY_REMOVED), "YES");
+        *studies
+            .entry(text(&set, tags::STUDY_INSTANCE_UID))
+            .or_insert(0) += 1;
+    }
+    assert_eq!(studies.len(), 1, "one study stays one study");
+}
+
+#[test]
+fn identity_comes_from_the_file_or_from_a_person() {
+    let stated = |id: Option<&str>, study: Option<&str>| StatedIdentity {
+        patient_id: id.map(str::to_owned),
+        study_uid: study.map(str::to_owned),
+        ..StatedIdentity::default()
+    };
+    let missing = |field| Err(DicomError::NoIdentity { field });
+    assert!(identity(Some(&provenance()), &stated(None, None)).is_ok());
+    assert!(identity(Some(&provenance()), &stated(Some("P-17"), None)).is_ok());
+    let other = identity(Some(&provenance()), &stated(Some("P-18"), None));
+    let field = "patient_id";
+    assert_eq!(other, Err(DicomError::Contradiction { field }));
+    assert_eq!(
+        identity(None, &stated(None, Some("1.2"))),
+        missing("patient_id")
+    );
+    assert_eq!(
+        identity(None, &stated(Some("A"), None)),
+        missing("study_uid")
+    );
+    assert!(identity(None, &stated(Some("A"), Some("1.2"))).is_ok());
+    for (id, study) in [("A\\B", "1.2"), ("", "1.2"), ("A", "1.02"), ("A", "one")] {
+        let refused = identity(None, &stated(Some(id), Some(study)));
+        assert!(
+            matches!(refused, Err(DicomError::Identity { .. })),
+            "{id} {study}"
+        );
+    }
+}
+
+#[test]
+fn a_volume_without_dicom_images_names_no_source() {
+    let caller = Provenance {
+        patient_id: Some("A".into()),
+        study_uid: Some("1.2.3".into()),
+        ..Provenance::default()
+    };
+    let scene = Scene::new(Matrix3::identity(), caller, true);
+    for object in DicomObject::ALL {
+        let set = scene.read(object);
+        let mut referenced = 0;
+        let mask = text(&scene.read(DicomObject::Mask), tags::SOP_INSTANCE_UID);
+        walk(&set, &mut |tag, value| {
+            if tag == tags::REFERENCED_SOP_INSTANCE_UID && value.trim_end_matches('\0') != mask {
+                referenced += 1;
+            }
+        });
+        assert_eq!(referenced, 0, "{object:?}");
+    }
+}
+
+#[test]
+fn pictures_keep_their_pixels_and_oblique_rows_are_refused() {
+    let scene = straight();
+    let set = scene.read(DicomObject::Page);
+    assert_eq!(
+        (text(&set, tags::ROWS), text(&set, tags::COLUMNS)),
+        ("3".into(), "5".into())
+    );
+    let pixels = set.element(tags::PIXEL_DATA).unwrap().to_bytes().unwrap();
+    assert_eq!(pixels[..45], [10, 20, 30].repeat(15));
+    assert_eq!(pixels.len(), 46);
+    let bare = DicomResults {
+        polar: None,
+        ..scene.results()
+    };
+    assert_eq!(bare.write(DicomObject::Polar), Ok(None));
+
+    let mut sheared = Matrix3::identity();
+    sheared[(0, 1)] = 0.1;
+    let scene = Scene::new(sheared, provenance(), true);
+    assert_eq!(
+        scene.results().write(DicomObject::Mask),
+        Err(DicomError::Oblique)
+    );
+}
+
+#[test]
+fn decimals_have_sixteen_characters_at_most() {
+    for (number, text) in [
+        (0.0, "0"),
+        (-0.0, "0"),
+        (3.5, "3.5"),
+        (-123.456_789_012_345_67, "-123.45678901235"),
+        (1.0 / 3.0, "0.33333333333333"),
+        (-1.234_567_890_123e-9, "-1.23456789012e-9"),
+    ] {
+        let shown = data_set::decimal(number);
+        assert!(shown.len() <= 16);
+        let read: f64 = shown.parse().unwrap();
+        assert!(
+            (read - number).abs() <= 1e-9 * number.abs().max(1e-3),
+            "{text}: {shown}"
+        );
+    }
+}
