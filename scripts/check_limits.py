@@ -301,6 +301,10 @@ def wavelet_voxels(service, count=40, seconds=8):
 ATTACKS = [wavelets, wavelet_voxels, zip64, half_uploads, half_json, dense_json, half_forms, half_objects, labelled, work_items, slow_downloads]
 
 
+# Memory of the service: a third of the limit is left for attacks that come together.
+MOST_MEBIBYTES = 640
+
+
 def attempt(attack, program, patience):
     with tempfile.TemporaryDirectory() as folder:
         service = Service(program, folder + "/data", "--queue-limit", "1000")
@@ -316,7 +320,10 @@ def attempt(attack, program, patience):
         if service.process.poll() is not None:
             wrong.append(f"the service died: {service.process.poll()}")
         else:
-            said += f", at most {service.memory()} MiB"
+            most = service.memory()
+            said += f", at most {most} MiB"
+            if most > MOST_MEBIBYTES:
+                wrong.append("the budgets do not bound the memory")
             status, _ = service.ask("GET", "/readyz")
             if status != 200:
                 wrong.append(f"/readyz {status}")
