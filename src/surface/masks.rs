@@ -516,8 +516,7 @@ mod tests {
         }
     }
 
-    /// Against the definition: after it no two parts touch along an edge or at a corner, nothing is lost, and
-    /// what is added has a face in common with the mask.
+    /// Against the definition: after it no two parts touch along an edge or at a corner, and nothing is lost.
     fn is_joined(mask: &Labels) -> bool {
         let (whole, added) = joined(mask);
         let parts = Components::of_inside(&whole);
