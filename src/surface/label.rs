@@ -6,6 +6,7 @@ use super::{
 };
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
+use crate::grid::components::Components;
 use crate::grid::labels::Labels;
 use crate::progress::Monitor;
 use crate::volume::Volume;
@@ -25,23 +26,27 @@ pub(super) fn select<'a>(
         facts.kind = VolumeKind::Labels;
     }
     facts.label = Some(label);
-    let mut mask = mask_of(volume, label);
+    let given = mask_of(volume, label);
     let asked = parameters.mask_smoothing;
     let voxel_ml = volume.frame.voxel_volume() / 1000.0;
-    facts.mask_ml = Some(mask.count() as f64 * voxel_ml);
+    facts.mask_ml = Some(given.count() as f64 * voxel_ml);
     let ball = parameters.topology == TopologyMode::Genus0;
-    let mut count = mask.count();
-    let mut joined = 0;
-    if ball {
-        (mask, joined) = masks::joined(&mask);
-    }
+    let mut count = given.count();
+    let (mut mask, mut joined) = if ball {
+        masks::joined(&given)
+    } else {
+        (given.clone(), 0)
+    };
     let mut smoothed = masks::smooth(&mask, count, asked, &volume.frame, monitor)?;
     let mut dropped = [0; 2];
-    if ball && let Some((kept, parts, voxels)) = masks::largest_part(&mask, &smoothed) {
-        // The level has to suit the volume of what remains.
-        count = count.saturating_sub(voxels).max(1);
+    if ball && let Some((kept, parts)) = masks::largest_part(&mask, &smoothed) {
+        // The level has to suit the volume of what remains of the label, without what joined its parts.
+        let remaining = given.voxels().filter(|&p| kept.get(p)).count();
+        dropped = [parts, count - remaining];
+        joined = kept.count() - remaining;
+        count = remaining.max(1);
         smoothed = masks::smooth(&kept, count, asked, &volume.frame, monitor)?;
-        (mask, dropped) = (kept, [parts, voxels]);
+        mask = kept;
     }
     if smoothed.sigma < parameters.mask_smoothing {
         facts.warnings.push(format!(
@@ -49,12 +54,8 @@ pub(super) fn select<'a>(
             smoothed.sigma, parameters.mask_smoothing
         ));
     }
-    let torn = || {
-        let labels = masks::at_level(&smoothed, smoothed.level);
-        labels.euler_characteristic() != 1
-    };
     let level = match parameters.iso {
-        IsoLevel::Auto if ball && torn() => {
+        IsoLevel::Auto if ball && !is_ball(&masks::at_level(&smoothed, smoothed.level)) => {
             masks::level_as_ball(&smoothed, count, &volume.frame, monitor)?
         }
         IsoLevel::Auto => smoothed.level,
@@ -95,6 +96,14 @@ pub(super) fn select<'a>(
     })
 }
 
+/// `true` for one component without cavities and handles. The Euler characteristic alone does not tell: it
+/// is 1 for a handle and a cavity, too.
+fn is_ball(labels: &Labels) -> bool {
+    labels.euler_characteristic() == 1
+        && Components::of_inside(labels).sizes.len() == 1
+        && Components::of_outside(labels).sizes.len() == 1
+}
+
 /// The voxels that carry `label`, in the smallest box that holds them.
 fn mask_of(volume: &Volume, label: i64) -> Labels {
     let [nx, ny, _] = volume.shape;
@@ -128,4 +137,74 @@ fn mask_of(volume: &Volume, label: i64) -> Labels {
         }
     }
     mask
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::extract;
+
+    /// The volume of 30 x 24 x 24 voxels of 2 mm whose label 1 is where `inside` holds.
+    fn label_map(inside: impl Fn([usize; 3]) -> bool) -> Volume {
+        let shape = [30, 24, 24];
+        let frame = VoxelToPatient::centred(shape, [2.0; 3], Vec3::zeros()).unwrap();
+        let voxels = (0..shape.iter().product()).map(|n| {
+            let p = [n % 30, n / 30 % 24, n / (30 * 24)];
+            f32::from(u8::from(inside(p)))
+        });
+        Volume {
+            shape,
+            voxels: voxels.collect(),
+            frame,
+            integral: true,
+        }
+    }
+
+    /// The enclosed volume as a share of that of `voxels`, and what was found.
+    fn volume_share(volume: &Volume, voxels: usize) -> (f64, SurfaceFacts) {
+        let parameters = SurfaceParameters::default();
+        let surface = extract(volume, &parameters, &Monitor::silent()).unwrap();
+        let wanted = voxels as f64 * volume.frame.voxel_volume();
+        (surface.mesh.volume() / wanted, surface.facts)
+    }
+
+    /// Two crumbs that touch along an edge are joined and left out: the voxels that join them are none of the
+    /// label's.
+    #[test]
+    fn what_joins_parts_that_are_left_out_is_not_taken_off() {
+        let cube = |p: [usize; 3]| p.iter().all(|x| (4..14).contains(x));
+        let crumbs = |p: [usize; 3]| {
+            let [i, j, k] = p;
+            let crumb = |x, y| (x..x + 4).contains(&i) && (y..y + 4).contains(&j);
+            (4..8).contains(&k) && (crumb(18, 4) || crumb(22, 8))
+        };
+        let alone = volume_share(&label_map(cube), 1000).0;
+        let (share, facts) = volume_share(&label_map(|p| cube(p) || crumbs(p)), 1000);
+        assert_eq!(facts.voxels_dropped, 2 * 64);
+        assert_eq!(facts.voxels_filled, 0);
+        assert!((share - alone).abs() < 1e-3, "{share} {alone}");
+    }
+
+    /// The Euler characteristic of a ball with a cavity and a handle is that of a ball.
+    #[test]
+    fn a_handle_and_a_cavity_do_not_hide_each_other() {
+        let solid = |p: [usize; 3]| {
+            let [i, j, k] = p.map(|x| x as f64);
+            let near = (i - 9.0).hypot(j - 11.0).hypot(k - 11.0) < 8.0;
+            let bar = (10..26).contains(&p[0]) && (9..13).contains(&p[2]);
+            let ends = (6..9).contains(&p[1]) || (14..17).contains(&p[1]);
+            near || bar && ends || (23..26).contains(&p[0]) && bar && (6..17).contains(&p[1])
+        };
+        let hollow = |p: [usize; 3]| {
+            let [i, j, k] = p.map(|x| x as f64);
+            (i - 9.0).hypot(j - 11.0).hypot(k - 11.0) < 4.0
+        };
+        let holed = label_map(|p| solid(p) && !hollow(p));
+        let labels = mask_of(&holed, 1);
+        assert_eq!(labels.euler_characteristic(), 1);
+        assert!(!is_ball(&labels));
+        let (share, facts) = volume_share(&holed, labels.count());
+        assert_eq!((facts.handles_before, facts.cavities_before), (1, 1));
+        assert!((share - 1.0).abs() < 0.02, "{share}");
+    }
 }
