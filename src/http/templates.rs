@@ -11,6 +11,7 @@ use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody, 
 use super::request::{
     PathSegments, bytes_of, merge_patch, query_pairs, refuse_unknown, unknown, word,
 };
+use super::upload::media_types::MESH_TYPES;
 use super::wire::{added, path_of, rfc3339};
 use crate::config::Size;
 use crate::jobs::{ProductRoom, Resource, TemplateSource, Tenant, check_name};
@@ -27,42 +28,6 @@ use utoipa::ToSchema;
 
 /// Largest mesh.
 pub const MESH_SIZE: Size = Size(TEMPLATE_BYTES);
-
-/// Media types of meshes, the recommended one first; the content tells the format.
-const MESH_TYPES: [&str; 32] = [
-    "application/json",
-    "application/octet-stream",
-    "application/x-octet-stream",
-    "binary/octet-stream",
-    "application/x-www-form-urlencoded",
-    "text/plain",
-    "application/xml",
-    "text/xml",
-    "model/stl",
-    "model/x.stl-ascii",
-    "model/x.stl-binary",
-    "application/sla",
-    "application/vnd.ms-pki.stl",
-    "application/x-navistyle",
-    "model/ply",
-    "model/x-ply",
-    "application/ply",
-    "application/x-ply",
-    "model/obj",
-    "model/x-obj",
-    "text/prs.wavefront-obj",
-    "application/x-tgif",
-    "model/vtk",
-    "model/x-vtk",
-    "application/x-vtk",
-    "application/vtk",
-    "model/vtp",
-    "model/x-vtp",
-    "application/x-vtp",
-    "application/vtp",
-    "model/gltf-binary",
-    "model/gltf+json",
-];
 
 /// Memory for a byte of a mesh: numbers as text, parsed, and as files of several formats.
 const MEMORY_PER_BYTE: u64 = 16;

@@ -209,6 +209,39 @@ async fn an_expert_may_draw_a_mesh() {
     problem(stray, 422, "invalid-parameter").await;
 }
 
+/// What a template may be sent as, an expert's mesh may be, too: the same bytes are told by their content.
+#[tokio::test]
+async fn a_mesh_is_taken_under_each_of_its_media_types_by_both_collections() {
+    let data = tempfile::tempdir().unwrap();
+    let service = Service::start(data.path(), &[]).await;
+    let mesh = mesh_json(&cup());
+    for media_type in [
+        "application/json",
+        "application/octet-stream",
+        "text/plain",
+        "application/xml",
+        "text/xml",
+        "model/stl",
+        "model/x-ply",
+        "model/x-obj",
+        "model/x-vtk",
+        "model/x-vtp",
+        "model/gltf+json",
+    ] {
+        for collection in ["templates", "volumes"] {
+            let answer = service
+                .post(&format!("/v1/{collection}"))
+                .header("content-type", media_type)
+                .body(mesh.clone())
+                .send()
+                .await
+                .unwrap();
+            let status = answer.status();
+            assert!(status.is_success(), "{media_type} {collection}: {status}");
+        }
+    }
+}
+
 /// Of a label map, the page shows the one structure that was compared.
 #[tokio::test]
 async fn the_structure_that_was_compared_can_be_downloaded_alone() {

@@ -9,6 +9,7 @@
 
 mod bundle;
 mod form;
+pub mod media_types;
 
 pub use bundle::Bundle;
 
@@ -21,61 +22,6 @@ use axum::extract::Request;
 use axum::http::{HeaderMap, header};
 use futures::TryStreamExt;
 use std::collections::BTreeMap;
-
-/// Bodies of these types are the bytes of a volume; what they hold is told by their content. Browsers,
-/// operating systems and old clients have names of their own for the same formats.
-/// `x-www-form-urlencoded` is what curl and urllib send unless told otherwise.
-const RAW_TYPES: [&str; 48] = [
-    "application/octet-stream",
-    "application/x-octet-stream",
-    "application/binary",
-    "application/x-binary",
-    "binary/octet-stream",
-    "application/gzip",
-    "application/x-gzip",
-    "application/gzip-compressed",
-    "application/x-gzip-compressed",
-    "application/x-gunzip",
-    "application/x-compressed",
-    "application/x-compress",
-    "application/zip",
-    "application/x-zip",
-    "application/x-zip-compressed",
-    "application/zip-compressed",
-    "multipart/x-zip",
-    "multipart/x-gzip",
-    "application/dicom",
-    "application/x-dicom",
-    "application/dicom+zip",
-    "application/nifti",
-    "application/x-nifti",
-    "application/x-nifti-gz",
-    "image/nifti",
-    "image/x-nifti",
-    // Meshes: an expert's.
-    "model/stl",
-    "model/x.stl-ascii",
-    "model/x.stl-binary",
-    "application/sla",
-    "application/vnd.ms-pki.stl",
-    "application/x-navistyle",
-    "model/ply",
-    "model/x-ply",
-    "application/ply",
-    "application/x-ply",
-    "model/obj",
-    "text/prs.wavefront-obj",
-    "application/x-tgif",
-    "model/vtk",
-    "application/x-vtk",
-    "application/vtk",
-    "model/vtp",
-    "application/x-vtp",
-    "application/vtp",
-    "model/gltf-binary",
-    "model/gltf+json",
-    "application/x-www-form-urlencoded",
-];
 
 /// A received body: files that are not published yet, and the text fields of the form.
 pub struct Upload {
@@ -121,10 +67,10 @@ pub async fn receive(app: &App, request: Request, apart: &[&'static str]) -> Ans
             form::receive_related(app, request, limits.size, &mut upload).await?;
         }
         // An empty header says as much as none.
-        Some(other) if !other.is_empty() && !RAW_TYPES.contains(&other) => {
+        Some(other) if !other.is_empty() && !media_types::is_raw(other) => {
             let wanted = format!(
                 "{}, multipart/form-data, or multipart/related of application/dicom",
-                RAW_TYPES[0]
+                media_types::VOLUME_TYPES[0]
             );
             return Err(body::unsupported_type(other, &wanted));
         }
