@@ -20,6 +20,13 @@ fn is_obeyed(c: char) -> bool {
         || matches!(c, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
+/// `true` if `text` is of ASCII's printable characters and line feeds alone, as nearly all lines of a log are.
+/// All bytes are looked at, so that the compiler can look at many at once.
+fn is_plain(text: &str) -> bool {
+    let plain = |b: u8| (b >= b' ') & (b < 0x7f) | (b == b'\n');
+    text.bytes().fold(true, |all, b| all & plain(b))
+}
+
 /// `text` on one line, with every character that would be obeyed as `\n`, `\t`, `\u{1b}`, ...
 pub fn escaped(text: &str) -> Cow<'_, str> {
     escape(text, &[])
@@ -33,7 +40,7 @@ pub fn escaped_lines(text: &str) -> Cow<'_, str> {
 /// JSON text with the same characters as `\uXXXX`; line feeds between values stay.
 pub fn escaped_json(text: &str) -> Cow<'_, str> {
     let escapes = |c: char| is_obeyed(c) && c != '\n';
-    if !text.contains(escapes) {
+    if is_plain(text) || !text.contains(escapes) {
         return text.into();
     }
     let mut shown = String::with_capacity(text.len() + 16);
@@ -49,7 +56,7 @@ pub fn escaped_json(text: &str) -> Cow<'_, str> {
 
 fn escape<'a>(text: &'a str, kept: &[char]) -> Cow<'a, str> {
     let escapes = |c: char| is_obeyed(c) && !kept.contains(&c);
-    if !text.contains(escapes) {
+    if is_plain(text) && (kept.contains(&'\n') || !text.contains('\n')) || !text.contains(escapes) {
         return text.into();
     }
     let mut shown = String::with_capacity(text.len() + 16);

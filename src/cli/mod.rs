@@ -14,6 +14,7 @@ mod inspect;
 mod keys;
 mod library;
 mod limit_args;
+mod log;
 mod measure;
 mod mesh_args;
 mod migrate;

@@ -1,21 +1,18 @@
-//! `ventriform serve` and `ventriform healthcheck`: settings, log, listener, signals.
+//! `ventriform serve` and `ventriform healthcheck`: settings, listener, signals.
 
+use super::log;
 use super::output::say;
-use crate::config::{DatabaseUrl, Flags, LogFormat, Settings};
+use crate::config::{DatabaseUrl, Flags, Settings};
 use crate::http::{self, Running};
 use crate::jobs::{Isolation, serve_isolated};
-use crate::text::{escaped_json, escaped_lines};
 use crate::volume::ReadLimits;
 use crate::work::Engine;
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use std::borrow::Cow;
-use std::io::{self, IsTerminal, Write};
 use std::net::{SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tokio::runtime::Runtime;
-use tracing_subscriber::EnvFilter;
 
 /// How long the health check waits for an answer.
 const HEALTH_TIMEOUT: Duration = Duration::from_secs(3);
@@ -56,7 +53,7 @@ pub fn run(args: &ServeArgs) -> Result<()> {
     }
     settings.read_credentials(variable)?;
     let arenas = limit_arenas();
-    start_log(&settings)?;
+    let _written_on_return = log::start(&settings, variable)?;
     if let Err(error) = arenas {
         tracing::warn!(%error, "the memory allocator keeps its default; set MALLOC_ARENA_MAX");
     }
@@ -263,56 +260,6 @@ fn bind(listen: SocketAddr) -> Result<TcpListener> {
     })
 }
 
-fn start_log(settings: &Settings) -> Result<()> {
-    let filter = EnvFilter::try_new(&settings.log).with_context(|| {
-        format!(
-            "log = `{}` is not a valid log filter; give one such as `info` or `ventriform=debug`",
-            settings.log
-        )
-    })?;
-    let log = tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_ansi(has_colours(std::io::stderr().is_terminal(), variable))
-        .log_internal_errors(false);
-    match settings.log_format {
-        LogFormat::Json => log.json().with_writer(|| LogLine(escaped_json)).init(),
-        LogFormat::Text => log.with_writer(|| LogLine(escaped_but_colours)).init(),
-    }
-    Ok(())
-}
-
-/// A line of the log on its way to standard error, and how its control characters are escaped.
-struct LogLine(fn(&str) -> Cow<'_, str>);
-
-impl Write for LogLine {
-    fn write(&mut self, line: &[u8]) -> io::Result<usize> {
-        let text = String::from_utf8_lossy(line);
-        io::stderr().lock().write_all((self.0)(&text).as_bytes())?;
-        Ok(line.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        io::stderr().flush()
-    }
-}
-
-/// A line of text. Colours of the formatter stay; it has escaped what values contain of ESC.
-fn escaped_but_colours(line: &str) -> Cow<'_, str> {
-    match line.contains('\x1b') {
-        false => escaped_lines(line),
-        true => {
-            let parts: Vec<Cow<'_, str>> = line.split('\x1b').map(escaped_lines).collect();
-            parts.join("\x1b").into()
-        }
-    }
-}
-
-/// Whether log lines may have colours: only on a terminal, and not if `NO_COLOR` has a value
-/// (<https://no-color.org>).
-fn has_colours(terminal: bool, variable: impl Fn(&str) -> Option<String>) -> bool {
-    terminal && variable("NO_COLOR").is_none_or(|value| value.is_empty())
-}
-
 /// Returns on Ctrl-C, and on SIGTERM where the system has it.
 async fn shutdown_signal() -> Result<()> {
     #[cfg(unix)]
@@ -334,14 +281,6 @@ mod tests {
     use super::*;
     use crate::config::variable_name;
     use clap::Command;
-
-    #[test]
-    fn logs_have_colours_on_terminals_only() {
-        let given = |value: &'static str| move |_: &str| Some(value.to_owned());
-        assert!(has_colours(true, |_| None) && has_colours(true, given("")));
-        assert!(!has_colours(true, given("1")));
-        assert!(!has_colours(false, |_| None));
-    }
 
     #[test]
     fn help_describes_every_setting_with_its_variable_and_default() {

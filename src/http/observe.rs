@@ -189,18 +189,14 @@ fn method_of(request: &Request) -> &'static str {
 /// Counts a request, its answer and their bodies, and times the answer.
 pub async fn measure(State(app): State<App>, request: Request, next: Next) -> AxumResponse {
     let method = method_of(&request);
-    let route = request.extensions().get::<MatchedPath>();
-    let route = route.map_or(NO_ROUTE, MatchedPath::as_str).to_owned();
     let metrics = &app.metrics.requests;
-    let id = request.extensions().get::<RequestId>();
-    let id = id.and_then(|id| id.header_value().to_str().ok());
     let waiting = Waiting {
         metrics: metrics.clone(),
         since: Instant::now(),
         answered: false,
-        id: id.map(str::to_owned),
+        id: request.extensions().get::<RequestId>().cloned(),
         method,
-        route: route.clone(),
+        route: request.extensions().get::<MatchedPath>().cloned(),
     };
     metrics.in_flight.inc();
     let request = request.map(|body| CountedBody::around(body, &metrics.received));
@@ -214,23 +210,33 @@ struct Waiting {
     metrics: RequestMetrics,
     since: Instant,
     answered: bool,
-    id: Option<String>,
+    id: Option<RequestId>,
     method: &'static str,
-    route: String,
+    route: Option<MatchedPath>,
 }
 
 impl Waiting {
+    fn route(&self) -> &str {
+        self.route.as_ref().map_or(NO_ROUTE, MatchedPath::as_str)
+    }
+
     fn end(mut self, status: StatusCode) {
         self.answered = true;
-        let (method, route) = (self.method, self.route.as_str());
+        let (method, route) = (self.method, self.route());
         let answers = &self.metrics.answers;
         answers
             .with_label_values(&[method, route, status.as_str()])
             .inc();
-        let class = format!("{}xx", status.as_u16() / 100);
+        let class = match status.as_u16() / 100 {
+            1 => "1xx",
+            2 => "2xx",
+            3 => "3xx",
+            4 => "4xx",
+            _ => "5xx",
+        };
         let durations = &self.metrics.durations;
         durations
-            .with_label_values(&[method, route, class.as_str()])
+            .with_label_values(&[method, route, class])
             .observe(self.since.elapsed().as_secs_f64());
     }
 }
@@ -240,7 +246,9 @@ impl Drop for Waiting {
         self.metrics.in_flight.dec();
         if !self.answered {
             self.metrics.abandoned.inc();
-            let (id, method, path) = (&self.id, self.method, &self.route);
+            let id = self.id.as_ref();
+            let id = id.and_then(|id| id.header_value().to_str().ok());
+            let (method, path) = (self.method, self.route());
             let ms = self.since.elapsed().as_millis() as u64;
             tracing::info!(
                 id,

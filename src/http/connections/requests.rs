@@ -12,12 +12,13 @@ use axum::http::{HeaderValue, Method, Request, Response, StatusCode, Uri, header
 use axum::response::IntoResponse;
 use hyper::body::{Frame, Incoming, SizeHint};
 use hyper::service::Service;
+use std::cell::RefCell;
 use std::convert::Infallible;
 use std::net::IpAddr;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll, ready};
-use std::time::SystemTime;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 /// The paths that are answered on every connection.
 const FOR_OPERATORS: [&str; 2] = ["/healthz", "/readyz"];
@@ -110,10 +111,23 @@ fn with_path(target: &Uri, path: &str) -> Uri {
 /// The answer with the time of the system's clock in `Date`. Left to itself, hyper keeps a date until
 /// its time is over: after the clock has been set back, for as long as it was ahead.
 fn dated(mut response: Response<Body>) -> Response<Body> {
-    let now = httpdate::fmt_http_date(SystemTime::now());
-    if let Ok(now) = HeaderValue::try_from(now) {
-        response.headers_mut().insert(header::DATE, now);
+    thread_local! {
+        /// The last second in which this thread has answered, since 1970, and its date.
+        static LAST_DATE: RefCell<Option<(u64, HeaderValue)>> = const { RefCell::new(None) };
     }
+    let now = SystemTime::now();
+    let second = now
+        .duration_since(UNIX_EPOCH)
+        .map_or(0, |age| age.as_secs());
+    LAST_DATE.with_borrow_mut(|last| {
+        if last.as_ref().is_none_or(|(of, _)| *of != second) {
+            let date = HeaderValue::try_from(httpdate::fmt_http_date(now)).ok();
+            *last = date.map(|date| (second, date));
+        }
+        if let Some((_, date)) = last {
+            response.headers_mut().insert(header::DATE, date.clone());
+        }
+    });
     response
 }
 
