@@ -1,21 +1,25 @@
-# Build stage. Dependencies are compiled first, in a layer of their own, so that a change in src/ does not
+# Build stage. Dependencies are compiled first, in a layer of their own, so that a change in the sources does not
 # compile them again.
 FROM rust:1-bookworm AS build
 WORKDIR /build
 COPY Cargo.toml Cargo.lock ./
+COPY crates/ventriform/Cargo.toml crates/ventriform/
+COPY crates/service/Cargo.toml crates/service/
+COPY crates/store/Cargo.toml crates/store/
+COPY crates/http/Cargo.toml crates/http/
 # Not built, but Cargo.toml declares them and cargo looks for their files.
 COPY benches benches
-RUN mkdir src \
+RUN for crate in . crates/*; do mkdir "$crate/src" && touch "$crate/src/lib.rs" || exit; done \
  && echo 'fn main() {}' > src/main.rs \
- && touch src/lib.rs \
  && cargo build --profile dist --locked --bin ventriform \
- && rm -rf src
+ && rm -rf src crates
+COPY crates crates
 COPY src src
 COPY web/dist web/dist
 COPY web/uptake.json web/
 COPY README.md ./
 # cargo compares modification times: the sources must be newer than the placeholders above.
-RUN find src -exec touch {} + \
+RUN find src crates -exec touch {} + \
  && cargo build --profile dist --locked --bin ventriform
 
 # Runtime image: the program, its bill of materials, one volume, an unprivileged user.

@@ -11,18 +11,19 @@ use std::net::TcpListener;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use tokio::time::{MissedTickBehavior, interval, sleep};
-use ventriform::config::{Flags, Settings};
-use ventriform::http::{Running, install_cryptography, start};
-use ventriform::jobs::{
+use ventriform::progress::{Monitor, Plan};
+use ventriform::volume::nifti::{self, StoredType};
+use ventriform::volume::{PhantomParameters, ReadLimits, phantom};
+use ventriform_http::{Running, install_cryptography};
+use ventriform_program::server::start;
+use ventriform_service::config::{Flags, PostgresSettings, Settings};
+use ventriform_service::jobs::{
     Claimant, Clock, Failure, GivenParameters, JobFilter, JobOutcome, JobState, JobStore, Lease,
     ListRequest, Needs, NewJob, Resource, StoredItem, SystemClock, Work, WorkError, WorkInput,
     WorkOutput, random_id,
 };
-use ventriform::progress::{Monitor, Plan};
-use ventriform::store::{PostgresSettings, SqlStore, open_database};
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::{PhantomParameters, ReadLimits, phantom};
-use ventriform::work::Engine;
+use ventriform_service::work::Engine;
+use ventriform_store::{SqlStore, open_database};
 
 /// How long a job sleeps.
 const NAP: Duration = Duration::from_millis(500);

@@ -23,7 +23,7 @@ from referencing.jsonschema import DRAFT202012
 URL = os.environ["SERVICE_URL"]
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 DOCUMENT = os.path.join(ROOT, "openapi", "ventriform.json")
-EXAMPLES = os.path.join(ROOT, "src", "http", "openapi", "examples.json")
+EXAMPLES = os.path.join(ROOT, "crates", "http", "src", "openapi", "examples.json")
 PROBLEM = "application/problem+json"
 
 # Problems that the walk cannot provoke, in the service's words.

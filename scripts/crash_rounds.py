@@ -332,7 +332,7 @@ class Rounds:
 
     def old_database(self, rows, parameters):
         """Makes the database of the first version, with these volumes and a job on each; returns the jobs."""
-        folder = os.path.join(ROOT, "src/store/migrations")
+        folder = os.path.join(ROOT, "crates/store/src/migrations")
         name = min(os.listdir(folder))
         with open(os.path.join(folder, name)) as file:
             script = file.read()

@@ -31,16 +31,16 @@ from pathlib import Path
 
 # Name, and the files that belong to it.
 GROUPS = [
-    ("optimise", "src/optimise/**"),
-    ("retile", "src/retile/**"),
-    ("deform", "src/deform/**"),
-    ("agreement", "src/grid/agreement.rs"),
+    ("optimise", "crates/ventriform/src/optimise/**"),
+    ("retile", "crates/ventriform/src/retile/**"),
+    ("deform", "crates/ventriform/src/deform/**"),
+    ("agreement", "crates/ventriform/src/grid/agreement.rs"),
 ]
 # The tests that judge, one set after the other, each what those before it miss: target and names.
 STAGES = [
-    (["--lib"], r"^(optimise|retile|deform|grid::agreement)::"),
-    (["--lib"], r"^(?!(optimise|retile|deform|grid::agreement)::)"),
-    (["--test", "domain"], ""),
+    (["--package", "ventriform", "--lib"], r"^(optimise|retile|deform|grid::agreement)::"),
+    (["--package", "ventriform", "--lib"], r"^(?!(optimise|retile|deform|grid::agreement)::)"),
+    (["--package", "ventriform-program", "--test", "domain"], ""),
 ]
 # Building the crate takes longer than its tests: it is optimised less than usual; what it depends on is not rebuilt.
 PROFILE = [
@@ -113,7 +113,7 @@ def listed(clean):
     found = []
     for group, files in GROUPS:
         out = subprocess.run(
-            ["cargo", "mutants", "--dir", clean, "--file", files, "--no-default-features", "--list", "--json"],
+            ["cargo", "mutants", "--dir", clean, "--file", files, "--list", "--json"],
             check=True, capture_output=True, text=True,
         ).stdout
         texts = {}
@@ -189,7 +189,7 @@ class Tree:
     def cargo(self, *arguments):
         """The messages of cargo, as it builds."""
         run = subprocess.run(
-            ["cargo", *arguments, *PROFILE, "--no-default-features", "--message-format=json"],
+            ["cargo", *arguments, *PROFILE, "--message-format=json"],
             cwd=self.path, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
             env={**os.environ, "CARGO_INCREMENTAL": "1"},
         )
@@ -217,17 +217,17 @@ def errors(messages):
 def instrument(tree, mutants):
     """Puts all switchable mutants into the tree and builds the first tests; mutants that do not compile get their
     outcome. Returns the test program."""
-    tree.reset({m.file for m in mutants} | {"src/lib.rs"})
+    tree.reset({m.file for m in mutants} | {"crates/ventriform/src/lib.rs"})
     by_file = collections.defaultdict(list)
     for m in mutants:
         by_file[m.file].append(m)
     originals = {file: tree.original(file) for file in by_file}
-    library = tree.original("src/lib.rs")
+    library = tree.original("crates/ventriform/src/lib.rs")
     first = re.search(r"^(pub )?mod ", library, re.M).start()
     tree.write({
-        "src/lib.rs": "#![allow(warnings, unconditional_panic, arithmetic_overflow)]\n"
+        "crates/ventriform/src/lib.rs": "#![allow(warnings, unconditional_panic, arithmetic_overflow)]\n"
         + library[:first] + "mod mutant_switch;\n" + library[first:],
-        "src/mutant_switch.rs": SWITCH.replace("COUNT", str(max([m.id for m in mutants], default=0) + 1)),
+        "crates/ventriform/src/mutant_switch.rs": SWITCH.replace("COUNT", str(max([m.id for m in mutants], default=0) + 1)),
     })
     while True:
         files = {

@@ -91,8 +91,8 @@ install_external_tools() {
 
 # The library without the service compiles, and depends on none of the service's crates.
 library_alone() {
-  cargo clippy --quiet --lib --no-default-features -- -D warnings &&
-    ! cargo tree --edges normal --no-default-features --prefix none | grep -E '^(axum|tokio|sqlx|reqwest) '
+  cargo clippy --quiet --package ventriform --lib -- -D warnings &&
+    ! cargo tree --package ventriform --edges normal --prefix none | grep -E '^(axum|tokio|sqlx|reqwest) '
 }
 
 need cc build-essential

@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    ventriform::cli::main()
+    ventriform_program::cli::main()
 }

@@ -4,7 +4,6 @@
 //! The time until it stops is processor time of the working thread. Other load on the machine
 //! lengthens wall time, but not processor time.
 
-#![cfg(feature = "service")]
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
 
@@ -15,12 +14,12 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use serde_json::Map;
-use ventriform::jobs::{LocalFile, StoredItem, Work, WorkError, WorkInput};
 use ventriform::progress::{CancelToken, Monitor, Silent};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
 use ventriform::volume::{ReadLimits, Volume};
-use ventriform::work::Engine;
+use ventriform_service::jobs::{LocalFile, StoredItem, Work, WorkError, WorkInput};
+use ventriform_service::work::Engine;
 
 /// Most processor time after cancellation. The promise is 100 ms, also in this build, which is not
 /// the fastest one.

@@ -9,7 +9,6 @@
 #[path = "../fuzz/src/targets.rs"]
 mod targets;
 
-#[cfg(feature = "service")]
 #[path = "../fuzz/src/service.rs"]
 mod service;
 
@@ -114,14 +113,12 @@ fn damaged_parameters_never_panic() {
     drive("parameters", 20_000, targets::parameters);
 }
 
-#[cfg(feature = "service")]
 #[test]
 fn damaged_forms_are_answered() {
     let service = service::Target::start();
     drive("multipart", 400, |file| service.multipart(file));
 }
 
-#[cfg(feature = "service")]
 #[test]
 fn damaged_associations_end_and_harm_nobody() {
     let service = service::Target::start();

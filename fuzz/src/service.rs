@@ -5,10 +5,11 @@ use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::time::Duration;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
-use ventriform::config::Settings;
-use ventriform::http::{Running, start};
 use ventriform::volume::ReadLimits;
-use ventriform::work::Engine;
+use ventriform_http::Running;
+use ventriform_program::server::start;
+use ventriform_service::config::Settings;
+use ventriform_service::work::Engine;
 
 /// A running service.
 pub struct Target {

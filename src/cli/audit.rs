@@ -2,11 +2,11 @@
 
 use super::data_args::DataArgs;
 use super::output::{json, say};
-use crate::access::{AccessStore, AuditFilter, fhir, verify};
-use crate::jobs::ListRequest;
 use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
 use tokio::runtime::Runtime;
+use ventriform_service::access::{AccessStore, AuditFilter, fhir, verify};
+use ventriform_service::jobs::ListRequest;
 
 /// Check or print the audit trail, also while the service runs
 #[derive(Debug, Args)]

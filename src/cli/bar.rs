@@ -1,9 +1,9 @@
 //! A progress bar, shown only on a terminal.
 
-use crate::progress::{Observer, Plan, Stage, TotalProgress};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::Instant;
+use ventriform::progress::{Observer, Plan, Stage, TotalProgress};
 
 const STEPS: u64 = 1000;
 

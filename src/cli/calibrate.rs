@@ -1,16 +1,16 @@
-//! `ventriform calibrate`: [`crate::evaluate::calibration`] on the command line.
+//! `ventriform calibrate`: [`ventriform::evaluate::calibration`] on the command line.
 
 use super::output::{note, say, write_file};
 use super::{Bar, FitArgs, UnusableArgument};
-use crate::evaluate::calibration::{
-    Calibration, CalibrationError, CaseFigures, calibrate, cases_of,
-};
-use crate::evaluate::sample::Sample;
-use crate::progress::Plan;
-use crate::reader::ReaderOffset;
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
+use ventriform::evaluate::calibration::{
+    Calibration, CalibrationError, CaseFigures, calibrate, cases_of,
+};
+use ventriform::evaluate::sample::Sample;
+use ventriform::progress::Plan;
+use ventriform::reader::ReaderOffset;
 
 /// Learn how a reader draws the wall, from scans and the reader's masks
 #[derive(Debug, Args)]

@@ -1,10 +1,10 @@
 //! The arguments of the commands that work on a cohort's folder.
 
 use super::mesh_args::MeshArgs;
-use crate::evaluate::{Cohort, CohortError};
-use crate::volume::given_mask::MaskChoice;
 use clap::Args;
 use std::path::PathBuf;
+use ventriform::evaluate::{Cohort, CohortError};
+use ventriform::volume::given_mask::MaskChoice;
 
 /// Which cohort, and how its templates' models are made. A command that takes these sets the
 /// default of `points`.

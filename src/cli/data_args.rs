@@ -1,12 +1,12 @@
 //! The arguments of commands beside the service that use its database.
 
 use super::serve::settings_beside;
-use crate::config::DatabaseUrl;
-use crate::store::{SqlStore, open_database};
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
 use std::sync::Arc;
+use ventriform_service::config::DatabaseUrl;
+use ventriform_store::{SqlStore, open_database};
 
 #[derive(Debug, Args)]
 pub struct DataArgs {

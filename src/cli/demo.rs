@@ -2,9 +2,6 @@
 
 use super::output::{create_folder, say, write_file};
 use super::{Bar, serve};
-use crate::progress::Monitor;
-use crate::volume::nifti::{self, StoredType};
-use crate::volume::phantom::{PhantomParameters, phantom};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use reqwest::Client;
@@ -12,6 +9,9 @@ use serde_json::Value;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use ventriform::progress::Monitor;
+use ventriform::volume::nifti::{self, StoredType};
+use ventriform::volume::phantom::{PhantomParameters, phantom};
 
 /// Start the service here, send it a simulated scan, and fetch the model
 #[derive(Debug, Args)]

@@ -1,17 +1,17 @@
 //! The flags of DICOM output.
 
-use crate::export::dicom::{
-    Deidentification, Moment, SourceScan, StatedIdentity, identity, legible,
-};
-use crate::progress::Monitor;
-use crate::segmentation::SegmentedVolume;
-use crate::volume::dicom::Provenance;
-use crate::volume::{self, ReadLimits, ReadOptions, VolumeFile};
-use crate::work::problems::Explain;
 use anyhow::{Result, anyhow};
 use clap::Args;
 use time::format_description::well_known::Rfc3339;
 use time::{OffsetDateTime, UtcOffset};
+use ventriform::export::dicom::{
+    Deidentification, Moment, SourceScan, StatedIdentity, identity, legible,
+};
+use ventriform::progress::Monitor;
+use ventriform::segmentation::SegmentedVolume;
+use ventriform::volume::dicom::Provenance;
+use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
+use ventriform_service::work::problems::Explain;
 
 /// Whether to write DICOM objects, and for whom.
 #[derive(Debug, Args)]

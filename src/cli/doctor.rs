@@ -2,14 +2,14 @@
 
 use super::output::{json, say};
 use super::serve::variable;
-use crate::config::{BlobPlace, Flags, Settings};
-use crate::http::{self, s3_location};
-use crate::jobs::Tenant;
-use crate::store::{self, Examination};
+use crate::server::s3_location;
 use anyhow::{Result, bail};
 use clap::Args;
 use std::path::PathBuf;
 use tokio::runtime::Runtime;
+use ventriform_service::config::{BlobPlace, Flags, Settings};
+use ventriform_service::jobs::Tenant;
+use ventriform_store::Examination;
 
 /// Check a data folder, and repair it from what lies on disk (stop the service first)
 #[derive(Debug, Args)]
@@ -67,9 +67,9 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
     };
     let mut settings = Settings::load(&flags, variable)?.0;
     settings.read_aws(variable);
-    http::install_cryptography();
+    ventriform_http::install_cryptography();
     let s3 = s3_location(&settings);
-    let found = store::examine(&args.data_dir, s3.as_ref(), heirs);
+    let found = ventriform_store::examine(&args.data_dir, s3.as_ref(), heirs);
     let found = Runtime::new()?.block_on(found)?;
     match args.json {
         true => json(&serde_json::to_string_pretty(&found)?),
@@ -105,7 +105,7 @@ fn print(found: &Examination) {
 /// # Errors
 /// If the folder cannot be copied, or items in it are damaged.
 pub fn back_up(args: &BackupArgs) -> Result<()> {
-    let done = Runtime::new()?.block_on(store::backup(&args.data_dir, &args.target))?;
+    let done = Runtime::new()?.block_on(ventriform_store::backup(&args.data_dir, &args.target))?;
     say!(
         "{} items in the backup, {} of them copied now",
         done.items,

@@ -1,20 +1,20 @@
-//! `ventriform evaluate`: [`crate::evaluate`] on the command line.
+//! `ventriform evaluate`: [`ventriform::evaluate`] on the command line.
 
 use super::cohort_args::CohortArgs;
 use super::output::note;
 use super::{Bar, UnusableArgument};
-use crate::deform::DeformParameters;
-use crate::deform::elastic::{Stiffness, SupportScaling};
-use crate::evaluate::parameters::InSample;
-use crate::evaluate::rows::{self, Gold, Variant};
-use crate::evaluate::sample::Sample;
-use crate::evaluate::table::Evaluation;
-use crate::evaluate::{
-    EvaluateError, EvaluationObserver, EvaluationParameters, EvaluationStep, evaluate,
-};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
+use ventriform::deform::DeformParameters;
+use ventriform::deform::elastic::{Stiffness, SupportScaling};
+use ventriform::evaluate::parameters::InSample;
+use ventriform::evaluate::rows::{self, Gold, Variant};
+use ventriform::evaluate::sample::Sample;
+use ventriform::evaluate::table::Evaluation;
+use ventriform::evaluate::{
+    EvaluateError, EvaluationObserver, EvaluationParameters, EvaluationStep, evaluate,
+};
 
 /// Make models of the templates, fit them to every patient, write tables, plots and pictures
 #[derive(Debug, Args)]

@@ -4,17 +4,17 @@ use super::limit_args::LimitArgs;
 use super::output::{note, write_file};
 use super::volume_args::volume_files;
 use super::{Bar, ModelArgs, UnusableArgument};
-use crate::export::open_part::open_part;
-use crate::export::{self, Format, Part};
-use crate::pipeline::{self, Model};
-use crate::progress::{CancelToken, Monitor};
-use crate::report::{MeasuredSurface, ModelReport};
-use crate::volume::dicom::Provenance;
-use crate::volume::{self, ReadOptions};
-use crate::work::problems::Explain;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use ventriform::export::open_part::open_part;
+use ventriform::export::{self, Format, Part};
+use ventriform::pipeline::{self, Model};
+use ventriform::progress::{CancelToken, Monitor};
+use ventriform::report::{MeasuredSurface, ModelReport};
+use ventriform::volume::dicom::Provenance;
+use ventriform::volume::{self, ReadOptions};
+use ventriform_service::work::problems::Explain;
 
 /// Make a surface model from a volume
 #[derive(Debug, Args)]

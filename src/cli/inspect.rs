@@ -3,14 +3,14 @@
 use super::limit_args::LimitArgs;
 use super::output::json;
 use super::volume_args::volume_files;
-use crate::progress::Monitor;
-use crate::report;
-use crate::volume::{self, ReadOptions};
-use crate::work::problems::Explain;
 use anyhow::Result;
 use clap::Args;
 use serde_json::Value;
 use std::path::PathBuf;
+use ventriform::progress::Monitor;
+use ventriform::report;
+use ventriform::volume::{self, ReadOptions};
+use ventriform_service::work::problems::Explain;
 
 /// Print what is read of a volume: size, place, values and, of DICOM, whose scan it is
 #[derive(Debug, Args)]

@@ -3,13 +3,15 @@
 
 use super::data_args::DataArgs;
 use super::output::{note, say};
-use crate::access::{AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Maker, Quota, Scope};
-use crate::config::{Size, Span};
-use crate::jobs::{Clock, ListRequest, SystemClock, Tenant, Timestamp, rfc3339};
-use crate::text::escaped;
 use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
 use tokio::runtime::Runtime;
+use ventriform::text::escaped;
+use ventriform_service::access::{
+    AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Maker, Quota, Scope,
+};
+use ventriform_service::config::{Size, Span};
+use ventriform_service::jobs::{Clock, ListRequest, SystemClock, Tenant, Timestamp, rfc3339};
 
 /// Make, list and revoke API keys, also while the service runs
 #[derive(Debug, Args)]

@@ -3,18 +3,18 @@
 use super::mesh_args::{MeshArgs, mesh_bytes};
 use super::output::say;
 use super::serve::settings_beside;
-use crate::config::{DatabaseUrl, Settings};
-use crate::jobs::{
-    Failure, NotAdded, ProductRoom, Queue, QueueSettings, SystemClock, TemplateSource, Tenant,
-};
-use crate::store::{Store, StoreSettings};
-use crate::volume::ReadLimits;
-use crate::work::{Engine, TEMPLATE_BYTES};
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tokio::runtime::Runtime;
+use ventriform::volume::ReadLimits;
+use ventriform_service::config::{DatabaseUrl, Settings};
+use ventriform_service::jobs::{
+    Failure, NotAdded, ProductRoom, Queue, QueueSettings, SystemClock, TemplateSource, Tenant,
+};
+use ventriform_service::work::{Engine, TEMPLATE_BYTES};
+use ventriform_store::{Store, StoreSettings};
 
 /// The arguments of `templates import`.
 #[derive(Debug, Args)]

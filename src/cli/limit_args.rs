@@ -1,12 +1,12 @@
 //! The limits of the commands that read files of volumes, masks and meshes.
 
 use super::serve::variable;
-use crate::config::Size;
-use crate::volume::ReadLimits;
 use anyhow::{Context, Result};
 use clap::Args;
 use std::fmt::Display;
 use std::str::FromStr;
+use ventriform::volume::ReadLimits;
+use ventriform_service::config::Size;
 
 /// Limits on what is read.
 #[derive(Debug, Default, Args)]

@@ -6,8 +6,6 @@
 //! (tracing-appender), small requests took a tenth longer. At most [`GATHERED_BYTES`] wait; lines beyond that
 //! are dropped, and a line says how many.
 
-use crate::config::{LogFormat, Settings};
-use crate::text::{escaped_json, escaped_lines};
 use anyhow::{Context, Result};
 use std::borrow::Cow;
 use std::fmt::Debug;
@@ -20,6 +18,8 @@ use tracing_subscriber::EnvFilter;
 use tracing_subscriber::field::MakeExt;
 use tracing_subscriber::fmt::MakeWriter;
 use tracing_subscriber::fmt::format::{FormatFields, Writer, debug_fn};
+use ventriform::text::{escaped_json, escaped_lines};
+use ventriform_service::config::{LogFormat, Settings};
 
 /// Time from the first line of a batch until the batch is written.
 const GATHERING: Duration = Duration::from_millis(10);

@@ -3,17 +3,17 @@
 use super::limit_args::LimitArgs;
 use super::mesh_args::MeshArgs;
 use super::output::{json, note};
-use crate::grid::agreement::compare;
-use crate::mesh_files::{MeshFileError, MeshStatement};
-use crate::progress::Monitor;
-use crate::segmentation::agreement_json;
-use crate::volume::given_mask::{GivenMask, GivenMaskError, MaskChoice, MaskLabel, read_mask};
-use crate::volume::{VolumeError, VolumeFile};
-use crate::work::problems::Explain;
 use anyhow::{Result, anyhow};
 use clap::Args;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
+use ventriform::grid::agreement::compare;
+use ventriform::mesh_files::{MeshFileError, MeshStatement};
+use ventriform::progress::Monitor;
+use ventriform::segmentation::agreement_json;
+use ventriform::volume::given_mask::{GivenMask, GivenMaskError, MaskChoice, MaskLabel, read_mask};
+use ventriform::volume::{VolumeError, VolumeFile};
+use ventriform_service::work::problems::Explain;
 
 /// Compare two masks: Jaccard E_J, mean contour distance E_CD, Dice, Hausdorff
 #[derive(Debug, Args)]

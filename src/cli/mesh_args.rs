@@ -1,14 +1,14 @@
 //! Files of meshes on the command line: models, and what is stated of them.
 
 use super::output::note;
-use crate::mesh::TriMesh;
-use crate::mesh_files::{self, MeshFrame, MeshStatement, MeshUnit};
-use crate::volume::ReadLimits;
-use crate::work::problems::Explain;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use std::io::Read as _;
 use std::path::Path;
+use ventriform::mesh::TriMesh;
+use ventriform::mesh_files::{self, MeshFrame, MeshStatement, MeshUnit};
+use ventriform::volume::ReadLimits;
+use ventriform_service::work::problems::Explain;
 
 /// What is stated of meshes.
 #[derive(Debug, Clone, Copy, Default, Args)]

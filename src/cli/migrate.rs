@@ -2,16 +2,16 @@
 
 use super::output::{note, say};
 use super::serve::variable;
-use crate::access::verify;
-use crate::config::{BlobPlace, DatabaseUrl, Flags, Settings};
-use crate::http::{self, s3_location};
-use crate::store::{self, Destination, Migrated, Progress, open_database};
+use crate::server::s3_location;
 use anyhow::{Result, bail};
 use clap::Args;
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
+use ventriform_service::access::verify;
+use ventriform_service::config::{BlobPlace, DatabaseUrl, Flags, Settings};
+use ventriform_store::{Destination, Migrated, Progress, open_database};
 
 /// Time between two lines about the progress.
 const TOLD_EVERY: Duration = Duration::from_secs(2);
@@ -47,7 +47,7 @@ pub struct MigrateArgs {
 /// If it was not copied as a whole.
 pub fn run(args: &MigrateArgs) -> Result<()> {
     let to = args.destination()?;
-    http::install_cryptography();
+    ventriform_http::install_cryptography();
     let told = Mutex::new(Instant::now());
     let tell = |progress: Progress| {
         let Ok(mut told) = told.lock() else { return };
@@ -57,7 +57,7 @@ pub fn run(args: &MigrateArgs) -> Result<()> {
         }
     };
     Runtime::new()?.block_on(async {
-        let done = store::migrate(&args.from, &to, tell).await?;
+        let done = ventriform_store::migrate(&args.from, &to, tell).await?;
         print(&done);
         check_trail(&to).await
     })

@@ -1,11 +1,11 @@
 //! The tables of parameters as command-line flags.
 
-use crate::parameters::{
-    FitParameters, Kind, ModelParameters, ParameterError, ParameterSpec, Parameters,
-};
-use crate::work::problems::Explain;
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 use std::marker::PhantomData;
+use ventriform::parameters::{
+    FitParameters, Kind, ModelParameters, ParameterError, ParameterSpec, Parameters,
+};
+use ventriform_service::work::problems::Explain;
 
 /// The flags of the parameters of a model.
 pub type ModelArgs = TableArgs<ModelParameters>;

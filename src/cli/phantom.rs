@@ -2,13 +2,13 @@
 
 use super::Bar;
 use super::output::{create_folder, note, write_file};
-use crate::progress::{CancelToken, Monitor};
-use crate::volume::Volume;
-use crate::volume::nifti::{self, StoredType};
-use crate::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
 use anyhow::Result;
 use clap::Args;
 use std::path::{Path, PathBuf};
+use ventriform::progress::{CancelToken, Monitor};
+use ventriform::volume::Volume;
+use ventriform::volume::nifti::{self, StoredType};
+use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
 
 /// Simulate a SPECT scan, with the true mask of the wall
 #[derive(Debug, Args)]

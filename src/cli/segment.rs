@@ -7,18 +7,18 @@ use super::mesh_args::read_mesh;
 use super::output::{create_folder, note, write_file};
 use super::volume_args::volume_files;
 use super::{Bar, FitArgs, UnusableArgument};
-use crate::export::{Format, Part};
-use crate::mesh_files::MeshStatement;
-use crate::parameters::FitParameters;
-use crate::progress::{CancelToken, Monitor, Plan};
-use crate::reader::ReaderProfile;
-use crate::segmentation::Segmentation;
-use crate::segmentation::{NamedFile, NamedMesh, NamedReader, SegmentationOrder, from_files};
-use crate::volume::{ReadLimits, VolumeFile};
-use crate::work::problems::Explain;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use ventriform::export::{Format, Part};
+use ventriform::mesh_files::MeshStatement;
+use ventriform::parameters::FitParameters;
+use ventriform::progress::{CancelToken, Monitor, Plan};
+use ventriform::reader::ReaderProfile;
+use ventriform::segmentation::Segmentation;
+use ventriform::segmentation::{NamedFile, NamedMesh, NamedReader, SegmentationOrder, from_files};
+use ventriform::volume::{ReadLimits, VolumeFile};
+use ventriform_service::work::problems::Explain;
 
 /// Fit a model to the left ventricle (or another organ) in a volume
 #[derive(Debug, Args)]

@@ -2,17 +2,18 @@
 
 use super::log;
 use super::output::say;
-use crate::config::{DatabaseUrl, Flags, Settings};
-use crate::http::{self, Running};
-use crate::jobs::{Isolation, serve_isolated};
-use crate::volume::ReadLimits;
-use crate::work::Engine;
+use crate::server;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::net::{SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tokio::runtime::Runtime;
+use ventriform::volume::ReadLimits;
+use ventriform_http::Running;
+use ventriform_service::config::{DatabaseUrl, Flags, Settings};
+use ventriform_service::jobs::{Isolation, serve_isolated};
+use ventriform_service::work::Engine;
 
 /// How long the health check waits for an answer.
 const HEALTH_TIMEOUT: Duration = Duration::from_secs(3);
@@ -62,7 +63,7 @@ pub fn run(args: &ServeArgs) -> Result<()> {
     let engine = engine(&settings);
     let scheme = scheme(&settings);
     Runtime::new()?.block_on(async {
-        let running = http::start(settings, engine, listener).await?;
+        let running = server::start(settings, engine, listener).await?;
         let dicom = running.dicom_address();
         let dicom = dicom.map(|address| format!(", for DICOM on {address}"));
         say!(
@@ -113,7 +114,7 @@ pub fn check_health(args: &HealthcheckArgs) -> Result<()> {
             SocketAddr::V6(_) => std::net::Ipv6Addr::LOCALHOST.into(),
         });
     }
-    http::install_cryptography();
+    ventriform_http::install_cryptography();
     let scheme = scheme(&settings);
     Runtime::new()?.block_on(async {
         let client = reqwest::Client::builder()
@@ -148,7 +149,7 @@ pub async fn start_local(listen: SocketAddr, data_dir: &Path) -> Result<Running>
     };
     let engine = engine(&settings);
     let listener = bind(listen)?;
-    Ok(http::start(settings, engine, listener).await?)
+    Ok(server::start(settings, engine, listener).await?)
 }
 
 fn scheme(settings: &Settings) -> &'static str {
@@ -279,8 +280,8 @@ async fn shutdown_signal() -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::variable_name;
     use clap::Command;
+    use ventriform_service::config::variable_name;
 
     #[test]
     fn help_describes_every_setting_with_its_variable_and_default() {

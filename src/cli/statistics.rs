@@ -1,12 +1,12 @@
 //! `ventriform statistics`: mean shape and principal modes of a set of fits.
 
 use super::output::{create_folder, write_file};
-use crate::evaluate::statistics::statistics;
-use crate::export::{self, Format, Metadata};
-use crate::mesh::TriMesh;
 use anyhow::{Context, Result};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use ventriform::evaluate::statistics::statistics;
+use ventriform::export::{self, Format, Metadata};
+use ventriform::mesh::TriMesh;
 
 /// Compute mean shape and principal modes of fits of one model
 #[derive(Debug, Args)]

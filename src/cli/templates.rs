@@ -2,15 +2,15 @@
 
 use super::cohort_args::CohortArgs;
 use super::output::{create_folder, note, write_file};
-use crate::evaluate::parameters::ascending;
-use crate::export::{self, Format};
-use crate::parameters::ModelParameters;
-use crate::pipeline;
-use crate::progress::Monitor;
-use crate::work::problems::Explain;
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
+use ventriform::evaluate::parameters::ascending;
+use ventriform::export::{self, Format};
+use ventriform::parameters::ModelParameters;
+use ventriform::pipeline;
+use ventriform::progress::Monitor;
+use ventriform_service::work::problems::Explain;
 
 /// Build models for the library, or add them to a service's library
 #[derive(Debug, Args)]

@@ -1,9 +1,9 @@
 //! The files of a volume, as they are named on the command line.
 
-use crate::volume::{ReadLimits, VolumeFile};
-use crate::work::problems::Explain;
 use anyhow::{Result, anyhow};
 use std::path::PathBuf;
+use ventriform::volume::{ReadLimits, VolumeFile};
+use ventriform_service::work::problems::Explain;
 
 /// The files that `paths` name; a folder stands for the files in it.
 ///

@@ -9,14 +9,14 @@ use rcgen::ExtendedKeyUsagePurpose;
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use ventriform::archive::{Archive, Archives, Credentials};
-use ventriform::config::Settings;
-use ventriform::jobs::{
-    Failure, GivenParameters, Resource, StoredItem, Work, WorkError, WorkInput, WorkOutput,
-};
 use ventriform::progress::{Monitor, Plan};
 use ventriform::volume::ReadLimits;
-use ventriform::work::Engine;
+use ventriform_service::archive::{Archive, Archives, Credentials};
+use ventriform_service::config::Settings;
+use ventriform_service::jobs::{
+    Failure, GivenParameters, Resource, StoredItem, Work, WorkError, WorkInput, WorkOutput,
+};
+use ventriform_service::work::Engine;
 
 const STUDY: &str = "1.2.826.0.1.3680043.8.498.1";
 const SERIES: &str = "1.2.826.0.1.3680043.8.498.1.2";

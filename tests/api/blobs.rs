@@ -14,12 +14,12 @@ use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
 use std::time::Duration;
 use tokio::io::{AsyncWrite, AsyncWriteExt};
-use ventriform::jobs::{
+use ventriform_service::jobs::{
     BlobError, BlobStore, BlobStream, BlobWriter, FileRecord, Filed, ItemRecord, JobState,
     LocalFile, NewJob, Queue, QueueSettings, Resource, Shelved, StagedFiles, StagedFor,
     StoredVolume, SystemClock, Tags, Tenant, Timestamp, WorkerSettings, Workers,
 };
-use ventriform::store::Store;
+use ventriform_store::Store;
 
 /// Files of one item by name.
 type ItemFiles = BTreeMap<String, Vec<u8>>;

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
-use ventriform::http::install_cryptography;
+use ventriform_http::install_cryptography;
 
 /// The patient.
 const CANARY: &str = "Zzyzx^Kanarienvogel";

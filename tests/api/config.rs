@@ -1,4 +1,4 @@
-//! The settings of the program; more tests are in `src/config`.
+//! The settings of the program; more tests are in `crates/service/src/config`.
 
 use std::process::{Command, Output};
 
@@ -26,7 +26,7 @@ fn print_config_shows_every_setting_with_its_origin() {
     assert!(printed.contains("queue_limit = \"1000\" # default"));
     assert_eq!(
         printed.lines().count(),
-        ventriform::config::Settings::NAMES.len()
+        ventriform_service::config::Settings::NAMES.len()
     );
 }
 

@@ -9,16 +9,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 use tempfile::TempDir;
-use ventriform::access::{
+use ventriform::volume::dicom::DicomHeader;
+use ventriform_service::access::{
     AccessStore, Activity, ApiKey, AuditEvent, AuditFilter, KeyRequest, Maker, Quota, Scope, verify,
 };
-use ventriform::archive::{ArchiveStore, HeldSeries, SendSettlement, SeriesKey};
-use ventriform::hooks::{
+use ventriform_service::archive::{ArchiveStore, HeldSeries, SendSettlement, SeriesKey};
+use ventriform_service::hooks::{
     AttemptOutcome, DeliveryLimits, DeliveryState, DeliveryStore, HookEndpoint, HookEvent,
     Settlement, SigningSecret,
 };
-use ventriform::intake::{Added, GroupState, IntakeRoom, IntakeStore, NewObject, Origin, Protocol};
-use ventriform::jobs::{
+use ventriform_service::intake::{
+    Added, GroupState, IntakeRoom, IntakeStore, NewObject, Origin, Protocol,
+};
+use ventriform_service::jobs::{
     AddedProduct, Catalogue, Claimant, Clock, Custody, DeathLimit, Deleted, Erased, ErasureAgent,
     ErasureOrder, ErasureReason, Failure, Fault, FigureStore, FileRecord, Filed, Idempotency,
     Interrupted, ItemFilter, ItemRecord, Job, JobFilter, JobOutcome, JobState, JobStore,
@@ -26,11 +29,10 @@ use ventriform::jobs::{
     Resource, ScanFields, ScanFilter, Scans, SendOrder, SeriesSource, StoreFault, StoredVolume,
     SystemClock, TagFilter, Tags, Tenant, Timestamp, random_id,
 };
-use ventriform::store::{DiskGauge, PostgresError, SqlStore, Store, StoreSettings};
-use ventriform::volume::dicom::DicomHeader;
-use ventriform::worklist::{
+use ventriform_service::worklist::{
     AddedWorkitem, BATCH_BYTES, DataSetJson, Workitem, WorkitemState, Worklist,
 };
+use ventriform_store::{DiskGauge, PostgresError, SqlStore, Store, StoreSettings};
 
 /// Longer than a busy machine keeps anybody waiting.
 const WAIT: Duration = Duration::from_secs(30);
@@ -1819,7 +1821,7 @@ async fn a_folder_and_a_database_that_do_not_belong_together_are_refused() {
     assert!(error.contains("is empty"), "{error}");
     let error = on(None).await.err().unwrap().to_string();
     assert!(error.contains("--database"), "{error}");
-    let error = ventriform::store::examine(folder.path(), None, None)
+    let error = ventriform_store::examine(folder.path(), None, None)
         .await
         .unwrap_err()
         .to_string();

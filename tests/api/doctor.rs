@@ -7,8 +7,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
-use ventriform::jobs::Tenant;
-use ventriform::store::{backup, examine};
+use ventriform_service::jobs::Tenant;
+use ventriform_store::{backup, examine};
 
 /// A volume and a model; returns the paths that must be served, and the folder's service.
 async fn filled(data: &Path) -> (Service, Vec<String>) {
@@ -35,7 +35,7 @@ async fn serves(data: &Path, paths: &[String]) {
     service.kill();
 }
 
-fn kinds(found: &ventriform::store::Examination) -> Vec<&str> {
+fn kinds(found: &ventriform_store::Examination) -> Vec<&str> {
     found.findings.iter().map(|finding| finding.kind).collect()
 }
 
@@ -74,7 +74,7 @@ async fn readable_rows_of_a_damaged_database_are_kept_and_broken_items_set_aside
     let shelf = data.path().join("volumes").join(text(&lost["id"]));
     fs::write(shelf.join("volume.nii.gz"), "other").unwrap();
     // Moves the log into the database, whose second half is then destroyed.
-    ventriform::store::Store::open(data.path())
+    ventriform_store::Store::open(data.path())
         .await
         .unwrap()
         .close()

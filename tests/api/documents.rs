@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
-use ventriform::config::Settings;
+use ventriform_service::config::Settings;
 
 /// If set, the test writes the page instead of comparing it.
 const UPDATE: &str = "UPDATE_DOCS";

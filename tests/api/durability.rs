@@ -3,12 +3,12 @@
 use crate::helpers::{Service, fake_engine, heart, scan, text};
 use serde_json::{Value, json};
 use std::time::Duration;
-use ventriform::jobs::{
+use ventriform_service::jobs::{
     Catalogue, Claimant, DeathLimit, Failure, Fault, FileRecord, Filed, ItemFilter, JobOutcome,
     JobState, JobStore, Lease, ListRequest, NewJob, Resource, StoredVolume, Tags, Tenant,
     random_id,
 };
-use ventriform::store::Store;
+use ventriform_store::Store;
 
 #[tokio::test]
 async fn every_accepted_job_succeeds_once_although_the_service_is_killed() {
@@ -228,7 +228,8 @@ async fn older_database(folder: &std::path::Path, count: usize) -> sqlx::SqliteP
 
 /// The files of the migrations, in the order in which they run.
 fn migrations() -> Vec<std::path::PathBuf> {
-    let source = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/store/migrations");
+    let source =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/store/src/migrations");
     let files = std::fs::read_dir(source).unwrap();
     let mut files: Vec<_> = files.map(|file| file.unwrap().path()).collect();
     files.sort();

@@ -16,7 +16,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use ventriform::store::examine;
+use ventriform_store::examine;
 
 /// `errno` of a failing and of a full disk.
 const FAULTS: [(&str, i32); 2] = [("EIO", 5), ("ENOSPC", 28)];

@@ -12,26 +12,27 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use ventriform::access::{
-    AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Maker, Quota, Scope,
-};
-use ventriform::config::Settings;
 use ventriform::export::{self, Format, Metadata};
-use ventriform::http::{Running, install_cryptography, start};
-use ventriform::jobs::{
-    Clock, Failure, Fault, GivenParameters, LocalFile, Needs, OutputFile, Resource, ScanFields,
-    StoredItem, SystemClock, Work, WorkError, WorkInput, WorkOutput,
-};
 use ventriform::mesh::TriMesh;
 use ventriform::mesh::shapes::icosphere;
 use ventriform::mesh_files::MeshStatement;
 use ventriform::progress::{Monitor, Plan, Stage};
-use ventriform::store::{open_database, open_rows};
 use ventriform::volume::ReadLimits;
 use ventriform::volume::given_mask::MaskChoice;
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
-use ventriform::work::{Engine, IntensityFacts, UploadFacts, UploadReader};
+use ventriform_http::{Running, install_cryptography};
+use ventriform_program::server::start;
+use ventriform_service::access::{
+    AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Maker, Quota, Scope,
+};
+use ventriform_service::config::Settings;
+use ventriform_service::jobs::{
+    Clock, Failure, Fault, GivenParameters, LocalFile, Needs, OutputFile, Resource, ScanFields,
+    StoredItem, SystemClock, Work, WorkError, WorkInput, WorkOutput,
+};
+use ventriform_service::work::{Engine, IntensityFacts, UploadFacts, UploadReader};
+use ventriform_store::{open_database, open_rows};
 
 /// How long a test waits for a job or another event before it fails.
 const PATIENCE: Duration = Duration::from_secs(60);

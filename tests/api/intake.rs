@@ -10,11 +10,12 @@ use std::net::{SocketAddr, TcpStream};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use ventriform::access::{Quota, Scope};
-use ventriform::config::Settings;
-use ventriform::http::{ServeError, start};
 use ventriform::volume::ReadLimits;
-use ventriform::work::Engine;
+use ventriform_http::ServeError;
+use ventriform_program::server::start;
+use ventriform_service::access::{Quota, Scope};
+use ventriform_service::config::Settings;
+use ventriform_service::work::Engine;
 
 const PATIENCE: Duration = Duration::from_secs(20);
 

@@ -6,9 +6,11 @@ use serde_json::{Map, Value};
 use std::ffi::OsString;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use ventriform::jobs::{Claimant, Filed, Isolation, JobStore, NewJob, Tenant, serve_isolated};
-use ventriform::store::Store;
-use ventriform::work::Engine;
+use ventriform_service::jobs::{
+    Claimant, Filed, Isolation, JobStore, NewJob, Tenant, serve_isolated,
+};
+use ventriform_service::work::Engine;
+use ventriform_store::Store;
 
 const PATIENCE: Duration = Duration::from_secs(30);
 

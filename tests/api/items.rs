@@ -8,13 +8,13 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use tokio::io::AsyncWriteExt;
-use ventriform::jobs::{
+use ventriform_service::jobs::{
     Catalogue, Clock, Erased, ErasureAgent, ErasureOrder, ErasureReason, FileRecord, Filed,
     JobState, JobStore, LegalHold, ListRequest, NewJob, Queue, QueueSettings, Resource,
     RetentionAges, StagedFiles, StagedFor, StoredVolume, Tags, Tenant, Timestamp, Upkeep,
     WorkerSettings, Workers,
 };
-use ventriform::store::Store;
+use ventriform_store::Store;
 
 /// A clock that a test sets.
 #[derive(Default)]

@@ -6,8 +6,8 @@ use reqwest::{RequestBuilder, Response, StatusCode};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
-use ventriform::access::{Quota, Scope};
 use ventriform::mesh::shapes::icosphere;
+use ventriform_service::access::{Quota, Scope};
 
 const FORWARDED: &str = "x-forwarded-for";
 
@@ -17,7 +17,7 @@ fn mesh_json(radius: f64) -> Vec<u8> {
 }
 
 /// A service behind a proxy on this machine, which names the client of each request.
-async fn behind_proxy(change: impl FnOnce(&mut ventriform::config::Settings)) -> TestApp {
+async fn behind_proxy(change: impl FnOnce(&mut ventriform_service::config::Settings)) -> TestApp {
     TestApp::with(|settings| {
         settings.trusted_proxies = "127.0.0.1".parse().unwrap();
         change(settings);

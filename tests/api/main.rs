@@ -3,7 +3,6 @@
 //! Most tests replace the computation by a fake that returns a sphere at once, or behaves as the
 //! first word of the uploaded volume says. They test the service, not the geometry.
 
-#![cfg(feature = "service")]
 #![allow(
     clippy::unwrap_used,
     reason = "tests state their expectations by panicking"

@@ -10,10 +10,10 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use tempfile::TempDir;
-use ventriform::access::{Quota, Scope, verify};
-use ventriform::config::{AwsVariables, Settings};
-use ventriform::jobs::{Resource, random_id};
-use ventriform::store::{
+use ventriform_service::access::{Quota, Scope, verify};
+use ventriform_service::config::{AwsVariables, Settings};
+use ventriform_service::jobs::{Resource, random_id};
+use ventriform_store::{
     Destination, MigrateError, Migrated, OpenError, Progress, Store, StoreSettings, migrate,
     open_database, open_rows,
 };
@@ -113,7 +113,7 @@ fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 async fn moved(from: &Path, to: &Destination) -> Result<Migrated, MigrateError> {
-    ventriform::http::install_cryptography();
+    ventriform_http::install_cryptography();
     migrate(from, to, |_| {}).await
 }
 
@@ -215,7 +215,7 @@ async fn a_migration_that_breaks_off_goes_on_where_it_stopped() {
         s3: Some(S3Server::location_at(&proxy.url, &prefix)),
         folder: None,
     };
-    ventriform::http::install_cryptography();
+    ventriform_http::install_cryptography();
     let told = AtomicU64::new(0);
     let broken = migrate(folder.data.path(), &to, |progress| {
         if let Progress::Items { done: 2, .. } = progress {

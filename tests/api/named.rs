@@ -6,7 +6,7 @@ use reqwest::multipart::{Form, Part};
 use serde_json::Value;
 use std::io::{Cursor, Read, Write};
 use std::time::{Duration, Instant};
-use ventriform::access::{Quota, Scope};
+use ventriform_service::access::{Quota, Scope};
 
 /// The patient, short enough for every field of text.
 const NAME: &str = "Kanarienvogel";

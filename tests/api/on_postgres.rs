@@ -7,8 +7,8 @@ use serde_json::json;
 use std::process::Command;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use ventriform::access::AccessStore;
-use ventriform::store::open_database;
+use ventriform_service::access::AccessStore;
+use ventriform_store::open_database;
 
 #[tokio::test]
 async fn what_was_acknowledged_is_there_after_a_restart() {

@@ -3,8 +3,8 @@
 use crate::helpers::{TestApp, text};
 use serde_json::Value;
 use std::path::Path;
-use ventriform::http::document_json;
 use ventriform::parameters::{FIT_SPECS, SPECS};
+use ventriform_http::document_json;
 
 /// If set, the test writes the document instead of comparing it.
 const UPDATE: &str = "UPDATE_OPENAPI";

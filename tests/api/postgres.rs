@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, OnceLock};
 use std::time::Duration;
-use ventriform::config::DatabaseUrl;
-use ventriform::store::{PostgresSettings, PostgresUrl};
+use ventriform_service::config::DatabaseUrl;
+use ventriform_service::config::{PostgresSettings, PostgresUrl};
 
 /// Where Debian puts the programs of each version.
 const DEBIAN: &str = "/usr/lib/postgresql";
@@ -149,7 +149,7 @@ impl Server {
 
     /// Makes an empty database, and returns its URL.
     pub async fn database(&self) -> String {
-        let name = ventriform::jobs::random_id("t_");
+        let name = ventriform_service::jobs::random_id("t_");
         self.run("postgres", &format!("CREATE DATABASE {name}"))
             .await;
         self.url(&name)

@@ -10,9 +10,9 @@ use std::collections::BTreeSet;
 use std::time::{Duration, Instant, SystemTime};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
-use ventriform::access::{Quota, Scope};
-use ventriform::config::Settings;
-use ventriform::http::document_json;
+use ventriform_http::document_json;
+use ventriform_service::access::{Quota, Scope};
+use ventriform_service::config::Settings;
 
 /// More than the buffers of both sockets hold.
 const LARGE: usize = 24 << 20;

@@ -10,12 +10,12 @@ use std::process::Command;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use ventriform::config::Settings;
-use ventriform::jobs::{
+use ventriform_service::config::Settings;
+use ventriform_service::jobs::{
     Catalogue, Erased, ErasureAgent, ErasureOrder, ErasureReason, FileRecord, News, Resource,
     StoreFault, StoredVolume, Tags, Tenant, random_id,
 };
-use ventriform::store::{OpenError, Store, StoreSettings};
+use ventriform_store::{OpenError, Store, StoreSettings};
 
 /// Longest time until another process knows of a change. Their own looks come later.
 const SOON: Duration = Duration::from_secs(8);
@@ -273,7 +273,7 @@ async fn what_a_killed_worker_computed_is_computed_by_another_once() {
 
 #[tokio::test]
 async fn one_process_has_the_duty_and_all_hear_the_news() {
-    ventriform::http::install_cryptography();
+    ventriform_http::install_cryptography();
     let shared = Shared::new().await;
     let ((first, _kept), (second, _too)) = (shared.store().await, shared.store().await);
     let (a, b) = (first.peers.clone().unwrap(), second.peers.clone().unwrap());
@@ -395,7 +395,7 @@ async fn a_process_that_would_not_share_is_refused() {
     let said = refused(&["--role", "worker", "--database", &shared.database]);
     assert!(said.contains("--blobs s3://"), "{said}");
     assert!(refused(&["--role", "boss"]).contains("`worker`"));
-    ventriform::http::install_cryptography();
+    ventriform_http::install_cryptography();
     let (store, _folder) = shared.store().await;
     drop(store);
     // Its files would be seen by nobody else.

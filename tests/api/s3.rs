@@ -12,13 +12,13 @@ use std::sync::Arc;
 use std::time::Duration;
 use tempfile::TempDir;
 use tokio::io::AsyncWriteExt;
-use ventriform::config::{AwsVariables, Settings};
-use ventriform::intake::ReceivedFiles;
-use ventriform::jobs::{
+use ventriform_service::config::{AwsVariables, Settings};
+use ventriform_service::intake::ReceivedFiles;
+use ventriform_service::jobs::{
     BlobError, BlobStore, FileRecord, ItemRecord, Resource, StagedFiles, StagedFor, StoreFault,
     StoredVolume, Tenant, random_id,
 };
-use ventriform::store::{DiskGauge, FileBlobs, S3Blobs, S3Location, Store, StoreSettings, examine};
+use ventriform_store::{DiskGauge, FileBlobs, S3Blobs, S3Location, Store, StoreSettings, examine};
 
 const CACHE: u64 = 64 << 20;
 
@@ -46,7 +46,7 @@ impl Subject {
 
     /// A part of a server's bucket, reached at `url`.
     async fn bucket(server: &Arc<S3Server>, url: &str, prefix: &str) -> Self {
-        ventriform::http::install_cryptography();
+        ventriform_http::install_cryptography();
         let location = S3Server::location_at(url, prefix);
         let folder = tempfile::tempdir().unwrap();
         let gauge = DiskGauge::new(folder.path(), Some(0));
@@ -514,7 +514,7 @@ async fn without_its_store_the_service_says_so_and_jobs_wait() {
 
 #[tokio::test]
 async fn a_bucket_that_cannot_be_used_is_refused_at_the_start_with_what_to_do() {
-    ventriform::http::install_cryptography();
+    ventriform_http::install_cryptography();
     let server = Arc::new(S3Server::start().await);
     let prefix = random_id("");
     let folder = tempfile::tempdir().unwrap();

@@ -22,8 +22,8 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::Duration;
 use tempfile::TempDir;
 use tokio::net::TcpListener;
-use ventriform::config::{AwsVariables, Settings};
-use ventriform::store::S3Location;
+use ventriform_service::config::{AwsVariables, Settings};
+use ventriform_store::S3Location;
 
 /// The bucket that exists.
 pub const BUCKET: &str = "hearts";
@@ -138,7 +138,7 @@ impl S3Server {
 
 /// A client that knows nothing of the service.
 fn client(location: &S3Location) -> AmazonS3 {
-    ventriform::http::install_cryptography();
+    ventriform_http::install_cryptography();
     let mut builder = AmazonS3Builder::new().with_bucket_name(&location.bucket);
     for (name, value) in &location.variables {
         let key = name.to_lowercase().parse().unwrap();
@@ -263,7 +263,7 @@ async fn relay(State(state): State<Arc<ProxyState>>, request: Request) -> Respon
 impl FaultProxy {
     /// A proxy that lets everything pass.
     pub async fn before(upstream: &str) -> Self {
-        ventriform::http::install_cryptography();
+        ventriform_http::install_cryptography();
         let state = Arc::new(ProxyState {
             upstream: upstream.to_owned(),
             network: AtomicUsize::new(Network::Whole as usize),

@@ -14,11 +14,14 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
-use ventriform::access::{AccessStore, Activity, AuditEvent, BrokenLink, Quota, Scope, verify};
-use ventriform::config::Settings;
-use ventriform::http::{ServeError, document_json, start};
-use ventriform::jobs::{Clock, SystemClock, Tenant};
-use ventriform::store::{SqlStore, open_rows};
+use ventriform_http::{ServeError, document_json};
+use ventriform_program::server::start;
+use ventriform_service::access::{
+    AccessStore, Activity, AuditEvent, BrokenLink, Quota, Scope, verify,
+};
+use ventriform_service::config::Settings;
+use ventriform_service::jobs::{Clock, SystemClock, Tenant};
+use ventriform_store::{SqlStore, open_rows};
 
 async fn plain_key(app: &TestApp, scope: Scope) -> String {
     key(app.data.path(), scope, "default", Quota::default())

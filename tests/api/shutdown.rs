@@ -30,12 +30,13 @@ async fn a_job_that_outlasts_the_grace_period_returns_to_the_queue_uncounted() {
 #[tokio::test]
 async fn a_second_service_cannot_use_the_same_folder() {
     let app = TestApp::start().await;
-    let settings = ventriform::config::Settings {
+    let settings = ventriform_service::config::Settings {
         data_dir: app.data.path().to_owned(),
         ..Default::default()
     };
     let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-    let Err(error) = ventriform::http::start(settings, fake_engine(), listener).await else {
+    let Err(error) = ventriform_program::server::start(settings, fake_engine(), listener).await
+    else {
         panic!("the folder is in use");
     };
     assert!(error.to_string().contains("in use"));

@@ -6,7 +6,7 @@ use serde_json::json;
 use sqlx::ConnectOptions;
 use sqlx::sqlite::SqliteConnectOptions;
 use std::time::Duration;
-use ventriform::store::Store;
+use ventriform_store::Store;
 
 /// More than any disk has.
 const ENDLESS: &str = "1000000GiB";

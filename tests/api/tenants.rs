@@ -7,13 +7,13 @@ use crate::scu::nuclear;
 use reqwest::{Method, RequestBuilder, StatusCode};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use ventriform::access::{Quota, Scope};
-use ventriform::config::Settings;
-use ventriform::http::document_json;
-use ventriform::jobs::{
+use ventriform_http::document_json;
+use ventriform_service::access::{Quota, Scope};
+use ventriform_service::config::Settings;
+use ventriform_service::jobs::{
     Catalogue, Filed, Idempotency, JobStore, NewJob, StoredVolume, Tags, Tenant,
 };
-use ventriform::store::Store;
+use ventriform_store::Store;
 
 #[tokio::test]
 async fn an_idempotency_key_is_its_tenants_own() {

@@ -10,7 +10,7 @@ use std::path::Path;
 use std::time::Duration;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
-use ventriform::config::Settings;
+use ventriform_service::config::Settings;
 
 /// An authority that signs certificates.
 pub struct Authority(CertifiedIssuer<'static, KeyPair>);
@@ -74,7 +74,7 @@ impl Authority {
     }
 }
 
-pub fn file(folder: &Path, name: &str) -> ventriform::config::OptionalPath {
+pub fn file(folder: &Path, name: &str) -> ventriform_service::config::OptionalPath {
     folder.join(name).to_str().unwrap().parse().unwrap()
 }
 
@@ -172,7 +172,8 @@ async fn half_a_pair_of_settings_and_bad_files_stop_the_start() {
             ..Settings::default()
         };
         let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-        let started = ventriform::http::start(settings, crate::helpers::fake_engine(), listener);
+        let started =
+            ventriform_program::server::start(settings, crate::helpers::fake_engine(), listener);
         started.await.err().expect("it cannot start").to_string()
     };
     assert!(refused("cert.pem", "off").await.contains("tls_key"));

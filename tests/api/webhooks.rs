@@ -6,8 +6,8 @@ use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
-use ventriform::config::Settings;
-use ventriform::hooks::SigningSecret;
+use ventriform_service::config::Settings;
+use ventriform_service::hooks::SigningSecret;
 
 const SECRET: &str = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
 

@@ -12,7 +12,7 @@ use ventriform::progress::Monitor;
 use ventriform::retile::RetileError;
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::{ReadLimits, Volume, VolumeError, VolumeFile};
-use ventriform::work::problems::advice;
+use ventriform_service::work::problems::advice;
 
 fn volume(shape: [usize; 3], spacing: [f64; 3], value: impl Fn(Vec3) -> f64) -> Volume {
     let frame = VoxelToPatient::centred(shape, spacing, Vec3::zeros()).unwrap();

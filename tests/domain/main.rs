@@ -4,7 +4,6 @@
 //! the program or the service's advice needs the feature; the rest tests the library alone, too.
 
 mod volume_dicom;
-#[cfg(feature = "service")]
 mod volume_odd_nifti;
 
 mod surface_cohort;
@@ -27,18 +26,14 @@ mod deform_varied;
 mod doubt;
 
 mod containers;
-#[cfg(feature = "service")]
 mod edges;
 mod hot_neighbours;
 mod orientation;
-#[cfg(feature = "service")]
 mod pipeline;
 mod quality;
-#[cfg(feature = "service")]
 mod segment;
 
 mod reader;
 
-#[cfg(feature = "service")]
 mod evaluate_cohort;
 mod evaluate_reference;

@@ -13,7 +13,7 @@ use ventriform::progress::{CancelToken, Monitor, Observer, Stage};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
 use ventriform::volume::{self, ReadLimits, Volume, VolumeFile};
-use ventriform::work::problems::advice;
+use ventriform_service::work::problems::advice;
 
 /// A simulated scan, small enough for many runs.
 fn scan() -> &'static [u8] {

@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 use ventriform::progress::Monitor;
 use ventriform::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeFile};
-use ventriform::work::problems::advice;
+use ventriform_service::work::problems::advice;
 
 /// The folder of the test data, unless it is absent.
 fn data() -> Option<PathBuf> {

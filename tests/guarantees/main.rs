@@ -9,7 +9,6 @@
 //! of each family than CI does and prints how many models were refused. `VENTRIFORM_DUMP=DIR`
 //! writes some of the models to DIR, so that other programs can check them.
 
-#![cfg(feature = "service")]
 #![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
 
 mod families;
@@ -25,7 +24,7 @@ use ventriform::parameters::ModelParameters;
 use ventriform::progress::Monitor;
 use ventriform::retile::{RetileError, retile};
 use ventriform::surface::Surface;
-use ventriform::work::problems::advice;
+use ventriform_service::work::problems::advice;
 
 /// Numbers of points; the sweeps take them in turn.
 const POINTS: [usize; 9] = [12, 150, 35, 300, 67, 20, 110, 500, 200];

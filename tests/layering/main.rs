@@ -1,4 +1,5 @@
-//! Who may use whom: the imports of `src/` against the order of ARCHITECTURE.md.
+//! Who may use whom: the imports of the sources against the order of ARCHITECTURE.md. Between crates the compiler
+//! watches; here are the folders of a crate, and what may not be named by whom.
 
 mod imports;
 
@@ -7,9 +8,37 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Each module of the crate and the modules it uses, in reading order: a module uses only what
+/// The crates of the workspace: the folder, and those of ours that each depends on.
+const CRATES: &[(&str, &[&str])] = &[
+    ("crates/ventriform", &[]),
+    ("crates/service", &["ventriform"]),
+    ("crates/store", &["ventriform-service"]),
+    ("crates/http", &["ventriform", "ventriform-service"]),
+    (
+        ".",
+        &[
+            "ventriform",
+            "ventriform-http",
+            "ventriform-service",
+            "ventriform-store",
+        ],
+    ),
+];
+
+/// What one crate may not depend on, whatever it uses today.
+const FORBIDDEN: &[(&str, &[&str])] = &[
+    ("crates/ventriform", SERVICE_CRATES),
+    (
+        "crates/service",
+        &["axum", "hyper", "utoipa", "sqlx", "object_store"],
+    ),
+    ("crates/store", &["axum", "hyper", "utoipa"]),
+    ("crates/http", &["sqlx", "object_store"]),
+];
+
+/// Each module of the library and the modules it uses, in reading order: a module uses only what
 /// stands above it.
-const USES: &[(&str, &[&str])] = &[
+const LIBRARY: &[(&str, &[&str])] = &[
     ("text", &[]),
     ("geometry", &[]),
     ("numeric", &["geometry"]),
@@ -145,99 +174,30 @@ const USES: &[(&str, &[&str])] = &[
             "segmentation",
         ],
     ),
-    ("jobs", &["text", "progress"]),
-    ("access", &["text", "jobs"]),
+];
+
+/// The same for the service.
+const SERVICE: &[(&str, &[&str])] = &[
+    ("jobs", &[]),
+    ("access", &["jobs"]),
     ("pem", &[]),
     ("hooks", &["jobs"]),
     ("archive", &["jobs", "pem", "hooks"]),
-    (
-        "intake",
-        &["progress", "volume", "export", "jobs", "access"],
-    ),
+    ("intake", &["jobs", "access"]),
     ("worklist", &["jobs"]),
     (
-        "store",
+        "stores",
         &["jobs", "access", "hooks", "archive", "intake", "worklist"],
     ),
-    (
-        "work",
-        &[
-            "geometry",
-            "mesh",
-            "mesh_files",
-            "progress",
-            "grid",
-            "volume",
-            "locate",
-            "surface",
-            "retile",
-            "export",
-            "model",
-            "deform",
-            "polar",
-            "reader",
-            "report",
-            "parameters",
-            "pipeline",
-            "segmentation",
-            "jobs",
-        ],
-    ),
+    ("work", &["jobs"]),
     (
         "config",
-        &["jobs", "hooks", "archive", "intake", "worklist", "store"],
-    ),
-    (
-        "http",
-        &[
-            "text",
-            "mesh",
-            "mesh_files",
-            "progress",
-            "volume",
-            "export",
-            "parameters",
-            "jobs",
-            "access",
-            "pem",
-            "hooks",
-            "intake",
-            "worklist",
-            "archive",
-            "store",
-            "work",
-            "config",
-        ],
-    ),
-    (
-        "cli",
-        &[
-            "text",
-            "mesh",
-            "mesh_files",
-            "progress",
-            "grid",
-            "volume",
-            "export",
-            "deform",
-            "reader",
-            "report",
-            "parameters",
-            "pipeline",
-            "segmentation",
-            "evaluate",
-            "jobs",
-            "access",
-            "store",
-            "work",
-            "config",
-            "http",
-        ],
+        &["jobs", "hooks", "archive", "intake", "worklist"],
     ),
 ];
 
-/// Crates that only the service and the command line may name: the domain knows no network,
-/// no database, no runtime, no terminal.
+/// Crates of the service and the command line: the library knows no network, no database, no runtime,
+/// no terminal.
 const SERVICE_CRATES: &[&str] = &[
     "axum",
     "hyper",
@@ -267,24 +227,23 @@ const SERVICE_CRATES: &[&str] = &[
     "x509_parser",
 ];
 
-/// The service: what stands here may name [`SERVICE_CRATES`].
-const SERVICE: &[&str] = &[
-    "jobs", "access", "pem", "hooks", "archive", "intake", "worklist", "work", "store", "config",
-    "http", "cli",
-];
-
 /// Standard-library facilities that would make a result depend on more than its input.
 const IMPURE: &[&str] = &["std::time", "std::env", "std::net", "HashMap", "HashSet"];
 
-fn src() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The modules of `src/` that use each other, by the first word of their paths.
-fn used_modules() -> BTreeMap<String, BTreeSet<String>> {
+/// The sources of the crate in `folder`.
+fn src(folder: &str) -> PathBuf {
+    root().join(folder).join("src")
+}
+
+/// The modules of a crate that use each other, by the first word of their paths.
+fn used_modules(folder: &str) -> BTreeMap<String, BTreeSet<String>> {
     let mut used: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    for (file, others) in Sources::read(&src()).arrows() {
-        let Some(module) = file.first().filter(|m| *m != "main") else {
+    for (file, others) in Sources::read(&src(folder)).arrows() {
+        let Some(module) = file.first() else {
             continue;
         };
         let entry = used.entry(module.clone()).or_default();
@@ -300,41 +259,41 @@ fn used_modules() -> BTreeMap<String, BTreeSet<String>> {
 }
 
 #[test]
-fn modules_use_exactly_what_the_table_says() {
-    let table: BTreeMap<String, BTreeSet<String>> = USES
-        .iter()
-        .map(|(module, uses)| {
-            (
-                module.to_string(),
-                uses.iter().map(|u| u.to_string()).collect(),
-            )
-        })
-        .collect();
-    assert_eq!(
-        table.len(),
-        USES.len(),
-        "a module stands in the table twice"
-    );
-    let used = used_modules();
+fn modules_use_exactly_what_the_tables_say() {
     let mut wrong = Vec::new();
-    for module in table.keys().chain(used.keys()).collect::<BTreeSet<_>>() {
-        let empty = BTreeSet::new();
-        let (said, found) = (
-            table.get(module).unwrap_or(&empty),
-            used.get(module).unwrap_or(&empty),
+    for (folder, uses) in [("crates/ventriform", LIBRARY), ("crates/service", SERVICE)] {
+        let table: BTreeMap<String, BTreeSet<String>> = uses
+            .iter()
+            .map(|(module, uses)| {
+                let uses = uses.iter().map(|u| u.to_string()).collect();
+                (module.to_string(), uses)
+            })
+            .collect();
+        assert_eq!(
+            table.len(),
+            uses.len(),
+            "a module stands in a table twice: {folder}"
         );
-        for extra in found.difference(said) {
-            wrong.push(format!(
-                "`{module}` uses `{extra}`, which the table does not allow"
-            ));
-        }
-        for unused in said.difference(found) {
-            wrong.push(format!(
-                "the table lets `{module}` use `{unused}`; it does not"
-            ));
-        }
-        if !table.contains_key(module) {
-            wrong.push(format!("`{module}` is not in the table"));
+        let used = used_modules(folder);
+        for module in table.keys().chain(used.keys()).collect::<BTreeSet<_>>() {
+            let empty = BTreeSet::new();
+            let (said, found) = (
+                table.get(module).unwrap_or(&empty),
+                used.get(module).unwrap_or(&empty),
+            );
+            for extra in found.difference(said) {
+                wrong.push(format!(
+                    "`{module}` uses `{extra}`, which the table does not allow"
+                ));
+            }
+            for unused in said.difference(found) {
+                wrong.push(format!(
+                    "the table lets `{module}` use `{unused}`; it does not"
+                ));
+            }
+            if !table.contains_key(module) {
+                wrong.push(format!("`{module}` is not in the table"));
+            }
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
@@ -342,61 +301,86 @@ fn modules_use_exactly_what_the_table_says() {
 
 #[test]
 fn no_module_uses_one_that_stands_below_it() {
-    for (at, (module, uses)) in USES.iter().enumerate() {
-        for used in *uses {
-            assert!(
-                USES[..at].iter().any(|(above, _)| above == used),
-                "`{module}` uses `{used}`, which does not stand above it"
-            );
+    for table in [LIBRARY, SERVICE] {
+        for (at, (module, uses)) in table.iter().enumerate() {
+            for used in *uses {
+                assert!(
+                    table[..at].iter().any(|(above, _)| above == used),
+                    "`{module}` uses `{used}`, which does not stand above it"
+                );
+            }
         }
     }
 }
 
 #[test]
 fn no_files_use_each_other_in_a_circle() {
-    let found = circles(&Sources::read(&src()).arrows());
-    let told: Vec<String> = found
-        .iter()
-        .map(|circle| {
-            circle
-                .iter()
-                .map(|m: &ModulePath| m.join("::"))
-                .collect::<Vec<_>>()
-                .join(", ")
-        })
-        .collect();
+    let mut told = Vec::new();
+    for (folder, _) in CRATES {
+        for circle in circles(&Sources::read(&src(folder)).arrows()) {
+            let files: Vec<String> = circle.iter().map(|m: &ModulePath| m.join("::")).collect();
+            told.push(format!("{folder}: {}", files.join(", ")));
+        }
+    }
     assert!(told.is_empty(), "{}", told.join("\n"));
 }
 
-#[test]
-fn the_domain_knows_no_service_and_no_clock() {
-    let mut violations = Vec::new();
-    for path in rust_files(&src()) {
-        let inside = path.strip_prefix(src()).expect("a path inside src");
-        let first = inside
-            .iter()
-            .next()
-            .map(Path::new)
-            .and_then(Path::file_stem);
-        let module = first
-            .map(|m| m.to_string_lossy().into_owned())
-            .unwrap_or_default();
-        if SERVICE.contains(&module.as_str()) || module == "lib" || module == "main" {
-            continue;
+/// The names under `[dependencies]` of the crate in `folder`, for every platform.
+fn dependencies(folder: &str) -> BTreeSet<String> {
+    let manifest = fs::read_to_string(root().join(folder).join("Cargo.toml")).expect("a manifest");
+    let mut names = BTreeSet::new();
+    let mut inside = false;
+    for line in manifest.lines() {
+        if line.starts_with('[') {
+            inside = line.ends_with("dependencies]")
+                && !line.contains("dev-")
+                && !line.contains("workspace");
+        } else if inside && let Some((name, _)) = line.split_once(['.', ' ', '=']) {
+            names.insert(name.to_owned());
         }
+    }
+    assert!(!names.is_empty(), "{folder} depends on nothing");
+    names
+}
+
+#[test]
+fn a_crate_depends_on_the_crates_below_it_alone() {
+    for (folder, ours) in CRATES {
+        let found = dependencies(folder);
+        let found: BTreeSet<&str> = found
+            .iter()
+            .map(String::as_str)
+            .filter(|name| name.starts_with("ventriform"))
+            .collect();
+        assert_eq!(found, ours.iter().copied().collect(), "{folder}");
+    }
+    for (folder, forbidden) in FORBIDDEN {
+        let found = dependencies(folder);
+        for name in *forbidden {
+            let name = name.replace('_', "-");
+            assert!(!found.contains(&name), "{folder} depends on {name}");
+            assert!(
+                !found.contains(&name.replace('-', "_")),
+                "{folder} depends on {name}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_library_knows_no_clock_and_no_environment() {
+    let mut violations = Vec::new();
+    let src = src("crates/ventriform");
+    for path in rust_files(&src) {
         let text = fs::read_to_string(&path).expect("a source file");
         let code = text.split("#[cfg(test)]\nmod tests").next().unwrap_or("");
         for line in code.lines().map(str::trim).filter(|l| !l.starts_with("//")) {
-            let named = SERVICE_CRATES
-                .iter()
-                .map(|name| format!("{name}::"))
-                .chain(IMPURE.iter().map(|name| (*name).to_owned()));
-            for name in named {
-                let at_word = line.find(&name).is_some_and(|at| {
+            for name in IMPURE {
+                let at_word = line.find(name).is_some_and(|at| {
                     !line[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':')
                 });
                 if at_word {
-                    violations.push(format!("{}: {line}", inside.display()));
+                    violations.push(format!("{}: {line}", path.display()));
                 }
             }
         }
@@ -406,7 +390,8 @@ fn the_domain_knows_no_service_and_no_clock() {
 
 #[test]
 fn every_module_opens_with_its_method() {
-    for path in rust_files(&src()) {
+    let folders = CRATES.iter().map(|(folder, _)| src(folder));
+    for path in folders.flat_map(|folder| rust_files(&folder)) {
         let text = fs::read_to_string(&path).expect("a source file");
         assert!(
             text.starts_with("//!"),

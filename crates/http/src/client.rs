@@ -1,0 +1,168 @@
+//! Who sent a request: the address that limits are counted for.
+//!
+//! It is the address of the other end of the connection. If that is a trusted proxy (setting
+//! `trusted_proxies`), it is the last address in `X-Forwarded-For` or `Forwarded` (RFC 7239) that
+//! is not itself a trusted proxy; what stands before it could have been made up by the client.
+//! Connections of any other sender are not asked for these headers.
+//!
+//! An IPv6 address stands for its /64 network, which one host can use as a whole.
+//!
+//! [`crate::connections`] puts a [`ClientAddress`] into the extensions of each request and
+//! runs the request within [`ClientAddress::scope`], so that shared code can ask for
+//! [`ClientAddress::current`] without being handed the request.
+
+use axum::http::{HeaderMap, HeaderName, header};
+use std::fmt;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use ventriform_service::config::Networks;
+
+const X_FORWARDED_FOR: HeaderName = HeaderName::from_static("x-forwarded-for");
+
+tokio::task_local! {
+    static CURRENT: ClientAddress;
+}
+
+/// The address of a client, or its network where a host can take any address of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ClientAddress(IpAddr);
+
+impl ClientAddress {
+    /// The unspecified address, of work that belongs to no request.
+    pub const NONE: Self = Self(IpAddr::V4(Ipv4Addr::UNSPECIFIED));
+
+    /// The address of the other end of a connection.
+    pub fn of_peer(peer: IpAddr) -> Self {
+        Self(match peer.to_canonical() {
+            IpAddr::V6(address) => {
+                let network = u128::from(address) & !u128::from(u64::MAX);
+                IpAddr::V6(Ipv6Addr::from(network))
+            }
+            v4 => v4,
+        })
+    }
+
+    /// The address from which a request came that arrived from `peer`.
+    pub fn of_request(peer: IpAddr, headers: &HeaderMap, trusted: &Networks) -> Self {
+        if !trusted.contain(peer.to_canonical()) {
+            return Self::of_peer(peer);
+        }
+        let hops = forwarded_for(headers);
+        let known = hops.iter().rev().map_while(|hop| *hop);
+        let mut nearest = peer;
+        for hop in known {
+            nearest = hop;
+            if !trusted.contain(hop.to_canonical()) {
+                break;
+            }
+        }
+        Self::of_peer(nearest)
+    }
+
+    /// The client of the request that the current task answers. Work that belongs to no request
+    /// counts as that of the unspecified address.
+    pub fn current() -> Self {
+        CURRENT.try_with(|client| *client).unwrap_or(Self::NONE)
+    }
+
+    /// Runs the answering of a request of this client.
+    pub async fn scope<T>(self, answer: impl Future<Output = T>) -> T {
+        CURRENT.scope(self, answer).await
+    }
+}
+
+impl fmt::Display for ClientAddress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            IpAddr::V4(address) => address.fmt(f),
+            IpAddr::V6(network) => write!(f, "{network}/64"),
+        }
+    }
+}
+
+/// The addresses through which a request came, the nearest last; `None` for one that is hidden or
+/// cannot be read. `Forwarded` is used if the older `X-Forwarded-For` is missing.
+fn forwarded_for(headers: &HeaderMap) -> Vec<Option<IpAddr>> {
+    let lists = |name| {
+        let values = headers.get_all(name).iter();
+        values.flat_map(|value| value.to_str().unwrap_or("?").split(','))
+    };
+    if headers.contains_key(X_FORWARDED_FOR) {
+        return lists(X_FORWARDED_FOR).map(node_address).collect();
+    }
+    let node = |element: &str| {
+        let pairs = element.split(';').filter_map(|pair| pair.split_once('='));
+        let mut nodes = pairs.filter(|(name, _)| name.trim().eq_ignore_ascii_case("for"));
+        nodes.next().and_then(|(_, node)| node_address(node))
+    };
+    lists(header::FORWARDED).map(node).collect()
+}
+
+/// The address in `192.0.2.1`, `192.0.2.1:80`, `2001:db8::1`, `"[2001:db8::1]:80"`.
+pub(super) fn node_address(node: &str) -> Option<IpAddr> {
+    let node = node.trim().trim_matches('"');
+    let bare = node
+        .strip_prefix('[')
+        .and_then(|rest| rest.strip_suffix(']'));
+    let bare = bare.unwrap_or(node);
+    let with_port = || node.parse().ok().map(|address: SocketAddr| address.ip());
+    bare.parse().ok().or_else(with_port)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use axum::http::HeaderValue;
+
+    fn seen(peer: &str, name: &'static str, value: &'static str) -> String {
+        let mut headers = HeaderMap::new();
+        headers.insert(name, HeaderValue::from_static(value));
+        let trusted = "127.0.0.1, 10.0.0.0/8".parse().unwrap();
+        ClientAddress::of_request(peer.parse().unwrap(), &headers, &trusted).to_string()
+    }
+
+    #[test]
+    fn only_trusted_proxies_name_the_client() {
+        let list = "203.0.113.7, 198.51.100.9, 10.1.2.3";
+        assert_eq!(seen("127.0.0.1", "x-forwarded-for", list), "198.51.100.9");
+        assert_eq!(
+            seen("::ffff:127.0.0.1", "x-forwarded-for", list),
+            "198.51.100.9"
+        );
+        assert_eq!(seen("192.0.2.1", "x-forwarded-for", list), "192.0.2.1");
+        let list = "for=203.0.113.7;proto=https, For=\"[2001:db8:1:2:3::4]:99\"";
+        assert_eq!(seen("10.9.9.9", "forwarded", list), "2001:db8:1:2::/64");
+        assert_eq!(seen("192.0.2.1", "forwarded", list), "192.0.2.1");
+    }
+
+    #[test]
+    fn an_unreadable_hop_ends_the_trust() {
+        for list in [
+            "203.0.113.7, what",
+            "203.0.113.7, unknown",
+            "",
+            "203.0.113.7,",
+        ] {
+            assert_eq!(
+                seen("127.0.0.1", "x-forwarded-for", list),
+                "127.0.0.1",
+                "{list}"
+            );
+        }
+        let hidden = "203.0.113.7, _x, 10.1.2.3:81";
+        assert_eq!(seen("127.0.0.1", "x-forwarded-for", hidden), "10.1.2.3");
+        assert_eq!(seen("127.0.0.1", "forwarded", "proto=http"), "127.0.0.1");
+    }
+
+    #[test]
+    fn a_host_cannot_multiply_by_its_network() {
+        let one = ClientAddress::of_peer("2001:db8::1".parse().unwrap());
+        assert_eq!(
+            one,
+            ClientAddress::of_peer("2001:db8::ffff:2".parse().unwrap())
+        );
+        assert_ne!(
+            one,
+            ClientAddress::of_peer("2001:db8:0:1::1".parse().unwrap())
+        );
+    }
+}

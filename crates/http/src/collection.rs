@@ -1,0 +1,274 @@
+//! What volumes, models, segmentations and templates have in common: they are listed in pages,
+//! shown one by one, and erased.
+//!
+//! [`Collection`] says how one kind of thing is read from the catalogue and shown;
+//! [`routes`] serves it under `/v1/{plural}` and `/v1/{plural}/{id}`.
+
+use super::app::App;
+use super::caller::Caller;
+use super::erasures::{self, ReceiptBody};
+use super::guard::Agent;
+use super::openapi::{
+    CachedHeaders, CascadeParameter, Documented, EraseProblems, ErasureParameters, ListProblems,
+    LookupProblems, PageParameters, ScanParameters, TagParameters, UnchangedAnswer,
+};
+use super::pagination::{next_cursor, page_of};
+use super::problem::Answer;
+use super::problem::not_found::missing;
+use super::request::{PathSegments, query_pairs, refuse_unknown};
+use super::validators::ValidatedJson;
+use super::{scans, tags};
+use axum::extract::{RawQuery, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue};
+use axum::routing::{delete, get};
+use axum::{Extension, Json};
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
+use std::borrow::Cow;
+use std::convert::Infallible;
+use std::ops::ControlFlow;
+use utoipa::openapi::path::HttpMethod;
+use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, Schema, SchemaType, Type};
+use utoipa::openapi::{Ref, RefOr};
+use utoipa::{PartialSchema, ToSchema};
+use utoipa_axum::router::UtoipaMethodRouter;
+use ventriform_service::access::Scope;
+use ventriform_service::jobs::{
+    Catalogue, Held, ItemFilter, ListPage, ListRequest, Resource, ScanFilter, StoreError,
+    TagFilter, Tenant,
+};
+
+/// One kind of stored thing.
+pub trait Collection: 'static {
+    /// The kind: its ids, its noun, its path.
+    const RESOURCE: Resource;
+
+    /// Whether a caller may give it names of its own, and search by them.
+    const TAGGED: bool = false;
+
+    /// Whether it is of a scan, by which it is searched.
+    const SCANNED: bool = true;
+
+    /// A row of the catalogue.
+    type Row: Send;
+
+    /// The row as JSON.
+    type Body: Serialize + ToSchema + Send;
+
+    /// The JSON of a row for a caller of that scope.
+    ///
+    /// # Errors
+    /// If the row holds something that cannot be read.
+    fn body(app: &App, scope: Scope, row: Held<Self::Row>) -> Result<Self::Body, StoreError>;
+
+    /// The tenant's row of that id.
+    fn row(
+        catalogue: &dyn Catalogue,
+        tenant: &Tenant,
+        id: &str,
+    ) -> impl Future<Output = Result<Option<Held<Self::Row>>, StoreError>> + Send;
+
+    /// A page of the tenant's rows, newest first.
+    fn rows(
+        catalogue: &dyn Catalogue,
+        tenant: &Tenant,
+        filter: &ItemFilter,
+        page: ListRequest,
+    ) -> impl Future<Output = Result<ListPage<Held<Self::Row>>, StoreError>> + Send;
+}
+
+/// `GET /v1/{plural}`, `GET /v1/{plural}/{id}` and `DELETE /v1/{plural}/{id}`.
+pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
+    let (noun, plural) = (C::RESOURCE.noun(), C::RESOURCE.plural());
+    let operation = |method, path: &str, id, summary| {
+        Documented::new(method, format!("/v1/{plural}{path}"), plural, id, summary)
+    };
+    let mut listing = operation(
+        HttpMethod::Get,
+        "",
+        format!("list_{plural}"),
+        format!("List {plural}"),
+    )
+    .parameters::<PageParameters>()
+    .json::<ListBody<C>>("A page, newest first")
+    .answers::<ListProblems>();
+    if C::TAGGED {
+        listing = listing.parameters::<TagParameters>();
+    }
+    if C::SCANNED {
+        listing = listing.parameters::<ScanParameters>();
+    }
+    let lookup = operation(
+        HttpMethod::Get,
+        "/{id}",
+        format!("get_{noun}"),
+        format!("Show a {noun}"),
+    )
+    .id(noun)
+    .parameters::<CachedHeaders>()
+    .json::<C::Body>(&format!("The {noun}"))
+    .answers::<UnchangedAnswer>()
+    .answers::<LookupProblems>();
+    let mut erasure = operation(
+        HttpMethod::Delete,
+        "/{id}",
+        format!("delete_{noun}"),
+        format!("Erase a {noun}"),
+    )
+    .description(
+        "Refused while an unfinished job needs it or a legal hold keeps it. Every erasure leaves a \
+         receipt, at the path in `Location`; `Prefer: return=representation` asks for it in the \
+         answer.",
+    )
+    .id(noun)
+    .parameters::<ErasureParameters>()
+    .json::<ReceiptBody>("Erased; the receipt")
+    .empty_answer("204", "Erased")
+    .answers::<EraseProblems>()
+    .answers::<LookupProblems>();
+    if C::RESOURCE == Resource::Volume {
+        erasure = erasure.parameters::<CascadeParameter>();
+    }
+    [
+        listing.served_by(get(list::<C>)),
+        lookup.served_by(get(show::<C>)),
+        erasure.served_by(delete(erase::<C>)),
+    ]
+}
+
+/// The tenant's row of that id, or the 404 or 410 that says why there is none.
+pub async fn find<C: Collection>(app: &App, tenant: &Tenant, id: &str) -> Answer<Held<C::Row>> {
+    let catalogue = &*app.queue.catalogue;
+    let found = match Resource::of(id) == Some(C::RESOURCE) {
+        true => C::row(catalogue, tenant, id).await?,
+        false => None,
+    };
+    match found {
+        Some(row) => Ok(row),
+        None => Err(missing(catalogue, tenant, C::RESOURCE, id).await),
+    }
+}
+
+/// What one upload may hold (draft-ietf-httpbis-resumable-upload), so that clients need not send what will be
+/// refused.
+const UPLOAD_LIMIT: HeaderName = HeaderName::from_static("upload-limit");
+
+async fn list<C: Collection>(
+    State(app): State<App>,
+    caller: Caller,
+    RawQuery(query): RawQuery,
+) -> Answer<(HeaderMap, Json<ListBody<C>>)> {
+    let pairs = query_pairs(query.as_deref());
+    let (tags, pairs) = match C::TAGGED {
+        true => tags::take_filter(&app, pairs)?,
+        false => (TagFilter::default(), pairs),
+    };
+    let (scan, pairs) = match C::SCANNED {
+        true => scans::take_filter(pairs)?,
+        false => (ScanFilter::default(), pairs),
+    };
+    let filter = ItemFilter { tags, scan };
+    let (page, []) = page_of(pairs, []).await?;
+    let page = C::rows(&*app.queue.catalogue, &caller.tenant, &filter, page).await?;
+    let next_cursor = next_cursor(&page);
+    let items = page
+        .items
+        .into_iter()
+        .map(|row| C::body(&app, caller.scope, row))
+        .collect::<Result<_, _>>()?;
+    let mut headers = HeaderMap::new();
+    if C::RESOURCE == Resource::Volume {
+        let limit = HeaderValue::from(app.settings.body_limit.0);
+        let limit = [b"max-size=", limit.as_bytes()].concat();
+        headers.extend(HeaderValue::from_bytes(&limit).map(|limit| (UPLOAD_LIMIT, limit)));
+    }
+    Ok((headers, Json(ListBody { items, next_cursor })))
+}
+
+async fn show<C: Collection>(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+) -> Answer {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let read = async || {
+        let row = find::<C>(&app, &caller.tenant, &id).await?;
+        Ok(ControlFlow::Continue(ValidatedJson::of(&C::body(
+            &app,
+            caller.scope,
+            row,
+        )?)?))
+    };
+    let catalogue = &*app.queue.catalogue;
+    let asker = (&caller.tenant, scans::sees_patients(caller.scope));
+    let kept = app.answers.get(catalogue, asker, C::RESOURCE, &id, read);
+    let ControlFlow::<Infallible, _>::Continue(answer) = kept.await?;
+    Ok(answer.answer(&headers))
+}
+
+async fn erase<C: Collection>(
+    State(app): State<App>,
+    caller: Caller,
+    Extension(agent): Extension<Agent>,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+) -> Answer {
+    let pairs = query_pairs(query.as_deref());
+    let cascade = match C::RESOURCE {
+        Resource::Volume => erasures::cascade(&pairs)?,
+        _ => {
+            refuse_unknown(&pairs, &[])?;
+            false
+        }
+    };
+    erasures::erase(&app, (&caller, &agent), C::RESOURCE, id, cascade, &headers).await
+}
+
+/// A page of things: `{"models": [...], "next_cursor": "..."}`.
+struct ListBody<C: Collection> {
+    items: Vec<C::Body>,
+    next_cursor: Option<String>,
+}
+
+impl<C: Collection> Serialize for ListBody<C> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry(C::RESOURCE.plural(), &self.items)?;
+        if let Some(cursor) = &self.next_cursor {
+            map.serialize_entry("next_cursor", cursor)?;
+        }
+        map.end()
+    }
+}
+
+impl<C: Collection> ToSchema for ListBody<C> {
+    fn name() -> Cow<'static, str> {
+        format!("{}List", C::Body::name()).into()
+    }
+
+    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
+        schemas.push((C::Body::name().into(), C::Body::schema()));
+        C::Body::schemas(schemas);
+    }
+}
+
+impl<C: Collection> PartialSchema for ListBody<C> {
+    fn schema() -> RefOr<Schema> {
+        let plural = C::RESOURCE.plural();
+        let items = ArrayBuilder::new()
+            .items(Ref::from_schema_name(C::Body::name()))
+            .description(Some(format!("The {plural}, newest first.")));
+        let cursor = ObjectBuilder::new()
+            .schema_type(SchemaType::from_iter([Type::String, Type::Null]))
+            .description(Some("`cursor` of the next page; absent on the last."));
+        let page = ObjectBuilder::new()
+            .description(Some(format!("A page of {plural}.")))
+            .property(plural, Schema::Array(items.build()))
+            .required(plural)
+            .property("next_cursor", Schema::from(cursor));
+        Schema::from(page).into()
+    }
+}

@@ -1,0 +1,271 @@
+//! Erasing, and `/v1/erasures`: the receipts that stay.
+
+use super::app::App;
+use super::caller::Caller;
+use super::guard::{Agent, AlreadyRecorded};
+use super::openapi::{ListProblems, LookupProblems, PageParameters};
+use super::pagination::{list_query, next_cursor};
+use super::problem::not_found::{missing, no_receipt};
+use super::problem::{Answer, Problem, shorten};
+use super::request::{PathSegments, query_pairs, refuse_unknown};
+use super::wire::{path_of, rfc3339};
+use super::{negotiate, validators};
+use crate::public_base::public_path;
+use axum::extract::{RawQuery, State};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::IntoResponse;
+use axum::{Extension, Json};
+use serde::Serialize;
+use utoipa::ToSchema;
+use ventriform_service::jobs::{Erased, ErasureOrder, ErasureReason, Receipt, Resource};
+
+/// The receipt of an erasure. It stays when what it names is gone, and holds no name that was given
+/// to an item.
+#[derive(Serialize, ToSchema)]
+#[schema(as = Receipt)]
+pub struct ReceiptBody {
+    /// The receipt's id.
+    #[schema(example = "ers_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f")]
+    id: String,
+    /// The item that was to be erased.
+    #[schema(example = "vol_9f86d081884c7d659a2feaa0c55ad015")]
+    item: String,
+    /// When it was erased (RFC 3339).
+    #[schema(format = DateTime)]
+    erased_at: String,
+    /// The name of the key that asked for it; `retention` if it had reached its age.
+    erased_by: String,
+    /// Why it was erased.
+    reason: ReasonName,
+    /// The AuditEvent that records it.
+    audit_event: AuditEventName,
+    /// The item, and what went with it.
+    items: Vec<ErasedItemBody>,
+    /// The jobs whose records went with it.
+    jobs: Vec<String>,
+    /// Related paths.
+    links: ReceiptLinks,
+}
+
+/// Which AuditEvent records an act.
+#[derive(Serialize, ToSchema)]
+struct AuditEventName {
+    /// Its id, as `GET /v1/audit` shows it.
+    #[schema(example = "1234")]
+    id: String,
+    /// Its hash, which the hashes of all later events cover.
+    hash: String,
+}
+
+/// Why something was erased.
+#[derive(Serialize, ToSchema)]
+#[schema(as = ErasureReason)]
+#[serde(rename_all = "snake_case")]
+enum ReasonName {
+    /// Somebody asked for it.
+    Request,
+    /// It had reached the age that the operator has set.
+    Retention,
+}
+
+/// An erased item.
+#[derive(Serialize, ToSchema)]
+#[schema(as = ErasedItem)]
+struct ErasedItemBody {
+    /// Its id.
+    id: String,
+    /// Whether its files were erased; not if another tenant stored the same content.
+    files_erased: bool,
+    /// Its files.
+    files: Vec<ErasedFileBody>,
+}
+
+/// A file of an erased item.
+#[derive(Serialize, ToSchema)]
+#[schema(as = ErasedFile)]
+struct ErasedFileBody {
+    /// Its name in the store.
+    name: String,
+    /// Its length in bytes.
+    bytes: u64,
+    /// SHA-256 of its content, hexadecimal.
+    sha256: String,
+}
+
+/// Paths of one receipt.
+#[derive(Serialize, ToSchema)]
+struct ReceiptLinks {
+    /// This receipt.
+    #[serde(rename = "self")]
+    itself: String,
+}
+
+/// A page of receipts.
+#[derive(Serialize, ToSchema)]
+pub struct ReceiptList {
+    /// The receipts, newest first.
+    erasures: Vec<ReceiptBody>,
+    /// `cursor` of the next page; absent on the last.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    next_cursor: Option<String>,
+}
+
+impl From<Receipt> for ReceiptBody {
+    fn from(receipt: Receipt) -> Self {
+        let items = receipt.items.into_iter().map(|item| ErasedItemBody {
+            id: item.id,
+            files_erased: item.files_erased,
+            files: item
+                .files
+                .into_iter()
+                .map(|file| ErasedFileBody {
+                    name: file.name,
+                    bytes: file.bytes,
+                    sha256: file.sha256,
+                })
+                .collect(),
+        });
+        Self {
+            links: ReceiptLinks {
+                itself: path(&receipt.id),
+            },
+            id: receipt.id,
+            item: receipt.item,
+            erased_at: rfc3339(receipt.erased_at),
+            erased_by: receipt.erased_by,
+            reason: match receipt.reason {
+                ErasureReason::Request => ReasonName::Request,
+                ErasureReason::Retention => ReasonName::Retention,
+            },
+            audit_event: AuditEventName {
+                id: receipt.audit.sequence.to_string(),
+                hash: receipt.audit.hash,
+            },
+            items: items.collect(),
+            jobs: receipt.jobs,
+        }
+    }
+}
+
+fn path(id: &str) -> String {
+    public_path(&format!("/v1/erasures/{id}"))
+}
+
+/// Reads the query of a request to erase a volume: whether what was made of it goes too.
+///
+/// # Errors
+/// 400 for another parameter or value.
+pub fn cascade(pairs: &[(String, String)]) -> Answer<bool> {
+    refuse_unknown(pairs, &["cascade"])?;
+    match pairs.first().map(|(_, value)| value.as_str()) {
+        None | Some("false") => Ok(false),
+        Some("true") => Ok(true),
+        Some(other) => Err(Problem::bad_request(
+            "invalid-parameter",
+            format!("`cascade` must be true or false, not `{}`.", shorten(other)),
+        )
+        .at("cascade")
+        .fix("Give `cascade=true` to erase also what was made of the volume.")),
+    }
+}
+
+/// Erases an item. 204, or 200 with the receipt if the client prefers it; `Location` is the
+/// receipt's path.
+///
+/// # Errors
+/// 404 or 410 if the caller's tenant has no such item, 409 if it must stay.
+pub async fn erase(
+    app: &App,
+    (caller, agent): (&Caller, &Agent),
+    kind: Resource,
+    id: String,
+    cascade: bool,
+    headers: &HeaderMap,
+) -> Answer {
+    let order = ErasureOrder {
+        renewed_before: None,
+        tenant: caller.tenant.clone(),
+        id: id.clone(),
+        cascade,
+        by: agent.of_erasure(),
+        reason: ErasureReason::Request,
+    };
+    let erased = match Resource::of(&id) == Some(kind) {
+        true => app.queue.erase(order).await?,
+        false => Erased::Unknown,
+    };
+    match erased {
+        Erased::Done(receipt) => {
+            let location = [(header::LOCATION, path(&receipt.id))];
+            if !negotiate::prefers_representation(headers) {
+                let answer = (StatusCode::NO_CONTENT, location, Extension(AlreadyRecorded));
+                return Ok(answer.into_response());
+            }
+            let applied = [("preference-applied", "return=representation")];
+            let body = Json(ReceiptBody::from(*receipt));
+            Ok((location, applied, Extension(AlreadyRecorded), body).into_response())
+        }
+        Erased::Unknown => Err(missing(&*app.queue.catalogue, &caller.tenant, kind, &id).await),
+        Erased::InUse => Err(Problem::new(
+            StatusCode::CONFLICT,
+            "in-use",
+            format!("An unfinished job needs this {}.", kind.noun()),
+        )
+        .fix("Wait for the job to end, or DELETE it; GET /v1/jobs lists the jobs.")),
+        Erased::OnHold { id } => Err(on_hold(&id, kind.noun())),
+    }
+}
+
+/// 409: a legal hold on the item `id` keeps what was to be erased.
+pub fn on_hold(id: &str, what: &str) -> Problem {
+    Problem::new(
+        StatusCode::CONFLICT,
+        "legal-hold",
+        format!("A legal hold on `{id}` forbids to erase this {what}."),
+    )
+    .fix(format!(
+        "DELETE {}/hold with a key of scope `admin` when the hold has ended.",
+        path_of(id)
+    ))
+}
+
+/// List receipts of erasures
+#[utoipa::path(get, path = "/v1/erasures", tag = "erasures", operation_id = "list_erasures",
+    params(PageParameters,
+        ("item" = Option<String>, Query, description = "Only receipts of erasing this item")),
+    responses((status = 200, description = "A page, newest first", body = ReceiptList),
+        ListProblems))]
+pub async fn list_erasures(
+    State(app): State<App>,
+    caller: Caller,
+    RawQuery(query): RawQuery,
+) -> Answer<Json<ReceiptList>> {
+    let (page, [item]) = list_query(query.as_deref(), ["item"]).await?;
+    let catalogue = &app.queue.catalogue;
+    let page = catalogue
+        .receipts(&caller.tenant, item.as_deref(), page)
+        .await?;
+    let next_cursor = next_cursor(&page);
+    Ok(Json(ReceiptList {
+        erasures: page.items.into_iter().map(ReceiptBody::from).collect(),
+        next_cursor,
+    }))
+}
+
+/// Show the receipt of an erasure
+#[utoipa::path(get, path = "/v1/erasures/{id}", tag = "erasures", operation_id = "get_erasure",
+    params(("id" = String, Path, description = "The receipt's id")),
+    responses((status = 200, description = "The receipt", body = ReceiptBody), LookupProblems))]
+pub async fn get_erasure(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+) -> Answer {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    match app.queue.catalogue.receipt(&caller.tenant, &id).await? {
+        Some(receipt) => validators::json(&headers, &ReceiptBody::from(receipt)),
+        None => Err(no_receipt(&id)),
+    }
+}

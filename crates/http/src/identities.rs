@@ -1,0 +1,110 @@
+//! `/v1/volumes/{id}/identity`: whose scan a volume is, read, stated and erased.
+//!
+//! A caller states it in a body, so that it is in no path and no log.
+
+use super::app::App;
+use super::caller::Caller;
+use super::collection::find;
+use super::erasures::on_hold;
+use super::openapi::{self, LookupProblems};
+use super::problem::{Answer, Problem};
+use super::request::{PathSegments, json_object, query_pairs, refuse_unknown};
+use super::scans;
+use super::validators::json;
+use super::volumes::Volumes;
+use axum::Json;
+use axum::extract::{RawQuery, Request, State};
+use axum::http::{HeaderMap, StatusCode};
+use serde_json::{Map, Value};
+use ventriform_service::jobs::ScanFields;
+use ventriform_service::work::dicom;
+
+/// Whose scan a volume is
+///
+/// All that its file says of patient, study, series, instances and acquisition, completed by what
+/// was stated. Needs the scope `submit`.
+#[utoipa::path(get, path = "/v1/volumes/{id}/identity", tag = "volumes",
+    operation_id = "get_volume_identity",
+    params(("id" = String, Path, description = "The volume's id"), openapi::CachedHeaders),
+    responses((status = 200, description = "What is known", body = openapi::ScanSchema),
+        openapi::UnchangedAnswer, openapi::ScopeProblems, LookupProblems))]
+pub async fn get_identity(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+) -> Answer {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
+    json(&headers, &volume.holding.scan.whole())
+}
+
+/// State whose scan a volume is
+///
+/// For a volume whose file does not say it, such as NIfTI: its results can then be had as DICOM
+/// objects. Of a DICOM file, what its header lacks can be stated; a value that differs from the
+/// header is refused. What was stated before is replaced. Needs the scope `submit`.
+#[utoipa::path(put, path = "/v1/volumes/{id}/identity", tag = "volumes",
+    operation_id = "state_volume_identity",
+    params(("id" = String, Path, description = "The volume's id")),
+    request_body(content = openapi::StatedScanSchema, content_type = "application/json"),
+    responses((status = 200, description = "What is known now", body = openapi::ScanSchema),
+        openapi::IdentityProblems, LookupProblems))]
+pub async fn state_identity(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    request: Request,
+) -> Answer<Json<Map<String, Value>>> {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
+    let stated = json_object(request).await?;
+    let catalogue = &app.queue.catalogue;
+    if catalogue.scan(&caller.tenant, &id).await?.is_none() {
+        let found = scans::read(&app, &id, &volume.files).await?;
+        let noted = catalogue.note_scan(&caller.tenant, &id, found.as_ref());
+        noted.await?;
+    }
+    let scan = catalogue.scan(&caller.tenant, &id).await?;
+    dicom::check_stated(&scan.unwrap_or_default(), &stated).map_err(|failure| {
+        let differs = failure.code == "identity-differs";
+        let problem = Problem::from(failure);
+        match differs {
+            true => problem.conflict(),
+            false => problem,
+        }
+    })?;
+    catalogue
+        .state_scan(&caller.tenant, &id, &ScanFields(stated))
+        .await?;
+    let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
+    Ok(Json(volume.holding.scan.whole()))
+}
+
+/// Erase whose scan a volume is
+///
+/// The volume and what was made of it stay; so does the uploaded file, whatever its header says.
+/// It is not read again until the file is uploaded again. Refused while a legal hold keeps the
+/// volume. Needs the scope `submit`.
+#[utoipa::path(delete, path = "/v1/volumes/{id}/identity", tag = "volumes",
+    operation_id = "delete_volume_identity",
+    params(("id" = String, Path, description = "The volume's id")),
+    responses((status = 204, description = "Nothing is known any more"),
+        openapi::ScopeProblems, openapi::EraseProblems, LookupProblems))]
+pub async fn erase_identity(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+) -> Answer<StatusCode> {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    find::<Volumes>(&app, &caller.tenant, &id).await?;
+    if app.queue.erase_scan(&caller.tenant, &id).await? {
+        return Ok(StatusCode::NO_CONTENT);
+    }
+    // It was erased after it was looked up, or it is on hold.
+    find::<Volumes>(&app, &caller.tenant, &id).await?;
+    Err(on_hold(&id, "identity"))
+}

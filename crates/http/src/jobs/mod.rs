@@ -1,0 +1,328 @@
+//! `/v1/jobs`: jobs are filed, followed, cancelled and erased.
+
+pub mod archives;
+pub mod events;
+pub mod filing;
+
+mod body;
+mod priority;
+
+pub use body::{JobBody, ObjectDeliveryBody, describe, describe_all};
+pub use filing::Filing;
+pub use priority::PriorityName;
+
+use super::app::App;
+use super::caller::Caller;
+use super::given_webhook::webhook_of;
+use super::idempotency;
+use super::observe;
+use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
+use super::pagination::{next_cursor, page_of};
+use super::problem::not_found::missing;
+use super::problem::{Answer, Problem, ProblemBody, shorten};
+use super::request::{
+    PathSegments, flag, json_object, query_pairs, refuse_unknown, text, unknown, unknown_state,
+};
+use super::validators::ValidatedJson;
+use super::{scans, tags};
+use axum::Json;
+use axum::extract::{RawQuery, Request, State};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::IntoResponse;
+use body::JobStateName;
+use serde::Serialize;
+use serde_json::{Map, Value};
+use std::ops::ControlFlow;
+use utoipa::ToSchema;
+use ventriform_service::jobs::{
+    Deleted, Interrupted, Job, JobFilter, JobState, NewJob, Resource, Tenant, Timestamp,
+    parse_rfc3339,
+};
+
+/// A page of jobs.
+#[derive(Serialize, ToSchema)]
+pub struct JobList {
+    /// The jobs, newest first.
+    jobs: Vec<JobBody>,
+    /// `cursor` of the next page; absent on the last.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    next_cursor: Option<String>,
+}
+
+/// File a job
+///
+/// The job is stored on disk before the service answers. With an `Idempotency-Key`, repeating the
+/// request returns the same job.
+#[utoipa::path(post, path = "/v1/jobs", tag = "jobs",
+    request_body(content = openapi::JobRequest, content_type = "application/json"),
+    params(openapi::IdempotencyHeader),
+    responses(
+        (status = 202, description = "Accepted", body = JobBody, headers(
+            ("Location" = String, description = "The job's path"),
+            ("Retry-After" = u64, description = "Seconds to wait before asking for its state"))),
+        FileProblems,
+    ))]
+pub async fn create_job(
+    State(app): State<App>,
+    caller: Caller,
+    RawQuery(query): RawQuery,
+    request: Request,
+) -> Answer {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let key = idempotency::key(request.headers())?;
+    let trace_parent = observe::trace_parent(&request);
+    let object = json_object(request).await?;
+    let filing = Filing {
+        tenant: caller.tenant,
+        tags: tags::of_object(&app, &object)?,
+        priority: priority::of_object(&object)?,
+        key,
+        webhook: None,
+        source: None,
+        send: None,
+        trace_parent,
+        storage_limit: caller.quota.bytes,
+    };
+    let job = read_job(&app, &object, filing).await?;
+    let job = filing::file(&app, &job).await?;
+    filing::accepted(&app, job).await
+}
+
+const FIELDS: [&str; 10] = [
+    "kind",
+    priority::FIELD,
+    "volume",
+    "source",
+    "parameters",
+    "external_id",
+    "labels",
+    "webhook",
+    "send",
+    "to",
+];
+
+async fn read_job(app: &App, object: &Map<String, Value>, mut filing: Filing) -> Answer<NewJob> {
+    if let Some(name) = object.keys().find(|name| !FIELDS.contains(&name.as_str())) {
+        return Err(unknown("field", name, &FIELDS));
+    }
+    let kind = text(object, "kind")?.unwrap_or("model");
+    let Some(work) = app.engine.work(kind) else {
+        let kinds: Vec<_> = app.engine.works.iter().map(|w| w.makes().noun()).collect();
+        return Err(Problem::invalid_field(
+            "kind",
+            format!("There is no kind of job `{}`.", shorten(kind)),
+        )
+        .fix(format!("Known kinds: {}.", kinds.join(", "))));
+    };
+    filing.source = archives::source_of(app, &filing.tenant, object).await?;
+    filing.send = archives::send_of(app, &filing.tenant, object, kind, filing.source.as_ref())?;
+    let volume = match (text(object, "volume")?, &filing.source) {
+        (None, None) => {
+            return Err(Problem::invalid_field("volume", "`volume` is missing.")
+                .fix("Give the id of a stored volume, or in `source` a series of an archive."));
+        }
+        (Some(_), Some(_)) => {
+            let both = "A job has a `volume` or a `source`, not both.";
+            return Err(Problem::invalid_field("source", both).fix("Leave one of them out."));
+        }
+        (volume, _) => volume.map(str::to_owned),
+    };
+    let empty = Map::new();
+    let parameters = match object.get("parameters") {
+        None => &empty,
+        Some(Value::Object(parameters)) => parameters,
+        Some(_) => {
+            return Err(Problem::invalid_field(
+                "parameters",
+                "`parameters` must be a JSON object.",
+            )
+            .fix("Give an object such as {\"points\": 150}."));
+        }
+    };
+    let parameters = work.parameters_from_json(parameters)?;
+    // Last, since looking up the name of its host may take seconds.
+    filing.webhook = webhook_of(app, object).await?;
+    Ok(filing::new_job(&**work, volume, parameters, filing))
+}
+
+/// List jobs
+#[utoipa::path(get, path = "/v1/jobs", tag = "jobs",
+    params(openapi::PageParameters, openapi::TagParameters, openapi::ScanParameters,
+        ("state" = Option<JobStateName>, Query, description = "Only jobs in this state"),
+        ("kind" = Option<String>, Query, description = "Only jobs of this kind: model, segmentation"),
+        ("priority" = Option<PriorityName>, Query, description = "Only jobs of this priority"),
+        ("volume" = Option<String>, Query, description = "Only jobs on this volume"),
+        ("created_after" = Option<String>, Query, format = DateTime,
+            description = "Only jobs filed after this moment (RFC 3339)")),
+    responses((status = 200, description = "A page, newest first", body = JobList), ListProblems))]
+pub async fn list_jobs(
+    State(app): State<App>,
+    caller: Caller,
+    RawQuery(query): RawQuery,
+) -> Answer<Json<JobList>> {
+    let (tags, pairs) = tags::take_filter(&app, query_pairs(query.as_deref()))?;
+    let (scan, pairs) = scans::take_filter(pairs)?;
+    let own = ["state", "kind", priority::FIELD, "volume", "created_after"];
+    let (page, [state, kind, priority, volume, created_after]) = page_of(pairs, own).await?;
+    let priority = priority.map(|name| priority::parse(&name).map_err(Problem::of_search));
+    let filter = JobFilter {
+        tenant: caller.tenant,
+        state: state.map(|name| parse_state(&name)).transpose()?,
+        kind,
+        priority: priority.transpose()?,
+        volume,
+        tags,
+        scan,
+        created_after: created_after.map(|text| parse_moment(&text)).transpose()?,
+    };
+    let page = app.queue.jobs.jobs(&filter, page).await?;
+    let next_cursor = next_cursor(&page);
+    let jobs = describe_all(&app, page.items).await?;
+    Ok(Json(JobList { jobs, next_cursor }))
+}
+
+fn parse_moment(text: &str) -> Answer<Timestamp> {
+    parse_rfc3339(text).ok_or_else(|| {
+        Problem::bad_request(
+            "invalid-parameter",
+            "`created_after` must be a moment as RFC 3339 writes it.",
+        )
+        .at("created_after")
+        .fix("Give a moment such as 2026-11-22T08:00:00Z.")
+    })
+}
+
+fn parse_state(name: &str) -> Answer<JobState> {
+    JobState::parse(name).ok_or_else(|| unknown_state(name, &JobState::ALL.map(JobState::as_str)))
+}
+
+/// Show a job
+///
+/// A job that has ended has a validator in `ETag`. For one that has not, `Retry-After` says when to
+/// ask again.
+#[utoipa::path(get, path = "/v1/jobs/{id}", tag = "jobs",
+    params(("id" = String, Path, description = "The job's id"), openapi::CachedHeaders),
+    responses((status = 200, description = "The job", body = JobBody),
+        openapi::UnchangedAnswer, LookupProblems))]
+pub async fn get_job(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+) -> Answer {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let read = async || {
+        let job = find(&app, &caller.tenant, &id).await?;
+        let ended = job.state.is_final();
+        let body = describe(&app, job).await?;
+        Ok(match ended {
+            true => ControlFlow::Continue(ValidatedJson::of(&body)?),
+            false => {
+                let ask_again = [
+                    (header::CACHE_CONTROL, "no-store"),
+                    (header::RETRY_AFTER, "1"),
+                ];
+                ControlFlow::Break((ask_again, Json(body)).into_response())
+            }
+        })
+    };
+    let catalogue = &*app.queue.catalogue;
+    // A job says the same to all callers of its tenant.
+    let asker = (&caller.tenant, false);
+    let kept = app.answers.get(catalogue, asker, Resource::Job, &id, read);
+    Ok(match kept.await? {
+        ControlFlow::Continue(answer) => answer.answer(&headers),
+        ControlFlow::Break(answer) => answer,
+    })
+}
+
+/// Change a job's names
+///
+/// A JSON merge patch (RFC 7396) of `external_id` and `labels`: what is `null` is removed, what is
+/// absent stays.
+#[utoipa::path(patch, path = "/v1/jobs/{id}", tag = "jobs", operation_id = "update_job",
+    params(("id" = String, Path, description = "The job's id")),
+    request_body(content(
+        (openapi::TagsPatch = "application/merge-patch+json"),
+        (openapi::TagsPatch = "application/json"))),
+    responses((status = 200, description = "The job", body = JobBody),
+        openapi::PatchProblems, LookupProblems))]
+pub async fn update_job(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    request: Request,
+) -> Answer<Json<JobBody>> {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let job = find(&app, &caller.tenant, &id).await?;
+    tags::change(&app, &caller.tenant, &id, job.tags, request).await?;
+    let job = find(&app, &caller.tenant, &id).await?;
+    Ok(Json(describe(&app, job).await?))
+}
+
+/// Cancel or erase a job
+///
+/// A waiting job is cancelled at once; a running job is asked to stop and does so within 100 ms.
+/// Repeating the request changes nothing more: a job that a client has cancelled is shown, not
+/// erased, so a client that lost the answer can ask again. Any other finished job is erased, but
+/// its result stays. With `erase=true`, a finished job is erased however it ended, and an
+/// unfinished one is refused.
+#[utoipa::path(delete, path = "/v1/jobs/{id}", tag = "jobs",
+    params(("id" = String, Path, description = "The job's id"),
+        ("erase" = Option<bool>, Query, description = "Whether to erase a job that was cancelled")),
+    responses(
+        (status = 200, description = "It is cancelled, or ended before it could be", body = JobBody),
+        (status = 202, description = "It is running and was asked to stop", body = JobBody),
+        (status = 204, description = "It was finished and is erased"),
+        (status = 409, description = "It is not finished, so it cannot be erased",
+            body = ProblemBody, content_type = "application/problem+json"),
+        LookupProblems))]
+pub async fn delete_job(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+) -> Answer {
+    let pairs = query_pairs(query.as_deref());
+    refuse_unknown(&pairs, &["erase"])?;
+    let erase = match pairs.first() {
+        Some((_, value)) => flag("erase", value)?,
+        None => false,
+    };
+    let tenant = &caller.tenant;
+    let job = find(&app, tenant, &id).await?;
+    if erase && !job.state.is_final() {
+        return Err(Problem::new(
+            StatusCode::CONFLICT,
+            "not-finished",
+            "The job is not finished, so it cannot be erased.",
+        )
+        .fix("DELETE it without `erase` to cancel it, wait for its end, then erase it."));
+    }
+    let (status, job) = match app.queue.interrupt(&id).await? {
+        Interrupted::Cancelled(job) => (StatusCode::OK, job),
+        Interrupted::Asked(job) => (StatusCode::ACCEPTED, job),
+        Interrupted::Unknown => {
+            return Err(missing(&*app.queue.catalogue, tenant, Resource::Job, &id).await);
+        }
+        Interrupted::Finished(job) if job.cancel_requested && !erase => (StatusCode::OK, job),
+        Interrupted::Finished(_) => {
+            return match app.queue.delete_job(&id).await? {
+                Deleted::Done => Ok(StatusCode::NO_CONTENT.into_response()),
+                _ => Err(missing(&*app.queue.catalogue, tenant, Resource::Job, &id).await),
+            };
+        }
+    };
+    Ok((status, Json(describe(&app, job).await?)).into_response())
+}
+
+/// The tenant's job of that id, or the 404 or 410 that says why there is none.
+pub async fn find(app: &App, tenant: &Tenant, id: &str) -> Answer<Job> {
+    let job = app.queue.jobs.job(id).await?;
+    match job.filter(|job| job.tenant == *tenant) {
+        Some(job) => Ok(job),
+        None => Err(missing(&*app.queue.catalogue, tenant, Resource::Job, id).await),
+    }
+}

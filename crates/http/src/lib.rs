@@ -1,0 +1,108 @@
+//! The service over HTTP: version 1 of the API.
+//!
+//! [`router`] is the map of all paths and the list of the layers that every request passes. There
+//! is one file per resource; a handler reads the request, calls [`ventriform_service::jobs`], and writes the
+//! answer. Nothing is computed here.
+//!
+//! | what | where |
+//! |---|---|
+//! | the paths, the layers around them | [`router`] |
+//! | uploads, jobs, results | [`volumes`], [`jobs`], [`models`], [`segmentations`], [`templates`] |
+//! | webhooks and what became of their deliveries | [`webhooks`], [`given_webhook`], [`hooks`] |
+//! | what several of them share | [`collection`] (list, show, erase), [`products`] (meshes, reports, files), [`files`] (ranges, validators), [`validators`] (of JSON), [`kept`] |
+//! | who may do what, and the record of it | [`guard`] (before every handler), [`caller`], [`keys`], [`audit`] |
+//! | a tenant's names for its things, legal holds, receipts of erasures | [`tags`], [`legal_hold`], [`erasures`] |
+//! | whose scan a volume is | [`scans`] (in answers and searches), [`identities`] (stated, erased) |
+//! | objects that other systems send | [`stow`], [`received`], [`intake`], [`volume_maker`] |
+//! | work items of other systems (UPS-RS) | [`workitems`] |
+//! | errors and their wording | [`problem`]; 404 and 410 in [`problem::not_found`] |
+//! | limits on bodies, connections and decoding | [`limits`], [`connections`], [`decoding`] |
+//! | the address that sent a request | [`client`] |
+//! | reading requests | [`request`], [`negotiate`], [`pagination`], [`idempotency`], [`upload`] |
+//! | log, traces, metrics | [`observe`], [`spans`], [`metrics`], [`job_watch`] |
+//! | the published document | [`openapi`], [`document`] |
+//! | streams of events | [`streams`] |
+//! | what goes on in the background | [`duties`] |
+//!
+//! Guarantees: every error is a problem object (RFC 9457) with a stable `type`, and with `field`
+//! and `fix` where they apply; every body and list has a limit; uploads are streamed to the disk
+//! and never held in memory. The published document is derived from the handlers.
+//!
+//! Not guaranteed: that a service is closed. On a loopback address without keys, and with the
+//! setting `allow_anonymous`, it admits everybody; see `docs/security.md`.
+
+mod app;
+mod archives;
+mod audit;
+pub mod caller;
+mod client;
+mod collection;
+mod connections;
+mod cryptography;
+mod decoding;
+mod document;
+mod duties;
+mod erasures;
+mod exchange;
+mod files;
+mod front_page;
+mod given_webhook;
+mod guard;
+mod health;
+mod held_body;
+mod hooks;
+mod idempotency;
+mod identities;
+mod intake;
+mod job_watch;
+mod jobs;
+mod kept;
+mod keys;
+mod legal_hold;
+mod limits;
+mod memory;
+mod metrics;
+mod models;
+mod negotiate;
+mod observe;
+mod openapi;
+mod originals;
+mod pagination;
+mod performer;
+mod problem;
+mod products;
+mod public_base;
+mod readers;
+mod readiness;
+mod received;
+mod request;
+mod router;
+mod scans;
+mod segmentations;
+mod server;
+mod spans;
+mod stow;
+mod streams;
+mod tags;
+mod templates;
+mod thread_clock;
+mod turns;
+mod upload;
+mod validators;
+mod volume_maker;
+mod volumes;
+mod voxels;
+mod webhooks;
+mod wire;
+mod workitems;
+
+pub use app::App;
+pub use connections::tls::TlsError;
+pub use cryptography::install_cryptography;
+pub use server::{Running, ServeError, start};
+pub use spans::OtlpError;
+
+/// The OpenAPI document, as committed under `openapi/`.
+pub fn document_json() -> String {
+    format!("{:#}\n", router::document())
+}

@@ -1,0 +1,106 @@
+//! `/v1/models`: surface models, and the request that uploads a volume and makes its model.
+
+use super::app::App;
+use super::caller::Caller;
+use super::files;
+use super::jobs::filing::{self, UploadJob};
+use super::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
+use super::problem::Answer;
+use super::products::{Offer, ProductCollection, body_of_product, object_paths};
+use super::wire::path_of;
+use axum::extract::{RawQuery, Request, State};
+use serde::Serialize;
+use utoipa::ToSchema;
+use ventriform_service::jobs::{Product, Resource};
+
+/// The collection of models.
+pub struct Models;
+
+impl ProductCollection for Models {
+    const RESOURCE: Resource = Resource::Model;
+    type Body = ModelBody;
+    const FILES: &'static [&'static str] = &["report.json", files::PAGE, "distance.json"];
+    const FILE_SCHEMA: &'static str = "FileName";
+    const FILE_HELP: &'static str = "The mesh in each format, `report.json`, `distance.json` \
+        (signed distances of the model's vertices and triangles to the surface) and \
+        `report.html`, which is made on request and names patient, study and series as far as the \
+        key may see them. The `.dcm` files are DICOM objects of the scan's \
+        patient and study, made on request; they need the scope `submit`, or `deidentify=true`.";
+    type FileAnswer = openapi::ModelFileAnswer;
+}
+
+body_of_product!(
+    /// A model: what it was made of, its main figures, and its files.
+    ModelBody,
+    Model,
+    ModelLinks,
+    openapi::ModelParametersObject,
+    openapi::ModelSummarySchema,
+    "Counts and main figures; the report has all figures.",
+    "mdl_2c26b46b68ffc68ff99b453c1d304134"
+);
+
+/// Paths of one model.
+#[derive(Serialize, ToSchema)]
+struct ModelLinks {
+    /// This model.
+    #[serde(rename = "self")]
+    itself: String,
+    /// Its mesh, in the format that `Accept` asks for.
+    mesh: String,
+    /// Its quality report.
+    report: String,
+    /// The report as an HTML page.
+    page: String,
+    /// DICOM objects of the scan's patient and study, for the archive.
+    dicom: Vec<String>,
+    /// Its volume.
+    volume: String,
+}
+
+impl ModelLinks {
+    fn of(model: &Product) -> Self {
+        let itself = path_of(&model.id);
+        Self {
+            mesh: format!("{itself}/mesh"),
+            report: format!("{itself}/report"),
+            page: format!("{itself}/{}", files::PAGE),
+            dicom: object_paths(model),
+            volume: path_of(model.volume.as_deref().unwrap_or_default()),
+            itself,
+        }
+    }
+}
+
+/// Make a model of a volume
+///
+/// The body is the volume. The service stores it, files a job, and answers 202 with the job. With
+/// `Prefer: wait=60` it waits up to 60 seconds for the job to end and answers 200 with the mesh in
+/// the format that `Accept` asks for. Every parameter of a model is a query parameter.
+#[utoipa::path(post, path = "/v1/models", tag = "models",
+    request_body(content(
+        (Vec<u8> = "application/octet-stream"),
+        (Vec<u8> = "application/gzip"),
+        (Vec<u8> = "application/zip"),
+        (Vec<u8> = "application/dicom"),
+        (Vec<u8> = "application/nifti"),
+        (openapi::UploadForm = "multipart/form-data"),
+        (Vec<u8> = "multipart/related"),
+    )),
+    params(openapi::ModelQuery, openapi::TagParameters, openapi::PriorityParameter,
+        openapi::IdempotencyHeader,
+        openapi::PreferHeader, openapi::WebhookInputs),
+    responses(openapi::MeshAnswer, WaitAnswers, FileProblems, UploadProblems))]
+pub async fn create_model(
+    State(app): State<App>,
+    caller: Caller,
+    RawQuery(query): RawQuery,
+    request: Request,
+) -> Answer {
+    let job = UploadJob {
+        makes: Resource::Model,
+        apart: &[],
+        offers: Offer::meshes(),
+    };
+    filing::file_upload(&app, &caller, job, query.as_deref(), request).await
+}

@@ -1,0 +1,287 @@
+//! The last steps on the collected document. They work on its JSON, because they touch every
+//! operation alike.
+//!
+//! 1. A path `.../{file}` becomes one path per file, so that each file has one media type and one
+//!    schema. Generators of clients choose how to read an answer by its first media type.
+//! 2. Bytes become `type: string, format: binary`. OpenAPI 3.1 would express them by a schema
+//!    without a type, which generators read as "anything".
+//! 3. Every operation gets examples: those of `examples.json`, recorded from a running service by
+//!    `scripts/check_contract.py`, and a command line for curl.
+//! 4. Every operation takes `X-Request-Id`.
+
+use super::answers::media_type_of;
+use crate::files::PAGE;
+use crate::problem::MEDIA_TYPE;
+use serde_json::{Map, Value, json};
+use ventriform::export::dicom::DicomObject;
+
+/// Requests and answers as a running service gave them.
+const RECORDED: &str = include_str!("examples.json");
+
+/// Completes `document`.
+pub fn finish(document: &mut Value) {
+    one_path_per_file(document);
+    let recorded = serde_json::from_str(RECORDED).expect("examples.json is an object");
+    let problems = problem_examples(&recorded);
+    for (path, method, operation) in operations(document) {
+        bytes_as_binary(operation);
+        if let Some(request) = operation
+            .get_mut("requestBody")
+            .and_then(Value::as_object_mut)
+        {
+            // utoipa leaves it out where a body may have several media types.
+            request.entry("required").or_insert(true.into());
+        }
+        type_report(path, operation);
+        add_examples(operation, &recorded);
+        add_request_id(operation);
+        let sample = command_line(path, method, operation, &recorded);
+        operation["x-codeSamples"] = json!([{"lang": "Shell", "label": "curl", "source": sample}]);
+    }
+    document["components"]["examples"] = problems;
+    document["components"]["parameters"] = json!({"RequestId": {
+        "name": "X-Request-Id",
+        "in": "header",
+        "required": false,
+        "description": "Names the request in the log; the answer repeats it",
+        "schema": {"type": "string"},
+    }});
+}
+
+/// Path, method and content of every operation.
+fn operations(document: &mut Value) -> impl Iterator<Item = (&str, &str, &mut Value)> {
+    let paths = document["paths"].as_object_mut();
+    paths.into_iter().flatten().flat_map(|(path, item)| {
+        let methods = item.as_object_mut().into_iter().flatten();
+        methods
+            .filter(|(_, operation)| operation["operationId"].is_string())
+            .map(|(method, operation)| (path.as_str(), method.as_str(), operation))
+    })
+}
+
+/// Media type and content of a request or an answer.
+fn contents(body: &mut Value) -> impl Iterator<Item = (&str, &mut Value)> {
+    let contents = body.get_mut("content").and_then(Value::as_object_mut);
+    let contents = contents.into_iter().flatten();
+    contents.map(|(media_type, content)| (media_type.as_str(), content))
+}
+
+/// Every answer of an operation, with its status.
+fn answers(operation: &mut Value) -> impl Iterator<Item = (&str, &mut Value)> {
+    let answers = operation
+        .get_mut("responses")
+        .and_then(Value::as_object_mut);
+    let answers = answers.into_iter().flatten();
+    answers.map(|(status, answer)| (status.as_str(), answer))
+}
+
+fn one_path_per_file(document: &mut Value) {
+    let Some(Value::Object(paths)) = document.get_mut("paths").map(Value::take) else {
+        return;
+    };
+    let mut separate = Map::new();
+    for (path, item) in paths {
+        let Some(folder) = path.strip_suffix("/{file}") else {
+            separate.insert(path, item);
+            continue;
+        };
+        for name in take_file_names(&mut document["components"]["schemas"], &item) {
+            let operation = of_one_file(folder, &name, &item["get"]);
+            separate.insert(format!("{folder}/{name}"), json!({ "get": operation }));
+        }
+    }
+    separate.sort_keys();
+    document["paths"] = separate.into();
+}
+
+/// The values of the parameter `file`. Its schema is dropped.
+fn take_file_names(schemas: &mut Value, item: &Value) -> Vec<String> {
+    let parameters = item["get"]["parameters"].as_array();
+    let file = parameters
+        .into_iter()
+        .flatten()
+        .find(|parameter| parameter["name"] == "file");
+    let reference = file.and_then(|file| file["schema"]["$ref"].as_str());
+    let schema = reference.and_then(|reference| {
+        let name = reference.rsplit('/').next()?;
+        schemas.as_object_mut()?.remove(name)
+    });
+    let names = schema.as_ref().and_then(|schema| schema["enum"].as_array());
+    let names = names.into_iter().flatten().filter_map(Value::as_str);
+    names.map(str::to_owned).collect()
+}
+
+/// The operation that downloads the file `name`, from the one that downloads any.
+fn of_one_file(folder: &str, name: &str, any: &Value) -> Value {
+    let mut one = any.clone();
+    let stem = any["operationId"].as_str().unwrap_or_default();
+    let stem = stem.strip_suffix("file").unwrap_or(stem);
+    one["operationId"] = format!("{stem}{}", name.replace(['.', '-'], "_")).into();
+    one["summary"] = format!("Download {name}").into();
+    if let Some(parameters) = one["parameters"].as_array_mut() {
+        parameters.retain(|parameter| parameter["name"] != "file");
+    }
+    let media_type = media_type_of(name);
+    let is_object = media_type == DicomObject::MEDIA_TYPE;
+    if let Some(answers) = one["responses"].as_object_mut() {
+        // The name says the format; `Accept` is not looked at.
+        answers.shift_remove("406");
+        if !is_object {
+            for status in ["403", "409", "422"] {
+                answers.shift_remove(status);
+            }
+        }
+    }
+    if !is_object
+        && name != PAGE
+        && let Some(parameters) = one["parameters"].as_array_mut()
+    {
+        parameters.retain(|parameter| parameter["name"] != "deidentify");
+    }
+    let schema = match (name, media_type) {
+        ("mesh.json" | "mesh_apparent.json" | "mesh_anatomical.json", _) => {
+            reference("MeshDocument")
+        }
+        ("report.json", _) => report_of(folder),
+        ("distance.json", _) => reference("Closeness"),
+        ("polar.json", _) => reference("PolarMap"),
+        ("profile.json", _) => reference("ReaderProfile"),
+        (_, "model/gltf+json") => json!({"type": "object"}),
+        (_, "text/html" | "image/svg+xml") => json!({"type": "string"}),
+        _ => binary(),
+    };
+    let mut content = Map::new();
+    content.insert(media_type.to_owned(), json!({ "schema": schema }));
+    one["responses"]["200"]["content"] = content.into();
+    one
+}
+
+fn reference(schema: &str) -> Value {
+    json!({"$ref": format!("#/components/schemas/{schema}")})
+}
+
+/// The schema of the reports below `path`.
+fn report_of(path: &str) -> Value {
+    match path.starts_with("/v1/segmentations") {
+        true => reference("SegmentationReport"),
+        false => reference("ModelReport"),
+    }
+}
+
+fn type_report(path: &str, operation: &mut Value) {
+    if path.ends_with("/report") {
+        operation["responses"]["200"]["content"]["application/json"]["schema"] = report_of(path);
+    }
+}
+
+fn binary() -> Value {
+    json!({"type": "string", "format": "binary", "contentMediaType": "application/octet-stream"})
+}
+
+/// utoipa writes `Vec<u8>` as an array of numbers.
+fn bytes_as_binary(operation: &mut Value) {
+    let change = |body: &mut Value| {
+        for (_, content) in contents(body) {
+            let schema = &content["schema"];
+            let numbers = schema["type"] == "array" && schema["items"]["format"] == "int32";
+            let untyped = schema["type"].is_null() && schema["contentMediaType"].is_string();
+            if numbers || untyped {
+                content["schema"] = binary();
+            }
+        }
+    };
+    if let Some(request) = operation.get_mut("requestBody") {
+        change(request);
+    }
+    answers(operation).for_each(|(_, answer)| change(answer));
+}
+
+fn problem_examples(recorded: &Value) -> Value {
+    let problems = recorded["problems"].as_object().into_iter().flatten();
+    let examples = problems.map(|(status, problem)| {
+        let example = json!({"summary": problem["title"], "value": problem});
+        (format!("Problem{status}"), example)
+    });
+    Value::Object(examples.collect())
+}
+
+/// Adds the recorded request and answers, and to every problem without one of its own the example of its status.
+fn add_examples(operation: &mut Value, recorded: &Value) {
+    let id = operation["operationId"].as_str().unwrap_or_default();
+    let own = &recorded["operations"][id];
+    if let Some(request) = operation.get_mut("requestBody") {
+        add_own(request, &own["request"]);
+    }
+    for (status, answer) in answers(operation) {
+        add_own(answer, &own[status]);
+        for (media_type, content) in contents(answer) {
+            if media_type == MEDIA_TYPE
+                && content.get("example").is_none()
+                && recorded["problems"].get(status).is_some()
+            {
+                let example = format!("#/components/examples/Problem{status}");
+                content["examples"] = json!({"problem": {"$ref": example}});
+            }
+        }
+    }
+    let parameters = operation
+        .get_mut("parameters")
+        .and_then(Value::as_array_mut);
+    for parameter in parameters.into_iter().flatten() {
+        let name = parameter["name"].as_str().unwrap_or_default();
+        if let Some(example) = own["parameters"].get(name) {
+            parameter["example"] = example.clone();
+        }
+    }
+}
+
+fn add_request_id(operation: &mut Value) {
+    let parameter = json!({"$ref": "#/components/parameters/RequestId"});
+    match operation
+        .get_mut("parameters")
+        .and_then(Value::as_array_mut)
+    {
+        Some(parameters) => parameters.push(parameter),
+        None => operation["parameters"] = json!([parameter]),
+    }
+}
+
+fn add_own(body: &mut Value, examples: &Value) {
+    for (media_type, content) in contents(body) {
+        if let Some(example) = examples.get(media_type) {
+            content["example"] = example.clone();
+        }
+    }
+}
+
+/// A command line for curl; `$U` stands for the service's address.
+fn command_line(path: &str, method: &str, operation: &Value, recorded: &Value) -> String {
+    let id = operation["operationId"].as_str().unwrap_or_default();
+    let own = &recorded["operations"][id];
+    let mut url = path.to_owned();
+    for (name, value) in own["parameters"].as_object().into_iter().flatten() {
+        url = url.replace(&format!("{{{name}}}"), value.as_str().unwrap_or_default());
+    }
+    let mut words = vec!["curl -fsS".to_owned()];
+    if method == "delete" {
+        words.push("-X DELETE".into());
+    }
+    let requests = &operation["requestBody"]["content"];
+    if requests.get("application/octet-stream").is_some() {
+        words.push("--data-binary @scan.nii.gz".into());
+    } else if let Some(request) = own["request"].get("application/json") {
+        words.push(format!(
+            "-H 'content-type: application/json' -d '{request}'"
+        ));
+    } else if requests.get("application/json").is_some() {
+        words.push("-H 'content-type: application/json' --data-binary @mesh.json".into());
+    }
+    words.push(format!("\"$U{url}\""));
+    let answers = operation["responses"]["200"]["content"].as_object();
+    let bytes = |content: &Value| content["schema"]["format"] == "binary";
+    if answers.is_some_and(|answers| answers.values().all(bytes)) {
+        let name = url.rsplit('/').next().unwrap_or_default();
+        words.push(format!("-o {name}"));
+    }
+    words.join(" ")
+}

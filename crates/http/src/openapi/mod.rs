@@ -1,0 +1,101 @@
+//! The building blocks of the published document, OpenAPI 3.1.
+//!
+//! The handlers' attributes describe most of it. This folder adds what attributes cannot say:
+//!
+//! | file | what it describes |
+//! |---|---|
+//! | [`inputs`] | parameters: those of a model and a fit come from the tables of [`ventriform::parameters`], so a new one needs no change here |
+//! | [`bodies`] | request bodies that handlers read piece by piece |
+//! | [`answers`] | answers and problems that several handlers share |
+//! | [`access`] | credentials, and how requests are refused before any handler |
+//! | [`operation`] | operations of handlers that serve several kinds of things |
+//! | [`reports`] | JSON files and summaries that jobs write |
+//! | [`finish`] | the last steps on the whole document: one path per file, bytes, examples |
+//!
+//! [`publish`] completes the document that the routes have collected.
+
+mod access;
+mod answers;
+mod bodies;
+mod finish;
+mod inputs;
+mod operation;
+mod reports;
+
+pub use answers::{
+    DicomProblems, DownloadAnswers, EraseProblems, EventsAnswer, FileProblems, HoldProblems,
+    IdentityProblems, ListProblems, LookupProblems, MeshAnswer, ModelFileAnswer, OriginalAnswer,
+    PatchProblems, ReaderFileAnswer, ReportAnswer, ScopeProblems, SegmentationAnswer,
+    SegmentationFileAnswer, StowAnswers, UnchangedAnswer, UploadProblems, WaitAnswers,
+    WorkitemConflict, WorkitemProblems,
+};
+pub use bodies::{
+    HoldRequest, JobParameters, JobRequest, MeshDocument, SegmentationForm, StatedScanSchema,
+    TagsPatch, TemplatePatch, UploadForm, WebhookRequest, WorkitemBody,
+};
+pub use inputs::{
+    CachedHeaders, CascadeParameter, ConditionalHeaders, DeidentifyParameter, ErasureParameters,
+    EventHeader, IdempotencyHeader, MaskParameters, ModelParametersObject, ModelQuery,
+    PageParameters, PartParameter, PreferHeader, PriorityParameter, ReaderQuery, ScanParameters,
+    SegmentationParametersObject, SegmentationQuery, TagParameters, TemplateQuery,
+    TransactionParameters, WebhookInputs,
+};
+pub use operation::Documented;
+pub use reports::{
+    ModelSummarySchema, ReaderProfileSchema, ReaderSummarySchema, ScanSchema,
+    SegmentationSummarySchema, TemplateSummarySchema,
+};
+
+use utoipa::OpenApi;
+use utoipa::openapi::{RefOr, Required};
+
+/// Title, licence and tags.
+#[derive(OpenApi)]
+#[openapi(
+    info(
+        title = "Ventriform",
+        description = "Surface models of the left ventricle from cardiac SPECT.\n\n\
+            Errors are problem objects (RFC 9457) with a stable `type`. Results never change and \
+            carry strong validators. Lists are paged by cursors. Breaking changes will appear \
+            under `/v2`.",
+        license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0"),
+        contact(),
+    ),
+    tags(
+        (name = "volumes", description = "Uploaded volumes"),
+        (name = "jobs", description = "Work on volumes: filed, followed, cancelled"),
+        (name = "models", description = "Surface models, and one request from volume to model"),
+        (name = "segmentations", description = "Models fitted to volumes, and one request from volume to segmentation"),
+        (name = "templates", description = "The library of models that `auto` chooses from"),
+        (name = "readers", description = "How readers draw the wall: profiles that segmentations can be drawn by"),
+        (name = "webhooks", description = "Telling other programs about jobs"),
+        (name = "workitems", description = "Unified Procedure Steps (DICOM UPS-RS): work that is scheduled, claimed, done"),
+        (name = "access", description = "Keys and the audit trail, for the scope `admin`"),
+        (name = "dicomweb", description = "Images from other systems: STOW-RS, and what became of them"),
+        (name = "erasures", description = "Receipts of what was erased"),
+        (name = "operations", description = "For operators"),
+    ),
+    components(schemas(
+        super::problem::ProblemBody,
+        bodies::MeshDocument,
+        reports::ModelReportSchema,
+        reports::ClosenessSchema,
+        reports::SegmentationReportSchema,
+        reports::PolarMapSchema,
+    ))
+)]
+pub struct DocumentFrame;
+
+/// The document as it is published, from what the routes have collected.
+pub fn publish(mut collected: utoipa::openapi::OpenApi) -> serde_json::Value {
+    let add = collected.paths.paths.get_mut("/v1/templates");
+    let body = add.and_then(|path| path.post.as_mut()?.request_body.as_mut());
+    if let Some(RefOr::T(body)) = body {
+        // `model` may name the mesh instead. An optional type would allow the body `null`.
+        body.required = Some(Required::False);
+    }
+    access::add_access(&mut collected);
+    let mut document = serde_json::to_value(collected).expect("the document is plain data");
+    finish::finish(&mut document);
+    document
+}

@@ -1,0 +1,114 @@
+//! What is not there: 404 for what never was, 410 for what was erased, and 422 when a field of
+//! an otherwise good request names such a thing.
+
+use super::{Answer, Problem, shorten};
+use crate::wire::rfc3339;
+use axum::http::StatusCode;
+use ventriform_service::jobs::{Catalogue, Resource, Tenant, Timestamp};
+
+/// 410 if the tenant erased `id`, else 404.
+pub async fn missing(
+    catalogue: &dyn Catalogue,
+    tenant: &Tenant,
+    resource: Resource,
+    id: &str,
+) -> Problem {
+    match catalogue.erased_at(tenant, id).await {
+        Ok(Some(at)) if Resource::of(id) == Some(resource) => erased(resource, id, at),
+        Ok(_) => unknown_id(resource, id),
+        Err(error) => error.into(),
+    }
+}
+
+fn unknown_id(resource: Resource, id: &str) -> Problem {
+    Problem::new(
+        StatusCode::NOT_FOUND,
+        "not-found",
+        format!("There is no {} `{}`.", resource.noun(), shorten(id)),
+    )
+    .fix(format!(
+        "Take an id from the list at GET /v1/{}.",
+        resource.plural()
+    ))
+}
+
+fn erased(resource: Resource, id: &str, at: Timestamp) -> Problem {
+    let fix = match resource {
+        Resource::Volume => "Upload the same file again; it gets the same id.",
+        Resource::Model | Resource::Segmentation => {
+            "Send the same volume with the same parameters again; the result gets the same id."
+        }
+        Resource::Template => "Add the same mesh again; it gets the same id.",
+        Resource::Reader => "Add the same profile again; it gets the same id.",
+        Resource::Job => "File a new job.",
+    };
+    Problem::new(
+        StatusCode::GONE,
+        "gone",
+        format!(
+            "The {} `{id}` was erased at {}.",
+            resource.noun(),
+            rfc3339(at)
+        ),
+    )
+    .fix(fix)
+}
+
+/// 404: a thing that exists has no file of that name; `names` are those it has.
+pub fn no_such_file(resource: Resource, name: &str, names: &[String]) -> Problem {
+    Problem::new(
+        StatusCode::NOT_FOUND,
+        "not-found",
+        format!("This {} has no file `{}`.", resource.noun(), shorten(name)),
+    )
+    .fix(format!("Ask for one of {}.", names.join(", ")))
+}
+
+/// 404: there is no receipt of an erasure with this id.
+pub fn no_receipt(id: &str) -> Problem {
+    Problem::new(
+        StatusCode::NOT_FOUND,
+        "not-found",
+        format!("There is no receipt `{}`.", shorten(id)),
+    )
+    .fix("Take an id from the list at GET /v1/erasures.")
+}
+
+/// 404: no route has this path.
+pub async fn no_such_path() -> Problem {
+    Problem::new(
+        StatusCode::NOT_FOUND,
+        "no-such-path",
+        "The API has no such path.",
+    )
+    .fix("GET /openapi.json lists all paths; /docs shows them in a browser.")
+}
+
+/// 422: the value of `field` is the id of something that does not exist (any more).
+///
+/// # Errors
+/// A problem with status 500 if the catalogue cannot be read.
+pub async fn field_names_nothing(
+    catalogue: &dyn Catalogue,
+    tenant: &Tenant,
+    field: &str,
+    id: &str,
+) -> Answer<Problem> {
+    let resource = Resource::of(id).unwrap_or(match field {
+        "model" => Resource::Model,
+        _ => Resource::Volume,
+    });
+    let (noun, short) = (resource.noun(), shorten(id));
+    let detail = match catalogue.erased_at(tenant, id).await? {
+        Some(at) => format!("The {noun} `{short}` was erased at {}.", rfc3339(at)),
+        None => format!("There is no {noun} `{short}`."),
+    };
+    let fix = match resource {
+        Resource::Volume => "POST the file to /v1/volumes first.".to_owned(),
+        _ => format!(
+            "Take an id from the list at GET /v1/{}, or leave the choice to `auto`.",
+            resource.plural()
+        ),
+    };
+    Ok(Problem::invalid_field(field, detail).fix(fix))
+}

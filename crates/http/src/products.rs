@@ -1,0 +1,751 @@
+//! What models, segmentations and templates have in common beside being [`Collection`]s: a mesh
+//! in several formats, files that can be downloaded, and perhaps a report.
+//!
+//! [`routes`] serves them under `/v1/{plural}/{id}/mesh`, `.../report` and `.../{file}`.
+
+use super::app::App;
+use super::caller::Caller;
+use super::collection::{Collection, find};
+use super::decoding::LITTLE_MEMORY;
+use super::files;
+use super::kept::Keep;
+use super::memory::charge;
+use super::negotiate;
+use super::openapi::{
+    ConditionalHeaders, DeidentifyParameter, DicomProblems, Documented, DownloadAnswers,
+    LookupProblems, MeshAnswer, PartParameter, ReportAnswer,
+};
+use super::problem::not_found::{missing, no_such_file};
+use super::problem::{Answer, Problem};
+use super::request::{PathSegments, flag, query_pairs, refuse_unknown};
+use super::scans::{self, ScanUidsBody};
+use super::wire::path_of;
+use axum::extract::{RawQuery, State};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::routing::get;
+use serde::Serialize;
+use serde_json::{Map, Value};
+use std::borrow::Cow;
+use std::convert::Infallible;
+use std::marker::PhantomData;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use utoipa::openapi::RefOr;
+use utoipa::openapi::path::HttpMethod;
+use utoipa::openapi::schema::{ObjectBuilder, Schema, Type};
+use utoipa::{IntoResponses, PartialSchema, ToSchema};
+use utoipa_axum::router::UtoipaMethodRouter;
+use ventriform::export::dicom::DicomObject;
+use ventriform::export::{Format, Part};
+use ventriform::progress::Monitor;
+use ventriform_service::access::Scope;
+use ventriform_service::jobs::{
+    Catalogue, Held, ItemFilter, ListPage, ListRequest, Product, Resource, StoreError, Tenant,
+};
+use ventriform_service::work::{UploadFacts, dicom, part};
+
+/// One kind of product.
+pub trait ProductCollection: 'static {
+    /// The kind: its ids, its noun, its path.
+    const RESOURCE: Resource;
+
+    /// Whether it is made of a scan, by which it is searched.
+    const SCANNED: bool = true;
+
+    /// The product as JSON.
+    type Body: From<Presented> + Serialize + ToSchema + Send;
+
+    /// The names, without extension, of the meshes it may have in every format.
+    const MESHES: &'static [&'static str] = &["mesh"];
+
+    /// The names of the files it may have beside its meshes.
+    const FILES: &'static [&'static str];
+
+    /// The name of the schema that lists all names of files.
+    const FILE_SCHEMA: &'static str;
+
+    /// What the document says about downloading a file.
+    const FILE_HELP: &'static str;
+
+    /// How the document describes a downloaded file.
+    type FileAnswer: IntoResponses;
+}
+
+impl<P: ProductCollection> Collection for P {
+    const RESOURCE: Resource = P::RESOURCE;
+    const SCANNED: bool = P::SCANNED;
+    type Row = Product;
+    type Body = P::Body;
+
+    async fn row(
+        catalogue: &dyn Catalogue,
+        tenant: &Tenant,
+        id: &str,
+    ) -> Result<Option<Held<Product>>, StoreError> {
+        catalogue.product(tenant, id).await
+    }
+
+    fn body(app: &App, _: Scope, product: Held<Product>) -> Result<P::Body, StoreError> {
+        Ok(Presented::of(app, product).into())
+    }
+
+    async fn rows(
+        catalogue: &dyn Catalogue,
+        tenant: &Tenant,
+        filter: &ItemFilter,
+        page: ListRequest,
+    ) -> Result<ListPage<Held<Product>>, StoreError> {
+        catalogue.products(tenant, P::RESOURCE, filter, page).await
+    }
+}
+
+/// A product and when it will be erased.
+pub struct Presented {
+    /// The product.
+    pub product: Product,
+    /// When it will be erased (RFC 3339); `None` if it is kept.
+    pub expires_at: Option<String>,
+    /// The scan of its volume.
+    pub scan: Option<ScanUidsBody>,
+    /// Whether every `model=auto` fits it; templates only.
+    pub library: bool,
+}
+
+impl Presented {
+    /// A product as its tenant has it.
+    pub fn of(app: &App, held: Held<Product>) -> Self {
+        Self {
+            expires_at: app.expires_at(held.item.resource(), &held.holding),
+            scan: ScanUidsBody::of(&held.holding.scan),
+            library: held.holding.library,
+            product: held.item,
+        }
+    }
+}
+
+/// `GET /v1/{plural}/{id}/mesh` and `GET /v1/{plural}/{id}/{file}`; and
+/// `GET /v1/{plural}/{id}/report` if there are reports.
+pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
+    let (noun, plural) = (P::RESOURCE.noun(), P::RESOURCE.plural());
+    let download = |path: &str, id: &str, summary: String| {
+        let path = format!("/v1/{plural}/{{id}}/{path}");
+        Documented::new(HttpMethod::Get, path, plural, id.to_owned(), summary).id(noun)
+    };
+    let mesh = download(
+        "mesh",
+        &format!("get_{noun}_mesh"),
+        format!("Download a {noun}'s mesh"),
+    )
+    .description("In the format that `Accept` asks for; GLB if it allows any.")
+    .parameters::<PartParameter>()
+    .parameters::<ConditionalHeaders>()
+    .answers::<MeshAnswer>();
+    let mut file = download(
+        "{file}",
+        &format!("get_{noun}_file"),
+        format!("Download one of a {noun}'s files"),
+    )
+    .description(P::FILE_HELP);
+    let names = file.refer::<FileNames<P>>();
+    let mut file = file
+        .segment("file", "The file's name".into(), names)
+        .parameters::<ConditionalHeaders>()
+        .answers::<P::FileAnswer>();
+    if !P::MESHES.is_empty() {
+        file = file.parameters::<PartParameter>();
+    }
+    if !dicom::objects(P::RESOURCE).is_empty() {
+        file = file
+            .parameters::<DeidentifyParameter>()
+            .answers::<DicomProblems>();
+    }
+    let shared = |operation: Documented| {
+        operation
+            .answers::<DownloadAnswers>()
+            .answers::<LookupProblems>()
+    };
+    let mut routes = vec![shared(file).served_by(get(get_file::<P>))];
+    if !P::MESHES.is_empty() {
+        routes.push(shared(mesh).served_by(get(get_mesh::<P>)));
+    }
+    if P::FILES.contains(&REPORT) {
+        let report = download(
+            "report",
+            &format!("get_{noun}_report"),
+            format!("Read a {noun}'s report"),
+        )
+        .description("JSON, or an HTML page if `Accept` prefers `text/html`.")
+        .parameters::<ConditionalHeaders>()
+        .answers::<ReportAnswer>();
+        routes.push(shared(report).served_by(get(get_report::<P>)));
+    }
+    routes
+}
+
+/// Memory for a byte of the files that a page is made of: the file, what is read of it, and the page.
+const PAGE_MEMORY_PER_BYTE: u64 = 8;
+
+/// The file that holds the report.
+const REPORT: &str = "report.json";
+
+/// 409 where the tenant has as many products of that kind as the setting of that name allows.
+pub async fn refuse_when_full<P: ProductCollection>(
+    app: &App,
+    tenant: &Tenant,
+    limit: u32,
+    setting: &str,
+) -> Answer<()> {
+    let page = ListRequest {
+        before: None,
+        limit,
+    };
+    let filter = ItemFilter::default();
+    let page = app
+        .queue
+        .catalogue
+        .products(tenant, P::RESOURCE, &filter, page)
+        .await?;
+    if page.items.len() < limit as usize {
+        return Ok(());
+    }
+    let (noun, plural) = (P::RESOURCE.noun(), P::RESOURCE.plural());
+    Err(Problem::new(
+        StatusCode::CONFLICT,
+        "library-full",
+        format!("There are {limit} {plural} already, the most that this service allows."),
+    )
+    .fix(format!(
+        "DELETE a {noun} first, or ask the operator to raise `{setting}`."
+    )))
+}
+
+/// The program that made a product.
+#[derive(Serialize, ToSchema)]
+#[schema(as = Software)]
+pub struct SoftwareBody {
+    /// The program.
+    name: String,
+    /// Its version.
+    version: String,
+}
+
+/// A file that can be downloaded.
+#[derive(Serialize, ToSchema)]
+#[schema(as = Download)]
+pub struct DownloadBody {
+    /// The file's name.
+    #[schema(example = "mesh.glb")]
+    name: String,
+    /// Its path.
+    href: String,
+    /// Its media type.
+    media_type: String,
+    /// Its length in bytes.
+    bytes: u64,
+    /// SHA-256 of its content, hexadecimal; also its `ETag`.
+    sha256: String,
+}
+
+impl SoftwareBody {
+    /// The program that made `product`.
+    pub fn of(product: &Product) -> Self {
+        Self {
+            name: env!("CARGO_PKG_NAME").into(),
+            version: product.software.clone(),
+        }
+    }
+}
+
+impl DownloadBody {
+    /// All files of `product`.
+    pub fn all(product: &Product) -> Vec<Self> {
+        product
+            .files
+            .iter()
+            .map(|file| Self {
+                href: files::path(product, file),
+                name: file.name.clone(),
+                media_type: file.media_type.clone(),
+                bytes: file.bytes,
+                sha256: file.sha256.clone(),
+            })
+            .collect()
+    }
+}
+
+/// Declares the JSON of a kind of product that is made of a volume: its doc comments, its name, the
+/// name of its schema, the type of its links, the schemas of its parameters and of its summary,
+/// what its summary holds, and an example of an id.
+macro_rules! body_of_product {
+    ($(#[doc = $doc:tt])+ $name:ident, $schema:ident, $links:ident, $parameters:path, $figures:path, $summary:tt, $example:tt) => {
+        $(#[doc = $doc])+
+        #[derive(serde::Serialize, utoipa::ToSchema)]
+        #[schema(as = $schema)]
+        pub struct $name {
+            /// Derived from tenant, volume, parameters and mesh, so it is the same on every machine.
+            #[schema(example = $example)]
+            id: String,
+            /// When it was made (RFC 3339).
+            #[schema(format = DateTime)]
+            created_at: String,
+            /// When it will be erased unless it is computed again (RFC 3339); absent if it is kept.
+            #[schema(format = DateTime)]
+            expires_at: Option<String>,
+            /// The volume it was made of.
+            volume: String,
+            /// The scan of that volume; absent if it is not known.
+            dicom: Option<$crate::scans::ScanUidsBody>,
+            /// The parameters used, including every default.
+            #[schema(value_type = $parameters)]
+            parameters: serde_json::Map<String, serde_json::Value>,
+            #[doc = $summary]
+            #[schema(value_type = $figures)]
+            summary: serde_json::Map<String, serde_json::Value>,
+            /// The program that made it.
+            software: $crate::products::SoftwareBody,
+            /// Its files.
+            files: Vec<$crate::products::DownloadBody>,
+            /// Related paths.
+            links: $links,
+        }
+
+        impl From<$crate::products::Presented> for $name {
+            fn from(presented: $crate::products::Presented) -> Self {
+                let product = presented.product;
+                Self {
+                    expires_at: presented.expires_at,
+                    dicom: presented.scan,
+                    created_at: $crate::wire::rfc3339(product.created_at),
+                    volume: product.volume.clone().unwrap_or_default(),
+                    software: $crate::products::SoftwareBody::of(&product),
+                    files: $crate::products::DownloadBody::all(&product),
+                    links: $links::of(&product),
+                    id: product.id,
+                    parameters: product.parameters,
+                    summary: product.summary,
+                }
+            }
+        }
+    };
+}
+pub(super) use body_of_product;
+
+/// A media type that a client may ask for, and the file that has it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Offer {
+    /// The media type.
+    pub media_type: &'static str,
+    /// The file's name.
+    pub file: String,
+}
+
+impl Offer {
+    /// `file` under `media_type`.
+    pub fn new(media_type: &'static str, file: impl Into<String>) -> Self {
+        Self {
+            media_type,
+            file: file.into(),
+        }
+    }
+
+    /// The mesh in every format, GLB first.
+    pub fn meshes() -> Vec<Self> {
+        Format::ALL
+            .map(|format| Self::new(format.media_type(), mesh_name(format)))
+            .to_vec()
+    }
+
+    fn reports() -> [Self; 2] {
+        [
+            Self::new("application/json", REPORT),
+            Self::new("text/html", files::PAGE),
+        ]
+    }
+}
+
+fn mesh_name(format: Format) -> String {
+    format!("mesh.{}", format.extension())
+}
+
+/// The offer that `Accept` rates highest, or the 406 that lists the offers.
+pub fn choose<'a>(headers: &HeaderMap, offers: &'a [Offer]) -> Answer<&'a Offer> {
+    let types: Vec<&str> = offers.iter().map(|offer| offer.media_type).collect();
+    Ok(&offers[negotiate::require_offer(headers, &types)?])
+}
+
+/// The tenant's product of that id, or the 404 or 410 that says why there is none.
+pub async fn find_any(app: &App, tenant: &Tenant, id: &str) -> Answer<Product> {
+    let catalogue = &*app.queue.catalogue;
+    match catalogue.product(tenant, id).await? {
+        Some(product) => Ok(product.item),
+        None => {
+            let resource = Resource::of(id).unwrap_or(Resource::Model);
+            Err(missing(catalogue, tenant, resource, id).await)
+        }
+    }
+}
+
+impl Keep for Arc<Product> {
+    fn bytes(&self) -> usize {
+        /// Of a file's record, and of an item beside its maps.
+        const RECORD: usize = 400;
+        /// By how much a JSON object in memory is larger than its text.
+        const IN_MEMORY: usize = 4;
+        let text = |map| serde_json::to_string(map).map_or(0, |text: String| text.len());
+        IN_MEMORY * (text(&self.parameters) + text(&self.summary)) + RECORD * (self.files.len() + 1)
+    }
+}
+
+/// The tenant's product of that id, without asking the database again while nothing is written.
+async fn kept<P: ProductCollection>(app: &App, tenant: &Tenant, id: &str) -> Answer<Arc<Product>> {
+    let read = async || {
+        let product = find::<P>(app, tenant, id).await?.item;
+        Ok(ControlFlow::Continue(Arc::new(product)))
+    };
+    // What is used of it tells nobody whose scan it is.
+    let asker = (tenant, false);
+    let kept = app
+        .products
+        .get(&*app.queue.catalogue, asker, P::RESOURCE, id, read);
+    let ControlFlow::<Infallible, _>::Continue(product) = kept.await?;
+    Ok(product)
+}
+
+/// Answers with the offered file, under the media type by which it was offered.
+pub async fn send(
+    app: &App,
+    asker: Asker<'_>,
+    product: &Product,
+    offer: &Offer,
+    headers: &HeaderMap,
+) -> Answer {
+    let mut response = send_named(app, asker, product, &offer.file, headers).await?;
+    if let Some(own) = response.headers_mut().get_mut(header::CONTENT_TYPE)
+        && !own.as_bytes().starts_with(offer.media_type.as_bytes())
+    {
+        *own = HeaderValue::from_static(offer.media_type);
+    }
+    Ok(response)
+}
+
+async fn get_mesh<P: ProductCollection>(
+    state: State<App>,
+    caller: Caller,
+    id: PathSegments<String>,
+    query: RawQuery,
+    headers: HeaderMap,
+) -> Answer {
+    let PathSegments(id_text) = &id;
+    let pairs = query_pairs(query.0.as_deref());
+    let Some(part) = wanted_part(&pairs)? else {
+        return get_offered::<P>(state, caller, id, query, headers, &Offer::meshes()).await;
+    };
+    refuse_unknown(&pairs, &[PART])?;
+    let State(app) = &state;
+    let product = kept::<P>(app, &caller.tenant, id_text).await?;
+    let offers = Offer::meshes();
+    let offer = choose(&headers, &offers)?;
+    let mut response = send_part(app, &product, &offer.file, part, &headers).await?;
+    response
+        .headers_mut()
+        .insert(header::VARY, HeaderValue::from_static("accept"));
+    Ok(response)
+}
+
+/// The query parameter that asks for one part of a mesh.
+const PART: &str = "part";
+
+/// The part that a request asks for.
+fn wanted_part(pairs: &[(String, String)]) -> Answer<Option<Part>> {
+    let Some((_, name)) = pairs.iter().find(|(name, _)| name == PART) else {
+        return Ok(None);
+    };
+    let part = Part::named(name).ok_or_else(|| {
+        let names = Part::ALL.map(Part::as_str).join(", ");
+        Problem::bad_request(
+            "invalid-parameter",
+            "`part` names no part of a ventricle's wall.",
+        )
+        .at(PART)
+        .fix(format!(
+            "Give one of {names}, or leave it out for the closed mesh."
+        ))
+    });
+    part.map(Some)
+}
+
+/// Answers with one part of the mesh `name` of `product`, cut out of it now.
+async fn send_part(
+    app: &App,
+    product: &Product,
+    name: &str,
+    part: Part,
+    headers: &HeaderMap,
+) -> Answer {
+    let (stem, extension) = name.rsplit_once('.').unwrap_or((name, ""));
+    let stem = stem.to_owned();
+    let source = format!("{stem}.json");
+    let format = Format::from_extension(extension);
+    let (Some(format), Some(size)) = (format, product.file(&source).map(|file| file.bytes)) else {
+        let names: Vec<_> = product.files.iter().map(|file| file.name.clone()).collect();
+        return Err(no_such_file(product.resource(), name, &names));
+    };
+    charge(size).await?;
+    let stored = app
+        .queue
+        .with_files(product.clone(), &[source.as_str()])
+        .await?;
+    let memory = LITTLE_MEMORY + MEMORY_PER_MESH_BYTE * size;
+    let make = move |_: &Monitor<'_>| part::part_file(&stored, &stem, part, format);
+    match app.decoding.run(memory, make).await?? {
+        Some(file) => files::send_derived(product, file, headers).await,
+        None => Err(Problem::new(
+            StatusCode::NOT_FOUND,
+            "not-found",
+            format!("The triangles of this mesh do not say which are {}.", part.as_str()),
+        )
+        .at(PART)
+        .fix(
+            "Leave out `part`. Meshes of left ventricles have parts; those of older versions get them when the same \
+             job is started again.",
+        )),
+    }
+}
+
+/// Memory for a byte of a JSON mesh: numbers as text, parsed, and as a file.
+const MEMORY_PER_MESH_BYTE: u64 = 16;
+
+async fn get_report<P: ProductCollection>(
+    state: State<App>,
+    caller: Caller,
+    id: PathSegments<String>,
+    query: RawQuery,
+    headers: HeaderMap,
+) -> Answer {
+    get_offered::<P>(state, caller, id, query, headers, &Offer::reports()).await
+}
+
+/// The file among `offers` that `Accept` rates highest.
+async fn get_offered<P: ProductCollection>(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+    offers: &[Offer],
+) -> Answer {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let product = kept::<P>(&app, &caller.tenant, &id).await?;
+    let asker = Asker::of(&caller);
+    let mut response = send(&app, asker, &product, choose(&headers, offers)?, &headers).await?;
+    response
+        .headers_mut()
+        .insert(header::VARY, HeaderValue::from_static("accept"));
+    Ok(response)
+}
+
+async fn get_file<P: ProductCollection>(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments((id, name)): PathSegments<(String, String)>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+) -> Answer {
+    let pairs = query_pairs(query.as_deref());
+    let object = dicom::object_named(P::RESOURCE, &name);
+    let mesh = mesh_names::<P>().any(|mesh| mesh == name);
+    let known: &[&str] = match object.is_some() || name == files::PAGE {
+        true => &["deidentify"],
+        false if mesh => &[PART],
+        false => &[],
+    };
+    refuse_unknown(&pairs, known)?;
+    let names = file_names::<P>();
+    if !names.contains(&name) {
+        return Err(no_such_file(P::RESOURCE, &name, &names));
+    }
+    let product = kept::<P>(&app, &caller.tenant, &id).await?;
+    if let Some(part) = wanted_part(&pairs)?.filter(|_| mesh) {
+        return send_part(&app, &product, &name, part, &headers).await;
+    }
+    let deidentify = match pairs.first() {
+        Some((_, value)) => flag("deidentify", value)?,
+        None => false,
+    };
+    let Some(object) = object else {
+        let asker = Asker {
+            deidentify,
+            ..Asker::of(&caller)
+        };
+        return send_named(&app, asker, &product, &name, &headers).await;
+    };
+    if !deidentify {
+        caller.require(Scope::Submit)?;
+    }
+    send_object(&app, &caller.tenant, &product, object, deidentify, &headers).await
+}
+
+/// Answers with a DICOM object, which is made of the product's files and the scan of its volume.
+async fn send_object(
+    app: &App,
+    tenant: &Tenant,
+    product: &Product,
+    object: DicomObject,
+    deidentify: bool,
+    headers: &HeaderMap,
+) -> Answer {
+    let id = &product.id;
+    let size: u64 = product.files.iter().map(|file| file.bytes).sum();
+    charge(size).await?;
+    let result = app.queue.result(tenant, id, dicom::FILES).await?;
+    let result = result.ok_or_else(|| volume_erased(id))?;
+    let secret = match deidentify {
+        true => Some(app.queue.catalogue.deidentification_secret(tenant).await?),
+        false => None,
+    };
+    let memory = dicom::object_memory(UploadFacts::of(&result.volume)?.shape);
+    let limits = app.engine.limits;
+    let make = move |_: &Monitor<'_>| dicom::object(&result, object, secret.as_deref(), &limits);
+    let made = app.decoding.run(memory, make).await?.map_err(|failure| {
+        let unknown = failure.code == "identity-needed" || failure.code == "identity-differs";
+        let problem = Problem::from(failure);
+        match unknown {
+            true => problem.conflict(),
+            false => problem,
+        }
+    })?;
+    match made {
+        Some(file) => files::send_object(product, file, headers).await,
+        None => {
+            let names: Vec<_> = product.files.iter().map(|file| file.name.clone()).collect();
+            Err(no_such_file(product.resource(), object.file_name(), &names))
+        }
+    }
+}
+
+/// The paths of the DICOM objects that can be made of a product.
+pub fn object_paths(product: &Product) -> Vec<String> {
+    let itself = path_of(&product.id);
+    let objects = dicom::objects(product.resource()).iter();
+    objects
+        .filter(|object| product.file("polar.png").is_some() || **object != DicomObject::Polar)
+        .map(|object| format!("{itself}/{}", object.file_name()))
+        .collect()
+}
+
+/// 409: whose scan a result is of went with its volume.
+fn volume_erased(id: &str) -> Problem {
+    Problem::new(
+        StatusCode::CONFLICT,
+        "volume-erased",
+        format!("The volume of `{id}` was erased, and with it whose scan it is."),
+    )
+    .fix("Upload the same file again; DICOM objects of the result can then be had.")
+}
+
+/// Who asks for a file of a product.
+#[derive(Clone, Copy)]
+pub struct Asker<'a> {
+    tenant: &'a Tenant,
+    scope: Scope,
+    /// Whether a page names nobody.
+    deidentify: bool,
+}
+
+impl<'a> Asker<'a> {
+    /// `caller`, who sees of a scan what its scope allows.
+    pub fn of(caller: &'a Caller) -> Self {
+        Self {
+            tenant: &caller.tenant,
+            scope: caller.scope,
+            deidentify: false,
+        }
+    }
+
+    /// Somebody who files a job of `tenant`, for which the scope `submit` is needed.
+    pub fn filer(tenant: &'a Tenant) -> Self {
+        Self {
+            tenant,
+            scope: Scope::Submit,
+            deidentify: false,
+        }
+    }
+
+    /// What the page of `product` names of the scan.
+    async fn sees(self, app: &App, product: &Product) -> Answer<Map<String, Value>> {
+        let Some(volume) = product.volume.as_deref().filter(|_| !self.deidentify) else {
+            return Ok(Map::new());
+        };
+        let scan = app.queue.catalogue.scan(self.tenant, volume).await?;
+        let shown = scan.and_then(|scan| scans::shown(&scan, self.scope));
+        Ok(shown.unwrap_or_default())
+    }
+}
+
+async fn send_named(
+    app: &App,
+    asker: Asker<'_>,
+    product: &Product,
+    name: &str,
+    headers: &HeaderMap,
+) -> Answer {
+    if let Some(file) = product.file(name) {
+        return files::send(app, product, file, headers).await;
+    }
+    let work = app.engine.work(product.resource().noun());
+    match work.filter(|_| name == files::PAGE).cloned() {
+        Some(work) => {
+            let files = product.files.iter();
+            let needed = files.filter(|file| work.page_files().contains(&&file.name[..]));
+            let size: u64 = needed.map(|file| file.bytes).sum();
+            charge(PAGE_MEMORY_PER_BYTE * size).await?;
+            let stored = app
+                .queue
+                .with_files(product.clone(), work.page_files())
+                .await?;
+            let scan = asker.sees(app, product).await?;
+            let draw = move |_: &Monitor<'_>| work.page(&stored, &scan);
+            let page = app.decoding.run(LITTLE_MEMORY, draw).await??;
+            files::send_page(product, page, headers).await
+        }
+        None => {
+            let names: Vec<_> = product.files.iter().map(|file| file.name.clone()).collect();
+            Err(no_such_file(product.resource(), name, &names))
+        }
+    }
+}
+
+/// The names of the meshes that a product of that kind may have, in every format.
+fn mesh_names<P: ProductCollection>() -> impl Iterator<Item = String> {
+    P::MESHES.iter().flat_map(|name| {
+        let named = |format: Format| format!("{name}.{}", format.extension());
+        Format::ALL.map(named)
+    })
+}
+
+/// All names of files that a product of that kind may have.
+fn file_names<P: ProductCollection>() -> Vec<String> {
+    let meshes = mesh_names::<P>();
+    let others = P::FILES.iter().map(|name| (*name).to_owned());
+    let objects = dicom::objects(P::RESOURCE).iter();
+    let objects = objects.map(|object| object.file_name().to_owned());
+    meshes.chain(others).chain(objects).collect()
+}
+
+/// The schema of [`file_names`].
+struct FileNames<P>(PhantomData<P>);
+
+impl<P: ProductCollection> ToSchema for FileNames<P> {
+    fn name() -> Cow<'static, str> {
+        P::FILE_SCHEMA.into()
+    }
+}
+
+impl<P: ProductCollection> PartialSchema for FileNames<P> {
+    fn schema() -> RefOr<Schema> {
+        let names = ObjectBuilder::new()
+            .schema_type(Type::String)
+            .enum_values(Some(file_names::<P>()));
+        Schema::from(names).into()
+    }
+}

@@ -1,0 +1,132 @@
+//! `/v1/readers`: readers' profiles, by which segmentations are drawn.
+
+use super::app::App;
+use super::caller::Caller;
+use super::decoding::LITTLE_MEMORY;
+use super::openapi::{self, UploadProblems};
+use super::problem::{Answer, ProblemBody};
+use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody, refuse_when_full};
+use super::request::{json_bytes, query_pairs, refuse_unknown};
+use super::wire::{added, path_of, rfc3339};
+use axum::extract::{RawQuery, Request, State};
+use serde::Serialize;
+use serde_json::{Map, Value};
+use utoipa::ToSchema;
+use ventriform::progress::Monitor;
+use ventriform_service::config::Size;
+use ventriform_service::jobs::{ProductRoom, Resource, check_name};
+
+/// Largest profile: 5000 masks with two hashes each.
+pub const PROFILE_SIZE: Size = Size(1 << 20);
+
+/// The file of a profile.
+const PROFILE: &str = "profile.json";
+
+/// The collection of readers.
+pub struct Readers;
+
+impl ProductCollection for Readers {
+    const RESOURCE: Resource = Resource::Reader;
+    const SCANNED: bool = false;
+    type Body = ReaderBody;
+    const MESHES: &'static [&'static str] = &[];
+    const FILES: &'static [&'static str] = &[PROFILE];
+    const FILE_SCHEMA: &'static str = "ReaderFileName";
+    const FILE_HELP: &'static str = "The profile, as `ventriform segment --reader` takes it.";
+    type FileAnswer = openapi::ReaderFileAnswer;
+}
+
+/// A reader: a profile by which segmentations are drawn.
+#[derive(Serialize, ToSchema)]
+#[schema(as = Reader)]
+pub struct ReaderBody {
+    /// Derived from tenant and profile, so it is the same on every machine.
+    #[schema(example = "rdr_2c26b46b68ffc68ff99b453c1d304134")]
+    id: String,
+    /// When it was added (RFC 3339).
+    #[schema(format = DateTime)]
+    created_at: String,
+    /// Its name.
+    name: String,
+    /// What the profile holds.
+    #[schema(value_type = openapi::ReaderSummarySchema)]
+    summary: Map<String, Value>,
+    /// The program that added it.
+    software: SoftwareBody,
+    /// Its files.
+    files: Vec<DownloadBody>,
+    /// Related paths.
+    links: ReaderLinks,
+}
+
+/// Paths of one reader.
+#[derive(Serialize, ToSchema)]
+struct ReaderLinks {
+    /// This reader.
+    #[serde(rename = "self")]
+    itself: String,
+    /// Its profile.
+    profile: String,
+}
+
+impl From<Presented> for ReaderBody {
+    fn from(presented: Presented) -> Self {
+        let product = presented.product;
+        let itself = path_of(&product.id);
+        let name = product.parameters.get("name").and_then(Value::as_str);
+        Self {
+            created_at: rfc3339(product.created_at),
+            name: name.unwrap_or_default().to_owned(),
+            files: DownloadBody::all(&product),
+            software: SoftwareBody::of(&product),
+            links: ReaderLinks {
+                profile: format!("{itself}/{PROFILE}"),
+                itself,
+            },
+            id: product.id,
+            summary: product.summary,
+        }
+    }
+}
+
+/// Add a reader
+///
+/// The body is a reader's profile, as `ventriform calibrate` writes it. `reader=ID` of a segmentation then
+/// draws the wall as that reader would. The same profile is added only once. Retention never erases
+/// readers.
+#[utoipa::path(post, path = "/v1/readers", tag = "readers",
+    request_body(content = openapi::ReaderProfileSchema, content_type = "application/json"),
+    params(openapi::ReaderQuery),
+    responses(
+        (status = 201, description = "Added", body = ReaderBody,
+            headers(("Location" = String, description = "The reader's path"))),
+        (status = 200, description = "Already there", body = ReaderBody,
+            headers(("Location" = String, description = "The reader's path"))),
+        (status = 409, description = "There are as many readers as the operator allows",
+            body = ProblemBody, content_type = "application/problem+json"),
+        UploadProblems,
+    ))]
+pub async fn create_reader(
+    State(app): State<App>,
+    caller: Caller,
+    RawQuery(query): RawQuery,
+    request: Request,
+) -> Answer {
+    let pairs = query_pairs(query.as_deref());
+    refuse_unknown(&pairs, &["name"])?;
+    let name = pairs.first().map_or("reader", |(_, value)| value.as_str());
+    check_name(name)?;
+    let tenant = &caller.tenant;
+    let room = ProductRoom {
+        count: app.settings.reader_limit,
+        bytes: caller.quota.bytes,
+    };
+    refuse_when_full::<Readers>(&app, tenant, room.count, "reader_limit").await?;
+    let profile = json_bytes(request).await?;
+    let reader = app.engine.reader.clone();
+    let check = move |_: &Monitor<'_>| reader.profile(&profile);
+    let output = app.decoding.run(LITTLE_MEMORY, check).await??;
+    let (stored, new) = app.queue.add_reader(tenant, name, output, room).await?;
+    let body = ReaderBody::from(Presented::of(&app, stored));
+    Ok(added(new, &body.id, &body))
+}

@@ -1,0 +1,191 @@
+//! `/v1/intake`: what other systems have sent, and what became of it, for callers with the scope
+//! `admin`.
+
+use super::app::App;
+use super::caller::Caller;
+use super::openapi::{ListProblems, LookupProblems, PageParameters};
+use super::pagination::{list_query, next_cursor};
+use super::problem::{Answer, Problem, ProblemBody, shorten};
+use super::request::{PathSegments, query_pairs, refuse_unknown, unknown_state};
+use super::wire::{path_of, rfc3339};
+use crate::public_base::public_path;
+use axum::Json;
+use axum::extract::{RawQuery, State};
+use axum::http::StatusCode;
+use serde::Serialize;
+use utoipa::ToSchema;
+use ventriform_service::intake::{GroupState, IntakeGroup};
+
+/// Objects that make up one volume.
+#[derive(Serialize, ToSchema)]
+#[schema(as = Received)]
+pub struct ReceivedBody {
+    /// Its id.
+    #[schema(example = "rcv_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f")]
+    id: String,
+    /// What became of it.
+    state: ReceivedState,
+    /// Study Instance UID.
+    study: String,
+    /// Series Instance UID.
+    series: String,
+    /// SOP Instance UID of an object that is a volume of its own; absent for a series of slices.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    instance: Option<String>,
+    /// Modality.
+    modality: Option<String>,
+    /// The values of Image Type.
+    image_type: Vec<String>,
+    /// How its last object came: `c-store` or `stow-rs`.
+    #[schema(example = "c-store")]
+    protocol: String,
+    /// The AE title, or the name of the key, that sent its last object.
+    sender: String,
+    /// Number of its objects.
+    objects: u64,
+    /// Size of those that are not part of a volume, bytes.
+    waiting_bytes: u64,
+    /// The volume made of it.
+    volume: Option<String>,
+    /// The job that a rule started.
+    job: Option<String>,
+    /// Why it is no volume, or why its job was not started.
+    error: Option<ProblemBody>,
+    /// When its first object came (RFC 3339).
+    #[schema(format = DateTime)]
+    created_at: String,
+    /// When it last changed (RFC 3339).
+    #[schema(format = DateTime)]
+    changed_at: String,
+    /// Related paths.
+    links: ReceivedLinks,
+}
+
+/// What became of received objects.
+#[derive(Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ReceivedState {
+    /// More may come, or they wait to be read.
+    Gathering,
+    /// The volume is stored; its job is to be started.
+    Filing,
+    /// The volume is stored.
+    Stored,
+    /// They make up no volume; `error` says why.
+    Failed,
+}
+
+/// Paths of received objects.
+#[derive(Serialize, ToSchema)]
+struct ReceivedLinks {
+    /// This entry; DELETE forgets it.
+    #[serde(rename = "self")]
+    itself: String,
+    /// The volume.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    volume: Option<String>,
+    /// The job.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    job: Option<String>,
+}
+
+/// A page of what was received.
+#[derive(Serialize, ToSchema)]
+pub struct ReceivedList {
+    /// The entries, newest first.
+    intake: Vec<ReceivedBody>,
+    /// `cursor` of the next page; absent on the last.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    next_cursor: Option<String>,
+}
+
+impl From<IntakeGroup> for ReceivedBody {
+    fn from(group: IntakeGroup) -> Self {
+        Self {
+            state: match group.state {
+                GroupState::Gathering => ReceivedState::Gathering,
+                GroupState::Filing => ReceivedState::Filing,
+                GroupState::Stored => ReceivedState::Stored,
+                GroupState::Failed => ReceivedState::Failed,
+            },
+            study: group.study,
+            series: group.series,
+            instance: group.instance,
+            modality: group.modality,
+            image_type: group.image_type,
+            protocol: group.origin.protocol.as_str().to_owned(),
+            sender: group.origin.sender,
+            objects: group.objects,
+            waiting_bytes: group.waiting_bytes,
+            error: group.failure.map(|f| Problem::from(f).into_body()),
+            created_at: rfc3339(group.created_at),
+            changed_at: rfc3339(group.changed_at),
+            links: ReceivedLinks {
+                itself: public_path(&format!("/v1/intake/{}", group.id)),
+                volume: group.volume.as_deref().map(path_of),
+                job: group
+                    .job
+                    .as_ref()
+                    .map(|job| public_path(&format!("/v1/jobs/{job}"))),
+            },
+            volume: group.volume,
+            job: group.job,
+            id: group.id,
+        }
+    }
+}
+
+/// List what other systems have sent
+///
+/// The series and objects that came by C-STORE or STOW-RS, what became of them, and why those that failed
+/// are no volume.
+#[utoipa::path(get, path = "/v1/intake", tag = "dicomweb", operation_id = "list_received",
+    params(PageParameters,
+        ("state" = Option<ReceivedState>, Query, description = "Only what is in this state")),
+    responses((status = 200, description = "A page, newest first", body = ReceivedList), ListProblems))]
+pub async fn list_received(
+    State(app): State<App>,
+    caller: Caller,
+    RawQuery(query): RawQuery,
+) -> Answer<Json<ReceivedList>> {
+    let (page, [state]) = list_query(query.as_deref(), ["state"]).await?;
+    let state = state.map(|name| parse_state(&name)).transpose()?;
+    let page = app.intake.store.groups(&caller.tenant, state, page).await?;
+    let next_cursor = next_cursor(&page);
+    Ok(Json(ReceivedList {
+        intake: page.items.into_iter().map(ReceivedBody::from).collect(),
+        next_cursor,
+    }))
+}
+
+fn parse_state(name: &str) -> Answer<GroupState> {
+    GroupState::parse(name)
+        .ok_or_else(|| unknown_state(name, &GroupState::ALL.map(GroupState::as_str)))
+}
+
+/// Forget what was sent
+///
+/// Erases the objects that are not part of a volume, and what is known of those that are: sent again, they
+/// are stored again. The volume stays.
+#[utoipa::path(delete, path = "/v1/intake/{id}", tag = "dicomweb", operation_id = "forget_received",
+    params(("id" = String, Path, description = "The entry's id")),
+    responses((status = 204, description = "It is forgotten"), LookupProblems))]
+pub async fn forget_received(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+) -> Answer<StatusCode> {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let removed = app.intake.store.remove(&caller.tenant, &id).await?;
+    let files = removed.ok_or_else(|| {
+        Problem::new(
+            StatusCode::NOT_FOUND,
+            "not-found",
+            format!("Nothing that was received has the id `{}`.", shorten(&id)),
+        )
+        .fix("List what was received by GET /v1/intake.")
+    })?;
+    app.intake.files.discard(&files).await?;
+    Ok(StatusCode::NO_CONTENT)
+}

@@ -1,0 +1,232 @@
+//! Strict reading of paths, query strings and JSON bodies: what is unknown or given twice is
+//! refused.
+
+use super::limits::BodyLimits;
+use super::memory::charge;
+use super::problem::{Answer, Problem, body, shorten};
+use axum::body::Bytes;
+use axum::extract::{FromRequestParts, Request};
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, header};
+use futures::StreamExt;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+use ventriform::parameters::nearest;
+
+/// Segments of the path, as [`axum::extract::Path`] reads them, but refused with a problem object.
+pub struct PathSegments<T>(pub T);
+
+impl<S, T> FromRequestParts<S> for PathSegments<T>
+where
+    S: Send + Sync,
+    T: DeserializeOwned + Send,
+{
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Answer<Self> {
+        match axum::extract::Path::from_request_parts(parts, state).await {
+            Ok(axum::extract::Path(path)) => Ok(Self(path)),
+            Err(error) => Err(Problem::bad_request(
+                "malformed-path",
+                format!("{}.", error.body_text()),
+            )
+            .fix("Use the paths in `links` unchanged.")),
+        }
+    }
+}
+
+/// The names and values of a query string, decoded, in their order.
+pub fn query_pairs(query: Option<&str>) -> Vec<(String, String)> {
+    form_urlencoded::parse(query.unwrap_or_default().as_bytes())
+        .into_owned()
+        .collect()
+}
+
+/// Refuses a name that is not among `known`, and a name that is given twice.
+pub fn refuse_unknown(pairs: &[(String, String)], known: &[&str]) -> Answer<()> {
+    for (index, (name, _)) in pairs.iter().enumerate() {
+        if !known.contains(&name.as_str()) {
+            return Err(unknown("query parameter", name, known));
+        }
+        if pairs[..index].iter().any(|(earlier, _)| earlier == name) {
+            return Err(Problem::bad_request(
+                "repeated-parameter",
+                format!("`{name}` is given more than once."),
+            )
+            .at(name)
+            .fix("Give it only once."));
+        }
+    }
+    Ok(())
+}
+
+/// The value of the parameter `name`: `true` or `false`.
+///
+/// # Errors
+/// 400 for another text.
+pub fn flag(name: &str, text: &str) -> Answer<bool> {
+    text.parse().map_err(|_| {
+        Problem::bad_request(
+            "invalid-parameter",
+            format!("`{name}` must be `true` or `false`."),
+        )
+        .at(name)
+        .fix("Give `true` or `false`, or leave it out for `false`.")
+    })
+}
+
+/// What `text`, the value of the parameter `field`, names; `known` lists what it may.
+///
+/// # Errors
+/// 400 for another text.
+pub fn word<T>(
+    text: Option<&str>,
+    field: &str,
+    named: impl Fn(&str) -> Option<T>,
+    known: &str,
+) -> Answer<Option<T>> {
+    let Some(text) = text else {
+        return Ok(None);
+    };
+    named(text).map(Some).ok_or_else(|| {
+        Problem::bad_request("invalid-parameter", format!("`{field}` must be {known}."))
+            .at(field)
+            .fix(format!(
+                "Give {known}, or leave it out if the file says it."
+            ))
+    })
+}
+
+/// 400: the parameter `state` names none of the `known` states.
+pub fn unknown_state(name: &str, known: &[&str]) -> Problem {
+    Problem::bad_request(
+        "invalid-parameter",
+        format!("There is no state `{}`.", shorten(name)),
+    )
+    .at("state")
+    .fix(format!("Give one of {}.", known.join(", ")))
+}
+
+/// 400 for an unknown name, with the most similar known one.
+pub fn unknown(what: &str, name: &str, known: &[&str]) -> Problem {
+    let fix = match nearest(name, known.iter().copied()) {
+        Some(near) => format!("Did you mean `{near}`?"),
+        None if known.is_empty() => format!("Leave it out: this path takes no {what}."),
+        None => format!("This path takes {}.", known.join(", ")),
+    };
+    Problem::bad_request(
+        "unknown-parameter",
+        format!("There is no {what} `{}`.", shorten(name)),
+    )
+    .at(shorten(name))
+    .fix(fix)
+}
+
+/// The media type of a request's body, in lower case, without parameters.
+pub fn media_type(headers: &HeaderMap) -> Option<String> {
+    let value = headers.get(header::CONTENT_TYPE)?.to_str().unwrap_or("?");
+    let essence = value.split(';').next().unwrap_or_default();
+    Some(essence.trim().to_ascii_lowercase())
+}
+
+/// Refuses a body that is compressed for the transfer: the limit on its size would not limit what
+/// it decompresses to.
+pub fn refuse_content_encoding(headers: &HeaderMap) -> Answer<()> {
+    match headers.get(header::CONTENT_ENCODING) {
+        Some(encoding) if encoding != "identity" => Err(body::unsupported_encoding()),
+        _ => Ok(()),
+    }
+}
+
+/// The bytes of a JSON body, not parsed yet.
+///
+/// # Errors
+/// 400 broken off, 408 too slow, 413 too large, 415 of another type or encoding.
+pub async fn json_bytes(request: Request) -> Answer<Bytes> {
+    bytes_of(request, &["application/json"]).await
+}
+
+/// The bytes of a body of one of these types, the first of which is recommended.
+///
+/// # Errors
+/// As [`json_bytes`].
+pub async fn bytes_of(request: Request, types: &[&str]) -> Answer<Bytes> {
+    refuse_content_encoding(request.headers())?;
+    match media_type(request.headers()).as_deref() {
+        None => {}
+        Some(known) if types.contains(&known) => {}
+        Some(other) => return Err(body::unsupported_type(other, types[0])),
+    }
+    let limits = BodyLimits::of(&request)?;
+    let mut pieces = request.into_body().into_data_stream();
+    let (mut bytes, mut charged) = (Vec::new(), UNCHARGED);
+    while let Some(piece) = pieces.next().await {
+        let piece = piece.map_err(|error| body::interrupted(&error, limits.size))?;
+        while bytes.len() + piece.len() > charged {
+            // A vector that grows has up to twice as much.
+            charge(2 * CHARGED_AT_ONCE as u64).await?;
+            charged += CHARGED_AT_ONCE;
+        }
+        bytes.extend_from_slice(&piece);
+    }
+    Ok(bytes.into())
+}
+
+/// Bytes of a body in memory that are not charged, and that are charged at once beyond these.
+const UNCHARGED: usize = 8 << 10;
+const CHARGED_AT_ONCE: usize = 64 << 10;
+
+/// Memory for a byte of JSON that is parsed: `[0,0]` takes a value and its place for two.
+const PARSED_MEMORY: u64 = 40;
+
+/// Charges for the value that JSON of that length becomes.
+///
+/// # Errors
+/// 503 if there is no memory for it.
+pub async fn charge_parsed(bytes: &[u8]) -> Answer<()> {
+    match bytes.len() <= UNCHARGED {
+        true => Ok(()),
+        false => charge(PARSED_MEMORY * bytes.len() as u64).await,
+    }
+}
+
+/// The JSON object in a request's body.
+///
+/// # Errors
+/// As [`json_bytes`], and 400 if the body is not one JSON object.
+pub async fn json_object(request: Request) -> Answer<Map<String, Value>> {
+    object(&json_bytes(request).await?).await
+}
+
+/// The JSON merge patch (RFC 7396) in a request's body.
+///
+/// # Errors
+/// As [`json_object`].
+pub async fn merge_patch(request: Request) -> Answer<Map<String, Value>> {
+    let types = ["application/merge-patch+json", "application/json"];
+    object(&bytes_of(request, &types).await?).await
+}
+
+async fn object(bytes: &[u8]) -> Answer<Map<String, Value>> {
+    charge_parsed(bytes).await?;
+    match serde_json::from_slice(bytes) {
+        Ok(Value::Object(object)) => Ok(object),
+        Ok(_) => Err(body::malformed_json("it is another JSON value")),
+        Err(error) => Err(body::malformed_json(&error.to_string())),
+    }
+}
+
+/// A string in a JSON object.
+///
+/// # Errors
+/// 422 if it is another value.
+pub fn text<'a>(object: &'a Map<String, Value>, name: &str) -> Answer<Option<&'a str>> {
+    match object.get(name) {
+        None => Ok(None),
+        Some(Value::String(text)) => Ok(Some(text)),
+        Some(_) => Err(
+            Problem::invalid_field(name, format!("`{name}` must be a string."))
+                .fix("Give a JSON string."),
+        ),
+    }
+}

@@ -1,0 +1,154 @@
+//! `/v1/segmentations`: models fitted to volumes, and the request that uploads a volume and fits
+//! a model to it.
+
+use super::app::App;
+use super::caller::Caller;
+use super::files;
+use super::jobs::filing::{self, UploadJob};
+use super::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
+use super::problem::Answer;
+use super::products::{Offer, ProductCollection, body_of_product, object_paths};
+use super::wire::path_of;
+use axum::extract::{RawQuery, Request, State};
+use serde::Serialize;
+use utoipa::ToSchema;
+use ventriform_service::jobs::{Product, Resource};
+
+const MASK: &str = "mask.nii.gz";
+
+/// The collection of segmentations.
+pub struct Segmentations;
+
+impl ProductCollection for Segmentations {
+    const RESOURCE: Resource = Resource::Segmentation;
+    type Body = SegmentationBody;
+    const MESHES: &'static [&'static str] = &["mesh", "mesh_anatomical", "mesh_apparent"];
+    const FILES: &'static [&'static str] = &[
+        MASK,
+        "mask_anatomical.nii.gz",
+        "mask_apparent.nii.gz",
+        "labels.nii.gz",
+        "labels.seg.nrrd",
+        "report.json",
+        files::PAGE,
+        "slices.png",
+        "region.nii.gz",
+        "polar.json",
+        "polar.svg",
+        "polar.png",
+    ];
+    const FILE_SCHEMA: &'static str = "SegmentationFileName";
+    const FILE_HELP: &'static str = "`mask.nii.gz`, `labels.nii.gz` and `labels.seg.nrrd` (wall 1, cavity 2, with names and colours; the second for 3D Slicer), the mesh in each format, `report.json`, \
+        `report.html` (made on request; it names patient, study and series as far as the key may \
+        see them), `slices.png` (three slices with the contour of the \
+        fit) and `region.nii.gz` (the scan about the organ, in 256 steps); for a left ventricle also `polar.json`, `polar.svg` and `polar.png`, and mask and \
+        meshes of the wall that `edge` does not ask for: `mask_anatomical.nii.gz` and \
+        `mesh_anatomical.*`, or `mask_apparent.nii.gz` and `mesh_apparent.*`. The `.dcm` files are \
+        DICOM objects of the scan's patient and study, made on request; they need the scope \
+        `submit`, or `deidentify=true`.";
+    type FileAnswer = openapi::SegmentationFileAnswer;
+}
+
+body_of_product!(
+    /// A segmentation: a model fitted to a volume, with its main figures and its reliability.
+    SegmentationBody,
+    Segmentation,
+    SegmentationLinks,
+    openapi::SegmentationParametersObject,
+    openapi::SegmentationSummarySchema,
+    "The chosen model and the merit of every candidate, why the fit stopped, its confidence, \
+     volumes, agreement with the expert's mask, and warnings; the report has all figures.",
+    "seg_2c26b46b68ffc68ff99b453c1d304134"
+);
+
+/// Paths of one segmentation.
+#[derive(Serialize, ToSchema)]
+struct SegmentationLinks {
+    /// This segmentation.
+    #[serde(rename = "self")]
+    itself: String,
+    /// The mask on the volume's grid.
+    mask: String,
+    /// The fitted mesh, in the format that `Accept` asks for.
+    mesh: String,
+    /// The report.
+    report: String,
+    /// The report as an HTML page.
+    page: String,
+    /// The polar map; left ventricles only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    polar: Option<String>,
+    /// DICOM objects of the scan's patient and study, for the archive.
+    dicom: Vec<String>,
+    /// The volume.
+    volume: String,
+}
+
+impl SegmentationLinks {
+    fn of(segmentation: &Product) -> Self {
+        let itself = path_of(&segmentation.id);
+        let polar = segmentation.file("polar.svg");
+        Self {
+            mask: format!("{itself}/{MASK}"),
+            mesh: format!("{itself}/mesh"),
+            report: format!("{itself}/report"),
+            page: format!("{itself}/{}", files::PAGE),
+            polar: polar.map(|file| format!("{itself}/{}", file.name)),
+            dicom: object_paths(segmentation),
+            volume: path_of(segmentation.volume.as_deref().unwrap_or_default()),
+            itself,
+        }
+    }
+}
+
+/// What a client that waits for a segmentation may ask for: the mask, the mesh or the report.
+fn offers() -> Vec<Offer> {
+    let masks = [
+        "application/gzip",
+        "application/nifti",
+        "application/x-nifti",
+    ];
+    let meshes = Offer::meshes().into_iter();
+    masks
+        .map(|media_type| Offer::new(media_type, MASK))
+        .into_iter()
+        .chain(meshes.filter(|offer| offer.file != "mesh.json"))
+        .chain([Offer::new("application/json", "report.json")])
+        .collect()
+}
+
+/// Segment a volume
+///
+/// The body is the volume, or a form with the file `volume` and optionally the file `expert`, an
+/// expert's mask to measure against. The service stores them, files a job, and answers 202 with
+/// the job. With `Prefer: wait=60` it waits up to 60 seconds for the job to end and answers 200
+/// with what `Accept` asks for: the mask on the volume's grid, the fitted mesh, or the report
+/// (`application/json`). Every parameter is a query parameter; `model` names the model to fit,
+/// and `auto` chooses the best one of the library.
+#[utoipa::path(post, path = "/v1/segmentations", tag = "segmentations",
+    request_body(content(
+        (Vec<u8> = "application/octet-stream"),
+        (Vec<u8> = "application/gzip"),
+        (Vec<u8> = "application/zip"),
+        (Vec<u8> = "application/dicom"),
+        (Vec<u8> = "application/nifti"),
+        (openapi::SegmentationForm = "multipart/form-data"),
+        (Vec<u8> = "multipart/related"),
+    )),
+    params(openapi::SegmentationQuery, openapi::TagParameters, openapi::PriorityParameter,
+        openapi::IdempotencyHeader,
+        openapi::PreferHeader, openapi::WebhookInputs),
+    responses(openapi::SegmentationAnswer, WaitAnswers, FileProblems, UploadProblems))]
+pub async fn create_segmentation(
+    State(app): State<App>,
+    caller: Caller,
+    RawQuery(query): RawQuery,
+    request: Request,
+) -> Answer {
+    let job = UploadJob {
+        makes: Resource::Segmentation,
+        apart: &["expert"],
+        offers: offers(),
+    };
+    filing::file_upload(&app, &caller, job, query.as_deref(), request).await
+}

@@ -1,0 +1,210 @@
+//! A tenant's own names for volumes and jobs: `external_id` and labels, given with a request,
+//! changed by a JSON merge patch (RFC 7396), and searched by.
+//!
+//! In a query string or a form: `external_id=A1` and `labels=study:42`, the latter repeated. In
+//! JSON: `"external_id": "A1"` and `"labels": {"study": "42"}`.
+
+use super::app::App;
+use super::problem::{Answer, Problem, shorten};
+use super::request::{merge_patch, unknown};
+use axum::extract::Request;
+use serde_json::{Map, Value};
+use std::collections::BTreeMap;
+use ventriform::text::is_printable;
+use ventriform_service::jobs::{TagFilter, Tags, Tenant};
+
+/// Longest external id, characters.
+pub const EXTERNAL_ID_LENGTH: usize = 128;
+/// Longest name of a label, characters.
+pub const LABEL_NAME_LENGTH: usize = 64;
+/// Longest value of a label, characters.
+pub const LABEL_VALUE_LENGTH: usize = 256;
+
+/// What this module reads: parameters of a query string or form, fields of a JSON object. (`label`
+/// is a parameter of models: the label of an object in a label map.)
+pub const FIELDS: [&str; 2] = ["external_id", "labels"];
+
+/// Pairs of name and value.
+type Pairs = Vec<(String, String)>;
+
+/// Takes the tags out of the pairs of a query string or form.
+///
+/// # Errors
+/// 422 if they are malformed, given twice or too many.
+pub fn take(app: &App, pairs: Pairs) -> Answer<(Tags, Pairs)> {
+    let (own, others): (Pairs, Pairs) = pairs
+        .into_iter()
+        .partition(|(name, _)| FIELDS.contains(&name.as_str()));
+    let mut tags = Tags::default();
+    for (name, value) in own {
+        if name == "external_id" {
+            if tags.external_id.replace(external_id(&value)?).is_some() {
+                return Err(twice("external_id"));
+            }
+            continue;
+        }
+        let (name, value) = label(&value)?;
+        if tags.labels.insert(name, value).is_some() {
+            return Err(twice("labels"));
+        }
+    }
+    limit_labels(app, &tags.labels)?;
+    Ok((tags, others))
+}
+
+/// Takes a filter out of the pairs of a query string.
+///
+/// # Errors
+/// 400 where [`take`] has 422.
+pub fn take_filter(app: &App, pairs: Pairs) -> Answer<(TagFilter, Pairs)> {
+    let (tags, others) = take(app, pairs).map_err(Problem::of_search)?;
+    let filter = TagFilter {
+        external_id: tags.external_id,
+        labels: tags.labels,
+    };
+    Ok((filter, others))
+}
+
+/// The tags of a JSON object that may have other fields.
+///
+/// # Errors
+/// 422 if they are malformed or too many.
+pub fn of_object(app: &App, object: &Map<String, Value>) -> Answer<Tags> {
+    let fields = object
+        .iter()
+        .filter(|(name, _)| FIELDS.contains(&name.as_str()));
+    let mut tags = Tags::default();
+    for (name, value) in fields {
+        merge_field(&mut tags, name, value)?;
+    }
+    limit_labels(app, &tags.labels)?;
+    Ok(tags)
+}
+
+/// Applies the JSON merge patch of a request to the tags of a tenant's item or job.
+///
+/// # Errors
+/// Those of [`merge_patch`] and [`merged`], 503 or 507 if the storage fails.
+pub async fn change(
+    app: &App,
+    tenant: &Tenant,
+    id: &str,
+    tags: Tags,
+    request: Request,
+) -> Answer<()> {
+    let tags = merged(app, tags, &merge_patch(request).await?)?;
+    app.queue.catalogue.set_tags(tenant, id, &tags).await?;
+    Ok(())
+}
+
+/// The tags after a JSON merge patch: what is `null` goes, what is absent stays.
+///
+/// # Errors
+/// 400 for a field that is not a tag, 422 for one that is malformed.
+fn merged(app: &App, mut tags: Tags, patch: &Map<String, Value>) -> Answer<Tags> {
+    for (name, value) in patch {
+        if !FIELDS.contains(&name.as_str()) {
+            return Err(unknown("field", name, &FIELDS));
+        }
+        merge_field(&mut tags, name, value)?;
+    }
+    limit_labels(app, &tags.labels)?;
+    Ok(tags)
+}
+
+fn merge_field(tags: &mut Tags, name: &str, value: &Value) -> Answer<()> {
+    match (name, value) {
+        ("external_id", Value::Null) => tags.external_id = None,
+        ("external_id", Value::String(text)) => tags.external_id = Some(external_id(text)?),
+        ("labels", Value::Null) => tags.labels.clear(),
+        ("labels", Value::Object(labels)) => {
+            for (name, value) in labels {
+                let name = label_name(name)?;
+                match value {
+                    Value::Null => tags.labels.remove(&name),
+                    Value::String(text) => tags.labels.insert(name, label_value(text)?),
+                    _ => return Err(not_text("labels", "The value of a label")),
+                };
+            }
+        }
+        ("labels", _) => {
+            return Err(
+                Problem::invalid_field("labels", "`labels` must be a JSON object.")
+                    .fix("Give an object such as {\"study\": \"42\"}."),
+            );
+        }
+        _ => return Err(not_text("external_id", "`external_id`")),
+    }
+    Ok(())
+}
+
+fn not_text(field: &str, what: &str) -> Problem {
+    Problem::invalid_field(field, format!("{what} must be a string.")).fix("Give a JSON string.")
+}
+
+fn twice(name: &str) -> Problem {
+    Problem::bad_request(
+        "repeated-parameter",
+        format!("`{name}` is given more than once."),
+    )
+    .at(name)
+    .fix("Give each name only once.")
+}
+
+fn external_id(text: &str) -> Answer<String> {
+    printable("external_id", "`external_id`", text, EXTERNAL_ID_LENGTH)
+}
+
+/// `name:value`
+fn label(text: &str) -> Answer<(String, String)> {
+    let Some((name, value)) = text.split_once(':') else {
+        return Err(Problem::invalid_field(
+            "labels",
+            format!("`{}` is not a label.", shorten(text)),
+        )
+        .fix("Give name and value with a colon between them, such as study:42."));
+    };
+    Ok((label_name(name)?, label_value(value)?))
+}
+
+fn label_name(text: &str) -> Answer<String> {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || "_-./".contains(c);
+    match (1..=LABEL_NAME_LENGTH).contains(&text.len()) && text.chars().all(allowed) {
+        true => Ok(text.to_owned()),
+        false => Err(Problem::invalid_field(
+            "labels",
+            format!("`{}` is not the name of a label.", shorten(text)),
+        )
+        .fix(format!(
+            "Give 1 to {LABEL_NAME_LENGTH} characters of A-Z, a-z, 0-9, `_`, `-`, `.` and `/`."
+        ))),
+    }
+}
+
+fn label_value(text: &str) -> Answer<String> {
+    printable("labels", "The value of a label", text, LABEL_VALUE_LENGTH)
+}
+
+fn printable(field: &str, what: &str, text: &str, longest: usize) -> Answer<String> {
+    let length = text.chars().count();
+    match (1..=longest).contains(&length) && text.chars().all(is_printable) {
+        true => Ok(text.to_owned()),
+        false => Err(Problem::invalid_field(
+            field,
+            format!("{what} must have 1 to {longest} printable characters."),
+        )
+        .fix("Give a shorter text without control characters.")),
+    }
+}
+
+fn limit_labels(app: &App, labels: &BTreeMap<String, String>) -> Answer<()> {
+    let limit = app.settings.label_limit;
+    match labels.len() <= limit {
+        true => Ok(()),
+        false => Err(Problem::invalid_field(
+            "labels",
+            format!("There are more than {limit} labels."),
+        )
+        .fix("Give fewer labels, or ask the operator to raise `label_limit`.")),
+    }
+}

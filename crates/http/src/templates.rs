@@ -1,0 +1,283 @@
+//! `/v1/templates`: models that jobs name, and those that `model=auto` fits beside the built-in hearts.
+
+use super::app::App;
+use super::caller::Caller;
+use super::collection::find;
+use super::decoding::LITTLE_MEMORY;
+use super::openapi::{self, LookupProblems, UploadProblems};
+use super::problem::not_found::field_names_nothing;
+use super::problem::{Answer, Problem, ProblemBody};
+use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody, refuse_when_full};
+use super::request::{
+    PathSegments, bytes_of, merge_patch, query_pairs, refuse_unknown, unknown, word,
+};
+use super::upload::media_types::MESH_TYPES;
+use super::wire::{added, path_of, rfc3339};
+use axum::Json;
+use axum::body::Bytes;
+use axum::extract::{RawQuery, Request, State};
+use futures::TryStreamExt;
+use serde::Serialize;
+use serde_json::{Map, Value};
+use utoipa::ToSchema;
+use ventriform::mesh_files::{MeshFrame, MeshStatement, MeshUnit};
+use ventriform::progress::Monitor;
+use ventriform_service::config::Size;
+use ventriform_service::jobs::{ProductRoom, Resource, TemplateSource, Tenant, check_name};
+use ventriform_service::work::TEMPLATE_BYTES;
+
+/// Largest mesh.
+pub const MESH_SIZE: Size = Size(TEMPLATE_BYTES);
+
+/// Memory for a byte of a mesh: numbers as text, parsed, and as files of several formats.
+const MEMORY_PER_BYTE: u64 = 16;
+
+/// The collection of templates.
+pub struct Templates;
+
+impl ProductCollection for Templates {
+    const RESOURCE: Resource = Resource::Template;
+    const SCANNED: bool = false;
+    type Body = TemplateBody;
+    const FILES: &'static [&'static str] = &[];
+    const FILE_SCHEMA: &'static str = "TemplateFileName";
+    const FILE_HELP: &'static str = "The mesh in each format.";
+    type FileAnswer = openapi::MeshAnswer;
+}
+
+/// A template: a model that jobs name, or that every `model=auto` fits.
+#[derive(Serialize, ToSchema)]
+#[schema(as = Template)]
+pub struct TemplateBody {
+    /// Derived from tenant, organ and mesh, so it is the same on every machine.
+    #[schema(example = "tpl_2c26b46b68ffc68ff99b453c1d304134")]
+    id: String,
+    /// When it was added (RFC 3339).
+    #[schema(format = DateTime)]
+    created_at: String,
+    /// Its name.
+    name: String,
+    /// The organ it shows.
+    #[schema(example = "left_ventricle")]
+    organ: String,
+    /// Whether every `model=auto` fits it. Otherwise only jobs that name it do.
+    library: bool,
+    /// Counts and main figures.
+    #[schema(value_type = openapi::TemplateSummarySchema)]
+    summary: Map<String, Value>,
+    /// The program that added it.
+    software: SoftwareBody,
+    /// Its files.
+    files: Vec<DownloadBody>,
+    /// Related paths.
+    links: TemplateLinks,
+}
+
+/// Paths of one template.
+#[derive(Serialize, ToSchema)]
+struct TemplateLinks {
+    /// This template.
+    #[serde(rename = "self")]
+    itself: String,
+    /// Its mesh, in the format that `Accept` asks for.
+    mesh: String,
+}
+
+impl From<Presented> for TemplateBody {
+    fn from(presented: Presented) -> Self {
+        let product = presented.product;
+        let itself = path_of(&product.id);
+        let text = |key: &str| {
+            let value = product.parameters.get(key).and_then(Value::as_str);
+            value.unwrap_or_default().to_owned()
+        };
+        Self {
+            created_at: rfc3339(product.created_at),
+            name: text("name"),
+            organ: text("organ"),
+            library: presented.library,
+            files: DownloadBody::all(&product),
+            software: SoftwareBody::of(&product),
+            links: TemplateLinks {
+                mesh: format!("{itself}/mesh"),
+                itself,
+            },
+            id: product.id,
+            summary: product.summary,
+        }
+    }
+}
+
+/// Add a template
+///
+/// The body is a closed mesh: JSON (`mesh.json` of a model, or a file written by `ventriform templates
+/// build`), STL, PLY, OBJ, VTK or VTP PolyData, GLB or glTF, told by its content; `mesh_unit` and `mesh_frame`
+/// state what the file does not. Or `model` names a stored model or segmentation whose mesh is copied. The same mesh
+/// for the same organ is added only once. `model=auto` fits it beside the built-in hearts where a job
+/// names it (`model=auto,tpl_...`), and in every job with `library=true`. Retention never erases
+/// templates.
+#[utoipa::path(post, path = "/v1/templates", tag = "templates",
+    request_body(content = openapi::MeshDocument, content_type = "application/json"),
+    params(openapi::TemplateQuery),
+    responses(
+        (status = 201, description = "Added", body = TemplateBody,
+            headers(("Location" = String, description = "The template's path"))),
+        (status = 200, description = "Already in the library", body = TemplateBody,
+            headers(("Location" = String, description = "The template's path"))),
+        (status = 409, description = "The library is full",
+            body = ProblemBody, content_type = "application/problem+json"),
+        UploadProblems,
+    ))]
+pub async fn create_template(
+    State(app): State<App>,
+    caller: Caller,
+    RawQuery(query): RawQuery,
+    request: Request,
+) -> Answer {
+    let pairs = query_pairs(query.as_deref());
+    let known = ["name", "organ", "model", "mesh_unit", "mesh_frame", LIBRARY];
+    refuse_unknown(&pairs, &known)?;
+    let value = |name: &str| {
+        let found = pairs.iter().find(|(n, _)| n == name);
+        found.map(|(_, value)| value.as_str())
+    };
+    let organ = value("organ").unwrap_or("left_ventricle").to_owned();
+    let name = value("name").or(value("model")).unwrap_or("template");
+    check_name(name)?;
+    let library = match value(LIBRARY) {
+        None => None,
+        Some("true") => Some(true),
+        Some("false") => Some(false),
+        Some(_) => return Err(not_a_flag()),
+    };
+    let stated = MeshStatement {
+        unit: word(
+            value("mesh_unit"),
+            "mesh_unit",
+            MeshUnit::named,
+            "mm, cm or m",
+        )?,
+        frame: word(
+            value("mesh_frame"),
+            "mesh_frame",
+            MeshFrame::named,
+            "lps or ras",
+        )?,
+    };
+    let tenant = &caller.tenant;
+    let room = ProductRoom {
+        count: app.settings.template_limit,
+        bytes: caller.quota.bytes,
+    };
+    refuse_when_full::<Templates>(&app, tenant, room.count, "template_limit").await?;
+    let body = bytes_of(request, &MESH_TYPES).await?;
+    let (mesh, volume) = given_mesh(&app, tenant, value("model"), body).await?;
+    let reader = app.engine.reader.clone();
+    let shows = organ.clone();
+    let memory = LITTLE_MEMORY + MEMORY_PER_BYTE * mesh.len() as u64;
+    let make = move |_: &Monitor<'_>| reader.template(&mesh, &shows, &stated);
+    let output = app.decoding.run(memory, make).await??;
+    let source = TemplateSource {
+        tenant,
+        name,
+        volume: volume.as_deref(),
+        library,
+    };
+    let added_template = app.queue.add_template(source, &organ, output, room);
+    let (template, new) = added_template.await?;
+    let body = TemplateBody::from(Presented::of(&app, template));
+    Ok(added(new, &body.id, &body))
+}
+
+/// Change a template's setting
+///
+/// A JSON merge patch (RFC 7396) of `library`: whether every `model=auto` fits it, beside the built-in
+/// hearts; `null` stands for false.
+#[utoipa::path(patch, path = "/v1/templates/{id}", tag = "templates",
+    operation_id = "update_template",
+    params(("id" = String, Path, description = "The template's id")),
+    request_body(content(
+        (openapi::TemplatePatch = "application/merge-patch+json"),
+        (openapi::TemplatePatch = "application/json"))),
+    responses((status = 200, description = "The template", body = TemplateBody),
+        openapi::PatchProblems, LookupProblems))]
+pub async fn update_template(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(id): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    request: Request,
+) -> Answer<Json<TemplateBody>> {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let tenant = &caller.tenant;
+    find::<Templates>(&app, tenant, &id).await?;
+    for (field, value) in &merge_patch(request).await? {
+        let library = match (field.as_str(), value) {
+            (LIBRARY, Value::Bool(library)) => *library,
+            (LIBRARY, Value::Null) => false,
+            (LIBRARY, _) => return Err(not_a_flag()),
+            (other, _) => return Err(unknown("field", other, &[LIBRARY])),
+        };
+        app.queue
+            .catalogue
+            .set_library(tenant, &id, library)
+            .await?;
+    }
+    let template = find::<Templates>(&app, tenant, &id).await?;
+    Ok(Json(Presented::of(&app, template).into()))
+}
+
+/// The setting that [`TemplateBody`] shows.
+const LIBRARY: &str = "library";
+
+fn not_a_flag() -> Problem {
+    Problem::invalid_field(LIBRARY, "`library` must be true or false.")
+        .fix("Give true if every `model=auto` is to fit the template.")
+}
+
+/// The mesh to be added: the body, or that of the stored `model`, with the id of its volume.
+async fn given_mesh(
+    app: &App,
+    tenant: &Tenant,
+    model: Option<&str>,
+    body: Bytes,
+) -> Answer<(Bytes, Option<String>)> {
+    match model {
+        None => Ok((body, None)),
+        Some(id) if body.is_empty() => stored_mesh(app, tenant, id).await,
+        Some(_) => Err(Problem::bad_request(
+            "contradiction",
+            "The request has both a body and `model`.",
+        )
+        .at("model")
+        .fix("Send a mesh or name a model, not both.")),
+    }
+}
+
+/// The JSON mesh of a stored model or segmentation, with the id of its volume.
+async fn stored_mesh(app: &App, tenant: &Tenant, id: &str) -> Answer<(Bytes, Option<String>)> {
+    let catalogue = &*app.queue.catalogue;
+    let product = match Resource::of(id) {
+        Some(Resource::Model | Resource::Segmentation) => catalogue.product(tenant, id).await?,
+        _ => None,
+    };
+    let Some(product) = product else {
+        return Err(field_names_nothing(catalogue, tenant, "model", id).await?);
+    };
+    match product.file("mesh.json") {
+        Some(file) if file.bytes <= MESH_SIZE.0 => {
+            let pieces = app
+                .queue
+                .blobs
+                .read(id, &file.record(), 0..file.bytes)
+                .await?;
+            let pieces: Vec<Bytes> = pieces.try_collect().await?;
+            Ok((pieces.concat().into(), product.volume.clone()))
+        }
+        _ => Err(Problem::invalid_field(
+            "model",
+            "The mesh of this model is too large to be fitted.",
+        )
+        .fix("Name a model of at most 5000 points.")),
+    }
+}

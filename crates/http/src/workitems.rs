@@ -1,0 +1,558 @@
+//! `/dicom-web/workitems`: Unified Procedure Steps over HTTP (UPS-RS, DICOM PS3.18 section 11), as
+//! the IHE profile AI Workflow for Imaging (AIW-I) uses them.
+//!
+//! Bodies are DICOM JSON: an array with one data set, or the data set alone. The Transaction UID of a
+//! claimed item is taken from the query (`transaction-uid`, `transaction`), from the header
+//! `Transaction-UID`, or from the body (0008,1195); clients differ. No answer shows it.
+
+use super::app::App;
+use super::caller::Caller;
+use super::guard::Counting;
+use super::memory::charge;
+use super::openapi::{self, LookupProblems};
+use super::problem::{Answer, Problem, ProblemBody, body, shorten};
+use super::request::{PathSegments, bytes_of, charge_parsed, query_pairs, refuse_unknown};
+use crate::public_base::public_path;
+use axum::Json;
+use axum::extract::{RawQuery, Request, State};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{AppendHeaders, IntoResponse};
+use serde_json::{Map, Value};
+use std::time::{Duration, Instant};
+use ventriform::export::dicom::is_uid;
+use ventriform::progress::{Monitor, Stage};
+use ventriform_service::jobs::{Timestamp, random_id, rfc3339};
+use ventriform_service::worklist::{
+    AddedWorkitem, Change, DataSetJson, Matching, Refusal, Workitem, WorkitemState,
+};
+
+const MEDIA_TYPE: &str = "application/dicom+json";
+
+/// Media types of DICOM JSON.
+const TYPES: [&str; 2] = [MEDIA_TYPE, "application/json"];
+
+const TRANSACTION: &str = "00081195";
+const STATE: &str = "00741000";
+const SOP_INSTANCE: &str = "00080018";
+
+/// Names under which clients send the Transaction UID in the query.
+const TRANSACTION_NAMES: [&str; 2] = ["transaction-uid", "transaction"];
+
+/// Most items of a tenant.
+const MOST: u64 = 100_000;
+
+/// Items of a page, unless the client asks for fewer, and at most.
+const PAGE: (usize, usize) = (100, 1000);
+
+/// Items read from the table at a time.
+const BATCH: u32 = 200;
+
+/// Bytes of a page of items, unless one alone has more.
+const ANSWER_BYTES: usize = 2 << 20;
+
+/// Memory of a search: a batch of items, parsed, and the answer.
+const SEARCH_MEMORY: u64 = 20 << 20;
+
+/// Longest search.
+const LONGEST_SEARCH: Duration = Duration::from_secs(10);
+
+/// How often a change is tried again that another one came before.
+const TRIES: usize = 20;
+
+/// Create a work item
+///
+/// A scheduled Unified Procedure Step. Its UID is given in the query, in the body (0008,0018), or
+/// made by the service. Absent attributes that a schedule needs get neutral values, which a
+/// `Warning` says.
+#[utoipa::path(post, path = "/dicom-web/workitems", tag = "workitems",
+    operation_id = "create_workitem",
+    params(("workitem" = Option<String>, Query, description = "SOP Instance UID of the item")),
+    request_body(content = openapi::WorkitemBody, content_type = "application/dicom+json"),
+    responses(
+        (status = 201, description = "Created",
+            headers(("Location" = String, description = "The item's path"))),
+        (status = 409, description = "There is an item of this UID",
+            body = ProblemBody, content_type = "application/problem+json"),
+        openapi::WorkitemProblems))]
+pub async fn create_workitem(
+    State(app): State<App>,
+    caller: Caller,
+    RawQuery(query): RawQuery,
+    request: Request,
+) -> Answer {
+    let pairs = query_pairs(query.as_deref());
+    // PS3.18 writes `?workitem=UID`; many clients write `?UID`.
+    let named = match &pairs[..] {
+        [(uid, value)] if value.is_empty() && is_uid(uid) => Some(uid.clone()),
+        _ => {
+            refuse_unknown(&pairs, &["workitem"])?;
+            pairs.into_iter().next().map(|(_, uid)| uid)
+        }
+    };
+    let counting = Counting::of(&request);
+    let attributes = data_set(request).await?;
+    let named = named.or_else(|| attributes.text(SOP_INSTANCE).map(str::to_owned));
+    let uid = named.unwrap_or_else(new_uid);
+    require_uid("workitem", &uid)?;
+    let size = text_of(&attributes)?.len() as u64;
+    counting.arrived(size).await?;
+    let moment = now(&app);
+    let made = Workitem::create(&caller.tenant, &uid, attributes, (moment.0, &moment.1));
+    let (item, completed) = made.map_err(refused)?;
+    match app.worklist.add_workitem(&item, MOST).await? {
+        AddedWorkitem::Done => {}
+        AddedWorkitem::Exists => {
+            return Err(Problem::new(
+                StatusCode::CONFLICT,
+                "workitem-exists",
+                "There is a work item of this UID.",
+            )
+            .fix("Give another UID, or none: then the service makes one."));
+        }
+        AddedWorkitem::Full => {
+            return Err(Problem::new(
+                StatusCode::INSUFFICIENT_STORAGE,
+                "too-many-workitems",
+                format!("There are {MOST} work items."),
+            )
+            .fix("Set `job_retention`, so that ended items are deleted."));
+        }
+    }
+    app.scheduled.notify_one();
+    let location = [(header::LOCATION, path(&uid))];
+    let warning = completed.then(|| {
+        let text = "The Workitem was created with modifications.";
+        (header::WARNING, warning(text))
+    });
+    Ok((StatusCode::CREATED, location, AppendHeaders(warning)).into_response())
+}
+
+/// Show a work item
+///
+/// Without its Transaction UID.
+#[utoipa::path(get, path = "/dicom-web/workitems/{uid}", tag = "workitems",
+    operation_id = "get_workitem",
+    params(("uid" = String, Path, description = "SOP Instance UID of the item")),
+    responses(
+        (status = 200, description = "The item", body = openapi::WorkitemBody,
+            content_type = "application/dicom+json"),
+        openapi::ScopeProblems, LookupProblems))]
+pub async fn get_workitem(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(uid): PathSegments<String>,
+    RawQuery(query): RawQuery,
+) -> Answer {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let item = find(&app, &caller, &uid).await?;
+    Ok(shown(StatusCode::OK, &[item.shown()]))
+}
+
+/// Search work items
+///
+/// Attributes are named by keyword or tag, with points between a sequence and what is in it:
+/// `ProcedureStepState=SCHEDULED`, `InputInformationSequence.StudyInstanceUID=1.2.3`. `*` and `?` are
+/// wildcards, `FIRST-LAST` is a range of dates. Items come with all their attributes, oldest first; a `Warning`
+/// says that there are more than one answer holds, to be asked for by `offset`.
+#[utoipa::path(get, path = "/dicom-web/workitems", tag = "workitems",
+    operation_id = "search_workitems",
+    params(
+        ("limit" = Option<usize>, Query, description = "Greatest number of items"),
+        ("offset" = Option<usize>, Query, description = "Number of matching items to skip"),
+        ("ProcedureStepState" = Option<String>, Query,
+            description = "Only items in this state; any other attribute can be given likewise")),
+    responses(
+        (status = 200, description = "The items", body = openapi::WorkitemBody,
+            content_type = "application/dicom+json"),
+        (status = 204, description = "No item matches"),
+        (status = 413, description = "The search takes too long",
+            body = ProblemBody, content_type = "application/problem+json"),
+        openapi::ScopeProblems, openapi::ListProblems))]
+pub async fn search_workitems(
+    State(app): State<App>,
+    caller: Caller,
+    RawQuery(query): RawQuery,
+) -> Answer {
+    let (mut limit, mut skip) = (PAGE.0, 0);
+    let mut matching = Matching::default();
+    for (name, value) in query_pairs(query.as_deref()) {
+        match name.as_str() {
+            "limit" => limit = number(&name, &value)?.min(PAGE.1),
+            "offset" => skip = number(&name, &value)?,
+            // All attributes are answered, and names are compared without regard to case.
+            "includefield" | "fuzzymatching" => {}
+            _ => matching.add(&name, &value).map_err(|error| {
+                Problem::bad_request("unknown-parameter", format!("{error}."))
+                    .at(&error.name)
+                    .fix("Name attributes by keyword or tag, such as ProcedureStepState.")
+            })?,
+        }
+    }
+    charge(SEARCH_MEMORY).await?;
+    let state = matching.wanted(STATE).and_then(WorkitemState::parse);
+    let late = Instant::now() + LONGEST_SEARCH;
+    let (mut found, mut count, mut after) = (String::new(), 0, 0);
+    let mut more = false;
+    'search: while count < limit {
+        if Instant::now() > late {
+            return Err(too_broad());
+        }
+        let page = app.worklist.workitems(&caller.tenant, state, after, BATCH);
+        let page = page.await?;
+        let Some(last) = page.last() else { break };
+        after = last.sequence;
+        for item in matched(&app, &matching, page).await? {
+            if skip > 0 {
+                skip -= 1;
+                continue;
+            }
+            if count == limit {
+                break 'search;
+            }
+            let item = serde_json::to_string(item.shown()).map_err(Problem::internal)?;
+            if count > 0 && found.len() + item.len() > ANSWER_BYTES {
+                more = true;
+                break 'search;
+            }
+            found.push(match count {
+                0 => '[',
+                _ => ',',
+            });
+            found.push_str(&item);
+            count += 1;
+        }
+    }
+    if count == 0 {
+        return Ok(StatusCode::NO_CONTENT.into_response());
+    }
+    found.push(']');
+    let headers = [
+        (header::CONTENT_TYPE, MEDIA_TYPE),
+        (header::CACHE_CONTROL, "no-store"),
+    ];
+    // PS3.18, 8.3.4.4.
+    let warning = more.then(|| {
+        let text = "The number of results exceeded the maximum supported by the server. \
+                    Additional results can be requested.";
+        (header::WARNING, warning(text))
+    });
+    Ok((StatusCode::OK, headers, AppendHeaders(warning), found).into_response())
+}
+
+/// The items that match. Wildcards may be compared with much text, so that takes turns with what is decoded.
+async fn matched(app: &App, matching: &Matching, items: Vec<Workitem>) -> Answer<Vec<Workitem>> {
+    let is_match = |item: &Workitem, matching: &Matching| matching.matches(item.shown());
+    if !matching.has_patterns() {
+        let matched = items.into_iter().filter(|item| is_match(item, matching));
+        return Ok(matched.collect());
+    }
+    let matching = matching.clone();
+    let search = move |monitor: &Monitor<'_>| {
+        let mut matched = Vec::new();
+        for item in items {
+            if monitor.report(Stage::Read, 0.0).is_err() {
+                break;
+            }
+            if is_match(&item, &matching) {
+                matched.push(item);
+            }
+        }
+        matched
+    };
+    app.decoding.run(1, search).await
+}
+
+/// 413: PS3.18, table 8.3.4-1.
+fn too_broad() -> Problem {
+    Problem::new(
+        StatusCode::PAYLOAD_TOO_LARGE,
+        "search-too-broad",
+        format!("The search has not ended within {} seconds.", LONGEST_SEARCH.as_secs()),
+    )
+    .fix("Name the state, as in ProcedureStepState=SCHEDULED, or ask for fewer items by `limit` and `offset`.")
+}
+
+/// Change a work item
+///
+/// The attributes of the body replace those of the item. A claimed item needs the Transaction UID
+/// of its claim.
+#[utoipa::path(post, path = "/dicom-web/workitems/{uid}", tag = "workitems",
+    operation_id = "update_workitem",
+    params(("uid" = String, Path, description = "SOP Instance UID of the item"),
+        openapi::TransactionParameters),
+    request_body(content = openapi::WorkitemBody, content_type = "application/dicom+json"),
+    responses((status = 200, description = "Changed"),
+        openapi::WorkitemProblems, openapi::WorkitemConflict, LookupProblems))]
+pub async fn update_workitem(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(uid): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+    request: Request,
+) -> Answer {
+    let counting = Counting::of(&request);
+    let (changes, stated) = claimed_data_set(query.as_deref(), &headers, request).await?;
+    counting.arrived(text_of(&changes)?.len() as u64).await?;
+    change(&app, &caller, &uid, |item, now| {
+        item.update(stated.as_deref(), changes.clone(), now)?;
+        Ok(Change::Done)
+    })
+    .await?;
+    // It may be ready now.
+    app.scheduled.notify_one();
+    Ok(StatusCode::OK.into_response())
+}
+
+/// Change the state of a work item
+///
+/// The body names the new state (0074,1000) and the Transaction UID (0008,1195). `IN PROGRESS` claims
+/// the item for the performer that made up this UID; `COMPLETED` and `CANCELED` end it.
+#[utoipa::path(put, path = "/dicom-web/workitems/{uid}/state", tag = "workitems",
+    operation_id = "change_workitem_state",
+    params(("uid" = String, Path, description = "SOP Instance UID of the item"),
+        openapi::TransactionParameters),
+    request_body(content = openapi::WorkitemBody, content_type = "application/dicom+json"),
+    responses((status = 200, description = "The item is in this state"),
+        openapi::WorkitemProblems, openapi::WorkitemConflict, LookupProblems))]
+pub async fn change_workitem_state(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(uid): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+    request: Request,
+) -> Answer {
+    let (wanted, stated) = claimed_data_set(query.as_deref(), &headers, request).await?;
+    if let Some(uid) = &stated {
+        require_uid("00081195", uid)?;
+    }
+    let state = wanted.text(STATE).and_then(WorkitemState::parse);
+    let state = state.ok_or_else(|| {
+        Problem::bad_request(
+            "invalid-field",
+            "Procedure Step State (0074,1000) is missing or unknown.",
+        )
+        .at(STATE)
+        .fix("Give IN PROGRESS, COMPLETED or CANCELED.")
+    })?;
+    let done = change(&app, &caller, &uid, |item, now| {
+        item.change_state(stated.as_deref(), state, now)
+    });
+    let already = done.await? == Change::Already;
+    let warning = already.then(|| {
+        let state = state.as_str();
+        let text = format!("The UPS is already in the requested state of {state}.");
+        (header::WARNING, warning(&text))
+    });
+    Ok((StatusCode::OK, AppendHeaders(warning)).into_response())
+}
+
+/// Ask to cancel a work item
+///
+/// A scheduled item is canceled at once. Of a claimed one, the request is noted in the Procedure Step
+/// Progress Information, where its performer sees it. The body may say why.
+#[utoipa::path(post, path = "/dicom-web/workitems/{uid}/cancelrequest", tag = "workitems",
+    operation_id = "cancel_workitem",
+    params(("uid" = String, Path, description = "SOP Instance UID of the item")),
+    request_body(content = Option<openapi::WorkitemBody>, content_type = "application/dicom+json"),
+    responses((status = 202, description = "Accepted"),
+        openapi::WorkitemProblems, openapi::WorkitemConflict, LookupProblems))]
+pub async fn cancel_workitem(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(uid): PathSegments<String>,
+    RawQuery(query): RawQuery,
+    request: Request,
+) -> Answer {
+    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let bytes = bytes_of(request, &TYPES).await?;
+    let details = match bytes.is_empty() {
+        true => DataSetJson::default(),
+        false => parse(&bytes).await?,
+    };
+    let done = change(&app, &caller, &uid, |item, now| {
+        item.request_cancel(&details, now)
+    });
+    let already = done.await? == Change::Already;
+    let warning = already.then(|| {
+        let text = "The UPS is already in the requested state of CANCELED.";
+        (header::WARNING, warning(text))
+    });
+    Ok((StatusCode::ACCEPTED, AppendHeaders(warning)).into_response())
+}
+
+/// Changes an item, again if another change came before.
+async fn change(
+    app: &App,
+    caller: &Caller,
+    uid: &str,
+    how: impl Fn(&mut Workitem, (Timestamp, &str)) -> Result<Change, Refusal>,
+) -> Answer<Change> {
+    for _ in 0..TRIES {
+        let mut item = find(app, caller, uid).await?;
+        let moment = now(app);
+        let before = text_of(&item.attributes)?.len();
+        let done = how(&mut item, (moment.0, &moment.1)).map_err(refused)?;
+        let size = text_of(&item.attributes)?.len();
+        let limit = app.settings.json_limit;
+        if size > before && size as u64 > limit.0 {
+            return Err(body::too_large(limit));
+        }
+        if done == Change::Already || app.worklist.change_workitem(&item).await? {
+            return Ok(done);
+        }
+    }
+    Err(Problem::internal("a work item changes all the time"))
+}
+
+/// An item's attributes as they are stored.
+fn text_of(attributes: &DataSetJson) -> Answer<String> {
+    serde_json::to_string(attributes.object()).map_err(Problem::internal)
+}
+
+async fn find(app: &App, caller: &Caller, uid: &str) -> Answer<Workitem> {
+    let item = app.worklist.workitem(&caller.tenant, uid).await?;
+    item.ok_or_else(|| {
+        Problem::new(
+            StatusCode::NOT_FOUND,
+            "not-found",
+            format!("There is no work item `{}`.", shorten(uid)),
+        )
+        .fix("Take a UID from the list at GET /dicom-web/workitems.")
+    })
+}
+
+/// The time, also as DICOM writes it.
+fn now(app: &App) -> (Timestamp, String) {
+    let now = app.queue.clock.now();
+    (now, dicom_time(now))
+}
+
+/// A moment as DICOM writes it (DT, UTC).
+pub fn dicom_time(moment: Timestamp) -> String {
+    let text = rfc3339(moment);
+    let digits = text.chars().take(19).filter(char::is_ascii_digit);
+    digits.collect::<String>() + "+0000"
+}
+
+/// A new UID: a UUID under 2.25 (PS3.5 B.2).
+pub fn new_uid() -> String {
+    let number = u128::from_str_radix(&random_id(""), 16).unwrap_or_default();
+    format!("2.25.{number}")
+}
+
+fn path(uid: &str) -> String {
+    public_path(&format!("/dicom-web/workitems/{uid}"))
+}
+
+fn require_uid(field: &str, uid: &str) -> Answer<()> {
+    match is_uid(uid) {
+        true => Ok(()),
+        false => Err(
+            Problem::bad_request("invalid-parameter", format!("`{field}` is not a UID."))
+                .at(field)
+                .fix("Give numbers separated by dots, at most 64 characters."),
+        ),
+    }
+}
+
+fn number(name: &str, text: &str) -> Answer<usize> {
+    text.parse().map_err(|_| {
+        Problem::bad_request("invalid-parameter", format!("`{name}` must be a number."))
+            .at(name)
+            .fix("Give a whole number.")
+    })
+}
+
+/// The Transaction UID of the query or of the header.
+fn transaction(query: Option<&str>, headers: &HeaderMap) -> Answer<Option<String>> {
+    let pairs = query_pairs(query);
+    if let [(uid, value)] = &pairs[..]
+        && value.is_empty()
+        && is_uid(uid)
+    {
+        return Ok(Some(uid.clone()));
+    }
+    refuse_unknown(&pairs, &TRANSACTION_NAMES)?;
+    let header = headers.get("transaction-uid");
+    let header = header
+        .and_then(|value| value.to_str().ok())
+        .map(str::to_owned);
+    Ok(pairs.into_iter().next().map(|(_, uid)| uid).or(header))
+}
+
+/// The data set of the body, and the Transaction UID wherever the client states it.
+async fn claimed_data_set(
+    query: Option<&str>,
+    headers: &HeaderMap,
+    request: Request,
+) -> Answer<(DataSetJson, Option<String>)> {
+    let stated = transaction(query, headers)?;
+    let body = data_set(request).await?;
+    let stated = stated.or_else(|| body.text(TRANSACTION).map(str::to_owned));
+    Ok((body, stated))
+}
+
+async fn data_set(request: Request) -> Answer<DataSetJson> {
+    parse(&bytes_of(request, &TYPES).await?).await
+}
+
+/// The data set in an array with one, or alone.
+async fn parse(bytes: &[u8]) -> Answer<DataSetJson> {
+    charge_parsed(bytes).await?;
+    let malformed = |reason: &str| body::malformed_json(reason);
+    let value = serde_json::from_slice(bytes).map_err(|error| malformed(&error.to_string()))?;
+    let object = match value {
+        Value::Object(object) => Some(object),
+        Value::Array(mut sets) if sets.len() == 1 => match sets.pop() {
+            Some(Value::Object(object)) => Some(object),
+            _ => None,
+        },
+        _ => None,
+    };
+    let object: Map<String, Value> =
+        object.ok_or_else(|| malformed("DICOM JSON is an array with one data set"))?;
+    DataSetJson::of(object).map_err(|error| {
+        Problem::bad_request("malformed-dicom-json", format!("{error}."))
+            .at(&error.tag)
+            .fix("Send DICOM JSON (PS3.18 annex F), such as [{\"00741000\": {\"vr\": \"CS\", \"Value\": [\"SCHEDULED\"]}}].")
+    })
+}
+
+fn shown(status: StatusCode, sets: &[&Map<String, Value>]) -> axum::response::Response {
+    let headers = [
+        (header::CONTENT_TYPE, MEDIA_TYPE),
+        (header::CACHE_CONTROL, "no-store"),
+    ];
+    (status, headers, Json(sets)).into_response()
+}
+
+fn warning(text: &str) -> String {
+    format!("299 ventriform: {text}")
+}
+
+fn refused(refusal: Refusal) -> Problem {
+    let text = refusal.to_string();
+    let (problem, fix) = match &refusal {
+        Refusal::Attribute { tag, .. } => (
+            Problem::bad_request("invalid-field", format!("{text}.")).at(*tag),
+            "Correct the attribute.".to_owned(),
+        ),
+        Refusal::NoTransaction | Refusal::OtherTransaction => (
+            Problem::new(StatusCode::CONFLICT, "transaction-uid", &text).at("00081195"),
+            "Send the Transaction UID under which the item was claimed; whoever lost it cannot \
+             change the item."
+                .into(),
+        ),
+        Refusal::State { state } => (
+            Problem::new(StatusCode::CONFLICT, "workitem-state", &text).at(STATE),
+            format!("The item is {}.", state.as_str()),
+        ),
+        Refusal::Unfinished(_) => (
+            Problem::new(StatusCode::CONFLICT, "workitem-unfinished", &text).at("00741216"),
+            "Add what was performed by POST to the item, then complete it.".into(),
+        ),
+    };
+    problem.fix(fix).header(header::WARNING, warning(&text))
+}

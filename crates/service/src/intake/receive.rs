@@ -1,0 +1,387 @@
+//! One object: from bytes to a row.
+//!
+//! 1. The bytes are written to a file as they come ([`Incoming::write`]).
+//! 2. The header is read and the content hashed, a few objects at a time.
+//! 3. The file is forced to the disk; then its row is committed.
+
+use super::observer::IntakeObserver;
+use super::record::{
+    Added, IncomingFile, IntakeRoom, IntakeStore, NewObject, Origin, Protocol, ReceivedFiles,
+};
+use super::session::Session;
+use crate::jobs::{BlobError, Clock, StoreError, StoreFault, hex, random_id};
+use sha2::{Digest, Sha256};
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
+use std::sync::Arc;
+use tokio::io::AsyncWriteExt;
+use tokio::sync::Semaphore;
+use ventriform::progress::Monitor;
+use ventriform::volume::dicom::{DicomHeader, read_header};
+use ventriform::volume::{ReadLimits, VolumeError, VolumeFile};
+
+/// Objects whose headers are read at the same time. A hostile header takes 16 MiB at most.
+const EXAMINED_AT_ONCE: usize = 2;
+
+/// Bytes that are gathered for one write.
+const WRITE_BYTES: usize = 64 << 10;
+
+/// Bytes hashed at a time.
+const HASHED_BYTES: usize = 128 << 10;
+
+/// Why an object was not stored.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ReceiveError {
+    /// The disk, what waits, or what the tenant stores is full; or the object is too large.
+    NoRoom(&'static str),
+    /// It is no whole DICOM object, or one that is not read.
+    NotUnderstood(String),
+    /// It is not what the sender said it would be.
+    Mismatch(&'static str),
+    /// Another object with the same SOP Instance UID is stored.
+    Duplicate,
+    /// The storage failed.
+    Storage(String),
+}
+
+impl ReceiveError {
+    /// The status of C-STORE (PS3.4 B.2.3, PS3.7 C) and the failure reason of STOW-RS (PS3.18 I.2).
+    pub fn status(&self) -> u16 {
+        match self {
+            Self::NoRoom(_) | Self::Storage(_) => 0xA700,
+            Self::Mismatch(_) => 0xA900,
+            Self::NotUnderstood(_) => 0xC000,
+            Self::Duplicate => 0x0111,
+        }
+    }
+
+    /// The reason as an Error Comment, for people who look at the sender: no value of the object.
+    pub fn comment(&self) -> &'static str {
+        match self {
+            Self::NoRoom(what) | Self::Mismatch(what) => what,
+            Self::NotUnderstood(_) => "not a whole DICOM object that can be read",
+            Self::Duplicate => "another object with this SOP Instance UID is stored",
+            Self::Storage(_) => "the storage failed",
+        }
+    }
+
+    /// Its name in metrics.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::NoRoom(_) => "no-room",
+            Self::NotUnderstood(_) => "not-understood",
+            Self::Mismatch(_) => "mismatch",
+            Self::Duplicate => "duplicate",
+            Self::Storage(_) => "storage",
+        }
+    }
+}
+
+/// An object was not stored.
+#[derive(Debug, Clone)]
+pub struct Refused {
+    /// Why.
+    pub error: ReceiveError,
+    /// What it says of itself, if that could be read.
+    pub header: Option<DicomHeader>,
+}
+
+impl<E: Into<ReceiveError>> From<E> for Refused {
+    fn from(error: E) -> Self {
+        Self {
+            error: error.into(),
+            header: None,
+        }
+    }
+}
+
+impl From<BlobError> for ReceiveError {
+    fn from(error: BlobError) -> Self {
+        match error.cause {
+            StoreFault::Full => Self::NoRoom("the disk is full"),
+            _ => Self::Storage(error.to_string()),
+        }
+    }
+}
+
+impl From<StoreError> for ReceiveError {
+    fn from(error: StoreError) -> Self {
+        match error.cause() {
+            StoreFault::Full => Self::NoRoom("the disk is full"),
+            _ => Self::Storage(error.to_string()),
+        }
+    }
+}
+
+/// What a sender says of an object beside the object itself.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Stated<'a> {
+    /// Its SOP Class and SOP Instance UID.
+    pub object: Option<(&'a str, &'a str)>,
+    /// Its study.
+    pub study: Option<&'a str>,
+}
+
+impl Stated<'_> {
+    /// What of it the object contradicts.
+    fn contradiction(&self, header: &DicomHeader) -> Option<&'static str> {
+        let (class, instance) = self.object.unzip();
+        let differs = |stated: Option<&str>, own: &str| stated.is_some_and(|text| text != own);
+        if differs(class, &header.sop_class) {
+            Some("the data set has another SOP Class UID")
+        } else if differs(instance, &header.sop_instance) {
+            Some("the data set has another SOP Instance UID")
+        } else if differs(self.study, &header.study) {
+            Some("the object is of another study")
+        } else {
+            None
+        }
+    }
+}
+
+/// Limits on what is received.
+#[derive(Debug, Clone, Copy)]
+pub struct ReceiverSettings {
+    /// Bounds on what waits.
+    pub room: IntakeRoom,
+    /// Bytes of one object.
+    pub object_bytes: u64,
+    /// Limits on reading it.
+    pub limits: ReadLimits,
+}
+
+/// Takes objects.
+pub struct Receiver {
+    store: Arc<dyn IntakeStore>,
+    files: Arc<dyn ReceivedFiles>,
+    clock: Arc<dyn Clock>,
+    observer: Arc<dyn IntakeObserver>,
+    settings: ReceiverSettings,
+    examined: Semaphore,
+}
+
+/// An object on its way to the disk. Dropping it deletes it.
+pub struct Incoming {
+    file: Box<dyn IncomingFile>,
+    waiting: Vec<u8>,
+    bytes: u64,
+    limit: u64,
+}
+
+impl Incoming {
+    /// Writes the next bytes of the file.
+    ///
+    /// # Errors
+    /// [`ReceiveError::NoRoom`] if it gets too large or the disk is full, and
+    /// [`ReceiveError::Storage`].
+    pub async fn write(&mut self, bytes: &[u8]) -> Result<(), ReceiveError> {
+        self.bytes += bytes.len() as u64;
+        if self.bytes > self.limit {
+            return Err(ReceiveError::NoRoom("the object is larger than allowed"));
+        }
+        self.waiting.extend_from_slice(bytes);
+        if self.waiting.len() >= WRITE_BYTES {
+            self.flush().await?;
+        }
+        Ok(())
+    }
+
+    async fn flush(&mut self) -> Result<(), ReceiveError> {
+        let written = self.file.writer().write_all(&self.waiting).await;
+        written.map_err(BlobError::from)?;
+        self.waiting.clear();
+        Ok(())
+    }
+}
+
+/// What was found in an object's file.
+struct Examined {
+    header: DicomHeader,
+    data_sha256: String,
+    file_sha256: String,
+}
+
+impl Receiver {
+    /// A receiver of objects.
+    pub fn new(
+        store: Arc<dyn IntakeStore>,
+        files: Arc<dyn ReceivedFiles>,
+        clock: Arc<dyn Clock>,
+        observer: Arc<dyn IntakeObserver>,
+        settings: ReceiverSettings,
+    ) -> Self {
+        Self {
+            store,
+            files,
+            clock,
+            observer,
+            settings,
+            examined: Semaphore::new(EXAMINED_AT_ONCE),
+        }
+    }
+
+    /// Begins an object, whose file is written in the form of PS3.10.
+    ///
+    /// # Errors
+    /// If the disk is full or fails.
+    pub async fn begin(&self) -> Result<Incoming, ReceiveError> {
+        Ok(Incoming {
+            file: self.files.begin().await?,
+            waiting: Vec::new(),
+            bytes: 0,
+            limit: self.settings.object_bytes,
+        })
+    }
+
+    /// Stores an object whose bytes have all been written. When this returns, it is on disk. Returns
+    /// its group, and its header.
+    ///
+    /// # Errors
+    /// Why it was not stored; nothing is left of it.
+    pub async fn store(
+        &self,
+        incoming: Incoming,
+        stated: Stated<'_>,
+        origin: &Origin,
+        session: &mut Session,
+    ) -> Result<(String, DicomHeader), Refused> {
+        let bytes = incoming.bytes;
+        let stored = self
+            .store_uncounted(incoming, stated, origin, session)
+            .await;
+        let outcome = stored
+            .as_ref()
+            .map(|_| ())
+            .map_err(|refused| &refused.error);
+        self.note(origin.protocol, &outcome, bytes);
+        stored
+    }
+
+    /// Counts an object that was refused before it was stored.
+    pub fn note(&self, protocol: Protocol, outcome: &Result<(), &ReceiveError>, bytes: u64) {
+        let outcome = match outcome {
+            Ok(()) => "stored",
+            Err(error) => {
+                if let ReceiveError::Storage(reason) = error {
+                    tracing::error!(%reason, "a received object could not be stored");
+                }
+                error.code()
+            }
+        };
+        self.observer.object(protocol, outcome, bytes);
+    }
+
+    async fn store_uncounted(
+        &self,
+        mut incoming: Incoming,
+        stated: Stated<'_>,
+        origin: &Origin,
+        session: &mut Session,
+    ) -> Result<(String, DicomHeader), Refused> {
+        incoming.flush().await?;
+        let closed = incoming.file.writer().shutdown().await;
+        closed.map_err(BlobError::from)?;
+        let local = incoming.file.local();
+        let limits = self.settings.limits;
+        let examined = {
+            let _turn = self.examined.acquire().await;
+            tokio::task::spawn_blocking(move || examine(&local, &limits)).await
+        };
+        let examined = examined.map_err(|error| ReceiveError::Storage(error.to_string()))??;
+        let header = examined.header.clone();
+        let kept = match stated.contradiction(&header) {
+            Some(what) => Err(ReceiveError::Mismatch(what)),
+            None => self.keep(incoming, examined, origin).await,
+        };
+        match kept {
+            Ok(group) => {
+                session.brought(&group, !header.is_slice);
+                Ok((group, header))
+            }
+            Err(error) => Err(Refused {
+                error,
+                header: Some(header),
+            }),
+        }
+    }
+
+    /// Forces an object to the disk and commits its row. Returns its group.
+    async fn keep(
+        &self,
+        incoming: Incoming,
+        examined: Examined,
+        origin: &Origin,
+    ) -> Result<String, ReceiveError> {
+        let name = format!("{}.dcm", random_id("obj_"));
+        incoming.file.keep(&name).await?;
+        let object = NewObject {
+            origin: origin.clone(),
+            header: examined.header,
+            data_sha256: examined.data_sha256,
+            file_sha256: examined.file_sha256,
+            file: name.clone(),
+            bytes: incoming.bytes,
+        };
+        let now = self.clock.now();
+        let added = self.store.add(&object, self.settings.room, now).await;
+        let (group, useless) = match added {
+            Ok(Added::New(group, obsolete)) => (Ok(group), obsolete),
+            Ok(Added::Known(group)) => (Ok(group), Some(name)),
+            Ok(Added::Conflict) => (Err(ReceiveError::Duplicate), Some(name)),
+            Ok(Added::NoRoom) => {
+                let full = ReceiveError::NoRoom("too many objects wait, or the quota is used up");
+                (Err(full), Some(name))
+            }
+            // The row may have been committed. If not, the sweep finds the file.
+            Err(error) => (Err(error.into()), None),
+        };
+        if let Some(useless) = useless
+            && let Err(error) = self.files.discard(&[useless]).await
+        {
+            tracing::warn!(%error, "a file that is not needed could not be deleted");
+        }
+        group
+    }
+}
+
+/// Reads the header of an object and hashes its data set and its whole file.
+fn examine(path: &Path, limits: &ReadLimits) -> Result<Examined, ReceiveError> {
+    let not_understood = |error: VolumeError| ReceiveError::NotUnderstood(error.to_string());
+    let file = VolumeFile::named("the object", path);
+    let header = read_header(&file, limits, &Monitor::silent()).map_err(not_understood)?;
+    let hashed = hashes(path, header.data_set).map_err(BlobError::from)?;
+    let Some((data_sha256, file_sha256)) = hashed else {
+        let reason = "it is no file of PS3.10".to_owned();
+        return Err(ReceiveError::NotUnderstood(reason));
+    };
+    Ok(Examined {
+        header,
+        data_sha256,
+        file_sha256,
+    })
+}
+
+/// The hashes of the file from byte `data_set` on, and of all of it; `None` if it does not begin as
+/// PS3.10 says.
+fn hashes(path: &Path, data_set: u64) -> io::Result<Option<(String, String)>> {
+    let mut file = std::fs::File::open(path)?;
+    let mut start = [0; 132];
+    if file.read_exact(&mut start).is_err() || start[128..] != *b"DICM" {
+        return Ok(None);
+    }
+    file.seek(SeekFrom::Start(0))?;
+    let (mut data, mut whole) = (Sha256::new(), Sha256::new());
+    let mut head = vec![0; usize::try_from(data_set).unwrap_or(0)];
+    file.read_exact(&mut head)?;
+    whole.update(&head);
+    let mut portion = vec![0; HASHED_BYTES];
+    loop {
+        let read = file.read(&mut portion)?;
+        if read == 0 {
+            let [data, whole] = [data, whole].map(|hash| hex(&hash.finalize()));
+            return Ok(Some((data, whole)));
+        }
+        data.update(&portion[..read]);
+        whole.update(&portion[..read]);
+    }
+}

@@ -1,0 +1,457 @@
+//! Adding volumes and products: first the files, then the record that makes them visible.
+//!
+//! The two steps run in a task of their own, which goes on if the caller goes away: a client that
+//! hangs up leaves neither files without a record nor a record that nobody waited for.
+
+use super::Queue;
+use crate::jobs::{
+    AddedProduct, BlobError, Failure, Fault, FileRecord, Held, ItemRecord, Job, JobOutcome,
+    JobState, Lease, OutputFile, Product, ProductFile, ProductRoom, Resource, ScanFields,
+    StagedFiles, StagedFor, StoreError, StoreFault, StoredVolume, Tags, Tenant, WorkOutput,
+    content_id, hex,
+};
+use serde_json::{Map, Value};
+use sha2::{Digest, Sha256};
+use std::sync::Arc;
+use tokio::io::AsyncWriteExt;
+use tracing::Instrument;
+use ventriform::text::is_printable;
+
+/// How often an item is added anew that other processes erase at the same time.
+const ROUNDS: u32 = 3;
+
+impl Queue {
+    /// Adds an uploaded volume durably, with what its file says of the scan. Returns the record, and
+    /// whether it is new for the tenant.
+    ///
+    /// # Errors
+    /// If the files or the record cannot be written.
+    pub async fn add_volume(
+        self: &Arc<Self>,
+        mut volume: StoredVolume,
+        files: Box<dyn StagedFiles>,
+        tenant: &Tenant,
+        tags: &Tags,
+        scan: Option<ScanFields>,
+    ) -> Result<(Held<StoredVolume>, bool), StoreError> {
+        let (queue, tenant, tags) = (self.clone(), tenant.clone(), tags.clone());
+        to_its_end(async move {
+            let _lock = queue.items.lock(&volume.id).await;
+            queue.items.unsettle(&volume.id);
+            let record = ItemRecord::Volume(volume.clone());
+            let mut files = Some(files);
+            let mut again = ROUNDS;
+            let new = loop {
+                volume.files = queue
+                    .publish_unless_intact(record.clone(), &mut files)
+                    .await?;
+                let added = queue
+                    .catalogue
+                    .add_volume(&volume, &tenant, &tags, scan.as_ref());
+                match added.await {
+                    Err(error) if again > 0 && queue.was_erased_meanwhile(&error, &files) => {
+                        again -= 1;
+                    }
+                    added => break added?,
+                }
+            };
+            queue.items.settle(&volume.id);
+            let stored = queue.catalogue.volume(&tenant, &volume.id).await?;
+            Ok((stored.ok_or_else(vanished)?, new))
+        })
+        .await
+    }
+
+    /// The stored volume with that id, which the tenant has from now on, and whether it had it not
+    /// before: it was uploaded again, so its age counts from now.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn renew_volume(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        tags: &Tags,
+        scan: Option<&ScanFields>,
+    ) -> Result<Option<(Held<StoredVolume>, bool)>, StoreError> {
+        let now = self.clock.now();
+        let catalogue = &self.catalogue;
+        catalogue.renew_volume(tenant, id, tags, scan, now).await
+    }
+
+    /// Adds a template to the library, durably. Returns the record, and whether it is new: the
+    /// same mesh for the same organ is the same template, whatever its name.
+    ///
+    /// # Errors
+    /// [`NotAdded`] if its name cannot be used, the tenant has no room for it, or it cannot be written.
+    pub async fn add_template(
+        self: &Arc<Self>,
+        source: TemplateSource<'_>,
+        organ: &str,
+        output: WorkOutput,
+        room: ProductRoom,
+    ) -> Result<(Held<Product>, bool), NotAdded> {
+        check_name(source.name)?;
+        self.blobs.require_room(0).map_err(StoreError::from)?;
+        let parameters = [("name", source.name), ("organ", organ)]
+            .map(|(key, value)| (key.to_owned(), Value::from(value)))
+            .into_iter()
+            .collect();
+        let made = (source.tenant, Resource::Template);
+        let template = self.product(made, &[organ], None, parameters, &output);
+        self.add_product(template, source, output, room).await
+    }
+
+    /// Adds a reader's profile, durably. Returns the record, and whether it is new: the same profile is
+    /// the same reader, whatever its name.
+    ///
+    /// # Errors
+    /// As [`Queue::add_template`].
+    pub async fn add_reader(
+        self: &Arc<Self>,
+        tenant: &Tenant,
+        name: &str,
+        output: WorkOutput,
+        room: ProductRoom,
+    ) -> Result<(Held<Product>, bool), NotAdded> {
+        check_name(name)?;
+        self.blobs.require_room(0).map_err(StoreError::from)?;
+        let parameters = [("name".to_owned(), Value::from(name))]
+            .into_iter()
+            .collect();
+        let made = (tenant, Resource::Reader);
+        let reader = self.product(made, &[], None, parameters, &output);
+        let source = TemplateSource {
+            tenant,
+            name,
+            volume: None,
+            library: None,
+        };
+        self.add_product(reader, source, output, room).await
+    }
+
+    /// Adds a product that no job made.
+    async fn add_product(
+        self: &Arc<Self>,
+        mut product: Product,
+        source: TemplateSource<'_>,
+        output: WorkOutput,
+        room: ProductRoom,
+    ) -> Result<(Held<Product>, bool), NotAdded> {
+        let (queue, tenant) = (self.clone(), source.tenant.clone());
+        let (volume, library) = (source.volume.map(str::to_owned), source.library);
+        to_its_end(async move {
+            let _lock = queue.items.lock(&product.id).await;
+            queue.items.unsettle(&product.id);
+            let mut again = ROUNDS;
+            let added = loop {
+                let unused = queue.write_files(&mut product, &output).await?;
+                let added = queue
+                    .catalogue
+                    .add_product(&product, &tenant, volume.as_deref(), room);
+                match added.await {
+                    Err(error) if again > 0 && queue.was_erased_meanwhile(&error, &unused) => {
+                        again -= 1;
+                    }
+                    added => break added?,
+                }
+            };
+            let new = match added {
+                AddedProduct::New => true,
+                AddedProduct::Known => false,
+                // Its files have no record, so the upkeep deletes them.
+                AddedProduct::TooMany => {
+                    return Ok(Err(NotAdded::too_many(product.resource(), room.count)));
+                }
+                AddedProduct::TooLarge { stored } => {
+                    return Ok(Err(NotAdded::too_large(&product, stored, room)));
+                }
+            };
+            if let Some(library) = library {
+                let catalogue = &queue.catalogue;
+                catalogue.set_library(&tenant, &product.id, library).await?;
+            }
+            queue.items.settle(&product.id);
+            let stored = queue.catalogue.product(&tenant, &product.id).await?;
+            Ok(Ok((stored.ok_or_else(vanished)?, new)))
+        })
+        .await?
+    }
+
+    /// Stores what a job made and ends the job: the files first, then, in one commit, the record
+    /// and the job's state. `None` if the lease was lost. May be called again after an error.
+    ///
+    /// # Errors
+    /// If the database fails; then the job is still running.
+    pub(in crate::jobs) async fn finish_with(
+        &self,
+        made: Resource,
+        job: &Job,
+        lease: &Lease,
+        output: &WorkOutput,
+    ) -> Result<Option<Job>, StoreError> {
+        let parameters = Value::Object(job.parameters.clone()).to_string();
+        let volume = job.volume.as_deref();
+        let mut product = self.product(
+            (&job.tenant, made),
+            &[volume.unwrap_or_default(), &parameters],
+            volume,
+            job.parameters.clone(),
+            output,
+        );
+        let id = product.id.clone();
+        let _lock = self.items.lock(&id).await;
+        self.items.unsettle(&id);
+        let outcome = match self.write_files(&mut product, output).await {
+            Ok(_) => JobOutcome::Succeeded(Box::new(product)),
+            Err(error) if error.cause().may_pass() => return Err(error),
+            Err(error) => {
+                tracing::error!(job = %job.id, %error, "the result could not be stored");
+                JobOutcome::Failed(
+                    Failure::new(
+                        Fault::Service,
+                        "storage",
+                        "The result was computed but could not be stored.",
+                    )
+                    .fix("Ask the operator to look into the log, then start the job again."),
+                )
+            }
+        };
+        let ended = self.jobs.finish(lease, &outcome, self.clock.now()).await?;
+        // It fails all the same where the tenant's quota has no room for the result.
+        let stored = |job: &Job| job.state == JobState::Succeeded;
+        if ended.as_ref().is_some_and(stored) {
+            self.items.settle(&id);
+        }
+        Ok(ended)
+    }
+
+    /// Publishes what was made, and notes in `product` where its files are. Returns the files that
+    /// were not needed because the product is stored already.
+    async fn write_files(
+        &self,
+        product: &mut Product,
+        output: &WorkOutput,
+    ) -> Result<Option<Box<dyn StagedFiles>>, StoreError> {
+        let staged = self.blobs.stage(StagedFor::Result).await?;
+        for file in &output.files {
+            let mut writer = staged.create(&file.name).await?;
+            writer
+                .write_all(&file.bytes)
+                .await
+                .map_err(BlobError::from)?;
+            writer.shutdown().await.map_err(BlobError::from)?;
+        }
+        let record = ItemRecord::Product(product.clone());
+        let mut staged = Some(staged);
+        let stored = self.publish_unless_intact(record, &mut staged).await?;
+        for file in &mut product.files {
+            if let Some(stored) = stored.iter().find(|stored| stored.name == file.name) {
+                file.bytes = stored.bytes;
+                file.sha256.clone_from(&stored.sha256);
+                file.place.clone_from(&stored.place);
+            }
+        }
+        Ok(staged)
+    }
+
+    /// Whether a row was refused because another process has erased the item since it was found
+    /// intact, so that its files, which are at hand, have to be published after all.
+    fn was_erased_meanwhile(
+        &self,
+        error: &StoreError,
+        unused: &Option<Box<dyn StagedFiles>>,
+    ) -> bool {
+        self.is_shared() && unused.is_some() && error.cause() == StoreFault::Busy
+    }
+
+    /// Publishes the files of an item, unless it has a row and its files are what the row says.
+    /// If it has a row and damaged files, these are replaced, and the row with them. Returns the files
+    /// that the item has now; those that were published are taken.
+    async fn publish_unless_intact(
+        &self,
+        mut record: ItemRecord,
+        staged: &mut Option<Box<dyn StagedFiles>>,
+    ) -> Result<Vec<FileRecord>, StoreError> {
+        let known = self.catalogue.record(record.id()).await?;
+        if let Some(known) = &known {
+            if self.is_intact(known).await? {
+                return Ok(known.files());
+            }
+            tracing::warn!(id = record.id(), "damaged files are replaced");
+        }
+        let files = staged.take().ok_or_else(vanished)?;
+        record.put_at(files.place());
+        // Without a row, the upkeep deletes these and no others.
+        self.items.doom(record.id(), record.files());
+        files.publish(&record).await?;
+        if known.is_some() {
+            self.catalogue.amend(&record).await?;
+        }
+        Ok(record.files())
+    }
+
+    /// Whether every file of an item is there and holds what its row says.
+    async fn is_intact(&self, record: &ItemRecord) -> Result<bool, BlobError> {
+        for file in record.files() {
+            match self.blobs.local(record.id(), &file).await {
+                Ok(Some(_)) => {}
+                Ok(None) => return Ok(false),
+                Err(error) if error.cause == StoreFault::DamagedFile => return Ok(false),
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(true)
+    }
+
+    /// The files of a volume, if it is stored, whoever has it, and they are not damaged.
+    ///
+    /// # Errors
+    /// If the storage fails.
+    pub async fn intact_volume(&self, id: &str) -> Result<Option<Vec<FileRecord>>, StoreError> {
+        match self.catalogue.record(id).await? {
+            Some(record) if self.is_intact(&record).await? => Ok(Some(record.files())),
+            _ => Ok(None),
+        }
+    }
+
+    /// The record of a product. Its id is a hash of the kind, of `origin`, of the tenant and of the
+    /// mesh; the report contains times and must not change the id.
+    ///
+    /// The tenant is part of it because reports say when they were made, and which templates of the
+    /// tenant's library were tried: no tenant gets the files of another one. The default tenant is
+    /// not hashed, so that its ids are those of a service without tenants.
+    fn product(
+        &self,
+        (tenant, made): (&Tenant, Resource),
+        origin: &[&str],
+        volume: Option<&str>,
+        parameters: Map<String, Value>,
+        output: &WorkOutput,
+    ) -> Product {
+        let files: Vec<_> = output.files.iter().map(described).collect();
+        let own = (*tenant != Tenant::default()).then_some(tenant.as_str());
+        let parts = std::iter::once(made.noun())
+            .chain(origin.iter().copied())
+            .chain(own)
+            .chain([mesh_hash(&files)]);
+        Product {
+            id: content_id(made.prefix(), parts.map(str::as_bytes)),
+            sequence: 0,
+            created_at: self.clock.now(),
+            volume: volume.map(str::to_owned),
+            parameters,
+            summary: output.summary.clone(),
+            software: env!("CARGO_PKG_VERSION").into(),
+            files,
+        }
+    }
+}
+
+/// Longest name of a template or a reader, characters.
+const NAME_LENGTH: usize = 80;
+
+/// Why a template or a reader was not added.
+#[derive(Debug)]
+pub enum NotAdded {
+    /// It may not be: what is wrong, and what to do.
+    Refused(Failure),
+    /// The tenant has as many as it may have.
+    TooMany(Failure),
+    /// The tenant's quota of bytes has no room for it.
+    TooLarge(Failure),
+    /// The files or the record cannot be written.
+    Store(StoreError),
+}
+
+impl From<StoreError> for NotAdded {
+    fn from(error: StoreError) -> Self {
+        Self::Store(error)
+    }
+}
+
+impl NotAdded {
+    fn too_many(kind: Resource, limit: u32) -> Self {
+        let (noun, plural) = (kind.noun(), kind.plural());
+        let detail =
+            format!("There are {limit} {plural} already, the most that this service allows.");
+        let failure = Failure::new(Fault::Request, "library-full", detail);
+        Self::TooMany(failure.fix(format!(
+            "DELETE a {noun} first, or ask the operator to raise `{noun}_limit`."
+        )))
+    }
+
+    fn too_large(product: &Product, stored: u64, room: ProductRoom) -> Self {
+        let size: u64 = product.files.iter().map(|file| file.bytes).sum();
+        let limit = room.bytes.unwrap_or(u64::MAX);
+        let detail = format!(
+            "It has {size} bytes; the tenant stores {stored} of the {limit} bytes that it may store."
+        );
+        let failure = Failure::new(Fault::TooLarge, "storage-quota", detail);
+        Self::TooLarge(
+            failure.fix("DELETE items that are no longer needed, or ask the operator for more."),
+        )
+    }
+}
+
+/// Refuses a name that is empty, longer than [`NAME_LENGTH`] or not printable.
+///
+/// # Errors
+/// [`NotAdded::Refused`].
+pub fn check_name(name: &str) -> Result<(), NotAdded> {
+    let length = name.chars().count();
+    if (1..=NAME_LENGTH).contains(&length) && name.chars().all(is_printable) {
+        return Ok(());
+    }
+    let detail = format!("The name must have 1 to {NAME_LENGTH} printable characters.");
+    let failure = Failure::new(Fault::Request, "invalid-field", detail).at("name");
+    Err(NotAdded::Refused(
+        failure.fix("Give a short name such as t1_150."),
+    ))
+}
+
+/// Where a template comes from.
+#[derive(Debug, Clone, Copy)]
+pub struct TemplateSource<'a> {
+    /// The tenant whose library it joins.
+    pub tenant: &'a Tenant,
+    /// The name that reports show.
+    pub name: &'a str,
+    /// The volume from whose model it was copied.
+    pub volume: Option<&'a str>,
+    /// Whether every `model=auto` fits it; `None` leaves that as it is, not so at first.
+    pub library: Option<bool>,
+}
+
+/// The record of an item that was just added under its lock is not there.
+fn vanished() -> StoreError {
+    StoreError::database("a record is missing that was just added")
+}
+
+/// Runs a section to its end even if the caller is dropped meanwhile.
+pub(super) async fn to_its_end<T: Send + 'static>(
+    section: impl Future<Output = Result<T, StoreError>> + Send + 'static,
+) -> Result<T, StoreError> {
+    tokio::spawn(section.in_current_span())
+        .await
+        .unwrap_or_else(|error| Err(StoreError::database(error.to_string())))
+}
+
+/// The hash of the mesh, which stands for the whole result.
+fn mesh_hash(files: &[ProductFile]) -> &str {
+    files
+        .iter()
+        .find(|file| file.name == "mesh.json")
+        .or(files.first())
+        .map_or("", |file| file.sha256.as_str())
+}
+
+fn described(file: &OutputFile) -> ProductFile {
+    ProductFile {
+        name: file.name.clone(),
+        media_type: file.media_type.clone().into_owned(),
+        bytes: file.bytes.len() as u64,
+        sha256: hex(&Sha256::digest(&file.bytes)),
+        place: None,
+    }
+}

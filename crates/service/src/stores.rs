@@ -1,0 +1,38 @@
+//! What the service stores into: one value for each kind of record, made once by the program.
+
+use crate::access::AccessStore;
+use crate::archive::ArchiveStore;
+use crate::hooks::DeliveryStore;
+use crate::intake::{IntakeStore, ReceivedFiles};
+use crate::jobs::{BlobStore, Catalogue, FigureStore, JobStore, Peers};
+use crate::worklist::Worklist;
+use futures::future::BoxFuture;
+use std::sync::Arc;
+
+/// The stores of one service.
+pub struct Stores {
+    /// Jobs.
+    pub jobs: Arc<dyn JobStore>,
+    /// Volumes, products, and who owns them.
+    pub catalogue: Arc<dyn Catalogue>,
+    /// Keys and the audit trail.
+    pub access: Arc<dyn AccessStore>,
+    /// Work items of other systems.
+    pub worklist: Arc<dyn Worklist>,
+    /// Deliveries of webhooks.
+    pub deliveries: Arc<dyn DeliveryStore>,
+    /// What is sent to archives.
+    pub archives: Arc<dyn ArchiveStore>,
+    /// Objects received by DICOM.
+    pub intake: Arc<dyn IntakeStore>,
+    /// Figures that only the database knows.
+    pub figures: Arc<dyn FigureStore>,
+    /// The files of items.
+    pub blobs: Arc<dyn BlobStore>,
+    /// The files of received objects.
+    pub received: Arc<dyn ReceivedFiles>,
+    /// The other processes on the database and the files, if there can be any.
+    pub peers: Option<Arc<dyn Peers>>,
+    /// Closes the database and unlocks the data folder. Dropping it unlocks the folder, too.
+    pub close: Box<dyn FnOnce() -> BoxFuture<'static, ()> + Send + Sync>,
+}

@@ -1,0 +1,71 @@
+//! What jobs and uploads do with volumes and models: the bridge from the queue to the domain.
+//!
+//! | file | what |
+//! |---|---|
+//! | `model` | jobs of kind `model`: a volume's files to a surface model |
+//! | `segmentation` | jobs of kind `segmentation`: a stored model fitted to a volume |
+//! | `template` | a mesh to a template of the library |
+//! | `profile` | a reader's profile, checked |
+//! | `upload` | validating and previewing an uploaded volume |
+//! | [`dicom`] | DICOM objects of a stored result |
+//! | `page` | the HTML page of a stored model or segmentation |
+//! | `problems` | errors of the domain to failures with status class, code, field and advice |
+//!
+//! Everything here is synchronous and runs on the threads of a worker or of a blocking pool. It
+//! reads local files and returns bytes; it neither stores anything nor sees the queue.
+
+pub mod dicom;
+mod files;
+mod model;
+mod page;
+mod parameters;
+pub mod part;
+pub mod problems;
+mod profile;
+mod segmentation;
+mod template;
+mod upload;
+
+pub use model::ModelWork;
+pub use page::PageError;
+pub use segmentation::SegmentationWork;
+pub use template::TEMPLATE_BYTES;
+pub use upload::{
+    DomainReader, INSPECTION_MEMORY, IntensityFacts, UploadFacts, UploadReader, preview_memory,
+    voxels_memory,
+};
+
+use crate::jobs::{Work, Works};
+use std::sync::Arc;
+use ventriform::volume::ReadLimits;
+
+/// All that the service can do with volumes and models. Tests replace its parts.
+#[derive(Clone)]
+pub struct Engine {
+    /// Validates uploads.
+    pub reader: Arc<dyn UploadReader>,
+    /// Computes jobs, by kind.
+    pub works: Works,
+    /// Limits on the volumes that are read.
+    pub limits: ReadLimits,
+}
+
+impl Engine {
+    /// The engine of the product; `limits` bound the volumes it reads.
+    pub fn new(limits: ReadLimits) -> Self {
+        let works: [Arc<dyn Work>; 2] = [
+            Arc::new(ModelWork { limits }),
+            Arc::new(SegmentationWork { limits }),
+        ];
+        Self {
+            reader: Arc::new(DomainReader { limits }),
+            works: works.into_iter().collect(),
+            limits,
+        }
+    }
+
+    /// The work that computes jobs of that kind.
+    pub fn work(&self, kind: &str) -> Option<&Arc<dyn Work>> {
+        self.works.of_kind(kind)
+    }
+}

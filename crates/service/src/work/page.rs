@@ -1,0 +1,133 @@
+//! HTML pages of stored models and segmentations.
+//!
+//! A page consists mostly of pictures: it is ten times as large as the other files together and
+//! takes as long to make as the model, and few are ever looked at. Pages are therefore not stored.
+//! Each is made when it is requested, from the product's own files; the volume may have been
+//! deleted by then. The scan that a page names is not one of these files: whoever asks hands in what
+//! may be shown of it.
+
+use serde_json::{Map, Value};
+use std::io;
+use ventriform::export::read_json::{self, ReadMeshError};
+use ventriform::report::{self, Closeness, ModelReport, SegmentationPage, SegmentationReport};
+use ventriform::volume::dicom::Provenance;
+
+/// Why there is no page.
+#[derive(Debug, thiserror::Error)]
+pub enum PageError {
+    /// A required file does not exist.
+    #[error("the file {0} is missing")]
+    Missing(&'static str),
+    /// A file cannot be read.
+    #[error("{0} cannot be read: {1}")]
+    Io(&'static str, io::Error),
+    /// A JSON file cannot be parsed.
+    #[error("{0} cannot be parsed: {1}")]
+    Json(&'static str, serde_json::Error),
+    /// The mesh cannot be parsed.
+    #[error("mesh.json cannot be used: {0}")]
+    Mesh(#[from] ReadMeshError),
+}
+
+/// Reads a product's file by name; `None` if it does not exist.
+pub type ReadFile<'a> = dyn Fn(&str) -> io::Result<Option<Vec<u8>>> + 'a;
+
+/// The files that [`model_page`] reads.
+pub(super) const MODEL_FILES: &[&str] = &["report.json", "mesh.json", "distance.json"];
+
+/// The files that [`segmentation_page`] reads.
+pub(super) const SEGMENTATION_FILES: &[&str] = &[
+    "report.json",
+    "mesh.json",
+    OTHER_WALLS[0],
+    OTHER_WALLS[1],
+    "slices.png",
+    "polar.svg",
+    "polar.json",
+    "region.nii.gz",
+];
+
+/// The mesh of the wall by the other edge: one of these, of a ventricle.
+const OTHER_WALLS: [&str; 2] = ["mesh_anatomical.json", "mesh_apparent.json"];
+
+/// The page of a model, made of `report.json`, `mesh.json` and, if it exists, `distance.json`.
+///
+/// # Errors
+/// [`PageError`].
+pub(super) fn model_page(
+    read: &ReadFile<'_>,
+    scan: &Map<String, Value>,
+) -> Result<String, PageError> {
+    let text = required(read, "report.json")?;
+    let report: ModelReport = from_json("report.json", &text)?;
+    let mesh = read_json::decode(&required(read, "mesh.json")?)?;
+    let closeness: Option<Closeness> = optional(read, "distance.json")?
+        .map(|text| from_json("distance.json", &text))
+        .transpose()?;
+    let scan = provenance(scan);
+    Ok(report::model_page(
+        &report,
+        &mesh,
+        closeness.as_ref(),
+        Some(&scan),
+    ))
+}
+
+/// The page of a segmentation, made of `report.json`, `mesh.json` and those of [`SEGMENTATION_FILES`] that
+/// exist. Segmentations of older versions have no `region.nii.gz`: their slices are a picture.
+///
+/// # Errors
+/// [`PageError`].
+pub(super) fn segmentation_page(
+    read: &ReadFile<'_>,
+    scan: &Map<String, Value>,
+) -> Result<String, PageError> {
+    let report: SegmentationReport = from_json("report.json", &required(read, "report.json")?)?;
+    let mesh_file = required(read, "mesh.json")?;
+    let mesh = read_json::decode(&mesh_file)?;
+    let mut other = None;
+    for name in OTHER_WALLS {
+        if let Some(file) = optional(read, name)? {
+            other = Some((read_json::decode(&file)?, read_json::uncertainty(&file)));
+        }
+    }
+    let slices = optional(read, "slices.png")?;
+    let polar = optional(read, "polar.svg")?;
+    let polar_map: Option<Value> = optional(read, "polar.json")?
+        .map(|text| from_json("polar.json", &text))
+        .transpose()?;
+    let region = optional(read, "region.nii.gz")?;
+    Ok(report::segmentation_page(&SegmentationPage {
+        report: &report,
+        mesh: &mesh,
+        uncertainty: &read_json::uncertainty(&mesh_file),
+        other: other
+            .as_ref()
+            .map(|(mesh, uncertainty)| (mesh, uncertainty.as_slice())),
+        slices: slices.as_deref(),
+        polar: polar.as_deref(),
+        polar_map: polar_map.as_ref(),
+        region: region.as_deref(),
+        scan: Some(&provenance(scan)),
+    }))
+}
+
+/// What is to be named of a scan; fields of another type are left out.
+fn provenance(scan: &Map<String, Value>) -> Provenance {
+    serde_json::from_value(scan.clone().into()).unwrap_or_default()
+}
+
+fn optional(read: &ReadFile<'_>, name: &'static str) -> Result<Option<Vec<u8>>, PageError> {
+    read(name).map_err(|error| PageError::Io(name, error))
+}
+
+fn required(read: &ReadFile<'_>, name: &'static str) -> Result<Vec<u8>, PageError> {
+    optional(read, name)?.ok_or(PageError::Missing(name))
+}
+
+fn from_json<T: serde::de::DeserializeOwned>(
+    name: &'static str,
+    text: &[u8],
+) -> Result<T, PageError> {
+    serde_json::from_slice(text).map_err(|error| PageError::Json(name, error))
+}

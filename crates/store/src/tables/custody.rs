@@ -1,0 +1,110 @@
+//! Looking after the rows of items.
+
+use super::rows::{self, to_json};
+use crate::database::SqlStore;
+use crate::query::query;
+use async_trait::async_trait;
+use std::collections::BTreeSet;
+use std::sync::atomic::Ordering;
+use ventriform_service::jobs::{Custody, ItemRecord, Resource, StoreResult};
+
+/// Defects named at most.
+const DEFECTS: &str = "PRAGMA quick_check(20)";
+
+#[async_trait]
+impl Custody for SqlStore {
+    async fn record(&self, id: &str) -> StoreResult<Option<ItemRecord>> {
+        let volume = Resource::of(id) == Some(Resource::Volume);
+        let row = query(match volume {
+            true => "SELECT * FROM volumes WHERE id = $1",
+            false => "SELECT * FROM products WHERE id = $1",
+        })
+        .bind(id)
+        .fetch_optional(&self.readers)
+        .await?;
+        row.map(|row| match volume {
+            true => rows::volume(row).map(ItemRecord::Volume),
+            false => rows::product(row).map(ItemRecord::Product),
+        })
+        .transpose()
+    }
+
+    async fn known(&self, ids: &[String]) -> StoreResult<BTreeSet<String>> {
+        let rows = query(
+            "SELECT id FROM volumes WHERE id IN (SELECT value FROM json_each($1))
+             UNION ALL SELECT id FROM products WHERE id IN (SELECT value FROM json_each($1))",
+        )
+        .bind(to_json(&ids)?)
+        .fetch_all(&self.readers)
+        .await?;
+        rows.into_iter().map(|row| row.try_get(0)).collect()
+    }
+
+    async fn records(
+        &self,
+        kind: Resource,
+        after: i64,
+        limit: u32,
+    ) -> StoreResult<Vec<ItemRecord>> {
+        let rows = query(match kind {
+            Resource::Volume => {
+                "SELECT * FROM volumes WHERE sequence > $1 ORDER BY sequence LIMIT $2"
+            }
+            _ => "SELECT * FROM products WHERE sequence > $1 ORDER BY sequence LIMIT $2",
+        })
+        .bind(after)
+        .bind(limit)
+        .fetch_all(&self.readers)
+        .await?;
+        rows::all(
+            rows,
+            match kind {
+                Resource::Volume => |row| rows::volume(row).map(ItemRecord::Volume),
+                _ => |row| rows::product(row).map(ItemRecord::Product),
+            },
+        )
+    }
+
+    async fn amend(&self, record: &ItemRecord) -> StoreResult<()> {
+        match record {
+            ItemRecord::Volume(volume) => {
+                query("UPDATE volumes SET files = $1, facts = $2 WHERE id = $3")
+                    .bind(to_json(&volume.files)?)
+                    .bind(to_json(&volume.facts)?)
+                    .bind(&volume.id)
+                    .write(&self.writer)
+                    .await?
+            }
+            ItemRecord::Product(product) => {
+                query("UPDATE products SET files = $1, summary = $2, software = $3 WHERE id = $4")
+                    .bind(to_json(&product.files)?)
+                    .bind(to_json(&product.summary)?)
+                    .bind(&product.software)
+                    .bind(&product.id)
+                    .write(&self.writer)
+                    .await?
+            }
+        };
+        Ok(())
+    }
+
+    async fn was_erased(&self, id: &str) -> StoreResult<bool> {
+        let found = query("SELECT 1 FROM erased WHERE id = $1 LIMIT 1")
+            .bind(id)
+            .fetch_optional(&self.readers)
+            .await?;
+        Ok(found.is_some())
+    }
+
+    async fn defects(&self) -> StoreResult<Vec<String>> {
+        // The server looks after its own files.
+        if self.on_server() {
+            return Ok(Vec::new());
+        }
+        let found = query(DEFECTS).fetch_all(&self.readers).await?;
+        let lines: Vec<String> = rows::all(found, |row| row.try_get(0))?;
+        let defects: Vec<String> = lines.into_iter().filter(|line| line != "ok").collect();
+        self.damaged.store(!defects.is_empty(), Ordering::Relaxed);
+        Ok(defects)
+    }
+}

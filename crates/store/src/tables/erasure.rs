@@ -1,0 +1,248 @@
+//! Erasing an item within one transaction: checked, deleted, remembered.
+//!
+//! 1. Collect what goes: the item; with `cascade` also what was made of a volume.
+//! 2. Refuse if a job that has not ended needs one of them, or a legal hold keeps one.
+//! 3. Delete the tenant's holdings; with the last holding of an item, the record of its content;
+//!    with `cascade`, the jobs on the volume.
+//! 4. Remember each id (410 from then on), append a row to the audit trail, and store the receipt,
+//!    which names that row.
+
+use super::access::append;
+use super::rows::{self, to_json};
+use crate::database::Transaction;
+use crate::query::{Target, query};
+use ventriform_service::access::{Activity, AuditEvent};
+use ventriform_service::jobs::{
+    AuditMark, Erased, ErasedFile, ErasedItem, ErasureOrder, Receipt, Resource, StoreResult,
+    Tenant, Timestamp, random_id,
+};
+
+/// The prefix of the ids of receipts.
+const PREFIX: &str = "ers_";
+
+/// What was made of a volume.
+pub(super) async fn made_of(
+    from: impl Into<Target<'_>> + Send,
+    tenant: &Tenant,
+    volume: &str,
+) -> StoreResult<Vec<String>> {
+    let rows = query("SELECT id FROM sources WHERE tenant = $1 AND volume = $2 ORDER BY id")
+        .bind(tenant.as_str())
+        .bind(volume)
+        .fetch_all(from)
+        .await?;
+    rows.into_iter().map(|row| row.try_get(0)).collect()
+}
+
+/// Erases what an order names. Changes nothing unless it returns [`Erased::Done`].
+pub(super) async fn erase(
+    to: &mut Transaction<'_>,
+    order: &ErasureOrder,
+    expected: &[String],
+    now: Timestamp,
+) -> StoreResult<Erased> {
+    let tenant = &order.tenant;
+    let mut ids = vec![order.id.clone()];
+    if order.cascade {
+        ids.extend(made_of(&mut *to, tenant, &order.id).await?);
+    }
+    if ids.iter().any(|id| !expected.contains(id)) {
+        return Ok(Erased::InUse);
+    }
+    if !has(to, tenant, &order.id, order.renewed_before).await? {
+        return Ok(Erased::Unknown);
+    }
+    for id in &ids {
+        if let Some(id) = legal_hold(to, tenant, id).await? {
+            return Ok(Erased::OnHold { id });
+        }
+        if is_needed(to, tenant, id).await? {
+            return Ok(Erased::InUse);
+        }
+    }
+    let mut items = Vec::with_capacity(ids.len());
+    // What was made of an item goes before the item.
+    for id in ids.iter().rev() {
+        items.insert(0, release(to, tenant, id, now).await?);
+    }
+    let jobs = match order.cascade {
+        true => delete_jobs(to, tenant, &order.id, now).await?,
+        false => Vec::new(),
+    };
+    let by = order.by.clone();
+    let event = AuditEvent {
+        key: by.key,
+        address: by.address,
+        request: by.request,
+        ..AuditEvent::new(now, Activity::Delete, tenant.clone(), by.name)
+    };
+    let recorded = append(to, &[event.on(&order.id)]).await?;
+    let receipt = Receipt {
+        id: random_id(PREFIX),
+        tenant: tenant.clone(),
+        item: order.id.clone(),
+        erased_at: now,
+        erased_by: order.by.name.clone(),
+        audit: AuditMark {
+            sequence: recorded.sequence,
+            hash: recorded.hash,
+        },
+        reason: order.reason,
+        items,
+        jobs,
+    };
+    query(
+        "INSERT INTO erasures (id, tenant, item, erased_at, erased_by, receipt)
+         VALUES ($1, $2, $3, $4, $5, $6)",
+    )
+    .bind(&receipt.id)
+    .bind(tenant.as_str())
+    .bind(&receipt.item)
+    .bind(now)
+    .bind(&receipt.erased_by)
+    .bind(to_json(&receipt)?)
+    .execute(to)
+    .await?;
+    Ok(Erased::Done(Box::new(receipt)))
+}
+
+async fn has(
+    from: &mut Transaction<'_>,
+    tenant: &Tenant,
+    id: &str,
+    renewed_before: Option<Timestamp>,
+) -> StoreResult<bool> {
+    let row = query("SELECT 1 FROM holdings WHERE tenant = $1 AND id = $2 AND renewed_at < $3")
+        .bind(tenant.as_str())
+        .bind(id)
+        .bind(renewed_before.unwrap_or(Timestamp::MAX))
+        .fetch_optional(from)
+        .await?;
+    Ok(row.is_some())
+}
+
+/// The item on legal hold that keeps this one: itself, or a volume that it was made of.
+async fn legal_hold(
+    from: &mut Transaction<'_>,
+    tenant: &Tenant,
+    id: &str,
+) -> StoreResult<Option<String>> {
+    let row = query(
+        "SELECT id FROM holdings WHERE tenant = $1 AND held_at IS NOT NULL AND id IN
+             (SELECT $2 UNION ALL SELECT volume FROM sources WHERE tenant = $1 AND id = $2)",
+    )
+    .bind(tenant.as_str())
+    .bind(id)
+    .fetch_optional(from)
+    .await?;
+    row.map(|row| row.try_get(0)).transpose()
+}
+
+/// Whether a job that has not ended needs the item.
+async fn is_needed(from: &mut Transaction<'_>, tenant: &Tenant, id: &str) -> StoreResult<bool> {
+    let row = query(
+        "SELECT 1 FROM jobs WHERE tenant = $1 AND volume = $2 AND state IN ('queued', 'running')
+         UNION ALL
+         SELECT 1 FROM jobs WHERE needs != '{}' AND state IN ('queued', 'running')
+             AND tenant = $1 AND EXISTS (SELECT 1 FROM json_each(jobs.needs) WHERE value = $2)
+         LIMIT 1",
+    )
+    .bind(tenant.as_str())
+    .bind(id)
+    .fetch_optional(from)
+    .await?;
+    Ok(row.is_some())
+}
+
+/// Deletes a tenant's holding and, if it was the last one, the record of the content.
+async fn release(
+    to: &mut Transaction<'_>,
+    tenant: &Tenant,
+    id: &str,
+    now: Timestamp,
+) -> StoreResult<ErasedItem> {
+    let files = files_of(to, id).await?;
+    query("DELETE FROM holdings WHERE tenant = $1 AND id = $2")
+        .bind(tenant.as_str())
+        .bind(id)
+        .execute(&mut *to)
+        .await?;
+    let delete = match Resource::of(id) {
+        Some(Resource::Volume) => {
+            "DELETE FROM volumes WHERE id = $1
+                 AND NOT EXISTS (SELECT 1 FROM holdings WHERE id = $1)"
+        }
+        _ => {
+            "DELETE FROM products WHERE id = $1
+                 AND NOT EXISTS (SELECT 1 FROM holdings WHERE id = $1)"
+        }
+    };
+    let done = query(delete).bind(id).execute(&mut *to).await?;
+    record_deletion(to, tenant, id, now).await?;
+    Ok(ErasedItem {
+        id: id.to_owned(),
+        files_erased: done == 1,
+        files,
+    })
+}
+
+/// The files of an item as its record describes them.
+async fn files_of(from: &mut Transaction<'_>, id: &str) -> StoreResult<Vec<ErasedFile>> {
+    let row = query(
+        "SELECT files FROM volumes WHERE id = $1 UNION ALL SELECT files FROM products WHERE id = $1",
+    )
+    .bind(id)
+    .fetch_optional(from)
+    .await?;
+    match row {
+        Some(row) => rows::json(&row, "files"),
+        None => Ok(Vec::new()),
+    }
+}
+
+/// Deletes the records of the jobs on a volume, or that needed it.
+async fn delete_jobs(
+    to: &mut Transaction<'_>,
+    tenant: &Tenant,
+    volume: &str,
+    now: Timestamp,
+) -> StoreResult<Vec<String>> {
+    let rows = query(
+        "DELETE FROM jobs WHERE state NOT IN ('queued', 'running') AND sequence IN (
+             SELECT sequence FROM jobs WHERE tenant = $1 AND volume = $2
+             UNION ALL
+             SELECT sequence FROM jobs
+             WHERE needs != '{}' AND state IN ('succeeded', 'failed', 'cancelled')
+                 AND tenant = $1 AND EXISTS (SELECT 1 FROM json_each(jobs.needs) WHERE value = $2))
+         RETURNING id",
+    )
+    .bind(tenant.as_str())
+    .bind(volume)
+    .fetch_all(&mut *to)
+    .await?;
+    let mut jobs: Vec<String> = rows::all(rows, |row| row.try_get(0))?;
+    jobs.sort();
+    for id in &jobs {
+        record_deletion(to, tenant, id, now).await?;
+    }
+    Ok(jobs)
+}
+
+/// Records that the item or job with that id was erased.
+pub(super) async fn record_deletion(
+    to: &mut Transaction<'_>,
+    tenant: &Tenant,
+    id: &str,
+    now: Timestamp,
+) -> StoreResult<()> {
+    query(
+        "INSERT INTO erased (tenant, id, erased_at) VALUES ($1, $2, $3)
+         ON CONFLICT (tenant, id) DO UPDATE SET erased_at = excluded.erased_at",
+    )
+    .bind(tenant.as_str())
+    .bind(id)
+    .bind(now)
+    .execute(to)
+    .await?;
+    Ok(())
+}

@@ -1,0 +1,120 @@
+//! What the tables of errands have in common. An errand is work towards a destination on the network
+//! (fetch a series, deliver an object, call a webhook) that waits in a table until it succeeds, is
+//! given up or is taken back. Triggers of the jobs table write the rows; see the migrations.
+
+use super::rows;
+use crate::database::SqlStore;
+use crate::query::{DbRow, query};
+use ventriform_service::hooks::{Backlog, DeliveryState};
+use ventriform_service::jobs::{StoreResult, Tenant, Timestamp};
+
+/// A table of errands.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Errands {
+    /// Series to fetch from archives.
+    Pulls,
+    /// Objects to deliver to archives.
+    Sends,
+    /// Webhooks to call.
+    Deliveries,
+}
+
+impl Errands {
+    fn table(self) -> &'static str {
+        match self {
+            Self::Pulls => "pulls",
+            Self::Sends => "sends",
+            Self::Deliveries => "deliveries",
+        }
+    }
+}
+
+impl SqlStore {
+    /// The destinations of waiting errands, each with the time when its first one is due.
+    pub(super) async fn due_destinations(
+        &self,
+        errands: Errands,
+    ) -> StoreResult<Vec<(String, Timestamp)>> {
+        let table = errands.table();
+        // Jumps through the index from destination to destination.
+        let rows = query(format!(
+            "WITH RECURSIVE found (name) AS (
+                 SELECT min(destination) FROM {table} WHERE state = 'pending'
+                 UNION ALL
+                 SELECT (SELECT min(destination) FROM {table}
+                         WHERE state = 'pending' AND destination > found.name)
+                 FROM found WHERE found.name IS NOT NULL)
+             SELECT found.name, (SELECT min(next_attempt_at) FROM {table}
+                           WHERE state = 'pending' AND destination = found.name)
+             FROM found WHERE found.name IS NOT NULL",
+        ))
+        .fetch_all(&self.readers)
+        .await?;
+        rows.iter()
+            .map(|row| Ok((row.try_get(0)?, row.try_get(1)?)))
+            .collect()
+    }
+
+    /// How many errands wait, since when, and how many were given up. Not for pulls, which have no index of
+    /// states.
+    pub(super) async fn backlog_of(&self, errands: Errands) -> StoreResult<Backlog> {
+        let table = errands.table();
+        let row = query(format!(
+            "SELECT (SELECT count(*) FROM {table} WHERE state = 'pending'),
+                    (SELECT min(since) FROM {table} WHERE state = 'pending'),
+                    (SELECT count(*) FROM {table} WHERE state = 'dead')",
+        ))
+        .fetch_one(&self.readers)
+        .await?;
+        let count = |column: usize| row.try_get(column).map(rows::unsigned);
+        Ok(Backlog {
+            pending: count(0)?,
+            oldest: row.try_get(1)?,
+            dead: count(2)?,
+        })
+    }
+
+    /// Lets an ended errand of a job wait again, unless what it would deliver was erased. Returns its row as
+    /// it is then, or nothing if the job has no such errand.
+    pub(super) async fn run_again(
+        &self,
+        errands: Errands,
+        (tenant, job, id): (&Tenant, &str, &str),
+        now: Timestamp,
+    ) -> StoreResult<Option<DbRow>> {
+        let table = errands.table();
+        let mut transaction = self.writer.begin().await?;
+        query(format!(
+            "UPDATE {table} SET state = 'pending', attempts = 0, since = $1, next_attempt_at = $1,
+                    ended_at = NULL
+             WHERE id = $2 AND job = $3 AND tenant = $4 AND state != 'pending'
+               AND last_outcome IS DISTINCT FROM 'erased'",
+        ))
+        .bind(now)
+        .bind(id)
+        .bind(job)
+        .bind(tenant.as_str())
+        .execute(&mut transaction)
+        .await?;
+        let found = format!("SELECT * FROM {table} WHERE id = $1 AND job = $2 AND tenant = $3");
+        let row = query(found)
+            .bind(id)
+            .bind(job)
+            .bind(tenant.as_str())
+            .fetch_optional(&mut transaction)
+            .await?;
+        transaction.commit().await?;
+        Ok(row)
+    }
+}
+
+/// The state of an errand's row.
+pub(super) fn state(row: &DbRow) -> StoreResult<DeliveryState> {
+    Ok(DeliveryState::parse(row.try_get("state")?).unwrap_or(DeliveryState::Dead))
+}
+
+/// When an errand's row in that state is tried next.
+pub(super) fn next_attempt(row: &DbRow, state: DeliveryState) -> StoreResult<Option<Timestamp>> {
+    let at: Timestamp = row.try_get("next_attempt_at")?;
+    Ok((state == DeliveryState::Pending).then_some(at))
+}

@@ -1,0 +1,146 @@
+//! The table of work items.
+
+use super::rows::{self, to_json};
+use crate::database::SqlStore;
+use crate::query::{DbRow, query};
+use async_trait::async_trait;
+use ventriform_service::jobs::{StoreError, StoreResult, Tenant, Timestamp};
+use ventriform_service::worklist::{
+    AddedWorkitem, BATCH_BYTES, DataSetJson, Workitem, WorkitemState, Worklist,
+};
+
+#[async_trait]
+impl Worklist for SqlStore {
+    async fn add_workitem(&self, item: &Workitem, limit: u64) -> StoreResult<AddedWorkitem> {
+        self.require_room()?;
+        let added = query(
+            "INSERT INTO workitems (tenant, uid, state, attributes, changed_at)
+             SELECT $1, $2, $3, $4, $5
+             WHERE (SELECT count(*) FROM workitems WHERE tenant = $1) < $6
+             ON CONFLICT (tenant, uid) DO NOTHING",
+        )
+        .bind(item.tenant.as_str())
+        .bind(&item.uid)
+        .bind(item.state.as_str())
+        .bind(to_json(item.attributes.object())?)
+        .bind(item.changed_at)
+        .bind(i64::try_from(limit).unwrap_or(i64::MAX))
+        .write(&self.writer)
+        .await?;
+        if added == 1 {
+            return Ok(AddedWorkitem::Done);
+        }
+        Ok(match self.workitem(&item.tenant, &item.uid).await? {
+            Some(_) => AddedWorkitem::Exists,
+            None => AddedWorkitem::Full,
+        })
+    }
+
+    async fn workitem(&self, tenant: &Tenant, uid: &str) -> StoreResult<Option<Workitem>> {
+        let row = query("SELECT * FROM workitems WHERE tenant = $1 AND uid = $2")
+            .bind(tenant.as_str())
+            .bind(uid)
+            .fetch_optional(&self.readers)
+            .await?;
+        row.map(item_of).transpose()
+    }
+
+    async fn change_workitem(&self, item: &Workitem) -> StoreResult<bool> {
+        let changed = query(
+            "UPDATE workitems SET state = $1, transaction_uid = $2, performer = $3, attributes = $4,
+                 changed_at = $5, revision = revision + 1
+             WHERE tenant = $6 AND uid = $7 AND revision = $8",
+        )
+        .bind(item.state.as_str())
+        .bind(&item.transaction)
+        .bind(&item.performer)
+        .bind(to_json(item.attributes.object())?)
+        .bind(item.changed_at)
+        .bind(item.tenant.as_str())
+        .bind(&item.uid)
+        .bind(item.revision)
+        .write(&self.writer)
+        .await?;
+        Ok(changed == 1)
+    }
+
+    async fn workitems(
+        &self,
+        tenant: &Tenant,
+        state: Option<WorkitemState>,
+        after: i64,
+        limit: u32,
+    ) -> StoreResult<Vec<Workitem>> {
+        let state = state.map(WorkitemState::as_str);
+        let items = match state {
+            None => query(batch("tenant = $4")).bind(after).bind(limit),
+            Some(_) => query(batch("tenant = $4 AND state = $5"))
+                .bind(after)
+                .bind(limit),
+        };
+        let items = items.bind(most_bytes()).bind(tenant.as_str());
+        let items = match state {
+            None => items,
+            Some(state) => items.bind(state),
+        };
+        rows::all(items.fetch_all(&self.readers).await?, item_of)
+    }
+
+    async fn scheduled_workitems(&self, after: i64, limit: u32) -> StoreResult<Vec<Workitem>> {
+        let items = query(batch("state = 'SCHEDULED'")).bind(after).bind(limit);
+        let items = items.bind(most_bytes()).fetch_all(&self.readers);
+        rows::all(items.await?, item_of)
+    }
+
+    async fn performed_workitems(&self, after: i64, limit: u32) -> StoreResult<Vec<Workitem>> {
+        let which = "state = 'IN PROGRESS' AND performer IS NOT NULL";
+        let items = query(batch(which)).bind(after).bind(limit);
+        let items = items.bind(most_bytes()).fetch_all(&self.readers);
+        rows::all(items.await?, item_of)
+    }
+
+    async fn delete_ended_workitems(&self, before: Timestamp) -> StoreResult<u64> {
+        query(
+            "DELETE FROM workitems
+             WHERE state IN ('COMPLETED', 'CANCELED') AND changed_at < $1",
+        )
+        .bind(before)
+        .write(&self.writer)
+        .await
+    }
+}
+
+/// A statement for the items for which `which` holds: at most `$2` after position `$1`, as long as those before each
+/// have fewer than `$3` bytes together. Sizes are added up before any item is read.
+fn batch(which: &str) -> String {
+    format!(
+        "SELECT * FROM workitems WHERE sequence IN (
+             SELECT sequence FROM (
+                 SELECT sequence, bytes, sum(bytes) OVER (ORDER BY sequence) AS total FROM (
+                     SELECT sequence, bytes FROM workitems WHERE {which} AND sequence > $1
+                     ORDER BY sequence LIMIT $2) AS next) AS added
+             WHERE total - bytes < $3)
+         ORDER BY sequence"
+    )
+}
+
+fn most_bytes() -> i64 {
+    i64::try_from(BATCH_BYTES).unwrap_or(i64::MAX)
+}
+
+fn item_of(row: DbRow) -> StoreResult<Workitem> {
+    let damaged = |what: String| StoreError::database(format!("damaged row: {what}"));
+    let state: &str = row.try_get("state")?;
+    let attributes = DataSetJson::of(rows::json(&row, "attributes")?);
+    Ok(Workitem {
+        tenant: rows::tenant(&row)?,
+        uid: row.try_get("uid")?,
+        sequence: row.try_get("sequence")?,
+        revision: row.try_get("revision")?,
+        state: WorkitemState::parse(state).ok_or_else(|| damaged(state.to_owned()))?,
+        transaction: row.try_get("transaction_uid")?,
+        performer: row.try_get("performer")?,
+        attributes: attributes.map_err(|error| damaged(error.to_string()))?,
+        changed_at: row.try_get("changed_at")?,
+    })
+}

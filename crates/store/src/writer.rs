@@ -1,0 +1,327 @@
+//! The one connection that writes, and how a failed write ends.
+//!
+//! SQLite allows one writer at a time, so writers wait for one connection in order instead of
+//! polling for the database's lock. Every write goes through [`Writer::begin`] and
+//! [`WriteTransaction::commit`]:
+//!
+//! 1. wait for the connection, and for other processes that hold the database's lock, for at most
+//!    the set time in all;
+//! 2. run the statements within `BEGIN IMMEDIATE` and `COMMIT`;
+//! 3. keep the connection only if the commit succeeded.
+//!
+//! A transaction that ends in any other way (a failed statement, a failed commit, a caller that
+//! went away) closes the connection with it, and the next write opens a new one. So no write can
+//! fall into the open transaction of an earlier one, which would report success for changes that
+//! are never committed.
+//!
+//! Readers that keep what they read ask [`Writer::version`] before and after: what was read while the
+//! version stayed the same is current until it changes.
+//!
+//! Single statements are wrapped too: when a statement that returns rows is reset, SQLite commits
+//! it, and the driver ignores errors of that commit.
+
+use crate::faults;
+use sqlx::query::Query;
+use sqlx::sqlite::{SqliteArguments, SqliteConnectOptions, SqliteRow};
+use sqlx::{ConnectOptions, Row, Sqlite, SqliteConnection};
+use std::ops::{Deref, DerefMut};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
+use tokio::sync::{Mutex, MutexGuard};
+use tokio::time::{Instant, timeout_at};
+use ventriform_service::jobs::{StoreError, StoreFault, StoreResult};
+
+/// How long SQLite itself waits for the database's lock before [`Writer::begin`] looks at the
+/// time and asks again.
+const LOCK_POLL: Duration = Duration::from_millis(100);
+
+/// The connection that writes.
+pub(super) struct Writer {
+    options: SqliteConnectOptions,
+    /// `None` before the first write, and after one that failed.
+    connection: Mutex<Option<SqliteConnection>>,
+    wait: Duration,
+    /// Whether the last write did not end with a commit.
+    suspect: AtomicBool,
+    /// Even when nothing is being written. Odd from the beginning of a write to the end of its
+    /// commit; without a commit, to the beginning of the next write, which waits for the lock of the
+    /// one before: until then the changes of that one may still reach the disk.
+    version: AtomicU64,
+}
+
+impl Writer {
+    /// Connects when the first write comes. `wait` is the longest time that a write waits for its
+    /// turn.
+    pub fn new(options: &SqliteConnectOptions, wait: Duration) -> Self {
+        Self {
+            options: options.clone().busy_timeout(LOCK_POLL.min(wait)),
+            connection: Mutex::new(None),
+            wait,
+            suspect: AtomicBool::new(false),
+            version: AtomicU64::new(0),
+        }
+    }
+
+    /// A number that every write changes; `None` while there may be one under way.
+    pub fn version(&self) -> Option<u64> {
+        let version = self.version.load(Ordering::SeqCst);
+        version.is_multiple_of(2).then_some(version)
+    }
+
+    /// Starts a transaction that holds the database's write lock.
+    pub async fn begin(&self) -> StoreResult<WriteTransaction<'_>> {
+        let deadline = Instant::now() + self.wait;
+        let mut place = timeout_at(deadline, self.connection.lock())
+            .await
+            .map_err(|_| busy("other writes take too long"))?;
+        loop {
+            let mut connection = match place.take() {
+                Some(connection) => connection,
+                None => self.options.connect().await.map_err(faults::of_sqlite)?,
+            };
+            match sqlx::query("BEGIN IMMEDIATE")
+                .execute(&mut connection)
+                .await
+            {
+                Ok(_) => {
+                    self.suspect.store(true, Ordering::Relaxed);
+                    let odd = |version: u64| Some(version + 1 + version % 2);
+                    let _ = self
+                        .version
+                        .fetch_update(Ordering::SeqCst, Ordering::SeqCst, odd);
+                    return Ok(WriteTransaction {
+                        writer: self,
+                        place,
+                        connection,
+                    });
+                }
+                Err(error) => {
+                    let error = faults::of_sqlite(error);
+                    if error.cause() != StoreFault::Busy {
+                        self.suspect.store(true, Ordering::Relaxed);
+                        return Err(error);
+                    }
+                    // No transaction was begun, so the connection is as it was.
+                    *place = Some(connection);
+                    if Instant::now() >= deadline {
+                        return Err(busy("another process holds the database's lock"));
+                    }
+                }
+            }
+        }
+    }
+
+    /// A connection of its own, beside the one that writes.
+    pub async fn connect(&self) -> StoreResult<SqliteConnection> {
+        self.options.connect().await.map_err(faults::of_sqlite)
+    }
+
+    /// Moves the write-ahead log into the database and empties it. `false` if a reader was in the
+    /// way.
+    pub async fn truncate_log(&self) -> StoreResult<bool> {
+        let deadline = Instant::now() + self.wait;
+        let mut place = timeout_at(deadline, self.connection.lock())
+            .await
+            .map_err(|_| busy("other writes take too long"))?;
+        let mut connection = match place.take() {
+            Some(connection) => connection,
+            None => self.options.connect().await.map_err(faults::of_sqlite)?,
+        };
+        let row = sqlx::query("PRAGMA wal_checkpoint(TRUNCATE)")
+            .fetch_one(&mut connection)
+            .await
+            .map_err(faults::of_sqlite)?;
+        *place = Some(connection);
+        Ok(row.try_get::<i64, _>(0).map_err(faults::of_sqlite)? == 0)
+    }
+
+    /// Whether the last write failed or was abandoned, so that only another write can tell
+    /// whether the database can be written.
+    pub fn is_suspect(&self) -> bool {
+        self.suspect.load(Ordering::Relaxed)
+    }
+
+    /// Closes the connection; later writes fail to wait for it.
+    pub async fn close(&self) {
+        use sqlx::Connection;
+        if let Some(connection) = self.connection.lock().await.take()
+            && let Err(error) = connection.close().await
+        {
+            tracing::warn!(%error, "the database was not closed in order; the next start recovers it");
+        }
+    }
+}
+
+fn busy(what: &str) -> StoreError {
+    StoreError::Database {
+        cause: StoreFault::Busy,
+        message: what.to_owned(),
+    }
+}
+
+/// A transaction. Dropping it without [`WriteTransaction::commit`] rolls it back and closes the
+/// connection.
+pub(super) struct WriteTransaction<'a> {
+    writer: &'a Writer,
+    place: MutexGuard<'a, Option<SqliteConnection>>,
+    connection: SqliteConnection,
+}
+
+impl WriteTransaction<'_> {
+    /// Makes the changes durable.
+    ///
+    /// # Errors
+    /// If they may not be on disk.
+    pub async fn commit(mut self) -> StoreResult<()> {
+        sqlx::query("COMMIT")
+            .execute(&mut self.connection)
+            .await
+            .map_err(faults::of_sqlite)?;
+        self.writer.suspect.store(false, Ordering::Relaxed);
+        self.writer.version.fetch_add(1, Ordering::SeqCst);
+        *self.place = Some(self.connection);
+        Ok(())
+    }
+}
+
+impl Deref for WriteTransaction<'_> {
+    type Target = SqliteConnection;
+
+    fn deref(&self) -> &SqliteConnection {
+        &self.connection
+    }
+}
+
+impl DerefMut for WriteTransaction<'_> {
+    fn deref_mut(&mut self) -> &mut SqliteConnection {
+        &mut self.connection
+    }
+}
+
+/// A single statement as a transaction of its own.
+pub(super) trait Write: Sized {
+    /// Runs it; returns the rows of its `RETURNING`.
+    async fn write_all(self, writer: &Writer) -> StoreResult<Vec<SqliteRow>>;
+
+    /// Runs it; returns the number of rows it changed.
+    async fn write(self, writer: &Writer) -> StoreResult<u64>;
+}
+
+impl Write for Query<'_, Sqlite, SqliteArguments> {
+    async fn write_all(self, writer: &Writer) -> StoreResult<Vec<SqliteRow>> {
+        let mut transaction = writer.begin().await?;
+        let rows = self
+            .fetch_all(&mut *transaction)
+            .await
+            .map_err(faults::of_sqlite)?;
+        transaction.commit().await?;
+        Ok(rows)
+    }
+
+    async fn write(self, writer: &Writer) -> StoreResult<u64> {
+        let mut transaction = writer.begin().await?;
+        let done = self
+            .execute(&mut *transaction)
+            .await
+            .map_err(faults::of_sqlite)?;
+        transaction.commit().await?;
+        Ok(done.rows_affected())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sqlx::Row;
+
+    async fn writer(folder: &std::path::Path, wait: u64) -> Writer {
+        let options = SqliteConnectOptions::new()
+            .filename(folder.join("test.db"))
+            .create_if_missing(true)
+            .journal_mode(sqlx::sqlite::SqliteJournalMode::Wal);
+        let writer = Writer::new(&options, Duration::from_millis(wait));
+        sqlx::query("CREATE TABLE IF NOT EXISTS t (x)")
+            .write(&writer)
+            .await
+            .unwrap();
+        writer
+    }
+
+    async fn seen_by_others(writer: &Writer) -> i64 {
+        let mut other = writer.options.connect().await.unwrap();
+        let row = sqlx::query("SELECT count(*) FROM t");
+        row.fetch_one(&mut other).await.unwrap().get(0)
+    }
+
+    #[tokio::test]
+    async fn writes_after_a_full_disk_are_seen_by_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let writer = writer(folder.path(), 1000).await;
+        for _ in 0..3 {
+            let mut transaction = writer.begin().await.unwrap();
+            // The connection takes the disk to be full.
+            sqlx::query("PRAGMA max_page_count = 2")
+                .execute(&mut *transaction)
+                .await
+                .unwrap();
+            let error = sqlx::query("INSERT INTO t VALUES (zeroblob(100000))")
+                .execute(&mut *transaction)
+                .await
+                .unwrap_err();
+            assert_eq!(faults::of_sqlite(error).cause(), StoreFault::Full);
+            drop(transaction);
+            assert!(writer.is_suspect());
+        }
+        let done = sqlx::query("INSERT INTO t VALUES (1)").write(&writer).await;
+        assert_eq!(done.unwrap(), 1);
+        assert!(!writer.is_suspect());
+        assert_eq!(seen_by_others(&writer).await, 1);
+    }
+
+    #[tokio::test]
+    async fn a_transaction_whose_caller_went_away_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let writer = writer(folder.path(), 1000).await;
+        let mut transaction = writer.begin().await.unwrap();
+        sqlx::query("INSERT INTO t VALUES (1)")
+            .execute(&mut *transaction)
+            .await
+            .unwrap();
+        assert_eq!(writer.version(), None, "it is under way");
+        drop(transaction);
+        assert_eq!(writer.version(), None, "its end is not known");
+        let row = sqlx::query("INSERT INTO t VALUES (2) RETURNING x")
+            .write_all(&writer)
+            .await
+            .unwrap();
+        assert_eq!(row[0].get::<i64, _>(0), 2);
+        let version = writer.version();
+        assert!(version.is_some());
+        let done = sqlx::query("DELETE FROM t WHERE x = 3").write(&writer);
+        assert_eq!(done.await.unwrap(), 0);
+        assert!(writer.version().is_some());
+        assert_ne!(writer.version(), version);
+        assert_eq!(seen_by_others(&writer).await, 1);
+    }
+
+    #[tokio::test]
+    async fn writes_give_up_together_when_another_process_holds_the_lock() {
+        let folder = tempfile::tempdir().unwrap();
+        let writer = writer(folder.path(), 1500).await;
+        let mut other = writer.options.connect().await.unwrap();
+        sqlx::query("BEGIN IMMEDIATE")
+            .execute(&mut other)
+            .await
+            .unwrap();
+        let started = std::time::Instant::now();
+        let write = || sqlx::query("INSERT INTO t VALUES (1)").write(&writer);
+        let outcomes = tokio::join!(write(), write(), write(), write());
+        for outcome in [outcomes.0, outcomes.1, outcomes.2, outcomes.3] {
+            assert_eq!(outcome.unwrap_err().cause(), StoreFault::Busy);
+        }
+        // One after the other, they would have waited 6 s.
+        assert!(started.elapsed() < Duration::from_millis(4500));
+        sqlx::query("ROLLBACK").execute(&mut other).await.unwrap();
+        assert_eq!(write().await.unwrap(), 1);
+    }
+}

@@ -1,0 +1,323 @@
+//! The polar map as a picture, for SVG and PNG.
+
+use std::f64::consts::TAU;
+use std::sync::LazyLock;
+
+use serde::Deserialize;
+
+use super::{COLUMNS, Level, PolarMap, Projection, ROWS, territory};
+use crate::draw::vector::{Drawing, Point, Rgb, VectorShape};
+
+/// Height of the picture, pixels.
+const SIZE: usize = 640;
+/// Its width: the map, and the colour bar on its right.
+const WIDTH: usize = 760;
+/// Radius of the map.
+const RADIUS: f64 = 280.0;
+const CENTRE: f64 = SIZE as f64 / 2.0;
+/// Height of a line of text.
+const TEXT: f64 = 18.0;
+
+/// The colours of maps, which the page (`web/src/viewer/colours.ts`) reads from the same file.
+#[derive(Deserialize)]
+struct Palette {
+    /// Dark to bright, equal steps of lightness (a polyline through matplotlib's `inferno`).
+    colours: [[f64; 3]; 6],
+    /// Outside of the wall.
+    no_wall: Rgb,
+    /// The line about the wall below the threshold.
+    threshold: Rgb,
+}
+
+static PALETTE: LazyLock<Palette> = LazyLock::new(|| {
+    serde_json::from_str(include_str!("../../../../web/uptake.json"))
+        .expect("the file holds what `Palette` names")
+});
+
+const BORDER: Rgb = [200; 3];
+/// Borders between the territories of two arteries.
+const TERRITORY_BORDER: Rgb = [255; 3];
+const WHITE: Rgb = [255; 3];
+const BLACK: Rgb = [0; 3];
+
+/// The four letters round the map: anterior, septal, inferior, lateral, in turns from lateral.
+const SIDES: [(char, f64); 4] = [('A', 0.25), ('S', 0.5), ('I', 0.75), ('L', 0.0)];
+
+/// The map as SVG: uptake, borders of segments and territories, the means of both in per cent, a line about
+/// the wall below the threshold, a colour bar with the threshold marked. Grey is outside of the wall.
+/// Without orientation, "ORIENTATION UNKNOWN" instead of sides and territories.
+pub fn svg(map: &PolarMap) -> String {
+    drawing(map).svg()
+}
+
+/// The same picture as an RGB PNG of 760 × 640 pixels.
+pub fn png(map: &PolarMap) -> Vec<u8> {
+    drawing(map).image().png()
+}
+
+fn drawing(map: &PolarMap) -> Drawing {
+    let rings = rings(map);
+    let places = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column)));
+    let tiles = places.map(|(row, column)| VectorShape::Polygon {
+        corners: tile(map, &rings, row, column),
+        fill: shade(map, row, column),
+    });
+    Drawing {
+        title: format!(
+            "Polar map, per cent of {:.4}; extent below {:.0} %: {:.1} % of the wall; grey: no wall{}",
+            map.reference,
+            100.0 * map.threshold,
+            map.extent_percent,
+            if map.is_oriented() {
+                ""
+            } else {
+                "; orientation unknown"
+            }
+        ),
+        width: WIDTH,
+        height: SIZE,
+        shapes: tiles
+            .chain(threshold_line(map, &rings))
+            .chain(borders(map, &rings))
+            .chain(labels(map, &rings))
+            .chain(colour_bar(map))
+            .chain(sums(map))
+            .collect(),
+    }
+}
+
+/// The radii at which the levels end, as shares of the map's.
+pub(super) fn rings(map: &PolarMap) -> [f64; 4] {
+    let standard = [0.25, 0.5, 0.75, 1.0];
+    if map.projection == Projection::Standard {
+        return standard;
+    }
+    let area = |level: Level| -> f64 {
+        let places = (0..ROWS * COLUMNS)
+            .filter(|index| map.levels.of_pixel(index / COLUMNS, index % COLUMNS) == level);
+        places
+            .filter_map(|index| Some(map.pixels[index]?.area))
+            .sum()
+    };
+    let areas = Level::ALL.map(area);
+    let all: f64 = areas.iter().sum();
+    if !(all > 0.0) {
+        return standard;
+    }
+    let mut inner = 0.0;
+    areas.map(|area| {
+        inner += area / all;
+        inner.sqrt()
+    })
+}
+
+/// The colour of a place of the map.
+fn shade(map: &PolarMap, row: usize, column: usize) -> Rgb {
+    match map.pixels[row * COLUMNS + column] {
+        Some(pixel) if map.reference > 0.0 => colour(pixel.max / map.reference),
+        _ => PALETTE.no_wall,
+    }
+}
+
+/// The colour of an uptake in per cent of the reference, sRGB, 0..=1; grey where there is no wall (NaN).
+pub fn colour_of(percent: f64) -> [f64; 3] {
+    let rgb = if percent.is_nan() {
+        PALETTE.no_wall
+    } else {
+        colour(percent / 100.0)
+    };
+    rgb.map(|part| f64::from(part) / 255.0)
+}
+
+fn colour(share: f64) -> Rgb {
+    let colours = &PALETTE.colours;
+    let at = share.clamp(0.0, 1.0) * (colours.len() - 1) as f64;
+    let step = (at as usize).min(colours.len() - 2);
+    let t = at - step as f64;
+    std::array::from_fn(|c| {
+        (colours[step][c] + t * (colours[step + 1][c] - colours[step][c])).round() as u8
+    })
+}
+
+/// The outline of one pixel of the map, slightly enlarged so that no gaps show between
+/// neighbours.
+fn tile(map: &PolarMap, rings: &[f64; 4], row: usize, column: usize) -> Vec<Point> {
+    let shares = [row as f64, row as f64 + 1.03].map(|rows| map.levels.share(rows, column, rings));
+    let turns = [column as f64, column as f64 + 1.03].map(|c| c / COLUMNS as f64);
+    vec![
+        screen(shares[0], turns[0]),
+        screen(shares[1], turns[0]),
+        screen(shares[1], turns[1]),
+        screen(shares[0], turns[1]),
+    ]
+}
+
+/// The edges between pixels below the threshold and others.
+fn threshold_line(map: &PolarMap, rings: &[f64; 4]) -> Vec<VectorShape> {
+    let limit = map.threshold * map.reference;
+    let below = |row: usize, column: usize| {
+        let pixel = map.pixels[row * COLUMNS + column % COLUMNS];
+        pixel.map(|pixel| pixel.max < limit)
+    };
+    let place = |rows: usize, column: usize, side: usize| {
+        let share = map.levels.share(rows as f64, column % COLUMNS, rings);
+        screen(share, (column + side) as f64 / COLUMNS as f64)
+    };
+    let line = |ends: [Point; 2]| VectorShape::Line {
+        ends,
+        stroke: PALETTE.threshold,
+        width: 2.5,
+    };
+    let mut lines = Vec::new();
+    for column in 0..COLUMNS {
+        for row in 0..ROWS {
+            let Some(here) = below(row, column) else {
+                continue;
+            };
+            if row + 1 < ROWS && below(row + 1, column) == Some(!here) {
+                lines.push(line([place(row + 1, column, 0), place(row + 1, column, 1)]));
+            }
+            if below(row, column + 1) == Some(!here) {
+                lines.push(line([place(row, column, 1), place(row + 1, column, 1)]));
+            }
+        }
+    }
+    lines
+}
+
+/// The borders of the segments; those between two territories are thicker.
+fn borders(map: &PolarMap, rings: &[f64; 4]) -> Vec<VectorShape> {
+    let mut shapes: Vec<VectorShape> = rings
+        .iter()
+        .map(|share| VectorShape::Circle {
+            centre: [CENTRE; 2],
+            radius: RADIUS * share,
+            stroke: BORDER,
+            width: 1.5,
+        })
+        .collect();
+    // First segment of a level, number of its segments.
+    for (level, first, count) in [(1, 13, 4), (2, 7, 6), (3, 1, 6)] {
+        for k in 0..count {
+            // Segments follow each other counter-clockwise; the first is centred on anterior.
+            let turns = 0.25 + (k as f64 - 0.5) / count as f64;
+            let pair = [(k + count - 1) % count, k].map(|k| territory(first + k));
+            let (stroke, width) = match pair[0] == pair[1] || !map.is_oriented() {
+                true => (BORDER, 1.5),
+                false => (TERRITORY_BORDER, 4.0),
+            };
+            shapes.push(VectorShape::Line {
+                ends: [screen(rings[level - 1], turns), screen(rings[level], turns)],
+                stroke,
+                width,
+            });
+        }
+    }
+    shapes
+}
+
+/// The segments' means and the letters of the four sides.
+fn labels<'a>(map: &'a PolarMap, rings: &'a [f64; 4]) -> impl Iterator<Item = VectorShape> + 'a {
+    let means = map.segments.iter().map(|segment| {
+        let mean = segment.mean_percent;
+        let (share, turns) = label_place(segment.number, rings);
+        // Black on bright tiles, white on dark ones.
+        let bright = mean.is_some_and(|mean| mean > 62.0);
+        VectorShape::Label {
+            middle: screen(share, turns),
+            text: mean.map_or_else(|| "-".to_owned(), |mean| format!("{mean:.0}")),
+            size: TEXT,
+            ink: if bright { BLACK } else { WHITE },
+            rim: Some(if bright { WHITE } else { BLACK }),
+        }
+    });
+    let letters = SIDES
+        .map(|(letter, turns)| text(screen(1.07, turns), letter.to_string()))
+        .into_iter()
+        .filter(|_| map.is_oriented());
+    let unknown = text(
+        [CENTRE, SIZE as f64 - 18.0],
+        "ORIENTATION UNKNOWN".to_owned(),
+    );
+    let unknown = (!map.is_oriented()).then_some(unknown);
+    means.chain(letters).chain(unknown)
+}
+
+fn text(middle: Point, text: String) -> VectorShape {
+    VectorShape::Label {
+        middle,
+        text,
+        size: TEXT,
+        ink: BLACK,
+        rim: None,
+    }
+}
+
+/// Centre of a segment: share of the radius and angle in turns from lateral.
+fn label_place(segment: usize, rings: &[f64; 4]) -> (f64, f64) {
+    let between = |level: usize| f64::midpoint(rings[level - 1], rings[level]);
+    match segment {
+        17 => (0.0, 0.0),
+        13..=16 => (between(1), 0.25 + (segment - 13) as f64 / 4.0),
+        7..=12 => (between(2), 0.25 + (segment - 7) as f64 / 6.0),
+        _ => (between(3), 0.25 + (segment - 1) as f64 / 6.0),
+    }
+}
+
+/// The colours from 0 to 100 per cent, with the threshold.
+fn colour_bar(map: &PolarMap) -> Vec<VectorShape> {
+    const STEPS: usize = 100;
+    let (left, right, top, bottom) = (652.0, 676.0, 140.0, 500.0);
+    let height = |share: f64| bottom - (bottom - top) * share;
+    let mut shapes: Vec<VectorShape> = (0..STEPS)
+        .map(|step| {
+            let ends = [step as f64, step as f64 + 1.03].map(|s| height(s / STEPS as f64));
+            VectorShape::Polygon {
+                corners: vec![
+                    [left, ends[0]],
+                    [right, ends[0]],
+                    [right, ends[1]],
+                    [left, ends[1]],
+                ],
+                fill: colour((step as f64 + 0.5) / STEPS as f64),
+            }
+        })
+        .collect();
+    for percent in [0, 25, 50, 75, 100] {
+        let y = height(f64::from(percent) / 100.0);
+        shapes.push(VectorShape::Line {
+            ends: [[right, y], [right + 6.0, y]],
+            stroke: BLACK,
+            width: 1.5,
+        });
+        shapes.push(text([right + 28.0, y], percent.to_string()));
+    }
+    shapes.push(text([(left + right) / 2.0, top - 24.0], "%".to_owned()));
+    let y = height(map.threshold.clamp(0.0, 1.0));
+    shapes.push(VectorShape::Line {
+        ends: [[left - 6.0, y], [right + 6.0, y]],
+        stroke: PALETTE.threshold,
+        width: 3.0,
+    });
+    shapes
+}
+
+/// The territories' means, below the colour bar.
+fn sums(map: &PolarMap) -> Vec<VectorShape> {
+    let lines = map.territories.iter().enumerate();
+    lines
+        .filter(|_| map.is_oriented())
+        .map(|(line, territory)| {
+            let mean = territory.mean_percent;
+            let mean = mean.map_or_else(|| "-".to_owned(), |mean| format!("{mean:.0}"));
+            let y = 540.0 + 28.0 * line as f64;
+            text([688.0, y], format!("{} {mean}", territory.name))
+        })
+        .collect()
+}
+
+/// Place in the picture of a share of the radius and an angle in turns from lateral.
+fn screen(share: f64, turns: f64) -> Point {
+    let (sin, cos) = (TAU * turns).sin_cos();
+    [CENTRE + RADIUS * share * cos, CENTRE - RADIUS * share * sin]
+}
