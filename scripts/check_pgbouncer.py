@@ -50,15 +50,22 @@ class Postgres:
     """A server whose log has every statement with its values, by the process that ran it."""
 
     def __init__(self, folder):
-        self.data, self.port = folder + "/postgres", free_port()
+        self.data = folder + "/postgres"
         subprocess.run([*AS_USER, BIN + "initdb", "-A", "trust", "-U", "ventriform", "-E", "UTF8", "--no-locale", "-N", self.data],
                        check=True, cwd="/", stdout=subprocess.DEVNULL)
         settings = ["listen_addresses=127.0.0.1", "fsync=off", "log_statement=all", "log_line_prefix=%p ", "unix_socket_directories="]
+        settings = [word for setting in settings for word in ("-c", setting)]
         self.log = open(folder + "/postgres.log", "wb")
-        command = [*AS_USER, BIN + "postgres", "-D", self.data, "-p", str(self.port), *(w for s in settings for w in ("-c", s))]
-        self.process = subprocess.Popen(command, cwd="/", stdout=self.log, stderr=self.log)
-        ready = [BIN + "pg_isready", "-q", "-h", "127.0.0.1", "-p", str(self.port), "-U", "ventriform"]
-        until(lambda: subprocess.run(ready).returncode == 0, "PostgreSQL")
+        # Another check may have taken the port before the server does.
+        for _ in range(3):
+            self.port = free_port()
+            command = [*AS_USER, BIN + "postgres", "-D", self.data, "-p", str(self.port), *settings]
+            self.process = subprocess.Popen(command, cwd="/", stdout=self.log, stderr=self.log)
+            ready = [BIN + "pg_isready", "-q", "-h", "127.0.0.1", "-p", str(self.port), "-U", "ventriform"]
+            until(lambda: self.process.poll() is not None or subprocess.run(ready).returncode == 0, "PostgreSQL", 60)
+            if self.process.poll() is None:
+                return
+        raise SystemExit("PostgreSQL does not start: " + open(self.log.name, errors="replace").read()[-2000:])
 
     def psql(self, text, database="ventriform", **more):
         command = [BIN + "psql", "-h", "127.0.0.1", "-p", str(self.port), "-U", "ventriform", "-Atqc", text, database]
