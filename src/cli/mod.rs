@@ -37,6 +37,7 @@ use std::process::ExitCode;
 /// Surface models of the left ventricle from cardiac SPECT
 #[derive(Debug, Parser)]
 #[command(
+    name = "ventriform",
     version,
     after_help = "Start with:
   ventriform demo                            a model of a simulated scan, through the service
@@ -111,7 +112,7 @@ pub fn main() -> ExitCode {
         Command::Migrate(args) => migrate::run(&args),
         Command::Completions { shell } => {
             let mut script = Vec::new();
-            let name = env!("CARGO_PKG_NAME");
+            let name = "ventriform";
             clap_complete::generate(shell, &mut Cli::command(), name, &mut script);
             output::write_out(&script);
             Ok(())

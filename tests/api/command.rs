@@ -33,6 +33,20 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
+/// Whatever package a part of it is compiled in.
+#[test]
+fn the_program_has_one_name() {
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, wanted) in [
+        (&["--version"][..], "ventriform 0."),
+        (&["completions", "bash"], "_ventriform()"),
+    ] {
+        let output = program(folder.path(), arguments).output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert!(text.starts_with(wanted), "{text}");
+    }
+}
+
 #[test]
 fn a_reader_that_is_gone_is_no_failure_and_a_full_disk_is_one() {
     let folder = folder();

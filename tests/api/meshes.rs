@@ -63,6 +63,7 @@ async fn a_template_is_the_same_in_whatever_format_it_comes() {
     assert_eq!(added.status(), StatusCode::CREATED);
     let first: Value = added.json().await.unwrap();
     assert_eq!(first["summary"]["warnings"], serde_json::json!([]));
+    assert_eq!(first["software"]["name"], "ventriform");
     for format in Format::ALL {
         let bytes = export::encode(format, &mesh, &Metadata::new("t")).unwrap();
         for media_type in [format.media_type(), "application/octet-stream"] {

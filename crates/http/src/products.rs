@@ -250,7 +250,7 @@ impl SoftwareBody {
     /// The program that made `product`.
     pub fn of(product: &Product) -> Self {
         Self {
-            name: env!("CARGO_PKG_NAME").into(),
+            name: "ventriform".into(),
             version: product.software.clone(),
         }
     }
