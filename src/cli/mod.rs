@@ -112,8 +112,9 @@ pub fn main() -> ExitCode {
         Command::Migrate(args) => migrate::run(&args),
         Command::Completions { shell } => {
             let mut script = Vec::new();
-            let name = "ventriform";
-            clap_complete::generate(shell, &mut Cli::command(), name, &mut script);
+            let mut command = Cli::command();
+            let name = command.get_name().to_owned();
+            clap_complete::generate(shell, &mut command, name, &mut script);
             output::write_out(&script);
             Ok(())
         }

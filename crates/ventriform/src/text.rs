@@ -34,6 +34,9 @@ pub fn escaped(text: &str) -> Cow<'_, str> {
 
 /// As [`escaped`], except that line feeds and tabs stay.
 pub fn escaped_lines(text: &str) -> Cow<'_, str> {
+    if is_plain(text) {
+        return text.into();
+    }
     escape(text, &['\n', '\t'])
 }
 
@@ -56,7 +59,7 @@ pub fn escaped_json(text: &str) -> Cow<'_, str> {
 
 fn escape<'a>(text: &'a str, kept: &[char]) -> Cow<'a, str> {
     let escapes = |c: char| is_obeyed(c) && !kept.contains(&c);
-    if is_plain(text) && (kept.contains(&'\n') || !text.contains('\n')) || !text.contains(escapes) {
+    if !text.contains(escapes) {
         return text.into();
     }
     let mut shown = String::with_capacity(text.len() + 16);

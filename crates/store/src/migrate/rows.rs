@@ -227,12 +227,7 @@ async fn copy_table(
         .fetch(from)
         .try_chunks(BATCH);
     let mut tally = Tally::default();
-    while let Some(chunk) = rows
-        .try_next()
-        .await
-        .map_err(|error| error.1)
-        .map_err(of_sqlite)?
-    {
+    while let Some(chunk) = rows.try_next().await.map_err(|error| of_sqlite(error.1))? {
         let batch: Vec<Vec<Value>> = chunk
             .iter()
             .map(|row| table.of_sqlite(row))
