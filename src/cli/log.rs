@@ -12,7 +12,7 @@ use std::fmt::Debug;
 use std::io::{self, IsTerminal, Write};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tracing::field::Field;
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::field::MakeExt;
@@ -23,6 +23,9 @@ use ventriform_service::config::{LogFormat, Settings};
 
 /// Time from the first line of a batch until the batch is written.
 const GATHERING: Duration = Duration::from_millis(10);
+
+/// Longest time to write the lines that wait when the service has ended.
+const LAST_LINES: Duration = Duration::from_secs(2);
 
 /// Most bytes of lines that wait to be written.
 const GATHERED_BYTES: usize = 4 << 20;
@@ -100,24 +103,25 @@ fn write_lines(to: impl Write + Send + 'static, line: Line) -> io::Result<(Lines
         .spawn(move || read.write_to(to, line))?;
     let thread = LogThread {
         lines: lines.clone(),
-        thread: Some(thread),
+        thread,
     };
     Ok((lines, thread))
 }
 
-/// The thread that writes the log. Dropping it writes the lines that wait and ends it.
+/// The thread that writes the log. Dropping it writes the lines that wait and ends it; if nobody reads them,
+/// they are given up after [`LAST_LINES`].
 pub struct LogThread {
     lines: Lines,
-    thread: Option<JoinHandle<()>>,
+    thread: JoinHandle<()>,
 }
 
 impl Drop for LogThread {
     fn drop(&mut self) {
         self.lines.gathered().ended = true;
         self.lines.0.1.notify_one();
-        if let Some(thread) = self.thread.take() {
-            // A panic there has said so on standard error.
-            let _ = thread.join();
+        let end = Instant::now() + LAST_LINES;
+        while !self.thread.is_finished() && Instant::now() < end {
+            thread::sleep(Duration::from_millis(1));
         }
     }
 }
