@@ -8,7 +8,7 @@ use clap::Args;
 use std::path::PathBuf;
 use tokio::runtime::Runtime;
 use ventriform_service::config::{BlobPlace, Flags, Settings};
-use ventriform_service::jobs::Tenant;
+use ventriform_service::records::Tenant;
 use ventriform_store::Examination;
 
 /// Check a data folder, and repair it from what lies on disk (stop the service first)

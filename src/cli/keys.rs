@@ -11,7 +11,7 @@ use ventriform_service::access::{
     AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Maker, Quota, Scope,
 };
 use ventriform_service::config::{Size, Span};
-use ventriform_service::jobs::{Clock, ListRequest, SystemClock, Tenant, Timestamp, rfc3339};
+use ventriform_service::records::{Clock, ListRequest, SystemClock, Tenant, Timestamp, rfc3339};
 
 /// Make, list and revoke API keys, also while the service runs
 #[derive(Debug, Args)]

@@ -13,9 +13,9 @@ use ventriform::progress::{Monitor, Plan};
 use ventriform::volume::ReadLimits;
 use ventriform_service::archive::{Archive, Archives, Credentials};
 use ventriform_service::config::Settings;
-use ventriform_service::jobs::{
-    Failure, GivenParameters, Resource, StoredItem, Work, WorkError, WorkInput, WorkOutput,
-};
+use ventriform_service::items::{StoredItem, WorkOutput};
+use ventriform_service::jobs::{GivenParameters, Work, WorkError, WorkInput};
+use ventriform_service::records::{Failure, Resource};
 use ventriform_service::work::Engine;
 
 const STUDY: &str = "1.2.826.0.1.3680043.8.498.1";

@@ -21,7 +21,7 @@ use ventriform_service::hooks::{
 use ventriform_service::intake::{
     Added, GroupState, IntakeRoom, IntakeStore, NewObject, Origin, Protocol,
 };
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     AddedProduct, Catalogue, Claimant, Clock, Custody, DeathLimit, Deleted, Erased, ErasureAgent,
     ErasureOrder, ErasureReason, Failure, Fault, FigureStore, FileRecord, Filed, Idempotency,
     Interrupted, ItemFilter, ItemRecord, Job, JobFilter, JobOutcome, JobState, JobStore,

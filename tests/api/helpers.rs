@@ -27,9 +27,10 @@ use ventriform_service::access::{
     AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Maker, Quota, Scope,
 };
 use ventriform_service::config::Settings;
-use ventriform_service::jobs::{
-    Clock, Failure, Fault, GivenParameters, LocalFile, Needs, OutputFile, Resource, ScanFields,
-    StoredItem, SystemClock, Work, WorkError, WorkInput, WorkOutput,
+use ventriform_service::items::{OutputFile, StoredItem, WorkOutput};
+use ventriform_service::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
+use ventriform_service::records::{
+    Clock, Failure, Fault, LocalFile, Resource, ScanFields, SystemClock,
 };
 use ventriform_service::work::{Engine, IntensityFacts, UploadFacts, UploadReader};
 use ventriform_store::{open_database, open_rows};

@@ -20,7 +20,7 @@ use ventriform_service::access::{
     AccessStore, Activity, AuditEvent, BrokenLink, Quota, Scope, verify,
 };
 use ventriform_service::config::Settings;
-use ventriform_service::jobs::{Clock, SystemClock, Tenant};
+use ventriform_service::records::{Clock, SystemClock, Tenant};
 use ventriform_store::{SqlStore, open_rows};
 
 async fn plain_key(app: &TestApp, scope: Scope) -> String {

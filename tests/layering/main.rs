@@ -178,22 +178,27 @@ const LIBRARY: &[(&str, &[&str])] = &[
 
 /// The same for the service.
 const SERVICE: &[(&str, &[&str])] = &[
-    ("jobs", &[]),
-    ("access", &["jobs"]),
+    ("records", &[]),
+    ("items", &["records"]),
+    ("jobs", &["records", "items"]),
+    ("access", &["records"]),
     ("pem", &[]),
-    ("hooks", &["jobs"]),
-    ("archive", &["jobs", "pem", "hooks"]),
-    ("intake", &["jobs", "access"]),
-    ("worklist", &["jobs"]),
+    ("hooks", &["records"]),
+    ("archive", &["records", "items", "jobs", "pem", "hooks"]),
+    ("intake", &["records", "jobs", "access"]),
+    ("worklist", &["records"]),
     (
         "stores",
-        &["jobs", "access", "hooks", "archive", "intake", "worklist"],
+        &[
+            "records", "access", "hooks", "archive", "intake", "worklist",
+        ],
     ),
-    ("work", &["jobs"]),
+    ("work", &["records", "items", "jobs"]),
     (
         "config",
-        &["jobs", "hooks", "archive", "intake", "worklist"],
+        &["records", "hooks", "archive", "intake", "worklist"],
     ),
+    ("background", &["records", "items", "jobs"]),
 ];
 
 /// Crates of the service and the command line: the library knows no network, no database, no runtime,

@@ -18,7 +18,9 @@ use tokio::sync::Notify;
 use tokio_util::sync::CancellationToken;
 use ventriform_service::access::AccessStore;
 use ventriform_service::config::Settings;
-use ventriform_service::jobs::{FigureStore, Holding, Product, Queue, Resource, RetentionAges};
+use ventriform_service::items::RetentionAges;
+use ventriform_service::jobs::Queue;
+use ventriform_service::records::{FigureStore, Holding, Product, Resource};
 use ventriform_service::work::Engine;
 use ventriform_service::worklist::Worklist;
 

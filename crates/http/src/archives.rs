@@ -5,7 +5,7 @@ use tokio::sync::Notify;
 use ventriform_service::archive::{ArchiveBacklog, ArchiveStore, ExchangeCounts};
 use ventriform_service::config::Settings;
 use ventriform_service::hooks::UrlGuard;
-use ventriform_service::jobs::StoreResult;
+use ventriform_service::records::StoreResult;
 
 /// Archives, for handlers.
 pub struct ArchiveDesk {

@@ -11,7 +11,7 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 use ventriform_service::access::{AuditFilter, fhir};
-use ventriform_service::jobs::{Timestamp, parse_rfc3339};
+use ventriform_service::records::{Timestamp, parse_rfc3339};
 
 /// A page of the audit trail.
 #[derive(Serialize, ToSchema)]

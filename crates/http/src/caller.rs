@@ -6,7 +6,7 @@ use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{StatusCode, header};
 use ventriform_service::access::{Identity, Quota, Scope};
-use ventriform_service::jobs::{Tenant, Timestamp};
+use ventriform_service::records::{Tenant, Timestamp};
 
 /// Who sent the request.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -33,7 +33,7 @@ use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 use utoipa_axum::router::UtoipaMethodRouter;
 use ventriform_service::access::Scope;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     Catalogue, Held, ItemFilter, ListPage, ListRequest, Resource, ScanFilter, StoreError,
     TagFilter, Tenant,
 };
@@ -138,7 +138,7 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
 
 /// The tenant's row of that id, or the 404 or 410 that says why there is none.
 pub async fn find<C: Collection>(app: &App, tenant: &Tenant, id: &str) -> Answer<Held<C::Row>> {
-    let catalogue = &*app.queue.catalogue;
+    let catalogue = app.queue.items().catalogue();
     let found = match Resource::of(id) == Some(C::RESOURCE) {
         true => C::row(catalogue, tenant, id).await?,
         false => None,
@@ -169,7 +169,7 @@ async fn list<C: Collection>(
     };
     let filter = ItemFilter { tags, scan };
     let (page, []) = page_of(pairs, []).await?;
-    let page = C::rows(&*app.queue.catalogue, &caller.tenant, &filter, page).await?;
+    let page = C::rows(app.queue.items().catalogue(), &caller.tenant, &filter, page).await?;
     let next_cursor = next_cursor(&page);
     let items = page
         .items
@@ -201,7 +201,7 @@ async fn show<C: Collection>(
             row,
         )?)?))
     };
-    let catalogue = &*app.queue.catalogue;
+    let catalogue = app.queue.items().catalogue();
     let asker = (&caller.tenant, scans::sees_patients(caller.scope));
     let kept = app.answers.get(catalogue, asker, C::RESOURCE, &id, read);
     let ControlFlow::<Infallible, _>::Continue(answer) = kept.await?;

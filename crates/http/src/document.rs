@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::io::Write;
 use std::sync::{Arc, Mutex, PoisonError};
-use ventriform_service::jobs::hex;
+use ventriform_service::records::hex;
 
 /// Another version of the program may publish another document.
 const CACHE_CONTROL: HeaderValue = HeaderValue::from_static("public, max-age=300");

@@ -1,5 +1,5 @@
 //! What goes on in the background: in the only process on a store, or in one of several at a time
-//! ([`Queue::on_duty`](ventriform_service::jobs::Queue::on_duty)).
+//! ([`Queue::while_leader`](ventriform_service::jobs::Queue::while_leader)).
 //!
 //! Each of these is right also if two processes do it for a moment: what is sent is settled by its row
 //! and known to its receiver by its id, what is deleted is deleted in one statement, what is filed is
@@ -12,8 +12,10 @@ use std::time::Duration;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 use ventriform_service::access::AccessStore;
+use ventriform_service::background::Upkeep;
 use ventriform_service::intake::{GatherSettings, Gatherer};
-use ventriform_service::jobs::{Clock, Custodian, SystemClock, Upkeep};
+use ventriform_service::items::Custodian;
+use ventriform_service::records::{Clock, SystemClock};
 
 /// How often the upkeep looks for expired things and for jobs beyond their attempt limit.
 pub const UPKEEP_EVERY: Duration = Duration::from_secs(30);
@@ -24,7 +26,7 @@ const PRUNE_EVERY: Duration = Duration::from_secs(3600);
 /// Does all of it until `end`, whenever it is this process's turn.
 pub async fn run(app: App, end: CancellationToken) {
     let term = |term: CancellationToken| perform(&app, term);
-    app.queue.on_duty(end, term).await;
+    app.queue.while_leader(end, term).await;
 }
 
 /// Does all of it until `end`. What is on its way to other systems then gets some time; the rest is broken
@@ -49,7 +51,7 @@ async fn perform(app: &App, end: CancellationToken) {
     };
     others.spawn(upkeep.run(end.clone()));
     let custodian = Custodian {
-        queue: queue.clone(),
+        items: queue.items().clone(),
         quarantine_keep: settings.quarantine_keep.0.map(|span| span.0),
         scrub_rate: settings.scrub_rate.0,
     };
@@ -99,7 +101,7 @@ async fn prune_workitems(app: App, age: Duration, end: CancellationToken) {
     let mut round = tokio::time::interval(PRUNE_EVERY);
     let age = i64::try_from(age.as_millis()).unwrap_or(i64::MAX);
     while end.run_until_cancelled(round.tick()).await.is_some() {
-        let before = app.queue.clock.now().saturating_sub(age);
+        let before = app.queue.now().saturating_sub(age);
         if let Err(error) = app.worklist.delete_ended_workitems(before).await {
             tracing::error!(%error, "ended work items could not be deleted");
         }

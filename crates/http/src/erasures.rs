@@ -17,7 +17,7 @@ use axum::response::IntoResponse;
 use axum::{Extension, Json};
 use serde::Serialize;
 use utoipa::ToSchema;
-use ventriform_service::jobs::{Erased, ErasureOrder, ErasureReason, Receipt, Resource};
+use ventriform_service::records::{Erased, ErasureOrder, ErasureReason, Receipt, Resource};
 
 /// The receipt of an erasure. It stays when what it names is gone, and holds no name that was given
 /// to an item.
@@ -191,7 +191,7 @@ pub async fn erase(
         reason: ErasureReason::Request,
     };
     let erased = match Resource::of(&id) == Some(kind) {
-        true => app.queue.erase(order).await?,
+        true => app.queue.items().erase(order).await?,
         false => Erased::Unknown,
     };
     match erased {
@@ -205,7 +205,9 @@ pub async fn erase(
             let body = Json(ReceiptBody::from(*receipt));
             Ok((location, applied, Extension(AlreadyRecorded), body).into_response())
         }
-        Erased::Unknown => Err(missing(&*app.queue.catalogue, &caller.tenant, kind, &id).await),
+        Erased::Unknown => {
+            Err(missing(app.queue.items().catalogue(), &caller.tenant, kind, &id).await)
+        }
         Erased::InUse => Err(Problem::new(
             StatusCode::CONFLICT,
             "in-use",
@@ -241,7 +243,7 @@ pub async fn list_erasures(
     RawQuery(query): RawQuery,
 ) -> Answer<Json<ReceiptList>> {
     let (page, [item]) = list_query(query.as_deref(), ["item"]).await?;
-    let catalogue = &app.queue.catalogue;
+    let catalogue = app.queue.items().catalogue();
     let page = catalogue
         .receipts(&caller.tenant, item.as_deref(), page)
         .await?;
@@ -264,7 +266,13 @@ pub async fn get_erasure(
     headers: HeaderMap,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    match app.queue.catalogue.receipt(&caller.tenant, &id).await? {
+    match app
+        .queue
+        .items()
+        .catalogue()
+        .receipt(&caller.tenant, &id)
+        .await?
+    {
         Some(receipt) => validators::json(&headers, &ReceiptBody::from(receipt)),
         None => Err(no_receipt(&id)),
     }

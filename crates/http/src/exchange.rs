@@ -17,7 +17,7 @@ use ventriform_service::archive::{
     ExchangeSettings, Puller, SeriesParts, StoredSeries, Trouble,
 };
 use ventriform_service::hooks::RetrySchedule;
-use ventriform_service::jobs::{Fault, Resource, StoreError, Tags, Tenant};
+use ventriform_service::records::{Fault, Resource, StoreError, Tags, Tenant};
 use ventriform_service::work::{UploadFacts, dicom};
 
 /// The agent of the audit trail that fetches and delivers.
@@ -70,7 +70,7 @@ impl ExchangeHost for App {
         tenant: &Tenant,
         mut parts: SeriesParts,
     ) -> Result<StoredSeries, Trouble> {
-        let blobs = &self.queue.blobs;
+        let blobs = self.queue.items().blobs();
         blobs.require_room(0).map_err(StoreError::from)?;
         let mut bundle = Bundle::new(self, &Counting::default());
         while let Some(part) = parts.next().await? {
@@ -110,17 +110,24 @@ impl ExchangeHost for App {
         let stored = stored.map_err(trouble)?;
         Ok(StoredSeries {
             volume: stored.volume.item.id,
-            hold: stored.hold,
+            pin: stored.pin,
         })
     }
 
     async fn held(&self, tenant: &Tenant, volume: &str) -> Result<Option<StoredSeries>, Trouble> {
-        let hold = self.queue.hold(volume).await?;
-        let intact = self.queue.intact_volume(volume).await?.is_some();
-        let held = intact && self.queue.catalogue.volume(tenant, volume).await?.is_some();
+        let pin = self.queue.items().pin(volume).await?;
+        let intact = self.queue.items().intact_volume(volume).await?.is_some();
+        let held = intact
+            && self
+                .queue
+                .items()
+                .catalogue()
+                .volume(tenant, volume)
+                .await?
+                .is_some();
         Ok(held.then(|| StoredSeries {
             volume: volume.to_owned(),
-            hold,
+            pin,
         }))
     }
 
@@ -141,7 +148,11 @@ impl ExchangeHost for App {
         let kind = Resource::of(result).unwrap_or(Resource::Model);
         let object = dicom::object_named(kind, name);
         let object = object.ok_or_else(|| gone("This version makes no such object."))?;
-        let result = self.queue.result(tenant, result, dicom::FILES).await?;
+        let result = self
+            .queue
+            .items()
+            .result(tenant, result, dicom::FILES)
+            .await?;
         let result = result.ok_or_else(|| gone("The result or its volume was erased."))?;
         let shape = UploadFacts::of(&result.volume)?.shape;
         let limits = self.engine.limits;
@@ -179,7 +190,7 @@ impl App {
             ExchangeEnd::Done | ExchangeEnd::Present => Outcome::Success,
             ExchangeEnd::GivenUp => Outcome::Refused,
         };
-        let now = self.queue.clock.now();
+        let now = self.queue.now();
         let event = AuditEvent {
             outcome,
             ..AuditEvent::new(now, activity, tenant.clone(), AGENT.into()).on(object)

@@ -6,7 +6,7 @@ use super::request::{text, unknown};
 use axum::http::{HeaderMap, HeaderName};
 use serde_json::{Map, Value};
 use ventriform_service::hooks::{HookEvent, SigningSecret, UrlGuard};
-use ventriform_service::jobs::JobWebhook;
+use ventriform_service::records::JobWebhook;
 
 /// The header with the signing secret of a job's webhook.
 pub const SECRET_HEADER: HeaderName = HeaderName::from_static("webhook-secret");

@@ -134,16 +134,16 @@ fn unready(why: &str, checks: Vec<Dependency>) -> Response {
 pub async fn metrics(State(app): State<App>, RawQuery(query): RawQuery) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let reading = MetricReadings {
-        load: app.queue.jobs.load().await?,
+        load: app.queue.table().load().await?,
         figures: app.figures.queue_figures().await?,
         received: app.intake.store.waiting().await?,
         backlog: app.hooks.store.backlog().await?,
         sent: app.hooks.dispatcher.counts(),
         archives: app.archives.read().await?,
         ready: app.readiness.is_ready(&app.queue).await,
-        space: app.queue.blobs.space(),
+        space: app.queue.items().blobs().space(),
         settings: &app.settings,
-        now: app.queue.clock.now(),
+        now: app.queue.now(),
     };
     let text = app.metrics.text(&reading);
     let media_type = format!("{}; charset=utf-8", prometheus::TEXT_FORMAT);

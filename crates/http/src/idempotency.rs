@@ -3,7 +3,7 @@
 use super::problem::{Answer, Problem};
 use axum::http::{HeaderMap, HeaderName};
 use serde_json::{Map, Value, json};
-use ventriform_service::jobs::{Idempotency, Tags, content_id};
+use ventriform_service::records::{Idempotency, Tags, content_id};
 
 /// The header's name.
 pub const HEADER: HeaderName = HeaderName::from_static("idempotency-key");

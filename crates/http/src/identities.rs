@@ -16,7 +16,7 @@ use axum::Json;
 use axum::extract::{RawQuery, Request, State};
 use axum::http::{HeaderMap, StatusCode};
 use serde_json::{Map, Value};
-use ventriform_service::jobs::ScanFields;
+use ventriform_service::records::ScanFields;
 use ventriform_service::work::dicom;
 
 /// Whose scan a volume is
@@ -61,7 +61,7 @@ pub async fn state_identity(
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     let stated = json_object(request).await?;
-    let catalogue = &app.queue.catalogue;
+    let catalogue = app.queue.items().catalogue();
     if catalogue.scan(&caller.tenant, &id).await?.is_none() {
         let found = scans::read(&app, &id, &volume.files).await?;
         let noted = catalogue.note_scan(&caller.tenant, &id, found.as_ref());
@@ -101,7 +101,7 @@ pub async fn erase_identity(
 ) -> Answer<StatusCode> {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     find::<Volumes>(&app, &caller.tenant, &id).await?;
-    if app.queue.erase_scan(&caller.tenant, &id).await? {
+    if app.queue.items().erase_scan(&caller.tenant, &id).await? {
         return Ok(StatusCode::NO_CONTENT);
     }
     // It was erased after it was looked up, or it is on hold.

@@ -8,7 +8,8 @@ use super::spans::{JobSpan, Spans};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
-use ventriform_service::jobs::{Job, JobObserver, JobState};
+use ventriform_service::jobs::JobObserver;
+use ventriform_service::records::{Job, JobState};
 
 /// The stage in which a result is stored.
 const COMMIT: &str = "commit";

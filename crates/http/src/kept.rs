@@ -2,7 +2,7 @@
 //!
 //! What is read about an item (its row, the JSON made of it) follows from the database and the
 //! settings. It is kept under the tenant that asked and the id, with the version of the database
-//! ([`ventriform_service::jobs::Catalogue::version`]) under which it was read. Whatever is written changes the
+//! ([`ventriform_service::records::Catalogue::version`]) under which it was read. Whatever is written changes the
 //! version, and what was kept under other versions is never used: neither what was erased, changed or
 //! put on hold meanwhile, nor what another tenant has. Callers who see whose scan a volume is have
 //! values of their own, and so have clients who reach the service under another path.
@@ -14,7 +14,7 @@ use super::public_base::public_path;
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};
-use ventriform_service::jobs::{Catalogue, Resource, Tenant};
+use ventriform_service::records::{Catalogue, Resource, Tenant};
 
 /// Memory for a value's place in the maps.
 const OVERHEAD: usize = 200;

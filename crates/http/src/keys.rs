@@ -22,7 +22,7 @@ use utoipa::ToSchema;
 use ventriform_service::access::{
     Activity, ApiKey, KeyError, KeyRequest, MOST_MAKERS, Maker, Quota, Scope,
 };
-use ventriform_service::jobs::{Timestamp, parse_rfc3339};
+use ventriform_service::records::{Timestamp, parse_rfc3339};
 
 /// A key. Its secret is shown once, when it is made.
 #[derive(Serialize, ToSchema)]
@@ -152,7 +152,7 @@ pub async fn create_key(
     request: Request,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let now = app.queue.clock.now();
+    let now = app.queue.now();
     let wanted = read(&json_object(request).await?, &caller)?;
     let (key, text) = ApiKey::make(wanted, now).map_err(unusable)?;
     let event = by.event(Activity::KeyCreated, now).on(&key.id);
@@ -188,7 +188,7 @@ pub async fn list_keys(
     RawQuery(query): RawQuery,
 ) -> Answer<Json<KeyList>> {
     let (page, []) = list_query(query.as_deref(), []).await?;
-    let now = app.queue.clock.now();
+    let now = app.queue.now();
     let page = app.access.keys(Some(&caller.tenant), page).await?;
     let next_cursor = next_cursor(&page);
     let keys = page.items.into_iter().map(|key| KeyBody::of(key, now));
@@ -221,7 +221,7 @@ pub async fn revoke_key(
         )
         .fix("Take an id from the list at GET /v1/keys."));
     }
-    let now = app.queue.clock.now();
+    let now = app.queue.now();
     let event = by.event(Activity::KeyRevoked, now).on(&id);
     app.access.revoke_key(&id, now, &event).await?;
     app.guard.gate.refresh();

@@ -13,7 +13,7 @@ use axum::extract::{RawQuery, Request, State};
 use axum::http::StatusCode;
 use serde_json::Value;
 use ventriform::text::is_printable;
-use ventriform_service::jobs::LegalHold;
+use ventriform_service::records::LegalHold;
 
 /// Put a volume on legal hold
 ///
@@ -39,7 +39,7 @@ pub async fn hold_volume(
     }
     let hold = LegalHold {
         reason: reason(object.get("reason"))?,
-        since: app.queue.clock.now(),
+        since: app.queue.now(),
         by: caller.name.clone(),
     };
     set(&app, &caller, &id, Some(&hold)).await?;
@@ -67,7 +67,7 @@ pub async fn release_volume(
 }
 
 async fn set(app: &App, caller: &Caller, id: &str, hold: Option<&LegalHold>) -> Answer<()> {
-    let catalogue = &app.queue.catalogue;
+    let catalogue = app.queue.items().catalogue();
     match catalogue.set_legal_hold(&caller.tenant, id, hold).await? {
         true => Ok(()),
         // It was erased after it was looked up.

@@ -15,7 +15,7 @@ use std::time::Instant;
 use ventriform_service::config::Settings;
 use ventriform_service::hooks::{Backlog, DeliveryCounts};
 use ventriform_service::intake::{AssociationEnd, IntakeObserver, Protocol};
-use ventriform_service::jobs::{DiskSpace, QueueFigures, QueueLoad, Timestamp};
+use ventriform_service::records::{DiskSpace, QueueFigures, QueueLoad, Timestamp};
 
 type Made<T> = Result<T, prometheus::Error>;
 

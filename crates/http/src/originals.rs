@@ -19,7 +19,7 @@ use axum::extract::{RawQuery, State};
 use axum::http::{HeaderMap, StatusCode};
 use ventriform::progress::Monitor;
 use ventriform_service::access::Scope;
-use ventriform_service::jobs::{FileRecord, Resource, StoredVolume};
+use ventriform_service::records::{FileRecord, Resource, StoredVolume};
 
 /// Download an upload
 ///
@@ -83,7 +83,7 @@ async fn is_bare(app: &App, volume: &StoredVolume, file: &FileRecord) -> Answer<
     if volume.files.len() > 1 {
         return Ok(false);
     }
-    let Some(local) = app.queue.blobs.local(&volume.id, file).await? else {
+    let Some(local) = app.queue.items().blobs().local(&volume.id, file).await? else {
         return Ok(false);
     };
     let reader = app.engine.reader.clone();

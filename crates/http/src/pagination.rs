@@ -3,7 +3,7 @@
 use super::memory::charge;
 use super::problem::{Answer, Problem};
 use super::request::{query_pairs, refuse_unknown};
-use ventriform_service::jobs::{ListPage, ListRequest};
+use ventriform_service::records::{ListPage, ListRequest};
 
 /// Entries of a page unless `limit` says otherwise.
 const USUAL: u32 = 20;

@@ -18,7 +18,7 @@ use tokio_util::sync::CancellationToken;
 use ventriform_service::archive::{ExchangeHost, ObjectDelivery};
 use ventriform_service::hooks::DeliveryState;
 use ventriform_service::intake::MakeError;
-use ventriform_service::jobs::{Interrupted, Job, JobState, StoreError, Timestamp};
+use ventriform_service::records::{Interrupted, Job, JobState, StoreError, Timestamp};
 use ventriform_service::worklist::{Procedure, Refusal, WorkOutputObject, Workitem};
 
 /// How often claimed items are looked at.
@@ -100,7 +100,7 @@ async fn follow(app: &App, mut item: Workitem) -> Result<(), StoreError> {
     if id.is_empty() {
         return file(app, item).await;
     }
-    let Some(job) = app.queue.jobs.job(&id).await? else {
+    let Some(job) = app.queue.table().job(&id).await? else {
         return give_up(app, item, "The job was deleted.").await;
     };
     if item.is_to_be_cancelled() && !job.state.is_final() {
@@ -246,7 +246,7 @@ async fn change(
     item: &mut Workitem,
     how: impl FnOnce(&mut Workitem, (Timestamp, &str)) -> Result<(), Refusal>,
 ) -> Result<bool, StoreError> {
-    let now = app.queue.clock.now();
+    let now = app.queue.now();
     match how(item, (now, &dicom_time(now))) {
         Ok(()) => app.worklist.change_workitem(item).await,
         Err(refusal) => {

@@ -39,7 +39,7 @@ use ventriform::export::dicom::DicomObject;
 use ventriform::export::{Format, Part};
 use ventriform::progress::Monitor;
 use ventriform_service::access::Scope;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     Catalogue, Held, ItemFilter, ListPage, ListRequest, Product, Resource, StoreError, Tenant,
 };
 use ventriform_service::work::{UploadFacts, dicom, part};
@@ -202,7 +202,8 @@ pub async fn refuse_when_full<P: ProductCollection>(
     let filter = ItemFilter::default();
     let page = app
         .queue
-        .catalogue
+        .items()
+        .catalogue()
         .products(tenant, P::RESOURCE, &filter, page)
         .await?;
     if page.items.len() < limit as usize {
@@ -375,7 +376,7 @@ pub fn choose<'a>(headers: &HeaderMap, offers: &'a [Offer]) -> Answer<&'a Offer>
 
 /// The tenant's product of that id, or the 404 or 410 that says why there is none.
 pub async fn find_any(app: &App, tenant: &Tenant, id: &str) -> Answer<Product> {
-    let catalogue = &*app.queue.catalogue;
+    let catalogue = app.queue.items().catalogue();
     match catalogue.product(tenant, id).await? {
         Some(product) => Ok(product.item),
         None => {
@@ -406,7 +407,7 @@ async fn kept<P: ProductCollection>(app: &App, tenant: &Tenant, id: &str) -> Ans
     let asker = (tenant, false);
     let kept = app
         .products
-        .get(&*app.queue.catalogue, asker, P::RESOURCE, id, read);
+        .get(app.queue.items().catalogue(), asker, P::RESOURCE, id, read);
     let ControlFlow::<Infallible, _>::Continue(product) = kept.await?;
     Ok(product)
 }
@@ -493,6 +494,7 @@ async fn send_part(
     charge(size).await?;
     let stored = app
         .queue
+        .items()
         .with_files(product.clone(), &[source.as_str()])
         .await?;
     let memory = LITTLE_MEMORY + MEMORY_PER_MESH_BYTE * size;
@@ -597,10 +599,16 @@ async fn send_object(
     let id = &product.id;
     let size: u64 = product.files.iter().map(|file| file.bytes).sum();
     charge(size).await?;
-    let result = app.queue.result(tenant, id, dicom::FILES).await?;
+    let result = app.queue.items().result(tenant, id, dicom::FILES).await?;
     let result = result.ok_or_else(|| volume_erased(id))?;
     let secret = match deidentify {
-        true => Some(app.queue.catalogue.deidentification_secret(tenant).await?),
+        true => Some(
+            app.queue
+                .items()
+                .catalogue()
+                .deidentification_secret(tenant)
+                .await?,
+        ),
         false => None,
     };
     let memory = dicom::object_memory(UploadFacts::of(&result.volume)?.shape);
@@ -676,7 +684,12 @@ impl<'a> Asker<'a> {
         let Some(volume) = product.volume.as_deref().filter(|_| !self.deidentify) else {
             return Ok(Map::new());
         };
-        let scan = app.queue.catalogue.scan(self.tenant, volume).await?;
+        let scan = app
+            .queue
+            .items()
+            .catalogue()
+            .scan(self.tenant, volume)
+            .await?;
         let shown = scan.and_then(|scan| scans::shown(&scan, self.scope));
         Ok(shown.unwrap_or_default())
     }
@@ -701,6 +714,7 @@ async fn send_named(
             charge(PAGE_MEMORY_PER_BYTE * size).await?;
             let stored = app
                 .queue
+                .items()
                 .with_files(product.clone(), work.page_files())
                 .await?;
             let scan = asker.sees(app, product).await?;

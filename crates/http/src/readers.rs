@@ -14,7 +14,8 @@ use serde_json::{Map, Value};
 use utoipa::ToSchema;
 use ventriform::progress::Monitor;
 use ventriform_service::config::Size;
-use ventriform_service::jobs::{ProductRoom, Resource, check_name};
+use ventriform_service::items::check_name;
+use ventriform_service::records::{ProductRoom, Resource};
 
 /// Largest profile: 5000 masks with two hashes each.
 pub const PROFILE_SIZE: Size = Size(1 << 20);
@@ -126,7 +127,11 @@ pub async fn create_reader(
     let reader = app.engine.reader.clone();
     let check = move |_: &Monitor<'_>| reader.profile(&profile);
     let output = app.decoding.run(LITTLE_MEMORY, check).await??;
-    let (stored, new) = app.queue.add_reader(tenant, name, output, room).await?;
+    let (stored, new) = app
+        .queue
+        .items()
+        .add_reader(tenant, name, output, room)
+        .await?;
     let body = ReaderBody::from(Presented::of(&app, stored));
     Ok(added(new, &body.id, &body))
 }

@@ -2,7 +2,8 @@
 
 use std::time::{Duration, Instant};
 use tokio::sync::Mutex;
-use ventriform_service::jobs::{Queue, StoreError, StoreFault};
+use ventriform_service::jobs::Queue;
+use ventriform_service::records::{StoreError, StoreFault};
 
 /// Whether each dependency works, checked at most once in [`CHECK_EVERY`] however many probes ask.
 #[derive(Default)]
@@ -56,15 +57,15 @@ pub fn why_unready(checks: &[Check]) -> Option<&'static str> {
 
 async fn check_all(queue: &Queue) -> Vec<Check> {
     let (database, files, workers) = tokio::join!(
-        limited(queue.jobs.check(), "The database does not answer."),
+        limited(queue.table().check(), "The database does not answer."),
         limited(
-            async { Ok(queue.blobs.check().await?) },
+            async { Ok(queue.items().blobs().check().await?) },
             "The place of the files does not answer.",
         ),
         limited(queue.workers(), "The database does not answer."),
     );
     // A full disk is its own finding; the check of the files stops there.
-    let full = queue.blobs.require_room(0).is_err();
+    let full = queue.items().blobs().require_room(0).is_err();
     let check = |name, required, fault| Check {
         name,
         required,

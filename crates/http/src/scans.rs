@@ -16,7 +16,7 @@ use utoipa::ToSchema;
 use ventriform::progress::Monitor;
 use ventriform::text::is_printable;
 use ventriform_service::access::Scope;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     BlobError, FileRecord, ScanFields, ScanFilter, ScanIdentity, StoreFault, Tenant,
 };
 use ventriform_service::work::INSPECTION_MEMORY;
@@ -137,7 +137,7 @@ pub async fn to_note(
     volume: &str,
     files: &[FileRecord],
 ) -> Answer<Option<ScanFields>> {
-    match app.queue.catalogue.scan(tenant, volume).await? {
+    match app.queue.items().catalogue().scan(tenant, volume).await? {
         Some(known) if known.erased_at.is_none() => Ok(None),
         _ => read(app, volume, files).await,
     }
@@ -148,7 +148,7 @@ pub async fn to_note(
 /// # Errors
 /// If the storage fails.
 pub async fn read(app: &App, volume: &str, files: &[FileRecord]) -> Answer<Option<ScanFields>> {
-    let files = app.queue.volume_files(volume, files).await?;
+    let files = app.queue.items().volume_files(volume, files).await?;
     let files = files.ok_or_else(|| {
         let which = format!("a file of {volume} is missing");
         BlobError::new(StoreFault::DamagedFile, which)
@@ -169,7 +169,7 @@ pub async fn read_old(app: App, end: CancellationToken) {
     end.run_until_cancelled(async {
         let mut after = 0;
         loop {
-            let next = app.queue.catalogue.unread_scans(after, 1).await;
+            let next = app.queue.items().catalogue().unread_scans(after, 1).await;
             let Some(unread) = (match next {
                 Ok(page) => page.into_iter().next(),
                 Err(error) => {
@@ -184,7 +184,7 @@ pub async fn read_old(app: App, end: CancellationToken) {
             let (tenant, volume) = (&unread.tenant, &unread.volume);
             let noted = async {
                 let found = read(&app, volume, &unread.files).await?;
-                let catalogue = &app.queue.catalogue;
+                let catalogue = app.queue.items().catalogue();
                 Ok::<(), Problem>(catalogue.note_scan(tenant, volume, found.as_ref()).await?)
             };
             if noted.await.is_err() {

@@ -12,7 +12,7 @@ use super::wire::path_of;
 use axum::extract::{RawQuery, Request, State};
 use serde::Serialize;
 use utoipa::ToSchema;
-use ventriform_service::jobs::{Product, Resource};
+use ventriform_service::records::{Product, Resource};
 
 const MASK: &str = "mask.nii.gz";
 

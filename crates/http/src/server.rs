@@ -26,12 +26,14 @@ use tokio_util::sync::CancellationToken;
 use ventriform_service::access::{
     AccessStore, Gate, Issuer, IssuerError, IssuerSettings, Recorder, Scope,
 };
+use ventriform_service::background::Upkeep;
 use ventriform_service::config::{Role, Settings};
 use ventriform_service::hooks::{Dispatcher, HookSettings, RetrySchedule, UrlGuard};
 use ventriform_service::intake::{Listener, Receiver, ScpSettings, Sessions, TlsConfiguration};
-use ventriform_service::jobs::{
-    DeathLimit, Failure, Fault, Queue, QueueSettings, RetentionAges, SteadyClock, StoreError,
-    SystemClock, Upkeep, WorkerSettings, Workers, recover_after_crash,
+use ventriform_service::items::{Items, RetentionAges};
+use ventriform_service::jobs::{Queue, QueueSettings, WorkerSettings, Workers};
+use ventriform_service::records::{
+    Clock, DeathLimit, Failure, Fault, SteadyClock, StoreError, SystemClock,
 };
 use ventriform_service::stores::Stores;
 use ventriform_service::work::Engine;
@@ -135,21 +137,26 @@ where
     let stores = open
         .await
         .map_err(|error| ServeError::Store(error.into()))?;
-    let queue = Queue::new(
-        stores.jobs.clone(),
+    let clock: Arc<dyn Clock> = Arc::new(SteadyClock::default());
+    let items = Items::new(
         stores.catalogue.clone(),
         stores.blobs.clone(),
-        Arc::new(SteadyClock::default()),
+        clock.clone(),
+        stores.peers.clone(),
+    );
+    let queue = Arc::new(Queue::new(
+        stores.jobs.clone(),
+        Arc::new(items),
+        clock,
         QueueSettings {
             limit: settings.queue_limit,
             workers: workers.workers,
         },
-    );
-    let queue = Arc::new(queue.among(stores.peers.clone()));
-    queue.join().await?;
+    ));
+    queue.heartbeat().await?;
     let limit = death_limit(&settings);
     let limit = Some(&limit).filter(|_| engine.works.isolation().is_none());
-    recover_after_crash(&queue, limit).await?;
+    queue.recover_after_crash(limit).await?;
     let closing = CancellationToken::new();
     listener.set_nonblocking(true)?;
     let address = listener.local_addr()?;
@@ -195,7 +202,7 @@ where
     let router = router(app.clone());
     let server = connections::serve(listener, router, tls, limits, open, closing.clone());
     let server = tokio::spawn(server);
-    let alive = tokio::spawn(queue.clone().stay());
+    let alive = tokio::spawn(queue.clone().run_heartbeat());
     let scheduled = {
         let app = app.clone();
         move || app.scheduled.notify_one()
@@ -339,7 +346,7 @@ fn serve_dicom(
         app.intake.sessions.clone(),
         app.guard.recorder.clone(),
         (
-            app.queue.clock.clone(),
+            app.queue.clock().clone(),
             Arc::new(app.metrics.intake.clone()),
         ),
         app.closing.clone(),
@@ -355,7 +362,7 @@ fn receiving(settings: &Settings, stores: &Stores, queue: &Queue, watching: &Wat
     let receiver = Receiver::new(
         stores.intake.clone(),
         stores.received.clone(),
-        queue.clock.clone(),
+        queue.clock().clone(),
         Arc::new(watching.metrics.intake.clone()),
         intake::receiver_settings(settings),
     );
@@ -447,7 +454,7 @@ fn hooks(settings: &Settings, stores: &Stores, queue: &Queue) -> Hooks {
     };
     let dispatcher = Dispatcher::new(
         stores.deliveries.clone(),
-        queue.clock.clone(),
+        queue.clock().clone(),
         guard.clone(),
         sending,
     );

@@ -25,7 +25,7 @@ use opentelemetry_sdk::Resource;
 use opentelemetry_sdk::trace::{SdkTracer, SdkTracerProvider};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio::runtime::Handle;
-use ventriform_service::jobs::{Job, Timestamp};
+use ventriform_service::records::{Job, Timestamp};
 
 /// Longest time to send a batch of spans, and to send the last ones on shutdown.
 const SEND_LIMIT: Duration = Duration::from_secs(5);

@@ -291,7 +291,7 @@ async fn store(
     if outcome.stored.is_empty() && outcome.failed.is_empty() && outcome.others.is_empty() {
         return Err(body::malformed_related("it has no part"));
     }
-    let now = app.queue.clock.now();
+    let now = app.queue.now();
     for group in &outcome.groups {
         let event = agent.event(Activity::Create, now).on(group);
         let recorded = app.guard.recorder.record(event).await;

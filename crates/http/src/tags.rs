@@ -11,7 +11,7 @@ use axum::extract::Request;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use ventriform::text::is_printable;
-use ventriform_service::jobs::{TagFilter, Tags, Tenant};
+use ventriform_service::records::{TagFilter, Tags, Tenant};
 
 /// Longest external id, characters.
 pub const EXTERNAL_ID_LENGTH: usize = 128;
@@ -93,7 +93,11 @@ pub async fn change(
     request: Request,
 ) -> Answer<()> {
     let tags = merged(app, tags, &merge_patch(request).await?)?;
-    app.queue.catalogue.set_tags(tenant, id, &tags).await?;
+    app.queue
+        .items()
+        .catalogue()
+        .set_tags(tenant, id, &tags)
+        .await?;
     Ok(())
 }
 

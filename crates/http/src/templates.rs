@@ -23,7 +23,8 @@ use utoipa::ToSchema;
 use ventriform::mesh_files::{MeshFrame, MeshStatement, MeshUnit};
 use ventriform::progress::Monitor;
 use ventriform_service::config::Size;
-use ventriform_service::jobs::{ProductRoom, Resource, TemplateSource, Tenant, check_name};
+use ventriform_service::items::{TemplateSource, check_name};
+use ventriform_service::records::{ProductRoom, Resource, Tenant};
 use ventriform_service::work::TEMPLATE_BYTES;
 
 /// Largest mesh.
@@ -183,7 +184,7 @@ pub async fn create_template(
         volume: volume.as_deref(),
         library,
     };
-    let added_template = app.queue.add_template(source, &organ, output, room);
+    let added_template = app.queue.items().add_template(source, &organ, output, room);
     let (template, new) = added_template.await?;
     let body = TemplateBody::from(Presented::of(&app, template));
     Ok(added(new, &body.id, &body))
@@ -219,7 +220,8 @@ pub async fn update_template(
             (other, _) => return Err(unknown("field", other, &[LIBRARY])),
         };
         app.queue
-            .catalogue
+            .items()
+            .catalogue()
             .set_library(tenant, &id, library)
             .await?;
     }
@@ -256,7 +258,7 @@ async fn given_mesh(
 
 /// The JSON mesh of a stored model or segmentation, with the id of its volume.
 async fn stored_mesh(app: &App, tenant: &Tenant, id: &str) -> Answer<(Bytes, Option<String>)> {
-    let catalogue = &*app.queue.catalogue;
+    let catalogue = app.queue.items().catalogue();
     let product = match Resource::of(id) {
         Some(Resource::Model | Resource::Segmentation) => catalogue.product(tenant, id).await?,
         _ => None,
@@ -268,7 +270,8 @@ async fn stored_mesh(app: &App, tenant: &Tenant, id: &str) -> Answer<(Bytes, Opt
         Some(file) if file.bytes <= MESH_SIZE.0 => {
             let pieces = app
                 .queue
-                .blobs
+                .items()
+                .blobs()
                 .read(id, &file.record(), 0..file.bytes)
                 .await?;
             let pieces: Vec<Bytes> = pieces.try_collect().await?;

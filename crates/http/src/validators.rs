@@ -8,7 +8,7 @@ use axum::http::{HeaderMap, HeaderName, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
-use ventriform_service::jobs::hex;
+use ventriform_service::records::hex;
 
 /// Only the client that asked may keep it, and asks each time whether it is still current.
 const CACHE_CONTROL: &str = "private, no-cache";

@@ -13,7 +13,7 @@ use futures::TryStreamExt;
 use serde_json::{Map, Value};
 use tokio_util::io::ReaderStream;
 use ventriform_service::intake::{IntakeGroup, MakeError, Rule, VolumeMaker};
-use ventriform_service::jobs::{Failure, Fault, Filed, LocalFile, Priority, Tags, Tenant};
+use ventriform_service::records::{Failure, Fault, Filed, LocalFile, Priority, Tags, Tenant};
 
 /// Bytes of a file that are read at a time.
 const CHUNK: usize = 256 << 10;
@@ -123,7 +123,7 @@ pub async fn file_unattended(app: &App, job: UnattendedJob<'_>) -> Result<String
     match app.queue.file(&new).await? {
         Filed::New(job) | Filed::Same(job) => Ok(job.id),
         // The settings have changed since it was filed.
-        Filed::KeyReused => match app.queue.jobs.filed_under(tenant, &key).await? {
+        Filed::KeyReused => match app.queue.table().filed_under(tenant, &key).await? {
             Some((job, _)) => Ok(job.id),
             None => Err(MakeError::Later("the job is gone".into())),
         },

@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 use utoipa::ToSchema;
 use ventriform::progress::Monitor;
 use ventriform_service::access::Scope;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     BlobError, Catalogue, FileRecord, Held, ItemFilter, LegalHold, ListPage, ListRequest,
     LocalFile, Resource, StoreError, StoreFault, StoredVolume, Tenant, content_id,
 };
@@ -381,12 +381,12 @@ pub async fn preview_volume(
 /// If one of them is missing or the store fails.
 pub async fn files_of(app: &App, volume: &StoredVolume) -> Answer<Vec<LocalFile>> {
     let id = &volume.id;
-    if let Some(files) = app.queue.volume_files(id, &volume.files).await? {
+    if let Some(files) = app.queue.items().volume_files(id, &volume.files).await? {
         return Ok(files);
     }
     let missing = BlobError::new(
         StoreFault::DamagedFile,
         format!("a file of {id} is missing"),
     );
-    Err(app.queue.unless_erased(id, missing).await.into())
+    Err(app.queue.items().unless_erased(id, missing).await.into())
 }

@@ -15,7 +15,7 @@ use axum::response::IntoResponse;
 use ventriform::mesh_files::{MeshFrame, MeshUnit};
 use ventriform::progress::Monitor;
 use ventriform::volume::given_mask::MaskChoice;
-use ventriform_service::jobs::content_id;
+use ventriform_service::records::content_id;
 use ventriform_service::work::{UploadFacts, voxels_memory};
 
 /// A later version of the program may read a file differently.

@@ -19,7 +19,7 @@ use serde::Serialize;
 use std::time::Duration;
 use utoipa::ToSchema;
 use ventriform_service::hooks::{Delivery, HookEndpoint, SigningSecret};
-use ventriform_service::jobs::{Timestamp, random_id};
+use ventriform_service::records::{Timestamp, random_id};
 
 /// How long the former signing secret signs too.
 const SECRET_OVERLAP: Duration = Duration::from_secs(24 * 3600);
@@ -114,7 +114,7 @@ pub async fn create_webhook(
     let endpoint = HookEndpoint {
         id: random_id("whk_"),
         tenant: caller.tenant,
-        created_at: app.queue.clock.now(),
+        created_at: app.queue.now(),
         url: checked.url,
         destination: checked.destination,
         events: checked.events,
@@ -168,7 +168,7 @@ pub async fn delete_webhook(
     RawQuery(query): RawQuery,
 ) -> Answer<StatusCode> {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let now = app.queue.clock.now();
+    let now = app.queue.now();
     match app
         .hooks
         .store
@@ -193,7 +193,7 @@ pub async fn create_webhook_secret(
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let secret = SigningSecret::random();
-    let until = app.queue.clock.now() + SECRET_OVERLAP.as_millis() as i64;
+    let until = app.queue.now() + SECRET_OVERLAP.as_millis() as i64;
     app.hooks
         .store
         .replace_secret(&caller.tenant, &secret, until)
@@ -319,7 +319,7 @@ pub async fn redeliver(
     RawQuery(query): RawQuery,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let now = app.queue.clock.now();
+    let now = app.queue.now();
     if delivery.starts_with(OBJECT_PREFIX) {
         return redeliver_object(&app, &caller, &id, &delivery, now).await;
     }

@@ -5,8 +5,8 @@ use axum::Json;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
-use ventriform_service::jobs::Resource;
-pub use ventriform_service::jobs::rfc3339;
+use ventriform_service::records::Resource;
+pub use ventriform_service::records::rfc3339;
 
 /// The path of the thing that has that id.
 pub fn path_of(id: &str) -> String {

@@ -21,7 +21,7 @@ use serde_json::{Map, Value};
 use std::time::{Duration, Instant};
 use ventriform::export::dicom::is_uid;
 use ventriform::progress::{Monitor, Stage};
-use ventriform_service::jobs::{Timestamp, random_id, rfc3339};
+use ventriform_service::records::{Timestamp, random_id, rfc3339};
 use ventriform_service::worklist::{
     AddedWorkitem, Change, DataSetJson, Matching, Refusal, Workitem, WorkitemState,
 };
@@ -425,7 +425,7 @@ async fn find(app: &App, caller: &Caller, uid: &str) -> Answer<Workitem> {
 
 /// The time, also as DICOM writes it.
 fn now(app: &App) -> (Timestamp, String) {
-    let now = app.queue.clock.now();
+    let now = app.queue.now();
     (now, dicom_time(now))
 }
 

@@ -6,11 +6,14 @@
 
 pub mod access;
 pub mod archive;
+pub mod background;
 pub mod config;
 pub mod hooks;
 pub mod intake;
+pub mod items;
 pub mod jobs;
 pub mod pem;
+pub mod records;
 pub mod stores;
 pub mod work;
 pub mod worklist;

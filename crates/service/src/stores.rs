@@ -4,7 +4,7 @@ use crate::access::AccessStore;
 use crate::archive::ArchiveStore;
 use crate::hooks::DeliveryStore;
 use crate::intake::{IntakeStore, ReceivedFiles};
-use crate::jobs::{BlobStore, Catalogue, FigureStore, JobStore, Peers};
+use crate::records::{BlobStore, Catalogue, FigureStore, JobStore, Peers};
 use crate::worklist::Worklist;
 use futures::future::BoxFuture;
 use std::sync::Arc;

@@ -23,7 +23,7 @@ use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io;
 use std::path::Path;
-use ventriform_service::jobs::{ItemRecord, RecordPages, Resource};
+use ventriform_service::records::{ItemRecord, RecordPages, Resource};
 
 /// Rows read at a time.
 const PAGE: u32 = 200;

@@ -23,7 +23,7 @@ use time::format_description::StaticFormatDescription;
 use time::macros::format_description;
 use time::{Date, OffsetDateTime};
 use tokio::io::AsyncWrite;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     BlobError, BlobStore, BlobStream, BlobWriter, DiskSpace, FileRecord, ItemRecord, LocalFile,
     Resource, Shelved, StagedFiles, StagedFor, StoreFault, Timestamp, random_id,
 };

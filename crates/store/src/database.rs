@@ -17,7 +17,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use ventriform_service::config::PostgresSettings;
-use ventriform_service::jobs::{StoreError, StoreFault, StoreResult, random_id};
+use ventriform_service::records::{StoreError, StoreFault, StoreResult, random_id};
 
 /// Connections for reading.
 pub(super) enum Readers {
@@ -149,7 +149,7 @@ impl Query {
 /// The prefix of the names of runs.
 const RUN: &str = "run_";
 
-/// The database. Implements [`ventriform_service::jobs::JobStore`] and [`ventriform_service::jobs::Catalogue`], and the traits
+/// The database. Implements [`ventriform_service::records::JobStore`] and [`ventriform_service::records::Catalogue`], and the traits
 /// of `access`, `hooks`, `archive`, `intake` and `worklist`.
 pub struct SqlStore {
     pub(super) writer: Writing,

@@ -36,7 +36,7 @@ use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     Clock, Custody, FileRecord, ItemRecord, RecordPages, Resource, StoreError, SystemClock, Tenant,
     random_id, volume_id,
 };

@@ -1,7 +1,7 @@
 //! Errors of SQLite and of PostgreSQL as kinds of failures of the storage.
 
 use sqlx::postgres::PgPool;
-use ventriform_service::jobs::{StoreError, StoreFault};
+use ventriform_service::records::{StoreError, StoreFault};
 
 /// Primary result codes of SQLite (<https://sqlite.org/rescode.html>).
 const BUSY: i32 = 5;

@@ -62,7 +62,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use ventriform_service::config::{PostgresSettings, PostgresUrl};
 use ventriform_service::intake::ReceivedFiles;
-use ventriform_service::jobs::{BlobError, BlobStore, Peers, Resource, random_id};
+use ventriform_service::records::{BlobError, BlobStore, Peers, Resource, random_id};
 use ventriform_service::stores::Stores;
 
 /// Limits of a store.

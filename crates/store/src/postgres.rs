@@ -33,7 +33,7 @@ use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use ventriform_service::config::{PostgresSettings, PostgresUrl};
-use ventriform_service::jobs::{StoreError, StoreFault, StoreResult};
+use ventriform_service::records::{StoreError, StoreFault, StoreResult};
 
 /// Pause between two attempts to reach the server at the start.
 const AGAIN: Duration = Duration::from_secs(1);

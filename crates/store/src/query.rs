@@ -12,7 +12,7 @@ use sqlx::sqlite::{SqliteArguments, SqliteConnection, SqlitePool, SqliteRow};
 use sqlx::{AssertSqlSafe, ColumnIndex, Decode, Postgres, Row, Sqlite, Type};
 use std::borrow::Cow;
 use std::time::Duration;
-use ventriform_service::jobs::StoreResult;
+use ventriform_service::records::StoreResult;
 
 /// How often a read is tried again on another connection after its connection was lost.
 const READ_RETRIES: u32 = 3;

@@ -7,7 +7,7 @@ use crate::faults;
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{AssertSqlSafe, ConnectOptions, Connection, SqliteConnection};
 use std::path::Path;
-use ventriform_service::jobs::{ItemRecord, StoreResult, Tenant};
+use ventriform_service::records::{ItemRecord, StoreResult, Tenant};
 
 impl SqlStore {
     /// What is wrong with the database's structure: `PRAGMA integrity_check` and

@@ -27,8 +27,8 @@ use tokio_rustls::TlsAcceptor;
 use tokio_rustls::server::TlsStream;
 use tokio_util::sync::CancellationToken;
 use ventriform_service::config::{OptionalPath, Settings};
-use ventriform_service::jobs::hex;
 use ventriform_service::pem;
+use ventriform_service::records::hex;
 
 /// How often the files are looked at.
 const LOOK_EVERY: Duration = Duration::from_secs(5);

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use ventriform_service::access::Usage;
-use ventriform_service::jobs::Tenant;
+use ventriform_service::records::Tenant;
 
 /// What the requests under way may add, for each tenant.
 #[derive(Clone, Default)]

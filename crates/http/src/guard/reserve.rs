@@ -19,7 +19,7 @@ use axum::http::request::Parts;
 use axum::http::{Method, StatusCode, header};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use ventriform_service::access::Usage;
-use ventriform_service::jobs::Tenant;
+use ventriform_service::records::Tenant;
 
 /// Bytes that the record of a job counts at least; see the migrations of the jobs table.
 const JOB_RECORD: u64 = 2048;

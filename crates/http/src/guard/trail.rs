@@ -16,7 +16,7 @@ use axum::response::{IntoResponse, Response};
 use tower_http::request_id::RequestId;
 use ventriform::export::dicom::is_uid;
 use ventriform_service::access::{Activity, AuditEvent, Identity, Outcome, Refusal};
-use ventriform_service::jobs::{ErasureAgent, Tenant, Timestamp};
+use ventriform_service::records::{ErasureAgent, Tenant, Timestamp};
 
 /// Longest id that is recorded; others are no ids of this service.
 const LONGEST_ID: usize = 80;
@@ -94,7 +94,7 @@ impl Act {
         let Some(activity) = self.activity(status) else {
             return response;
         };
-        self.event.recorded = app.queue.clock.now();
+        self.event.recorded = app.queue.now();
         self.event.activity = activity;
         self.event.object = match activity {
             Activity::Create | Activity::Execute => location(&response).or(self.object),
@@ -176,7 +176,7 @@ pub async fn access_refused(app: &App, request: &Parts, identity: &Identity, add
 
 async fn note_refusal(app: &App, mut event: AuditEvent) {
     event.outcome = Outcome::Refused;
-    event.recorded = app.queue.clock.now();
+    event.recorded = app.queue.now();
     app.guard.recorder.note(event).await;
 }
 

@@ -6,7 +6,7 @@ use crate::problem::{Answer, Problem, shorten};
 use crate::request::{text, unknown};
 use serde_json::{Map, Value};
 use ventriform::export::dicom::is_uid;
-use ventriform_service::jobs::{Resource, SendOrder, SeriesSource, Tenant};
+use ventriform_service::records::{Resource, SendOrder, SeriesSource, Tenant};
 use ventriform_service::work::dicom;
 
 /// The fields of `source`.

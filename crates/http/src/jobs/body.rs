@@ -11,9 +11,8 @@ use std::collections::BTreeMap;
 use utoipa::ToSchema;
 use ventriform_service::archive::{ObjectDelivery, Pull};
 use ventriform_service::hooks::DeliveryState;
-use ventriform_service::jobs::{
-    Job, JobState, QueuePosition, Resource, SendOrder, SeriesSource, Timestamp,
-};
+use ventriform_service::jobs::QueuePosition;
+use ventriform_service::records::{Job, JobState, Resource, SendOrder, SeriesSource, Timestamp};
 
 /// An accepted job.
 #[derive(Serialize, ToSchema)]
@@ -292,7 +291,7 @@ impl Context {
                 true => BTreeMap::new(),
                 false => store.sends(&sent).await?,
             },
-            now: app.queue.clock.now(),
+            now: app.queue.now(),
         })
     }
 }

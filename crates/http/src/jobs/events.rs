@@ -23,7 +23,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::broadcast::Receiver;
 use tokio::sync::broadcast::error::RecvError;
-use ventriform_service::jobs::Job;
+use ventriform_service::records::Job;
 
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
@@ -129,7 +129,7 @@ impl Follower {
     /// service shuts down.
     async fn newer(&mut self) -> Option<Job> {
         let queue = self.app.queue.clone();
-        let look = queue.time_to_look();
+        let look = queue.next_poll();
         tokio::pin!(look);
         loop {
             if let Some(job) = self.next.take()
@@ -146,7 +146,7 @@ impl Follower {
                     Err(RecvError::Closed) => return None,
                 },
                 () = &mut look => {
-                    look.set(queue.time_to_look());
+                    look.set(queue.next_poll());
                     Some(self.look().await?)
                 }
                 () = self.app.closing.cancelled() => return None,
@@ -155,6 +155,6 @@ impl Follower {
     }
 
     async fn look(&self) -> Option<Job> {
-        self.app.queue.jobs.job(&self.id).await.ok().flatten()
+        self.app.queue.table().job(&self.id).await.ok().flatten()
     }
 }

@@ -21,9 +21,10 @@ use axum::response::{IntoResponse, Response};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::time::Duration;
-use ventriform_service::jobs::{
+use ventriform_service::jobs::Work;
+use ventriform_service::records::{
     Filed, Job, JobState, JobWebhook, NewJob, Priority, Resource, SendOrder, SeriesSource, Tags,
-    Tenant, Work,
+    Tenant,
 };
 
 /// Least and greatest `Retry-After`, seconds.
@@ -100,23 +101,23 @@ pub async fn file_upload(
         return answer(app, filed, patience, &headers, &job.offers).await;
     }
     // Held until the job is filed: from then on the job keeps them.
-    let mut holds = Vec::new();
+    let mut pins = Vec::new();
     for (name, files) in upload.others {
         let stored = files
             .store(app, tenant, &filing.tags)
             .await
             .map_err(|p| p.at(name))?;
         pairs.push((name.to_owned(), stored.volume.id.clone()));
-        holds.push(stored.hold);
+        pins.push(stored.pin);
     }
-    if fields || !holds.is_empty() {
+    if fields || !pins.is_empty() {
         parameters = work.parameters_from_text(&pairs)?;
     }
     let stored = upload.volume.store(app, tenant, &filing.tags).await?;
-    holds.push(stored.hold);
+    pins.push(stored.pin);
     let volume = Some(stored.volume.item.id);
     let filed = file(app, &new_job(&**work, volume, parameters, filing)).await?;
-    drop(holds);
+    drop(pins);
     answer(app, filed, patience, &headers, &job.offers).await
 }
 
@@ -162,7 +163,7 @@ async fn key_was_used(app: &App, tenant: &Tenant, key: Option<&str>) -> Answer<b
     let Some(key) = key else {
         return Ok(false);
     };
-    Ok(app.queue.jobs.filed_under(tenant, key).await?.is_some())
+    Ok(app.queue.table().filed_under(tenant, key).await?.is_some())
 }
 
 /// What became of the key of this upload, if it was used before: ids are hashes, so the request can
@@ -189,7 +190,7 @@ async fn filed_earlier(
     };
     let earlier = app
         .queue
-        .jobs
+        .table()
         .filed_under(&job.tenant, &promise.key)
         .await?;
     Ok(earlier.map(|(job, fingerprint)| promise.judge(job, &fingerprint)))
@@ -274,11 +275,25 @@ async fn wait(
 async fn require(app: &App, tenant: &Tenant, needs: &BTreeMap<String, String>) -> Answer<()> {
     for (field, id) in needs {
         let there = match Resource::of(id) {
-            Some(Resource::Volume) => app.queue.catalogue.volume(tenant, id).await?.is_some(),
-            _ => app.queue.catalogue.product(tenant, id).await?.is_some(),
+            Some(Resource::Volume) => app
+                .queue
+                .items()
+                .catalogue()
+                .volume(tenant, id)
+                .await?
+                .is_some(),
+            _ => app
+                .queue
+                .items()
+                .catalogue()
+                .product(tenant, id)
+                .await?
+                .is_some(),
         };
         if !there {
-            return Err(field_names_nothing(&*app.queue.catalogue, tenant, field, id).await?);
+            return Err(
+                field_names_nothing(app.queue.items().catalogue(), tenant, field, id).await?,
+            );
         }
     }
     Ok(())
@@ -306,14 +321,14 @@ async fn accept(app: &App, tenant: &Tenant, filed: Filed) -> Answer<Job> {
         .at("Idempotency-Key")
         .fix("Use a new key for each new request.")),
         Filed::Missing { field, id } => {
-            Err(field_names_nothing(&*app.queue.catalogue, tenant, &field, &id).await?)
+            Err(field_names_nothing(app.queue.items().catalogue(), tenant, &field, &id).await?)
         }
     }
 }
 
 /// 429 of a full queue.
 async fn queue_full(app: &App) -> Problem {
-    let seconds = match app.queue.jobs.load().await {
+    let seconds = match app.queue.table().load().await {
         Ok(load) => load.mean_duration_ms.unwrap_or_default() / 1000.0,
         Err(_) => RETRY_AFTER.1,
     };

@@ -34,7 +34,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use std::ops::ControlFlow;
 use utoipa::ToSchema;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     Deleted, Interrupted, Job, JobFilter, JobState, NewJob, Resource, Tenant, Timestamp,
     parse_rfc3339,
 };
@@ -175,7 +175,7 @@ pub async fn list_jobs(
         scan,
         created_after: created_after.map(|text| parse_moment(&text)).transpose()?,
     };
-    let page = app.queue.jobs.jobs(&filter, page).await?;
+    let page = app.queue.table().jobs(&filter, page).await?;
     let next_cursor = next_cursor(&page);
     let jobs = describe_all(&app, page.items).await?;
     Ok(Json(JobList { jobs, next_cursor }))
@@ -227,7 +227,7 @@ pub async fn get_job(
             }
         })
     };
-    let catalogue = &*app.queue.catalogue;
+    let catalogue = app.queue.items().catalogue();
     // A job says the same to all callers of its tenant.
     let asker = (&caller.tenant, false);
     let kept = app.answers.get(catalogue, asker, Resource::Job, &id, read);
@@ -305,13 +305,13 @@ pub async fn delete_job(
         Interrupted::Cancelled(job) => (StatusCode::OK, job),
         Interrupted::Asked(job) => (StatusCode::ACCEPTED, job),
         Interrupted::Unknown => {
-            return Err(missing(&*app.queue.catalogue, tenant, Resource::Job, &id).await);
+            return Err(missing(app.queue.items().catalogue(), tenant, Resource::Job, &id).await);
         }
         Interrupted::Finished(job) if job.cancel_requested && !erase => (StatusCode::OK, job),
         Interrupted::Finished(_) => {
             return match app.queue.delete_job(&id).await? {
                 Deleted::Done => Ok(StatusCode::NO_CONTENT.into_response()),
-                _ => Err(missing(&*app.queue.catalogue, tenant, Resource::Job, &id).await),
+                _ => Err(missing(app.queue.items().catalogue(), tenant, Resource::Job, &id).await),
             };
         }
     };
@@ -320,9 +320,9 @@ pub async fn delete_job(
 
 /// The tenant's job of that id, or the 404 or 410 that says why there is none.
 pub async fn find(app: &App, tenant: &Tenant, id: &str) -> Answer<Job> {
-    let job = app.queue.jobs.job(id).await?;
+    let job = app.queue.table().job(id).await?;
     match job.filter(|job| job.tenant == *tenant) {
         Some(job) => Ok(job),
-        None => Err(missing(&*app.queue.catalogue, tenant, Resource::Job, id).await),
+        None => Err(missing(app.queue.items().catalogue(), tenant, Resource::Job, id).await),
     }
 }

@@ -12,7 +12,7 @@ use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 use ventriform::export::dicom::DicomObject;
 use ventriform_service::hooks::HookEvent;
-use ventriform_service::jobs::LegalHold;
+use ventriform_service::records::LegalHold;
 
 /// A job to be filed; `create_job` reads it field by field.
 pub struct JobRequest;

@@ -12,7 +12,7 @@ use ventriform::export::Part;
 use ventriform::parameters::{
     FIT_SPECS, FitParameters, Kind, ModelParameters, ParameterSpec, Parameters,
 };
-use ventriform_service::jobs::Priority;
+use ventriform_service::records::Priority;
 
 /// Declares two types that document a table of parameters: as a JSON object, and as query
 /// parameters.

@@ -4,7 +4,8 @@ use super::Problem;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use std::any::Any;
-use ventriform_service::jobs::{BlobError, Failure, Fault, NotAdded, StoreError, StoreFault};
+use ventriform_service::items::NotAdded;
+use ventriform_service::records::{BlobError, Failure, Fault, StoreError, StoreFault};
 
 /// When to try again after the storage failed for a reason that may pass.
 const RETRY_AFTER_SECONDS: &str = "5";

@@ -4,7 +4,7 @@
 use super::{Answer, Problem, shorten};
 use crate::wire::rfc3339;
 use axum::http::StatusCode;
-use ventriform_service::jobs::{Catalogue, Resource, Tenant, Timestamp};
+use ventriform_service::records::{Catalogue, Resource, Tenant, Timestamp};
 
 /// 410 if the tenant erased `id`, else 404.
 pub async fn missing(

@@ -11,8 +11,9 @@ use sha2::{Digest, Sha256};
 use std::sync::Arc;
 use tokio::io::AsyncWriteExt;
 use ventriform::progress::Monitor;
-use ventriform_service::jobs::{
-    BlobError, BlobStore, BlobWriter, Failure, FileRecord, Held, Hold, StagedFiles, StagedFor,
+use ventriform_service::items::Pin;
+use ventriform_service::records::{
+    BlobError, BlobStore, BlobWriter, Failure, FileRecord, Held, StagedFiles, StagedFor,
     StoredVolume, Tags, Tenant, hex, volume_id,
 };
 use ventriform_service::work::INSPECTION_MEMORY;
@@ -44,7 +45,7 @@ pub struct Stored {
     /// Whether the tenant did not have it before.
     pub new: bool,
     /// Keeps it from being deleted.
-    pub hold: Hold,
+    pub pin: Pin,
 }
 
 /// One received file.
@@ -148,7 +149,7 @@ impl Bundle {
     /// An empty bundle. What it receives counts against a quota.
     pub fn new(app: &App, counting: &Counting) -> Self {
         Self {
-            blobs: app.queue.blobs.clone(),
+            blobs: app.queue.items().blobs().clone(),
             memory: app.memory.clone(),
             counting: counting.clone(),
             staged: None,
@@ -251,12 +252,15 @@ impl Bundle {
     async fn store_uncounted(mut self, app: &App, tenant: &Tenant, tags: &Tags) -> Answer<Stored> {
         let id = self.volume_id();
         let records = self.records();
-        let hold = app.queue.hold(&id).await?;
-        if let Some(stored) = app.queue.intact_volume(&id).await? {
+        let pin = app.queue.items().pin(&id).await?;
+        if let Some(stored) = app.queue.items().intact_volume(&id).await? {
             let scan = scans::to_note(app, tenant, &id, &stored).await?;
-            let renewed = app.queue.renew_volume(tenant, &id, tags, scan.as_ref());
+            let renewed = app
+                .queue
+                .items()
+                .renew_volume(tenant, &id, tags, scan.as_ref());
             if let Some((volume, new)) = renewed.await? {
-                return Ok(Stored { volume, new, hold });
+                return Ok(Stored { volume, new, pin });
             }
         }
         let received = self.files;
@@ -279,15 +283,18 @@ impl Bundle {
         let ((facts, scan), ()) = tokio::try_join!(inspected, settled)?;
         let volume = StoredVolume {
             sequence: 0,
-            created_at: app.queue.clock.now(),
+            created_at: app.queue.now(),
             bytes,
             files: records,
             facts: facts.to_json(),
             id,
         };
-        let added = app.queue.add_volume(volume, staged, tenant, tags, scan);
+        let added = app
+            .queue
+            .items()
+            .add_volume(volume, staged, tenant, tags, scan);
         let (volume, new) = added.await?;
-        Ok(Stored { volume, new, hold })
+        Ok(Stored { volume, new, pin })
     }
 
     /// The id of the volume of these files.

@@ -51,7 +51,8 @@ pub async fn receive(app: &App, request: Request, apart: &[&'static str]) -> Ans
     let counting = Counting::of(&request);
     let limits = BodyLimits::of(&request)?;
     app.queue
-        .blobs
+        .items()
+        .blobs()
         .require_room(announced_length(request.headers()))?;
     let mut upload = Upload {
         volume: Bundle::new(app, &counting),

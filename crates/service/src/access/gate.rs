@@ -4,7 +4,7 @@ use super::{
     AccessStore, ApiKey, Identity, Issuer, IssuerError, KeyState, Maker, Makers, PresentedKey,
     Quota, Scope,
 };
-use crate::jobs::{Clock, StoreError, Tenant};
+use crate::records::{Clock, StoreError, Tenant};
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};

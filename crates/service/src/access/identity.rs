@@ -1,7 +1,7 @@
 //! Who sends a request.
 
 use super::{Quota, Scope};
-use crate::jobs::{Tenant, Timestamp};
+use crate::records::{Tenant, Timestamp};
 
 /// Who sends a request.
 #[derive(Debug, Clone, PartialEq, Eq)]

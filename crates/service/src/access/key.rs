@@ -6,7 +6,7 @@
 //! let strangers keep the processor busy.
 
 use super::{Quota, Scope};
-use crate::jobs::{Tenant, Timestamp, hex};
+use crate::records::{Tenant, Timestamp, hex};
 use base64::Engine;
 use base64::prelude::BASE64_URL_SAFE_NO_PAD;
 use sha2::{Digest, Sha256};

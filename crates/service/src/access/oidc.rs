@@ -14,7 +14,7 @@
 //! used as they are, for at most [`STALE_AFTER`], and read anew beside the requests.
 
 use super::{Identity, Makers, Quota, Scope};
-use crate::jobs::{Tenant, content_id};
+use crate::records::{Tenant, content_id};
 use base64::Engine;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use jsonwebtoken::jwk::{AlgorithmParameters, EllipticCurve, Jwk};

@@ -2,7 +2,7 @@
 
 use super::audit::{Anchor, AuditEvent, AuditFilter, AuditLink, AuditRecord};
 use super::{ApiKey, Usage};
-use crate::jobs::{ListPage, ListRequest, StoreResult, Tenant, Timestamp};
+use crate::records::{ListPage, ListRequest, StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
 
 /// Keys and audit trail. Every method is one transaction and fails only if the database does.

@@ -1,6 +1,6 @@
 //! An archive as the operator describes it.
 
-use crate::jobs::Tenant;
+use crate::records::Tenant;
 use reqwest::Url;
 use std::fmt;
 use std::path::PathBuf;

@@ -4,8 +4,8 @@
 use super::trouble::Trouble;
 use super::web::{Stored, store_failure};
 use super::{ArchiveObject, DicomPeer, DicomTls};
-use crate::jobs::Fault;
 use crate::pem;
+use crate::records::Fault;
 use dicom_core::{PrimitiveValue, VR, dicom_value};
 use dicom_dictionary_std::{tags, uids};
 use dicom_encoding::TransferSyntaxIndex;

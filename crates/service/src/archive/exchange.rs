@@ -4,7 +4,8 @@ use super::trouble::Trouble;
 use super::web::WebClients;
 use super::{Archive, ArchiveStore, Archives, ExchangeHost};
 use crate::hooks::{AttemptEnd, Lanes, RetrySchedule, UrlGuard, random_share};
-use crate::jobs::{Clock, Queue, Tenant, Timestamp};
+use crate::jobs::Queue;
+use crate::records::{Clock, Tenant, Timestamp};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -55,7 +56,7 @@ impl Exchange {
     }
 
     pub(super) fn clock(&self) -> &Arc<dyn Clock> {
-        &self.queue.clock
+        self.queue.clock()
     }
 
     pub(super) fn lanes(&self) -> Lanes {

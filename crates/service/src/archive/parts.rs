@@ -4,7 +4,7 @@
 use super::pieces::{EndlessHeader, Unparsed};
 use super::related::RelatedType;
 use super::trouble::{Trouble, odd_answer};
-use crate::jobs::Fault;
+use crate::records::Fault;
 use futures::stream::BoxStream;
 use futures::{Stream, StreamExt};
 use multer::{Constraints, Multipart, SizeLimit};

@@ -1,7 +1,7 @@
 //! Fetches and deliveries, and the trait that a database implements.
 
 use crate::hooks::{Backlog, DeliveryState};
-use crate::jobs::{Failure, Job, SeriesSource, StoreResult, Tenant, Timestamp};
+use crate::records::{Failure, Job, SeriesSource, StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
 use std::collections::BTreeMap;
 

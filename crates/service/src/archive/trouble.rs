@@ -1,6 +1,6 @@
 //! Why an attempt failed, and whether another one may succeed.
 
-use crate::jobs::{Failure, Fault, StoreError};
+use crate::records::{Failure, Fault, StoreError};
 use std::time::Duration;
 
 /// Why an attempt did not succeed.

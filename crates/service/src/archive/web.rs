@@ -7,7 +7,7 @@ use super::parts::{PartLimits, SeriesParts};
 use super::trouble::{Trouble, odd_answer};
 use super::{Archive, Credentials};
 use crate::hooks::{Pin, PinnedNames, UrlGuard, retry_after};
-use crate::jobs::{Failure, Fault, Timestamp};
+use crate::records::{Failure, Fault, Timestamp};
 use futures::StreamExt;
 use reqwest::header::{ACCEPT, CONTENT_TYPE, HeaderMap};
 use reqwest::redirect::{Attempt, Policy};

@@ -2,7 +2,7 @@
 
 use super::ConfigError;
 use crate::archive::{Archive, Archives};
-use crate::jobs::Tenant;
+use crate::records::Tenant;
 use std::path::Path;
 
 /// The key of the file.

@@ -6,7 +6,7 @@ use super::{
     AttemptEnd, AttemptOutcome, DeliveryLimits, DeliveryStore, DueDelivery, Errands, Lanes,
     RetrySchedule, Rounds, Sender, Settlement, SigningSecret, UrlGuard,
 };
-use crate::jobs::{Clock, Job, JobState, StoreResult, Timestamp};
+use crate::records::{Clock, Job, JobState, StoreResult, Timestamp};
 use async_trait::async_trait;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

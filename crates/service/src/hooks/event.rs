@@ -1,6 +1,6 @@
 //! What is told of jobs.
 
-use crate::jobs::JobState;
+use crate::records::JobState;
 
 /// What happened to a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,7 +1,7 @@
 //! Deliveries and endpoints, and the trait that a database implements.
 
 use super::{AttemptOutcome, HookEvent, SigningSecret};
-use crate::jobs::{StoreResult, Tenant, Timestamp};
+use crate::records::{StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
 
 /// How far a delivery has come.

@@ -5,7 +5,7 @@
 
 use super::Lanes;
 use super::schedule::milliseconds;
-use crate::jobs::{Clock, Job, StoreResult, Timestamp};
+use crate::records::{Clock, Job, StoreResult, Timestamp};
 use async_trait::async_trait;
 use std::sync::Arc;
 use std::time::Duration;

@@ -1,6 +1,6 @@
 //! When a failed delivery is tried again.
 
-use crate::jobs::Timestamp;
+use crate::records::Timestamp;
 use std::time::Duration;
 
 /// The longest pause between two attempts.

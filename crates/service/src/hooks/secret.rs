@@ -4,7 +4,7 @@
 //! HMAC-SHA256 of `ID.TIMESTAMP.BODY`, written as `v1,` and base64. With two secrets, while one
 //! replaces the other, there are two signatures, separated by a space.
 
-use crate::jobs::random_key;
+use crate::records::random_key;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use hmac::{Hmac, KeyInit, Mac};

@@ -16,7 +16,7 @@ use super::service::{Place, Service};
 use super::session::Session;
 use super::wire::{Wire, WireError};
 use crate::access::{Activity, AuditEvent, Outcome};
-use crate::jobs::Tenant;
+use crate::records::Tenant;
 use dicom_ul::pdu::{
     AbortRQServiceProviderReason as AbortReason, AbortRQSource, AssociationRJ, AssociationRJResult,
     AssociationRJServiceProviderASCEReason, AssociationRJServiceProviderPresentationReason,

@@ -11,8 +11,9 @@ use super::observer::IntakeObserver;
 use super::record::{GroupState, IntakeGroup, IntakeStore, Origin, ReceivedFiles};
 use super::rules::Rule;
 use super::session::Sessions;
-use crate::jobs::{
-    BlobError, Failure, Fault, LocalFile, Queue, StoreError, StoreFault, StoreResult, Timestamp,
+use crate::jobs::Queue;
+use crate::records::{
+    BlobError, Failure, Fault, LocalFile, StoreError, StoreFault, StoreResult, Timestamp,
 };
 use async_trait::async_trait;
 use futures::StreamExt;
@@ -194,7 +195,7 @@ impl Gatherer {
         self.release(&files).await?;
         let late = self.sessions.patience() + LATE;
         let late = Timestamp::try_from(late.as_millis()).unwrap_or(Timestamp::MAX);
-        let before = self.queue.clock.now().saturating_sub(late);
+        let before = self.queue.now().saturating_sub(late);
         for group in self.store.unfinished().await? {
             if group.changed_at < before && !self.sessions.watches(&group.id) {
                 self.sessions.resume(&group.id, true);
@@ -280,7 +281,7 @@ impl Gatherer {
                         "received objects make no volume"
                     );
                     self.observer.group(false);
-                    let now = self.queue.clock.now();
+                    let now = self.queue.now();
                     let failed = self.store.failed(id, group.revision, &failure, now);
                     failed.await.map_err(text)?;
                 }
@@ -299,7 +300,7 @@ impl Gatherer {
     async fn make(&self, group: &IntakeGroup) -> Result<(), MakeError> {
         let files = self.local_files(group).await?;
         let volume = self.maker.make(group, &files).await?;
-        let now = self.queue.clock.now();
+        let now = self.queue.now();
         self.store
             .made(&group.id, group.revision, &volume, now)
             .await?;
@@ -318,7 +319,7 @@ impl Gatherer {
         let volume = match &group.volume {
             Some(id) => {
                 let tenant = &group.origin.tenant;
-                self.queue.catalogue.volume(tenant, id).await?
+                self.queue.items().catalogue().volume(tenant, id).await?
             }
             None => None,
         };
@@ -329,7 +330,7 @@ impl Gatherer {
                 (None, Some(volume)) => {
                     let mut stored = volume.files.iter();
                     match stored.find(|file| file.sha256 == object.file_sha256) {
-                        Some(file) => self.queue.blobs.local(&volume.id, file).await?,
+                        Some(file) => self.queue.items().blobs().local(&volume.id, file).await?,
                         None => None,
                     }
                 }
@@ -364,7 +365,7 @@ impl Gatherer {
                 }
             }
         };
-        let now = self.queue.clock.now();
+        let now = self.queue.now();
         let ended = self
             .store
             .filed(&group.id, job.as_deref(), failure.as_ref(), now);
@@ -388,7 +389,7 @@ impl Gatherer {
 
     /// Forgets failed groups that are too old, and sets files without a row aside.
     async fn sweep(&self) -> StoreResult<()> {
-        let now = self.queue.clock.now();
+        let now = self.queue.now();
         if let Some(age) = self.settings.keep_failed {
             let age = Timestamp::try_from(age.as_millis()).unwrap_or(Timestamp::MAX);
             let failed = self.store.failed_before(now.saturating_sub(age)).await?;

@@ -11,7 +11,7 @@ use super::receive::Receiver;
 use super::service::{Places, ScpSettings, Service};
 use super::session::Sessions;
 use crate::access::Recorder;
-use crate::jobs::Clock;
+use crate::records::Clock;
 use rustls::ServerConfig;
 use std::collections::BTreeMap;
 use std::net::IpAddr;

@@ -9,7 +9,7 @@ use super::record::{
     Added, IncomingFile, IntakeRoom, IntakeStore, NewObject, Origin, Protocol, ReceivedFiles,
 };
 use super::session::Session;
-use crate::jobs::{BlobError, Clock, StoreError, StoreFault, hex, random_id};
+use crate::records::{BlobError, Clock, StoreError, StoreFault, hex, random_id};
 use sha2::{Digest, Sha256};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;

@@ -1,8 +1,8 @@
 //! What was received: groups of objects that become a volume each, and the interfaces to the database
 //! and the files that keep them.
 
-use crate::jobs::{BlobError, Failure, ListPage, ListRequest, LocalFile, StoreResult, Tenant};
-use crate::jobs::{BlobWriter, Timestamp};
+use crate::records::{BlobError, Failure, ListPage, ListRequest, LocalFile, StoreResult, Tenant};
+use crate::records::{BlobWriter, Timestamp};
 use async_trait::async_trait;
 use std::collections::BTreeSet;
 use std::fmt;
@@ -281,7 +281,7 @@ pub trait ReceivedFiles: Send + Sync + 'static {
     /// Starts a file.
     ///
     /// # Errors
-    /// [`BlobError`], as of every method here; [`StoreFault::Full`](crate::jobs::StoreFault::Full) if the
+    /// [`BlobError`], as of every method here; [`StoreFault::Full`](crate::records::StoreFault::Full) if the
     /// disk is nearly full.
     async fn begin(&self) -> Result<Box<dyn IncomingFile>, BlobError>;
 

@@ -1,6 +1,6 @@
 //! The systems that may send, as the operator lists them.
 
-use crate::jobs::Tenant;
+use crate::records::Tenant;
 use ipnet::IpNet;
 use serde::{Deserialize, Serialize};
 use std::fmt;

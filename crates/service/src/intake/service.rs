@@ -6,7 +6,7 @@ use super::receive::Receiver;
 use super::senders::{AeTitle, Senders};
 use super::session::Sessions;
 use crate::access::Recorder;
-use crate::jobs::Clock;
+use crate::records::Clock;
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

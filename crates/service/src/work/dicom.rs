@@ -13,10 +13,8 @@ use super::problems::{
     Explain, broken_result, identity_needed, malformed_identity, not_exportable, unknown_identity,
 };
 use super::upload::UploadFacts;
-use crate::jobs::{
-    Failure, OutputFile, Resource, ScanFields, ScanIdentity, StoredItem, StoredResult, Timestamp,
-    rfc3339,
-};
+use crate::items::{OutputFile, StoredItem, StoredResult};
+use crate::records::{Failure, Resource, ScanFields, ScanIdentity, Timestamp, rfc3339};
 use nalgebra::Matrix3;
 use serde_json::{Map, Value};
 use ventriform::export::dicom::{

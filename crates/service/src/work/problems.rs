@@ -6,7 +6,8 @@
 //! by their common names and fits both.
 
 use super::page::PageError;
-use crate::jobs::{Failure, Fault, WorkError};
+use crate::jobs::WorkError;
+use crate::records::{Failure, Fault};
 use std::error::Error;
 use std::fmt::Display;
 use ventriform::deform::DeformError;

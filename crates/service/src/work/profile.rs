@@ -2,7 +2,8 @@
 
 use super::problems::Explain;
 use super::segmentation::PROFILE;
-use crate::jobs::{Failure, OutputFile, WorkOutput};
+use crate::items::{OutputFile, WorkOutput};
+use crate::records::Failure;
 use serde_json::json;
 use ventriform::reader::ReaderProfile;
 

@@ -6,10 +6,9 @@ use super::parameters;
 use super::problems::{
     Explain, mesh_missing, not_exportable, profile_missing, unreadable_model, work_error,
 };
-use crate::jobs::{
-    Failure, GivenParameters, Needs, OutputFile, Resource, StoredItem, Work, WorkError, WorkInput,
-    WorkOutput,
-};
+use crate::items::{OutputFile, StoredItem, WorkOutput};
+use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
+use crate::records::{Failure, Resource};
 use serde_json::{Map, Value};
 use ventriform::export::{Format, read_json};
 use ventriform::parameters::{FitParameters, Parameters};

@@ -3,7 +3,8 @@
 use super::files::volume_files;
 use super::problems::Explain;
 use super::{profile, template};
-use crate::jobs::{Failure, Fault, LocalFile, ScanFields, StoreError, StoredVolume, WorkOutput};
+use crate::items::WorkOutput;
+use crate::records::{Failure, Fault, LocalFile, ScanFields, StoreError, StoredVolume};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use ventriform::mesh_files::MeshStatement;

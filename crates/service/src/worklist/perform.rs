@@ -3,7 +3,7 @@
 use super::dataset::DataSetJson;
 use super::procedure::WORK;
 use super::workitem::{PERFORMED, PRIORITY, PROGRESS, Refusal, Workitem, WorkitemState};
-use crate::jobs::{Priority, Timestamp};
+use crate::records::{Priority, Timestamp};
 use serde_json::{Map, Value, json};
 
 const STEP_PROGRESS: &str = "00741004";
@@ -158,7 +158,7 @@ fn output(object: &WorkOutputObject) -> Value {
 )]
 mod tests {
     use super::*;
-    use crate::jobs::Tenant;
+    use crate::records::Tenant;
 
     const NOW: (Timestamp, &str) = (7, "20261123050000+0000");
 

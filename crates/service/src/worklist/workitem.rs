@@ -1,7 +1,7 @@
 //! One work item and what may be done to it in each state.
 
 use super::dataset::DataSetJson;
-use crate::jobs::{Tenant, Timestamp};
+use crate::records::{Tenant, Timestamp};
 use serde_json::{Map, Value};
 
 const SOP_CLASS: &str = "00080016";

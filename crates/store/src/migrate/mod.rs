@@ -28,7 +28,7 @@ use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use ventriform_service::config::PostgresSettings;
-use ventriform_service::jobs::{StoreError, random_id};
+use ventriform_service::records::{StoreError, random_id};
 
 pub use rows::TableCount;
 
@@ -116,8 +116,8 @@ pub enum MigrateError {
     Differs(String),
 }
 
-impl From<ventriform_service::jobs::BlobError> for MigrateError {
-    fn from(error: ventriform_service::jobs::BlobError) -> Self {
+impl From<ventriform_service::records::BlobError> for MigrateError {
+    fn from(error: ventriform_service::records::BlobError) -> Self {
         Self::Store(error.into())
     }
 }

@@ -15,7 +15,7 @@ use sqlx::query::Query;
 use sqlx::sqlite::{SqlitePool, SqliteRow};
 use sqlx::{AssertSqlSafe, Connection, PgConnection, Postgres, Row};
 use ventriform_service::config::PostgresSettings;
-use ventriform_service::jobs::{StoreError, StoreResult};
+use ventriform_service::records::{StoreError, StoreResult};
 
 /// Rows sent at a time.
 const BATCH: usize = 200;

@@ -12,7 +12,7 @@ use crate::database::SqlStore;
 use crate::findings::Examination;
 use std::collections::{BTreeMap, BTreeSet};
 use ventriform_service::intake::ReceivedFiles;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     BlobStore, Clock, Custody, FileRecord, ItemRecord, RecordPages, Resource, StoreResult,
     SystemClock, Tenant,
 };

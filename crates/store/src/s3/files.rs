@@ -20,7 +20,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     BlobError, BlobStore, BlobStream, DiskSpace, FileRecord, ItemRecord, LocalFile, Resource,
     Shelved, StagedFiles, StagedFor, StoreFault, Timestamp, random_id, volume_id,
 };

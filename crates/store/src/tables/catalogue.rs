@@ -8,7 +8,7 @@ use super::scans::{note_upload, push_scan};
 use crate::database::{SqlStore, Transaction};
 use crate::query::{QueryBuilder, query};
 use async_trait::async_trait;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     AddedProduct, Catalogue, Erased, ErasureOrder, Expired, Held, ItemFilter, LegalHold, ListPage,
     ListRequest, Product, ProductRoom, Receipt, Resource, ScanFields, StoreResult, StoredVolume,
     Tags, Tenant, Timestamp,

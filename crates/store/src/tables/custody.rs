@@ -6,7 +6,7 @@ use crate::query::query;
 use async_trait::async_trait;
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
-use ventriform_service::jobs::{Custody, ItemRecord, Resource, StoreResult};
+use ventriform_service::records::{Custody, ItemRecord, Resource, StoreResult};
 
 /// Defects named at most.
 const DEFECTS: &str = "PRAGMA quick_check(20)";

@@ -12,7 +12,7 @@ use super::rows::{self, to_json};
 use crate::database::Transaction;
 use crate::query::{Target, query};
 use ventriform_service::access::{Activity, AuditEvent};
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     AuditMark, Erased, ErasedFile, ErasedItem, ErasureOrder, Receipt, Resource, StoreResult,
     Tenant, Timestamp, random_id,
 };

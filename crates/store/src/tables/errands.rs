@@ -6,7 +6,7 @@ use super::rows;
 use crate::database::SqlStore;
 use crate::query::{DbRow, query};
 use ventriform_service::hooks::{Backlog, DeliveryState};
-use ventriform_service::jobs::{StoreResult, Tenant, Timestamp};
+use ventriform_service::records::{StoreResult, Tenant, Timestamp};
 
 /// A table of errands.
 #[derive(Debug, Clone, Copy)]

@@ -11,7 +11,7 @@ use ventriform_service::intake::{
     Added, GROUP_PREFIX, GroupState, IntakeGroup, IntakeRoom, IntakeStore, NewObject, Origin,
     Protocol, ReceivedObject,
 };
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     Failure, ListPage, ListRequest, StoreError, StoreResult, Tenant, Timestamp, random_id,
 };
 

@@ -28,7 +28,7 @@ use crate::query::{QueryBuilder, query};
 use async_trait::async_trait;
 use std::collections::BTreeMap;
 use std::time::Duration;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     Claimant, DeathLimit, Deleted, Failure, Fault, Filed, Interrupted, Job, JobFilter, JobOutcome,
     JobState, JobStore, Lease, ListPage, ListRequest, NewJob, Priority, Product, QueueLoad,
     Resource, ScanFilter, StoreResult, TagFilter, Tenant, Timestamp, random_id,

@@ -9,7 +9,7 @@ use async_trait::async_trait;
 use sqlx::postgres::PgPool;
 use std::sync::Arc;
 use std::time::Duration;
-use ventriform_service::jobs::{NewsFeed, Peers, StoreResult};
+use ventriform_service::records::{NewsFeed, Peers, StoreResult};
 
 /// How long is remembered which places of files were given up: longer than any process may stand still
 /// between writing files and their row.
@@ -42,7 +42,7 @@ impl Peers for PgPeers {
         &self.store.run
     }
 
-    async fn live(&self, workers: usize, length: Duration) -> StoreResult<()> {
+    async fn heartbeat(&self, workers: usize, length: Duration) -> StoreResult<()> {
         query(
             "INSERT INTO runs (id, workers, expires_at) VALUES ($1, $2, database_now() + $3)
              ON CONFLICT (id) DO UPDATE
@@ -81,7 +81,7 @@ impl Peers for PgPeers {
         Ok(rows::unsigned(row.try_get(0)?))
     }
 
-    async fn hold(&self, token: &str, item: &str) -> StoreResult<()> {
+    async fn pin(&self, token: &str, item: &str) -> StoreResult<()> {
         // Not beside other writers: an erasure looks for holds before it deletes.
         query("INSERT INTO holds (token, run, item) VALUES ($1, $2, $3)")
             .bind(token)
@@ -92,7 +92,7 @@ impl Peers for PgPeers {
         Ok(())
     }
 
-    async fn release(&self, token: &str) -> StoreResult<()> {
+    async fn unpin(&self, token: &str) -> StoreResult<()> {
         query("DELETE FROM holds WHERE token = $1")
             .bind(token)
             .write_beside(&self.store.writer)
@@ -100,12 +100,12 @@ impl Peers for PgPeers {
         Ok(())
     }
 
-    async fn held_by_others(&self, items: &[String]) -> StoreResult<bool> {
+    async fn pinned_by_others(&self, items: &[String]) -> StoreResult<bool> {
         let held = holds_of_others(&self.store.run, items)?;
         Ok(held.fetch_optional(&self.store.readers).await?.is_some())
     }
 
-    async fn take_duty(&self, duty: &str, length: Duration) -> StoreResult<bool> {
+    async fn lead(&self, duty: &str, length: Duration) -> StoreResult<bool> {
         let taken = query(
             "INSERT INTO duties (name, run, expires_at) VALUES ($1, $2, database_now() + $3)
              ON CONFLICT (name) DO UPDATE SET run = excluded.run, expires_at = excluded.expires_at

@@ -4,7 +4,7 @@ use super::rows::{self, to_json};
 use crate::database::SqlStore;
 use crate::query::{DbRow, query};
 use async_trait::async_trait;
-use ventriform_service::jobs::{StoreError, StoreResult, Tenant, Timestamp};
+use ventriform_service::records::{StoreError, StoreResult, Tenant, Timestamp};
 use ventriform_service::worklist::{
     AddedWorkitem, BATCH_BYTES, DataSetJson, Workitem, WorkitemState, Worklist,
 };

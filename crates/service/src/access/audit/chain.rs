@@ -2,7 +2,7 @@
 
 use super::event::{Activity, Anchor, AuditEvent};
 use crate::access::AccessStore;
-use crate::jobs::{StoreResult, hex};
+use crate::records::{StoreResult, hex};
 use sha2::{Digest, Sha256};
 
 /// The hash before the first row.

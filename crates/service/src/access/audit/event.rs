@@ -1,6 +1,6 @@
 //! One event of the audit trail, and the rows that hold events.
 
-use crate::jobs::{Tenant, Timestamp};
+use crate::records::{Tenant, Timestamp};
 use serde::{Deserialize, Serialize};
 
 /// What was done.

@@ -3,7 +3,7 @@
 //! events.
 
 use super::event::{Activity, AuditRecord, Outcome};
-use crate::jobs::{Resource, rfc3339};
+use crate::records::{Resource, rfc3339};
 use serde_json::{Value, json};
 
 const TYPES: &str = "http://terminology.hl7.org/CodeSystem/audit-event-type";

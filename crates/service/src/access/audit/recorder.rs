@@ -14,7 +14,7 @@
 
 use super::event::{Activity, AuditEvent};
 use crate::access::AccessStore;
-use crate::jobs::{Clock, Tenant};
+use crate::records::{Clock, Tenant};
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Duration;

@@ -22,10 +22,9 @@
 //! goes to the service's.
 
 use super::run::Ended;
-use crate::jobs::{
-    Failure, Fault, Isolation, LocalFile, OutputFile, StoredItem, WorkError, WorkInput, WorkOutput,
-    Works,
-};
+use crate::items::{OutputFile, StoredItem, WorkOutput};
+use crate::jobs::{Isolation, WorkError, WorkInput, Works};
+use crate::records::{Failure, Fault, LocalFile};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::{Deserialize, Serialize};

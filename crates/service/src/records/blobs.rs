@@ -6,53 +6,21 @@
 //! for a [`LocalFile`]. No method takes or returns the path of a stored file, so that a store
 //! may keep its files elsewhere than on a disk.
 
-use super::{FileRecord, ItemRecord, StoreFault};
-use crate::jobs::{Resource, Timestamp};
+use super::{BlobError, FileRecord, ItemRecord, StoreFault};
+use super::{Resource, Timestamp};
 use async_trait::async_trait;
 use bytes::Bytes;
 use futures::stream::BoxStream;
 use std::any::Any;
 use std::collections::BTreeSet;
 use std::fmt;
-use std::io::ErrorKind;
 use std::ops::{Deref, Range};
 use std::path::{Path, PathBuf};
 use std::pin::Pin;
 use std::sync::Arc;
 use tokio::io::AsyncWrite;
 
-/// A file could not be written or read.
-#[derive(Debug, Clone, thiserror::Error)]
-#[error("the file store: {message}")]
-pub struct BlobError {
-    /// The kind of failure.
-    pub cause: StoreFault,
-    /// What failed.
-    pub message: String,
-}
-
-impl BlobError {
-    /// A failure of that kind.
-    pub fn new(cause: StoreFault, message: impl Into<String>) -> Self {
-        Self {
-            cause,
-            message: message.into(),
-        }
-    }
-}
-
-impl From<std::io::Error> for BlobError {
-    fn from(error: std::io::Error) -> Self {
-        let cause = match error.kind() {
-            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => StoreFault::Full,
-            _ if error.raw_os_error().is_some() => StoreFault::Disk,
-            _ => StoreFault::Other,
-        };
-        Self::new(cause, error.to_string())
-    }
-}
-
-/// What staged files are for. A file store that keeps a reserve of free space gives it to results
+/// The purpose of staged files. A file store that keeps a reserve of free space gives it to results
 /// only, so that the jobs it has accepted can end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StagedFor {

@@ -5,7 +5,7 @@
 //! sees neither the others nor what they call the item.
 
 use super::{ScanFilter, ScanIdentity};
-use crate::jobs::{Tenant, Timestamp};
+use super::{Tenant, Timestamp};
 use std::collections::BTreeMap;
 use std::ops::Deref;
 

@@ -6,7 +6,7 @@ use super::{
     Custody, Erased, ErasureOrder, Expired, Held, ItemFilter, LegalHold, ListPage, ListRequest,
     Product, Receipt, ScanFields, Scans, StoreResult, StoredVolume, Tags,
 };
-use crate::jobs::{Resource, Tenant, Timestamp};
+use super::{Resource, Tenant, Timestamp};
 use async_trait::async_trait;
 
 /// The result of a request to delete a job.

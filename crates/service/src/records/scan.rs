@@ -5,7 +5,7 @@
 //! holding, can be erased by itself, and no result contains it.
 
 use super::{FileRecord, StoreResult};
-use crate::jobs::{Tenant, Timestamp};
+use super::{Tenant, Timestamp};
 use async_trait::async_trait;
 use serde_json::{Map, Value};
 use std::fmt;

@@ -1,8 +1,8 @@
 //! The interface for looking after what is stored: which items have a row, and what their rows
 //! say of their files.
 
+use super::Resource;
 use super::{ItemRecord, StoreResult};
-use crate::jobs::Resource;
 use async_trait::async_trait;
 use std::collections::BTreeSet;
 

@@ -1,6 +1,6 @@
 //! Erasing items, and the receipts that stay.
 
-use crate::jobs::{Tenant, Timestamp};
+use super::{Tenant, Timestamp};
 use serde::{Deserialize, Serialize};
 
 /// An item to be erased.

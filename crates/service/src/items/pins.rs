@@ -1,10 +1,10 @@
-//! What protects a single item while its files and its record change: locks, holds, and the list
+//! Protection of a single item while its files and its record change: locks, pins, and the list
 //! of items whose files and record may disagree.
 //!
 //! - A **lock** is kept while the files and the record of one item are added or deleted, so that
 //!   the two always agree. Items with different ids do not wait for each other.
-//! - A **hold** is kept by a request from the moment it finds or stores an item until it has filed
-//!   the job that needs it. An item on hold is not deleted. A hold is taken under the lock, so that
+//! - A **pin** is kept by a request from the moment it finds or stores an item until it has filed
+//!   the job that needs it. A pinned item is not deleted. A pin is set under the lock, so that
 //!   a deletion that has begun is over before the item is looked for.
 //! - An item is **unsettled** from before its first file is written until its record is committed,
 //!   and from before its record is deleted until its files are. What stays in that list after the
@@ -14,68 +14,68 @@
 //! and records. Where several processes share a store, its files lie in places of their own, so that
 //! - a lock is needed within a process only: each publication has other files, and no row can name files
 //!   that were erased meanwhile (the database refuses it, and the publication is done again);
-//! - a hold is also a row of the database, which an erasure by another process reads;
+//! - a pin is also a row of the database, which an erasure by another process reads;
 //! - what one process leaves unsettled are its own files.
 
-use crate::jobs::{FileRecord, Peers, StoreError, random_id};
+use crate::records::{FileRecord, Peers, StoreError, random_id};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Duration;
 use tokio::sync::OwnedMutexGuard;
 
-/// Locks, holds and unsettled items, by id.
+/// Locks, pins and unsettled items, by id.
 #[derive(Default)]
-pub(super) struct Items {
+pub(super) struct ItemLocks {
     locks: Mutex<BTreeMap<String, Weak<tokio::sync::Mutex<()>>>>,
-    holds: Arc<Mutex<BTreeMap<String, usize>>>,
+    pins: Arc<Mutex<BTreeMap<String, usize>>>,
     /// With the files that are to be deleted with the item.
     unsettled: Mutex<BTreeMap<String, Vec<FileRecord>>>,
 }
 
 /// Keeps an item from being deleted until this is dropped.
-#[must_use = "the item may be deleted as soon as the hold is dropped"]
-pub struct Hold {
+#[must_use = "the item may be deleted as soon as the pin is dropped"]
+pub struct Pin {
     id: String,
-    holds: Arc<Mutex<BTreeMap<String, usize>>>,
-    /// The other processes, and the token by which they see the hold.
+    pins: Arc<Mutex<BTreeMap<String, usize>>>,
+    /// The other processes, and the token by which they see the pin.
     elsewhere: Option<(Arc<dyn Peers>, String)>,
 }
 
-/// Pause before the release of a hold is tried again.
-const RELEASE_AGAIN: Duration = Duration::from_secs(5);
+/// Pause before the release of a pin is tried again.
+const UNPIN_RETRY: Duration = Duration::from_secs(5);
 
-impl Hold {
+impl Pin {
     /// The same, which the other processes see too.
     pub(super) async fn among(mut self, peers: &Arc<dyn Peers>) -> Result<Self, StoreError> {
         let token = random_id("");
         // Released also if it is not known whether it was written.
         self.elsewhere = Some((peers.clone(), token.clone()));
-        peers.hold(&token, &self.id).await?;
+        peers.pin(&token, &self.id).await?;
         Ok(self)
     }
 }
 
-async fn release(peers: Arc<dyn Peers>, token: String) {
-    while let Err(error) = peers.release(&token).await {
-        tracing::warn!(%error, "other processes still see a hold; tried again");
-        tokio::time::sleep(RELEASE_AGAIN).await;
+async fn unpin(peers: Arc<dyn Peers>, token: String) {
+    while let Err(error) = peers.unpin(&token).await {
+        tracing::warn!(%error, "other processes still see a pin; tried again");
+        tokio::time::sleep(UNPIN_RETRY).await;
     }
 }
 
-impl Drop for Hold {
+impl Drop for Pin {
     fn drop(&mut self) {
-        let mut holds = entered(&self.holds);
-        if let Some(count) = holds.get_mut(&self.id) {
+        let mut pins = entered(&self.pins);
+        if let Some(count) = pins.get_mut(&self.id) {
             *count -= 1;
             if *count == 0 {
-                holds.remove(&self.id);
+                pins.remove(&self.id);
             }
         }
-        drop(holds);
+        drop(pins);
         if let Some((peers, token)) = self.elsewhere.take()
             && let Ok(runtime) = tokio::runtime::Handle::try_current()
         {
-            runtime.spawn(release(peers, token));
+            runtime.spawn(unpin(peers, token));
         }
     }
 }
@@ -85,7 +85,7 @@ fn entered<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl Items {
+impl ItemLocks {
     /// Waits for the lock of an item.
     pub async fn lock(&self, id: &str) -> OwnedMutexGuard<()> {
         let lock = {
@@ -103,20 +103,20 @@ impl Items {
         lock.lock_owned().await
     }
 
-    /// Holds an item, which need not exist yet.
-    pub async fn hold(&self, id: &str) -> Hold {
+    /// Pins an item, which need not exist yet.
+    pub async fn pin(&self, id: &str) -> Pin {
         let _lock = self.lock(id).await;
-        *entered(&self.holds).entry(id.to_owned()).or_default() += 1;
-        Hold {
+        *entered(&self.pins).entry(id.to_owned()).or_default() += 1;
+        Pin {
             id: id.to_owned(),
-            holds: self.holds.clone(),
+            pins: self.pins.clone(),
             elsewhere: None,
         }
     }
 
-    /// Whether somebody holds the item.
-    pub fn is_held(&self, id: &str) -> bool {
-        entered(&self.holds).contains_key(id)
+    /// Whether somebody pins the item.
+    pub fn is_pinned(&self, id: &str) -> bool {
+        entered(&self.pins).contains_key(id)
     }
 
     /// Notes that the item's files and record may disagree from now on.
@@ -160,7 +160,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_lock_keeps_out_the_same_id_only() {
-        let items = Items::default();
+        let items = ItemLocks::default();
         let first = items.lock("a").await;
         assert!(items.lock("b").now_or_never().is_some());
         assert!(items.lock("a").now_or_never().is_none());
@@ -169,14 +169,14 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn an_item_is_held_until_its_last_hold_is_dropped() {
-        let items = Items::default();
-        let (first, second) = (items.hold("a").await, items.hold("a").await);
-        assert!(items.is_held("a") && !items.is_held("b"));
+    async fn an_item_is_pinned_until_its_last_pin_is_dropped() {
+        let items = ItemLocks::default();
+        let (first, second) = (items.pin("a").await, items.pin("a").await);
+        assert!(items.is_pinned("a") && !items.is_pinned("b"));
         drop(first);
-        assert!(items.is_held("a"));
+        assert!(items.is_pinned("a"));
         drop(second);
-        assert!(!items.is_held("a"));
-        assert!(entered(&items.holds).is_empty());
+        assert!(!items.is_pinned("a"));
+        assert!(entered(&items.pins).is_empty());
     }
 }

@@ -1,7 +1,7 @@
 //! Figures for operators that only the database knows.
 
 use super::StoreResult;
-use crate::jobs::{Resource, Timestamp};
+use super::{Resource, Timestamp};
 use async_trait::async_trait;
 
 /// What is stored and what waits.

@@ -1,7 +1,7 @@
 //! The interface to the jobs table.
 
 use super::{Deleted, ListPage, ListRequest, Product, ScanFilter, StoreResult, TagFilter};
-use crate::jobs::{Failure, Filed, Job, JobState, NewJob, Priority, Tenant, Timestamp};
+use super::{Failure, Filed, Job, JobState, NewJob, Priority, Tenant, Timestamp};
 use async_trait::async_trait;
 use std::collections::BTreeMap;
 use std::time::Duration;

@@ -1,6 +1,6 @@
 //! The record of an uploaded volume.
 
-use crate::jobs::Timestamp;
+use super::Timestamp;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 

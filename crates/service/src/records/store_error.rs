@@ -1,44 +1,6 @@
-//! The interfaces to storage: a database for jobs and records, a file store for contents.
-//!
-//! [`JobStore`] holds the queue's table, [`Catalogue`] the records of volumes and products, and
-//! [`BlobStore`] their files, and [`Scans`] whose scans the volumes are; [`Custody`] is what is needed to look
-//! after them, and [`Peers`] what processes on one store know of each other. The module `store` implements them with SQLite or PostgreSQL, and a folder.
+//! Failures of the database and of the file store.
 
-mod blobs;
-mod catalogue;
-mod custody;
-mod erasure;
-mod figures;
-mod holding;
-mod job_store;
-mod listing;
-mod peers;
-mod product;
-mod record;
-mod scan;
-mod volume;
-
-pub use blobs::{
-    BlobError, BlobStore, BlobStream, BlobWriter, DiskSpace, LocalFile, Shelved, StagedFiles,
-    StagedFor,
-};
-pub use catalogue::{AddedProduct, Catalogue, Deleted, ProductRoom};
-pub use custody::{Custody, RecordPages};
-pub use erasure::{
-    AuditMark, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder, ErasureReason, Expired,
-    Receipt,
-};
-pub use figures::{FigureStore, QueueFigures};
-pub use holding::{Held, Holding, ItemFilter, LegalHold, TagFilter, Tags};
-pub use job_store::{
-    Claimant, DeathLimit, Interrupted, JobFilter, JobOutcome, JobStore, Lease, QueueLoad,
-};
-pub use listing::{ListPage, ListRequest};
-pub use peers::{News, NewsFeed, Peers};
-pub use product::{Product, ProductFile};
-pub use record::ItemRecord;
-pub use scan::{ScanFields, ScanFilter, ScanIdentity, Scans, UnreadScan};
-pub use volume::{FileRecord, StoredVolume};
+use std::io::ErrorKind;
 
 /// The result of an operation on the database.
 pub type StoreResult<T> = Result<T, StoreError>;
@@ -105,5 +67,36 @@ impl StoreFault {
     /// Whether the same operation can succeed later.
     pub fn may_pass(self) -> bool {
         matches!(self, Self::Full | Self::Busy | Self::Disk | Self::Away)
+    }
+}
+
+/// A file could not be written or read.
+#[derive(Debug, Clone, thiserror::Error)]
+#[error("the file store: {message}")]
+pub struct BlobError {
+    /// The kind of failure.
+    pub cause: StoreFault,
+    /// What failed.
+    pub message: String,
+}
+
+impl BlobError {
+    /// A failure of that kind.
+    pub fn new(cause: StoreFault, message: impl Into<String>) -> Self {
+        Self {
+            cause,
+            message: message.into(),
+        }
+    }
+}
+
+impl From<std::io::Error> for BlobError {
+    fn from(error: std::io::Error) -> Self {
+        let cause = match error.kind() {
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => StoreFault::Full,
+            _ if error.raw_os_error().is_some() => StoreFault::Disk,
+            _ => StoreFault::Other,
+        };
+        Self::new(cause, error.to_string())
     }
 }

@@ -1,7 +1,7 @@
 //! The record of a product: a model, a segmentation or a template.
 
 use super::FileRecord;
-use crate::jobs::{Resource, Timestamp};
+use super::{Resource, Timestamp};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 

@@ -3,24 +3,22 @@
 //! The two steps run in a task of their own, which goes on if the caller goes away: a client that
 //! hangs up leaves neither files without a record nor a record that nobody waited for.
 
-use super::Queue;
-use crate::jobs::{
-    AddedProduct, BlobError, Failure, Fault, FileRecord, Held, ItemRecord, Job, JobOutcome,
-    JobState, Lease, OutputFile, Product, ProductFile, ProductRoom, Resource, ScanFields,
-    StagedFiles, StagedFor, StoreError, StoreFault, StoredVolume, Tags, Tenant, WorkOutput,
-    content_id, hex,
+use super::{Items, OutputFile, WorkOutput, to_its_end};
+use crate::records::{
+    AddedProduct, BlobError, Failure, Fault, FileRecord, Held, ItemRecord, Product, ProductFile,
+    ProductRoom, Resource, ScanFields, StagedFiles, StagedFor, StoreError, StoreFault,
+    StoredVolume, Tags, Tenant, content_id, hex,
 };
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
 use std::sync::Arc;
 use tokio::io::AsyncWriteExt;
-use tracing::Instrument;
 use ventriform::text::is_printable;
 
 /// How often an item is added anew that other processes erase at the same time.
 const ROUNDS: u32 = 3;
 
-impl Queue {
+impl Items {
     /// Adds an uploaded volume durably, with what its file says of the scan. Returns the record, and
     /// whether it is new for the tenant.
     ///
@@ -34,29 +32,29 @@ impl Queue {
         tags: &Tags,
         scan: Option<ScanFields>,
     ) -> Result<(Held<StoredVolume>, bool), StoreError> {
-        let (queue, tenant, tags) = (self.clone(), tenant.clone(), tags.clone());
+        let (items, tenant, tags) = (self.clone(), tenant.clone(), tags.clone());
         to_its_end(async move {
-            let _lock = queue.items.lock(&volume.id).await;
-            queue.items.unsettle(&volume.id);
+            let _lock = items.locks.lock(&volume.id).await;
+            items.locks.unsettle(&volume.id);
             let record = ItemRecord::Volume(volume.clone());
             let mut files = Some(files);
             let mut again = ROUNDS;
             let new = loop {
-                volume.files = queue
+                volume.files = items
                     .publish_unless_intact(record.clone(), &mut files)
                     .await?;
-                let added = queue
+                let added = items
                     .catalogue
                     .add_volume(&volume, &tenant, &tags, scan.as_ref());
                 match added.await {
-                    Err(error) if again > 0 && queue.was_erased_meanwhile(&error, &files) => {
+                    Err(error) if again > 0 && items.was_erased_meanwhile(&error, &files) => {
                         again -= 1;
                     }
                     added => break added?,
                 }
             };
-            queue.items.settle(&volume.id);
-            let stored = queue.catalogue.volume(&tenant, &volume.id).await?;
+            items.locks.settle(&volume.id);
+            let stored = items.catalogue.volume(&tenant, &volume.id).await?;
             Ok((stored.ok_or_else(vanished)?, new))
         })
         .await
@@ -106,7 +104,7 @@ impl Queue {
     /// the same reader, whatever its name.
     ///
     /// # Errors
-    /// As [`Queue::add_template`].
+    /// As [`Items::add_template`].
     pub async fn add_reader(
         self: &Arc<Self>,
         tenant: &Tenant,
@@ -138,19 +136,19 @@ impl Queue {
         output: WorkOutput,
         room: ProductRoom,
     ) -> Result<(Held<Product>, bool), NotAdded> {
-        let (queue, tenant) = (self.clone(), source.tenant.clone());
+        let (items, tenant) = (self.clone(), source.tenant.clone());
         let (volume, library) = (source.volume.map(str::to_owned), source.library);
         to_its_end(async move {
-            let _lock = queue.items.lock(&product.id).await;
-            queue.items.unsettle(&product.id);
+            let _lock = items.locks.lock(&product.id).await;
+            items.locks.unsettle(&product.id);
             let mut again = ROUNDS;
             let added = loop {
-                let unused = queue.write_files(&mut product, &output).await?;
-                let added = queue
+                let unused = items.write_files(&mut product, &output).await?;
+                let added = items
                     .catalogue
                     .add_product(&product, &tenant, volume.as_deref(), room);
                 match added.await {
-                    Err(error) if again > 0 && queue.was_erased_meanwhile(&error, &unused) => {
+                    Err(error) if again > 0 && items.was_erased_meanwhile(&error, &unused) => {
                         again -= 1;
                     }
                     added => break added?,
@@ -168,62 +166,36 @@ impl Queue {
                 }
             };
             if let Some(library) = library {
-                let catalogue = &queue.catalogue;
+                let catalogue = &items.catalogue;
                 catalogue.set_library(&tenant, &product.id, library).await?;
             }
-            queue.items.settle(&product.id);
-            let stored = queue.catalogue.product(&tenant, &product.id).await?;
+            items.locks.settle(&product.id);
+            let stored = items.catalogue.product(&tenant, &product.id).await?;
             Ok(Ok((stored.ok_or_else(vanished)?, new)))
         })
         .await?
     }
 
-    /// Stores what a job made and ends the job: the files first, then, in one commit, the record
-    /// and the job's state. `None` if the lease was lost. May be called again after an error.
+    /// Stores the files of a product, then calls `commit`, which writes its record and returns whether it did. It is
+    /// given the product, or the storage's error.
     ///
     /// # Errors
-    /// If the database fails; then the job is still running.
-    pub(in crate::jobs) async fn finish_with(
+    /// Those of `commit`.
+    pub(crate) async fn publish_with<T>(
         &self,
-        made: Resource,
-        job: &Job,
-        lease: &Lease,
+        mut product: Product,
         output: &WorkOutput,
-    ) -> Result<Option<Job>, StoreError> {
-        let parameters = Value::Object(job.parameters.clone()).to_string();
-        let volume = job.volume.as_deref();
-        let mut product = self.product(
-            (&job.tenant, made),
-            &[volume.unwrap_or_default(), &parameters],
-            volume,
-            job.parameters.clone(),
-            output,
-        );
+        commit: impl AsyncFnOnce(Result<Product, StoreError>) -> Result<(T, bool), StoreError>,
+    ) -> Result<T, StoreError> {
         let id = product.id.clone();
-        let _lock = self.items.lock(&id).await;
-        self.items.unsettle(&id);
-        let outcome = match self.write_files(&mut product, output).await {
-            Ok(_) => JobOutcome::Succeeded(Box::new(product)),
-            Err(error) if error.cause().may_pass() => return Err(error),
-            Err(error) => {
-                tracing::error!(job = %job.id, %error, "the result could not be stored");
-                JobOutcome::Failed(
-                    Failure::new(
-                        Fault::Service,
-                        "storage",
-                        "The result was computed but could not be stored.",
-                    )
-                    .fix("Ask the operator to look into the log, then start the job again."),
-                )
-            }
-        };
-        let ended = self.jobs.finish(lease, &outcome, self.clock.now()).await?;
-        // It fails all the same where the tenant's quota has no room for the result.
-        let stored = |job: &Job| job.state == JobState::Succeeded;
-        if ended.as_ref().is_some_and(stored) {
-            self.items.settle(&id);
+        let _lock = self.locks.lock(&id).await;
+        self.locks.unsettle(&id);
+        let written = self.write_files(&mut product, output).await;
+        let (done, stored) = commit(written.map(|_| product)).await?;
+        if stored {
+            self.locks.settle(&id);
         }
-        Ok(ended)
+        Ok(done)
     }
 
     /// Publishes what was made, and notes in `product` where its files are. Returns the files that
@@ -283,7 +255,7 @@ impl Queue {
         let files = staged.take().ok_or_else(vanished)?;
         record.put_at(files.place());
         // Without a row, the upkeep deletes these and no others.
-        self.items.doom(record.id(), record.files());
+        self.locks.doom(record.id(), record.files());
         files.publish(&record).await?;
         if known.is_some() {
             self.catalogue.amend(&record).await?;
@@ -292,7 +264,7 @@ impl Queue {
     }
 
     /// Whether every file of an item is there and holds what its row says.
-    async fn is_intact(&self, record: &ItemRecord) -> Result<bool, BlobError> {
+    pub(super) async fn is_intact(&self, record: &ItemRecord) -> Result<bool, BlobError> {
         for file in record.files() {
             match self.blobs.local(record.id(), &file).await {
                 Ok(Some(_)) => {}
@@ -304,24 +276,13 @@ impl Queue {
         Ok(true)
     }
 
-    /// The files of a volume, if it is stored, whoever has it, and they are not damaged.
-    ///
-    /// # Errors
-    /// If the storage fails.
-    pub async fn intact_volume(&self, id: &str) -> Result<Option<Vec<FileRecord>>, StoreError> {
-        match self.catalogue.record(id).await? {
-            Some(record) if self.is_intact(&record).await? => Ok(Some(record.files())),
-            _ => Ok(None),
-        }
-    }
-
     /// The record of a product. Its id is a hash of the kind, of `origin`, of the tenant and of the
     /// mesh; the report contains times and must not change the id.
     ///
     /// The tenant is part of it because reports say when they were made, and which templates of the
     /// tenant's library were tried: no tenant gets the files of another one. The default tenant is
     /// not hashed, so that its ids are those of a service without tenants.
-    fn product(
+    pub(crate) fn product(
         &self,
         (tenant, made): (&Tenant, Resource),
         origin: &[&str],
@@ -426,15 +387,6 @@ pub struct TemplateSource<'a> {
 /// The record of an item that was just added under its lock is not there.
 fn vanished() -> StoreError {
     StoreError::database("a record is missing that was just added")
-}
-
-/// Runs a section to its end even if the caller is dropped meanwhile.
-pub(super) async fn to_its_end<T: Send + 'static>(
-    section: impl Future<Output = Result<T, StoreError>> + Send + 'static,
-) -> Result<T, StoreError> {
-    tokio::spawn(section.in_current_span())
-        .await
-        .unwrap_or_else(|error| Err(StoreError::database(error.to_string())))
 }
 
 /// The hash of the mesh, which stands for the whole result.

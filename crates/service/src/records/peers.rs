@@ -1,13 +1,13 @@
 //! What processes that share a database and a file store know of each other.
 //!
 //! Each process is a *run*, whose row says until when it lives by the clock of the database. It renews
-//! the row; if it does not, what it held is free.
+//! the row; if it does not, its pins and leases are free.
 //!
-//! - A **hold** keeps an item from being erased by another process; see
-//!   [`Queue::hold`](crate::jobs::Queue::hold).
-//! - A **duty** is what one process does for all, such as sending webhooks. Whoever takes it has it
-//!   until the time set, unless it renews it. What is done under a duty must be right also if two do it
-//!   for a moment: a process that stood still finds out that it has lost the duty only afterwards.
+//! - A **pin** keeps an item from being erased by another process; see
+//!   [`Items::pin`](crate::items::Items::pin).
+//! - The **leader** does what one process does for all, such as sending webhooks, until its lease expires or
+//!   it renews it. Its work must be right also if two do it for a moment: a process that stood still finds out
+//!   that it has lost the lease only afterwards.
 //! - **News** tell the others at once of a change that this one has committed. They may be lost, so
 //!   whoever waits for them looks from time to time too.
 
@@ -41,27 +41,27 @@ pub trait Peers: Send + Sync + 'static {
     /// Names the run of this process.
     fn run(&self) -> &str;
 
-    /// Says that this process lives for `length` from now, and has that many workers.
-    async fn live(&self, workers: usize, length: Duration) -> StoreResult<()>;
+    /// Writes that this process lives for `length` from now, and has that many workers.
+    async fn heartbeat(&self, workers: usize, length: Duration) -> StoreResult<()>;
 
-    /// Says that it ends: what it has is free.
+    /// Writes that it ends: its pins and leases are free.
     async fn leave(&self) -> StoreResult<()>;
 
     /// Number of workers of all processes that live.
     async fn workers(&self) -> StoreResult<u64>;
 
-    /// Holds an item, which need not exist, until [`Peers::release`] with that token. An erasure that
+    /// Pins an item, which need not exist, until [`Peers::unpin`] with that token. An erasure that
     /// has begun is over when this returns.
-    async fn hold(&self, token: &str, item: &str) -> StoreResult<()>;
+    async fn pin(&self, token: &str, item: &str) -> StoreResult<()>;
 
-    /// Ends a hold.
-    async fn release(&self, token: &str) -> StoreResult<()>;
+    /// Ends a pin.
+    async fn unpin(&self, token: &str) -> StoreResult<()>;
 
-    /// Whether another process holds one of the items.
-    async fn held_by_others(&self, items: &[String]) -> StoreResult<bool>;
+    /// Whether another process has pinned one of the items.
+    async fn pinned_by_others(&self, items: &[String]) -> StoreResult<bool>;
 
-    /// Takes a duty, or keeps it, for `length` from now. `false` if another process has it.
-    async fn take_duty(&self, duty: &str, length: Duration) -> StoreResult<bool>;
+    /// Takes the lease of that name, or renews it, for `length` from now. `false` if another process has it.
+    async fn lead(&self, lease: &str, length: Duration) -> StoreResult<bool>;
 
     /// Deletes what ended processes have left, and what was remembered for processes that stood
     /// still.

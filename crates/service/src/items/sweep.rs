@@ -1,4 +1,4 @@
-//! Looking after what is stored: setting aside files without a row, and verifying all files.
+//! Looking after stored files: setting aside files without a row, and verifying all files.
 //!
 //! Both run in the background, in small steps, so that the start does not wait for them however
 //! much is stored.
@@ -13,8 +13,8 @@
 //! **Scrub**, at the set rate and at most once a day: each file is read and compared with the hash
 //! in its row. What is damaged is logged; readers of it are told already.
 
-use super::Queue;
-use crate::jobs::{
+use super::Items;
+use crate::records::{
     BlobError, FileRecord, ItemRecord, RecordPages, Resource, StoreError, StoreFault, StoreResult,
     volume_id,
 };
@@ -35,8 +35,8 @@ const HASH_DIGITS: usize = 64;
 
 /// Looks after the files of a running service.
 pub struct Custodian {
-    /// The queue whose items are looked after.
-    pub queue: Arc<Queue>,
+    /// The items to look after.
+    pub items: Arc<Items>,
     /// Age at which quarantined items are deleted; `None` keeps them.
     pub quarantine_keep: Option<Duration>,
     /// Bytes read per second to verify files; 0 verifies none.
@@ -76,8 +76,8 @@ impl Custodian {
     /// # Errors
     /// If the storage fails, or the database is damaged.
     pub async fn sweep(&self) -> StoreResult<Swept> {
-        let queue = &self.queue;
-        let defects = queue.catalogue.defects().await?;
+        let items = &self.items;
+        let defects = items.catalogue.defects().await?;
         if let Some(first) = defects.first() {
             return Err(StoreError::Database {
                 cause: StoreFault::DamagedDatabase,
@@ -86,9 +86,9 @@ impl Custodian {
         }
         let mut swept = Swept::default();
         for kind in Resource::WITH_FILES {
-            for batch in queue.blobs.ids(kind).await?.chunks(BATCH) {
+            for batch in items.blobs.ids(kind).await?.chunks(BATCH) {
                 let ids: Vec<String> = batch.iter().map(|item| item.id.clone()).collect();
-                let known = queue.catalogue.known(&ids).await?;
+                let known = items.catalogue.known(&ids).await?;
                 for item in batch {
                     if !known.contains(&item.id) {
                         self.remove(&item.id, &mut swept).await?;
@@ -102,10 +102,10 @@ impl Custodian {
         let age = self.quarantine_keep.map(|age| age.as_millis());
         let before = age.map(|age| {
             let age = i64::try_from(age).unwrap_or(i64::MAX);
-            queue.clock.now().saturating_sub(age)
+            items.clock.now().saturating_sub(age)
         });
-        queue.blobs.tidy(before).await?;
-        if let Some(peers) = &queue.peers {
+        items.blobs.tidy(before).await?;
+        if let Some(peers) = &items.peers {
             peers.tidy().await?;
         }
         if swept.set_aside > 0 {
@@ -120,15 +120,15 @@ impl Custodian {
 
     /// Sets the files of an unknown item aside; deletes them if the item was erased.
     async fn remove(&self, id: &str, swept: &mut Swept) -> StoreResult<()> {
-        let queue = &self.queue;
-        let _lock = queue.items.lock(id).await;
-        if queue.catalogue.record(id).await?.is_some() {
+        let items = &self.items;
+        let _lock = items.locks.lock(id).await;
+        if items.catalogue.record(id).await?.is_some() {
             return Ok(());
         }
-        if queue.catalogue.was_erased(id).await? {
-            queue.blobs.delete(id, &[]).await?;
+        if items.catalogue.was_erased(id).await? {
+            items.blobs.delete(id, &[]).await?;
             swept.erased += 1;
-        } else if queue.blobs.set_aside(id, queue.clock.now()).await? {
+        } else if items.blobs.set_aside(id, items.clock.now()).await? {
             swept.set_aside += 1;
         }
         Ok(())
@@ -136,9 +136,9 @@ impl Custodian {
 
     /// Deletes the publications of an item that its row does not name.
     async fn prune(&self, id: &str) -> StoreResult<()> {
-        let _lock = self.queue.items.lock(id).await;
-        if let Some(record) = self.queue.catalogue.record(id).await? {
-            self.queue.blobs.prune(id, &record.files()).await?;
+        let _lock = self.items.locks.lock(id).await;
+        if let Some(record) = self.items.catalogue.record(id).await? {
+            self.items.blobs.prune(id, &record.files()).await?;
         }
         Ok(())
     }
@@ -165,7 +165,7 @@ impl Custodian {
     pub async fn scrub(&self) -> StoreResult<u64> {
         let mut damaged = 0;
         // One by one: an item may be erased while those before it are read.
-        let mut pages = RecordPages::new(&*self.queue.catalogue, 1);
+        let mut pages = RecordPages::new(&*self.items.catalogue, 1);
         while let Some(page) = pages.next().await? {
             for record in page {
                 match self.scrub_item(record).await {
@@ -182,11 +182,11 @@ impl Custodian {
     }
 
     async fn scrub_item(&self, mut record: ItemRecord) -> StoreResult<()> {
-        let queue = &self.queue;
+        let items = &self.items;
         let id = record.id().to_owned();
         let mut found = Vec::new();
         for expected in record.files() {
-            let file = match queue.blobs.hash(&id, &expected).await {
+            let file = match items.blobs.hash(&id, &expected).await {
                 Err(error) if error.cause == StoreFault::DamagedFile => {
                     return self.unless_erased(&id, error).await;
                 }
@@ -206,14 +206,14 @@ impl Custodian {
             && volume.files.iter().any(|f| f.sha256.len() < HASH_DIGITS)
         {
             complete(&mut volume.files, found, &id)?;
-            queue.catalogue.amend(&record).await?;
+            items.catalogue.amend(&record).await?;
         }
-        Ok(queue.blobs.describe(&record).await?)
+        Ok(items.blobs.describe(&record).await?)
     }
 
     /// The error, unless the item has been erased meanwhile.
     async fn unless_erased(&self, id: &str, error: BlobError) -> StoreResult<()> {
-        match self.queue.catalogue.record(id).await? {
+        match self.items.catalogue.record(id).await? {
             Some(_) => Err(error.into()),
             None => Ok(()),
         }

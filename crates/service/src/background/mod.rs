@@ -1,0 +1,5 @@
+//! Tasks that run beside requests and jobs for as long as the service lives.
+
+mod upkeep;
+
+pub use upkeep::Upkeep;
