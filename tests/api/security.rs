@@ -237,7 +237,7 @@ async fn beyond_loopback_nobody_is_served_without_credentials() {
     };
     let everywhere = || TcpListener::bind("0.0.0.0:0").unwrap();
     let refused = start(settings(false), fake_engine(), everywhere()).await;
-    let Err(ServeError::Open(_)) = refused.map(|_| ()) else {
+    let Err(ServeError::OpenHttp(_)) = refused.map(|_| ()) else {
         panic!("it must not start");
     };
     let open = start(settings(true), fake_engine(), everywhere())

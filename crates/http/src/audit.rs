@@ -50,8 +50,8 @@ pub async fn list_audit_events(
         until: until.map(|text| time("until", &text)).transpose()?,
     };
     // What was noted within the last second belongs to the answer.
-    app.guard.recorder.flush().await;
-    let page = app.access.audit(&filter, page).await?;
+    app.service.recorder.flush().await;
+    let page = app.service.access.audit(&filter, page).await?;
     let next_cursor = next_cursor(&page);
     let events = page.items.iter().map(fhir).collect();
     Ok(Json(AuditPage {

@@ -138,7 +138,7 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
 
 /// The tenant's row of that id, or the 404 or 410 that says why there is none.
 pub async fn find<C: Collection>(app: &App, tenant: &Tenant, id: &str) -> Answer<Held<C::Row>> {
-    let catalogue = app.queue.items().catalogue();
+    let catalogue = app.service.items().catalogue();
     let found = match Resource::of(id) == Some(C::RESOURCE) {
         true => C::row(catalogue, tenant, id).await?,
         false => None,
@@ -169,7 +169,13 @@ async fn list<C: Collection>(
     };
     let filter = ItemFilter { tags, scan };
     let (page, []) = page_of(pairs, []).await?;
-    let page = C::rows(app.queue.items().catalogue(), &caller.tenant, &filter, page).await?;
+    let page = C::rows(
+        app.service.items().catalogue(),
+        &caller.tenant,
+        &filter,
+        page,
+    )
+    .await?;
     let next_cursor = next_cursor(&page);
     let items = page
         .items
@@ -178,7 +184,7 @@ async fn list<C: Collection>(
         .collect::<Result<_, _>>()?;
     let mut headers = HeaderMap::new();
     if C::RESOURCE == Resource::Volume {
-        let limit = HeaderValue::from(app.settings.body_limit.0);
+        let limit = HeaderValue::from(app.service.settings.body_limit.0);
         let limit = [b"max-size=", limit.as_bytes()].concat();
         headers.extend(HeaderValue::from_bytes(&limit).map(|limit| (UPLOAD_LIMIT, limit)));
     }
@@ -201,7 +207,7 @@ async fn show<C: Collection>(
             row,
         )?)?))
     };
-    let catalogue = app.queue.items().catalogue();
+    let catalogue = app.service.items().catalogue();
     let asker = (&caller.tenant, scans::sees_patients(caller.scope));
     let kept = app.answers.get(catalogue, asker, C::RESOURCE, &id, read);
     let ControlFlow::<Infallible, _>::Continue(answer) = kept.await?;

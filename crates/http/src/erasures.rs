@@ -191,7 +191,7 @@ pub async fn erase(
         reason: ErasureReason::Request,
     };
     let erased = match Resource::of(&id) == Some(kind) {
-        true => app.queue.items().erase(order).await?,
+        true => app.service.items().erase(order).await?,
         false => Erased::Unknown,
     };
     match erased {
@@ -206,7 +206,7 @@ pub async fn erase(
             Ok((location, applied, Extension(AlreadyRecorded), body).into_response())
         }
         Erased::Unknown => {
-            Err(missing(app.queue.items().catalogue(), &caller.tenant, kind, &id).await)
+            Err(missing(app.service.items().catalogue(), &caller.tenant, kind, &id).await)
         }
         Erased::InUse => Err(Problem::new(
             StatusCode::CONFLICT,
@@ -243,7 +243,7 @@ pub async fn list_erasures(
     RawQuery(query): RawQuery,
 ) -> Answer<Json<ReceiptList>> {
     let (page, [item]) = list_query(query.as_deref(), ["item"]).await?;
-    let catalogue = app.queue.items().catalogue();
+    let catalogue = app.service.items().catalogue();
     let page = catalogue
         .receipts(&caller.tenant, item.as_deref(), page)
         .await?;
@@ -267,7 +267,7 @@ pub async fn get_erasure(
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     match app
-        .queue
+        .service
         .items()
         .catalogue()
         .receipt(&caller.tenant, &id)

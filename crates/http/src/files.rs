@@ -64,7 +64,11 @@ pub async fn send(app: &App, product: &Product, file: &ProductFile, headers: &He
 pub async fn send_file(app: &App, file: &Download<'_>, headers: &HeaderMap) -> Answer {
     let read = async |span: Range<u64>| {
         charge(SENT_MEMORY.min(span.end - span.start)).await?;
-        let content = app.queue.items().read(file.id, &file.record, span).await?;
+        let content = app
+            .service
+            .items()
+            .read(file.id, &file.record, span)
+            .await?;
         Ok(Body::from_stream(content))
     };
     respond(file, headers, CACHE_CONTROL, read).await

@@ -103,7 +103,7 @@ impl GivenWebhook {
     /// # Errors
     /// 422 that names the part of `webhook` which cannot be used.
     pub async fn of_job(self, app: &App) -> Answer<JobWebhook> {
-        let checked = self.check(&app.hooks.guard).await;
+        let checked = self.check(&app.service.hooks.guard).await;
         let checked = checked.map_err(|problem| problem.within("webhook"))?;
         let names = checked.events.iter().map(|event| event.as_str().to_owned());
         Ok(JobWebhook {

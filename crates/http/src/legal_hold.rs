@@ -39,7 +39,7 @@ pub async fn hold_volume(
     }
     let hold = LegalHold {
         reason: reason(object.get("reason"))?,
-        since: app.queue.now(),
+        since: app.service.now(),
         by: caller.name.clone(),
     };
     set(&app, &caller, &id, Some(&hold)).await?;
@@ -67,7 +67,7 @@ pub async fn release_volume(
 }
 
 async fn set(app: &App, caller: &Caller, id: &str, hold: Option<&LegalHold>) -> Answer<()> {
-    let catalogue = app.queue.items().catalogue();
+    let catalogue = app.service.items().catalogue();
     match catalogue.set_legal_hold(&caller.tenant, id, hold).await? {
         true => Ok(()),
         // It was erased after it was looked up.

@@ -6,9 +6,7 @@
 use super::app::App;
 use super::caller::Caller;
 use super::collection::{Collection, find};
-use super::decoding::LITTLE_MEMORY;
 use super::files;
-use super::kept::Keep;
 use super::memory::charge;
 use super::negotiate;
 use super::openapi::{
@@ -18,6 +16,7 @@ use super::openapi::{
 use super::problem::not_found::{missing, no_such_file};
 use super::problem::{Answer, Problem};
 use super::request::{PathSegments, flag, query_pairs, refuse_unknown};
+use super::response_cache::Keep;
 use super::scans::{self, ScanUidsBody};
 use super::wire::path_of;
 use axum::extract::{RawQuery, State};
@@ -39,6 +38,7 @@ use ventriform::export::dicom::DicomObject;
 use ventriform::export::{Format, Part};
 use ventriform::progress::Monitor;
 use ventriform_service::access::Scope;
+use ventriform_service::decoding::LITTLE_MEMORY;
 use ventriform_service::records::{
     Catalogue, Held, ItemFilter, ListPage, ListRequest, Product, Resource, StoreError, Tenant,
 };
@@ -187,38 +187,6 @@ const PAGE_MEMORY_PER_BYTE: u64 = 8;
 
 /// The file that holds the report.
 const REPORT: &str = "report.json";
-
-/// 409 where the tenant has as many products of that kind as the setting of that name allows.
-pub async fn refuse_when_full<P: ProductCollection>(
-    app: &App,
-    tenant: &Tenant,
-    limit: u32,
-    setting: &str,
-) -> Answer<()> {
-    let page = ListRequest {
-        before: None,
-        limit,
-    };
-    let filter = ItemFilter::default();
-    let page = app
-        .queue
-        .items()
-        .catalogue()
-        .products(tenant, P::RESOURCE, &filter, page)
-        .await?;
-    if page.items.len() < limit as usize {
-        return Ok(());
-    }
-    let (noun, plural) = (P::RESOURCE.noun(), P::RESOURCE.plural());
-    Err(Problem::new(
-        StatusCode::CONFLICT,
-        "library-full",
-        format!("There are {limit} {plural} already, the most that this service allows."),
-    )
-    .fix(format!(
-        "DELETE a {noun} first, or ask the operator to raise `{setting}`."
-    )))
-}
 
 /// The program that made a product.
 #[derive(Serialize, ToSchema)]
@@ -376,7 +344,7 @@ pub fn choose<'a>(headers: &HeaderMap, offers: &'a [Offer]) -> Answer<&'a Offer>
 
 /// The tenant's product of that id, or the 404 or 410 that says why there is none.
 pub async fn find_any(app: &App, tenant: &Tenant, id: &str) -> Answer<Product> {
-    let catalogue = app.queue.items().catalogue();
+    let catalogue = app.service.items().catalogue();
     match catalogue.product(tenant, id).await? {
         Some(product) => Ok(product.item),
         None => {
@@ -405,9 +373,13 @@ async fn kept<P: ProductCollection>(app: &App, tenant: &Tenant, id: &str) -> Ans
     };
     // What is used of it tells nobody whose scan it is.
     let asker = (tenant, false);
-    let kept = app
-        .products
-        .get(app.queue.items().catalogue(), asker, P::RESOURCE, id, read);
+    let kept = app.products.get(
+        app.service.items().catalogue(),
+        asker,
+        P::RESOURCE,
+        id,
+        read,
+    );
     let ControlFlow::<Infallible, _>::Continue(product) = kept.await?;
     Ok(product)
 }
@@ -493,13 +465,13 @@ async fn send_part(
     };
     charge(size).await?;
     let stored = app
-        .queue
+        .service
         .items()
         .with_files(product.clone(), &[source.as_str()])
         .await?;
     let memory = LITTLE_MEMORY + MEMORY_PER_MESH_BYTE * size;
     let make = move |_: &Monitor<'_>| part::part_file(&stored, &stem, part, format);
-    match app.decoding.run(memory, make).await?? {
+    match app.service.decoding.run(memory, make).await?? {
         Some(file) => files::send_derived(product, file, headers).await,
         None => Err(Problem::new(
             StatusCode::NOT_FOUND,
@@ -599,11 +571,11 @@ async fn send_object(
     let id = &product.id;
     let size: u64 = product.files.iter().map(|file| file.bytes).sum();
     charge(size).await?;
-    let result = app.queue.items().result(tenant, id, dicom::FILES).await?;
+    let result = app.service.items().result(tenant, id, dicom::FILES).await?;
     let result = result.ok_or_else(|| volume_erased(id))?;
     let secret = match deidentify {
         true => Some(
-            app.queue
+            app.service
                 .items()
                 .catalogue()
                 .deidentification_secret(tenant)
@@ -612,16 +584,21 @@ async fn send_object(
         false => None,
     };
     let memory = dicom::object_memory(UploadFacts::of(&result.volume)?.shape);
-    let limits = app.engine.limits;
+    let limits = app.service.engine.limits;
     let make = move |_: &Monitor<'_>| dicom::object(&result, object, secret.as_deref(), &limits);
-    let made = app.decoding.run(memory, make).await?.map_err(|failure| {
-        let unknown = failure.code == "identity-needed" || failure.code == "identity-differs";
-        let problem = Problem::from(failure);
-        match unknown {
-            true => problem.conflict(),
-            false => problem,
-        }
-    })?;
+    let made = app
+        .service
+        .decoding
+        .run(memory, make)
+        .await?
+        .map_err(|failure| {
+            let unknown = failure.code == "identity-needed" || failure.code == "identity-differs";
+            let problem = Problem::from(failure);
+            match unknown {
+                true => problem.conflict(),
+                false => problem,
+            }
+        })?;
     match made {
         Some(file) => files::send_object(product, file, headers).await,
         None => {
@@ -685,7 +662,7 @@ impl<'a> Asker<'a> {
             return Ok(Map::new());
         };
         let scan = app
-            .queue
+            .service
             .items()
             .catalogue()
             .scan(self.tenant, volume)
@@ -705,7 +682,7 @@ async fn send_named(
     if let Some(file) = product.file(name) {
         return files::send(app, product, file, headers).await;
     }
-    let work = app.engine.work(product.resource().noun());
+    let work = app.service.engine.work(product.resource().noun());
     match work.filter(|_| name == files::PAGE).cloned() {
         Some(work) => {
             let files = product.files.iter();
@@ -713,13 +690,13 @@ async fn send_named(
             let size: u64 = needed.map(|file| file.bytes).sum();
             charge(PAGE_MEMORY_PER_BYTE * size).await?;
             let stored = app
-                .queue
+                .service
                 .items()
                 .with_files(product.clone(), work.page_files())
                 .await?;
             let scan = asker.sees(app, product).await?;
             let draw = move |_: &Monitor<'_>| work.page(&stored, &scan);
-            let page = app.decoding.run(LITTLE_MEMORY, draw).await??;
+            let page = app.service.decoding.run(LITTLE_MEMORY, draw).await??;
             files::send_page(product, page, headers).await
         }
         None => {

@@ -184,10 +184,10 @@ const PARSED_MEMORY: u64 = 40;
 /// # Errors
 /// 503 if there is no memory for it.
 pub async fn charge_parsed(bytes: &[u8]) -> Answer<()> {
-    match bytes.len() <= UNCHARGED {
-        true => Ok(()),
-        false => charge(PARSED_MEMORY * bytes.len() as u64).await,
+    if bytes.len() > UNCHARGED {
+        charge(PARSED_MEMORY * bytes.len() as u64).await?;
     }
+    Ok(())
 }
 
 /// The JSON object in a request's body.

@@ -7,12 +7,13 @@
 use super::app::App;
 use super::caller::Caller;
 use super::client::ClientAddress;
-use super::guard::{Agent, AlreadyRecorded, Counting};
+use super::guard::{Agent, AlreadyRecorded};
 use super::limits::BodyLimits;
 use super::memory::charge;
 use super::negotiate::require_offer;
 use super::openapi::{StowAnswers, UploadProblems};
 use super::problem::{Answer, Problem, body};
+use super::quota::reserve_upload;
 use super::request::{
     PathSegments, media_type, query_pairs, refuse_content_encoding, refuse_unknown,
 };
@@ -30,6 +31,7 @@ use ventriform_service::archive::{RelatedType, Unparsed};
 use ventriform_service::intake::{
     Incoming, Origin, Protocol, ReceiveError, Refused, Session, Stated,
 };
+use ventriform_service::quotas::Counting;
 
 /// The media types of the answer.
 const OFFERS: [&str; 2] = ["application/dicom+json", "application/json"];
@@ -178,7 +180,7 @@ impl Storing<'_> {
     /// # Errors
     /// The problem in the body; objects that are not stored are no error.
     async fn object(&mut self, pieces: impl Stream<Item = Answer<Bytes>>) -> Answer<()> {
-        let receiver = &self.app.intake.receiver;
+        let receiver = &self.app.service.intake.receiver;
         let mut pieces = std::pin::pin!(pieces);
         let mut object: Result<Incoming, ReceiveError> = receiver.begin().await;
         while let Some(piece) = pieces.next().await {
@@ -231,8 +233,8 @@ impl Storing<'_> {
             unparsed.reset();
             charge(OBJECT_MEMORY).await?;
             count += 1;
-            if count > self.app.settings.parts_limit {
-                return Err(body::too_many_files(self.app.settings.parts_limit));
+            if count > self.app.service.settings.parts_limit {
+                return Err(body::too_many_files(self.app.service.settings.parts_limit));
             }
             let essence = part
                 .content_type()
@@ -271,8 +273,8 @@ async fn store(
             sender: caller.name.clone(),
             address: ClientAddress::current().to_string(),
         },
-        session: app.intake.sessions.begin(),
-        counting: Counting::of(&request),
+        session: app.service.intake.sessions.begin(),
+        counting: reserve_upload(app, caller, request.headers(), 0).await?,
         outcome: Outcome::default(),
     };
     match boundary {
@@ -291,10 +293,10 @@ async fn store(
     if outcome.stored.is_empty() && outcome.failed.is_empty() && outcome.others.is_empty() {
         return Err(body::malformed_related("it has no part"));
     }
-    let now = app.queue.now();
+    let now = app.service.now();
     for group in &outcome.groups {
         let event = agent.event(Activity::Create, now).on(group);
-        let recorded = app.guard.recorder.record(event).await;
+        let recorded = app.service.recorder.record(event).await;
         recorded.map_err(|NotRecorded| not_recorded())?;
     }
     let headers = [

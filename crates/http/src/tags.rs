@@ -93,7 +93,7 @@ pub async fn change(
     request: Request,
 ) -> Answer<()> {
     let tags = merged(app, tags, &merge_patch(request).await?)?;
-    app.queue
+    app.service
         .items()
         .catalogue()
         .set_tags(tenant, id, &tags)
@@ -202,7 +202,7 @@ fn printable(field: &str, what: &str, text: &str, longest: usize) -> Answer<Stri
 }
 
 fn limit_labels(app: &App, labels: &BTreeMap<String, String>) -> Answer<()> {
-    let limit = app.settings.label_limit;
+    let limit = app.service.settings.label_limit;
     match labels.len() <= limit {
         true => Ok(()),
         false => Err(Problem::invalid_field(

@@ -7,10 +7,10 @@
 
 use super::app::App;
 use super::caller::Caller;
-use super::guard::Counting;
 use super::memory::charge;
 use super::openapi::{self, LookupProblems};
 use super::problem::{Answer, Problem, ProblemBody, body, shorten};
+use super::quota::reserve_item;
 use super::request::{PathSegments, bytes_of, charge_parsed, query_pairs, refuse_unknown};
 use crate::public_base::public_path;
 use axum::Json;
@@ -21,9 +21,10 @@ use serde_json::{Map, Value};
 use std::time::{Duration, Instant};
 use ventriform::export::dicom::is_uid;
 use ventriform::progress::{Monitor, Stage};
-use ventriform_service::records::{Timestamp, random_id, rfc3339};
+use ventriform_service::records::Timestamp;
 use ventriform_service::worklist::{
-    AddedWorkitem, Change, DataSetJson, Matching, Refusal, Workitem, WorkitemState,
+    AddedWorkitem, Change, DataSetJson, Matching, Refusal, Workitem, WorkitemState, dicom_time,
+    new_uid,
 };
 
 const MEDIA_TYPE: &str = "application/dicom+json";
@@ -89,7 +90,7 @@ pub async fn create_workitem(
             pairs.into_iter().next().map(|(_, uid)| uid)
         }
     };
-    let counting = Counting::of(&request);
+    let counting = reserve_item(&app, &caller, request.headers()).await?;
     let attributes = data_set(request).await?;
     let named = named.or_else(|| attributes.text(SOP_INSTANCE).map(str::to_owned));
     let uid = named.unwrap_or_else(new_uid);
@@ -99,7 +100,7 @@ pub async fn create_workitem(
     let moment = now(&app);
     let made = Workitem::create(&caller.tenant, &uid, attributes, (moment.0, &moment.1));
     let (item, completed) = made.map_err(refused)?;
-    match app.worklist.add_workitem(&item, MOST).await? {
+    match app.service.worklist.add_workitem(&item, MOST).await? {
         AddedWorkitem::Done => {}
         AddedWorkitem::Exists => {
             return Err(Problem::new(
@@ -118,7 +119,7 @@ pub async fn create_workitem(
             .fix("Set `job_retention`, so that ended items are deleted."));
         }
     }
-    app.scheduled.notify_one();
+    app.service.scheduled.notify_one();
     let location = [(header::LOCATION, path(&uid))];
     let warning = completed.then(|| {
         let text = "The Workitem was created with modifications.";
@@ -197,7 +198,10 @@ pub async fn search_workitems(
         if Instant::now() > late {
             return Err(too_broad());
         }
-        let page = app.worklist.workitems(&caller.tenant, state, after, BATCH);
+        let page = app
+            .service
+            .worklist
+            .workitems(&caller.tenant, state, after, BATCH);
         let page = page.await?;
         let Some(last) = page.last() else { break };
         after = last.sequence;
@@ -259,7 +263,7 @@ async fn matched(app: &App, matching: &Matching, items: Vec<Workitem>) -> Answer
         }
         matched
     };
-    app.decoding.run(1, search).await
+    Ok(app.service.decoding.run(1, search).await?)
 }
 
 /// 413: PS3.18, table 8.3.4-1.
@@ -291,7 +295,7 @@ pub async fn update_workitem(
     headers: HeaderMap,
     request: Request,
 ) -> Answer {
-    let counting = Counting::of(&request);
+    let counting = reserve_item(&app, &caller, request.headers()).await?;
     let (changes, stated) = claimed_data_set(query.as_deref(), &headers, request).await?;
     counting.arrived(text_of(&changes)?.len() as u64).await?;
     change(&app, &caller, &uid, |item, now| {
@@ -300,7 +304,7 @@ pub async fn update_workitem(
     })
     .await?;
     // It may be ready now.
-    app.scheduled.notify_one();
+    app.service.scheduled.notify_one();
     Ok(StatusCode::OK.into_response())
 }
 
@@ -395,11 +399,11 @@ async fn change(
         let before = text_of(&item.attributes)?.len();
         let done = how(&mut item, (moment.0, &moment.1)).map_err(refused)?;
         let size = text_of(&item.attributes)?.len();
-        let limit = app.settings.json_limit;
+        let limit = app.service.settings.json_limit;
         if size > before && size as u64 > limit.0 {
             return Err(body::too_large(limit));
         }
-        if done == Change::Already || app.worklist.change_workitem(&item).await? {
+        if done == Change::Already || app.service.worklist.change_workitem(&item).await? {
             return Ok(done);
         }
     }
@@ -412,7 +416,7 @@ fn text_of(attributes: &DataSetJson) -> Answer<String> {
 }
 
 async fn find(app: &App, caller: &Caller, uid: &str) -> Answer<Workitem> {
-    let item = app.worklist.workitem(&caller.tenant, uid).await?;
+    let item = app.service.worklist.workitem(&caller.tenant, uid).await?;
     item.ok_or_else(|| {
         Problem::new(
             StatusCode::NOT_FOUND,
@@ -425,21 +429,8 @@ async fn find(app: &App, caller: &Caller, uid: &str) -> Answer<Workitem> {
 
 /// The time, also as DICOM writes it.
 fn now(app: &App) -> (Timestamp, String) {
-    let now = app.queue.now();
+    let now = app.service.now();
     (now, dicom_time(now))
-}
-
-/// A moment as DICOM writes it (DT, UTC).
-pub fn dicom_time(moment: Timestamp) -> String {
-    let text = rfc3339(moment);
-    let digits = text.chars().take(19).filter(char::is_ascii_digit);
-    digits.collect::<String>() + "+0000"
-}
-
-/// A new UID: a UUID under 2.25 (PS3.5 B.2).
-pub fn new_uid() -> String {
-    let number = u128::from_str_radix(&random_id(""), 16).unwrap_or_default();
-    format!("2.25.{number}")
 }
 
 fn path(uid: &str) -> String {

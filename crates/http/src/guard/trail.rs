@@ -94,7 +94,7 @@ impl Act {
         let Some(activity) = self.activity(status) else {
             return response;
         };
-        self.event.recorded = app.queue.now();
+        self.event.recorded = app.service.now();
         self.event.activity = activity;
         self.event.object = match activity {
             Activity::Create | Activity::Execute => location(&response).or(self.object),
@@ -103,10 +103,10 @@ impl Act {
         let place = || place_of(&self.route);
         self.event.object = self.event.object.take().or_else(place);
         if self.method.is_safe() {
-            app.guard.recorder.note(self.event).await;
+            app.service.recorder.note(self.event).await;
             return response;
         }
-        match app.guard.recorder.record(self.event).await {
+        match app.service.recorder.record(self.event).await {
             Ok(()) => response,
             Err(_) => not_recorded().into_response(),
         }
@@ -176,8 +176,8 @@ pub async fn access_refused(app: &App, request: &Parts, identity: &Identity, add
 
 async fn note_refusal(app: &App, mut event: AuditEvent) {
     event.outcome = Outcome::Refused;
-    event.recorded = app.queue.now();
-    app.guard.recorder.note(event).await;
+    event.recorded = app.service.now();
+    app.service.recorder.note(event).await;
 }
 
 fn event(request: &Parts, identity: &Identity, address: String, activity: Activity) -> AuditEvent {

@@ -278,11 +278,11 @@ impl Context {
             let those = jobs.iter().filter(|job| with(job));
             those.map(|job| job.id.as_str()).collect()
         };
-        let store = &app.archives.store;
+        let store = &app.service.archives.store;
         let sourced = ids(|job| job.source.is_some());
         let sent = ids(|job| job.send.is_some() && job.state == JobState::Succeeded);
         Ok(Self {
-            positions: app.queue.positions(jobs).await?,
+            positions: app.service.queue().positions(jobs).await?,
             pulls: match sourced.is_empty() {
                 true => BTreeMap::new(),
                 false => store.pulls(&sourced).await?,
@@ -291,7 +291,7 @@ impl Context {
                 true => BTreeMap::new(),
                 false => store.sends(&sent).await?,
             },
-            now: app.queue.now(),
+            now: app.service.now(),
         })
     }
 }

@@ -50,7 +50,7 @@ pub async fn follow_job(
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let seen = last_event_id(&headers)?;
     // Subscribing comes before reading, so that no change is missed in between.
-    let changes = app.queue.changes();
+    let changes = app.service.queue().changes();
     let job = find(&app, &caller.tenant, &id).await?;
     if job.state.is_final() && job.revision <= seen {
         return Ok(StatusCode::NO_CONTENT.into_response());
@@ -128,7 +128,7 @@ impl Follower {
     /// The next state that is newer than the last one sent; `None` if the job is gone or the
     /// service shuts down.
     async fn newer(&mut self) -> Option<Job> {
-        let queue = self.app.queue.clone();
+        let queue = self.app.service.queue().clone();
         let look = queue.next_poll();
         tokio::pin!(look);
         loop {
@@ -149,12 +149,19 @@ impl Follower {
                     look.set(queue.next_poll());
                     Some(self.look().await?)
                 }
-                () = self.app.closing.cancelled() => return None,
+                () = self.app.service.closing.cancelled() => return None,
             };
         }
     }
 
     async fn look(&self) -> Option<Job> {
-        self.app.queue.table().job(&self.id).await.ok().flatten()
+        self.app
+            .service
+            .queue()
+            .table()
+            .job(&self.id)
+            .await
+            .ok()
+            .flatten()
     }
 }

@@ -33,6 +33,7 @@
 
 mod deliver;
 mod description;
+mod desk;
 mod dimse;
 mod end;
 mod exchange;
@@ -48,6 +49,7 @@ mod web;
 
 pub use deliver::Deliverer;
 pub use description::{Archive, ArchiveFault, Archives, Credentials, DicomPeer, DicomTls};
+pub use desk::{ArchiveDesk, ArchiveReadings};
 pub use end::{ExchangeCounts, ExchangeEnd};
 pub use exchange::{Exchange, ExchangeSettings};
 pub use host::{ExchangeHost, StoredSeries};

@@ -1,5 +1,6 @@
 //! Why an attempt failed, and whether another one may succeed.
 
+use crate::error::ServiceError;
 use crate::records::{Failure, Fault, StoreError};
 use std::time::Duration;
 
@@ -36,6 +37,16 @@ impl Trouble {
         match self {
             Trouble::Passing { what, .. } => what,
             Trouble::Final(failure) => &failure.detail,
+        }
+    }
+}
+
+impl From<ServiceError> for Trouble {
+    fn from(error: ServiceError) -> Self {
+        if error.may_pass() {
+            Self::passing(error.failure.detail)
+        } else {
+            Self::Final(*error.failure)
         }
     }
 }

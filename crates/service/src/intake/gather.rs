@@ -11,6 +11,7 @@ use super::observer::IntakeObserver;
 use super::record::{GroupState, IntakeGroup, IntakeStore, Origin, ReceivedFiles};
 use super::rules::Rule;
 use super::session::Sessions;
+use crate::error::ServiceError;
 use crate::jobs::Queue;
 use crate::records::{
     BlobError, Failure, Fault, LocalFile, StoreError, StoreFault, StoreResult, Timestamp,
@@ -45,6 +46,16 @@ pub enum MakeError {
     Later(String),
     /// It is never possible.
     Never(Failure),
+}
+
+impl From<ServiceError> for MakeError {
+    fn from(error: ServiceError) -> Self {
+        if error.may_pass() {
+            Self::Later(error.failure.detail)
+        } else {
+            Self::Never(*error.failure)
+        }
+    }
 }
 
 impl From<StoreError> for MakeError {

@@ -332,7 +332,7 @@ impl From<StoreError> for NotAdded {
 }
 
 impl NotAdded {
-    fn too_many(kind: Resource, limit: u32) -> Self {
+    pub(crate) fn too_many(kind: Resource, limit: u32) -> Self {
         let (noun, plural) = (kind.noun(), kind.plural());
         let detail =
             format!("There are {limit} {plural} already, the most that this service allows.");

@@ -202,13 +202,23 @@ impl Custodian {
             }
             found.push(file);
         }
+        // An erasure that comes between would leave a description of nothing.
+        let _lock = items.locks.lock(&id).await;
+        if items.catalogue.record(&id).await?.is_none() {
+            return Ok(());
+        }
         if let ItemRecord::Volume(volume) = &mut record
             && volume.files.iter().any(|f| f.sha256.len() < HASH_DIGITS)
         {
             complete(&mut volume.files, found, &id)?;
             items.catalogue.amend(&record).await?;
         }
-        Ok(items.blobs.describe(&record).await?)
+        items.blobs.describe(&record).await?;
+        // So would one by another process, which does not know the lock.
+        if items.is_shared() && items.catalogue.record(&id).await?.is_none() {
+            items.blobs.delete(&id, &record.files()).await?;
+        }
+        Ok(())
     }
 
     /// The error, unless the item has been erased meanwhile.

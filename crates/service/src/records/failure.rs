@@ -54,6 +54,13 @@ impl Failure {
         self
     }
 
+    /// Says that the field concerned is inside of the field `outer`.
+    #[must_use]
+    pub fn within(mut self, outer: &str) -> Self {
+        self.field = self.field.map(|field| format!("{outer}.{field}"));
+        self
+    }
+
     /// Sets the advice.
     #[must_use]
     pub fn fix(mut self, fix: impl Into<String>) -> Self {

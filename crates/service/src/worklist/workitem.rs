@@ -117,6 +117,17 @@ pub enum Change {
     Already,
 }
 
+/// The work of this service on an item.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Performer {
+    /// This service has not claimed the item.
+    None,
+    /// It has claimed the item; the job is not filed yet.
+    Claimed,
+    /// The job of that id does the work.
+    Job(String),
+}
+
 /// A work item of a tenant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Workitem {
@@ -132,8 +143,8 @@ pub struct Workitem {
     pub state: WorkitemState,
     /// The Transaction UID under which it was claimed.
     pub transaction: Option<String>,
-    /// If this service has claimed it: the job that does the work, empty until that is filed.
-    pub performer: Option<String>,
+    /// The work of this service on it.
+    pub performer: Performer,
     /// All attributes but the Transaction UID.
     pub attributes: DataSetJson,
     /// When it was last changed.
@@ -213,7 +224,7 @@ impl Workitem {
             revision: 0,
             state: WorkitemState::Scheduled,
             transaction: None,
-            performer: None,
+            performer: Performer::None,
             attributes,
             changed_at: 0,
         };

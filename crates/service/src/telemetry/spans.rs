@@ -11,8 +11,8 @@
 //! Without an endpoint nothing is made. With one, spans wait in a queue of limited length for a
 //! thread that sends them; what does not fit, or cannot be sent, is dropped.
 
+use crate::records::{Job, Timestamp};
 use async_trait::async_trait;
-use axum::http;
 use bytes::Bytes;
 use opentelemetry::trace::{
     Span, SpanContext, SpanId, SpanKind, Status, TraceContextExt, TraceFlags, TraceId, TraceState,
@@ -25,7 +25,6 @@ use opentelemetry_sdk::Resource;
 use opentelemetry_sdk::trace::{SdkTracer, SdkTracerProvider};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio::runtime::Handle;
-use ventriform_service::records::{Job, Timestamp};
 
 /// Longest time to send a batch of spans, and to send the last ones on shutdown.
 const SEND_LIMIT: Duration = Duration::from_secs(5);
@@ -274,7 +273,7 @@ impl HttpClient for CollectorClient {
             Ok::<_, reqwest::Error>((status, body))
         });
         let (status, body) = sent.await??;
-        let answer = http::Response::builder().status(status);
+        let answer = Response::builder().status(status);
         Ok(answer.body(Bytes::from(body))?)
     }
 }

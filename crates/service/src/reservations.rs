@@ -1,15 +1,15 @@
-//! What the requests under way may add to what their tenants use.
+//! Reservations of the uses under way on what their tenants may store and queue.
 
+use crate::access::Usage;
+use crate::records::Tenant;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
-use ventriform_service::access::Usage;
-use ventriform_service::records::Tenant;
 
-/// What the requests under way may add, for each tenant.
+/// What the uses under way may add, for each tenant.
 #[derive(Clone, Default)]
 pub struct Reservations(Arc<Mutex<HashMap<Tenant, Usage>>>);
 
-/// What one request may add. Dropping it ends the reservation.
+/// What one use may add. Dropping it ends the reservation.
 pub struct Reservation {
     all: Reservations,
     tenant: Tenant,

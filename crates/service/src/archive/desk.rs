@@ -1,13 +1,12 @@
-//! Archives, for handlers and operators.
+//! The archives of a service, for those who order exchanges and those who watch them.
 
+use super::{ArchiveBacklog, ArchiveStore, ExchangeCounts};
+use crate::hooks::UrlGuard;
+use crate::records::StoreResult;
 use std::sync::Arc;
 use tokio::sync::Notify;
-use ventriform_service::archive::{ArchiveBacklog, ArchiveStore, ExchangeCounts};
-use ventriform_service::config::Settings;
-use ventriform_service::hooks::UrlGuard;
-use ventriform_service::records::StoreResult;
 
-/// Archives, for handlers.
+/// The archives of a service.
 pub struct ArchiveDesk {
     /// The tables.
     pub store: Arc<dyn ArchiveStore>,
@@ -21,9 +20,9 @@ pub struct ArchiveDesk {
     pub sends: Arc<ExchangeCounts>,
 }
 
-/// What operators see of archives.
+/// Figures of archives for operators.
 pub struct ArchiveReadings<'a> {
-    /// What waits.
+    /// The exchanges that wait.
     pub backlog: ArchiveBacklog,
     /// Attempts to fetch.
     pub pulls: &'a ExchangeCounts,
@@ -32,18 +31,18 @@ pub struct ArchiveReadings<'a> {
 }
 
 impl ArchiveDesk {
-    /// The desk of a service that starts now.
-    pub fn new(settings: &Settings, store: Arc<dyn ArchiveStore>) -> Self {
+    /// The archives of a service that starts now. `guard` knows the DICOMweb services that jobs may name.
+    pub fn new(store: Arc<dyn ArchiveStore>, guard: UrlGuard) -> Self {
         Self {
             store,
-            guard: UrlGuard::of_listed(settings.dicomweb_allow.clone()),
+            guard,
             woken: Arc::default(),
             pulls: Arc::default(),
             sends: Arc::default(),
         }
     }
 
-    /// What operators see.
+    /// Figures for operators.
     ///
     /// # Errors
     /// If the database fails.

@@ -1,9 +1,9 @@
-//! Whether what the service depends on works: one check for all probes.
+//! Readiness: one check of everything that the service depends on, for all probes.
 
+use crate::jobs::Queue;
+use crate::records::{StoreError, StoreFault};
 use std::time::{Duration, Instant};
 use tokio::sync::Mutex;
-use ventriform_service::jobs::Queue;
-use ventriform_service::records::{StoreError, StoreFault};
 
 /// Whether each dependency works, checked at most once in [`CHECK_EVERY`] however many probes ask.
 #[derive(Default)]

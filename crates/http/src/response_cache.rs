@@ -29,7 +29,7 @@ pub trait Keep: Clone {
 }
 
 /// See the module.
-pub struct Kept<V> {
+pub struct ResponseCache<V> {
     limit: usize,
     values: Mutex<Values<V>>,
 }
@@ -48,7 +48,7 @@ impl<V> Values<V> {
     }
 }
 
-impl<V: Keep> Kept<V> {
+impl<V: Keep> ResponseCache<V> {
     /// Keeps values of at most `limit` bytes together.
     pub fn new(limit: usize) -> Self {
         Self {
@@ -130,7 +130,7 @@ mod tests {
     fn a_value_is_used_for_its_tenant_and_version_only() {
         let (a, b): (Tenant, Tenant) = ("a".parse().unwrap(), "b".parse().unwrap());
         let answer = ValidatedJson::of(&"1").unwrap();
-        let kept = Kept::new(10_000);
+        let kept = ResponseCache::new(10_000);
         kept.keep(2, (&a, true), "vol_1", &answer);
         assert!(kept.find(2, (&a, true), "vol_1").is_some());
         assert!(kept.find(2, (&b, true), "vol_1").is_none());
@@ -148,7 +148,7 @@ mod tests {
     fn memory_is_limited() {
         let tenant = Tenant::default();
         let answer = ValidatedJson::of(&"x".repeat(1000)).unwrap();
-        let kept = Kept::new(10_000);
+        let kept = ResponseCache::new(10_000);
         for number in 0..1000 {
             kept.keep(0, (&tenant, true), &number.to_string(), &answer);
             assert!(kept.find(0, (&tenant, true), &number.to_string()).is_some());
@@ -162,6 +162,6 @@ mod tests {
         });
         assert!((2..10).contains(&count), "{count}");
         drop(held);
-        Kept::new(100).keep(0, (&tenant, true), "vol_1", &answer);
+        ResponseCache::new(100).keep(0, (&tenant, true), "vol_1", &answer);
     }
 }

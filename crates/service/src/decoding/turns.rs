@@ -5,7 +5,7 @@
 //! than the next free place, whatever others have begun. What a client has computed counts half after
 //! [`HALF_LIFE`], so that nobody waits for ever.
 
-use super::client::ClientAddress;
+use crate::client::ClientAddress;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};

@@ -4,7 +4,11 @@
 //! Names follow Prometheus: base units, `_total` for counters. Every label has a fixed set of
 //! values: the pattern of a path and never the path, the code of a failure and never its text.
 
-use super::archives::ArchiveReadings;
+use crate::archive::ArchiveReadings;
+use crate::config::Settings;
+use crate::hooks::{Backlog, DeliveryCounts};
+use crate::intake::{AssociationEnd, IntakeObserver, Protocol};
+use crate::records::{DiskSpace, QueueFigures, QueueLoad, Timestamp};
 use prometheus::core::Collector;
 use prometheus::{
     Encoder, Gauge, Histogram, HistogramOpts, HistogramVec, IntCounter, IntCounterVec, IntGauge,
@@ -12,10 +16,6 @@ use prometheus::{
 };
 use std::path::Path;
 use std::time::Instant;
-use ventriform_service::config::Settings;
-use ventriform_service::hooks::{Backlog, DeliveryCounts};
-use ventriform_service::intake::{AssociationEnd, IntakeObserver, Protocol};
-use ventriform_service::records::{DiskSpace, QueueFigures, QueueLoad, Timestamp};
 
 type Made<T> = Result<T, prometheus::Error>;
 
@@ -194,6 +194,12 @@ impl Maker<'_> {
     ) -> Made<HistogramVec> {
         let options = HistogramOpts::new(name, help).buckets(bounds.to_vec());
         self.keep(HistogramVec::new(options, labels))
+    }
+}
+
+impl Default for Metrics {
+    fn default() -> Self {
+        Self::new()
     }
 }
 

@@ -1,36 +1,35 @@
-//! What the exchange with archives needs of the service: storing volumes, making objects, the audit
-//! trail.
+//! The exchange with archives: series are fetched and stored as uploads are, objects of results are made and delivered.
 
-use super::app::App;
-use super::guard::Counting;
-use super::problem::Problem;
-use super::upload::Bundle;
+use crate::access::{Activity, AuditEvent, Outcome};
+use crate::archive::{
+    ArchiveObject, Deliverer, DuePull, DueSend, Exchange, ExchangeEnd, ExchangeHost,
+    ExchangeSettings, Puller, SeriesParts, StoredSeries, Trouble,
+};
+use crate::error::{Refusal, ServiceError};
+use crate::hooks::RetrySchedule;
+use crate::quotas::Addition;
+use crate::records::{Failure, Fault, Resource, StoreError, Tags, Tenant};
+use crate::service::Service;
+use crate::uploads::VolumeUpload;
+use crate::work::{UploadFacts, dicom};
 use async_trait::async_trait;
 use futures::StreamExt;
 use std::sync::Arc;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 use ventriform::progress::Monitor;
-use ventriform_service::access::{Activity, AuditEvent, Outcome, Usage};
-use ventriform_service::archive::{
-    ArchiveObject, Deliverer, DuePull, DueSend, Exchange, ExchangeEnd, ExchangeHost,
-    ExchangeSettings, Puller, SeriesParts, StoredSeries, Trouble,
-};
-use ventriform_service::hooks::RetrySchedule;
-use ventriform_service::records::{Fault, Resource, StoreError, Tags, Tenant};
-use ventriform_service::work::{UploadFacts, dicom};
 
 /// The agent of the audit trail that fetches and delivers.
 const AGENT: &str = "archive exchange";
 
 /// Fetches and delivers until `end`.
-pub async fn run(app: App, end: CancellationToken) {
-    let settings = &app.settings;
+pub async fn run(service: Arc<Service>, end: CancellationToken) {
+    let settings = &service.settings;
     let exchange = Arc::new(Exchange::new(
-        app.archives.store.clone(),
-        Arc::new(app.clone()),
-        app.queue.clone(),
-        app.archives.guard.clone(),
+        service.archives.store.clone(),
+        service.clone(),
+        service.queue.clone(),
+        service.archives.guard.clone(),
         ExchangeSettings {
             archives: settings.archives.clone(),
             retries: RetrySchedule {
@@ -46,67 +45,55 @@ pub async fn run(app: App, end: CancellationToken) {
         },
     ));
     let grace = settings.shutdown_grace.0;
-    let puller = Puller::new(exchange.clone(), app.archives.pulls.clone());
-    let deliverer = Deliverer::new(exchange, app.archives.sends.clone());
-    let woken = app.archives.woken.clone();
+    let puller = Puller::new(exchange.clone(), service.archives.pulls.clone());
+    let deliverer = Deliverer::new(exchange, service.archives.sends.clone());
+    let woken = service.archives.woken.clone();
     let mut both = JoinSet::new();
     both.spawn(puller.run(end.clone(), grace));
     both.spawn(deliverer.run(woken, end, grace));
     while both.join_next().await.is_some() {}
 }
 
-/// A problem of an upload, as the trouble of a fetch.
-fn trouble(problem: Problem) -> Trouble {
-    match problem.into_failure() {
-        Ok(failure) => Trouble::Final(failure),
-        Err(passing) => Trouble::passing(passing),
+/// A refused upload, as the trouble of a fetch. That the tenant's quota is full lasts until somebody erases something.
+fn trouble(error: ServiceError) -> Trouble {
+    if error.refusal == Refusal::NoRoom && error.failure.code == "storage-quota" {
+        return Trouble::Final(*error.failure);
     }
+    error.into()
 }
 
 #[async_trait]
-impl ExchangeHost for App {
+impl ExchangeHost for Service {
     async fn store(
         &self,
         tenant: &Tenant,
         mut parts: SeriesParts,
     ) -> Result<StoredSeries, Trouble> {
-        let blobs = self.queue.items().blobs();
+        let blobs = self.items().blobs();
         blobs.require_room(0).map_err(StoreError::from)?;
-        let mut bundle = Bundle::new(self, &Counting::default());
+        let addition = Addition::bytes(0);
+        let reserved = self
+            .quotas
+            .reserve(tenant, self.quotas.general, addition, None);
+        let counting = reserved.await.map_err(trouble)?;
+        let mut upload = VolumeUpload::new(self, &counting);
         while let Some(part) = parts.next().await? {
             let mut broken = None;
             let pieces = part.map(|piece| {
                 piece.map_err(|why| {
                     broken = Some(why);
                     // Replaced by the trouble itself below.
-                    Problem::bad_request("broken-body", "The answer broke off.")
+                    ServiceError::from(broken_off())
                 })
             });
-            let written = bundle.write(pieces).await.map(|_| ());
+            let written = upload.write(pieces).await.map(|_| ());
             if let Some(broken) = broken {
                 return Err(broken);
             }
             written.map_err(trouble)?;
-            bundle.join_repeated().await.map_err(trouble)?;
+            upload.join_repeated().await.map_err(trouble)?;
         }
-        // Counted first, so that fetches and uploads that come together cannot exceed the quota together.
-        let amount = Usage {
-            bytes: bundle.bytes(),
-            jobs: 0,
-        };
-        let (_reservation, reserved) = self.guard.reservations.add(tenant, amount);
-        if let Some(quota) = self.guard.quota.bytes
-            && let used = self.access.usage(tenant).await?.bytes
-            && used.saturating_add(reserved.bytes) > quota
-        {
-            return Err(Trouble::lasting(
-                Fault::TooLarge,
-                "storage-quota",
-                format!("The series does not fit: this tenant may store {quota} bytes."),
-                "DELETE volumes that are no longer needed, or ask the operator for more.",
-            ));
-        }
-        let stored = bundle.store(self, tenant, &Tags::default()).await;
+        let stored = self.store_volume(tenant, upload, &Tags::default()).await;
         let stored = stored.map_err(trouble)?;
         Ok(StoredSeries {
             volume: stored.volume.item.id,
@@ -115,8 +102,8 @@ impl ExchangeHost for App {
     }
 
     async fn held(&self, tenant: &Tenant, volume: &str) -> Result<Option<StoredSeries>, Trouble> {
-        let pin = self.queue.items().pin(volume).await?;
-        let intact = self.queue.items().intact_volume(volume).await?.is_some();
+        let pin = self.items().pin(volume).await?;
+        let intact = self.items().intact_volume(volume).await?.is_some();
         let held = intact
             && self
                 .queue
@@ -158,7 +145,7 @@ impl ExchangeHost for App {
         let limits = self.engine.limits;
         let make = move |_: &Monitor<'_>| dicom::object(&result, object, None, &limits);
         let made = self.decoding.run(dicom::object_memory(shape), make).await;
-        let made = made.map_err(trouble)?.map_err(Trouble::Final)?;
+        let made = made?.map_err(Trouble::Final)?;
         let made = made.ok_or_else(|| gone("The result has no such object."))?;
         ArchiveObject::of(made.bytes).ok_or_else(|| {
             Trouble::lasting(
@@ -181,7 +168,7 @@ impl ExchangeHost for App {
     }
 }
 
-impl App {
+impl Service {
     /// Notes in the audit trail what left or entered the service without a request. Attempts that
     /// will be repeated are not noted.
     async fn recorded(&self, tenant: &Tenant, activity: Activity, object: &str, end: ExchangeEnd) {
@@ -195,6 +182,10 @@ impl App {
             outcome,
             ..AuditEvent::new(now, activity, tenant.clone(), AGENT.into()).on(object)
         };
-        self.guard.recorder.note(event).await;
+        self.recorder.note(event).await;
     }
+}
+
+fn broken_off() -> Failure {
+    Failure::new(Fault::Content, "broken-body", "The answer broke off.")
 }

@@ -1,9 +1,9 @@
-//! What handlers need of webhooks.
+//! The webhooks of a service.
 
+use super::{DeliveryStore, Dispatcher, UrlGuard};
 use std::sync::Arc;
-use ventriform_service::hooks::{DeliveryStore, Dispatcher, UrlGuard};
 
-/// What handlers need of webhooks.
+/// The webhooks of a service.
 pub struct Hooks {
     /// The tables.
     pub store: Arc<dyn DeliveryStore>,

@@ -1,22 +1,29 @@
-//! The received files of one volume, before they are published.
+//! Uploads: the files of one volume on their way into the store, whoever sends them.
+//!
+//! In: files as streams of bytes. Out: a stored volume, pinned until the caller has done with it.
+//!
+//! 1. [`VolumeUpload::write`] streams each file to the disk and hashes it on the way; nothing but a few pieces is held in memory.
+//! 2. [`Service::store_volume`] tells the volume by its content, reads it if it is new, and adds it.
+//!
+//! Guaranteed: what arrives counts against the tenant's quota as it comes. Not guaranteed: that a refused upload has
+//! not been written to the disk; its files are deleted.
 
-use crate::app::App;
-use crate::guard::Counting;
+use crate::error::ServiceError;
+use crate::items::Pin;
 use crate::memory::{HeldMemory, MemoryBudget};
-use crate::problem::{Answer, Problem, body};
-use crate::scans;
-use axum::body::Bytes;
+use crate::quotas::Counting;
+use crate::records::{
+    BlobError, BlobStore, BlobWriter, Failure, Fault, FileRecord, Held, StagedFiles, StagedFor,
+    StoredVolume, Tags, Tenant, hex, volume_id,
+};
+use crate::service::Service;
+use crate::work::INSPECTION_MEMORY;
+use bytes::Bytes;
 use futures::{Stream, StreamExt};
 use sha2::{Digest, Sha256};
 use std::sync::Arc;
 use tokio::io::AsyncWriteExt;
 use ventriform::progress::Monitor;
-use ventriform_service::items::Pin;
-use ventriform_service::records::{
-    BlobError, BlobStore, BlobWriter, Failure, FileRecord, Held, StagedFiles, StagedFor,
-    StoredVolume, Tags, Tenant, hex, volume_id,
-};
-use ventriform_service::work::INSPECTION_MEMORY;
 
 /// Bytes gathered for one write: at most, for the first one, and where the client has no memory left.
 /// Up to the first write an upload lies in memory alone: clients that send a few bytes and then wait cost neither
@@ -28,14 +35,14 @@ const LEAST_WRITE: usize = 8 << 10;
 /// Memory for a gathered byte: it lies here, and once more in the file's writer.
 const MEMORY_PER_BYTE: u64 = 2;
 
-/// The files of one volume, which are not published yet.
-pub struct Bundle {
+/// The files of one volume, which are not stored yet.
+pub struct VolumeUpload {
     blobs: Arc<dyn BlobStore>,
     memory: MemoryBudget,
     counting: Counting,
     /// Where the files lie; made for the first of them.
     staged: Option<Box<dyn StagedFiles>>,
-    files: Vec<Received>,
+    files: Vec<ReceivedFile>,
 }
 
 /// A stored volume, which is not deleted while this exists.
@@ -49,14 +56,14 @@ pub struct Stored {
 }
 
 /// One received file.
-pub struct Received {
+pub struct ReceivedFile {
     name: String,
     kind: &'static str,
     digest: [u8; 32],
     bytes: u64,
 }
 
-impl Received {
+impl ReceivedFile {
     /// Uses the extension of the client's name for the file where the content does not tell.
     pub fn known_as(&mut self, given: &str) {
         self.kind = kind_by_name(given).unwrap_or(self.kind);
@@ -65,7 +72,7 @@ impl Received {
 
 /// A file on its way to the disk.
 struct Arriving<'a> {
-    bundle: &'a mut Bundle,
+    upload: &'a mut VolumeUpload,
     name: String,
     file: Option<BlobWriter>,
     waiting: Vec<u8>,
@@ -84,7 +91,7 @@ impl Arriving<'_> {
     }
 
     /// Takes the next piece: lets it wait, or writes it with what waits.
-    async fn take(&mut self, piece: &[u8]) -> Answer<()> {
+    async fn take(&mut self, piece: &[u8]) -> Result<(), ServiceError> {
         if self.waiting.len() + piece.len() > self.room {
             self.extend(match self.file {
                 None => FIRST_WRITE,
@@ -105,21 +112,21 @@ impl Arriving<'_> {
     }
 
     /// Writes the bytes that wait, and keeps no room for others: more may not come for a while.
-    async fn flush(&mut self) -> Answer<()> {
+    async fn flush(&mut self) -> Result<(), ServiceError> {
         let waiting = std::mem::take(&mut self.waiting);
         self.write(&waiting).await
     }
 
-    async fn write(&mut self, bytes: &[u8]) -> Answer<()> {
+    async fn write(&mut self, bytes: &[u8]) -> Result<(), ServiceError> {
         let file = match &mut self.file {
             Some(file) => file,
-            none => none.insert(self.bundle.staged().await?.create(&self.name).await?),
+            none => none.insert(self.upload.staged().await?.create(&self.name).await?),
         };
         file.write_all(bytes).await.map_err(BlobError::from)?;
         Ok(())
     }
 
-    async fn end(mut self) -> Answer<()> {
+    async fn end(mut self) -> Result<(), ServiceError> {
         self.flush().await?;
         if let Some(mut file) = self.file {
             file.shutdown().await.map_err(BlobError::from)?;
@@ -145,12 +152,12 @@ fn kind_by_name(name: &str) -> Option<&'static str> {
         .find(|kind| name.ends_with(&format!(".{kind}")))
 }
 
-impl Bundle {
-    /// An empty bundle. What it receives counts against a quota.
-    pub fn new(app: &App, counting: &Counting) -> Self {
+impl VolumeUpload {
+    /// An empty upload. What it receives counts against a quota.
+    pub fn new(service: &Service, counting: &Counting) -> Self {
         Self {
-            blobs: app.queue.items().blobs().clone(),
-            memory: app.memory.clone(),
+            blobs: service.items().blobs().clone(),
+            memory: service.memory.clone(),
             counting: counting.clone(),
             staged: None,
             files: Vec::new(),
@@ -158,7 +165,7 @@ impl Bundle {
     }
 
     /// Where the files lie.
-    async fn staged(&mut self) -> Answer<&mut Box<dyn StagedFiles>> {
+    async fn staged(&mut self) -> Result<&mut Box<dyn StagedFiles>, ServiceError> {
         Ok(match &mut self.staged {
             Some(staged) => staged,
             none => none.insert(self.blobs.stage(StagedFor::Upload).await?),
@@ -174,16 +181,16 @@ impl Bundle {
     /// file to the disk.
     ///
     /// # Errors
-    /// The problem in the stream, 507 beyond the tenant's quota, or 500 if the file cannot be written.
-    pub async fn write(
+    /// The error in the stream, `storage-quota` beyond the tenant's quota, or the storage's error.
+    pub async fn write<E: From<ServiceError>>(
         &mut self,
-        mut pieces: impl Stream<Item = Answer<Bytes>> + Unpin,
-    ) -> Answer<&mut Received> {
+        mut pieces: impl Stream<Item = Result<Bytes, E>> + Unpin,
+    ) -> Result<&mut ReceivedFile, E> {
         let name = self.files.len().to_string();
         let counting = self.counting.clone();
         let held = self.memory.hold();
         let mut arriving = Arriving {
-            bundle: self,
+            upload: self,
             name: name.clone(),
             file: None,
             waiting: Vec::new(),
@@ -205,7 +212,7 @@ impl Bundle {
             arriving.take(&piece).await?;
         }
         arriving.end().await?;
-        self.files.push(Received {
+        self.files.push(ReceivedFile {
             name,
             kind: kind_by_content(&head),
             digest: hash.finalize().into(),
@@ -223,8 +230,8 @@ impl Bundle {
     /// Makes one of the last file and an earlier one with the same content.
     ///
     /// # Errors
-    /// 500 if the file cannot be renamed.
-    pub async fn join_repeated(&mut self) -> Answer<()> {
+    /// If the file cannot be renamed.
+    pub async fn join_repeated(&mut self) -> Result<(), ServiceError> {
         let Some((last, before)) = self.files.split_last() else {
             return Ok(());
         };
@@ -234,67 +241,6 @@ impl Bundle {
             self.files.pop();
         }
         Ok(())
-    }
-
-    /// Checks and stores the volume. One that is stored already is not checked again; its age
-    /// counts from now.
-    ///
-    /// # Errors
-    /// 413 or 422 if the files are not a usable volume.
-    pub async fn store(self, app: &App, tenant: &Tenant, tags: &Tags) -> Answer<Stored> {
-        let counting = self.counting.clone();
-        counting.settle().await?;
-        let stored = self.store_uncounted(app, tenant, tags).await?;
-        counting.stored();
-        Ok(stored)
-    }
-
-    async fn store_uncounted(mut self, app: &App, tenant: &Tenant, tags: &Tags) -> Answer<Stored> {
-        let id = self.volume_id();
-        let records = self.records();
-        let pin = app.queue.items().pin(&id).await?;
-        if let Some(stored) = app.queue.items().intact_volume(&id).await? {
-            let scan = scans::to_note(app, tenant, &id, &stored).await?;
-            let renewed = app
-                .queue
-                .items()
-                .renew_volume(tenant, &id, tags, scan.as_ref());
-            if let Some((volume, new)) = renewed.await? {
-                return Ok(Stored { volume, new, pin });
-            }
-        }
-        let received = self.files;
-        let staged = self.staged.ok_or_else(body::empty)?;
-        let mut files = Vec::with_capacity(records.len());
-        for (file, record) in received.iter().zip(&records) {
-            staged.rename(&file.name, &record.name).await?;
-            files.push(staged.local(&record.name).await?);
-        }
-        let reader = app.engine.reader.clone();
-        let inspect = move |monitor: &Monitor<'_>| {
-            let facts = reader.inspect(&files, monitor)?;
-            Ok::<_, Failure>((facts, reader.scan(&files, monitor)?))
-        };
-        // The disk and the processor work at the same time.
-        let bytes = received.iter().map(|file| file.bytes).sum();
-        let decoding = app.decoding.run_on(bytes, INSPECTION_MEMORY, inspect);
-        let inspected = async { Ok(decoding.await??) };
-        let settled = async { Ok::<(), Problem>(staged.settle(&id).await?) };
-        let ((facts, scan), ()) = tokio::try_join!(inspected, settled)?;
-        let volume = StoredVolume {
-            sequence: 0,
-            created_at: app.queue.now(),
-            bytes,
-            files: records,
-            facts: facts.to_json(),
-            id,
-        };
-        let added = app
-            .queue
-            .items()
-            .add_volume(volume, staged, tenant, tags, scan);
-        let (volume, new) = added.await?;
-        Ok(Stored { volume, new, pin })
     }
 
     /// The id of the volume of these files.
@@ -325,4 +271,78 @@ impl Bundle {
             })
             .collect()
     }
+}
+
+impl Service {
+    /// Checks and stores the volume of an upload. One that is stored already is not checked again; its age
+    /// counts from now.
+    ///
+    /// # Errors
+    /// If the files are no usable volume, the tenant's quota has no room for them, or the storage fails.
+    pub async fn store_volume(
+        &self,
+        tenant: &Tenant,
+        upload: VolumeUpload,
+        tags: &Tags,
+    ) -> Result<Stored, ServiceError> {
+        let counting = upload.counting.clone();
+        counting.settle().await?;
+        let stored = self.store_counted(tenant, upload, tags).await?;
+        counting.stored();
+        Ok(stored)
+    }
+
+    async fn store_counted(
+        &self,
+        tenant: &Tenant,
+        mut upload: VolumeUpload,
+        tags: &Tags,
+    ) -> Result<Stored, ServiceError> {
+        let (id, records) = (upload.volume_id(), upload.records());
+        let items = self.items();
+        let pin = items.pin(&id).await?;
+        if let Some(stored) = items.intact_volume(&id).await? {
+            let scan = self.scan_to_note(tenant, &id, &stored).await?;
+            let renewed = items.renew_volume(tenant, &id, tags, scan.as_ref());
+            if let Some((volume, new)) = renewed.await? {
+                return Ok(Stored { volume, new, pin });
+            }
+        }
+        let received = upload.files;
+        let staged = upload.staged.ok_or_else(empty)?;
+        let mut files = Vec::with_capacity(records.len());
+        for (file, record) in received.iter().zip(&records) {
+            staged.rename(&file.name, &record.name).await?;
+            files.push(staged.local(&record.name).await?);
+        }
+        let reader = self.engine.reader.clone();
+        let inspect = move |monitor: &Monitor<'_>| {
+            let facts = reader.inspect(&files, monitor)?;
+            Ok::<_, Failure>((facts, reader.scan(&files, monitor)?))
+        };
+        // The disk and the processor work at the same time.
+        let bytes = received.iter().map(|file| file.bytes).sum();
+        let decoding = self.decoding.run_on(bytes, INSPECTION_MEMORY, inspect);
+        let inspected = async { Ok(decoding.await??) };
+        let settled = async { Ok::<(), ServiceError>(staged.settle(&id).await?) };
+        let ((facts, scan), ()) = tokio::try_join!(inspected, settled)?;
+        let volume = StoredVolume {
+            sequence: 0,
+            created_at: items.now(),
+            bytes,
+            files: records,
+            facts: facts.to_json(),
+            id,
+        };
+        let added = items.add_volume(volume, staged, tenant, tags, scan);
+        let (volume, new) = added.await?;
+        Ok(Stored { volume, new, pin })
+    }
+}
+
+/// An upload of no file.
+fn empty() -> ServiceError {
+    Failure::new(Fault::Request, "empty-body", "The body holds no volume.")
+        .fix("Send the volume as the body: curl --data-binary @volume.nii.gz ...")
+        .into()
 }

@@ -1,29 +1,13 @@
-//! Receiving objects from other systems: its parts, from the settings.
+//! The settings of the intake.
 
-use std::sync::Arc;
+use crate::config::Settings;
+use crate::intake::{IntakeRoom, ReceiverSettings, ScpSettings, Senders, Waits};
 use ventriform::volume::ReadLimits;
-use ventriform_service::config::Settings;
-use ventriform_service::intake::{
-    IntakeRoom, IntakeStore, ReceivedFiles, Receiver, ReceiverSettings, ScpSettings, Senders,
-    Sessions, Waits,
-};
 
 /// Bounds of the longest P-DATA-TF PDU, bytes.
 const PDU_BYTES: (u64, u64) = (4 << 10, 16 << 20);
 
-/// What handlers need to receive objects.
-pub struct Intake {
-    /// Takes objects.
-    pub receiver: Arc<Receiver>,
-    /// The groups that wait.
-    pub sessions: Arc<Sessions>,
-    /// The tables.
-    pub store: Arc<dyn IntakeStore>,
-    /// The files.
-    pub files: Arc<dyn ReceivedFiles>,
-}
-
-/// How long groups wait.
+/// The waiting times of groups.
 pub fn waits(settings: &Settings) -> Waits {
     Waits {
         quiet: settings.series_quiet.0,

@@ -5,11 +5,11 @@
 
 use super::metrics::JobMetrics;
 use super::spans::{JobSpan, Spans};
+use crate::jobs::JobObserver;
+use crate::records::{Job, JobState};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
-use ventriform_service::jobs::JobObserver;
-use ventriform_service::records::{Job, JobState};
 
 /// The stage in which a result is stored.
 const COMMIT: &str = "commit";

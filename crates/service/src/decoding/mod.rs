@@ -7,7 +7,7 @@
 //!    that much of the budget is free (setting `decoding_memory`). What waits is admitted client by
 //!    client in turn, and one client holds at most half of the budget, so that one client's queue does
 //!    not delay another's work. The queue is bounded (setting `decoding_queue`); beyond that the answer
-//!    is 503, except for a client that has less than its equal share of the queue.
+//!    is `busy`, except for a client that has less than its equal share of the queue.
 //! 2. Turns. As many pieces of work as the machine has cores compute at the same time, on blocking
 //!    threads. Each gives up its turn after [`SLICE`] if other work goes before it, that of clients that have
 //!    computed less ([`Turns`]), and queues again: short work does not wait until long work ends, nor that of
@@ -15,29 +15,32 @@
 //!    loses its turn without being asked; it goes on beside the others until it reports, as one of at
 //!    most [`OVERRUNS`] per core.
 //! 3. Time. Work computes for at most `decoding_time`, and one second more for every `decoding_rate`
-//!    bytes of its file; it is then ended, and the answer is 422. For how long a thread waits for a processor
+//!    bytes of its file; it is then ended with `decoding-time`. For how long a thread waits for a processor
 //!    does not count ([`ThreadClock`]). While other work has waited for [`PATIENCE`] for memory, work that has
-//!    used a [`SHARE`] of its time is ended with 503.
+//!    used a [`SHARE`] of its time is ended with `busy`.
 //!
 //! Memory and turn belong to the computation and not to the request that waits for it: the memory is
 //! free when the computation has ended. If the client hangs up, the computation is cancelled and
 //! ends at its next report.
 
-use super::client::ClientAddress;
-use super::problem::{Answer, Problem};
-use super::thread_clock::{Moment, ThreadClock};
-use super::turns::{Turn, Turns};
-use axum::http::{StatusCode, header};
+mod thread_clock;
+mod turns;
+
+use crate::client::ClientAddress;
+use crate::config::Settings;
+use crate::error::{Refusal, ServiceError};
+use crate::records::{Failure, Fault};
 use prometheus::Histogram;
 use std::collections::{BTreeMap, VecDeque};
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
+use thread_clock::{Moment, ThreadClock};
 use tokio::runtime::Handle;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 use tokio_util::sync::CancellationToken;
+use turns::{Turn, Turns};
 use ventriform::progress::{CancelToken, Monitor, Observer, Stage};
-use ventriform_service::config::Settings;
 
 /// How long work computes before others that wait get their turn.
 const SLICE: Duration = Duration::from_millis(10);
@@ -54,6 +57,9 @@ const PATIENCE: Duration = Duration::from_secs(1);
 
 /// The part of its time after which work is costly: one in so many.
 const SHARE: u32 = 20;
+
+/// Pause before work is tried again that found the queue full.
+const BUSY_RETRY: Duration = Duration::from_secs(5);
 
 /// Memory of work that needs little, bytes. It bounds the number of threads.
 pub const LITTLE_MEMORY: u64 = 8 << 20;
@@ -96,12 +102,12 @@ impl Decoding {
     /// Dropping the future cancels the work.
     ///
     /// # Errors
-    /// 503 if too much waits, 422 if the work takes too long, 500 if it panics.
+    /// `busy` if too much waits, `decoding-time` if the work takes too long, `internal` if it panics.
     pub async fn run<T: Send + 'static>(
         &self,
         memory: u64,
         work: impl FnOnce(&Monitor<'_>) -> T + Send + 'static,
-    ) -> Answer<T> {
+    ) -> Result<T, ServiceError> {
         self.run_on(memory, memory, work).await
     }
 
@@ -114,7 +120,7 @@ impl Decoding {
         bytes: u64,
         memory: u64,
         work: impl FnOnce(&Monitor<'_>) -> T + Send + 'static,
-    ) -> Answer<T> {
+    ) -> Result<T, ServiceError> {
         let (asked, client) = (Instant::now(), ClientAddress::current());
         let admitted = self.admission.enter(client, memory).await?;
         let turn = self.turns.take(client).await;
@@ -152,12 +158,12 @@ impl Decoding {
                 result = &mut running => break result,
                 _ = look.tick() => task.look(),
                 // The work goes on until its next report; its client is answered at once.
-                () = task.stopped.cancelled() => return Err(task.problem()),
+                () = task.stopped.cancelled() => return Err(task.error()),
             }
         };
         match task.stopped.is_cancelled() {
-            true => Err(task.problem()),
-            false => result.map_err(Problem::internal),
+            true => Err(task.error()),
+            false => result.map_err(ServiceError::internal),
         }
     }
 }
@@ -271,19 +277,17 @@ impl Task {
     }
 
     /// Why it was stopped.
-    fn problem(&self) -> Problem {
+    fn error(&self) -> ServiceError {
         if self.state().displaced {
             return busy();
         }
         let seconds = self.limit.as_secs_f64();
-        Problem::new(
-            StatusCode::UNPROCESSABLE_ENTITY,
-            "decoding-time",
-            format!(
-                "Reading the file takes longer than the {seconds:.1} s that are allowed for its size."
-            ),
-        )
-        .fix("Send the image uncompressed, or ask the operator to raise `decoding_time`.")
+        let detail = format!(
+            "Reading the file takes longer than the {seconds:.1} s that are allowed for its size."
+        );
+        Failure::new(Fault::Content, "decoding-time", detail)
+            .fix("Send the image uncompressed, or ask the operator to raise `decoding_time`.")
+            .into()
     }
 }
 
@@ -413,7 +417,11 @@ impl Admission {
     }
 
     /// Waits for its turn to begin.
-    async fn enter(self: &Arc<Self>, client: ClientAddress, memory: u64) -> Answer<Admitted> {
+    async fn enter(
+        self: &Arc<Self>,
+        client: ClientAddress,
+        memory: u64,
+    ) -> Result<Admitted, ServiceError> {
         let (admit, admitted) = oneshot::channel();
         {
             let mut queue = self.queue();
@@ -432,7 +440,7 @@ impl Admission {
         let mut admitted = std::pin::pin!(admitted);
         loop {
             tokio::select! {
-                admitted = &mut admitted => return admitted.map_err(Problem::internal),
+                admitted = &mut admitted => return admitted.map_err(ServiceError::internal),
                 () = tokio::time::sleep(PATIENCE) => self.displace(),
             }
         }
@@ -533,20 +541,23 @@ impl AdmissionQueue {
     }
 }
 
-fn busy() -> Problem {
-    Problem::new(
-        StatusCode::SERVICE_UNAVAILABLE,
+fn busy() -> ServiceError {
+    let failure = Failure::new(
+        Fault::Service,
         "busy",
         "Too many files are waiting to be read.",
+    );
+    ServiceError::new(
+        Refusal::Unavailable,
+        failure.fix("Send the request again later."),
     )
-    .header(header::RETRY_AFTER, "5")
-    .fix("Send the request again later.")
+    .after(BUSY_RETRY)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metrics::Metrics;
+    use crate::telemetry::Metrics;
     use std::net::IpAddr;
     use std::sync::atomic::{AtomicUsize, Ordering};
     use std::sync::mpsc;

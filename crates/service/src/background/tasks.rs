@@ -1,49 +1,49 @@
-//! What goes on in the background: in the only process on a store, or in one of several at a time
-//! ([`Queue::while_leader`](ventriform_service::jobs::Queue::while_leader)).
+//! The tasks of the leader: of the only process on a store, or of one of several at a time
+//! ([`Queue::while_leader`](crate::jobs::Queue::while_leader)).
 //!
 //! Each of these is right also if two processes do it for a moment: what is sent is settled by its row
 //! and known to its receiver by its id, what is deleted is deleted in one statement, what is filed is
 //! filed by an idempotency key.
 
-use super::app::{App, retention_ages};
-use super::{exchange, performer, scans};
+use super::{Upkeep, exchange};
+use crate::access::AccessStore;
+use crate::intake::{GatherSettings, Gatherer};
+use crate::items::Custodian;
+use crate::procedures;
+use crate::records::{Clock, SystemClock};
+use crate::service::{Service, retention_ages};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
-use ventriform_service::access::AccessStore;
-use ventriform_service::background::Upkeep;
-use ventriform_service::intake::{GatherSettings, Gatherer};
-use ventriform_service::items::Custodian;
-use ventriform_service::records::{Clock, SystemClock};
 
 /// How often the upkeep looks for expired things and for jobs beyond their attempt limit.
-pub const UPKEEP_EVERY: Duration = Duration::from_secs(30);
+pub(crate) const UPKEEP_EVERY: Duration = Duration::from_secs(30);
 
 /// How often old rows of the audit trail are removed.
 const PRUNE_EVERY: Duration = Duration::from_secs(3600);
 
-/// Does all of it until `end`, whenever it is this process's turn.
-pub async fn run(app: App, end: CancellationToken) {
-    let term = |term: CancellationToken| perform(&app, term);
-    app.queue.while_leader(end, term).await;
+/// Runs all of them until `end`, whenever this process is the leader.
+pub(crate) async fn run(service: Arc<Service>, end: CancellationToken) {
+    let term = |term: CancellationToken| perform(&service, term);
+    service.queue().while_leader(end, term).await;
 }
 
-/// Does all of it until `end`. What is on its way to other systems then gets some time; the rest is broken
-/// off, as by a crash.
-async fn perform(app: &App, end: CancellationToken) {
-    let (queue, settings) = (&app.queue, &app.settings);
+/// Runs all of them until `end`. Deliveries to other systems then get some time; the rest is broken off, as by a
+/// crash.
+async fn perform(service: &Arc<Service>, end: CancellationToken) {
+    let (queue, settings) = (service.queue(), &service.settings);
     let mut sending = JoinSet::new();
-    sending.spawn(app.hooks.dispatcher.clone().run(
+    sending.spawn(service.hooks.dispatcher.clone().run(
         queue.changes(),
         end.clone(),
         settings.shutdown_grace.0,
     ));
-    sending.spawn(exchange::run(app.clone(), end.clone()));
+    sending.spawn(exchange::run(service.clone(), end.clone()));
     let mut others = JoinSet::new();
-    others.spawn(performer::run(app.clone(), end.clone()));
-    others.spawn(scans::read_old(app.clone(), end.clone()));
-    others.spawn(gatherer(app).keep_house(end.clone()));
+    others.spawn(procedures::run(service.clone(), end.clone()));
+    others.spawn(read_scans(service.clone(), end.clone()));
+    others.spawn(gatherer(service).keep_house(end.clone()));
     let upkeep = Upkeep {
         queue: queue.clone(),
         retention: retention_ages(settings),
@@ -57,10 +57,10 @@ async fn perform(app: &App, end: CancellationToken) {
     };
     others.spawn(custodian.run(end.clone()));
     if let Some(age) = retention_ages(settings).jobs {
-        others.spawn(prune_workitems(app.clone(), age, end.clone()));
+        others.spawn(prune_workitems(service.clone(), age, end.clone()));
     }
     if let Some(age) = settings.audit_retention.0 {
-        others.spawn(prune_audit(app.access.clone(), age.0, end));
+        others.spawn(prune_audit(service.access.clone(), age.0, end));
     }
     while let Some(ended) = sending.join_next().await {
         if let Err(error) = ended {
@@ -69,18 +69,18 @@ async fn perform(app: &App, end: CancellationToken) {
     }
 }
 
-/// What makes volumes of received objects.
-pub fn gatherer(app: &App) -> Gatherer {
+/// The maker of volumes of received objects.
+pub(crate) fn gatherer(service: &Arc<Service>) -> Gatherer {
     Gatherer {
-        store: app.intake.store.clone(),
-        files: app.intake.files.clone(),
-        queue: app.queue.clone(),
-        maker: Arc::new(app.clone()),
-        observer: Arc::new(app.metrics.intake.clone()),
-        sessions: app.intake.sessions.clone(),
+        store: service.intake.store.clone(),
+        files: service.intake.files.clone(),
+        queue: service.queue().clone(),
+        maker: service.clone(),
+        observer: Arc::new(service.metrics.intake.clone()),
+        sessions: service.intake.sessions.clone(),
         settings: GatherSettings {
-            rules: app.settings.rules.0.clone(),
-            keep_failed: app.settings.intake_keep.0.map(|age| age.0),
+            rules: service.settings.rules.0.clone(),
+            keep_failed: service.settings.intake_keep.0.map(|age| age.0),
         },
     }
 }
@@ -97,13 +97,17 @@ async fn prune_audit(store: Arc<dyn AccessStore>, age: Duration, end: Cancellati
 }
 
 /// Deletes work items that ended as long ago as jobs are kept.
-async fn prune_workitems(app: App, age: Duration, end: CancellationToken) {
+async fn prune_workitems(service: Arc<Service>, age: Duration, end: CancellationToken) {
     let mut round = tokio::time::interval(PRUNE_EVERY);
     let age = i64::try_from(age.as_millis()).unwrap_or(i64::MAX);
     while end.run_until_cancelled(round.tick()).await.is_some() {
-        let before = app.queue.now().saturating_sub(age);
-        if let Err(error) = app.worklist.delete_ended_workitems(before).await {
+        let before = service.now().saturating_sub(age);
+        if let Err(error) = service.worklist.delete_ended_workitems(before).await {
             tracing::error!(%error, "ended work items could not be deleted");
         }
     }
+}
+
+async fn read_scans(service: Arc<Service>, end: CancellationToken) {
+    service.read_unread_scans(end).await;
 }
