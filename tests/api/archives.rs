@@ -18,11 +18,11 @@ use ventriform_service::jobs::{GivenParameters, Work, WorkError, WorkInput};
 use ventriform_service::records::{Failure, Resource};
 use ventriform_service::work::Engine;
 
-const STUDY: &str = "1.2.826.0.1.3680043.8.498.1";
+pub const STUDY: &str = "1.2.826.0.1.3680043.8.498.1";
 const SERIES: &str = "1.2.826.0.1.3680043.8.498.1.2";
 
 /// An archive of the settings.
-fn archive(entry: &[(&str, &str)], tenants: &[&str]) -> Archive {
+pub fn archive(entry: &[(&str, &str)], tenants: &[&str]) -> Archive {
     let value = |key: &str| entry.iter().find(|(k, _)| *k == key).map(|(_, v)| *v);
     let tenants = tenants.iter().map(|name| name.parse().unwrap()).collect();
     Archive::read(value, tenants).unwrap()
