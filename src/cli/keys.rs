@@ -73,7 +73,7 @@ struct RevokeArgs {
 }
 
 /// Who acts in the audit trail.
-const AGENT: &str = "command line";
+const AUDIT_AGENT: &str = "command line";
 
 /// Runs the command.
 ///
@@ -160,5 +160,5 @@ async fn revoke(args: &RevokeArgs) -> Result<()> {
 }
 
 fn event(activity: Activity, key: &ApiKey, now: Timestamp) -> AuditEvent {
-    AuditEvent::new(now, activity, key.tenant.clone(), AGENT.into()).on(&key.id)
+    AuditEvent::new(now, activity, key.tenant.clone(), AUDIT_AGENT.into()).on(&key.id)
 }

@@ -69,7 +69,7 @@ enum Command {
     Audit(audit::AuditArgs),
     Phantom(phantom::PhantomArgs),
     Healthcheck(Box<serve::HealthcheckArgs>),
-    #[command(name = serve::COMPUTE, hide = true)]
+    #[command(name = serve::COMPUTE_COMMAND, hide = true)]
     Compute(serve::ComputeArgs),
     Doctor(doctor::DoctorArgs),
     Backup(doctor::BackupArgs),

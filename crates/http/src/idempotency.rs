@@ -6,7 +6,7 @@ use axum::http::{HeaderMap, HeaderName};
 /// The header's name.
 pub const HEADER: HeaderName = HeaderName::from_static("idempotency-key");
 
-const LONGEST: usize = 255;
+const KEY_LENGTH: usize = 255;
 
 /// The key of a request, if it has one. The draft's quoted form and a bare token are equal.
 pub fn key(headers: &HeaderMap) -> Answer<Option<String>> {
@@ -14,10 +14,10 @@ pub fn key(headers: &HeaderMap) -> Answer<Option<String>> {
         return Ok(None);
     };
     let key = value.to_str().unwrap_or_default().trim().trim_matches('"');
-    if key.is_empty() || key.len() > LONGEST {
+    if key.is_empty() || key.len() > KEY_LENGTH {
         return Err(Problem::bad_request(
             "invalid-idempotency-key",
-            format!("The key must have 1 to {LONGEST} visible ASCII characters."),
+            format!("The key must have 1 to {KEY_LENGTH} visible ASCII characters."),
         )
         .at("Idempotency-Key")
         .fix("Send a random UUID as the key."));

@@ -125,7 +125,7 @@ pub struct NewKey {
     queued_jobs: Option<u64>,
 }
 
-const FIELDS: [&str; 6] = [
+const KEY_FIELDS: [&str; 6] = [
     "name",
     "scope",
     "expires_at",
@@ -229,8 +229,11 @@ pub async fn revoke_key(
 }
 
 fn read(object: &Map<String, Value>, caller: &Caller) -> Answer<KeyRequest> {
-    if let Some(name) = object.keys().find(|name| !FIELDS.contains(&name.as_str())) {
-        return Err(unknown("field", name, &FIELDS));
+    if let Some(name) = object
+        .keys()
+        .find(|name| !KEY_FIELDS.contains(&name.as_str()))
+    {
+        return Err(unknown("field", name, &KEY_FIELDS));
     }
     for required in ["name", "scope"] {
         if !object.contains_key(required) {

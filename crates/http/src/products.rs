@@ -168,7 +168,7 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
     if !P::MESHES.is_empty() {
         routes.push(shared(mesh).served_by(get(get_mesh::<P>)));
     }
-    if P::FILES.contains(&REPORT) {
+    if P::FILES.contains(&REPORT_FILE) {
         let report = download(
             "report",
             &format!("get_{noun}_report"),
@@ -186,7 +186,7 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
 const PAGE_MEMORY_PER_BYTE: u64 = 8;
 
 /// The file that holds the report.
-const REPORT: &str = "report.json";
+const REPORT_FILE: &str = "report.json";
 
 /// The program that made a product.
 #[derive(Serialize, ToSchema)]
@@ -326,7 +326,7 @@ impl Offer {
 
     fn reports() -> [Self; 2] {
         [
-            Self::new("application/json", REPORT),
+            Self::new("application/json", REPORT_FILE),
             Self::new("text/html", files::PAGE),
         ]
     }
@@ -357,11 +357,12 @@ pub async fn find_any(app: &App, tenant: &Tenant, id: &str) -> Answer<Product> {
 impl Keep for Arc<Product> {
     fn bytes(&self) -> usize {
         /// Of a file's record, and of an item beside its maps.
-        const RECORD: usize = 400;
+        const RECORD_BYTES: usize = 400;
         /// By how much a JSON object in memory is larger than its text.
         const IN_MEMORY: usize = 4;
         let text = |map| serde_json::to_string(map).map_or(0, |text: String| text.len());
-        IN_MEMORY * (text(&self.parameters) + text(&self.summary)) + RECORD * (self.files.len() + 1)
+        IN_MEMORY * (text(&self.parameters) + text(&self.summary))
+            + RECORD_BYTES * (self.files.len() + 1)
     }
 }
 
@@ -413,7 +414,7 @@ async fn get_mesh<P: ProductCollection>(
     let Some(part) = wanted_part(&pairs)? else {
         return get_offered::<P>(state, caller, id, query, headers, &Offer::meshes()).await;
     };
-    refuse_unknown(&pairs, &[PART])?;
+    refuse_unknown(&pairs, &[PART_PARAMETER])?;
     let State(app) = &state;
     let product = kept::<P>(app, &caller.tenant, id_text).await?;
     let offers = Offer::meshes();
@@ -426,11 +427,11 @@ async fn get_mesh<P: ProductCollection>(
 }
 
 /// The query parameter that asks for one part of a mesh.
-const PART: &str = "part";
+const PART_PARAMETER: &str = "part";
 
 /// The part that a request asks for.
 fn wanted_part(pairs: &[(String, String)]) -> Answer<Option<Part>> {
-    let Some((_, name)) = pairs.iter().find(|(name, _)| name == PART) else {
+    let Some((_, name)) = pairs.iter().find(|(name, _)| name == PART_PARAMETER) else {
         return Ok(None);
     };
     let part = Part::named(name).ok_or_else(|| {
@@ -439,7 +440,7 @@ fn wanted_part(pairs: &[(String, String)]) -> Answer<Option<Part>> {
             "invalid-parameter",
             "`part` names no part of a ventricle's wall.",
         )
-        .at(PART)
+        .at(PART_PARAMETER)
         .fix(format!(
             "Give one of {names}, or leave it out for the closed mesh."
         ))
@@ -478,7 +479,7 @@ async fn send_part(
             "not-found",
             format!("The triangles of this mesh do not say which are {}.", part.as_str()),
         )
-        .at(PART)
+        .at(PART_PARAMETER)
         .fix(
             "Leave out `part`. Meshes of left ventricles have parts; those of older versions get them when the same \
              job is started again.",
@@ -530,7 +531,7 @@ async fn get_file<P: ProductCollection>(
     let mesh = mesh_names::<P>().any(|mesh| mesh == name);
     let known: &[&str] = match object.is_some() || name == files::PAGE {
         true => &["deidentify"],
-        false if mesh => &[PART],
+        false if mesh => &[PART_PARAMETER],
         false => &[],
     };
     refuse_unknown(&pairs, known)?;

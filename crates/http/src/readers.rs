@@ -21,7 +21,7 @@ use ventriform_service::records::Resource;
 pub const PROFILE_SIZE: Size = Size(1 << 20);
 
 /// The file of a profile.
-const PROFILE: &str = "profile.json";
+const PROFILE_FILE: &str = "profile.json";
 
 /// The collection of readers.
 pub struct Readers;
@@ -31,7 +31,7 @@ impl ProductCollection for Readers {
     const SCANNED: bool = false;
     type Body = ReaderBody;
     const MESHES: &'static [&'static str] = &[];
-    const FILES: &'static [&'static str] = &[PROFILE];
+    const FILES: &'static [&'static str] = &[PROFILE_FILE];
     const FILE_SCHEMA: &'static str = "ReaderFileName";
     const FILE_HELP: &'static str = "The profile, as `ventriform segment --reader` takes it.";
     type FileAnswer = openapi::ReaderFileAnswer;
@@ -81,7 +81,7 @@ impl From<Presented> for ReaderBody {
             files: DownloadBody::all(&product),
             software: SoftwareBody::of(&product),
             links: ReaderLinks {
-                profile: format!("{itself}/{PROFILE}"),
+                profile: format!("{itself}/{PROFILE_FILE}"),
                 itself,
             },
             id: product.id,

@@ -17,7 +17,7 @@ use std::sync::{Mutex, PoisonError};
 use ventriform_service::records::{Catalogue, Resource, Tenant};
 
 /// Memory for a value's place in the maps.
-const OVERHEAD: usize = 200;
+const ENTRY_OVERHEAD_BYTES: usize = 200;
 
 /// The tenant of a caller, and whether the caller sees whose scan a volume is.
 pub type Asker<'a> = (&'a Tenant, bool);
@@ -104,7 +104,7 @@ impl<V: Keep> ResponseCache<V> {
 
     /// Keeps a value that was made of what was read under that version.
     fn keep(&self, version: u64, (tenant, patients): Asker<'_>, id: &str, value: &V) {
-        let bytes = value.bytes() + id.len() + OVERHEAD;
+        let bytes = value.bytes() + id.len() + ENTRY_OVERHEAD_BYTES;
         let mut values = self.values.lock().unwrap_or_else(PoisonError::into_inner);
         if version < values.version || bytes > self.limit {
             return;
@@ -157,7 +157,7 @@ mod tests {
         let held = kept.values.lock().unwrap();
         let count = held.by_tenant[1][&tenant].len();
         assert_eq!(held.bytes, {
-            let bytes = |id: &String| answer.bytes() + id.len() + OVERHEAD;
+            let bytes = |id: &String| answer.bytes() + id.len() + ENTRY_OVERHEAD_BYTES;
             held.by_tenant[1][&tenant].keys().map(bytes).sum::<usize>()
         });
         assert!((2..10).contains(&count), "{count}");

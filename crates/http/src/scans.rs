@@ -22,7 +22,7 @@ const VALUE_LENGTH: usize = 64;
 
 /// The fields that callers of the scope `read` see: identifiers that DICOM systems exchange, the
 /// acquisition and the equipment.
-const READABLE: [&str; 17] = [
+const READABLE_FIELDS: [&str; 17] = [
     "study_uid",
     "series_uid",
     "series_number",
@@ -43,7 +43,7 @@ const READABLE: [&str; 17] = [
 ];
 
 /// Shown by `/identity` only: a series may have hundreds.
-const INSTANCES: &str = "instance_uids";
+const INSTANCES_FIELD: &str = "instance_uids";
 
 /// Study, series and Frame of Reference of a scan.
 #[derive(Serialize, ToSchema)]
@@ -78,9 +78,9 @@ pub fn shown(scan: &ScanIdentity, scope: Scope) -> Option<Map<String, Value>> {
         return None;
     }
     let mut shown = scan.whole();
-    shown.remove(INSTANCES);
+    shown.remove(INSTANCES_FIELD);
     if !sees_patients(scope) {
-        shown.retain(|name, _| READABLE.contains(&name.as_str()));
+        shown.retain(|name, _| READABLE_FIELDS.contains(&name.as_str()));
     }
     Some(shown)
 }

@@ -34,11 +34,11 @@ use ventriform_service::intake::{
 use ventriform_service::quotas::Counting;
 
 /// The media types of the answer.
-const OFFERS: [&str; 2] = ["application/dicom+json", "application/json"];
+const ANSWER_TYPES: [&str; 2] = ["application/dicom+json", "application/json"];
 /// The media type of an object.
-const OBJECT: &str = "application/dicom";
+const OBJECT_TYPE: &str = "application/dicom";
 /// The media type of several.
-const RELATED: &str = "multipart/related";
+const RELATED_TYPE: &str = "multipart/related";
 /// Memory of a request: what is gathered for a write, here and in the file's writer; and of what is answered about
 /// one object.
 const REQUEST_MEMORY: u64 = 1 << 20;
@@ -239,7 +239,7 @@ impl Storing<'_> {
             let essence = part
                 .content_type()
                 .map(|kind| kind.essence_str().to_owned());
-            let is_object = essence.is_none_or(|kind| kind == OBJECT);
+            let is_object = essence.is_none_or(|kind| kind == OBJECT_TYPE);
             let pieces = part.inspect_ok(|_| unparsed.reset()).map_err(interrupted);
             if is_object {
                 self.object(pieces).await?;
@@ -259,7 +259,7 @@ async fn store(
     study: Option<String>,
     request: Request,
 ) -> Answer {
-    require_offer(request.headers(), &OFFERS)?;
+    require_offer(request.headers(), &ANSWER_TYPES)?;
     refuse_content_encoding(request.headers())?;
     let limits = BodyLimits::of(&request)?;
     let boundary = boundary(request.headers())?;
@@ -300,7 +300,7 @@ async fn store(
         recorded.map_err(|NotRecorded| not_recorded())?;
     }
     let headers = [
-        (header::CONTENT_TYPE, OFFERS[0]),
+        (header::CONTENT_TYPE, ANSWER_TYPES[0]),
         (header::CACHE_CONTROL, "no-store"),
     ];
     let module = outcome.module().to_string();
@@ -312,7 +312,7 @@ async fn store(
 fn boundary(headers: &HeaderMap) -> Answer<Option<String>> {
     let wanted = "multipart/related; type=\"application/dicom\", or application/dicom";
     let given = media_type(headers).unwrap_or_default();
-    if given == OBJECT {
+    if given == OBJECT_TYPE {
         return Ok(None);
     }
     let text = headers.get(header::CONTENT_TYPE);
@@ -322,7 +322,7 @@ fn boundary(headers: &HeaderMap) -> Answer<Option<String>> {
     };
     if !related.is_dicom() {
         let found = related.parts.unwrap_or_default();
-        let found = format!("{RELATED}; type=\"{found}\"");
+        let found = format!("{RELATED_TYPE}; type=\"{found}\"");
         return Err(body::unsupported_type(&found, wanted));
     }
     let boundary = related.boundary;

@@ -133,7 +133,14 @@ pub async fn create_template(
 ) -> Answer {
     let counting = reserve_item(&app, &caller, request.headers()).await?;
     let pairs = query_pairs(query.as_deref());
-    let known = ["name", "organ", "model", "mesh_unit", "mesh_frame", LIBRARY];
+    let known = [
+        "name",
+        "organ",
+        "model",
+        "mesh_unit",
+        "mesh_frame",
+        LIBRARY_FIELD,
+    ];
     refuse_unknown(&pairs, &known)?;
     let value = |name: &str| {
         let found = pairs.iter().find(|(n, _)| n == name);
@@ -142,7 +149,7 @@ pub async fn create_template(
     let organ = value("organ").unwrap_or("left_ventricle").to_owned();
     let name = value("name").or(value("model")).unwrap_or("template");
     check_name(name).map_err(ServiceError::from)?;
-    let library = match value(LIBRARY) {
+    let library = match value(LIBRARY_FIELD) {
         None => None,
         Some("true") => Some(true),
         Some("false") => Some(false),
@@ -206,10 +213,10 @@ pub async fn update_template(
     find::<Templates>(&app, tenant, &id).await?;
     for (field, value) in &merge_patch(request).await? {
         let library = match (field.as_str(), value) {
-            (LIBRARY, Value::Bool(library)) => *library,
-            (LIBRARY, Value::Null) => false,
-            (LIBRARY, _) => return Err(not_a_flag()),
-            (other, _) => return Err(unknown("field", other, &[LIBRARY])),
+            (LIBRARY_FIELD, Value::Bool(library)) => *library,
+            (LIBRARY_FIELD, Value::Null) => false,
+            (LIBRARY_FIELD, _) => return Err(not_a_flag()),
+            (other, _) => return Err(unknown("field", other, &[LIBRARY_FIELD])),
         };
         app.service
             .items()
@@ -222,10 +229,10 @@ pub async fn update_template(
 }
 
 /// The setting that [`TemplateBody`] shows.
-const LIBRARY: &str = "library";
+const LIBRARY_FIELD: &str = "library";
 
 fn not_a_flag() -> Problem {
-    Problem::invalid_field(LIBRARY, "`library` must be true or false.")
+    Problem::invalid_field(LIBRARY_FIELD, "`library` must be true or false.")
         .fix("Give true if every `model=auto` is to fit the template.")
 }
 

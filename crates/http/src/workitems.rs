@@ -30,7 +30,7 @@ use ventriform_service::worklist::{
 const MEDIA_TYPE: &str = "application/dicom+json";
 
 /// Media types of DICOM JSON.
-const TYPES: [&str; 2] = [MEDIA_TYPE, "application/json"];
+const JSON_TYPES: [&str; 2] = [MEDIA_TYPE, "application/json"];
 
 const TRANSACTION: &str = "00081195";
 const STATE: &str = "00741000";
@@ -40,13 +40,13 @@ const SOP_INSTANCE: &str = "00080018";
 const TRANSACTION_NAMES: [&str; 2] = ["transaction-uid", "transaction"];
 
 /// Most items of a tenant.
-const MOST: u64 = 100_000;
+const MAX_WORKITEMS: u64 = 100_000;
 
 /// Items of a page, unless the client asks for fewer, and at most.
-const PAGE: (usize, usize) = (100, 1000);
+const PAGE_ITEMS: (usize, usize) = (100, 1000);
 
 /// Items read from the table at a time.
-const BATCH: u32 = 200;
+const BATCH_ITEMS: u32 = 200;
 
 /// Bytes of a page of items, unless one alone has more.
 const ANSWER_BYTES: usize = 2 << 20;
@@ -58,7 +58,7 @@ const SEARCH_MEMORY: u64 = 20 << 20;
 const LONGEST_SEARCH: Duration = Duration::from_secs(10);
 
 /// How often a change is tried again that another one came before.
-const TRIES: usize = 20;
+const CHANGE_TRIES: usize = 20;
 
 /// Create a work item
 ///
@@ -100,7 +100,12 @@ pub async fn create_workitem(
     let moment = now(&app);
     let made = Workitem::create(&caller.tenant, &uid, attributes, (moment.0, &moment.1));
     let (item, completed) = made.map_err(refused)?;
-    match app.service.worklist.add_workitem(&item, MOST).await? {
+    match app
+        .service
+        .worklist
+        .add_workitem(&item, MAX_WORKITEMS)
+        .await?
+    {
         AddedWorkitem::Done => {}
         AddedWorkitem::Exists => {
             return Err(Problem::new(
@@ -114,7 +119,7 @@ pub async fn create_workitem(
             return Err(Problem::new(
                 StatusCode::INSUFFICIENT_STORAGE,
                 "too-many-workitems",
-                format!("There are {MOST} work items."),
+                format!("There are {MAX_WORKITEMS} work items."),
             )
             .fix("Set `job_retention`, so that ended items are deleted."));
         }
@@ -174,11 +179,11 @@ pub async fn search_workitems(
     caller: Caller,
     RawQuery(query): RawQuery,
 ) -> Answer {
-    let (mut limit, mut skip) = (PAGE.0, 0);
+    let (mut limit, mut skip) = (PAGE_ITEMS.0, 0);
     let mut matching = Matching::default();
     for (name, value) in query_pairs(query.as_deref()) {
         match name.as_str() {
-            "limit" => limit = number(&name, &value)?.min(PAGE.1),
+            "limit" => limit = number(&name, &value)?.min(PAGE_ITEMS.1),
             "offset" => skip = number(&name, &value)?,
             // All attributes are answered, and names are compared without regard to case.
             "includefield" | "fuzzymatching" => {}
@@ -201,7 +206,7 @@ pub async fn search_workitems(
         let page = app
             .service
             .worklist
-            .workitems(&caller.tenant, state, after, BATCH);
+            .workitems(&caller.tenant, state, after, BATCH_ITEMS);
         let page = page.await?;
         let Some(last) = page.last() else { break };
         after = last.sequence;
@@ -370,7 +375,7 @@ pub async fn cancel_workitem(
     request: Request,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let bytes = bytes_of(request, &TYPES).await?;
+    let bytes = bytes_of(request, &JSON_TYPES).await?;
     let details = match bytes.is_empty() {
         true => DataSetJson::default(),
         false => parse(&bytes).await?,
@@ -393,7 +398,7 @@ async fn change(
     uid: &str,
     how: impl Fn(&mut Workitem, (Timestamp, &str)) -> Result<Change, Refusal>,
 ) -> Answer<Change> {
-    for _ in 0..TRIES {
+    for _ in 0..CHANGE_TRIES {
         let mut item = find(app, caller, uid).await?;
         let moment = now(app);
         let before = text_of(&item.attributes)?.len();
@@ -486,7 +491,7 @@ async fn claimed_data_set(
 }
 
 async fn data_set(request: Request) -> Answer<DataSetJson> {
-    parse(&bytes_of(request, &TYPES).await?).await
+    parse(&bytes_of(request, &JSON_TYPES).await?).await
 }
 
 /// The data set in an array with one, or alone.

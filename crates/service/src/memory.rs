@@ -1,6 +1,6 @@
 //! The memory that requests hold, shared out between clients.
 //!
-//! In: how many bytes a request is about to hold. Out: leave to do so, now or within [`PATIENCE`], or the error `busy`.
+//! In: how many bytes a request is about to hold. Out: leave to do so, now or within [`MEMORY_WAIT`], or the error `busy`.
 //!
 //! Whatever a client can make the service keep for it is charged here before it is taken: the part of a body
 //! that is gathered, what is made of it, the rows of a page, the answer until it is read. What is decoded has a
@@ -24,7 +24,7 @@ use tokio::sync::Notify;
 use tokio::time::{Instant, timeout_at};
 
 /// Longest time for which a request waits for memory.
-const PATIENCE: Duration = Duration::from_secs(2);
+const MEMORY_WAIT: Duration = Duration::from_secs(2);
 
 /// Pause before a request is sent again that found no memory.
 const BUSY_RETRY: Duration = Duration::from_secs(1);
@@ -131,9 +131,9 @@ impl HeldMemory {
     /// Holds `bytes` more, as soon as the client's share has them.
     ///
     /// # Errors
-    /// `busy` if it has not within [`PATIENCE`].
+    /// `busy` if it has not within [`MEMORY_WAIT`].
     pub async fn grow(&mut self, bytes: u64) -> Result<(), ServiceError> {
-        let late = Instant::now() + PATIENCE;
+        let late = Instant::now() + MEMORY_WAIT;
         loop {
             // Before looking, so that nothing is missed in between.
             let budget = self.budget.clone();
@@ -297,7 +297,7 @@ mod tests {
         let mut large = client(2).scope(async { budget.hold() }).await;
         let began = Instant::now();
         let late = large.grow(10_000).await;
-        assert!(late.is_err() && began.elapsed() >= PATIENCE);
+        assert!(late.is_err() && began.elapsed() >= MEMORY_WAIT);
         drop(second);
         large.grow(10_000).await.unwrap();
         assert_eq!(large.bytes(), 500);

@@ -28,7 +28,7 @@ const ROUND_EVERY: Duration = Duration::from_secs(1);
 /// How often all scheduled items are looked at, also if none was announced.
 const CLAIM_EVERY: Duration = Duration::from_secs(60);
 /// Items read from the table at a time.
-const BATCH: u32 = 200;
+const BATCH_ITEMS: u32 = 200;
 /// Steps in which progress is noted, percent.
 const PROGRESS_STEP_PERCENT: u8 = 10;
 
@@ -59,7 +59,10 @@ pub(crate) async fn run(service: Arc<Service>, end: CancellationToken) {
 async fn claim_all(service: &Service) -> Result<(), StoreError> {
     let mut after = 0;
     loop {
-        let items = service.worklist.scheduled_workitems(after, BATCH).await?;
+        let items = service
+            .worklist
+            .scheduled_workitems(after, BATCH_ITEMS)
+            .await?;
         let Some(last) = items.last() else {
             return Ok(());
         };
@@ -87,7 +90,10 @@ fn procedure<'a>(service: &'a Service, item: &Workitem) -> Option<&'a Procedure>
 async fn follow_all(service: &Service) -> Result<(), StoreError> {
     let mut after = 0;
     loop {
-        let items = service.worklist.performed_workitems(after, BATCH).await?;
+        let items = service
+            .worklist
+            .performed_workitems(after, BATCH_ITEMS)
+            .await?;
         let Some(last) = items.last() else {
             return Ok(());
         };

@@ -40,7 +40,7 @@ pub(super) const DISCARDED: &str = "discarded";
 /// What was found without a row, by day.
 pub(super) const QUARANTINE: &str = "quarantine";
 
-const DAY: StaticFormatDescription = format_description!("[year]-[month]-[day]");
+const DAY_FORMAT: StaticFormatDescription = format_description!("[year]-[month]-[day]");
 
 /// What [`BlobStore::check`] writes: more than the free rest of a block.
 pub(super) const CHECK: &[u8] = &[b'v'; 8192];
@@ -490,13 +490,13 @@ fn set_aside_of(folder: &Path, id: &str) -> io::Result<Vec<PathBuf>> {
 
 /// The name of the quarantine of the day.
 pub(super) fn shelf_name(now: Timestamp) -> String {
-    let day = day(now).and_then(|day| day.format(&DAY).ok());
+    let day = day(now).and_then(|day| day.format(&DAY_FORMAT).ok());
     day.unwrap_or_else(|| "unknown".into())
 }
 
 /// Whether a folder in the quarantine is of an earlier day.
 pub(super) fn is_of_shelf_before(name: &str, first_kept: Timestamp) -> bool {
-    let of = Date::parse(name, &DAY).ok();
+    let of = Date::parse(name, &DAY_FORMAT).ok();
     of.zip(day(first_kept)).is_some_and(|(of, kept)| of < kept)
 }
 

@@ -147,7 +147,7 @@ impl Query {
 }
 
 /// The prefix of the names of runs.
-const RUN: &str = "run_";
+const RUN_PREFIX: &str = "run_";
 
 /// The database. Implements [`ventriform_service::records::JobStore`] and [`ventriform_service::records::Catalogue`], and the traits
 /// of `access`, `hooks`, `archive`, `intake` and `worklist`.
@@ -173,7 +173,7 @@ impl SqlStore {
         Ok(Self {
             writer: Writing::Sqlite(Box::new(writer)),
             readers: Readers::Sqlite(readers),
-            run: random_id(RUN),
+            run: random_id(RUN_PREFIX),
             gauge,
             damaged: AtomicBool::new(false),
         })
@@ -188,7 +188,7 @@ impl SqlStore {
         wait: Duration,
         gauge: DiskGauge,
     ) -> Result<Self, postgres::PostgresError> {
-        let run = random_id(RUN);
+        let run = random_id(RUN_PREFIX);
         let (writer, readers) = postgres::open(settings, wait, &run).await?;
         Ok(Self {
             writer: Writing::Postgres(writer),

@@ -19,11 +19,11 @@ use tokio::task::JoinHandle;
 use ventriform_service::records::{News, NewsFeed};
 
 /// Pause between two attempts to listen.
-const AGAIN: Duration = Duration::from_secs(1);
+const LISTEN_RETRY: Duration = Duration::from_secs(1);
 /// Number of different news that wait to be followed.
-const WAITING: usize = 10_000;
+const QUEUED_NEWS: usize = 10_000;
 /// The channel of the notifications of migration 2.
-const CHANNEL: &str = "SELECT 'ventriform_' || md5(current_schema())";
+const SELECT_CHANNEL: &str = "SELECT 'ventriform_' || md5(current_schema())";
 
 /// News that wait to be followed, in the order in which they came.
 struct Inbox {
@@ -48,7 +48,7 @@ impl Inbox {
     /// Adds news, unless the same is waiting already.
     fn put(&self, news: News) {
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
-        let news = if waiting.order.len() < WAITING {
+        let news = if waiting.order.len() < QUEUED_NEWS {
             news
         } else {
             *waiting = Waiting::default();
@@ -115,7 +115,7 @@ async fn listen(pool: PgPool, run: String, inbox: Arc<Inbox>) {
             Ok(listener) => listener,
             Err(error) => {
                 tracing::debug!(%error, "other processes cannot be listened to");
-                tokio::time::sleep(jitter(AGAIN)).await;
+                tokio::time::sleep(jitter(LISTEN_RETRY)).await;
                 continue;
             }
         };
@@ -140,7 +140,9 @@ async fn listen(pool: PgPool, run: String, inbox: Arc<Inbox>) {
 
 async fn listener(pool: &PgPool) -> Result<PgListener, sqlx::Error> {
     let mut listener = PgListener::connect_with(pool).await?;
-    let channel: String = sqlx::query_scalar(CHANNEL).fetch_one(&mut listener).await?;
+    let channel: String = sqlx::query_scalar(SELECT_CHANNEL)
+        .fetch_one(&mut listener)
+        .await?;
     listener.listen(&channel).await?;
     Ok(listener)
 }
@@ -184,7 +186,7 @@ mod tests {
     #[test]
     fn more_than_it_holds_is_missed_and_what_comes_later_is_not() {
         let inbox = Inbox::new();
-        for number in 0..=WAITING {
+        for number in 0..=QUEUED_NEWS {
             inbox.put(job(number));
         }
         inbox.put(job(1));

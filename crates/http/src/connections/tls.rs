@@ -34,7 +34,7 @@ use ventriform_service::records::hex;
 const LOOK_EVERY: Duration = Duration::from_secs(5);
 
 /// The first byte of a TLS handshake (RFC 8446, section 5.1).
-const HANDSHAKE: u8 = 22;
+const TLS_HANDSHAKE: u8 = 22;
 
 /// The body of the answer to plain HTTP.
 const PLAIN_HTTP: &str = "{\"type\":\"urn:ventriform:problem:tls-required\",\
@@ -188,7 +188,7 @@ impl Tls {
         mut stream: WatchedStream<TcpStream>,
     ) -> io::Result<Option<TlsStream<WatchedStream<TcpStream>>>> {
         let mut first = [0];
-        if stream.get_ref().peek(&mut first).await? == 1 && first[0] != HANDSHAKE {
+        if stream.get_ref().peek(&mut first).await? == 1 && first[0] != TLS_HANDSHAKE {
             stream.write_all(plain_http().as_bytes()).await?;
             stream.shutdown().await?;
             // Unread bytes would make the system reset the connection before the client has read

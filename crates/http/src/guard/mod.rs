@@ -2,7 +2,7 @@
 //!
 //! 1. [`hosts`]: the `Host` header must name this service (against DNS rebinding), and a page of
 //!    another site cannot change anything on a service that asks nobody who they are.
-//!    Headers that a request has at most once are refused if it has two ([`SINGLE`]): one part of the way
+//!    Headers that a request has at most once are refused if it has two ([`SINGLE_HEADERS`]): one part of the way
 //!    may have looked at the first, another at the last.
 //! 2. The `Authorization` header tells the caller, see [`ventriform_service::access::Gate`]; without a valid one the answer is
 //!    401. [`is_open_path`] names the paths that everybody may read.
@@ -42,7 +42,7 @@ const RATE_LIMIT: HeaderName = HeaderName::from_static("ratelimit");
 const RATE_LIMIT_POLICY: HeaderName = HeaderName::from_static("ratelimit-policy");
 
 /// The headers that a request has at most once.
-const SINGLE: [HeaderName; 9] = [
+const SINGLE_HEADERS: [HeaderName; 9] = [
     header::AUTHORIZATION,
     header::CONTENT_TYPE,
     header::CONTENT_ENCODING,
@@ -54,10 +54,10 @@ const SINGLE: [HeaderName; 9] = [
     HeaderName::from_static("webhook-secret"),
 ];
 
-/// Refuses a request that has one of [`SINGLE`] twice.
+/// Refuses a request that has one of [`SINGLE_HEADERS`] twice.
 fn check_single(headers: &HeaderMap) -> Answer<()> {
     let repeated = |name: &&HeaderName| headers.get_all(*name).iter().nth(1).is_some();
-    match SINGLE.iter().find(repeated) {
+    match SINGLE_HEADERS.iter().find(repeated) {
         None => Ok(()),
         Some(name) => Err(Problem::bad_request(
             "repeated-header",

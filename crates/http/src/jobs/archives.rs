@@ -9,7 +9,7 @@ use ventriform_service::records::{SendOrder, SeriesSource, Tenant};
 use ventriform_service::series::{GivenSeries, sendable_fix};
 
 /// The fields of `source`.
-const FIELDS: [&str; 4] = ["archive", "dicomweb", "study", "series"];
+const SOURCE_FIELDS: [&str; 4] = ["archive", "dicomweb", "study", "series"];
 
 /// The series in the field `source` of a job.
 ///
@@ -37,8 +37,11 @@ pub async fn source_of(
 }
 
 fn given_series(given: &Map<String, Value>) -> Answer<GivenSeries<'_>> {
-    if let Some(name) = given.keys().find(|name| !FIELDS.contains(&name.as_str())) {
-        return Err(unknown("field", name, &FIELDS));
+    if let Some(name) = given
+        .keys()
+        .find(|name| !SOURCE_FIELDS.contains(&name.as_str()))
+    {
+        return Err(unknown("field", name, &SOURCE_FIELDS));
     }
     Ok(GivenSeries {
         archive: text(given, "archive")?,

@@ -88,7 +88,7 @@ pub async fn create_job(
     filing::accepted(&app, filed.await?).await
 }
 
-const FIELDS: [&str; 10] = [
+const JOB_FIELDS: [&str; 10] = [
     "kind",
     priority::FIELD,
     "volume",
@@ -107,8 +107,11 @@ async fn read_job<'a>(
     object: &Map<String, Value>,
     order: &mut JobOrder,
 ) -> Answer<(&'a dyn Work, Option<String>, Map<String, Value>)> {
-    if let Some(name) = object.keys().find(|name| !FIELDS.contains(&name.as_str())) {
-        return Err(unknown("field", name, &FIELDS));
+    if let Some(name) = object
+        .keys()
+        .find(|name| !JOB_FIELDS.contains(&name.as_str()))
+    {
+        return Err(unknown("field", name, &JOB_FIELDS));
     }
     let kind = text(object, "kind")?.unwrap_or("model");
     let work = app.service.work_of(kind)?;

@@ -16,12 +16,12 @@ use serde_json::{Map, Value, json};
 use ventriform::export::dicom::DicomObject;
 
 /// Requests and answers as a running service gave them.
-const RECORDED: &str = include_str!("examples.json");
+const RECORDED_EXAMPLES: &str = include_str!("examples.json");
 
 /// Completes `document`.
 pub fn finish(document: &mut Value) {
     one_path_per_file(document);
-    let recorded = serde_json::from_str(RECORDED).expect("examples.json is an object");
+    let recorded = serde_json::from_str(RECORDED_EXAMPLES).expect("examples.json is an object");
     let problems = problem_examples(&recorded);
     for (path, method, operation) in operations(document) {
         bytes_as_binary(operation);

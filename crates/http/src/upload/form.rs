@@ -18,7 +18,7 @@ use ventriform_service::uploads::VolumeUpload;
 /// Longest text field, bytes.
 const FIELD_BYTES: usize = 4096;
 /// Most text fields.
-const FIELDS: usize = 100;
+const TEXT_FIELDS: usize = 100;
 
 /// Memory of a form beside the parts' contents: what the parser has read and not handed out.
 const FORM_MEMORY: u64 = 128 << 10;
@@ -90,8 +90,8 @@ async fn receive_parts(
         if is_text && apart.is_some() {
             let text = text_field(field, &name, &unparsed, interrupted).await?;
             upload.fields.push((name, text));
-            if upload.fields.len() > FIELDS {
-                let reason = format!("it has more than {FIELDS} text fields");
+            if upload.fields.len() > TEXT_FIELDS {
+                let reason = format!("it has more than {TEXT_FIELDS} text fields");
                 return Err(body::malformed_form(&reason));
             }
             continue;

@@ -21,7 +21,7 @@ const MOST_KEPT: usize = 1024;
 pub const MOST_MAKERS: usize = 8;
 
 /// Longest credentials, bytes. Tokens with many groups have a few thousand.
-const LONGEST: usize = 16 * 1024;
+const AUTHORIZATION_BYTES: usize = 16 * 1024;
 
 /// Why a request was not admitted.
 #[derive(Debug, thiserror::Error)]
@@ -247,7 +247,7 @@ fn bearer(authorization: &[u8]) -> Option<&str> {
     let credential = credential.trim();
     let usable = scheme.eq_ignore_ascii_case("bearer")
         && !credential.is_empty()
-        && credential.len() <= LONGEST;
+        && credential.len() <= AUTHORIZATION_BYTES;
     usable.then_some(credential)
 }
 
@@ -273,7 +273,7 @@ mod tests {
         ] {
             assert_eq!(bearer(wrong), None);
         }
-        let long = format!("Bearer {}", "x".repeat(LONGEST + 1));
+        let long = format!("Bearer {}", "x".repeat(AUTHORIZATION_BYTES + 1));
         assert_eq!(bearer(long.as_bytes()), None);
     }
 }

@@ -14,7 +14,7 @@ use subtle::ConstantTimeEq;
 use ventriform::text::is_printable;
 
 /// What every key begins with, so that scanners for leaked secrets find it.
-const PREFIX: &str = "vf_";
+const KEY_PREFIX: &str = "vf_";
 /// Bytes of an id.
 const ID_BYTES: usize = 8;
 /// Bytes of a secret.
@@ -141,7 +141,7 @@ impl ApiKey {
             revoked_at: None,
             digest: digest(&secret),
         };
-        let text = format!("{PREFIX}{}_{secret}", key.id);
+        let text = format!("{KEY_PREFIX}{}_{secret}", key.id);
         Ok((key, text))
     }
 
@@ -172,7 +172,7 @@ pub struct PresentedKey<'a> {
 impl<'a> PresentedKey<'a> {
     /// Takes a text apart. `None` if it is no key by its form.
     pub fn parse(text: &'a str) -> Option<Self> {
-        let (id, secret) = text.strip_prefix(PREFIX)?.split_once('_')?;
+        let (id, secret) = text.strip_prefix(KEY_PREFIX)?.split_once('_')?;
         let digit = |b: u8| b.is_ascii_digit() || (b'a'..=b'f').contains(&b);
         let letter = |b: u8| b.is_ascii_alphanumeric() || b == b'-' || b == b'_';
         let formed = id.len() == 2 * ID_BYTES

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 const NAME_LENGTH: usize = 64;
 
 /// The application entity title by which this service calls archives unless told otherwise.
-const CALLING: &str = "VENTRIFORM";
+const CALLING_AE_TITLE: &str = "VENTRIFORM";
 
 /// Whether `text` can name an archive: 1 to 64 letters, digits, dots, dashes and underscores.
 fn is_name(text: &str) -> bool {
@@ -328,7 +328,7 @@ fn peer<'a>(given: &impl Fn(&str) -> Given<'a>) -> Result<Option<DicomPeer>, Arc
     };
     let called = given("ae_title");
     let called = called.ok_or_else(|| fault("ae_title", "it is missing beside `dicom`"))?;
-    let calling = given("calling_ae_title").unwrap_or(CALLING);
+    let calling = given("calling_ae_title").unwrap_or(CALLING_AE_TITLE);
     Ok(Some(DicomPeer {
         address: address.to_owned(),
         called: title("ae_title", called)?,

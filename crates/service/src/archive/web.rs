@@ -22,13 +22,13 @@ use std::time::Duration;
 const JSON_BYTES: usize = 16 << 20;
 
 /// Longest time to connect.
-const CONNECT: Duration = Duration::from_secs(10);
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Most redirects within an archive.
-const REDIRECTS: usize = 3;
+const MAX_REDIRECTS: usize = 3;
 
 const DICOM_JSON: &str = "application/dicom+json";
-const BOUNDARY: &str = "ventriform-dicom-object";
+const PART_BOUNDARY: &str = "ventriform-dicom-object";
 
 /// SOP Instance UID, as DICOM JSON names it.
 const SOP_INSTANCE_UID: &str = "00080018";
@@ -147,7 +147,7 @@ impl WebClients {
             .no_proxy()
             .referer(false)
             .pool_idle_timeout(Duration::from_secs(10))
-            .connect_timeout(CONNECT.min(self.timeout))
+            .connect_timeout(CONNECT_TIMEOUT.min(self.timeout))
             .read_timeout(self.timeout)
             .user_agent(concat!("ventriform/", env!("CARGO_PKG_VERSION")))
     }
@@ -174,7 +174,7 @@ impl WebClients {
 /// Follows redirects to the same scheme, host and port.
 fn within_origin(attempt: Attempt<'_>) -> reqwest::redirect::Action {
     let known = attempt.previous().first().map(reqwest::Url::origin);
-    match known == Some(attempt.url().origin()) && attempt.previous().len() <= REDIRECTS {
+    match known == Some(attempt.url().origin()) && attempt.previous().len() <= MAX_REDIRECTS {
         true => attempt.follow(),
         false => attempt.stop(),
     }
@@ -284,11 +284,11 @@ impl DicomWeb {
     /// # Errors
     /// If the archive does not take it, or does not answer.
     pub async fn store(&self, object: &[u8]) -> Result<Stored, Trouble> {
-        let head = format!("--{BOUNDARY}\r\nContent-Type: application/dicom\r\n\r\n");
-        let tail = format!("\r\n--{BOUNDARY}--\r\n");
+        let head = format!("--{PART_BOUNDARY}\r\nContent-Type: application/dicom\r\n\r\n");
+        let tail = format!("\r\n--{PART_BOUNDARY}--\r\n");
         let body = [head.as_bytes(), object, tail.as_bytes()].concat();
         let content_type =
-            format!("multipart/related; type=\"application/dicom\"; boundary={BOUNDARY}");
+            format!("multipart/related; type=\"application/dicom\"; boundary={PART_BOUNDARY}");
         let request = self
             .client
             .post(format!("{}/studies", self.base))

@@ -20,7 +20,7 @@ use tokio_util::sync::CancellationToken;
 use ventriform::progress::Monitor;
 
 /// The agent of the audit trail that fetches and delivers.
-const AGENT: &str = "archive exchange";
+const AUDIT_AGENT: &str = "archive exchange";
 
 /// Fetches and delivers until `end`.
 pub async fn run(service: Arc<Service>, end: CancellationToken) {
@@ -180,7 +180,7 @@ impl Service {
         let now = self.queue.now();
         let event = AuditEvent {
             outcome,
-            ..AuditEvent::new(now, activity, tenant.clone(), AGENT.into()).on(object)
+            ..AuditEvent::new(now, activity, tenant.clone(), AUDIT_AGENT.into()).on(object)
         };
         self.recorder.note(event).await;
     }

@@ -10,7 +10,7 @@ use tokio_util::sync::CancellationToken;
 const HOUR_MS: Timestamp = 3_600_000;
 
 /// How long nothing is erased by age after a start at a doubtful time.
-const DOUBT: Duration = Duration::from_secs(3600);
+const CLOCK_GRACE: Duration = Duration::from_secs(3600);
 
 /// The periodic upkeep of a running service.
 pub struct Upkeep {
@@ -33,7 +33,7 @@ impl Upkeep {
                 _ = round.tick() => {}
                 () = end.cancelled() => return,
             }
-            let trusted = !doubtful || started.elapsed() >= DOUBT;
+            let trusted = !doubtful || started.elapsed() >= CLOCK_GRACE;
             if let Err(error) = self.run_round(trusted).await {
                 tracing::error!(%error, "upkeep failed; the next round tries again");
             }

@@ -9,15 +9,15 @@
 //!    not delay another's work. The queue is bounded (setting `decoding_queue`); beyond that the answer
 //!    is `busy`, except for a client that has less than its equal share of the queue.
 //! 2. Turns. As many pieces of work as the machine has cores compute at the same time, on blocking
-//!    threads. Each gives up its turn after [`SLICE`] if other work goes before it, that of clients that have
+//!    threads. Each gives up its turn after [`TURN_SLICE`] if other work goes before it, that of clients that have
 //!    computed less ([`Turns`]), and queues again: short work does not wait until long work ends, nor that of
-//!    one client for that of another. Work that has not reported for [`STALL`], and work whose client hung up,
+//!    one client for that of another. Work that has not reported for [`STALL_TIME`], and work whose client hung up,
 //!    loses its turn without being asked; it goes on beside the others until it reports, as one of at
-//!    most [`OVERRUNS`] per core.
+//!    most [`OVERRUNS_PER_CORE`] per core.
 //! 3. Time. Work computes for at most `decoding_time`, and one second more for every `decoding_rate`
 //!    bytes of its file; it is then ended with `decoding-time`. For how long a thread waits for a processor
-//!    does not count ([`ThreadClock`]). While other work has waited for [`PATIENCE`] for memory, work that has
-//!    used a [`SHARE`] of its time is ended with `busy`.
+//!    does not count ([`ThreadClock`]). While other work has waited for [`ADMISSION_PATIENCE`] for memory, work that has
+//!    used a [`COSTLY_SHARE`] of its time is ended with `busy`.
 //!
 //! Memory and turn belong to the computation and not to the request that waits for it: the memory is
 //! free when the computation has ended. If the client hangs up, the computation is cancelled and
@@ -43,20 +43,20 @@ use turns::{Turn, Turns};
 use ventriform::progress::{CancelToken, Monitor, Observer, Stage};
 
 /// How long work computes before others that wait get their turn.
-const SLICE: Duration = Duration::from_millis(10);
+const TURN_SLICE: Duration = Duration::from_millis(10);
 
 /// How long work keeps its turn without a report, and how often that is looked at.
-const STALL: Duration = Duration::from_millis(50);
+const STALL_TIME: Duration = Duration::from_millis(50);
 
 /// Pieces of work for each core that go on after they lost their turn. The more there are, the slower is the work
 /// that has the turn.
-const OVERRUNS: usize = 2;
+const OVERRUNS_PER_CORE: usize = 2;
 
 /// How long work waits for memory before costly work is ended for it.
-const PATIENCE: Duration = Duration::from_secs(1);
+const ADMISSION_PATIENCE: Duration = Duration::from_secs(1);
 
 /// The part of its time after which work is costly: one in so many.
-const SHARE: u32 = 20;
+const COSTLY_SHARE: u32 = 20;
 
 /// Pause before work is tried again that found the queue full.
 const BUSY_RETRY: Duration = Duration::from_secs(5);
@@ -91,7 +91,7 @@ impl Decoding {
                 }),
             }),
             turns: Turns::new(cores),
-            overruns: Arc::new(Semaphore::new(cores * OVERRUNS)),
+            overruns: Arc::new(Semaphore::new(cores * OVERRUNS_PER_CORE)),
             time: settings.decoding_time.0,
             rate: settings.decoding_rate.0.max(1),
             waits,
@@ -152,7 +152,7 @@ impl Decoding {
             result
         };
         let mut running = tokio::task::spawn_blocking(run);
-        let mut look = tokio::time::interval(STALL);
+        let mut look = tokio::time::interval(STALL_TIME);
         let result = loop {
             tokio::select! {
                 result = &mut running => break result,
@@ -258,7 +258,7 @@ impl Task {
     fn look(&self) {
         let mut state = self.state();
         self.count(&mut state);
-        if state.passed().is_some_and(|passed| passed >= STALL) {
+        if state.passed().is_some_and(|passed| passed >= STALL_TIME) {
             self.take_turn(&mut state);
         }
         if state.computed() > self.limit {
@@ -302,7 +302,7 @@ impl Drop for StopOnDrop {
     }
 }
 
-/// Gives up the turn at the first report after [`SLICE`], and waits for the next one.
+/// Gives up the turn at the first report after [`TURN_SLICE`], and waits for the next one.
 struct TurnTaker {
     task: Arc<Task>,
     runtime: Handle,
@@ -313,7 +313,9 @@ impl Observer for TurnTaker {
         let task = &self.task;
         {
             let mut state = task.state();
-            if state.passed().is_some_and(|passed| passed <= SLICE) || task.cancel.is_cancelled() {
+            if state.passed().is_some_and(|passed| passed <= TURN_SLICE)
+                || task.cancel.is_cancelled()
+            {
                 return;
             }
             task.count(&mut state);
@@ -441,7 +443,7 @@ impl Admission {
         loop {
             tokio::select! {
                 admitted = &mut admitted => return admitted.map_err(ServiceError::internal),
-                () = tokio::time::sleep(PATIENCE) => self.displace(),
+                () = tokio::time::sleep(ADMISSION_PATIENCE) => self.displace(),
             }
         }
     }
@@ -451,7 +453,7 @@ impl Admission {
         let mut queue = self.queue();
         if queue
             .displaced
-            .is_some_and(|last| last.elapsed() < PATIENCE)
+            .is_some_and(|last| last.elapsed() < ADMISSION_PATIENCE)
         {
             return;
         }
@@ -462,7 +464,7 @@ impl Admission {
         };
         let going = running.iter().filter(|task| !task.cancel.is_cancelled());
         let costliest = going.max_by(|a, b| used(a).total_cmp(&used(b)));
-        if let Some(task) = costliest.filter(|task| used(task) * f64::from(SHARE) >= 1.0) {
+        if let Some(task) = costliest.filter(|task| used(task) * f64::from(COSTLY_SHARE) >= 1.0) {
             queue.displaced = Some(Instant::now());
             task.state().displaced = true;
             task.stop();

@@ -15,7 +15,7 @@ use tokio::sync::oneshot;
 const HALF_LIFE: Duration = Duration::from_secs(10);
 
 /// What is not remembered, seconds.
-const NEGLIGIBLE: f64 = 1e-3;
+const NEGLIGIBLE_S: f64 = 1e-3;
 
 /// The places, and who waits for one.
 pub struct Turns {
@@ -75,7 +75,7 @@ impl Turns {
     pub fn count(&self, client: ClientAddress, time: Duration) {
         let now = Instant::now();
         let mut state = self.state();
-        state.used.retain(|_, used| used.now(now) > NEGLIGIBLE);
+        state.used.retain(|_, used| used.now(now) > NEGLIGIBLE_S);
         let before = state.used.get(&client).map_or(0.0, |used| used.now(now));
         let seconds = before + time.as_secs_f64();
         state.used.insert(client, Used { seconds, at: now });

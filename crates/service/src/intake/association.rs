@@ -35,7 +35,7 @@ pub const REQUEST_WAIT: Duration = Duration::from_secs(10);
 /// Longest time for the last PDU to be sent.
 const LAST_WRITE: Duration = Duration::from_secs(5);
 /// Shortest P-DATA-TF PDU in which a response is sent, whatever the caller says.
-const SHORTEST: usize = 64;
+const SHORTEST_REQUEST_BYTES: usize = 64;
 /// Bytes of a P-DATA-TF PDU beside the value.
 const VALUE_HEADER: usize = 6;
 
@@ -222,7 +222,9 @@ where
         service,
         wire,
         contexts,
-        portion: theirs.map_or(usize::MAX, |length| length.max(SHORTEST) - VALUE_HEADER),
+        portion: theirs.map_or(usize::MAX, |length| {
+            length.max(SHORTEST_REQUEST_BYTES) - VALUE_HEADER
+        }),
         session: service.sessions.begin(),
         origin,
         command: (0, Vec::new()),

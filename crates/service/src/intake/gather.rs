@@ -28,16 +28,16 @@ use tokio_util::sync::CancellationToken;
 const AT_ONCE: usize = 8;
 const AT_ONCE_OF_SENDER: usize = 2;
 /// Pause before a group is looked at again that changed while it was made.
-const AGAIN: Duration = Duration::from_secs(1);
+const CHANGED_PAUSE: Duration = Duration::from_secs(1);
 /// Pause after a failure that may pass.
-const RETRY: Duration = Duration::from_secs(10);
+const RETRY_PAUSE: Duration = Duration::from_secs(10);
 /// How often a process looks for groups that others have left, and how long these are late then.
 const ADOPT_EVERY: Duration = Duration::from_secs(10);
-const LATE: Duration = Duration::from_secs(30);
+const LATE_AFTER: Duration = Duration::from_secs(30);
 /// Time between two sweeps.
 const SWEEP_EVERY: Duration = Duration::from_secs(600);
 /// A file without a row that was written this long ago will not get one.
-const ABANDONED: Duration = Duration::from_secs(3600);
+const ABANDONED_AFTER: Duration = Duration::from_secs(3600);
 
 /// Why a step could not be done.
 #[derive(Debug)]
@@ -204,7 +204,7 @@ impl Gatherer {
     async fn adopt(&self) -> StoreResult<()> {
         let files = self.store.releasable().await?;
         self.release(&files).await?;
-        let late = self.sessions.patience() + LATE;
+        let late = self.sessions.patience() + LATE_AFTER;
         let late = Timestamp::try_from(late.as_millis()).unwrap_or(Timestamp::MAX);
         let before = self.queue.now().saturating_sub(late);
         for group in self.store.unfinished().await? {
@@ -220,7 +220,7 @@ impl Gatherer {
             && let Err(error) = self.resume().await
         {
             tracing::error!(%error, "what was received before the start could not be listed");
-            tokio::time::sleep(RETRY).await;
+            tokio::time::sleep(RETRY_PAUSE).await;
         }
         let mut turns = Turns::default();
         let mut making = FuturesUnordered::new();
@@ -229,7 +229,7 @@ impl Gatherer {
                 making.push(async move {
                     if let Err(error) = self.advance(&group).await {
                         tracing::warn!(group, error, "a received series waits: {error}");
-                        self.sessions.retry(&group, RETRY);
+                        self.sessions.retry(&group, RETRY_PAUSE);
                     }
                     (sender, group)
                 });
@@ -238,14 +238,14 @@ impl Gatherer {
                 Some((_, group)) = making.next() => turns.end(&group),
                 group = self.sessions.next() => match turns.knows(&group) {
                     // Two at a time would file two volumes; one that still waits is made as it is then.
-                    Some(true) => self.sessions.retry(&group, AGAIN),
+                    Some(true) => self.sessions.retry(&group, CHANGED_PAUSE),
                     Some(false) => {}
                     None => match self.store.group(&group).await {
                         Ok(Some(found)) => turns.wait(sender_of(&found.origin), group),
                         Ok(None) => {}
                         Err(error) => {
                             tracing::warn!(group, %error, "a received series waits: {error}");
-                            self.sessions.retry(&group, RETRY);
+                            self.sessions.retry(&group, RETRY_PAUSE);
                         }
                     },
                 },
@@ -411,7 +411,7 @@ impl Gatherer {
             }
         }
         // Listed before the rows are: a file that gets its row meanwhile is among the rows.
-        let kept = self.files.kept(ABANDONED).await?;
+        let kept = self.files.kept(ABANDONED_AFTER).await?;
         let known = self.store.files().await?;
         for name in kept.iter().filter(|name| !known.contains(*name)) {
             self.files.quarantine(name, now).await?;

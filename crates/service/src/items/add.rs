@@ -16,7 +16,7 @@ use tokio::io::AsyncWriteExt;
 use ventriform::text::is_printable;
 
 /// How often an item is added anew that other processes erase at the same time.
-const ROUNDS: u32 = 3;
+const PUBLISH_ROUNDS: u32 = 3;
 
 impl Items {
     /// Adds an uploaded volume durably, with what its file says of the scan. Returns the record, and
@@ -38,7 +38,7 @@ impl Items {
             items.locks.unsettle(&volume.id);
             let record = ItemRecord::Volume(volume.clone());
             let mut files = Some(files);
-            let mut again = ROUNDS;
+            let mut again = PUBLISH_ROUNDS;
             let new = loop {
                 volume.files = items
                     .publish_unless_intact(record.clone(), &mut files)
@@ -141,7 +141,7 @@ impl Items {
         to_its_end(async move {
             let _lock = items.locks.lock(&product.id).await;
             items.locks.unsettle(&product.id);
-            let mut again = ROUNDS;
+            let mut again = PUBLISH_ROUNDS;
             let added = loop {
                 let unused = items.write_files(&mut product, &output).await?;
                 let added = items

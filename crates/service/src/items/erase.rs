@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 const BY_RETENTION: &str = "retention";
 
 /// Items beyond their age that are read at a time.
-const PAGE: u32 = 500;
+const PAGE_ITEMS: u32 = 500;
 
 /// Longest time that an erasure waits for pins of other processes, and the time between two looks. They unpin an item
 /// a moment after they have answered.
@@ -260,9 +260,9 @@ impl ExpiredPages {
             return Ok(None);
         }
         let page = catalogue
-            .expired(self.kind, self.before, self.last.as_ref(), PAGE)
+            .expired(self.kind, self.before, self.last.as_ref(), PAGE_ITEMS)
             .await?;
-        self.ended = page.len() < PAGE as usize;
+        self.ended = page.len() < PAGE_ITEMS as usize;
         self.last = page.last().cloned();
         Ok(Some(page))
     }

@@ -25,9 +25,9 @@ use tokio_util::sync::CancellationToken;
 /// Time between two sweeps.
 const SWEEP_EVERY: Duration = Duration::from_secs(3600);
 /// Items looked up at a time.
-const BATCH: usize = 500;
+const BATCH_ITEMS: usize = 500;
 /// Pause between two batches, for other users of disk and database.
-const PAUSE: Duration = Duration::from_millis(5);
+const BATCH_PAUSE: Duration = Duration::from_millis(5);
 /// Shortest time between the starts of two scrubs.
 const SCRUB_EVERY: Duration = Duration::from_secs(86_400);
 /// Hexadecimal digits of a whole SHA-256.
@@ -86,7 +86,7 @@ impl Custodian {
         }
         let mut swept = Swept::default();
         for kind in Resource::WITH_FILES {
-            for batch in items.blobs.ids(kind).await?.chunks(BATCH) {
+            for batch in items.blobs.ids(kind).await?.chunks(BATCH_ITEMS) {
                 let ids: Vec<String> = batch.iter().map(|item| item.id.clone()).collect();
                 let known = items.catalogue.known(&ids).await?;
                 for item in batch {
@@ -96,7 +96,7 @@ impl Custodian {
                         self.prune(&item.id).await?;
                     }
                 }
-                tokio::time::sleep(PAUSE).await;
+                tokio::time::sleep(BATCH_PAUSE).await;
             }
         }
         let age = self.quarantine_keep.map(|age| age.as_millis());
@@ -193,7 +193,7 @@ impl Custodian {
                 other => other?,
             };
             let seconds = file.bytes as f64 / self.scrub_rate as f64;
-            tokio::time::sleep(PAUSE + Duration::from_secs_f64(seconds)).await;
+            tokio::time::sleep(BATCH_PAUSE + Duration::from_secs_f64(seconds)).await;
             if !file.sha256.starts_with(&expected.sha256) {
                 let how = format!("{id}/{}: its SHA-256 is another", file.name);
                 return self

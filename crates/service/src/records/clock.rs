@@ -36,7 +36,7 @@ impl Clock for SystemClock {
 }
 
 /// Three digits of a second, zeros included: texts of equal length sort as the times do.
-const MILLISECONDS: EncodedConfig = Config::DEFAULT
+const RFC3339_MILLISECONDS: EncodedConfig = Config::DEFAULT
     .set_time_precision(TimePrecision::Second {
         decimal_digits: NonZero::new(3),
     })
@@ -47,7 +47,7 @@ const MILLISECONDS: EncodedConfig = Config::DEFAULT
 pub fn rfc3339(at: Timestamp) -> String {
     OffsetDateTime::from_unix_timestamp_nanos(i128::from(at) * 1_000_000)
         .ok()
-        .and_then(|time| time.format(&Iso8601::<MILLISECONDS>).ok())
+        .and_then(|time| time.format(&Iso8601::<RFC3339_MILLISECONDS>).ok())
         .unwrap_or_default()
 }
 
@@ -58,7 +58,7 @@ pub fn parse_rfc3339(text: &str) -> Option<Timestamp> {
 }
 
 /// Greatest correction that is followed at once.
-const STEP: i64 = 2_000;
+const CLOCK_STEP_MS: i64 = 2_000;
 
 /// How long a step of the system's clock must last until it is followed.
 pub const SETTLING: Duration = Duration::from_secs(600);
@@ -112,13 +112,13 @@ impl Course {
     fn now(&mut self, wall: Timestamp, monotonic: i64) -> Timestamp {
         let shown = wall - monotonic;
         let settling = SETTLING.as_millis() as i64;
-        if (shown - self.offset).abs() <= STEP {
+        if (shown - self.offset).abs() <= CLOCK_STEP_MS {
             (self.offset, self.doubt) = (shown, None);
             self.last = self.last.max(wall);
             return self.last;
         }
         match self.doubt {
-            Some((offset, since)) if (shown - offset).abs() <= STEP => {
+            Some((offset, since)) if (shown - offset).abs() <= CLOCK_STEP_MS => {
                 if monotonic - since >= settling {
                     tracing::warn!(
                         milliseconds = shown - self.offset,
@@ -139,16 +139,28 @@ impl Course {
 mod tests {
     use super::*;
 
-    const HOUR: i64 = 3_600_000;
-    const START: i64 = 1_000 * HOUR;
+    const HOUR_MS: i64 = 3_600_000;
+    const START_MS: i64 = 1_000 * HOUR_MS;
 
     fn course() -> Course {
-        Course::new(START, 0)
+        Course::new(START_MS, 0)
     }
 
     #[test]
     fn texts_of_times_sort_as_the_times_do_and_read_back() {
-        let times = [0, 1, 10, 99, 100, 120, 123, 999, 1_000, START, START + 5];
+        let times = [
+            0,
+            1,
+            10,
+            99,
+            100,
+            120,
+            123,
+            999,
+            1_000,
+            START_MS,
+            START_MS + 5,
+        ];
         let texts = times.map(rfc3339);
         assert!(texts.is_sorted(), "{texts:?}");
         assert_eq!(texts[5], "1970-01-01T00:00:00.120Z");
@@ -158,26 +170,26 @@ mod tests {
 
     #[test]
     fn a_step_that_does_not_last_changes_nothing() {
-        for step in [-500 * HOUR, 9 * HOUR, 100_000 * HOUR] {
+        for step in [-500 * HOUR_MS, 9 * HOUR_MS, 100_000 * HOUR_MS] {
             let mut course = course();
             for minute in 0..30 {
                 let monotonic = minute * 60_000;
                 let stepped = (5..14).contains(&minute);
-                let wall = START + monotonic + if stepped { step } else { 0 };
-                assert_eq!(course.now(wall, monotonic), START + monotonic);
+                let wall = START_MS + monotonic + if stepped { step } else { 0 };
+                assert_eq!(course.now(wall, monotonic), START_MS + monotonic);
             }
         }
     }
 
     #[test]
     fn a_step_that_lasts_is_followed() {
-        for step in [-500 * HOUR, 9 * HOUR] {
+        for step in [-500 * HOUR_MS, 9 * HOUR_MS] {
             let mut course = course();
             for minute in 1..=30 {
                 let monotonic = minute * 60_000;
-                let now = course.now(START + monotonic + step, monotonic);
+                let now = course.now(START_MS + monotonic + step, monotonic);
                 let followed = if minute > 10 { step } else { 0 };
-                assert_eq!(now, START + monotonic + followed, "minute {minute}");
+                assert_eq!(now, START_MS + monotonic + followed, "minute {minute}");
             }
         }
     }
@@ -185,8 +197,8 @@ mod tests {
     #[test]
     fn small_corrections_are_followed_and_never_go_back() {
         let mut course = course();
-        assert_eq!(course.now(START + 1_500, 1_000), START + 1_500);
-        assert_eq!(course.now(START + 1_000, 1_100), START + 1_500);
-        assert_eq!(course.now(START + 2_000, 2_100), START + 2_000);
+        assert_eq!(course.now(START_MS + 1_500, 1_000), START_MS + 1_500);
+        assert_eq!(course.now(START_MS + 1_000, 1_100), START_MS + 1_500);
+        assert_eq!(course.now(START_MS + 2_000, 2_100), START_MS + 2_000);
     }
 }

@@ -6,10 +6,10 @@ use std::fmt;
 use std::str::FromStr;
 
 /// Longest name of a tenant, characters.
-const LONGEST: usize = 64;
+const NAME_LENGTH: usize = 64;
 
 /// The tenant of everything that is stored without naming one.
-const DEFAULT: &str = "default";
+const DEFAULT_NAME: &str = "default";
 
 /// A tenant's name: 1 to 64 characters of `a-z`, `0-9`, `-` and `_`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -18,7 +18,7 @@ pub struct Tenant(String);
 
 /// A text is not a tenant's name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("a tenant's name has 1 to {LONGEST} characters of a-z, 0-9, - and _")]
+#[error("a tenant's name has 1 to {NAME_LENGTH} characters of a-z, 0-9, - and _")]
 pub struct InvalidTenant;
 
 impl Tenant {
@@ -30,7 +30,7 @@ impl Tenant {
 
 impl Default for Tenant {
     fn default() -> Self {
-        Self(DEFAULT.to_owned())
+        Self(DEFAULT_NAME.to_owned())
     }
 }
 
@@ -39,7 +39,7 @@ impl TryFrom<String> for Tenant {
 
     fn try_from(name: String) -> Result<Self, InvalidTenant> {
         let allowed = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b"-_".contains(&b);
-        match (1..=LONGEST).contains(&name.len()) && name.bytes().all(allowed) {
+        match (1..=NAME_LENGTH).contains(&name.len()) && name.bytes().all(allowed) {
             true => Ok(Self(name)),
             false => Err(InvalidTenant),
         }
@@ -73,11 +73,11 @@ mod tests {
     #[test]
     fn only_short_names_of_plain_characters_are_tenants() {
         assert_eq!(Tenant::default(), "default".parse().unwrap());
-        let longest = "a".repeat(LONGEST);
+        let longest = "a".repeat(NAME_LENGTH);
         for name in ["a", "clinic-2_b", longest.as_str()] {
             assert_eq!(name.parse::<Tenant>().unwrap().as_str(), name);
         }
-        let too_long = "a".repeat(LONGEST + 1);
+        let too_long = "a".repeat(NAME_LENGTH + 1);
         for name in ["", "A", "a b", "a/b", "ä", "a\n", too_long.as_str()] {
             assert_eq!(name.parse::<Tenant>(), Err(InvalidTenant), "{name:?}");
         }

@@ -12,7 +12,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// The stage in which a result is stored.
-const COMMIT: &str = "commit";
+const COMMIT_STAGE: &str = "commit";
 
 /// Follows jobs.
 pub struct JobWatch {
@@ -116,7 +116,10 @@ impl JobObserver for JobWatch {
             _ => None,
         };
         let mut run = run.unwrap_or_else(|| self.start(job));
-        let committing = run.stage.as_ref().is_some_and(|(stage, _)| stage == COMMIT);
+        let committing = run
+            .stage
+            .as_ref()
+            .is_some_and(|(stage, _)| stage == COMMIT_STAGE);
         if !committing {
             self.enter(&job.kind, &mut run, job.stage.as_deref());
         }
@@ -126,7 +129,7 @@ impl JobObserver for JobWatch {
     fn computed(&self, job: &Job) {
         let mut runs = self.runs();
         if let Some(run) = runs.get_mut(&job.id) {
-            self.enter(&job.kind, run, Some(COMMIT));
+            self.enter(&job.kind, run, Some(COMMIT_STAGE));
         }
     }
 }

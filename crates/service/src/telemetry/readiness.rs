@@ -74,7 +74,7 @@ async fn check_all(queue: &Queue) -> Vec<Check> {
     vec![
         check("database", true, database.err()),
         check("files", true, files.err().filter(|_| !full)),
-        check("disk", true, full.then_some(FULL)),
+        check("disk", true, full.then_some(DISK_FULL)),
         check(
             "workers",
             false,
@@ -101,11 +101,11 @@ async fn limited<T>(
     }
 }
 
-const FULL: &str = "The disk is full, or nearly so.";
+const DISK_FULL: &str = "The disk is full, or nearly so.";
 
 fn fault_of(error: &StoreError) -> &'static str {
     match (error.cause(), error) {
-        (StoreFault::Full, _) => FULL,
+        (StoreFault::Full, _) => DISK_FULL,
         (StoreFault::Busy, _) => {
             "The database was not free in time: the machine is overloaded, or another program holds it."
         }

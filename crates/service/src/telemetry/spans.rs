@@ -33,7 +33,7 @@ const SEND_LIMIT: Duration = Duration::from_secs(5);
 const ANSWER_BYTES: usize = 64 << 10;
 
 /// The path of traces below a collector's address (OTLP over HTTP).
-const TRACES: &str = "/v1/traces";
+const TRACES_PATH: &str = "/v1/traces";
 
 /// Makes spans, if a collector is set.
 #[derive(Clone, Default)]
@@ -218,9 +218,9 @@ impl JobSpan {
 
 fn traces_url(endpoint: &str) -> String {
     let base = endpoint.trim_end_matches('/');
-    match base.ends_with(TRACES) {
+    match base.ends_with(TRACES_PATH) {
         true => base.to_owned(),
-        false => format!("{base}{TRACES}"),
+        false => format!("{base}{TRACES_PATH}"),
     }
 }
 

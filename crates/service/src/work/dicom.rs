@@ -32,9 +32,15 @@ use ventriform::volume::dicom::Provenance;
 use ventriform::volume::{self, AffineSource, ReadLimits, ReadOptions, VolumeFile};
 
 /// The files of a result of which objects are made.
-pub const FILES: &[&str] = &[MASK, "mesh.json", "report.json", "slices.png", "polar.png"];
+pub const FILES: &[&str] = &[
+    MASK_FILE,
+    "mesh.json",
+    "report.json",
+    "slices.png",
+    "polar.png",
+];
 
-const MASK: &str = "mask.nii.gz";
+const MASK_FILE: &str = "mask.nii.gz";
 
 /// The objects that are made of results of that kind. Of a segmentation without polar map there is
 /// no [`DicomObject::Polar`].
@@ -237,7 +243,7 @@ fn mesh(item: &StoredItem) -> Result<TriMesh, Failure> {
 }
 
 fn stored_mask(item: &StoredItem, limits: &ReadLimits) -> Result<Mask, Failure> {
-    let file = VolumeFile::in_memory(MASK, required(item, MASK)?);
+    let file = VolumeFile::in_memory(MASK_FILE, required(item, MASK_FILE)?);
     let reading = volume::read(&[file], &ReadOptions::default(), limits, &Monitor::silent());
     let volume = reading.map_err(|error| error.explain())?.volume;
     Ok(Mask {

@@ -29,7 +29,7 @@ use ventriform::volume::given_mask::GivenMaskError;
 const START_AGAIN: &str = "Start again if the result is still needed.";
 
 /// Code of a cancelled operation.
-const CANCELLED: (Fault, &str) = (Fault::Request, "cancelled");
+const CANCELLED_FAILURE: (Fault, &str) = (Fault::Request, "cancelled");
 
 /// An error that can be explained to a client.
 pub trait Explain: Error {
@@ -96,7 +96,7 @@ impl Explain for VolumeError {
             VolumeError::Corrupt { .. } => (Fault::Content, "corrupt-volume"),
             VolumeError::Field { .. } => (Fault::Content, "invalid-header"),
             VolumeError::Io { .. } | VolumeError::Memory { .. } => (Fault::Service, "unreadable"),
-            VolumeError::Cancelled(_) => CANCELLED,
+            VolumeError::Cancelled(_) => CANCELLED_FAILURE,
             _ => (Fault::Content, "unusable-volume"),
         };
         failure(kind, self, self.field(), volume_advice(self))
@@ -111,7 +111,7 @@ impl Explain for SurfaceError {
     fn explain(&self) -> Failure {
         let kind = match self {
             SurfaceError::NoSurface { .. } => (Fault::Content, "no-surface"),
-            SurfaceError::Cancelled(_) => CANCELLED,
+            SurfaceError::Cancelled(_) => CANCELLED_FAILURE,
             _ => (Fault::Content, "unusable-surface"),
         };
         failure(kind, self, self.field(), surface_advice(self))
@@ -125,7 +125,7 @@ impl Explain for SurfaceError {
 impl Explain for RetileError {
     fn explain(&self) -> Failure {
         match self {
-            RetileError::Cancelled(_) => failure(CANCELLED, self, None, START_AGAIN.into()),
+            RetileError::Cancelled(_) => failure(CANCELLED_FAILURE, self, None, START_AGAIN.into()),
             _ => failure(
                 (Fault::Request, "unsuitable-points"),
                 self,
@@ -147,7 +147,7 @@ impl Explain for PipelineError {
             PipelineError::Surface(error) => return error.explain(),
             PipelineError::Retile(error) => return error.explain(),
             PipelineError::Cancelled(_) => {
-                return failure(CANCELLED, self, None, START_AGAIN.into());
+                return failure(CANCELLED_FAILURE, self, None, START_AGAIN.into());
             }
             PipelineError::Optimise(_) => "not-optimised",
             PipelineError::Unsound { .. } => "unsound-model",
@@ -219,7 +219,7 @@ impl Explain for SegmentationError {
                 return if named { failure } else { failure.at("expert") };
             }
             SegmentationError::Cancelled(_) => {
-                return failure(CANCELLED, self, None, START_AGAIN.into());
+                return failure(CANCELLED_FAILURE, self, None, START_AGAIN.into());
             }
         };
         failure(code, self, Some(field), advice)
@@ -277,7 +277,7 @@ impl Explain for GivenMaskError {
                  by `mesh_frame` (lps or ras)."
                     .into(),
             ),
-            GivenMaskError::Cancelled(_) => (CANCELLED, None, START_AGAIN.into()),
+            GivenMaskError::Cancelled(_) => (CANCELLED_FAILURE, None, START_AGAIN.into()),
         };
         failure(kind, self, field, advice)
     }
@@ -306,7 +306,7 @@ impl Explain for LocateError {
                 None,
                 "Check that this is the right file and, for a 4-D one, the right `frame`.",
             ),
-            LocateError::Cancelled(_) => (CANCELLED, None, START_AGAIN),
+            LocateError::Cancelled(_) => (CANCELLED_FAILURE, None, START_AGAIN),
         };
         failure(kind, self, field, advice.into())
     }
@@ -321,7 +321,7 @@ impl Explain for DeformError {
         let (field, advice) = match self {
             DeformError::Localise(error) => return error.explain(),
             DeformError::Cancelled(_) => {
-                return failure(CANCELLED, self, None, START_AGAIN.into());
+                return failure(CANCELLED_FAILURE, self, None, START_AGAIN.into());
             }
             DeformError::TooManyNodes { limit, .. } => (
                 Some("model"),

@@ -1,7 +1,7 @@
 //! From a reader's profile as it was uploaded to one that is stored.
 
 use super::problems::Explain;
-use super::segmentation::PROFILE;
+use super::segmentation::PROFILE_FILE;
 use crate::items::{OutputFile, WorkOutput};
 use crate::records::Failure;
 use serde_json::json;
@@ -33,7 +33,7 @@ pub(super) fn make(text: &[u8]) -> Result<WorkOutput, Failure> {
             .into_iter()
             .collect(),
         files: vec![OutputFile {
-            name: PROFILE.into(),
+            name: PROFILE_FILE.into(),
             media_type: "application/json".into(),
             bytes: profile.to_json().into_bytes(),
         }],

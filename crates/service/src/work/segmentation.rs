@@ -21,9 +21,9 @@ use ventriform::segmentation::{
 use ventriform::volume::ReadLimits;
 
 /// The file of a reader's profile.
-pub(super) const PROFILE: &str = "profile.json";
+pub(super) const PROFILE_FILE: &str = "profile.json";
 /// The file of a model that is fitted.
-const MESH: &str = "mesh.json";
+const MESH_FILE: &str = "mesh.json";
 
 /// Fits models to volumes.
 #[derive(Debug, Clone, Copy)]
@@ -45,7 +45,7 @@ impl Work for SegmentationWork {
         Needs {
             library: !models.iter().any(|(field, _)| field == "model"),
             items: models.into_iter().chain(expert).chain(reader).collect(),
-            files: &[MESH, PROFILE],
+            files: &[MESH_FILE, PROFILE_FILE],
         }
     }
 
@@ -142,7 +142,7 @@ fn reader(input: &WorkInput) -> Result<Option<NamedReader>, WorkError> {
         return Ok(None);
     };
     let name = name_of(item);
-    let bytes = item.read(PROFILE).map_err(|e| unreadable_model(&e))?;
+    let bytes = item.read(PROFILE_FILE).map_err(|e| unreadable_model(&e))?;
     let bytes = bytes.ok_or_else(|| profile_missing(&item.id))?;
     let profile = ReaderProfile::from_json(&bytes).map_err(|error| work_error(&error))?;
     Ok(Some(NamedReader { name, profile }))
@@ -160,7 +160,7 @@ fn name_of(item: &StoredItem) -> String {
 /// does not exist.
 fn mesh(item: &StoredItem, required: bool) -> Result<Option<NamedMesh>, WorkError> {
     let name = name_of(item);
-    let Some(bytes) = item.read(MESH).map_err(|e| unreadable_model(&e))? else {
+    let Some(bytes) = item.read(MESH_FILE).map_err(|e| unreadable_model(&e))? else {
         return Ok(None);
     };
     match read_json::decode(&bytes) {

@@ -13,7 +13,7 @@ use std::path::Path;
 use ventriform_service::records::{ItemRecord, RecordPages, Resource};
 
 /// Items that are sent to a bucket at the same time.
-const PARALLEL: usize = 8;
+const PARALLEL_COPIES: usize = 8;
 
 /// What was found on the way.
 struct Copying<'a> {
@@ -79,7 +79,7 @@ pub(super) async fn to_bucket(
             let copied = bucket.take_in(&record, &from).await?;
             Ok::<_, MigrateError>((record, copied))
         });
-        let mut sent = stream::iter(sent).buffer_unordered(PARALLEL);
+        let mut sent = stream::iter(sent).buffer_unordered(PARALLEL_COPIES);
         while let Some((record, copied)) = sent.try_next().await? {
             copying.note(record.id(), copied, tell);
         }

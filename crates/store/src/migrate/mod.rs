@@ -20,8 +20,8 @@ use super::content;
 use super::database::SqlStore;
 use super::s3::{S3Blobs, S3Location};
 use super::{
-    DATABASE, DiskGauge, FolderLock, MARKER, MIGRATION, OpenError, StoreSettings, UNFINISHED,
-    blobs, name_of, note_place, unusable,
+    DATABASE_FILE, DiskGauge, FolderLock, MARKER_FILE, MIGRATION_MARK, OpenError, StoreSettings,
+    UNFINISHED_MIGRATION_FILE, blobs, name_of, note_place, unusable,
 };
 use source::Source;
 use std::fs;
@@ -166,7 +166,7 @@ pub async fn migrate(
     to.check()?;
     let source = Source::open(from).await?;
     let moved = Move {
-        note: format!("{MIGRATION}{}", from.canonicalize()?.display()),
+        note: format!("{MIGRATION_MARK}{}", from.canonicalize()?.display()),
         source: &source,
         to,
     };
@@ -218,10 +218,12 @@ impl Move<'_> {
     async fn noted(&self, target: Option<&SqlStore>) -> Result<Option<String>, MigrateError> {
         match (target, &self.to.folder) {
             (Some(target), _) => Ok(target.place().await?),
-            (None, Some(folder)) => match fs::read_to_string(folder.join(UNFINISHED)) {
-                Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
-                read => Ok(Some(read?)),
-            },
+            (None, Some(folder)) => {
+                match fs::read_to_string(folder.join(UNFINISHED_MIGRATION_FILE)) {
+                    Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+                    read => Ok(Some(read?)),
+                }
+            }
             (None, None) => Ok(None),
         }
     }
@@ -281,7 +283,7 @@ impl Move<'_> {
                 ..Migrated::default()
             });
         }
-        Err(self.occupied(&match place.starts_with(MIGRATION) {
+        Err(self.occupied(&match place.starts_with(MIGRATION_MARK) {
             true => format!("an unfinished {place}"),
             false => format!("the records of files in {place}"),
         }))
@@ -291,7 +293,7 @@ impl Move<'_> {
     fn final_place(&self) -> Result<String, MigrateError> {
         match (&self.to.s3, &self.to.folder) {
             (Some(bucket), _) => Ok(bucket.to_string()),
-            (None, Some(folder)) => name_of(&folder.join(MARKER))
+            (None, Some(folder)) => name_of(&folder.join(MARKER_FILE))
                 .ok_or_else(|| io::Error::from(ErrorKind::NotFound).into()),
             (None, None) => Ok(String::new()),
         }
@@ -302,7 +304,7 @@ impl Move<'_> {
         let Some(folder) = &self.to.folder else {
             return Ok(());
         };
-        let noted = folder.join(UNFINISHED);
+        let noted = folder.join(UNFINISHED_MIGRATION_FILE);
         match fs::read_to_string(&noted) {
             Ok(text) if text == self.note => return Ok(()),
             Ok(other) => return Err(self.occupied(&format!("an unfinished {other}"))),
@@ -317,7 +319,7 @@ impl Move<'_> {
         }
         if let Some(server) = &self.to.database {
             let text = format!("{}\n{}\n", server.url, random_id("folder "));
-            write(&folder.join(MARKER), &text)?;
+            write(&folder.join(MARKER_FILE), &text)?;
         }
         Ok(write(&noted, &self.note)?)
     }
@@ -340,7 +342,7 @@ impl Move<'_> {
         };
         note_place(folder, bucket)?;
         self.source.rows.close().await;
-        let draft = folder.join(format!("{DATABASE}.new"));
+        let draft = folder.join(format!("{DATABASE_FILE}.new"));
         fs::copy(self.source.snapshot(), &draft)?;
         blobs::sync(&draft)?;
         let (read, written) = (
@@ -350,7 +352,7 @@ impl Move<'_> {
         if content::hash(&read)? != content::hash(&written)? {
             return Err(MigrateError::Differs("all".into()));
         }
-        fs::rename(&draft, folder.join(DATABASE))?;
+        fs::rename(&draft, folder.join(DATABASE_FILE))?;
         Ok(blobs::sync(folder)?)
     }
 
@@ -359,7 +361,7 @@ impl Move<'_> {
         let Some(folder) = &self.to.folder else {
             return Ok(());
         };
-        match fs::remove_file(folder.join(UNFINISHED)) {
+        match fs::remove_file(folder.join(UNFINISHED_MIGRATION_FILE)) {
             Err(error) if error.kind() != ErrorKind::NotFound => Err(error.into()),
             _ => Ok(blobs::sync(folder)?),
         }

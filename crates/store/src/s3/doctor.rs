@@ -18,7 +18,7 @@ use ventriform_service::records::{
 };
 
 /// Rows read at a time.
-const PAGE: u32 = 200;
+const PAGE_ROWS: u32 = 200;
 
 /// What a bucket is checked against.
 pub(crate) struct BucketDoctor<'a> {
@@ -52,7 +52,7 @@ impl BucketDoctor<'_> {
     /// Checks the files of every row. Returns the places that rows name, by item.
     async fn rows(&mut self) -> StoreResult<BTreeMap<String, BTreeSet<String>>> {
         let mut known = BTreeMap::new();
-        let mut pages = RecordPages::new(self.rows, PAGE);
+        let mut pages = RecordPages::new(self.rows, PAGE_ROWS);
         while let Some(page) = pages.next().await? {
             for record in page {
                 let id = record.id();

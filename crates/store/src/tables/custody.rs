@@ -9,7 +9,7 @@ use std::sync::atomic::Ordering;
 use ventriform_service::records::{Custody, ItemRecord, Resource, StoreResult};
 
 /// Defects named at most.
-const DEFECTS: &str = "PRAGMA quick_check(20)";
+const QUICK_CHECK: &str = "PRAGMA quick_check(20)";
 
 #[async_trait]
 impl Custody for SqlStore {
@@ -101,7 +101,7 @@ impl Custody for SqlStore {
         if self.on_server() {
             return Ok(Vec::new());
         }
-        let found = query(DEFECTS).fetch_all(&self.readers).await?;
+        let found = query(QUICK_CHECK).fetch_all(&self.readers).await?;
         let lines: Vec<String> = rows::all(found, |row| row.try_get(0))?;
         let defects: Vec<String> = lines.into_iter().filter(|line| line != "ok").collect();
         self.damaged.store(!defects.is_empty(), Ordering::Relaxed);

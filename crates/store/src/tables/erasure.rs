@@ -18,7 +18,7 @@ use ventriform_service::records::{
 };
 
 /// The prefix of the ids of receipts.
-const PREFIX: &str = "ers_";
+const RECEIPT_PREFIX: &str = "ers_";
 
 /// What was made of a volume.
 pub(super) async fn made_of(
@@ -78,7 +78,7 @@ pub(super) async fn erase(
     };
     let recorded = append(to, &[event.on(&order.id)]).await?;
     let receipt = Receipt {
-        id: random_id(PREFIX),
+        id: random_id(RECEIPT_PREFIX),
         tenant: tenant.clone(),
         item: order.id.clone(),
         erased_at: now,

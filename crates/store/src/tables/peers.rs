@@ -13,7 +13,7 @@ use ventriform_service::records::{NewsFeed, Peers, StoreResult};
 
 /// How long is remembered which places of files were given up: longer than any process may stand still
 /// between writing files and their row.
-const REMEMBERED: Duration = Duration::from_secs(7 * 86_400);
+const DEAD_PEER_TTL: Duration = Duration::from_secs(7 * 86_400);
 
 fn milliseconds(length: Duration) -> i64 {
     i64::try_from(length.as_millis()).unwrap_or(i64::MAX / 2)
@@ -129,7 +129,7 @@ impl Peers for PgPeers {
             .execute(&mut transaction)
             .await?;
         query("DELETE FROM given_up_places WHERE given_up_at < database_now() - $1")
-            .bind(milliseconds(REMEMBERED))
+            .bind(milliseconds(DEAD_PEER_TTL))
             .execute(&mut transaction)
             .await?;
         transaction.commit().await
