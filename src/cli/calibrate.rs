@@ -58,7 +58,7 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
     Ok(())
 }
 
-/// What is printed of each case: the name, the figure and its decimals.
+/// Columns of the table of cases: the name, the figure and its decimals.
 type Column = (&'static str, fn(&CaseFigures) -> f64, usize);
 
 const TABLE_COLUMNS: [Column; 4] = [
@@ -112,7 +112,7 @@ fn table(made: &Calibration) -> String {
     text
 }
 
-/// What the profile changes, as a line.
+/// The changes by the profile, as a line.
 pub(super) fn gain(made: &Calibration, sample: Sample) -> String {
     let Some(gain) = made.gain(sample) else {
         return format!("E_J, {}: there is one mask only\n", sample.as_str());

@@ -71,9 +71,10 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
     let s3 = s3_location(&settings);
     let found = ventriform_store::examine(&args.data_dir, s3.as_ref(), heirs);
     let found = Runtime::new()?.block_on(found)?;
-    match args.json {
-        true => json(&serde_json::to_string_pretty(&found)?),
-        false => print(&found),
+    if args.json {
+        json(&serde_json::to_string_pretty(&found)?)
+    } else {
+        print(&found)
     }
     if found.is_healthy() {
         return Ok(());

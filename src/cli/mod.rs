@@ -123,9 +123,10 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             note!("error: {error:#}");
-            match error.is::<UnusableArgument>() {
-                true => ExitCode::from(USAGE_STATUS),
-                false => ExitCode::FAILURE,
+            if error.is::<UnusableArgument>() {
+                ExitCode::from(USAGE_STATUS)
+            } else {
+                ExitCode::FAILURE
             }
         }
     }

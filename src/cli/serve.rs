@@ -209,9 +209,10 @@ impl ComputeArgs {
     fn isolation(&self) -> Option<Isolation> {
         // The link names the running program even after its file was replaced by another version.
         let link = Path::new("/proc/self/exe");
-        let program = match link.exists() {
-            true => link.to_owned(),
-            false => std::env::current_exe().ok()?,
+        let program = if link.exists() {
+            link.to_owned()
+        } else {
+            std::env::current_exe().ok()?
         };
         let arguments = [
             COMPUTE_COMMAND.to_owned(),

@@ -721,9 +721,10 @@ async fn who_erases_whose_scan_it_is_erases_its_uids_in_jobs() {
         let job = sent(&app, &job, "delivered").await;
         assert_eq!(job["source"]["study"], JANE.study);
         let volume = text(&job["links"]["volume"]);
-        let erased = match whole {
-            true => volume.clone(),
-            false => format!("{volume}/identity"),
+        let erased = if whole {
+            volume.clone()
+        } else {
+            format!("{volume}/identity")
         };
         let erased = app.delete(&erased).send().await.unwrap();
         assert!(erased.status().is_success());

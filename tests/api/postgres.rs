@@ -60,9 +60,10 @@ fn shell() -> Command {
         use std::os::unix::fs::MetadataExt;
         own.uid() == 0
     });
-    let mut command = match root {
-        true => Command::new("setpriv"),
-        false => Command::new("sh"),
+    let mut command = if root {
+        Command::new("setpriv")
+    } else {
+        Command::new("sh")
     };
     if root {
         command.args([

@@ -15,7 +15,7 @@ pub struct Caller {
     pub tenant: Tenant,
     /// Its name, for people who read the log.
     pub name: String,
-    /// What it may do.
+    /// Its scope.
     pub scope: Scope,
     /// What its tenant may store and queue by its requests; those of its key, or the general limits.
     pub quota: Quota,

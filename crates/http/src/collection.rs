@@ -1,4 +1,4 @@
-//! What volumes, models, segmentations and templates have in common: they are listed in pages,
+//! The common routes of volumes, models, segmentations and templates: they are listed in pages,
 //! shown one by one, and erased.
 //!
 //! [`Collection`] says how one kind of thing is read from the catalogue and shown;
@@ -139,9 +139,10 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
 /// The tenant's row of that id, or the 404 or 410 that says why there is none.
 pub async fn find<C: Collection>(app: &App, tenant: &Tenant, id: &str) -> Answer<Held<C::Row>> {
     let catalogue = app.service.items().catalogue();
-    let found = match Resource::of(id) == Some(C::RESOURCE) {
-        true => C::row(catalogue, tenant, id).await?,
-        false => None,
+    let found = if Resource::of(id) == Some(C::RESOURCE) {
+        C::row(catalogue, tenant, id).await?
+    } else {
+        None
     };
     match found {
         Some(row) => Ok(row),
@@ -159,13 +160,15 @@ async fn list<C: Collection>(
     RawQuery(query): RawQuery,
 ) -> Answer<(HeaderMap, Json<ListBody<C>>)> {
     let pairs = query_pairs(query.as_deref());
-    let (tags, pairs) = match C::TAGGED {
-        true => tags::take_filter(&app, pairs)?,
-        false => (TagFilter::default(), pairs),
+    let (tags, pairs) = if C::TAGGED {
+        tags::take_filter(&app, pairs)?
+    } else {
+        (TagFilter::default(), pairs)
     };
-    let (scan, pairs) = match C::SCANNED {
-        true => scans::take_filter(pairs)?,
-        false => (ScanFilter::default(), pairs),
+    let (scan, pairs) = if C::SCANNED {
+        scans::take_filter(pairs)?
+    } else {
+        (ScanFilter::default(), pairs)
     };
     let filter = ItemFilter { tags, scan };
     let (page, []) = page_of(pairs, []).await?;

@@ -105,25 +105,25 @@ impl PublishedDocument {
 
     /// The document, or 304 if the client has it.
     pub fn answer(&self, request: &HeaderMap) -> Response {
-        let variant = match takes_gzip(request) {
-            true => &self.gzip,
-            false => &self.plain,
+        let variant = if takes_gzip(request) {
+            &self.gzip
+        } else {
+            &self.plain
         };
         let known = matches_any(request, &header::IF_NONE_MATCH, &variant.etag);
-        let mut response = match known {
-            true => StatusCode::NOT_MODIFIED.into_response(),
-            false => {
-                let json = HeaderValue::from_static("application/json");
-                let mut response = variant.bytes.clone().into_response();
-                response.headers_mut().insert(header::CONTENT_TYPE, json);
-                if let Some(encoding) = &variant.encoding {
-                    let encoding = encoding.clone();
-                    response
-                        .headers_mut()
-                        .insert(header::CONTENT_ENCODING, encoding);
-                }
+        let mut response = if known {
+            StatusCode::NOT_MODIFIED.into_response()
+        } else {
+            let json = HeaderValue::from_static("application/json");
+            let mut response = variant.bytes.clone().into_response();
+            response.headers_mut().insert(header::CONTENT_TYPE, json);
+            if let Some(encoding) = &variant.encoding {
+                let encoding = encoding.clone();
                 response
+                    .headers_mut()
+                    .insert(header::CONTENT_ENCODING, encoding);
             }
+            response
         };
         let headers = response.headers_mut();
         headers.insert(header::CACHE_CONTROL, CACHE_CONTROL);

@@ -190,9 +190,10 @@ pub async fn erase(
         by: agent.of_erasure(),
         reason: ErasureReason::Request,
     };
-    let erased = match Resource::of(&id) == Some(kind) {
-        true => app.service.items().erase(order).await?,
-        false => Erased::Unknown,
+    let erased = if Resource::of(&id) == Some(kind) {
+        app.service.items().erase(order).await?
+    } else {
+        Erased::Unknown
     };
     match erased {
         Erased::Done(receipt) => {

@@ -136,9 +136,10 @@ async fn respond(
         None => (StatusCode::OK, 0..file.record.bytes),
     };
     let length = span.end - span.start;
-    let disposition = match file.attached {
-        true => "attachment",
-        false => "inline",
+    let disposition = if file.attached {
+        "attachment"
+    } else {
+        "inline"
     };
     let content = read(span.clone()).await?;
     let mut response = (

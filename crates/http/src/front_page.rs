@@ -22,18 +22,18 @@ const INDEX_FILE: &str = "index.html";
 
 const HTML_TYPE: &str = "text/html; charset=utf-8";
 
-/// What the names of its files begin with in the page.
+/// The beginning of the names of its files in the page.
 const PAGE_ROOT: &str = "./";
 
-/// What the page may do: run the programs and styles that are files of this service, show pictures that
+/// Content security policy of the page: run the programs and styles that are files of this service, show pictures that
 /// it fetched or drew itself, and call its own service. Nothing comes from elsewhere.
 const PAGE_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; \
     connect-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'none'";
 
-/// What may be kept for ever.
+/// Cache control of files that never change.
 const FOR_EVER: &str = "public, max-age=31536000, immutable";
 
-/// What is asked for again each time.
+/// Cache control of files that are asked for again each time.
 const REVALIDATE: &str = "no-cache";
 
 /// The page if the client prefers HTML_TYPE, else text.
@@ -51,9 +51,10 @@ pub async fn welcome(headers: HeaderMap) -> Response {
 
 /// The documentation of the API: the same page, which reads `/openapi.json`.
 pub async fn documentation(uri: Uri, headers: HeaderMap) -> Response {
-    let root = match uri.path().ends_with('/') {
-        true => "../",
-        false => "./",
+    let root = if uri.path().ends_with('/') {
+        "../"
+    } else {
+        "./"
     };
     match index(root, &headers) {
         Some(page) => page,

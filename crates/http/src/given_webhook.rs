@@ -123,7 +123,7 @@ pub struct CheckedWebhook {
     pub destination: String,
     /// What to tell.
     pub events: Vec<HookEvent>,
-    /// What signs the deliveries.
+    /// The secret that signs the deliveries.
     pub secret: Option<SigningSecret>,
 }
 
@@ -146,9 +146,10 @@ fn events_of(names: &[String]) -> Answer<Vec<HookEvent>> {
             events.push(event);
         }
     }
-    match events.is_empty() {
-        true => Err(wrong("The webhook would be told nothing.".into())),
-        false => Ok(events),
+    if events.is_empty() {
+        Err(wrong("The webhook would be told nothing.".into()))
+    } else {
+        Ok(events)
     }
 }
 

@@ -69,10 +69,7 @@ pub async fn state_identity(
     dicom::check_stated(&scan.unwrap_or_default(), &stated).map_err(|failure| {
         let differs = failure.code == "identity-differs";
         let problem = Problem::from(failure);
-        match differs {
-            true => problem.conflict(),
-            false => problem,
-        }
+        if differs { problem.conflict() } else { problem }
     })?;
     catalogue
         .state_scan(&caller.tenant, &id, &ScanFields(stated))

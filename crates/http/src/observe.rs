@@ -1,4 +1,4 @@
-//! What operators see of a request: its id and trace, one line in the log, and the count of
+//! The trace of a request for operators: its id and trace, one line in the log, and the count of
 //! answers. The functions here are called by the layers that [`super::router`] lists.
 //!
 //! The log shows the pattern of a path and never the path itself, because ids lead to patients.

@@ -1,4 +1,4 @@
-//! What models, segmentations and templates have in common beside being [`Collection`]s: a mesh
+//! The common routes of models, segmentations and templates beside being [`Collection`]s: a mesh
 //! in several formats, files that can be downloaded, and perhaps a report.
 //!
 //! [`routes`] serves them under `/v1/{plural}/{id}/mesh`, `.../report` and `.../{file}`.
@@ -574,15 +574,16 @@ async fn send_object(
     charge(size).await?;
     let result = app.service.items().result(tenant, id, dicom::FILES).await?;
     let result = result.ok_or_else(|| volume_erased(id))?;
-    let secret = match deidentify {
-        true => Some(
+    let secret = if deidentify {
+        Some(
             app.service
                 .items()
                 .catalogue()
                 .deidentification_secret(tenant)
                 .await?,
-        ),
-        false => None,
+        )
+    } else {
+        None
     };
     let memory = dicom::object_memory(UploadFacts::of(&result.volume)?.shape);
     let limits = app.service.engine.limits;
@@ -595,10 +596,7 @@ async fn send_object(
         .map_err(|failure| {
             let unknown = failure.code == "identity-needed" || failure.code == "identity-differs";
             let problem = Problem::from(failure);
-            match unknown {
-                true => problem.conflict(),
-                false => problem,
-            }
+            if unknown { problem.conflict() } else { problem }
         })?;
     match made {
         Some(file) => files::send_object(product, file, headers).await,

@@ -29,7 +29,7 @@ tokio::task_local! {
     static CURRENT: Arc<PublicBase>;
 }
 
-/// What is known beforehand.
+/// The parts that are known beforehand.
 #[derive(Debug, Clone, Default)]
 pub struct ProxyPolicy {
     /// The proxies whose word is taken.
@@ -57,9 +57,10 @@ impl PublicBase {
             host: first(headers, &header::HOST).filter(|host| is_host(host)),
             prefix: policy.base_path.clone(),
         };
-        Arc::new(match policy.trusted.contain(peer.to_canonical()) {
-            true => own.forwarded(headers, policy),
-            false => own,
+        Arc::new(if policy.trusted.contain(peer.to_canonical()) {
+            own.forwarded(headers, policy)
+        } else {
+            own
         })
     }
 

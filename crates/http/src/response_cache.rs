@@ -1,8 +1,8 @@
-//! What follows from the database, kept until anything is written.
+//! A cache of answers that holds until the next write to the database.
 //!
-//! What is read about an item (its row, the JSON made of it) follows from the database and the
-//! settings. It is kept under the tenant that asked and the id, with the version of the database
-//! ([`ventriform_service::records::Catalogue::version`]) under which it was read. Whatever is written changes the
+//! Values read about an item (its row, the JSON made of it) follow from the database and the
+//! settings. They are kept under the tenant that asked and the id, with the version of the database
+//! ([`ventriform_service::records::Catalogue::version`]) under which they were read. Whatever is written changes the
 //! version, and what was kept under other versions is never used: neither what was erased, changed or
 //! put on hold meanwhile, nor what another tenant has. Callers who see whose scan a volume is have
 //! values of their own, and so have clients who reach the service under another path.

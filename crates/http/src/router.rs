@@ -123,7 +123,7 @@ pub fn document() -> serde_json::Value {
     openapi::publish(routes(&Settings::default()).split_for_parts().1)
 }
 
-/// What operators ask for, which every process answers.
+/// Paths for operators, which every process answers.
 fn operations() -> OpenApiRouter<App> {
     OpenApiRouter::new()
         .routes(routes!(health::alive))
@@ -133,9 +133,10 @@ fn operations() -> OpenApiRouter<App> {
 
 /// The whole service, or what a worker serves of it.
 pub fn router(app: App) -> Router {
-    let api = match app.service.settings.role.serves() {
-        true => public(&app.service.settings),
-        false => operations().split_for_parts().0,
+    let api = if app.service.settings.role.serves() {
+        public(&app.service.settings)
+    } else {
+        operations().split_for_parts().0
     };
     // A request passes the layers from top to bottom, its answer from bottom to top.
     let layers = ServiceBuilder::new()

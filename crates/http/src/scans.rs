@@ -1,7 +1,7 @@
 //! Whose scan a volume is: read when the volume is stored, shown in answers as `dicom`, and searched
 //! by `study`, `series` and `accession`.
 //!
-//! What names a patient (name, ID, dates, accession number, free texts) is shown to callers of the
+//! Fields that name a patient (name, ID, dates, accession number, free texts) are shown to callers of the
 //! scope `submit` and `admin`; `read` sees identifiers of DICOM, the acquisition and the equipment.
 //! None of it gets into a path, a header or the log.
 
@@ -72,7 +72,7 @@ impl ScanUidsBody {
     }
 }
 
-/// What a caller of that scope sees of a scan, without its instances; `None` if nothing is known.
+/// The fields of a scan that a caller of that scope sees, without its instances; `None` if nothing is known.
 pub fn shown(scan: &ScanIdentity, scope: Scope) -> Option<Map<String, Value>> {
     if scan.is_empty() {
         return None;

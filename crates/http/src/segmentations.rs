@@ -101,7 +101,7 @@ impl SegmentationLinks {
     }
 }
 
-/// What a client that waits for a segmentation may ask for: the mask, the mesh or the report.
+/// The answers that a client which waits for a segmentation may ask for: the mask, the mesh or the report.
 fn offers() -> Vec<Offer> {
     let masks = [
         "application/gzip",

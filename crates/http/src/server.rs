@@ -69,7 +69,7 @@ pub enum ServeError {
     Role {
         /// The role.
         role: Role,
-        /// What only this process can reach.
+        /// The part that only this process can reach.
         lacking: &'static str,
     },
     /// The system refused threads or sockets.

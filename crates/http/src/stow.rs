@@ -89,7 +89,7 @@ pub async fn store_study_instances(
     store(&app, &caller, &agent, Some(study), request).await
 }
 
-/// What became of the objects of a request.
+/// The outcome of the objects of a request.
 #[derive(Default)]
 struct Outcome {
     /// SOP Class and Instance UIDs of those that are stored.

@@ -170,15 +170,16 @@ pub async fn delete_webhook(
 ) -> Answer<StatusCode> {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let now = app.service.now();
-    match app
+    if app
         .service
         .hooks
         .store
         .remove_endpoint(&caller.tenant, &id, now)
         .await?
     {
-        true => Ok(StatusCode::NO_CONTENT),
-        false => Err(nothing_here("webhook", &id, "GET /v1/webhooks")),
+        Ok(StatusCode::NO_CONTENT)
+    } else {
+        Err(nothing_here("webhook", &id, "GET /v1/webhooks"))
     }
 }
 

@@ -16,9 +16,10 @@ pub fn path_of(id: &str) -> String {
 
 /// 201 if the thing of that id is new, 200 if it was there already; with its path.
 pub fn added(new: bool, id: &str, body: impl Serialize) -> Response {
-    let status = match new {
-        true => StatusCode::CREATED,
-        false => StatusCode::OK,
+    let status = if new {
+        StatusCode::CREATED
+    } else {
+        StatusCode::OK
     };
     (status, [(header::LOCATION, path_of(id))], Json(body)).into_response()
 }

@@ -376,9 +376,10 @@ pub async fn cancel_workitem(
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let bytes = bytes_of(request, &JSON_TYPES).await?;
-    let details = match bytes.is_empty() {
-        true => DataSetJson::default(),
-        false => parse(&bytes).await?,
+    let details = if bytes.is_empty() {
+        DataSetJson::default()
+    } else {
+        parse(&bytes).await?
     };
     let done = change(&app, &caller, &uid, |item, now| {
         item.request_cancel(&details, now)
@@ -443,13 +444,14 @@ fn path(uid: &str) -> String {
 }
 
 fn require_uid(field: &str, uid: &str) -> Answer<()> {
-    match is_uid(uid) {
-        true => Ok(()),
-        false => Err(
+    if is_uid(uid) {
+        Ok(())
+    } else {
+        Err(
             Problem::bad_request("invalid-parameter", format!("`{field}` is not a UID."))
                 .at(field)
                 .fix("Give numbers separated by dots, at most 64 characters."),
-        ),
+        )
     }
 }
 

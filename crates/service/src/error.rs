@@ -27,7 +27,7 @@ pub struct ServiceError {
 /// The kind of a [`ServiceError`], by what the caller can do about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
-    /// What was asked for cannot be done; [`Failure::fault`] says where the cause lies.
+    /// The request cannot be fulfilled; [`Failure::fault`] says where the cause lies.
     Failed,
     /// It contradicts what is stored.
     Conflict,
@@ -114,9 +114,10 @@ impl From<StoreError> for ServiceError {
             tracing::error!(%error, code, "the storage failed");
         }
         let refused = Self::new(refusal, failure);
-        match cause.may_pass() {
-            true => refused.after(STORAGE_RETRY),
-            false => refused,
+        if cause.may_pass() {
+            refused.after(STORAGE_RETRY)
+        } else {
+            refused
         }
     }
 }

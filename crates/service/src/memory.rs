@@ -178,7 +178,7 @@ fn busy() -> ServiceError {
     ServiceError::new(Refusal::Unavailable, failure.fix(advice)).after(BUSY_RETRY)
 }
 
-/// What a request holds.
+/// The memory that a request holds.
 #[derive(Clone)]
 pub struct Ledger(Arc<tokio::sync::Mutex<HeldMemory>>);
 

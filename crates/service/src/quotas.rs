@@ -3,7 +3,7 @@
 //! Every use case that stores or files takes a [`Counting`], which only [`Quotas`] makes: no way into the service goes
 //! round the quotas.
 //!
-//! What a use case may add is counted here until it has ended; from then on the database counts what it
+//! The addition of a use case is counted here until it has ended; from then on the database counts what it
 //! added. It is counted first and the database is read after, so uses that come together cannot exceed a quota
 //! together. At the limit they may be refused although one of them would have fitted.
 //!
@@ -24,7 +24,7 @@ const JOB_RECORD_BYTES: u64 = 2048;
 /// Pause before a job is filed again that found the tenant's jobs full.
 const JOB_RETRY: Duration = Duration::from_secs(5);
 
-/// What a use case may add.
+/// The addition that a use case may make.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Addition {
     /// Bytes that are known before; `None` if it stores nothing.
@@ -57,7 +57,7 @@ pub struct Quotas {
     pub general: Quota,
 }
 
-/// What a use case adds, as it comes.
+/// The count of what a use case adds, as it comes.
 #[derive(Clone)]
 pub struct Counting(Option<Arc<Counted>>);
 
@@ -73,7 +73,7 @@ struct State {
     /// Bytes that have come, and of those the ones that were announced.
     arrived: u64,
     announced: u64,
-    /// What the tenant stored when that was asked last.
+    /// Bytes that the tenant stored when that was asked last.
     used: u64,
 }
 
@@ -202,7 +202,7 @@ impl Counting {
         }
     }
 
-    /// What has come is stored: the database counts it from now on.
+    /// The bytes that have come are stored: the database counts it from now on.
     pub fn stored(&self) {
         if let Some(counted) = &self.0 {
             counted.state().reservation.stored();

@@ -5,11 +5,11 @@ use crate::records::Tenant;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What the uses under way may add, for each tenant.
+/// Additions that the uses under way may make, for each tenant.
 #[derive(Clone, Default)]
 pub struct Reservations(Arc<Mutex<HashMap<Tenant, Usage>>>);
 
-/// What one use may add. Dropping it ends the reservation.
+/// The addition that one use may make. Dropping it ends the reservation.
 pub struct Reservation {
     all: Reservations,
     tenant: Tenant,
@@ -52,7 +52,7 @@ impl Reservation {
         self.amount.bytes = 0;
     }
 
-    /// What is reserved in all.
+    /// All that is reserved.
     pub fn sum(&self) -> Usage {
         let all = self.all.0.lock().unwrap_or_else(PoisonError::into_inner);
         all.get(&self.tenant).copied().unwrap_or_default()

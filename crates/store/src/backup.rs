@@ -29,7 +29,7 @@ use ventriform_service::records::{ItemRecord, RecordPages, Resource};
 /// Rows read at a time.
 const PAGE_ROWS: u32 = 200;
 
-/// What a backup holds.
+/// The content of a backup.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Backup {
     /// Number of volumes and products.

@@ -35,9 +35,9 @@ pub(super) const RECORD: &str = "record.json";
 pub(super) const STAGING: &str = "staging";
 /// Received objects, which are not volumes yet.
 pub(super) const RECEIVED: &str = "received";
-/// What is to be deleted.
+/// The folder of files that are to be deleted.
 pub(super) const DISCARDED: &str = "discarded";
-/// What was found without a row, by day.
+/// The folder of files without a row, by day.
 pub(super) const QUARANTINE: &str = "quarantine";
 
 const DAY_FORMAT: StaticFormatDescription = format_description!("[year]-[month]-[day]");
@@ -447,12 +447,13 @@ impl BlobStore for FileBlobs {
             fs::write(&path, CHECK)?;
             let read = fs::read(&path);
             fs::remove_file(&path)?;
-            match read? == CHECK {
-                true => Ok(()),
-                false => Err(BlobError::new(
+            if read? == CHECK {
+                Ok(())
+            } else {
+                Err(BlobError::new(
                     StoreFault::Disk,
                     "a file was read back with another content",
-                )),
+                ))
             }
         });
         checked.await

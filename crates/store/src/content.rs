@@ -27,7 +27,7 @@ const SENT_CHUNK: u64 = 256 << 10;
 /// Bytes read at a time.
 const CHUNK_BYTES: usize = 128 << 10;
 
-/// What changes when a file's content does.
+/// The properties of a file that change with its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Stamp {
     bytes: u64,

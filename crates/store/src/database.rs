@@ -36,7 +36,7 @@ impl<'a> From<&'a Readers> for Target<'a> {
     }
 }
 
-/// What writes.
+/// The connection that writes.
 pub(super) enum Writing {
     /// The one connection that writes to the file.
     Sqlite(Box<Writer>),

@@ -311,7 +311,7 @@ impl Doctor<'_> {
         Ok(())
     }
 
-    /// What is wrong with the files of an item.
+    /// The faults of the files of an item.
     fn wrong_files(&mut self, place: &Path, record: &ItemRecord) -> io::Result<Vec<String>> {
         let mut wrong = Vec::new();
         let mut found = Vec::new();
@@ -429,9 +429,10 @@ impl Doctor<'_> {
             for name in names(&self.folder.join(shelf))? {
                 let place = self.folder.join(shelf).join(&name);
                 if self.heirs.is_some() {
-                    match place.is_dir() {
-                        true => fs::remove_dir_all(&place)?,
-                        false => fs::remove_file(&place)?,
+                    if place.is_dir() {
+                        fs::remove_dir_all(&place)?
+                    } else {
+                        fs::remove_file(&place)?
                     }
                 }
                 let detail = "It is left over from a write or a deletion that did not end.";

@@ -477,9 +477,10 @@ fn unusable(path: &Path, error: &dyn std::fmt::Display) -> OpenError {
 fn locked(folder: &Path) -> Result<FolderLock, OpenError> {
     std::fs::create_dir_all(folder).map_err(|e| unusable(folder, &e))?;
     let lock = FolderLock::take(folder)?;
-    match lock.log_is_missing(folder) {
-        true => Err(OpenError::LogMissing(folder.to_owned())),
-        false => Ok(lock),
+    if lock.log_is_missing(folder) {
+        Err(OpenError::LogMissing(folder.to_owned()))
+    } else {
+        Ok(lock)
     }
 }
 
@@ -524,10 +525,13 @@ fn check_place(folder: &Path, location: Option<&S3Location>) -> Result<(), OpenE
         (Some(blobs), given) if given.as_ref() != Some(&blobs) => {
             Err(OpenError::FilesElsewhere { folder, blobs })
         }
-        (None, Some(blobs)) => match has_items(&folder).map_err(|e| unusable(&folder, &e))? {
-            true => Err(OpenError::FilesHere { folder, blobs }),
-            false => Ok(()),
-        },
+        (None, Some(blobs)) => {
+            if has_items(&folder).map_err(|e| unusable(&folder, &e))? {
+                Err(OpenError::FilesHere { folder, blobs })
+            } else {
+                Ok(())
+            }
+        }
         _ => Ok(()),
     }
 }
@@ -581,7 +585,7 @@ const MARKER_FILE: &str = "database";
 /// The file that says that another folder is being moved to this one, and which.
 const UNFINISHED_MIGRATION_FILE: &str = "migration";
 
-/// What the note of an unfinished migration begins with.
+/// The beginning of the note of an unfinished migration.
 const MIGRATION_MARK: &str = "migration from ";
 
 /// The database's write-ahead log.
@@ -589,10 +593,10 @@ fn log_of(folder: &Path) -> PathBuf {
     folder.join(format!("{DATABASE_FILE}-wal"))
 }
 
-/// What the lock file says while a process has the database open. If that process is killed, its
+/// The content of the lock file while a process has the database open. If that process is killed, its
 /// successor finds this, and knows that there must be a write-ahead log.
 const OPEN_MARK: &[u8] = b"open\n";
-/// What the lock file says before the database is closed.
+/// The content of the lock file before the database is closed.
 const CLOSED_MARK: &[u8] = b"closed\n";
 
 /// The locked file `lock` of a data folder. Dropping it unlocks the folder.

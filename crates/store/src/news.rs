@@ -1,4 +1,4 @@
-//! What other processes on the same PostgreSQL tables tell (`NOTIFY`).
+//! News of other processes on the same PostgreSQL tables (`NOTIFY`).
 //!
 //! A task takes the notifications off a connection of its own as soon as they come, and leaves them in an
 //! [`Inbox`] for whoever follows them at the speed of its own reads. If they stayed on the connection, the
@@ -147,7 +147,7 @@ async fn listener(pool: &PgPool) -> Result<PgListener, sqlx::Error> {
     Ok(listener)
 }
 
-/// What a notification tells; `None` if it is of `run` itself, or of a newer version.
+/// The content of a notification; `None` if it is of `run` itself, or of a newer version.
 fn told(payload: &str, run: &str) -> Option<News> {
     let mut words = payload.splitn(3, ' ');
     let (kind, by, what) = (words.next()?, words.next()?, words.next()?);

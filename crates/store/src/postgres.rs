@@ -43,12 +43,12 @@ const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 const STATEMENT_TIMEOUT: Duration = Duration::from_secs(30);
 /// The parameter of a session that names the process.
 const RUN_SETTING: &str = "ventriform.run";
-/// What is wrong with a pooler that hands out sessions for transactions.
+/// The faults of a pooler that hands out sessions for transactions.
 const SHARED_SESSION: &str =
     "a pooler between this program and PostgreSQL lets several connections share one session";
-/// What to do about it.
+/// Advice.
 const USE_SESSIONS: &str = "Set `pool_mode = session` for this database in PgBouncer, or give the address of PostgreSQL itself";
-/// What to do about a user or a password that is not accepted.
+/// Advice about a user or a password that is not accepted.
 const WRONG_PASSWORD: &str = "Correct user and password in the URL (or PGPASSWORD), or let the user in by pg_hba.conf (by auth_file, if a \
      pooler says so)";
 /// Oldest version of the server that is tested.
@@ -88,7 +88,7 @@ pub enum PostgresError {
         url: PostgresUrl,
         /// The message of the server.
         reason: String,
-        /// What to do.
+        /// Advice.
         fix: &'static str,
     },
     /// A newer program has changed its tables.
@@ -106,7 +106,7 @@ pub enum PostgresError {
     Tables {
         /// The database.
         url: PostgresUrl,
-        /// What failed.
+        /// The failure.
         reason: String,
     },
 }
@@ -182,7 +182,7 @@ fn with_few_parameters(options: PgConnectOptions) -> PgConnectOptions {
         .extra_float_digits(None)
 }
 
-/// What a session is told besides its limits. `run` names this process.
+/// Settings of a session besides its limits. `run` names this process.
 fn session_names(run: &str) -> Vec<(&'static str, String)> {
     vec![
         ("client_min_messages", "warning".into()),
@@ -216,9 +216,10 @@ async fn set_session(
         return Ok(());
     };
     let kept = sqlx::query_scalar("SELECT current_setting($1, true) IS NOT DISTINCT FROM $2");
-    match kept.bind(name).bind(value).fetch_one(connection).await? {
-        true => Ok(()),
-        false => Err(sqlx::Error::Configuration(SHARED_SESSION.into())),
+    if kept.bind(name).bind(value).fetch_one(connection).await? {
+        Ok(())
+    } else {
+        Err(sqlx::Error::Configuration(SHARED_SESSION.into()))
     }
 }
 
@@ -256,13 +257,14 @@ async fn check_sessions(
     };
     let shared = shared.await.map_err(refused)?;
     let _ = second.close().await;
-    match shared {
-        false => Ok(()),
-        true => Err(PostgresError::Refused {
+    if !shared {
+        Ok(())
+    } else {
+        Err(PostgresError::Refused {
             url: url.clone(),
             reason: SHARED_SESSION.into(),
             fix: USE_SESSIONS,
-        }),
+        })
     }
 }
 
@@ -485,12 +487,13 @@ impl PgWriter {
         .fetch_one(&mut *connection)
         .await
         .map_err(faults::of_postgres)?;
-        match row.get(0) {
-            true => Err(StoreError::Database {
+        if row.get(0) {
+            Err(StoreError::Database {
                 cause: StoreFault::Away,
                 message: "the server cannot be written".into(),
-            }),
-            false => Ok(()),
+            })
+        } else {
+            Ok(())
         }
     }
 }

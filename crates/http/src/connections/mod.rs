@@ -97,7 +97,7 @@ pub struct ConnectionLimits {
     pub grace: Duration,
 }
 
-/// What all connections share.
+/// The state that all connections share.
 struct Server {
     router: Router,
     limits: ConnectionLimits,
@@ -172,14 +172,13 @@ impl Server {
     async fn serve(self: Arc<Self>, stream: TcpStream, peer: IpAddr, ticket: Ticket, end: Watcher) {
         let closed = ticket.connection.closed.clone();
         let ended = async {
-            match ticket.reserve {
-                true => {
-                    let served = self.serve_stream(stream, peer, &ticket, end);
-                    let late = |_| Err(Refused::Reserve.into());
-                    let served = tokio::time::timeout(RESERVE_LIFE, served).await;
-                    served.unwrap_or_else(late)
-                }
-                false => self.serve_stream(stream, peer, &ticket, end).await,
+            if ticket.reserve {
+                let served = self.serve_stream(stream, peer, &ticket, end);
+                let late = |_| Err(Refused::Reserve.into());
+                let served = tokio::time::timeout(RESERVE_LIFE, served).await;
+                served.unwrap_or_else(late)
+            } else {
+                self.serve_stream(stream, peer, &ticket, end).await
             }
         };
         tokio::select! {

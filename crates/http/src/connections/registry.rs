@@ -171,7 +171,7 @@ impl Table {
     }
 }
 
-/// What a connection waits for.
+/// The reason for which a connection waits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Phase {

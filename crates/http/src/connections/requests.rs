@@ -76,9 +76,10 @@ impl Service<Request<Incoming>> for RequestService {
                 body,
                 connection: self.connection.clone(),
             };
-            self.connection.enter(match body.is_end_stream() {
-                true => Phase::Answer,
-                false => Phase::Body,
+            self.connection.enter(if body.is_end_stream() {
+                Phase::Answer
+            } else {
+                Phase::Body
             });
             Body::new(body)
         });

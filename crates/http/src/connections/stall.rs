@@ -424,9 +424,10 @@ mod tests {
         answer.await.unwrap();
         // Connections are made as they are needed, since their wait begins then.
         for (before, sent) in [(false, 0), (false, 9), (true, 9)] {
-            let connection = match before {
-                true => used(),
-                false => Arc::new(OpenConnection::new(None)),
+            let connection = if before {
+                used()
+            } else {
+                Arc::new(OpenConnection::new(None))
             };
             let waited = waits_in_vain(connection, sent).await;
             assert!(

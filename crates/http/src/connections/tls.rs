@@ -64,7 +64,7 @@ pub enum TlsError {
         setting: &'static str,
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The faults of it.
         reason: String,
     },
     /// The certificate and the key cannot be used together.

@@ -1,4 +1,4 @@
-//! What stands before every handler: a request passes only with credentials that allow it.
+//! The layer before every handler: a request passes only with credentials that allow it.
 //!
 //! 1. [`hosts`]: the `Host` header must name this service (against DNS rebinding), and a page of
 //!    another site cannot change anything on a service that asks nobody who they are.
@@ -91,7 +91,7 @@ fn is_open_path(path: &str, settings: &Settings) -> bool {
         || (settings.open_metrics && path == "/metrics")
 }
 
-/// What a caller needs for this method on this path. `route` is the pattern of the path.
+/// The scope needed for this method on this path. `route` is the pattern of the path.
 fn needed(method: &Method, route: Option<&str>) -> Scope {
     let below = |path: &&str| {
         let rest = route.and_then(|route| route.strip_prefix(*path));
@@ -100,9 +100,10 @@ fn needed(method: &Method, route: Option<&str>) -> Scope {
     if ADMIN_PATHS.iter().any(below) {
         return Scope::Admin;
     }
-    match method.is_safe() && !PATIENT_PATHS.iter().any(below) {
-        true => Scope::Read,
-        false => Scope::Submit,
+    if method.is_safe() && !PATIENT_PATHS.iter().any(below) {
+        Scope::Read
+    } else {
+        Scope::Submit
     }
 }
 

@@ -22,7 +22,7 @@ const REPORT_POLICY: &str = "frame-ancestors 'none'; base-uri 'none'; form-actio
 const PICTURE_POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; \
     base-uri 'none'; form-action 'none'";
 
-/// What browsers are told where TLS is spoken: for a year, ask by https only.
+/// Instruction to browsers where TLS is spoken: for a year, ask by https only.
 const STRICT_TRANSPORT: &str = "max-age=31536000";
 
 /// The headers of requests that a page of another site may set: all that the service reads.

@@ -1,10 +1,10 @@
-//! What the guard knows and counts.
+//! The state of the guard.
 
 use super::hosts::HostPolicy;
 use ventriform_service::access::{Gate, RequestCounter};
 use ventriform_service::config::Settings;
 
-/// What the guard knows and counts.
+/// The state of the guard.
 pub struct Guard {
     /// Tells callers by their credentials.
     pub gate: Gate,

@@ -41,7 +41,7 @@ impl Agent {
         }
     }
 
-    /// What the agent did at that time.
+    /// The act of the agent at that time.
     pub fn event(&self, activity: Activity, now: Timestamp) -> AuditEvent {
         AuditEvent {
             activity,
@@ -214,7 +214,7 @@ fn item_of(path: &str) -> Option<String> {
     (formed && number.bytes().all(|b| b.is_ascii_hexdigit())).then(|| id.to_owned())
 }
 
-/// What a route without an id stands for: `webhooks/secret`.
+/// The object of a route without an id: `webhooks/secret`.
 fn place_of(route: &str) -> Option<String> {
     let rest = route.split('/').skip(2).collect::<Vec<_>>().join("/");
     (!rest.is_empty() && !rest.contains('{')).then_some(rest)

@@ -217,15 +217,14 @@ pub async fn get_job(
         let job = find(&app, &caller.tenant, &id).await?;
         let ended = job.state.is_final();
         let body = describe(&app, job).await?;
-        Ok(match ended {
-            true => ControlFlow::Continue(ValidatedJson::of(&body)?),
-            false => {
-                let ask_again = [
-                    (header::CACHE_CONTROL, "no-store"),
-                    (header::RETRY_AFTER, "1"),
-                ];
-                ControlFlow::Break((ask_again, Json(body)).into_response())
-            }
+        Ok(if ended {
+            ControlFlow::Continue(ValidatedJson::of(&body)?)
+        } else {
+            let ask_again = [
+                (header::CACHE_CONTROL, "no-store"),
+                (header::RETRY_AFTER, "1"),
+            ];
+            ControlFlow::Break((ask_again, Json(body)).into_response())
         })
     };
     let catalogue = app.service.items().catalogue();

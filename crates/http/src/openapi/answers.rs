@@ -159,7 +159,7 @@ impl IntoResponses for DownloadAnswers {
     }
 }
 
-/// What became of objects that came by STOW-RS, and 406.
+/// The outcome of objects that came by STOW-RS, and 406.
 pub struct StowAnswers;
 
 impl IntoResponses for StowAnswers {

@@ -291,9 +291,10 @@ impl PartialSchema for JobParameters {
 /// `external_id` and `labels`. In a patch, `null` removes them.
 fn tag_fields(patch: bool) -> (Schema, Schema) {
     let text = |longest: usize| {
-        let kinds = match patch {
-            true => SchemaType::from_iter([Type::String, Type::Null]),
-            false => Type::String.into(),
+        let kinds = if patch {
+            SchemaType::from_iter([Type::String, Type::Null])
+        } else {
+            Type::String.into()
         };
         ObjectBuilder::new()
             .schema_type(kinds)
@@ -301,9 +302,10 @@ fn tag_fields(patch: bool) -> (Schema, Schema) {
             .max_length(Some(longest))
     };
     let labels = ObjectBuilder::new()
-        .schema_type(match patch {
-            true => SchemaType::from_iter([Type::Object, Type::Null]),
-            false => Type::Object.into(),
+        .schema_type(if patch {
+            SchemaType::from_iter([Type::Object, Type::Null])
+        } else {
+            Type::Object.into()
         })
         .description(Some("The caller's own names and values"))
         .additional_properties(Some(Schema::from(text(tags::LABEL_VALUE_LENGTH))))

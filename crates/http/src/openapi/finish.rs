@@ -162,9 +162,10 @@ fn reference(schema: &str) -> Value {
 
 /// The schema of the reports below `path`.
 fn report_of(path: &str) -> Value {
-    match path.starts_with("/v1/segmentations") {
-        true => reference("SegmentationReport"),
-        false => reference("ModelReport"),
+    if path.starts_with("/v1/segmentations") {
+        reference("SegmentationReport")
+    } else {
+        reference("ModelReport")
     }
 }
 

@@ -1,4 +1,4 @@
-//! What is not there: 404 for what never was, 410 for what was erased, and 422 when a field of
+//! Answers about missing things: 404 for what never was, 410 for what was erased, and 422 when a field of
 //! an otherwise good request names such a thing.
 
 use super::{Problem, shorten};

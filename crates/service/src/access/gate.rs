@@ -100,9 +100,10 @@ impl Gate {
     /// If the credentials are missing or wrong, or cannot be checked.
     pub async fn identify(&self, authorization: Option<&[u8]>) -> Result<Identity, Refusal> {
         let Some(authorization) = authorization else {
-            return match self.is_open().await? {
-                true => Ok(self.anonymous()),
-                false => Err(Refusal::Missing),
+            return if self.is_open().await? {
+                Ok(self.anonymous())
+            } else {
+                Err(Refusal::Missing)
             };
         };
         let credential = bearer(authorization).ok_or(Refusal::NotBearer)?;

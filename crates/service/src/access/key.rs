@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 use subtle::ConstantTimeEq;
 use ventriform::text::is_printable;
 
-/// What every key begins with, so that scanners for leaked secrets find it.
+/// The beginning of every key, so that scanners for leaked secrets find it.
 const KEY_PREFIX: &str = "vf_";
 /// Bytes of an id.
 const ID_BYTES: usize = 8;
@@ -38,11 +38,11 @@ pub struct ApiKey {
     pub id: String,
     /// Its position in the order of making.
     pub sequence: i64,
-    /// What it is for, in the operator's words.
+    /// Its purpose, in the operator's words.
     pub name: String,
     /// Whose items and jobs it opens.
     pub tenant: Tenant,
-    /// What it allows.
+    /// Its scope.
     pub scope: Scope,
     /// Limits that replace the general ones.
     pub quota: Quota,
@@ -58,7 +58,7 @@ pub struct ApiKey {
     pub digest: Vec<u8>,
 }
 
-/// What a new key shall be.
+/// The properties of a new key.
 #[derive(Debug, Clone)]
 pub struct KeyRequest {
     /// See [`ApiKey::name`].

@@ -38,7 +38,7 @@ const ANSWER_BYTES: usize = 1 << 20;
 const MOST_KEYS: usize = 100;
 /// Longest subject that is kept as a name, characters.
 const LONGEST_NAME: usize = 128;
-/// What may stand before the name of a scope.
+/// The prefix of the name of a scope.
 const SCOPE_PREFIX: &str = "ventriform:";
 
 /// Which tokens are accepted.
@@ -404,11 +404,12 @@ fn check_address(address: &str) -> Result<(), IssuerError> {
                 .is_ok_and(|ip| ip.is_loopback());
         url.scheme() == "https" || (url.scheme() == "http" && here)
     });
-    match usable {
-        true => Ok(()),
-        false => Err(IssuerError::Unavailable(format!(
+    if usable {
+        Ok(())
+    } else {
+        Err(IssuerError::Unavailable(format!(
             "{address} is not an https address"
-        ))),
+        )))
     }
 }
 

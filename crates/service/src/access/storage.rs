@@ -29,7 +29,7 @@ pub trait AccessStore: Send + Sync + 'static {
     /// whether there is such a key.
     async fn revoke_key(&self, id: &str, now: Timestamp, event: &AuditEvent) -> StoreResult<bool>;
 
-    /// What a tenant uses.
+    /// Use of the service by a tenant.
     async fn usage(&self, tenant: &Tenant) -> StoreResult<Usage>;
 
     /// Whether a job of this tenant was filed under this idempotency key.

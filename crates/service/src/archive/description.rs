@@ -20,7 +20,7 @@ fn is_name(text: &str) -> bool {
 /// An archive (PACS). Its address was given by the operator, so it may be private.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Archive {
-    /// What jobs call it.
+    /// The name by which jobs know it.
     pub name: String,
     /// Base URL of its DICOMweb service, without a slash at the end.
     pub dicomweb: Option<String>,
@@ -39,7 +39,7 @@ pub struct Archive {
     pub credentials: Credentials,
 }
 
-/// What an archive wants to see of those who use it. `Debug` does not show it.
+/// Credentials for an archive. `Debug` does not show it.
 #[derive(Clone, Default, PartialEq, Eq)]
 pub enum Credentials {
     /// Nothing.
@@ -94,7 +94,7 @@ pub struct DicomTls {
 pub struct ArchiveFault {
     /// The key at fault.
     pub field: &'static str,
-    /// What is wrong with it, and what to write.
+    /// The faults of it, and what to write.
     pub reason: String,
 }
 
@@ -269,12 +269,13 @@ fn variable(field: &'static str, given: Given<'_>) -> Result<Option<String>, Arc
     let Some(name) = given else { return Ok(None) };
     let letter = |b: u8| b.is_ascii_alphanumeric() || b == b'_';
     let digit = name.bytes().next().is_none_or(|b| b.is_ascii_digit());
-    match !digit && name.bytes().all(letter) {
-        true => Ok(Some(name.to_owned())),
-        false => Err(fault(
+    if !digit && name.bytes().all(letter) {
+        Ok(Some(name.to_owned()))
+    } else {
+        Err(fault(
             field,
             "give the name of an environment variable, not its value",
-        )),
+        ))
     }
 }
 
@@ -318,12 +319,13 @@ fn peer<'a>(given: &impl Fn(&str) -> Given<'a>) -> Result<Option<DicomPeer>, Arc
         let plain = |b: u8| (b' '..=b'~').contains(&b) && b != b'\\';
         let usable =
             (1..=16).contains(&title.len()) && title.trim() == title && title.bytes().all(plain);
-        match usable {
-            true => Ok(title.to_owned()),
-            false => Err(fault(
+        if usable {
+            Ok(title.to_owned())
+        } else {
+            Err(fault(
                 field,
                 "give an application entity title: 1 to 16 characters",
-            )),
+            ))
         }
     };
     let called = given("ae_title");

@@ -1,4 +1,4 @@
-//! What fetching and delivering have in common.
+//! The common parts of fetching and delivering.
 
 use super::trouble::Trouble;
 use super::web::WebClients;
@@ -94,7 +94,7 @@ impl Exchange {
     }
 }
 
-/// What an attempt that failed so means for others to the same archive.
+/// Consequences of an attempt that failed so for others to the same archive.
 pub(super) fn means(trouble: &Trouble) -> AttemptEnd {
     match trouble {
         Trouble::Passing { asked, .. } => AttemptEnd::Failing(*asked),

@@ -1,4 +1,4 @@
-//! What the exchange with archives needs of the service around it.
+//! The interface that the exchange with archives needs of the service around it.
 
 use super::parts::SeriesParts;
 use super::trouble::Trouble;

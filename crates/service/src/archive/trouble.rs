@@ -9,7 +9,7 @@ use std::time::Duration;
 pub enum Trouble {
     /// It may pass: the archive does not answer, or is busy.
     Passing {
-        /// What happened, as a sentence without patient data.
+        /// The cause, as a sentence without patient data.
         what: String,
         /// How long the archive asks to wait.
         asked: Option<Duration>,

@@ -56,7 +56,7 @@ pub struct DicomWeb {
     _pin: Option<Pin>,
 }
 
-/// What became of an object that was sent.
+/// The outcome of an object that was sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stored {
     /// It was stored now.
@@ -174,9 +174,10 @@ impl WebClients {
 /// Follows redirects to the same scheme, host and port.
 fn within_origin(attempt: Attempt<'_>) -> reqwest::redirect::Action {
     let known = attempt.previous().first().map(reqwest::Url::origin);
-    match known == Some(attempt.url().origin()) && attempt.previous().len() <= MAX_REDIRECTS {
-        true => attempt.follow(),
-        false => attempt.stop(),
+    if known == Some(attempt.url().origin()) && attempt.previous().len() <= MAX_REDIRECTS {
+        attempt.follow()
+    } else {
+        attempt.stop()
     }
 }
 
@@ -313,15 +314,16 @@ impl DicomWeb {
             Credentials::Bearer(token) => request.bearer_auth(token),
         };
         request.send().await.map_err(|error| {
-            Trouble::passing(match error.is_timeout() {
-                true => "The archive did not answer in time.",
-                false => "The archive could not be reached, or broke the connection off.",
+            Trouble::passing(if error.is_timeout() {
+                "The archive did not answer in time."
+            } else {
+                "The archive could not be reached, or broke the connection off."
             })
         })
     }
 }
 
-/// What an answer to STOW-RS says of the only object (PS3.18, 10.5.3; Store Instances Response
+/// The outcome for the only object in an answer to STOW-RS (PS3.18, 10.5.3; Store Instances Response
 /// Module, PS3.18 annex I).
 fn judge(status: StatusCode, answer: &[u8]) -> Result<Stored, Trouble> {
     let json: Option<Value> = serde_json::from_slice(answer).ok();
@@ -334,12 +336,12 @@ fn judge(status: StatusCode, answer: &[u8]) -> Result<Stored, Trouble> {
             StatusCode::ACCEPTED => json.is_some(),
             _ => false,
         };
-        return match said {
-            true => Ok(Stored::Now),
-            // The page of a proxy, for instance. The next attempt asks whether it is stored.
-            false => Err(Trouble::passing(
+        return if said {
+            Ok(Stored::Now)
+        } else {
+            Err(Trouble::passing(
                 "The archive did not say whether it has stored the object.",
-            )),
+            ))
         };
     };
     let reason = failed

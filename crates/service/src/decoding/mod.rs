@@ -161,9 +161,10 @@ impl Decoding {
                 () = task.stopped.cancelled() => return Err(task.error()),
             }
         };
-        match task.stopped.is_cancelled() {
-            true => Err(task.error()),
-            false => result.map_err(ServiceError::internal),
+        if task.stopped.is_cancelled() {
+            Err(task.error())
+        } else {
+            result.map_err(ServiceError::internal)
         }
     }
 }
@@ -525,9 +526,10 @@ impl AdmissionQueue {
             *self.held.entry(client).or_default() += work.memory;
         }
         self.order.remove(place);
-        match list.is_empty() {
-            true => drop(self.waiting.remove(&client)),
-            false => self.order.push_back(client),
+        if list.is_empty() {
+            drop(self.waiting.remove(&client))
+        } else {
+            self.order.push_back(client)
         }
         Some((client, work))
     }

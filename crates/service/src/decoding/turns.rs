@@ -14,7 +14,7 @@ use tokio::sync::oneshot;
 /// After which time of computing counts half.
 const HALF_LIFE: Duration = Duration::from_secs(10);
 
-/// What is not remembered, seconds.
+/// Time of computing below which a client is forgotten, seconds.
 const NEGLIGIBLE_S: f64 = 1e-3;
 
 /// The places, and who waits for one.

@@ -54,9 +54,10 @@ impl FromStr for SigningSecret {
     fn from_str(text: &str) -> Result<Self, InvalidSecret> {
         let encoded = text.strip_prefix(SECRET_PREFIX).ok_or(InvalidSecret)?;
         let key = STANDARD.decode(encoded).map_err(|_| InvalidSecret)?;
-        match KEY_BYTES.contains(&key.len()) {
-            true => Ok(Self(key)),
-            false => Err(InvalidSecret),
+        if KEY_BYTES.contains(&key.len()) {
+            Ok(Self(key))
+        } else {
+            Err(InvalidSecret)
         }
     }
 }

@@ -346,9 +346,10 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send> Association<'_, S> {
                 if command.len() > LONGEST_COMMAND {
                     return violation(AbortReason::InvalidPduParameter);
                 }
-                match value.is_last {
-                    true => self.begin(id).await,
-                    false => Ok(()),
+                if value.is_last {
+                    self.begin(id).await
+                } else {
+                    Ok(())
                 }
             }
             PDataValueType::Data => {
@@ -393,12 +394,11 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send> Association<'_, S> {
             command,
             target,
         };
-        match follows {
-            true => {
-                self.message = Some(message);
-                Ok(())
-            }
-            false => self.end(message).await,
+        if follows {
+            self.message = Some(message);
+            Ok(())
+        } else {
+            self.end(message).await
         }
     }
 

@@ -99,9 +99,10 @@ impl Turns {
     /// Whether a group is being made; `None` if it does not wait either.
     fn knows(&self, group: &str) -> Option<bool> {
         let is = |(_, known): &(String, String)| known == group;
-        match self.making.iter().any(is) {
-            true => Some(true),
-            false => self.waiting.iter().any(is).then_some(false),
+        if self.making.iter().any(is) {
+            Some(true)
+        } else {
+            self.waiting.iter().any(is).then_some(false)
         }
     }
 
@@ -147,7 +148,7 @@ pub trait VolumeMaker: Send + Sync + 'static {
     ) -> Result<String, MakeError>;
 }
 
-/// What is done with complete groups.
+/// Settings for complete groups.
 pub struct GatherSettings {
     /// The rules; the first that matches counts.
     pub rules: Vec<Rule>,

@@ -1,4 +1,4 @@
-//! What was received: groups of objects that become a volume each, and the interfaces to the database
+//! Received objects: groups of objects that become a volume each, and the interfaces to the database
 //! and the files that keep them.
 
 use crate::records::{BlobError, Failure, ListPage, ListRequest, LocalFile, StoreResult, Tenant};
@@ -53,7 +53,7 @@ pub struct Origin {
     pub address: String,
 }
 
-/// What has become of a group.
+/// The state of a group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GroupState {
     /// Objects arrive, or wait to be read.
@@ -107,7 +107,7 @@ pub struct IntakeGroup {
     pub image_type: Vec<String>,
     /// Study Description.
     pub study_description: Option<String>,
-    /// What has become of it.
+    /// The state of it.
     pub state: GroupState,
     /// Grows with every object.
     pub revision: i64,
@@ -139,7 +139,7 @@ impl fmt::Debug for IntakeGroup {
 pub struct NewObject {
     /// Who sent it.
     pub origin: Origin,
-    /// What it says of itself.
+    /// Its own header.
     pub header: ventriform::volume::dicom::DicomHeader,
     /// SHA-256 of its data set, hexadecimal.
     pub data_sha256: String,

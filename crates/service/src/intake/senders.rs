@@ -39,9 +39,10 @@ impl FromStr for AeTitle {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let title = text.trim_matches(' ');
         let allowed = |b: u8| (b' '..=b'~').contains(&b) && b != b'\\';
-        match (1..=AE_TITLE_LENGTH).contains(&title.len()) && title.bytes().all(allowed) {
-            true => Ok(Self(title.to_owned())),
-            false => Err("an AE title has 1 to 16 ASCII characters without backslash"),
+        if (1..=AE_TITLE_LENGTH).contains(&title.len()) && title.bytes().all(allowed) {
+            Ok(Self(title.to_owned()))
+        } else {
+            Err("an AE title has 1 to 16 ASCII characters without backslash")
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What all associations share, and how many there are.
+//! The state that all associations share, and their number.
 
 use super::negotiate::Offer;
 use super::observer::IntakeObserver;
@@ -36,11 +36,11 @@ pub struct ScpSettings {
     pub grace: Duration,
 }
 
-/// What all associations share.
+/// The state that all associations share.
 pub struct Service {
     /// The settings.
     pub settings: ScpSettings,
-    /// What is accepted.
+    /// The transfer syntaxes and classes that are accepted.
     pub offer: Offer,
     /// Takes objects.
     pub receiver: Arc<Receiver>,

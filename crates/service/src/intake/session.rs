@@ -161,9 +161,10 @@ impl Session {
         self.sessions.change(group, whole, |watched| {
             watched.last = Instant::now();
             // The group may have been taken off the list since this session brought its last object.
-            watched.open = match first {
-                true => watched.open + 1,
-                false => watched.open.max(1),
+            watched.open = if first {
+                watched.open + 1
+            } else {
+                watched.open.max(1)
             };
         });
     }

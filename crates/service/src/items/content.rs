@@ -5,7 +5,7 @@ use serde_json::{Map, Value};
 use std::borrow::Cow;
 use std::io::ErrorKind;
 
-/// What a job made.
+/// The output of a job.
 #[derive(Debug, Clone, Default)]
 pub struct WorkOutput {
     /// Counts and main figures.

@@ -43,7 +43,7 @@ pub struct Custodian {
     pub scrub_rate: u64,
 }
 
-/// What a sweep did.
+/// The outcome of a sweep.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Swept {
     /// Items that were set aside.

@@ -1,4 +1,4 @@
-//! What a kind of job provides: its parameters, its computation, its input and output.
+//! The interface of a kind of job: its parameters, its computation, its input and output.
 
 use super::isolation::Isolation;
 use crate::items::{StoredItem, WorkOutput};
@@ -10,7 +10,7 @@ use ventriform::progress::{Cancelled, Monitor, Plan};
 
 /// One kind of work. Its methods are called on blocking threads.
 pub trait Work: Send + Sync + 'static {
-    /// What it makes. [`Resource::noun`] is the kind's name in jobs.
+    /// The kind of its results. [`Resource::noun`] is the kind's name in jobs.
     fn makes(&self) -> Resource;
 
     /// Its stages, with each stage's share of the time.
@@ -44,7 +44,7 @@ pub trait Work: Send + Sync + 'static {
         self.check_parameters(GivenParameters::Json(object))
     }
 
-    /// What the work needs besides the volume, given these parameters. Nothing by default.
+    /// The needs of the work besides the volume, given these parameters. Nothing by default.
     fn needs(&self, _parameters: &Map<String, Value>) -> Needs {
         Needs::default()
     }
@@ -75,7 +75,7 @@ pub enum GivenParameters<'a> {
     Json(&'a Map<String, Value>),
 }
 
-/// What work needs besides its volume.
+/// Needs of a work besides its volume.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Needs {
     /// Volumes and products named by parameters: parameter name to id.
@@ -87,7 +87,7 @@ pub struct Needs {
     pub files: &'static [&'static str],
 }
 
-/// What a job works on.
+/// The input of a job.
 #[derive(Debug, Clone)]
 pub struct WorkInput {
     /// Id of the volume.

@@ -63,6 +63,6 @@ pub trait Custody: Send + Sync + 'static {
     /// Whether anybody erased the item of that id.
     async fn was_erased(&self, id: &str) -> StoreResult<bool>;
 
-    /// What is wrong with the database's own structure; empty if nothing is.
+    /// The faults of the database's own structure; empty if nothing is.
     async fn defects(&self) -> StoreResult<Vec<String>>;
 }

@@ -43,7 +43,7 @@ pub enum ErasureReason {
     Retention,
 }
 
-/// What was erased, when and by whom. It holds no name that a tenant gave to an item.
+/// The record of an erasure: item, time, agent. It holds no name that a tenant gave to an item.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Receipt {
     /// `ers_...`
@@ -114,7 +114,7 @@ pub enum Erased {
     Unknown,
 }
 
-/// What is beyond its age, and its place in the order of age, where the next page begins.
+/// An item beyond its age, and its place in the order of age, where the next page begins.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Expired {
     /// Whose it is.

@@ -10,13 +10,13 @@ pub struct Failure {
     pub code: String,
     /// Where the cause lies; this decides the HTTP status.
     pub fault: Fault,
-    /// What happened, with the values involved, as a sentence. Contains neither patient data nor
+    /// The cause, with the values involved, as a sentence. Contains neither patient data nor
     /// internals of the service.
     pub detail: String,
     /// The parameter, or the field of the file, that caused it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field: Option<String>,
-    /// What to do about it, as a sentence.
+    /// Advice, as a sentence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fix: Option<String>,
 }

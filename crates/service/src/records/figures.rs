@@ -4,7 +4,7 @@ use super::StoreResult;
 use super::{Resource, Timestamp};
 use async_trait::async_trait;
 
-/// What is stored and what waits.
+/// Numbers of stored items and waiting jobs.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct QueueFigures {
     /// When the oldest waiting job was filed.

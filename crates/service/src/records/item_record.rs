@@ -1,4 +1,4 @@
-//! What is kept beside the files of an item, so that its row can be made anew if the database is
+//! The record beside the files of an item, so that its row can be made anew if the database is
 //! lost.
 
 use super::{FileRecord, Product, ProductFile, StoredVolume};

@@ -73,7 +73,7 @@ pub struct Job {
     pub volume: Option<String>,
     /// The series in an archive that the volume comes from.
     pub source: Option<SeriesSource>,
-    /// What of the result is sent to an archive.
+    /// The objects of the result that are sent to an archive.
     pub send: Option<SendOrder>,
     /// The validated parameters, with every default written out.
     pub parameters: Map<String, Value>,
@@ -129,7 +129,7 @@ impl fmt::Debug for SeriesSource {
     }
 }
 
-/// What of a job's result is sent to an archive.
+/// The objects of a job's result that are sent to an archive.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SendOrder {
     /// Names of the DICOM objects, such as `mask.dcm`; not empty, each once.
@@ -178,7 +178,7 @@ pub struct JobWebhook {
     pub destination: String,
     /// Names of the events to tell.
     pub events: Vec<String>,
-    /// What signs the deliveries; the tenant's secret if there is none.
+    /// The secret that signs the deliveries; the tenant's secret if there is none.
     pub secret: Option<String>,
 }
 
@@ -199,7 +199,7 @@ pub struct Idempotency {
 }
 
 impl Idempotency {
-    /// What became of a request with this key, after `job` was filed under it by the request with
+    /// The outcome of a request with this key, after `job` was filed under it by the request with
     /// that fingerprint.
     pub fn judge(&self, job: Job, fingerprint: &str) -> Filed {
         if self.fingerprint == fingerprint {

@@ -1,4 +1,4 @@
-//! What is stored, for whom, and the traits of a store: the vocabulary of the whole service.
+//! Records, their owners, and the traits of a store: the vocabulary of the whole service.
 //!
 //! - **Identity.** A [`Tenant`] owns items and jobs. The id of an item is a hash of its content ([`volume_id`],
 //!   [`content_id`]), that of a job is random ([`random_id`]); its prefix tells the [`Resource`].

@@ -1,4 +1,4 @@
-//! What a tenant knows of an item that it has: when it came, the tenant's own names for it, and
+//! The record of an item that a tenant has: when it came, the tenant's own names for it, and
 //! whether it may be erased.
 //!
 //! Content is stored once, however many tenants have it. Each has a [`Holding`] of its own, and
@@ -60,7 +60,7 @@ pub struct Holding {
 pub struct Held<T> {
     /// The item. Its sequence number and time of creation are the tenant's.
     pub item: T,
-    /// What the tenant knows of it.
+    /// The tenant's record of it.
     pub holding: Holding,
 }
 

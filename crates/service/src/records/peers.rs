@@ -1,4 +1,4 @@
-//! What processes that share a database and a file store know of each other.
+//! Peers: the processes that share a database and a file store.
 //!
 //! Each process is a *run*, whose row says until when it lives by the clock of the database. It renews
 //! the row; if it does not, its pins and leases are free.
@@ -15,7 +15,7 @@ use super::StoreResult;
 use async_trait::async_trait;
 use std::time::Duration;
 
-/// What another process has changed.
+/// A change by another process.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum News {
     /// A job was filed or changed.
@@ -24,7 +24,7 @@ pub enum News {
     Erased(String),
     /// A work item was scheduled, or may be performed now.
     Scheduled,
-    /// What was changed is not known: news were lost.
+    /// The change is not known: news were lost.
     Missed,
 }
 

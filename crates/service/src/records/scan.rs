@@ -30,9 +30,9 @@ impl fmt::Debug for ScanFields {
 /// Whose scan a volume is, as one tenant knows it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ScanIdentity {
-    /// What the file says; `None` if it says nothing, or it was erased here.
+    /// The fields in the file; `None` if it says nothing, or it was erased here.
     pub found: Option<ScanFields>,
-    /// What the tenant states.
+    /// The fields that the tenant states.
     pub stated: Option<ScanFields>,
     /// When the tenant erased both.
     pub erased_at: Option<Timestamp>,
@@ -93,7 +93,7 @@ pub struct UnreadScan {
 /// The table of scans. Every method is one transaction and fails only if the database does.
 #[async_trait]
 pub trait Scans: Send + Sync + 'static {
-    /// What a tenant knows of the scan of its volume; `None` if the volume was not read for it yet,
+    /// The scan of a tenant's volume, as the tenant knows it; `None` if the volume was not read for it yet,
     /// or the tenant has no such volume.
     async fn scan(&self, tenant: &Tenant, volume: &str) -> StoreResult<Option<ScanIdentity>>;
 

@@ -13,7 +13,7 @@ pub enum StoreError {
     Database {
         /// The kind of failure.
         cause: StoreFault,
-        /// What the database said.
+        /// The message of the database.
         message: String,
     },
     /// The file store failed.
@@ -76,7 +76,7 @@ impl StoreFault {
 pub struct BlobError {
     /// The kind of failure.
     pub cause: StoreFault,
-    /// What failed.
+    /// The failure.
     pub message: String,
 }
 

@@ -39,9 +39,10 @@ impl TryFrom<String> for Tenant {
 
     fn try_from(name: String) -> Result<Self, InvalidTenant> {
         let allowed = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b"-_".contains(&b);
-        match (1..=NAME_LENGTH).contains(&name.len()) && name.bytes().all(allowed) {
-            true => Ok(Self(name)),
-            false => Err(InvalidTenant),
+        if (1..=NAME_LENGTH).contains(&name.len()) && name.bytes().all(allowed) {
+            Ok(Self(name))
+        } else {
+            Err(InvalidTenant)
         }
     }
 }

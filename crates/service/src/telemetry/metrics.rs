@@ -123,7 +123,7 @@ impl IntakeObserver for IntakeMetrics {
     }
 }
 
-/// What is read when somebody asks.
+/// Gauges that are read when somebody asks.
 struct Gauges {
     jobs: IntGaugeVec,
     oldest_queued: Gauge,
@@ -242,11 +242,11 @@ impl Metrics {
     }
 }
 
-/// What is read from elsewhere when somebody asks.
+/// Readings from elsewhere.
 pub struct MetricReadings<'a> {
     /// How busy the queue is.
     pub load: QueueLoad,
-    /// What waits and what is stored.
+    /// Numbers of waiting jobs and stored items.
     pub figures: QueueFigures,
     /// Number and bytes of received objects that are not part of a volume.
     pub received: (u64, u64),

@@ -22,7 +22,7 @@ pub struct Check {
     pub name: &'static str,
     /// Whether no work can be accepted without it.
     pub required: bool,
-    /// What is wrong with it, as a sentence that names no address.
+    /// The faults of it, as a sentence that names no address.
     pub fault: Option<&'static str>,
 }
 
@@ -47,7 +47,7 @@ impl Readiness {
     }
 }
 
-/// What is wrong with the first dependency that is required and does not work.
+/// The faults of the first dependency that is required and does not work.
 pub fn why_unready(checks: &[Check]) -> Option<&'static str> {
     checks
         .iter()

@@ -218,9 +218,10 @@ impl JobSpan {
 
 fn traces_url(endpoint: &str) -> String {
     let base = endpoint.trim_end_matches('/');
-    match base.ends_with(TRACES_PATH) {
-        true => base.to_owned(),
-        false => format!("{base}{TRACES_PATH}"),
+    if base.ends_with(TRACES_PATH) {
+        base.to_owned()
+    } else {
+        format!("{base}{TRACES_PATH}")
     }
 }
 

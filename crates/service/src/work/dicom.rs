@@ -154,7 +154,7 @@ pub fn object(
     }))
 }
 
-/// What the fields say; those of another type are left out.
+/// The texts of the fields; those of another type are left out.
 fn provenance(fields: &ScanFields) -> Provenance {
     serde_json::from_value(fields.0.clone().into()).unwrap_or_default()
 }
@@ -184,7 +184,7 @@ fn source(
     Ok(SourceScan::new(known, frame, facts.shape, placed, made))
 }
 
-/// What the upload says, with the instances and frames of the volume that the result was made of.
+/// The fields of the upload, with the instances and frames of the volume that the result was made of.
 fn source_frames(
     result: &StoredResult,
     limits: &ReadLimits,
@@ -216,7 +216,7 @@ fn moment(at: Timestamp) -> Moment {
     }
 }
 
-/// What a result shows, by the parameters it was made with.
+/// The content of a result, by the parameters it was made with.
 fn structure(item: &StoredItem, facts: &UploadFacts) -> Structure {
     let parameter = |name: &str| item.parameters.get(name).and_then(Value::as_str);
     match Resource::of(&item.id) {

@@ -501,17 +501,18 @@ pub(super) fn broken_result(error: &dyn Display) -> Failure {
     .fix("Start the same job again, which stores the result anew.")
 }
 
-/// What to do about a field of a scan that cannot be decoded.
+/// Advice about a field of a scan that cannot be decoded.
 fn undecoded_advice(field: &str) -> String {
     let correct = "correct Specific Character Set (0008,0005) or the value in the file (its warnings \
                    say what is wrong)";
-    match StatedIdentity::FIELDS.contains(&field) {
-        true => format!(
+    if StatedIdentity::FIELDS.contains(&field) {
+        format!(
             "State `{field}` (PUT .../identity, or --{}), or {correct}, or ask for de-identified \
-             objects.",
+         objects.",
             field.replace('_', "-")
-        ),
-        false => format!("Ask for de-identified objects, or {correct}."),
+        )
+    } else {
+        format!("Ask for de-identified objects, or {correct}.")
     }
 }
 

@@ -107,7 +107,7 @@ pub trait UploadReader: Send + Sync + 'static {
     fn profile(&self, profile: &[u8]) -> Result<WorkOutput, Failure>;
 }
 
-/// What is known of a volume after reading it. Stored as JSON in [`StoredVolume::facts`].
+/// Facts about a volume that was read. Stored as JSON in [`StoredVolume::facts`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct UploadFacts {
     /// `NIfTI-1`, `DICOM NM` ...

@@ -12,7 +12,7 @@ const MAX_SEQUENCE_DEPTH: usize = 16;
 pub struct Malformed {
     /// The element.
     pub tag: String,
-    /// What is wrong with it.
+    /// The faults of it.
     pub reason: &'static str,
 }
 

@@ -86,7 +86,7 @@ pub enum Refusal {
         tag: &'static str,
         /// Name.
         name: &'static str,
-        /// What is wrong.
+        /// The fault.
         reason: &'static str,
     },
     /// The request names no Transaction UID, and the item is claimed.
@@ -108,7 +108,7 @@ pub enum Refusal {
     Unfinished(&'static str),
 }
 
-/// What a permitted request did.
+/// The effect of a permitted request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
     /// It was carried out.

@@ -15,7 +15,7 @@ use ventriform_service::records::{ItemRecord, RecordPages, Resource};
 /// Items that are sent to a bucket at the same time.
 const PARALLEL_COPIES: usize = 8;
 
-/// What was found on the way.
+/// Findings on the way.
 struct Copying<'a> {
     done: &'a mut Migrated,
     of: u64,
@@ -57,9 +57,10 @@ impl<'a> Copying<'a> {
 
     /// The names that the target is to have.
     fn end(self) -> Result<BTreeSet<String>, MigrateError> {
-        match self.damaged.is_empty() {
-            true => Ok(self.kept),
-            false => Err(MigrateError::Damaged(self.damaged)),
+        if self.damaged.is_empty() {
+            Ok(self.kept)
+        } else {
+            Err(MigrateError::Damaged(self.damaged))
         }
     }
 }

@@ -60,7 +60,7 @@ pub enum Progress {
     },
 }
 
-/// What the target has.
+/// The content of the target.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Migrated {
     /// Number of volumes and products with their files.
@@ -98,7 +98,7 @@ pub enum MigrateError {
     Occupied {
         /// The target.
         target: String,
-        /// What it holds.
+        /// Its content.
         found: String,
     },
     /// Items of the folder are damaged.
@@ -178,7 +178,7 @@ pub async fn migrate(
 struct Move<'a> {
     source: &'a Source,
     to: &'a Destination,
-    /// What the target is told while it is unfinished.
+    /// The note in the target while it is unfinished.
     note: String,
 }
 
@@ -214,7 +214,7 @@ impl Move<'_> {
         Ok(done)
     }
 
-    /// What the target notes of itself.
+    /// The note of the target about itself.
     async fn noted(&self, target: Option<&SqlStore>) -> Result<Option<String>, MigrateError> {
         match (target, &self.to.folder) {
             (Some(target), _) => Ok(target.place().await?),
@@ -283,9 +283,10 @@ impl Move<'_> {
                 ..Migrated::default()
             });
         }
-        Err(self.occupied(&match place.starts_with(MIGRATION_MARK) {
-            true => format!("an unfinished {place}"),
-            false => format!("the records of files in {place}"),
+        Err(self.occupied(&if place.starts_with(MIGRATION_MARK) {
+            format!("an unfinished {place}")
+        } else {
+            format!("the records of files in {place}")
         }))
     }
 

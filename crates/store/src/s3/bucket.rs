@@ -60,7 +60,7 @@ const RETRY_TIME: Duration = Duration::from_secs(10);
 pub struct S3Location {
     /// The bucket.
     pub bucket: String,
-    /// What the keys of all files begin with; empty for the whole bucket.
+    /// The beginning of the keys of all files; empty for the whole bucket.
     pub prefix: String,
     /// Names and values of variables as the AWS tools read them: `AWS_ACCESS_KEY_ID` ...
     pub variables: Vec<(String, String)>,

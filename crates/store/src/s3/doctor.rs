@@ -20,7 +20,7 @@ use ventriform_service::records::{
 /// Rows read at a time.
 const PAGE_ROWS: u32 = 200;
 
-/// What a bucket is checked against.
+/// The records that a bucket is checked against.
 pub(crate) struct BucketDoctor<'a> {
     pub blobs: &'a S3Blobs,
     pub rows: &'a SqlStore,
@@ -83,7 +83,7 @@ impl BucketDoctor<'_> {
         Ok(known)
     }
 
-    /// What is wrong with the files of an item whose publications lie in the folder `shelf`.
+    /// The faults of the files of an item whose publications lie in the folder `shelf`.
     async fn wrong_files(&mut self, record: &ItemRecord, shelf: &str) -> StoreResult<Vec<String>> {
         let mut wrong = Vec::new();
         for file in record.files() {

@@ -34,7 +34,7 @@ const CHECK_LIMIT: Duration = Duration::from_secs(4);
 /// How long the start waits for a store that does not answer, and between two attempts.
 const FIRST_REQUEST_TIMES: (Duration, Duration) = (Duration::from_secs(20), Duration::from_secs(1));
 
-/// What became of a file that was sent.
+/// The outcome of a file that was sent.
 enum Sent {
     /// The store has it.
     Whole(Content),

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 use ventriform_service::records::{BlobError, FileRecord, StoreFault, Timestamp};
 
-/// What checks write.
+/// The content that checks write.
 pub(super) const READY: &str = "ready";
 
 /// The bucket and its local copies.

@@ -15,16 +15,20 @@ const QUICK_CHECK: &str = "PRAGMA quick_check(20)";
 impl Custody for SqlStore {
     async fn record(&self, id: &str) -> StoreResult<Option<ItemRecord>> {
         let volume = Resource::of(id) == Some(Resource::Volume);
-        let row = query(match volume {
-            true => "SELECT * FROM volumes WHERE id = $1",
-            false => "SELECT * FROM products WHERE id = $1",
+        let row = query(if volume {
+            "SELECT * FROM volumes WHERE id = $1"
+        } else {
+            "SELECT * FROM products WHERE id = $1"
         })
         .bind(id)
         .fetch_optional(&self.readers)
         .await?;
-        row.map(|row| match volume {
-            true => rows::volume(row).map(ItemRecord::Volume),
-            false => rows::product(row).map(ItemRecord::Product),
+        row.map(|row| {
+            if volume {
+                rows::volume(row).map(ItemRecord::Volume)
+            } else {
+                rows::product(row).map(ItemRecord::Product)
+            }
         })
         .transpose()
     }

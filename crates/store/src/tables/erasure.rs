@@ -20,7 +20,7 @@ use ventriform_service::records::{
 /// The prefix of the ids of receipts.
 const RECEIPT_PREFIX: &str = "ers_";
 
-/// What was made of a volume.
+/// The products of a volume.
 pub(super) async fn made_of(
     from: impl Into<Target<'_>> + Send,
     tenant: &Tenant,
@@ -65,9 +65,10 @@ pub(super) async fn erase(
     for id in ids.iter().rev() {
         items.insert(0, release(to, tenant, id, now).await?);
     }
-    let jobs = match order.cascade {
-        true => delete_jobs(to, tenant, &order.id, now).await?,
-        false => Vec::new(),
+    let jobs = if order.cascade {
+        delete_jobs(to, tenant, &order.id, now).await?
+    } else {
+        Vec::new()
     };
     let by = order.by.clone();
     let event = AuditEvent {

@@ -1,4 +1,4 @@
-//! What the tables of errands have in common. An errand is work towards a destination on the network
+//! The common columns of the tables of errands. An errand is work towards a destination on the network
 //! (fetch a series, deliver an object, call a webhook) that waits in a table until it succeeds, is
 //! given up or is taken back. Triggers of the jobs table write the rows; see the migrations.
 

@@ -386,9 +386,10 @@ async fn open_group(
     now: Timestamp,
 ) -> StoreResult<String> {
     let (header, origin) = (&object.header, &object.origin);
-    let instance = match header.is_slice {
-        true => "",
-        false => header.sop_instance.as_str(),
+    let instance = if header.is_slice {
+        ""
+    } else {
+        header.sop_instance.as_str()
     };
     let row = query(
         "INSERT INTO intake_groups (id, tenant, study, series, instance, modality, image_type,

@@ -88,7 +88,7 @@ const QUEUE_POSITIONS: &str = "
                 OVER (PARTITION BY priority ORDER BY turn, sequence) AS BIGINT)
     FROM asked";
 
-/// What every statement sets by which a job leaves its worker without an outcome: `$1` is now, `$2`
+/// The assignments of every statement by which a job leaves its worker without an outcome: `$1` is now, `$2`
 /// the reason for failing it, or null to return it to the queue.
 const LEFT_BY_WORKER: &str = "
     state = CASE WHEN cancel_requested THEN 'cancelled'
@@ -585,9 +585,10 @@ pub(super) fn listed(filter: &JobFilter, page: ListRequest) -> QueryBuilder {
     let mut finds = !narrow;
     let mut compare = |query: &mut QueryBuilder, column: &str| {
         query.push(" AND ");
-        match std::mem::take(&mut finds) {
-            true => query.push(column),
-            false => query.push_unindexed(column),
+        if std::mem::take(&mut finds) {
+            query.push(column)
+        } else {
+            query.push_unindexed(column)
         };
         query.push(" = ");
     };
@@ -608,19 +609,16 @@ pub(super) fn listed(filter: &JobFilter, page: ListRequest) -> QueryBuilder {
         }
     }
     if let Some(moment) = filter.created_after {
-        match narrow {
-            true => {
-                query.push(" AND ").push_unindexed("created_at");
-                query.push(" > ").push_bind(moment);
-            }
-            false => {
-                let times = Times {
-                    table: "jobs",
-                    column: "created_at",
-                    bounds: &[(">", moment)],
-                };
-                push_times(&mut query, &times, &filter.tenant);
-            }
+        if narrow {
+            query.push(" AND ").push_unindexed("created_at");
+            query.push(" > ").push_bind(moment);
+        } else {
+            let times = Times {
+                table: "jobs",
+                column: "created_at",
+                bounds: &[(">", moment)],
+            };
+            push_times(&mut query, &times, &filter.tenant);
         }
     }
     push_tags(&mut query, "", &filter.tenant, Resource::Job, &filter.tags);

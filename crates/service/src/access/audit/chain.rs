@@ -39,7 +39,7 @@ pub enum BrokenLink {
     UnrecordedRemoval(i64),
 }
 
-/// What the check found.
+/// The result of the check.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AuditReport {
     /// Rows that were checked.

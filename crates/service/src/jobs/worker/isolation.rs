@@ -42,7 +42,7 @@ use ventriform::progress::{CancelToken, Monitor, Observer, Stage};
 /// Longest time until the parent notices that the computation was cancelled.
 const CANCEL_POLL: Duration = Duration::from_millis(20);
 
-/// What the child is to compute.
+/// The order to the child process.
 #[derive(Serialize, Deserialize)]
 struct Order {
     kind: String,
@@ -210,9 +210,10 @@ impl Isolation {
             }
         }
         let status = child.0.wait().map_err(broken_pipe)?;
-        Err(match was_told_to_end(status) {
-            true => Ended::Interrupted,
-            false => Ended::Crashed(status.to_string()),
+        Err(if was_told_to_end(status) {
+            Ended::Interrupted
+        } else {
+            Ended::Crashed(status.to_string())
         })
     }
 }

@@ -9,7 +9,7 @@ use crate::jobs::Queue;
 use crate::records::{Claimant, Lease, random_id};
 use std::time::Duration;
 
-/// What renewing a lease showed.
+/// The outcome of renewing a lease.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Renewal {
     /// The job is still ours.

@@ -32,7 +32,7 @@ const STORAGE_PAUSES: (Duration, Duration) = (Duration::from_secs(1), Duration::
 /// Pause before a job waits again whose files cannot be had because their store is away.
 const AWAY_PAUSE: Duration = Duration::from_secs(10);
 
-/// What one worker needs to run jobs.
+/// The parts that one worker needs to run jobs.
 pub(super) struct JobRunner {
     pub queue: Arc<Queue>,
     pub works: Works,
@@ -41,7 +41,7 @@ pub(super) struct JobRunner {
     pub halt: CancellationToken,
 }
 
-/// What the computation returned; the outer error is a panic.
+/// The result of the computation; the outer error is a panic.
 type Computed = std::thread::Result<Result<WorkOutput, Ended>>;
 
 /// How a computation ended without an output.
@@ -84,7 +84,7 @@ enum Stop {
     LeaseLost,
 }
 
-/// What is written about a job when it leaves its worker.
+/// The record of a job when it leaves its worker.
 enum Resolution {
     /// Nothing: another run of the service has the job.
     Nothing,
@@ -363,7 +363,7 @@ impl JobRunner {
         }
     }
 
-    /// What is to be written about a computation that has ended, or was told to stop.
+    /// The record of a computation that has ended, or was told to stop.
     fn resolve(&self, computed: Option<Computed>, stop: Option<Stop>) -> Resolution {
         match (computed, stop) {
             (_, Some(Stop::LeaseLost)) => Resolution::Nothing,
