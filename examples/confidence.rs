@@ -18,7 +18,8 @@ use ventriform::deform::{Evidence, Flag, WallEdge};
 use ventriform::grid::agreement::compare;
 use ventriform::parameters::FitParameters;
 use ventriform::progress::Monitor;
-use ventriform::segmentation::{SegmentationOrder, SegmentedVolume, from_files, report_json};
+use ventriform::report::object;
+use ventriform::segmentation::{SegmentationOrder, SegmentedVolume, from_files};
 use ventriform::volume::given_mask::{MaskChoice, read_mask};
 use ventriform::volume::{ReadLimits, VolumeFile};
 
@@ -88,7 +89,7 @@ fn line(case: &Path) -> Result<String> {
         judged(&anatomical, "lv_truth.nii.gz")?,
     );
     let made = &apparent.segmentation;
-    let report = report_json(made);
+    let report = object(&apparent.report());
     let chances = |evidence: &Evidence| both.map(|edge| of_agreement(evidence, edge));
     let candidates: Vec<_> = (made.candidates.iter())
         .map(|c| json!({"template": c.name, "chances": c.evidence.as_ref().map(chances)}))
