@@ -16,7 +16,6 @@ RUN for crate in . crates/*; do mkdir "$crate/src" && touch "$crate/src/lib.rs" 
 COPY crates crates
 COPY src src
 COPY web/dist web/dist
-COPY web/uptake.json web/
 COPY README.md ./
 # cargo compares modification times: the sources must be newer than the placeholders above.
 RUN find src crates -exec touch {} + \

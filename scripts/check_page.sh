@@ -2,7 +2,8 @@
 # Tests the page in Debian's Chromium: from an upload to a corrected fit, at two widths, light and dark.
 #
 #   scripts/check_page.sh             against a service of its own
-#   scripts/check_page.sh --bundle    also builds web/dist anew and compares it with what is committed
+#   scripts/check_page.sh --bundle    also builds web/dist and the script of reports anew and compares them with what is
+#                                     committed
 #   scripts/check_page.sh NAME        only the checks with NAME in their name
 #
 # The time from a correction to its new contours, with a program built for speed and nothing else running:
@@ -14,8 +15,12 @@ cd "$(dirname "$0")/.."
 # The packages are laid under target/, so that the sources stay clean.
 tools=$PWD/target/test-tools/web
 mkdir -p "$tools"
-rm -rf "$tools/src" "$tools/tests"
-cp -r web/package.json web/package-lock.json web/uptake.json web/tsconfig.json web/vite.config.ts web/index.html web/src web/tests "$tools/"
+assets=crates/ventriform/assets
+built=$tools/../$assets
+rm -rf "$tools/src" "$tools/tests" "$built"
+mkdir -p "$built"
+cp "$assets/uptake.json" "$built/"
+cp -r web/package.json web/package-lock.json web/tsconfig.json web/vite.config.ts web/index.html web/src web/tests "$tools/"
 # Not `npm ci`: it refuses a lock file without the packages for other systems, which npm leaves out where a
 # registry does not have them. What the lock file names is installed in that version.
 if ! cmp -s web/package-lock.json "$tools/installed"; then
@@ -25,7 +30,8 @@ fi
 if [ "${1:-}" = --bundle ]; then
   (cd "$tools" && rm -rf dist && npx tsc --noEmit && npm run --silent build)
   shift
-  diff -r "$tools/dist" web/dist || { echo "web/dist is not what web/src gives: cd web && npm ci && npm run build"; exit 1; }
+  diff -r "$tools/dist" web/dist && diff -r "$built" "$assets" ||
+    { echo "web/dist and $assets are not what web/src gives: cd web && npm ci && npm run build"; exit 1; }
 fi
 rm -rf target/page && mkdir -p target/page
 export PROGRAM=$(realpath -m "${PROGRAM:-target/debug/ventriform}") SCREENSHOTS=$PWD/target/page CHROMIUM=${CHROMIUM:-/usr/bin/chromium}
