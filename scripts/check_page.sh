@@ -2,8 +2,8 @@
 # Tests the page in Debian's Chromium: from an upload to a corrected fit, at two widths, light and dark.
 #
 #   scripts/check_page.sh             against a service of its own
-#   scripts/check_page.sh --bundle    also builds web/dist and the script of reports anew and compares them with what is
-#                                     committed
+#   scripts/check_page.sh --bundle    also makes web/src/generated, web/dist and the script of reports anew and compares
+#                                     them with what is committed
 #   scripts/check_page.sh NAME        only the checks with NAME in their name
 #
 # The time from a correction to its new contours, with a program built for speed and nothing else running:
@@ -20,7 +20,9 @@ built=$tools/../$assets
 rm -rf "$tools/src" "$tools/tests" "$built"
 mkdir -p "$built"
 cp "$assets/uptake.json" "$built/"
-cp -r web/package.json web/package-lock.json web/tsconfig.json web/vite.config.ts web/index.html web/src web/tests "$tools/"
+mkdir -p "$tools/../openapi"
+cp openapi/ventriform.json "$tools/../openapi/"
+cp -r web/package.json web/package-lock.json web/types.mjs web/tsconfig.json web/vite.config.ts web/index.html web/src web/tests "$tools/"
 # Not `npm ci`: it refuses a lock file without the packages for other systems, which npm leaves out where a
 # registry does not have them. What the lock file names is installed in that version.
 if ! cmp -s web/package-lock.json "$tools/installed"; then
@@ -28,6 +30,9 @@ if ! cmp -s web/package-lock.json "$tools/installed"; then
   cp web/package-lock.json "$tools/installed"
 fi
 if [ "${1:-}" = --bundle ]; then
+  (cd "$tools" && npm run --silent types)
+  diff -r "$tools/src/generated" web/src/generated ||
+    { echo "web/src/generated is not what openapi/ventriform.json gives: cd web && npm ci && npm run types"; exit 1; }
   (cd "$tools" && rm -rf dist && npx tsc --noEmit && npm run --silent build)
   shift
   diff -r "$tools/dist" web/dist && diff -r "$built" "$assets" ||
