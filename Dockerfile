@@ -7,16 +7,16 @@ COPY crates/ventriform/Cargo.toml crates/ventriform/
 COPY crates/service/Cargo.toml crates/service/
 COPY crates/store/Cargo.toml crates/store/
 COPY crates/http/Cargo.toml crates/http/
+COPY tools/Cargo.toml tools/
 # Not built, but Cargo.toml declares them and cargo looks for their files.
 COPY benches benches
-RUN for crate in . crates/*; do mkdir "$crate/src" && touch "$crate/src/lib.rs" || exit; done \
+RUN for crate in . crates/* tools; do mkdir "$crate/src" && touch "$crate/src/lib.rs" || exit; done \
  && echo 'fn main() {}' > src/main.rs \
  && cargo build --profile dist --locked --bin ventriform \
  && rm -rf src crates
 COPY crates crates
 COPY src src
 COPY web/dist web/dist
-COPY web/uptake.json web/
 COPY README.md ./
 # cargo compares modification times: the sources must be newer than the placeholders above.
 RUN find src crates -exec touch {} + \

@@ -4,7 +4,7 @@
 #   scripts/check_codecs.sh       some hundred frames, under a minute
 #
 # scripts/check_codecs.py encodes images (RLE, JPEG, JPEG-LS, JPEG 2000, deflated), reads the files by
-# target/debug/examples/voxels, and compares the voxels with the image or with what GDCM, CharLS, OpenJPEG and
+# target/debug/voxels, and compares the voxels with the image or with what GDCM, CharLS, OpenJPEG and
 # libjpeg-turbo decode. Frames that contradict their transfer syntax must be refused. Exits with 1 if anything
 # is wrong.
 #
@@ -23,6 +23,6 @@ if [ -z "${PYTHON:-}" ]; then
     grep -E '^(numpy|pydicom|python-gdcm|imagecodecs|pillow|pylibjpeg-openjpeg)==' scripts/requirements.txt |
       xargs "$PYTHON" -m pip install --quiet --disable-pip-version-check
 fi
-PROGRAM=${PROGRAM:-target/debug/examples/voxels}
-[ -x "$PROGRAM" ] || cargo build --quiet --example voxels --test layering
+PROGRAM=${PROGRAM:-target/debug/voxels}
+[ -x "$PROGRAM" ] || cargo build --quiet --package ventriform-program --package ventriform-tools --bin voxels --test layering
 "$PYTHON" scripts/check_codecs.py "$PROGRAM" "$out"

@@ -6,5 +6,5 @@
 # PYTHON: an interpreter that has numpy and pygeodesic.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-cargo build --quiet --example geodesics
-exec "${PYTHON:-python3}" scripts/check_geodesics.py target/debug/examples/geodesics "$@"
+cargo build --quiet --package ventriform-program --package ventriform-tools --bin geodesics --test layering
+exec "${PYTHON:-python3}" scripts/check_geodesics.py target/debug/geodesics "$@"

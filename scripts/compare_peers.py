@@ -27,7 +27,7 @@ class Bench:
         self.a = arguments
         self.work = arguments.work
         self.ventriform = str(arguments.binaries / "ventriform")
-        self.stopwatch = str(arguments.binaries / "examples" / "stopwatch")
+        self.stopwatch = str(arguments.binaries / "stopwatch")
 
     def phantom(self, side, spacing):
         """The folder of a simulated scan, which is made on the first call."""

@@ -104,7 +104,7 @@ command -v cargo >/dev/null || { echo "cargo not found: install Rust 1.95 or new
 
 # --- the project's own tests ------------------------------------------------------------
 check "format" cargo fmt --check
-check "clippy" cargo clippy --quiet --all-targets -- -D warnings
+check "clippy" cargo clippy --quiet --workspace --all-targets -- -D warnings
 check "library without the service" library_alone
 check "documentation" env RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc --quiet --no-deps --document-private-items
 
@@ -123,7 +123,7 @@ if wait "${running[install]}"; then
   export PYTHON=$tools/python/bin/python NODE_PATH=$tools/node_modules
   # Build once before the checks run in parallel. Naming a test gives the libraries the same features as
   # `cargo test` does.
-  cargo build --quiet --bins --examples --test layering
+  cargo build --quiet --workspace --bins --examples --test layering
   start formats scripts/check_formats.sh
   start geodesics scripts/check_geodesics.sh
   start codecs scripts/check_codecs.sh

@@ -6,8 +6,10 @@ import { brotliCompressSync, constants, gzipSync } from "node:zlib";
 // While developing: `SERVICE=http://127.0.0.1:8080 npm run dev`.
 const service = process.env["SERVICE"] ?? "http://127.0.0.1:8080";
 
-// Script and style of reports are built by `vite build --mode report` into one file each, which the program writes into them.
+// Script and style of reports are built by `vite build --mode report` into one file each, which the library embeds and
+// writes into them.
 const report: BuildOptions = {
+  outDir: "../crates/ventriform/assets",
   target: "es2022",
   emptyOutDir: false,
   lib: { entry: "src/report.tsx", formats: ["iife"], name: "report", fileName: () => "report.js", cssFileName: "report" },
@@ -19,7 +21,7 @@ export default defineConfig(({ mode }) => (mode === "report" ? { build: report, 
   // Files are named relative to the page and to each other: a proxy may show the service under a path.
   base: "./",
   esbuild,
-  server: { proxy: { "/v1": service, "/openapi.json": service, "/docs": service } },
+  server: { proxy: { "/v1": service, "/openapi.json": service, "/docs": service }, fs: { allow: [".", "../crates/ventriform/assets"] } },
   build: {
     target: "es2022",
     assetsDir: "assets",

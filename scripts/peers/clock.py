@@ -13,7 +13,7 @@ import time
 
 
 class Ours:
-    """The example `stopwatch` as a running process; see examples/stopwatch.rs."""
+    """The tool `stopwatch` as a running process; see tools/src/bin/stopwatch.rs."""
 
     def __init__(self, binary, threads=1):
         environment = dict(os.environ, RAYON_NUM_THREADS=str(threads))

@@ -5,10 +5,9 @@ use super::output::json;
 use super::volume_args::volume_files;
 use anyhow::Result;
 use clap::Args;
-use serde_json::Value;
 use std::path::PathBuf;
 use ventriform::progress::Monitor;
-use ventriform::report;
+use ventriform::report::{self, FileFacts};
 use ventriform::volume::{self, ReadOptions};
 use ventriform_service::work::problems::Explain;
 
@@ -39,8 +38,8 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     let first = ReadOptions { frame: Some(0) };
     let from = volume::provenance(&files, &first, &limits, &monitor)
         .map_err(|error| anyhow::anyhow!(error.with_advice()))?;
-    let mut shown = report::input(&facts);
-    if let (Value::Object(shown), Some(from)) = (&mut shown, from) {
+    let mut shown = report::object(&FileFacts::of(&facts));
+    if let Some(from) = from {
         shown.insert("dicom".into(), serde_json::to_value(from)?);
     }
     json(&serde_json::to_string_pretty(&shown)?);

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use ventriform::grid::agreement::compare;
 use ventriform::mesh_files::{MeshFileError, MeshStatement};
 use ventriform::progress::Monitor;
-use ventriform::segmentation::agreement_json;
+use ventriform::report::AgreementReport;
 use ventriform::volume::given_mask::{GivenMask, GivenMaskError, MaskChoice, MaskLabel, read_mask};
 use ventriform::volume::{VolumeError, VolumeFile};
 use ventriform_service::work::problems::Explain;
@@ -109,7 +109,9 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
         (&placed.mask, &holder.mask)
     };
     let agreement = compare(judged, reference, spacing, &monitor)?;
-    json(&serde_json::to_string_pretty(&agreement_json(&agreement))?);
+    json(&serde_json::to_string_pretty(&AgreementReport::of(
+        &agreement,
+    ))?);
     Ok(())
 }
 

@@ -126,9 +126,9 @@ fn a_model_of_a_label_has_the_volume_of_its_voxels_alone() {
             let label = label.to_string();
             let model = make(&[("label", &label), ("points", "400")]).unwrap();
             let found = model.mesh.volume() / 1000.0;
-            let facts = &model.report.surface.facts;
-            assert_eq!(facts["label"].to_string(), label);
-            assert!((facts["mask_ml"].as_f64().unwrap() / wanted - 1.0).abs() < 1e-6);
+            let facts = &model.report.surface;
+            assert_eq!(facts.label.unwrap().to_string(), label);
+            assert!((facts.mask_ml.unwrap() / wanted - 1.0).abs() < 1e-6);
             // Also where coarse voxels tear the small cup, and topology control closes it.
             let surface = model.report.surface.volume_ml;
             for (volume, most) in [(surface, 0.01), (found, 0.02)] {

@@ -6,19 +6,24 @@
 #![allow(clippy::needless_update)]
 
 use base64::Engine;
+use nalgebra::Matrix3;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use ventriform::geometry::Vec3;
+use ventriform::geometry::frame::VoxelToPatient;
+use ventriform::grid::Volume;
 use ventriform::mesh::{TriMesh, shapes};
 use ventriform::optimise::{
     FitnessForm, FitnessSummary, OptimiseFacts, OptimiseParameters, Optimised, Reference,
 };
 use ventriform::progress::Monitor;
 use ventriform::report::{
-    Closeness, MeasureParameters, ModelReport, ReportInput, StartSummary, measure, model_page,
+    Closeness, FileFacts, MeasureParameters, ModelReport, ReportInput, StartSummary, measure,
+    model_page, object,
 };
 use ventriform::retile::{RetileFacts, Tiled};
 use ventriform::surface::Surface;
+use ventriform::volume::describe;
 
 const HOSTILE: &str = "</script><img src=x onerror=alert(1)>\"'&";
 
@@ -33,6 +38,15 @@ fn fitness(normalised: f64) -> FitnessSummary {
     FitnessSummary {
         normalised,
         ..FitnessSummary::default()
+    }
+}
+
+fn volume() -> Volume {
+    Volume {
+        shape: [2; 3],
+        voxels: vec![1.0; 8],
+        frame: VoxelToPatient::new(Matrix3::identity(), Vec3::zeros()).unwrap(),
+        integral: true,
     }
 }
 
@@ -62,8 +76,11 @@ fn report(model: &TriMesh) -> ModelReport {
         facts: OptimiseFacts::default(),
     };
     ModelReport::new(ReportInput {
-        input: json!({ "name": HOSTILE }),
-        parameters: json!({ "points": model.vertices.len(), "seed": 1 }),
+        input: FileFacts {
+            data_type: HOSTILE.to_owned(),
+            ..FileFacts::of(&describe(&volume()).unwrap())
+        },
+        parameters: object(&json!({ "points": model.vertices.len(), "seed": 1 })),
         surface: &surface,
         tiled: &tiled,
         optimised: &optimised,

@@ -1,89 +1,24 @@
 // Requests to the service, with the key of the caller and with problems as the service words them.
 
 import { at } from "./base";
+import type { Download, Job as AnyJob, Model, ModelSummary, Problem, Segmentation, SegmentationSummary } from "./generated/openapi";
 import { saveBlob } from "./save";
 import { Watched } from "./state";
 
-export interface Problem {
-  type: string;
-  title: string;
-  status: number;
-  detail: string;
-  field?: string | null;
-  fix?: string | null;
-}
-
-export interface FileOfResult {
-  name: string;
-  href: string;
-  media_type: string;
-  bytes: number;
-}
-
-export interface Volume {
-  id: string;
-  created_at: string;
-  external_id?: string | null;
-  labels: Record<string, string>;
-  legal_hold?: unknown;
-  /** Whose scan it is, as far as the caller may see it. */
-  dicom?: Record<string, string | null> | null;
-  bytes: number;
-  files: number;
-  originals: FileOfResult[];
-  format: string;
-  shape: number[];
-  frames: number;
-  spacing_mm: number[];
-  label_values?: number[] | null;
-  warnings: string[];
-  links: { self: string; preview: string; content: string };
-}
-
-export type JobState = "queued" | "running" | "succeeded" | "failed" | "cancelled";
+export type { JobState, Problem, Volume } from "./generated/openapi";
+export type FileOfResult = Download;
+/** The page files and shows two kinds of work. */
+export type Job = AnyJob & { kind: "model" | "segmentation" };
 
 export type ParameterValue = string | number | boolean | (number | string)[];
 export type Parameters = Record<string, ParameterValue | null>;
 
-export interface Job {
-  id: string;
-  external_id?: string | null;
-  labels: Record<string, string>;
-  kind: "model" | "segmentation";
-  volume: string;
+/** A model, a segmentation or a template; which of them, its id says. */
+export type Result = Pick<Model | Segmentation, "id" | "created_at" | "volume" | "files"> & {
   parameters: Parameters;
-  state: JobState;
-  stage?: string | null;
-  progress: number;
-  queue_position?: number | null;
-  estimated_start?: string | null;
-  revision: number;
-  created_at: string;
-  finished_at?: string | null;
-  error?: Problem | null;
-  model?: string | null;
-  segmentation?: string | null;
-  links: { self: string; events: string; volume: string };
-}
-
-export interface Flag {
-  [name: string]: unknown;
-}
-
-export interface Walls {
-  wall: number;
-  cavity: number;
-}
-
-export interface Result {
-  id: string;
-  created_at: string;
-  volume: string;
-  parameters: Parameters;
-  summary: Record<string, unknown>;
-  files: FileOfResult[];
-  links: Record<string, string>;
-}
+  summary: Partial<ModelSummary & SegmentationSummary>;
+  links: Pick<Model["links"], "self" | "mesh"> & Partial<Model["links"]>;
+};
 
 export class ProblemError extends Error {
   constructor(readonly problem: Problem) {

@@ -19,10 +19,10 @@ interface Wanted {
 }
 
 function filesOf(volume: Volume, result: Result, folder: string): Wanted[] {
-  const page = result.links["page"];
+  const page = result.links.page;
   const files = result.files.map(file => ({ name: `${folder}/${file.name}`, path: file.href }));
   // DICOM objects are made when they are asked for. Of a scan that is not DICOM nobody knows whose they would be.
-  const objects = !volume.dicom ? [] : [(result.links as Record<string, string | string[]>)["dicom"] ?? []].flat();
+  const objects = !volume.dicom ? [] : result.links.dicom ?? [];
   const made = objects.map(path => ({ name: `${folder}/${path.slice(path.lastIndexOf("/") + 1)}`, path, object: true }));
   return [...files, ...(page ? [{ name: `${folder}/report.html`, path: page }] : []), ...made];
 }

@@ -17,7 +17,10 @@ export function JobLine({ job, onChange }: { job: Job; onChange?: ((job: Job) =>
   const [problem, setProblem] = useState("");
   const what = job.kind === "model" ? "Model" : "Fit";
   const act = (go: () => Promise<void>) => () => void go().catch((error: unknown) => setProblem(words(error)));
-  const change = () => (onChange ? onChange(job) : open(job.volume, job.id));
+  const change = () => {
+    if (onChange) onChange(job);
+    else if (job.volume) open(job.volume, job.id);
+  };
   return (
     <div class={`job ${job.state}`}>
       <span class="what">{what}</span>

@@ -1,7 +1,7 @@
 // The list of scans: what is being sent, what is stored, what was made of it.
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { type Job, type Result, type Volume, type Walls, words } from "./api";
+import { type Job, type Result, type Volume, words } from "./api";
 import { Confirm } from "./confirm";
 import { useDrop } from "./drop";
 import { JobLine, Trouble } from "./jobline";
@@ -292,10 +292,10 @@ function ScanRow({ row: { volume, results, open: openJobs } }: { row: Row }) {
 
 function figures(result: Result) {
   const { summary } = result;
-  if (!isFit(result.id)) return <span>distance {number(summary["distance_mean_mm"], 2, "mm")}</span>;
-  const given = summary["volumes_ml"] as (Walls & { anatomical?: Walls }) | undefined;
+  if (!isFit(result.id)) return <span>distance {number(summary.distance_mean_mm, 2, "mm")}</span>;
+  const given = summary.volumes_ml;
   const volumesMl = given?.anatomical ?? given;
-  const flags = (summary["flags"] as unknown[] | undefined)?.length ?? 0;
+  const flags = summary.flags?.length ?? 0;
   return (
     <>
       <span>cavity {number(volumesMl?.cavity, 0, "ml")}, wall {number(volumesMl?.wall, 0, "ml")}</span>

@@ -34,8 +34,8 @@ body_of_product!(
     ModelBody,
     Model,
     ModelLinks,
-    openapi::ModelParametersObject,
-    openapi::ModelSummarySchema,
+    ventriform::parameters::ModelParameters,
+    ventriform::report::ModelSummary,
     "Counts and main figures; the report has all figures.",
     "mdl_2c26b46b68ffc68ff99b453c1d304134"
 );

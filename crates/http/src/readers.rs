@@ -50,7 +50,7 @@ pub struct ReaderBody {
     /// Its name.
     name: String,
     /// What the profile holds.
-    #[schema(value_type = openapi::ReaderSummarySchema)]
+    #[schema(value_type = ventriform::report::ReaderSummary)]
     summary: Map<String, Value>,
     /// The program that added it.
     software: SoftwareBody,
@@ -96,7 +96,7 @@ impl From<Presented> for ReaderBody {
 /// draws the wall as that reader would. The same profile is added only once. Retention never erases
 /// readers.
 #[utoipa::path(post, path = "/v1/readers", tag = "readers",
-    request_body(content = openapi::ReaderProfileSchema, content_type = "application/json"),
+    request_body(content = ventriform::reader::ProfileDocument, content_type = "application/json"),
     params(openapi::ReaderQuery),
     responses(
         (status = 201, description = "Added", body = ReaderBody,

@@ -54,8 +54,8 @@ body_of_product!(
     SegmentationBody,
     Segmentation,
     SegmentationLinks,
-    openapi::SegmentationParametersObject,
-    openapi::SegmentationSummarySchema,
+    ventriform::parameters::FitParameters,
+    ventriform::report::SegmentationSummary,
     "The chosen model and the merit of every candidate, why the fit stopped, its confidence, \
      volumes, agreement with the expert's mask, and warnings; the report has all figures.",
     "seg_2c26b46b68ffc68ff99b453c1d304134"

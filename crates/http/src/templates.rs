@@ -60,7 +60,7 @@ pub struct TemplateBody {
     /// Whether every `model=auto` fits it. Otherwise only jobs that name it do.
     library: bool,
     /// Counts and main figures.
-    #[schema(value_type = openapi::TemplateSummarySchema)]
+    #[schema(value_type = ventriform::report::TemplateSummary)]
     summary: Map<String, Value>,
     /// The program that added it.
     software: SoftwareBody,

@@ -1,6 +1,6 @@
 // Colour maps: 256 colours each, from a few anchors.
 
-import uptake from "../../uptake.json";
+import uptake from "../../../crates/ventriform/assets/uptake.json";
 
 export type Lut = Uint8Array;
 

@@ -10,6 +10,7 @@ import type { Loaded } from "./loaded";
 import { frameOf } from "./plane";
 import { WallFrame } from "./polar";
 import type { Edit, Scene } from "./scene";
+import type { Triple } from "./shown";
 import { type Vec, add, dot, scale, sub, turned, unit } from "./vector";
 
 interface Props {
@@ -25,7 +26,7 @@ const HALF_LENGTH = 36;
 function start(scene: Scene, shown: Loaded | null): Edit {
   const heart = shown?.heart;
   if (heart) {
-    const center = shown.report?.localisation?.centre ?? shown.middle;
+    const center = (shown.report?.localisation?.centre as Triple | undefined) ?? shown.middle;
     // The plane of the base is that of the rim, as the service counts it.
     const { base } = new WallFrame(shown.mesh, heart, 1, 1);
     return { base, apex: heart.apex, center, roll: 0, changed: new Set() };

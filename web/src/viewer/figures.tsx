@@ -5,13 +5,14 @@ import { useState } from "preact/hooks";
 import { type Result, type Volume, key, save, words } from "../api";
 import { fileNameOf, saveResult } from "../bundle";
 import { bytes, isFit, moment, number, resultName } from "../words";
-import type { FitReport, Loaded } from "./loaded";
+import type { Agreement, ModelSummary, SegmentationReport } from "../generated/openapi";
+import type { Loaded } from "./loaded";
 
 type Row = [string, (loaded: Loaded) => number | null | undefined, number, string];
 
-const of = (read: (report: FitReport) => number | null | undefined) => (loaded: Loaded) => loaded.report && read(loaded.report);
-const summary = (name: string) => (loaded: Loaded) => loaded.result.summary[name] as number | undefined;
-const measure = (name: string) => of(report => report.measures?.[name]);
+const of = (read: (report: SegmentationReport) => number | null | undefined) => (loaded: Loaded) => loaded.report && read(loaded.report);
+const summary = (name: keyof ModelSummary) => (loaded: Loaded) => loaded.result.summary[name];
+const measure = (name: keyof Agreement) => of(report => report.measures?.[name]);
 
 const FIT: [string, Row[]][] = [
   ["", [
@@ -53,7 +54,7 @@ export function headlines(shown: Loaded): [string, string][] {
 }
 
 /** How likely the fit is good, and every reason to doubt it. */
-export function Verdict({ report }: { report: FitReport }) {
+export function Verdict({ report }: { report: SegmentationReport }) {
   const { confidence } = report.fit;
   return (
     <div class={report.flags.length ? "verdict doubt" : "verdict"}>
@@ -106,7 +107,7 @@ export function Downloads({ result, volume }: { result: Result; volume: Volume }
   const [state, setState] = useState("");
   const name = fileNameOf(volume);
   const failed = (error: unknown) => setState(words(error));
-  const page = result.links["page"];
+  const page = result.links.page;
   return (
     <section class="downloads" aria-label="Downloads">
       <div class="buttons">

@@ -1,35 +1,15 @@
 // A result with all that the views draw of it.
 
-import { type FileOfResult, type Result, type Volume, type Walls, call, get } from "../api";
+import { type FileOfResult, type Result, type Volume, call, get } from "../api";
+import type { Closeness, PolarMap, SegmentationReport } from "../generated/openapi";
 import { isFit } from "../words";
 import type { Mesh } from "./mesh";
-import type { PolarMap } from "./polar";
-import { type Placed, type Shown, type Triple, byVertex, heartOf, middleOf, wallNames } from "./shown";
+import { type Shown, byVertex, heartOf, middleOf, wallNames } from "./shown";
 import { type Voxels, unpackNifti } from "./volume";
-
-/** What the page reads of a fit's report. */
-export interface FitReport extends Placed {
-  template: string;
-  choice: string;
-  localisation?: { centre: Triple; axis: Triple; confidence: number };
-  fit: Placed["fit"] & { confidence: number | null };
-  volumes_ml: { wall: number; cavity: number | null; apparent?: Walls; anatomical?: Walls };
-  mass_g?: number | null;
-  thickness_mm?: { apparent: Spread; anatomical: Spread };
-  measures?: Record<string, number> | null;
-  polar?: { extent_percent: number; threshold_percent: number; orientation: string };
-  flags: { code: string; reason: string }[];
-  warnings: string[];
-}
-
-interface Spread {
-  mean: number;
-  spread: number;
-}
 
 export interface Loaded extends Shown {
   result: Result;
-  report: FitReport | null;
+  report: SegmentationReport | null;
 }
 
 const keptVoxels = new Map<string, Promise<Voxels>>();
@@ -80,12 +60,12 @@ export async function loadLoaded(result: Result): Promise<Loaded> {
   const [mesh, inner, report, polar, mask, expert, distance] = await Promise.all([
     get<Mesh>(meshFile.href),
     otherEdge ? get<Mesh>(otherEdge.href) : null,
-    fit ? json<FitReport>("report.json") : null,
+    fit ? json<SegmentationReport>("report.json") : null,
     json<PolarMap>("polar.json"),
     maskFile ? kept(maskFile.href) : null,
     // The expert's mask may have been erased since; the fit is shown all the same.
     typeof expertId === "string" ? expertOf(expertId, result.parameters).catch(() => null) : null,
-    fit ? null : json<{ parts: number; distances_mm: number[] }>("distance.json"),
+    fit ? null : json<Closeness>("distance.json"),
   ]);
   const heart = report && heartOf(report);
   return {

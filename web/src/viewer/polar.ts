@@ -1,33 +1,10 @@
 // The polar map of the service, drawn, and the places of the wall that its pixels show.
 
+import type { PolarMap, PolarSegment } from "../generated/openapi";
 import { type Lut, NO_WALL, colour, thresholdOn } from "./colours";
 import type { Mesh } from "./mesh";
 import { type Axis, frameOf } from "./plane";
 import { type Vec, add, dot, scale, sub } from "./vector";
-
-export interface PolarSegment {
-  number: number;
-  name: string;
-  territory: string | null;
-  mean_percent: number | null;
-  extent_percent: number;
-}
-
-export interface PolarMap {
-  threshold_percent: number;
-  extent_percent: number;
-  note: string;
-  segments: PolarSegment[];
-  territories: { name: string; mean_percent: number | null; extent_percent: number }[];
-  rows: number;
-  columns: number;
-  orientation: string;
-  values_percent: (number | null)[][];
-  segment_of: number[][];
-  /** The rows at which the levels of every column end, and the shares of the radius at which they are drawn to end. */
-  level_ends?: number[][];
-  rings?: number[];
-}
 
 /** Apex, apical, mid and basal, in maps that do not say how wide they are. */
 const RINGS = [1 / 4, 2 / 4, 3 / 4, 1];

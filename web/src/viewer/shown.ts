@@ -1,8 +1,8 @@
 // What the views draw of a result, whether the service or a self-contained report holds it.
 
+import type { Closeness, Fit, PolarMap, PolarSummary, Posture } from "../generated/openapi";
 import type { Mesh } from "./mesh";
 import type { Axis } from "./plane";
-import type { PolarMap } from "./polar";
 import type { Layer } from "./scene";
 import type { Vec } from "./vector";
 import type { Voxels } from "./volume";
@@ -10,13 +10,14 @@ import type { Voxels } from "./volume";
 /** Millimetres that slices show at first once the heart is known. */
 export const HEART_WIDTH = 140;
 
+/** A point or a direction in a document, whose type does not say that it has three numbers. */
 export type Triple = [number, number, number];
 
 /** What a fit's report says of the place of the heart. */
 export interface Placed {
-  fit: { long_axis?: { base: Triple; apex: Triple } | null; displacement_mm?: number[] };
-  posture?: { superior: Triple } | null;
-  polar?: { orientation: string } | null;
+  fit: Pick<Fit, "long_axis">;
+  posture?: Pick<Posture, "superior"> | null;
+  polar?: Pick<PolarSummary, "orientation"> | null;
 }
 
 export interface Shown {
@@ -39,7 +40,7 @@ export interface Shown {
 export function heartOf({ fit, posture, polar }: Placed): Axis | null {
   const axis = fit.long_axis;
   const known = polar?.orientation !== "unknown";
-  return axis ? { base: axis.base, apex: axis.apex, superior: (known && posture?.superior) || null, roll: 0 } : null;
+  return axis ? { base: axis.base as Triple, apex: axis.apex as Triple, superior: (known && (posture?.superior as Triple)) || null, roll: 0 } : null;
 }
 
 /** The middle of the heart's axis, or else of the vertices. */
@@ -56,7 +57,7 @@ export function wallNames(edge: unknown, both: boolean, fit: boolean): [string, 
 }
 
 /** Distances are given for equal parts of each triangle; a vertex gets the mean of its triangles. */
-export function byVertex(mesh: Mesh, { parts, distances_mm }: { parts: number; distances_mm: number[] }): Float32Array {
+export function byVertex(mesh: Mesh, { parts, distances_mm }: Closeness): Float32Array {
   const each = parts * parts;
   const sums = new Float32Array(mesh.vertices.length);
   const counts = new Float32Array(mesh.vertices.length);

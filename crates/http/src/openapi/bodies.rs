@@ -1,6 +1,6 @@
 //! Request bodies that the handlers read piece by piece, so that no Rust type describes them.
 
-use super::inputs::{ModelParametersObject, SegmentationParametersObject, priority_field};
+use super::inputs::priority_field;
 use crate::tags;
 use serde_json::json;
 use std::borrow::Cow;
@@ -11,6 +11,7 @@ use utoipa::openapi::schema::{
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 use ventriform::export::dicom::DicomObject;
+use ventriform::parameters::{FitParameters, ModelParameters};
 use ventriform_service::hooks::HookEvent;
 use ventriform_service::records::LegalHold;
 
@@ -23,15 +24,9 @@ impl ToSchema for JobRequest {
     }
 
     fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
-        schemas.push((
-            ModelParametersObject::name().into(),
-            ModelParametersObject::schema(),
-        ));
+        schemas.push((ModelParameters::name().into(), ModelParameters::schema()));
         schemas.push((JobParameters::name().into(), JobParameters::schema()));
-        schemas.push((
-            SegmentationParametersObject::name().into(),
-            SegmentationParametersObject::schema(),
-        ));
+        schemas.push((FitParameters::name().into(), FitParameters::schema()));
         schemas.push((WebhookRequest::name().into(), WebhookRequest::schema()));
         let own = [
             (VolumeJobRequest::name(), VolumeJobRequest::schema()),
@@ -282,8 +277,8 @@ impl ToSchema for JobParameters {
 impl PartialSchema for JobParameters {
     fn schema() -> RefOr<Schema> {
         let parameters = AnyOfBuilder::new()
-            .item(Ref::from_schema_name(ModelParametersObject::name()))
-            .item(Ref::from_schema_name(SegmentationParametersObject::name()));
+            .item(Ref::from_schema_name(ModelParameters::name()))
+            .item(Ref::from_schema_name(FitParameters::name()));
         Schema::AnyOf(parameters.build()).into()
     }
 }

@@ -1,13 +1,15 @@
 //! The last steps on the collected document. They work on its JSON, because they touch every
 //! operation alike.
 //!
-//! 1. A path `.../{file}` becomes one path per file, so that each file has one media type and one
+//! 1. A struct that serde flattens into another one is described by the fields of the other. Whole numbers have
+//!    64 bits.
+//! 2. A path `.../{file}` becomes one path per file, so that each file has one media type and one
 //!    schema. Generators of clients choose how to read an answer by its first media type.
-//! 2. Bytes become `type: string, format: binary`. OpenAPI 3.1 would express them by a schema
+//! 3. Bytes become `type: string, format: binary`. OpenAPI 3.1 would express them by a schema
 //!    without a type, which generators read as "anything".
-//! 3. Every operation gets examples: those of `examples.json`, recorded from a running service by
+//! 4. Every operation gets examples: those of `examples.json`, recorded from a running service by
 //!    `scripts/check_contract.py`, and a command line for curl.
-//! 4. Every operation takes `X-Request-Id`.
+//! 5. Every operation takes `X-Request-Id`.
 
 use super::answers::media_type_of;
 use crate::files::PAGE;
@@ -20,6 +22,8 @@ const RECORDED_EXAMPLES: &str = include_str!("examples.json");
 
 /// Completes `document`.
 pub fn finish(document: &mut Value) {
+    flatten(&mut document["components"]["schemas"]);
+    with_width(&mut document["components"]["schemas"]);
     one_path_per_file(document);
     let recorded = serde_json::from_str(RECORDED_EXAMPLES).expect("examples.json is an object");
     let problems = problem_examples(&recorded);
@@ -46,6 +50,73 @@ pub fn finish(document: &mut Value) {
         "description": "Names the request in the log; the answer repeats it",
         "schema": {"type": "string"},
     }});
+}
+
+/// Documents with a part that serde flattens. utoipa describes them as `allOf`, of which generators of clients make
+/// several types.
+const FLATTENED: [&str; 2] = ["MeshFacts", "PolarMap"];
+
+/// Joins the parts of the [`FLATTENED`] schemas, and drops parts that nothing else names.
+fn flatten(schemas: &mut Value) {
+    for name in FLATTENED {
+        let mut whole = json!({
+            "type": "object",
+            "description": schemas[name]["description"],
+            "required": [],
+            "properties": {},
+        });
+        let parts = schemas[name]["allOf"].as_array().cloned();
+        let mut named = Vec::new();
+        for part in parts.iter().flatten() {
+            let path = part["$ref"]
+                .as_str()
+                .and_then(|path| path.rsplit('/').next());
+            join(&mut whole, path.map_or(part, |name| &schemas[name]));
+            named.extend(path);
+        }
+        schemas[name] = whole;
+        let text = schemas.to_string();
+        if let Some(all) = schemas.as_object_mut() {
+            all.retain(|name, _| {
+                !named.contains(&name.as_str())
+                    || text.contains(&format!("#/components/schemas/{name}\""))
+            });
+        }
+    }
+}
+
+/// Adds the fields of `part` to those of `whole`.
+fn join(whole: &mut Value, part: &Value) {
+    for (name, field) in part["properties"].as_object().into_iter().flatten() {
+        whole["properties"][name] = field.clone();
+    }
+    let required = part["required"].as_array().into_iter().flatten();
+    if let Some(all) = whole["required"].as_array_mut() {
+        all.extend(required.cloned());
+    }
+}
+
+/// Says of every whole number without a width that it has 64 bits: utoipa does not say it of `usize`. Parameters
+/// have ranges instead.
+fn with_width(schema: &mut Value) {
+    match schema {
+        Value::Object(fields) => {
+            let kind = fields.get("type");
+            let whole = kind.is_some_and(|kind| {
+                kind == "integer"
+                    || kind
+                        .as_array()
+                        .is_some_and(|all| all.contains(&json!("integer")))
+            });
+            let bounded = fields.contains_key("maximum") || fields.contains_key("default");
+            if whole && !bounded && fields.contains_key("minimum") {
+                fields.entry("format").or_insert("int64".into());
+            }
+            fields.values_mut().for_each(with_width);
+        }
+        Value::Array(items) => items.iter_mut().for_each(with_width),
+        _ => {}
+    }
 }
 
 /// Path, method and content of every operation.

@@ -1,73 +1,32 @@
 //! Parameters that several handlers share, and those that come from the tables of parameters.
 
-use serde_json::{Value, json};
-use std::borrow::Cow;
+use serde_json::json;
+use utoipa::IntoParams;
 use utoipa::openapi::path::{Parameter, ParameterBuilder, ParameterIn, ParameterStyle};
-use utoipa::openapi::schema::{
-    AdditionalProperties, ArrayBuilder, Object, ObjectBuilder, Schema, SchemaType, Type,
-};
+use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, Schema, SchemaType, Type};
 use utoipa::openapi::{RefOr, Required};
-use utoipa::{IntoParams, PartialSchema, ToSchema};
 use ventriform::export::Part;
 use ventriform::parameters::{
-    FIT_SPECS, FitParameters, Kind, ModelParameters, ParameterSpec, Parameters,
+    FIT_SPECS, FitParameters, Kind, ModelParameters, Parameters, schema_of,
 };
 use ventriform_service::records::Priority;
 
-/// Declares two types that document a table of parameters: as a JSON object, and as query
-/// parameters.
-macro_rules! parameters {
-    ($object:ident, $name:literal, $query:ident, $table:ty, $what:literal) => {
-        #[doc = concat!("Parameters of a ", $what, " as a JSON object.")]
-        pub struct $object;
+/// Parameters of a model as query parameters.
+pub struct ModelQuery;
 
-        impl ToSchema for $object {
-            fn name() -> Cow<'static, str> {
-                $name.into()
-            }
-        }
-
-        impl PartialSchema for $object {
-            fn schema() -> RefOr<Schema> {
-                object_of::<$table>(concat!("The parameters of a ", $what))
-            }
-        }
-
-        #[doc = concat!("Parameters of a ", $what, " as query parameters.")]
-        pub struct $query;
-
-        impl IntoParams for $query {
-            fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-                query_of::<$table>()
-            }
-        }
-    };
+impl IntoParams for ModelQuery {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        query_of::<ModelParameters>()
+    }
 }
 
-parameters!(
-    ModelParametersObject,
-    "ModelParameters",
-    ModelQuery,
-    ModelParameters,
-    "model"
-);
-parameters!(
-    SegmentationParametersObject,
-    "SegmentationParameters",
-    SegmentationQuery,
-    FitParameters,
-    "segmentation"
-);
+/// Parameters of a segmentation as query parameters.
+pub struct SegmentationQuery;
 
-fn object_of<P: Parameters>(description: &str) -> RefOr<Schema> {
-    let object = P::SPECS
-        .iter()
-        .fold(ObjectBuilder::new(), |object, spec| {
-            object.property(spec.name, schema_of(spec))
-        })
-        .description(Some(description))
-        .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
-    Schema::from(object.build()).into()
+impl IntoParams for SegmentationQuery {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        query_of::<FitParameters>()
+    }
 }
 
 fn query_of<P: Parameters>() -> Vec<Parameter> {
@@ -84,90 +43,6 @@ fn query_of<P: Parameters>() -> Vec<Parameter> {
             parameter.build()
         })
         .collect()
-}
-
-fn schema_of<P: Parameters>(spec: &ParameterSpec<P>) -> Schema {
-    let object = ObjectBuilder::new()
-        .description(Some(spec.summary))
-        .default(default_of(spec));
-    match spec.kind {
-        Kind::Integer { min, max } => {
-            let object = object
-                .schema_type(Type::Integer)
-                .minimum(Some(min as usize));
-            match max {
-                u64::MAX => object,
-                _ => object.maximum(Some(max as usize)),
-            }
-            .into()
-        }
-        Kind::Number { min, max } => object
-            .schema_type(Type::Number)
-            .minimum(Some(min))
-            .maximum(Some(max))
-            .into(),
-        Kind::Switch => object.schema_type(Type::Boolean).into(),
-        Kind::Choice(words) => object
-            .schema_type(Type::String)
-            .enum_values(Some(words.iter().copied()))
-            .into(),
-        Kind::Direction(words) => {
-            let number = r"[+-]?[0-9]{1,9}(\.[0-9]{1,9})?";
-            let words = words.join("|");
-            object
-                .schema_type(Type::String)
-                .pattern(Some(format!("^({words}|{number},{number},{number})$")))
-                .examples([spec.default, "0,0,1"])
-                .into()
-        }
-        Kind::Integers { count } => list_of(Type::Integer, count, spec.summary),
-        Kind::Numbers { count } => list_of(Type::Number, count, spec.summary),
-        Kind::Stored {
-            prefixes,
-            word,
-            more,
-        } => {
-            let id = format!("({})[0-9a-f]{{1,64}}", prefixes.join("|"));
-            let pattern = match (word, more) {
-                ("", _) => format!("^{id}$"),
-                (_, 0) => format!("^({word}|{id})$"),
-                _ => format!("^({word}(,{id}){{0,{more}}}|{id})$"),
-            };
-            object
-                .schema_type(Type::String)
-                .pattern(Some(pattern))
-                .into()
-        }
-        Kind::Text { pattern, example } => object
-            .schema_type(Type::String)
-            .pattern(Some(pattern))
-            .examples([example])
-            .into(),
-    }
-}
-
-fn list_of(kind: Type, count: usize, summary: &str) -> Schema {
-    Schema::Array(
-        ArrayBuilder::new()
-            .description(Some(summary))
-            .items(Object::with_type(kind))
-            .min_items(Some(count))
-            .max_items(Some(count))
-            .build(),
-    )
-}
-
-fn default_of<P: Parameters>(spec: &ParameterSpec<P>) -> Option<Value> {
-    if spec.default.is_empty() {
-        return None;
-    }
-    Some(match spec.kind {
-        Kind::Integer { .. } | Kind::Number { .. } => {
-            serde_json::from_str(spec.default).unwrap_or(json!(spec.default))
-        }
-        Kind::Switch => json!(spec.default == "true"),
-        _ => json!(spec.default),
-    })
 }
 
 /// `limit` and `cursor`.

@@ -1,6 +1,7 @@
 //! The building blocks of the published document, OpenAPI 3.1.
 //!
-//! The handlers' attributes describe most of it. This folder adds what attributes cannot say:
+//! The handlers' attributes describe most of it; the library describes its documents (`ventriform::report`), by
+//! its feature `schema`. This folder adds what attributes cannot say:
 //!
 //! | file | what it describes |
 //! |---|---|
@@ -9,7 +10,6 @@
 //! | [`answers`] | answers and problems that several handlers share |
 //! | [`access`] | credentials, and how requests are refused before any handler |
 //! | [`operation`] | operations of handlers that serve several kinds of things |
-//! | [`reports`] | JSON files and summaries that jobs write |
 //! | [`finish`] | the last steps on the whole document: one path per file, bytes, examples |
 //!
 //! [`publish`] completes the document that the routes have collected.
@@ -20,7 +20,6 @@ mod bodies;
 mod finish;
 mod inputs;
 mod operation;
-mod reports;
 
 pub use answers::{
     DicomProblems, DownloadAnswers, EraseProblems, EventsAnswer, FileProblems, HoldProblems,
@@ -35,16 +34,11 @@ pub use bodies::{
 };
 pub use inputs::{
     CachedHeaders, CascadeParameter, ConditionalHeaders, DeidentifyParameter, ErasureParameters,
-    EventHeader, IdempotencyHeader, MaskParameters, ModelParametersObject, ModelQuery,
-    PageParameters, PartParameter, PreferHeader, PriorityParameter, ReaderQuery, ScanParameters,
-    SegmentationParametersObject, SegmentationQuery, TagParameters, TemplateQuery,
-    TransactionParameters, WebhookInputs,
+    EventHeader, IdempotencyHeader, MaskParameters, ModelQuery, PageParameters, PartParameter,
+    PreferHeader, PriorityParameter, ReaderQuery, ScanParameters, SegmentationQuery, TagParameters,
+    TemplateQuery, TransactionParameters, WebhookInputs,
 };
 pub use operation::Documented;
-pub use reports::{
-    ModelSummarySchema, ReaderProfileSchema, ReaderSummarySchema, ScanSchema,
-    SegmentationSummarySchema, TemplateSummarySchema,
-};
 
 use utoipa::OpenApi;
 use utoipa::openapi::{RefOr, Required};
@@ -78,10 +72,10 @@ use utoipa::openapi::{RefOr, Required};
     components(schemas(
         super::problem::ProblemBody,
         bodies::MeshDocument,
-        reports::ModelReportSchema,
-        reports::ClosenessSchema,
-        reports::SegmentationReportSchema,
-        reports::PolarMapSchema,
+        ventriform::report::ModelReport,
+        ventriform::report::Closeness,
+        ventriform::report::SegmentationReport,
+        ventriform::polar::PolarDocument,
     ))
 )]
 pub struct DocumentFrame;

@@ -27,6 +27,7 @@ use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::grid::voxelise::{Mask, voxelise};
 use ventriform::mesh::TriMesh;
 use ventriform::progress::Monitor;
+use ventriform::report::SegmentationReport;
 use ventriform::segmentation::cavity;
 use ventriform::volume::dicom::Provenance;
 use ventriform::volume::{self, AffineSource, ReadLimits, ReadOptions, VolumeFile};
@@ -131,27 +132,43 @@ pub fn object(
     if mask.shape != facts.shape {
         return Err(broken_result(&"mask and volume differ in size"));
     }
-    let report: Value = serde_json::from_slice(&required(item, "report.json")?)
-        .map_err(|error| broken_result(&error))?;
-    let pictures = [read(item, "slices.png")?, read(item, "polar.png")?];
-    let [slices, polar] = pictures.each_ref().map(Option::as_deref);
-    let cavity = match (object, Resource::of(&item.id)) {
-        // A silent monitor is never cancelled.
-        (DicomObject::Mask, Some(Resource::Segmentation)) => {
-            cavity(&report, &mesh, (&mask, &frame), &Monitor::silent()).unwrap_or_default()
-        }
+    let report = required(item, "report.json")?;
+    // UIDs are derived from the text without its spaces.
+    let text: Value = serde_json::from_slice(&report).map_err(|error| broken_result(&error))?;
+    let text = text.to_string();
+    let figures = match Resource::of(&item.id) {
+        Some(Resource::Segmentation) => Some(figures(&report)?),
         _ => None,
     };
-    let made = DicomResults::new(&scan, structure(item, &facts), &mask, &mesh, &report)
+    let pictures = [read(item, "slices.png")?, read(item, "polar.png")?];
+    let [slices, polar] = pictures.each_ref().map(Option::as_deref);
+    let axes = match object {
+        DicomObject::Mask => figures.as_ref().and_then(SegmentationReport::axes),
+        _ => None,
+    };
+    let cavity = axes.and_then(|(axis, superior)| {
+        // A silent monitor is never cancelled.
+        let cavity = cavity(&axis, &superior, &mesh, (&mask, &frame), &Monitor::silent());
+        cavity.unwrap_or_default()
+    });
+    let results = DicomResults::new(&scan, structure(item, &facts), &mask, &mesh, &text)
         .with_cavity(cavity.as_ref())
-        .with_pictures(slices, polar)
-        .write(object);
+        .with_pictures(slices, polar);
+    let results = match &figures {
+        Some(report) => results.with_figures(report),
+        None => results,
+    };
+    let made = results.write(object);
     let bytes = made.map_err(|error| error.explain())?;
     Ok(bytes.map(|bytes| OutputFile {
         name: object.file_name().into(),
         media_type: DicomObject::MEDIA_TYPE.into(),
         bytes,
     }))
+}
+
+fn figures(report: &[u8]) -> Result<SegmentationReport, Failure> {
+    serde_json::from_slice(report).map_err(|error| broken_result(&error))
 }
 
 /// The texts of the fields; those of another type are left out.

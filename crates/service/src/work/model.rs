@@ -7,11 +7,12 @@ use super::problems::{Explain, not_exportable, work_error};
 use crate::items::{OutputFile, StoredItem, WorkOutput};
 use crate::jobs::{GivenParameters, Work, WorkError, WorkInput};
 use crate::records::{Failure, Resource};
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 use ventriform::export::Format;
 use ventriform::parameters::ModelParameters;
 use ventriform::pipeline::{self, Model};
 use ventriform::progress::{Monitor, Plan, Stage};
+use ventriform::report::object;
 use ventriform::volume::ReadLimits;
 
 /// Makes models.
@@ -42,7 +43,7 @@ impl Work for ModelWork {
             .map_err(|error| work_error(&error))?;
         Ok(WorkOutput {
             files: downloads(&model, &input.volume, monitor)?,
-            summary: summary(&model),
+            summary: object(&model.report.summary()),
         })
     }
 
@@ -53,18 +54,6 @@ impl Work for ModelWork {
     fn page(&self, model: &StoredItem, scan: &Map<String, Value>) -> Result<String, Failure> {
         page::model_page(&|name| model.read(name), scan).map_err(|error| error.explain())
     }
-}
-
-fn summary(model: &Model) -> Map<String, Value> {
-    let counts = [
-        ("vertices", json!(model.mesh.vertices.len())),
-        ("triangles", json!(model.mesh.triangles.len())),
-    ];
-    counts
-        .into_iter()
-        .map(|(name, count)| (name.to_owned(), count))
-        .chain(model.report.quality_summary())
-        .collect()
 }
 
 fn downloads(

@@ -14,6 +14,7 @@ use ventriform::export::{Format, read_json};
 use ventriform::parameters::{FitParameters, Parameters};
 use ventriform::progress::{Monitor, Plan};
 use ventriform::reader::ReaderProfile;
+use ventriform::report::object;
 use ventriform::segmentation::{
     NamedFile, NamedMesh, NamedReader, SegmentationError, SegmentationFilesError,
     SegmentationOrder, from_files,
@@ -77,7 +78,7 @@ impl Work for SegmentationWork {
             error => WorkError::Failed(not_exportable(&error)),
         })?;
         Ok(WorkOutput {
-            summary: made.summary(),
+            summary: object(&made.summary()),
             files: files.into_iter().map(OutputFile::from).collect(),
         })
     }

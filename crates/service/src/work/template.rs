@@ -6,11 +6,11 @@ use super::files::mesh_file;
 use super::problems::{Explain, unknown_organ, unsuitable_mesh};
 use crate::items::{OutputFile, WorkOutput};
 use crate::records::Failure;
-use serde_json::json;
 use ventriform::export::{Format, Metadata};
 use ventriform::mesh_files::{self, MeshStatement};
 use ventriform::model::{Organ, Template, wall_parts};
 use ventriform::progress::Monitor;
+use ventriform::report::{TemplateSummary, object};
 
 /// Largest mesh of a template: a model to be fitted has at most 5000 points of about 200 bytes, and as many
 /// bytes of triangles.
@@ -46,17 +46,15 @@ pub(super) fn make(
         .map(|format| mesh_file(format, &template.mesh, &metadata))
         .collect::<Result<_, _>>()
         .map_err(|error| unsuitable_mesh(&error))?;
-    let summary = [
-        ("vertices", json!(template.mesh.vertices.len())),
-        ("triangles", json!(template.mesh.triangles.len())),
-        ("volume_ml", json!(template.mesh.volume() / 1000.0)),
-        ("length_mm", json!(template.cup.map(|cup| cup.length))),
-        ("warnings", json!(notes)),
-    ];
+    let summary = TemplateSummary {
+        vertices: template.mesh.vertices.len(),
+        triangles: template.mesh.triangles.len(),
+        volume_ml: template.mesh.volume() / 1000.0,
+        length_mm: template.cup.map(|cup| cup.length),
+        warnings: notes,
+    };
     Ok(WorkOutput {
-        summary: (summary.into_iter())
-            .map(|(name, figure)| (name.to_owned(), figure))
-            .collect(),
+        summary: object(&summary),
         files,
     })
 }

@@ -15,9 +15,9 @@ use super::text::leaves;
 
 const STYLE: &str = include_str!("document.css");
 /// Built from `web/src/report.tsx`: draws the embedded data, to be touched.
-const SCRIPT: &str = include_str!("../../../../web/dist/report.js");
+const SCRIPT: &str = include_str!("../../assets/report.js");
 /// The style of what it draws.
-const SCRIPT_STYLE: &str = include_str!("../../../../web/dist/report.css");
+const SCRIPT_STYLE: &str = include_str!("../../assets/report.css");
 
 /// A page.
 #[derive(Debug, Clone)]

@@ -12,6 +12,8 @@ mod fit_specs;
 mod input;
 mod kind;
 mod model;
+#[cfg(feature = "schema")]
+mod schema;
 mod specs;
 mod table;
 
@@ -20,6 +22,8 @@ pub use fit_specs::FIT_SPECS;
 pub use input::RawValue;
 pub use kind::Kind;
 pub use model::ModelParameters;
+#[cfg(feature = "schema")]
+pub use schema::schema_of;
 pub use specs::SPECS;
 pub use table::{ParameterSpec, Parameters};
 

@@ -20,7 +20,7 @@ use crate::model::{Organ, Template, TemplateError, wall_parts};
 use crate::optimise::{OptimiseError, Reference};
 use crate::parameters::{ModelParameters, Parameters};
 use crate::progress::{Cancelled, Monitor, Stage};
-use crate::report::{self, Closeness, MeasuredSurface, ModelReport, ReportInput};
+use crate::report::{self, Closeness, FileFacts, MeasuredSurface, ModelReport, ReportInput};
 use crate::retile::RetileError;
 use crate::surface::{self, IsoLevel, Isolate, SurfaceError};
 use crate::volume::dicom::Provenance;
@@ -274,8 +274,8 @@ fn from_volume(
     })
     .map_err(PipelineError::Optimise)?;
     let mut report = ModelReport::new(ReportInput {
-        input: report::input(facts),
-        parameters: parameters.to_json().into(),
+        input: FileFacts::of(facts),
+        parameters: parameters.to_json(),
         surface: &surface,
         tiled: &made.tiled,
         optimised: &made.optimised,

@@ -1,7 +1,7 @@
 //! The polar map: the wall's uptake laid flat, and its means over the AHA's 17 segments.
 //!
 //! In: a volume and the [`VentricleWall`] of a fitted model, as rays from the long axis. Out: a
-//! [`PolarMap`], drawn by [`svg()`] and [`png()`], written by [`json()`].
+//! [`PolarMap`], drawn by [`svg()`] and [`png()`], written as a [`PolarDocument`].
 //!
 //! 1. The image is blurred ([`PolarParameters::blur`]), because the largest of many noisy values
 //!    is too large.
@@ -35,11 +35,11 @@
 //! diagnosis. Without attenuation correction the base, which lies deeper in the body, is 20 to
 //! 30 % below the apex in a heart of even uptake.
 
-mod json;
+mod document;
 mod levels;
 mod picture;
 
-pub use json::json;
+pub use document::{PolarDocument, PolarSegment, PolarSummary, PolarTerritory};
 pub use levels::{Level, Levels};
 pub use picture::{colour_of, png, svg};
 
@@ -496,19 +496,19 @@ mod tests {
     fn a_map_without_orientation_names_no_side() {
         let (volume, wall) = scene();
         let map = map(&volume, &wall, &wall, &PolarParameters::default());
-        assert_eq!(json(&map)["orientation"], "frame");
+        assert_eq!(PolarSummary::of(&map).orientation, "frame");
         assert!(svg(&map).contains(">A</text>"));
         let map = map.counted_by(OrientationSource::Unknown);
-        let value = json(&map);
-        assert_eq!(value["orientation"], "unknown");
-        assert_eq!(value["territories"], serde_json::json!([]));
-        assert_eq!(value["first_column"], serde_json::Value::Null);
-        for segment in value["segments"].as_array().unwrap() {
-            let name = segment["name"].as_str().unwrap();
+        let summary = PolarSummary::of(&map);
+        assert_eq!(summary.orientation, "unknown");
+        assert_eq!(summary.territories, []);
+        assert_eq!(summary.first_column, None);
+        for segment in &summary.segments {
+            let name = &segment.name;
             for side in ["anter", "sept", "infer", "lateral"] {
                 assert!(!name.contains(side), "{name}");
             }
-            assert_eq!(segment["territory"], serde_json::Value::Null);
+            assert_eq!(segment.territory, None);
         }
         let picture = svg(&map);
         assert!(picture.contains("ORIENTATION UNKNOWN"));
@@ -584,6 +584,18 @@ mod tests {
     }
 
     #[test]
+    fn a_document_is_read_as_it_was_written() {
+        let (volume, wall) = scene();
+        let map = map(&volume, &wall, &wall, &PolarParameters::default());
+        let document = PolarDocument::of(&map);
+        let text = serde_json::to_string(&document).unwrap();
+        assert_eq!(
+            serde_json::from_str::<PolarDocument>(&text).unwrap(),
+            document
+        );
+    }
+
+    #[test]
     fn pictures_can_be_read_again() {
         let (volume, wall) = scene();
         let map = map(&volume, &wall, &wall, &PolarParameters::default());
@@ -591,8 +603,8 @@ mod tests {
         assert_eq!((width, height), (760, 640));
         let text = svg(&map);
         assert!(text.starts_with("<svg") && text.ends_with("</svg>\n"));
-        let value = json(&map);
-        assert_eq!(value["segments"].as_array().unwrap().len(), 17);
-        assert_eq!(value["segments"][16]["name"], "apex");
+        let segments = PolarSummary::of(&map).segments;
+        assert_eq!(segments.len(), 17);
+        assert_eq!(segments[16].name, "apex");
     }
 }

@@ -30,7 +30,7 @@ struct Palette {
 }
 
 static PALETTE: LazyLock<Palette> = LazyLock::new(|| {
-    serde_json::from_str(include_str!("../../../../web/uptake.json"))
+    serde_json::from_str(include_str!("../../assets/uptake.json"))
         .expect("the file holds what `Palette` names")
 });
 

@@ -24,4 +24,6 @@ pub mod profile;
 pub use draw::drawn;
 pub use learn::learn;
 pub use measure::measure;
-pub use profile::{LearntOn, ProfileError, ReaderOffset, ReaderOffsets, ReaderProfile};
+pub use profile::{
+    LearntOn, ProfileDocument, ProfileError, ReaderOffset, ReaderOffsets, ReaderProfile,
+};

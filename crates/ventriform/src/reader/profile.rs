@@ -5,10 +5,11 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 
-/// Distances from the fitted wall to a reader's, mm.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+/// How far a reader's wall lies from the fitted one, mm.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct ReaderOffsets {
-    /// How far the inner surface lies farther out, away from the cavity.
+    /// How far the inner surface lies farther out.
     pub endocardium: f64,
     /// How far the outer surface lies farther out.
     pub epicardium: f64,
@@ -32,11 +33,12 @@ impl ReaderOffsets {
     }
 }
 
-/// One distance of a profile, mm.
+/// One distance of a reader's profile, mm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = LearntOffset))]
 #[serde(deny_unknown_fields)]
 pub struct ReaderOffset {
-    /// What is applied: `mean`, drawn towards zero.
+    /// What is applied: the mean, drawn towards zero.
     pub value: f64,
     /// Mean over the masks.
     pub mean: f64,
@@ -44,13 +46,14 @@ pub struct ReaderOffset {
     pub spread: f64,
 }
 
-/// A scan and the mask drawn of it, as SHA-256 of their files, hexadecimal.
+/// A scan and its mask that a profile was learnt on.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LearntOn {
-    /// The scan.
+    /// SHA-256 of the scan's file, hexadecimal.
     pub scan: String,
-    /// The mask.
+    /// SHA-256 of the mask's file, hexadecimal.
     pub mask: String,
 }
 
@@ -95,23 +98,36 @@ pub const MOST_BYTES: usize = 1 << 20;
 /// Most masks of a profile.
 const MOST_MASKS: usize = 5000;
 
-/// The JSON, field by field.
+/// A reader's profile, as `ventriform calibrate` writes it.
 #[derive(Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = ReaderProfile))]
 #[serde(deny_unknown_fields)]
-struct Wire {
+pub struct ProfileDocument {
+    /// `ventriform-reader-profile`.
     format: String,
+    /// 1.
+    #[cfg_attr(feature = "schema", schema(value_type = u64))]
     version: u32,
+    /// The wall that the distances start from: `apparent` or `anatomical`.
     edge: String,
+    /// Number of masks that it was learnt on: the length of `learnt_on`.
     masks: usize,
-    offsets_mm: WireOffsets,
+    /// The distances, mm.
+    offsets_mm: LearntOffsets,
+    /// What it was learnt on.
     learnt_on: Vec<LearntOn>,
 }
 
+/// The distances of a reader's profile.
 #[derive(Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]
-struct WireOffsets {
+struct LearntOffsets {
+    /// Inner surface, outward.
     endocardium: ReaderOffset,
+    /// Outer surface, outward.
     epicardium: ReaderOffset,
+    /// Rim, towards the base.
     rim: ReaderOffset,
 }
 
@@ -129,19 +145,19 @@ impl ReaderProfile {
     /// The JSON, ending with a line feed.
     pub fn to_json(&self) -> String {
         let [endocardium, epicardium, rim] = self.offsets;
-        let wire = Wire {
+        let document = ProfileDocument {
             format: FORMAT.into(),
             version: VERSION,
             edge: self.edge.as_str().into(),
             masks: self.masks(),
-            offsets_mm: WireOffsets {
+            offsets_mm: LearntOffsets {
                 endocardium,
                 epicardium,
                 rim,
             },
             learnt_on: self.learnt_on.clone(),
         };
-        let mut text = serde_json::to_string_pretty(&wire).expect("finite numbers and texts");
+        let mut text = serde_json::to_string_pretty(&document).expect("finite numbers and texts");
         text.push('\n');
         text
     }
@@ -176,10 +192,10 @@ impl ReaderProfile {
             let version = u32::try_from(version).unwrap_or(u32::MAX);
             return Err(ProfileError::Version(version));
         }
-        let wire: Wire = serde_json::from_value(any).map_err(syntax)?;
-        let edge = WallEdge::parse(&wire.edge)
+        let document: ProfileDocument = serde_json::from_value(any).map_err(syntax)?;
+        let edge = WallEdge::parse(&document.edge)
             .ok_or_else(|| refused("edge", "it must be apparent or anatomical"))?;
-        let given = wire.offsets_mm;
+        let given = document.offsets_mm;
         let offsets = [given.endocardium, given.epicardium, given.rim];
         for ((name, most), offset) in OFFSETS.iter().zip(&offsets) {
             let within = |x: f64| x.abs() <= *most;
@@ -191,12 +207,13 @@ impl ReaderProfile {
                 return Err(refused(&format!("offsets_mm.{name}"), reason));
             }
         }
-        if wire.masks != wire.learnt_on.len() || !(1..=MOST_MASKS).contains(&wire.masks) {
+        if document.masks != document.learnt_on.len() || !(1..=MOST_MASKS).contains(&document.masks)
+        {
             let reason = format!("it must count the entries of `learnt_on`, 1 to {MOST_MASKS}");
             return Err(refused("masks", reason));
         }
         let hash = |h: &String| h.len() == 64 && h.bytes().all(|b| b.is_ascii_hexdigit());
-        if !wire
+        if !document
             .learnt_on
             .iter()
             .all(|l| hash(&l.scan) && hash(&l.mask))
@@ -207,7 +224,7 @@ impl ReaderProfile {
         Ok(Self {
             edge,
             offsets,
-            learnt_on: wire.learnt_on,
+            learnt_on: document.learnt_on,
         })
     }
 }

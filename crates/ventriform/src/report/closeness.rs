@@ -17,13 +17,15 @@ const MOST_QUERIES: usize = 20_000;
 /// Upper limit of the parts that a triangle's side is cut into.
 const MOST_PARTS: usize = 12;
 
-/// Signed distances from the model to its surface.
+/// Signed distances from a model to its surface, as in `distance.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct Closeness {
     /// Parts that each side of a triangle is cut into.
     pub parts: usize,
     /// Distance of the centroid of each part, mm, rounded to 0.001; positive outside of the
-    /// surface. Triangle by triangle, `parts`² each, in the order of [`cut`].
+    /// surface. Triangle by triangle, `parts`² each.
+    #[cfg_attr(feature = "schema", schema(value_type = Vec<f64>))]
     pub distances_mm: Vec<f32>,
 }
 

@@ -41,6 +41,7 @@ const RECENT: usize = 6;
 
 /// Distances between a model and its surface, and what they enclose.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct Distance {
     /// Mean of the two directions' means, mm.
     pub mean_mm: f64,
@@ -74,6 +75,7 @@ pub struct Distance {
 
 /// Distances of one side's points to the other side.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = DistanceDirection))]
 pub struct Direction {
     /// Number of even samples.
     pub samples: usize,

@@ -106,6 +106,7 @@ fn angles_deg([a, b, c]: &[Vec3; 3]) -> [f64; 3] {
 
 /// Counts, topology and size of a mesh.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct MeshFacts {
     /// Number of vertices.
     pub vertices: usize,
@@ -137,6 +138,7 @@ pub struct MeshFacts {
 
 /// What makes a mesh a closed, oriented manifold that faces outward.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct ManifoldFacts {
     /// No edge has a single triangle.
     pub closed: bool,
@@ -158,6 +160,7 @@ pub struct ManifoldFacts {
 
 /// How well-shaped the triangles are.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct Shape {
     /// Radius ratio 2r/R, 1 = equilateral.
     pub radius_ratio: Summary,
@@ -165,7 +168,7 @@ pub struct Shape {
     pub min_angle_deg: Summary,
     /// Largest angle of each triangle, degrees.
     pub max_angle_deg: Summary,
-    /// EdgeTriangles lengths, mm.
+    /// Lengths of edges, mm.
     pub edge_length_mm: Summary,
     /// Areas of triangles, mm².
     pub area_mm2: Summary,
@@ -175,8 +178,10 @@ pub struct Shape {
 
 /// How many edges meet at a vertex.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct Valence {
     /// Number of vertices for each valence.
+    #[cfg_attr(feature = "schema", schema(value_type = BTreeMap<String, u64>))]
     pub counts: BTreeMap<u32, usize>,
     /// Share of vertices with six edges, the regular case.
     pub share_6: f64,
@@ -186,6 +191,7 @@ pub struct Valence {
 
 /// How smooth the mesh is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct Smoothness {
     /// Angle between the normals of neighbouring triangles, degrees, 0 = flat.
     pub dihedral_deg: Summary,
@@ -234,12 +240,13 @@ impl Smoothness {
 
 /// Distributions before and after optimisation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct Histograms {
     /// Radius ratios 2r/R.
     pub radius_ratio: Histogram,
     /// Smallest angle of each triangle, degrees.
     pub min_angle_deg: Histogram,
-    /// EdgeTriangles lengths, mm.
+    /// Lengths of edges, mm.
     pub edge_length_mm: Histogram,
     /// Angles between neighbouring triangles' normals, degrees.
     pub dihedral_deg: Histogram,

@@ -5,7 +5,10 @@
 //! valences), smoothness (dihedral angles) and closeness (two-sided distances, volume, area).
 //! [`ModelReport::new`] joins these figures to the facts of the stages. [`model_page()`] makes a
 //! self-contained page of that report, coloured by [`Closeness`]; [`segmentation_page()`] one of a
-//! segmentation's.
+//! segmentation's [`SegmentationReport`].
+//!
+//! Each document is defined here once: the structs are what is written, what is read of a stored file, and,
+//! with the feature `schema`, what the OpenAPI document describes.
 //!
 //! A report is JSON with stable names: lengths in millimetres, angles in degrees, volumes in
 //! millilitres, as the names' endings say. Everything but `timings_ms` is the same for the
@@ -16,26 +19,37 @@ pub mod distance;
 mod distance_pictures;
 pub mod elements;
 mod embedded;
+mod fit_report;
 mod input;
+mod json_number;
 pub mod measure;
 mod model_page;
 mod model_report;
 mod sections;
 mod segmentation_page;
-mod segmentation_report;
+pub(crate) mod segmentation_report;
 mod stage_facts;
+mod summaries;
 pub mod summary;
 mod whose;
 
 pub use closeness::{Closeness, MeasuredSurface};
 pub use distance_pictures::vertex_colours;
-pub use input::input;
+pub use fit_report::{
+    EvidenceReport, FitReport, FittedVolumes, LocalisationReport, LongAxis, Posture, Thickness,
+    Thicknesses, Uncertainties, Uncertainty, WallVolumes,
+};
+pub use input::{FileFacts, IntensityFacts, Scaling};
 pub use measure::{MeasureParameters, Measures, measure};
 pub use model_page::model_page;
 pub use model_report::{ModelReport, ReportInput};
 pub use sections::{
-    FitnessForms, FitnessSection, FitnessTermsSection, Program, RetileSection, Stages,
-    StartSummary, SurfaceSection,
+    FitnessFormStages, FitnessForms, FitnessReport, FitnessScales, FitnessTermStages, FitnessTerms,
+    OptimiseReport, Program, RetileReport, StartSummary, SurfaceReport,
 };
 pub use segmentation_page::{SegmentationPage, segmentation_page};
-pub use segmentation_report::SegmentationReport;
+pub use segmentation_report::{
+    AgreementReport, AppliedReaderReport, CandidateReport, RaisedFlag, RefusedTemplateReport,
+    Resolution, SegmentationParts, SegmentationReport,
+};
+pub use summaries::{ModelSummary, ReaderSummary, SegmentationSummary, TemplateSummary, object};

@@ -1,7 +1,7 @@
 //! The page of a model: what was promised and whether it holds, figures, pictures, distributions.
 
 use maud::{Markup, html};
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use super::closeness::Closeness;
 use super::distance::Direction;
@@ -9,7 +9,8 @@ use super::distance_pictures;
 use super::elements::Shape;
 use super::embedded::Embedded;
 use super::model_report::ModelReport;
-use super::sections::{FitnessForms, FitnessTermsSection};
+use super::sections::{FitnessForms, FitnessTerms};
+use super::summaries::object;
 use super::summary::{Histogram, Summary};
 use super::whose;
 use crate::draw::chart::{self, Bins};
@@ -65,12 +66,8 @@ pub fn model_page(
 
 /// One line on where the model comes from.
 fn origin(report: &ModelReport) -> String {
-    let name = ["name", "file", "title", "id"]
-        .iter()
-        .find_map(|key| report.input.get(key)?.as_str());
     let seed = report.parameters.get("seed").and_then(Value::as_u64);
     [
-        name.map(|n| format!("Volume {n}")),
         Some(format!("iso-value {}", number(report.surface.iso_value, 3))),
         seed.map(|s| format!("seed {s}")),
         Some(format!("ventriform {}", report.software.version)),
@@ -273,7 +270,7 @@ fn direction_row(name: &str, direction: &Direction) -> Markup {
 fn fitness(report: &ModelReport) -> Markup {
     let fitness = &report.fitness;
     let terms = &fitness.terms;
-    let term = |pick: fn(&FitnessTermsSection) -> f64| {
+    let term = |pick: fn(&FitnessTerms) -> f64| {
         [&terms.retiled, &terms.fitted, &terms.optimised].map(pick)
     };
     let forms = &fitness.forms;
@@ -465,14 +462,18 @@ fn summary_cells(summary: &Summary, decimals: usize) -> Markup {
 
 /// Everything else, by its name in the JSON report.
 fn particulars(report: &ModelReport) -> Markup {
-    let surface = serde_json::to_value(&report.surface).unwrap_or_default();
-    let tables = [
+    let mut retile = object(&report.retile);
+    // They have sections of their own.
+    for name in ["shape", "smoothness"] {
+        retile.shift_remove(name);
+    }
+    let tables: [(&str, Map<String, Value>); 6] = [
         ("Parameters", report.parameters.clone()),
-        ("Input", report.input.clone()),
-        ("Surface", surface),
-        ("Re-tiling", report.retile.facts.clone().into()),
-        ("Optimisation", report.optimise.clone().into()),
-        ("Milliseconds", report.timings_ms.clone().into()),
+        ("Input", object(&report.input)),
+        ("Surface", object(&report.surface)),
+        ("Re-tiling", retile),
+        ("Optimisation", object(&report.optimise)),
+        ("Milliseconds", report.timings_ms.clone()),
     ];
-    document::particulars(&tables)
+    document::particulars(&tables.map(|(title, table)| (title, table.into())))
 }

@@ -5,34 +5,35 @@ use serde_json::{Map, Value};
 
 use super::distance::Distance;
 use super::elements::{Elements, Histograms, MeshFacts, Shape, Smoothness};
+use super::input::FileFacts;
 use super::measure::Measures;
 use super::sections::{
-    FitnessSection, FitnessTermsSection, Program, RetileSection, Stages, StartSummary,
-    SurfaceSection,
+    FitnessReport, OptimiseReport, Program, RetileReport, StartSummary, SurfaceReport,
 };
 use super::stage_facts;
-use crate::optimise::{FitnessSummary, OptimiseParameters, Optimised};
+use super::summaries::{ModelSummary, object};
+use crate::optimise::{OptimiseParameters, Optimised};
 use crate::retile::Tiled;
 use crate::surface::{Surface, SurfaceFacts};
 
-/// The report of a model. `serde_json::to_value(&report)` is what the service answers.
-///
-/// The page is made from a stored report, perhaps by a later version: a new field needs
-/// `#[serde(default)]`.
+// The page is made from a stored report, perhaps by a later version: a new field needs `#[serde(default)]`.
+/// The report of a model. Lengths are millimetres in the patient frame LPS.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct ModelReport {
-    /// Who made the model.
+    /// The program that made the model.
     pub software: Program,
-    /// The volume it was made from.
-    pub input: Value,
+    /// The volume's file.
+    pub input: FileFacts,
     /// Every parameter, defaults written out.
-    pub parameters: Value,
+    #[cfg_attr(feature = "schema", schema(value_type = crate::parameters::ModelParameters))]
+    pub parameters: Map<String, Value>,
     /// The iso-surface.
-    pub surface: SurfaceSection,
-    /// The re-tiled mesh, before optimisation.
-    pub retile: RetileSection,
+    pub surface: SurfaceReport,
+    /// The mesh before optimisation.
+    pub retile: RetileReport,
     /// What optimisation did.
-    pub optimise: Map<String, Value>,
+    pub optimise: OptimiseReport,
     /// The model: counts and topology.
     pub mesh: MeshFacts,
     /// The model: shape of its triangles.
@@ -42,10 +43,11 @@ pub struct ModelReport {
     /// The model beside the iso-surface.
     pub distance: Distance,
     /// The paper's fitness after each stage.
-    pub fitness: FitnessSection,
+    pub fitness: FitnessReport,
     /// Distributions before and after optimisation.
     pub histograms: Histograms,
     /// Milliseconds of each stage and their `total`.
+    #[cfg_attr(feature = "schema", schema(value_type = BTreeMap<String, f64>))]
     pub timings_ms: Map<String, Value>,
     /// Sentences about the input and the model that a user should know.
     pub warnings: Vec<String>,
@@ -54,10 +56,10 @@ pub struct ModelReport {
 /// The parts of a [`ModelReport`].
 #[derive(Debug)]
 pub struct ReportInput<'a> {
-    /// Facts about the volume, as the caller words them.
-    pub input: Value,
+    /// Facts about the volume's file.
+    pub input: FileFacts,
     /// Every parameter by its name, defaults written out.
-    pub parameters: Value,
+    pub parameters: Map<String, Value>,
     /// Result of the surface stage.
     pub surface: &'a Surface,
     /// Result of re-tiling.
@@ -89,18 +91,14 @@ impl ModelReport {
             input: input.input,
             parameters: input.parameters,
             surface,
-            retile: RetileSection {
-                facts: stage_facts::retile(&input.tiled.facts, &input.starts),
-                shape: Shape::of(&retiled),
-                smoothness: Smoothness::of(&retiled),
-            },
+            retile: stage_facts::retile(input.tiled, &retiled, input.starts),
             optimise: stage_facts::optimise(&input.optimised.facts),
             histograms: Histograms::of(&retiled, &measures.elements),
             mesh: measures.mesh,
             shape: measures.shape,
             smoothness: measures.smoothness,
             distance: measures.distance,
-            fitness: fitness(input.optimised, input.optimise_parameters),
+            fitness: stage_facts::fitness(input.optimised, input.optimise_parameters),
             timings_ms: timings(input.timings_ms),
             warnings,
         }
@@ -127,8 +125,7 @@ impl ModelReport {
     /// The main figures, one sentence a line.
     pub fn headlines(&self) -> Vec<String> {
         let (mesh, shape, distance) = (&self.mesh, &self.shape, &self.distance);
-        let mask = self.surface.facts.get("mask_ml").and_then(Value::as_f64);
-        let mask = mask.map(|mask| {
+        let mask = self.surface.mask_ml.map(|mask| {
             let model = self.mesh.volume_ml;
             let off = 100.0 * (model / mask - 1.0);
             let [mask, model] = [mask, model].map(millilitres);
@@ -155,25 +152,28 @@ impl ModelReport {
         lines.into_iter().chain(mask).collect()
     }
 
-    /// The figures that mesh files carry.
+    /// The main figures.
+    pub fn summary(&self) -> ModelSummary {
+        ModelSummary {
+            vertices: self.mesh.vertices,
+            triangles: self.mesh.triangles,
+            euler_characteristic: self.mesh.euler_characteristic,
+            self_intersections: self.mesh.self_intersections,
+            radius_ratio_mean: self.shape.radius_ratio.mean,
+            radius_ratio_min: self.shape.radius_ratio.min,
+            dihedral_mean_deg: self.smoothness.dihedral_deg.mean,
+            distance_mean_mm: self.distance.mean_mm,
+            hausdorff_mm: self.distance.hausdorff_mm,
+            volume_error_percent: self.distance.volume_error_percent,
+            fitness: self.fitness.optimised,
+        }
+    }
+
+    /// The figures that mesh files carry: the summary without the number of triangles.
     pub fn quality_summary(&self) -> Map<String, Value> {
-        let figures = [
-            ("radius_ratio_mean", self.shape.radius_ratio.mean),
-            ("radius_ratio_min", self.shape.radius_ratio.min),
-            ("dihedral_mean_deg", self.smoothness.dihedral_deg.mean),
-            ("distance_mean_mm", self.distance.mean_mm),
-            ("hausdorff_mm", self.distance.hausdorff_mm),
-            ("volume_error_percent", self.distance.volume_error_percent),
-            ("fitness", self.fitness.optimised),
-        ];
-        let mut summary = Map::new();
-        summary.insert("vertices".into(), self.mesh.vertices.into());
-        let euler = self.mesh.euler_characteristic;
-        summary.insert("euler_characteristic".into(), euler.into());
-        let crossings = self.mesh.self_intersections;
-        summary.insert("self_intersections".into(), crossings.into());
-        summary.extend(figures.map(|(name, x)| (name.to_owned(), x.into())));
-        summary
+        let mut figures = object(&self.summary());
+        figures.shift_remove("triangles");
+        figures
     }
 }
 
@@ -204,7 +204,7 @@ fn volume_lost(surface: &SurfaceFacts, mesh: &MeshFacts) -> Option<String> {
 }
 
 /// Sentences about the promises that a model breaks.
-fn doubts(mesh: &MeshFacts, surface: &SurfaceSection, tiled: &Tiled) -> Vec<String> {
+fn doubts(mesh: &MeshFacts, surface: &SurfaceReport, tiled: &Tiled) -> Vec<String> {
     let mut doubts = Vec::new();
     if let Some(defect) = &mesh.manifold.defect {
         doubts.push(format!("The model is no closed manifold: {defect}."));
@@ -262,33 +262,4 @@ fn timings(stages: Vec<(String, f64)>) -> Map<String, Value> {
         .collect();
     timings.insert("total".into(), total.into());
     timings
-}
-
-fn fitness(optimised: &Optimised, parameters: &OptimiseParameters) -> FitnessSection {
-    let stages = Stages {
-        retiled: &optimised.retiled,
-        fitted: &optimised.fitted,
-        optimised: &optimised.optimised,
-    };
-    let driving = stages.map(|s| stage_facts::driving_form(s, parameters.fitness));
-    FitnessSection {
-        form: stage_facts::form_name(parameters.fitness).to_owned(),
-        retiled: driving.retiled,
-        fitted: driving.fitted,
-        optimised: driving.optimised,
-        gain_percent: 100.0 * (driving.optimised / driving.retiled - 1.0),
-        weights: parameters.weights,
-        scales: stage_facts::scales(optimised.lengths),
-        forms: stages.map(stage_facts::forms),
-        terms: stages.map(terms),
-    }
-}
-
-fn terms(summary: &&FitnessSummary) -> FitnessTermsSection {
-    FitnessTermsSection {
-        a_deg: summary.a_mean.to_degrees(),
-        b_deg: summary.b_mean.to_degrees(),
-        c: summary.c_mean,
-        d_mm: summary.d_mean,
-    }
 }

@@ -6,13 +6,15 @@ use serde_json::{Map, Value};
 use super::elements::{Shape, Smoothness};
 use super::measure::Measures;
 use crate::retile::Tiled;
+use crate::surface::denoise::SurfaceNoise;
 
-/// The program that made a report.
+/// The program that made a product.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = Software))]
 pub struct Program {
-    /// Always `ventriform`.
+    /// The program: `ventriform`.
     pub name: String,
-    /// The version.
+    /// Its version.
     pub version: String,
 }
 
@@ -35,9 +37,10 @@ impl Program {
     }
 }
 
-/// The iso-surface's figures.
+/// Figures of the iso-surface.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SurfaceSection {
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct SurfaceReport {
     /// The iso-value, in the volume's units.
     pub iso_value: f64,
     /// Number of vertices.
@@ -56,27 +59,98 @@ pub struct SurfaceSection {
     pub area_mm2: f64,
     /// Smallest voxel spacing, mm.
     pub voxel_mm: f64,
-    /// Further facts of the stage.
-    #[serde(flatten)]
-    pub facts: Map<String, Value>,
+    /// Handles over all components.
+    pub genus: i64,
+    /// The iso-value as a share of the reference intensity.
+    pub iso_fraction: f64,
+    /// The object's maximum, which percentages refer to.
+    pub reference_intensity: f64,
+    /// Otsu's threshold.
+    pub otsu: Option<f64>,
+    /// Smallest and largest intensity.
+    pub intensity_range: [f64; 2],
+    /// `intensity`, `mask` or `labels`.
+    pub kind: String,
+    /// The object's label.
+    pub label: Option<i64>,
+    /// How much the object looks like a left ventricle.
+    pub ventricle_score: Option<f64>,
+    /// The noise that was measured and taken off the surface; null for masks and with denoise=off.
+    pub noise: Option<SurfaceNoise>,
+    /// Volume of the voxels that carry the label, millilitres, which the surface is made to enclose;
+    /// null for intensities.
+    pub mask_ml: Option<f64>,
+    /// Volume of the object's voxels, millilitres.
+    pub region_ml: f64,
+    /// Whether the object touches the volume's border.
+    pub touches_border: bool,
+    /// Voxels that are NaN or infinite.
+    pub not_finite_voxels: usize,
+    /// Voxels of neighbouring organs that were cut off.
+    pub neighbour_voxels_cut: usize,
+    /// Area of that cut, mm².
+    pub neighbour_cut_mm2: f64,
+    /// Components before all but one were removed.
+    pub components_before: usize,
+    /// Enclosed cavities before they were filled.
+    pub cavities_before: usize,
+    /// Handles before they were removed.
+    pub handles_before: usize,
+    /// Voxels of dropped components.
+    pub voxels_dropped: usize,
+    /// Voxels cut to open handles.
+    pub voxels_cut: usize,
+    /// Voxels filled to close handles and cavities.
+    pub voxels_filled: usize,
 }
 
-/// The re-tiled mesh's figures.
+/// Figures of the mesh before optimisation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RetileSection {
-    /// Facts of the stage.
-    #[serde(flatten)]
-    pub facts: Map<String, Value>,
-    /// Shape of the triangles before optimisation.
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct RetileReport {
+    /// Seed of the kept model's random numbers.
+    pub seed: u64,
+    /// Rounds of repulsion.
+    pub repulsion_rounds: usize,
+    /// Repetitions of repulsion and tessellation.
+    pub repeats: usize,
+    /// Rounds of relaxation.
+    pub relaxation_rounds: usize,
+    /// Attempts until the mesh was a manifold.
+    pub attempts: usize,
+    /// The models of which the best was kept.
+    pub starts: Vec<StartSummary>,
+    /// Shape of the triangles.
     pub shape: Shape,
-    /// Angles between neighbouring triangles before optimisation.
+    /// Angles between neighbouring triangles.
     pub smoothness: Smoothness,
+}
+
+/// What optimisation did.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct OptimiseReport {
+    /// Edges flipped.
+    pub flips: usize,
+    /// Sweeps over all edges.
+    pub sweeps: usize,
+    /// Why it ended: `no_flip_gains`, `cycle` or `sweep_limit`.
+    pub ended: String,
+    /// Rounds of the least-squares fit.
+    pub fit_rounds: usize,
+    /// Edges flipped during the fit.
+    pub fit_flips: usize,
+    /// Steps of the fit that were shortened.
+    pub fit_shortened: usize,
+    /// Intersecting pairs of triangles before optimisation.
+    pub self_intersections_before: usize,
 }
 
 /// The paper's fitness: mean over all edges.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FitnessSection {
-    /// The form that drove the flips, in which `retiled`, `fitted` and `optimised` are given.
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct FitnessReport {
+    /// The form in which `retiled`, `fitted` and `optimised` are given: the one that drove the flips.
     pub form: String,
     /// After re-tiling.
     pub retiled: f64,
@@ -86,29 +160,42 @@ pub struct FitnessSection {
     pub optimised: f64,
     /// From re-tiled to optimised, percent.
     pub gain_percent: f64,
-    /// Weights w1..w4 of A, B, C, D.
+    /// Weights of the four terms.
     pub weights: [f64; 4],
-    /// Numerators and floors of every form, in radians and millimetres.
+    /// Numerators and floors of every form.
+    #[cfg_attr(feature = "schema", schema(value_type = BTreeMap<String, FitnessScales>))]
     pub scales: Map<String, Value>,
     /// All forms after each stage.
-    pub forms: Stages<FitnessForms>,
+    pub forms: FitnessFormStages,
     /// Mean terms after each stage.
-    pub terms: Stages<FitnessTermsSection>,
+    pub terms: FitnessTermStages,
 }
 
-/// The same figures after each stage.
+/// Numerators and floors of the four terms.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Stages<T> {
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct FitnessScales {
+    /// Numerators, in radians and millimetres.
+    pub numerator: [f64; 4],
+    /// Floors, in radians and millimetres.
+    pub floor: [f64; 4],
+}
+
+/// All forms of the fitness after each stage.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct FitnessFormStages {
     /// After re-tiling.
-    pub retiled: T,
+    pub retiled: FitnessForms,
     /// After the least-squares fit.
-    pub fitted: T,
+    pub fitted: FitnessForms,
     /// After optimisation.
-    pub optimised: T,
+    pub optimised: FitnessForms,
 }
 
 /// Mean fitness in every form.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct FitnessForms {
     /// The paper's reciprocal terms, capped.
     pub raw: f64,
@@ -119,23 +206,37 @@ pub struct FitnessForms {
     pub robust: f64,
 }
 
+/// Mean terms of the fitness after each stage.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct FitnessTermStages {
+    /// After re-tiling.
+    pub retiled: FitnessTerms,
+    /// After the least-squares fit.
+    pub fitted: FitnessTerms,
+    /// After optimisation.
+    pub optimised: FitnessTerms,
+}
+
 /// Means of the four terms over all edges.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct FitnessTermsSection {
-    /// A: angle between the edge's triangles' normals, degrees.
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct FitnessTerms {
+    /// Angle between the normals of the edge's triangles, degrees.
     pub a_deg: f64,
-    /// B: mean angle to the four outer neighbours, degrees.
+    /// Mean angle to the four outer neighbours, degrees.
     pub b_deg: f64,
-    /// C: R/(2r) of the two triangles, 1 = equilateral.
+    /// R/(2r) of the two triangles, 1 = equilateral.
     pub c: f64,
-    /// D: distance of the edge's midpoint to the surface, mm.
+    /// Distance of the edge's midpoint to the surface, mm.
     pub d_mm: f64,
 }
 
-/// One of the models of which the best was kept, each from another seed.
+/// One of the models of which the best was kept.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = Start))]
 pub struct StartSummary {
-    /// Seed of its random choices.
+    /// Its seed.
     pub seed: u64,
     /// Mean 2r/R of its triangles.
     pub radius_ratio_mean: f64,
@@ -153,17 +254,6 @@ impl StartSummary {
             radius_ratio_mean: measures.shape.radius_ratio.mean,
             distance_mean_mm: measures.distance.mean_mm,
             hausdorff_mm: measures.distance.hausdorff_mm,
-        }
-    }
-}
-
-impl<T> Stages<T> {
-    /// `f` of the figure after each stage.
-    pub(super) fn map<U>(&self, f: impl Fn(&T) -> U) -> Stages<U> {
-        Stages {
-            retiled: f(&self.retiled),
-            fitted: f(&self.fitted),
-            optimised: f(&self.optimised),
         }
     }
 }

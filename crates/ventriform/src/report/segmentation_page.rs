@@ -5,7 +5,8 @@ use serde_json::{Map, Value, json};
 
 use super::embedded::Embedded;
 use super::sections::Program;
-use super::segmentation_report::{ReaderEntry, SegmentationReport};
+use super::segmentation_report::{AppliedReaderReport, SegmentationReport};
+use super::summaries::object;
 use super::whose;
 use crate::draw::document::{self, HeadlineFigure, HtmlDocument, Sign};
 use crate::draw::text::{data_uri, number, signed};
@@ -76,7 +77,7 @@ fn embedded(page: &SegmentationPage) -> Option<Value> {
         other: page.other,
         fit: Some(json!({
             "edge": report.edge(),
-            "fit": { "long_axis": report.fit.get("long_axis") },
+            "fit": { "long_axis": report.fit.long_axis },
             "posture": report.posture,
             "polar": report.polar.as_ref().map(|polar| json!({ "orientation": polar.orientation })),
         })),
@@ -104,32 +105,24 @@ fn organ(report: &SegmentationReport) -> String {
 
 /// One line on where the segmentation comes from.
 fn origin(report: &SegmentationReport) -> String {
-    let list = |name: &str, decimals: usize| {
-        let numbers = report.input.get(name)?.as_array()?;
-        let texts: Vec<String> = numbers
-            .iter()
-            .filter_map(Value::as_f64)
-            .map(|x| number(x, decimals))
-            .collect();
-        (!texts.is_empty()).then(|| texts.join(" × "))
-    };
-    let format = report.input.get("format").and_then(Value::as_str);
-    [
-        report.template.as_ref().map(|name| format!("Model {name}")),
-        format.map(|format| format!("volume: {format}")),
-        list("shape", 0).map(|shape| format!("{shape} voxels")),
-        list("spacing_mm", 2).map(|spacing| format!("{spacing} mm")),
+    let input = &report.input;
+    let times = |numbers: [f64; 3], decimals| numbers.map(|x| number(x, decimals)).join(" × ");
+    let parts = [
+        Some(format!("Model {}", report.template)),
+        Some(format!("volume: {}", input.format)),
+        Some(format!(
+            "{} voxels",
+            times(input.shape.map(|n| n as f64), 0)
+        )),
+        Some(format!("{} mm", times(input.spacing_mm, 2))),
         report.reader.as_ref().map(drawn_by),
-    ]
-    .into_iter()
-    .flatten()
-    .collect::<Vec<_>>()
-    .join(" · ")
+    ];
+    parts.into_iter().flatten().collect::<Vec<_>>().join(" · ")
 }
 
 /// By which reader's profile the wall was drawn.
-fn drawn_by(reader: &ReaderEntry) -> String {
-    let name = reader.name.as_deref().unwrap_or_default();
+fn drawn_by(reader: &AppliedReaderReport) -> String {
+    let name = &reader.name;
     let moved = [
         ("endocardium", reader.offsets_mm.endocardium, "outward"),
         ("epicardium", reader.offsets_mm.epicardium, "outward"),
@@ -141,22 +134,22 @@ fn drawn_by(reader: &ReaderEntry) -> String {
 
 /// What could be flagged, each with whether it is in order.
 fn checks(report: &SegmentationReport) -> Vec<(bool, String)> {
-    let percent = |name: &str| number(100.0 * report.fit_number(name), 0);
-    let reason = report.fit.get("reason").and_then(Value::as_str);
+    let percent = |share: f64| number(100.0 * share, 0);
+    let (fit, place) = (&report.fit, &report.localisation);
     let mut checks = vec![
         (
             "poor_contrast",
             format!(
                 "An edge is seen along {} % of the surface",
-                percent("active_sensors")
+                percent(fit.active_sensors)
             ),
         ),
         (
             "not_at_rest",
             format!(
                 "The model came to rest: {} after {} steps",
-                reason.unwrap_or("–").replace('_', " "),
-                number(report.fit_number("iterations"), 0)
+                fit.reason.replace('_', " "),
+                number(fit.iterations as f64, 0)
             ),
         ),
         (
@@ -174,14 +167,14 @@ fn checks(report: &SegmentationReport) -> Vec<(bool, String)> {
                 "uncertain_place",
                 format!(
                     "Confidence in the heart's place: {} %",
-                    number(100.0 * report.place_confidence(), 0)
+                    percent(place.as_ref().map_or(f64::NAN, |place| place.confidence))
                 ),
             ),
             (
                 "uncertain_fit",
                 format!(
                     "Chance that an expert's mask agrees: {} %",
-                    percent("confidence")
+                    percent(fit.confidence)
                 ),
             ),
             (
@@ -229,26 +222,31 @@ fn verdict(report: &SegmentationReport) -> Markup {
 }
 
 fn figures(report: &SegmentationReport) -> Markup {
-    let measures = report.measures.unwrap_or_default();
-    let extent = report.polar.as_ref().and_then(|polar| polar.extent_percent);
+    let measures = report.measures.as_ref();
+    let extent = report.polar.as_ref().map(|polar| polar.extent_percent);
     let mut rows = size_rows(report);
     rows.extend([
         (extent, 1, "%", "of the wall below the threshold of uptake"),
         (
-            measures.jaccard,
+            measures.map(|m| m.jaccard),
             3,
             "of 1",
             "Jaccard index against the expert (E_J)",
         ),
-        (measures.dice, 3, "of 1", "Dice index against the expert"),
         (
-            measures.contour_distance_voxels,
+            measures.map(|m| m.dice),
+            3,
+            "of 1",
+            "Dice index against the expert",
+        ),
+        (
+            measures.and_then(|m| m.contour_distance_voxels),
             3,
             "voxels",
             "mean distance of the contours (E_CD)",
         ),
         (
-            measures.hausdorff95_mm,
+            measures.and_then(|m| m.hausdorff95_mm),
             1,
             "mm",
             "95th percentile of the distance between the contours",
@@ -276,7 +274,7 @@ fn size_rows(report: &SegmentationReport) -> Vec<(Option<f64>, usize, &'static s
             false => "volume of the organ",
         };
         return vec![
-            (volumes.wall, 1, "ml", wall),
+            (Some(volumes.wall), 1, "ml", wall),
             (volumes.cavity, 1, "ml", "volume of the cavity"),
             (
                 report.wall_thickness_mm,
@@ -286,22 +284,22 @@ fn size_rows(report: &SegmentationReport) -> Vec<(Option<f64>, usize, &'static s
             ),
         ];
     };
-    let thickness = report.thickness_mm.unwrap_or_default();
+    let thickness = report.thickness_mm.as_ref();
     vec![
         (
-            anatomical.wall,
+            Some(anatomical.wall),
             1,
             "ml",
             "anatomical wall: without the blur",
         ),
         (
-            anatomical.cavity,
+            Some(anatomical.cavity),
             1,
             "ml",
             "cavity within the anatomical wall",
         ),
         (
-            thickness.anatomical.mean,
+            thickness.map(|both| both.anatomical.mean),
             1,
             "mm",
             "mean thickness of the anatomical wall",
@@ -313,14 +311,19 @@ fn size_rows(report: &SegmentationReport) -> Vec<(Option<f64>, usize, &'static s
             "mass of the anatomical wall (1.05 g/ml)",
         ),
         (
-            apparent.wall,
+            Some(apparent.wall),
             1,
             "ml",
             "apparent wall: as it looks in the image",
         ),
-        (apparent.cavity, 1, "ml", "cavity within the apparent wall"),
         (
-            thickness.apparent.mean,
+            Some(apparent.cavity),
+            1,
+            "ml",
+            "cavity within the apparent wall",
+        ),
+        (
+            thickness.map(|both| both.apparent.mean),
             1,
             "mm",
             "mean thickness of the apparent wall",
@@ -373,8 +376,10 @@ const UNKNOWN: &str = "unknown";
 
 /// The polar map beside its segments.
 fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
-    let figures = report.polar.clone().unwrap_or_default();
-    let percent = |value: Option<f64>, decimals| number(value.unwrap_or(f64::NAN), decimals);
+    let Some(figures) = &report.polar else {
+        return Markup::default();
+    };
+    let percent = |value: Option<f64>| number(value.unwrap_or(f64::NAN), 1);
     let sides = match figures.orientation.as_str() {
         UNKNOWN => {
             "base outside. Orientation unknown: nothing in the image or its header tells which side \
@@ -411,19 +416,18 @@ fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
                                 th scope="col" { "Artery" }
                                 th.n scope="col" { "mean, %" }
                                 th.n scope="col" {
-                                    "below " (percent(figures.threshold_percent, 0)) " %, % of area"
+                                    "below " (number(figures.threshold_percent, 0)) " %, % of area"
                                 }
                             }
                         }
                         tbody {
                             @for segment in &figures.segments {
-                                @let number = segment.number.unwrap_or(0);
-                                tr data-segment=(number) {
-                                    td.n { (number) }
+                                tr data-segment=(segment.number) {
+                                    td.n { (segment.number) }
                                     th scope="row" { (segment.name) }
                                     td { (segment.territory.as_deref().unwrap_or("–")) }
-                                    td.n { (percent(segment.mean_percent, 1)) }
-                                    td.n { (percent(segment.extent_percent, 1)) }
+                                    td.n { (percent(segment.mean_percent)) }
+                                    td.n { (number(segment.extent_percent, 1)) }
                                 }
                             }
                             @for territory in &figures.territories {
@@ -431,8 +435,8 @@ fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
                                     td.n {}
                                     th scope="row" { "all of the territory" }
                                     td { (territory.name) }
-                                    td.n { (percent(territory.mean_percent, 1)) }
-                                    td.n { (percent(territory.extent_percent, 1)) }
+                                    td.n { (percent(territory.mean_percent)) }
+                                    td.n { (number(territory.extent_percent, 1)) }
                                 }
                             }
                         }
@@ -450,8 +454,8 @@ fn agreement(report: &SegmentationReport) -> Markup {
     };
     let difference = measures.volume_difference_percent;
     let rows = [
-        ("Jaccard (E_J)", measures.jaccard, 3, ""),
-        ("Dice", measures.dice, 3, ""),
+        ("Jaccard (E_J)", Some(measures.jaccard), 3, ""),
+        ("Dice", Some(measures.dice), 3, ""),
         (
             "Mean contour distance (E_CD)",
             measures.contour_distance_voxels,
@@ -466,10 +470,10 @@ fn agreement(report: &SegmentationReport) -> Markup {
         ),
         ("Hausdorff distance", measures.hausdorff_mm, 2, "mm"),
         ("Hausdorff distance, 95 %", measures.hausdorff95_mm, 2, "mm"),
-        ("Volume of the mask", measures.volume_ml, 1, "ml"),
+        ("Volume of the mask", Some(measures.volume_ml), 1, "ml"),
         (
             "Volume of the expert's mask",
-            measures.expert_volume_ml,
+            Some(measures.expert_volume_ml),
             1,
             "ml",
         ),
@@ -497,7 +501,6 @@ fn candidates(report: &SegmentationReport) -> Markup {
     if tried.len() + refused.len() < 2 {
         return Markup::default();
     }
-    let or_dash = |text: &Option<String>| text.clone().unwrap_or_else(|| "–".to_owned());
     let columns = [
         "confidence",
         "merit",
@@ -508,7 +511,7 @@ fn candidates(report: &SegmentationReport) -> Markup {
     html! {
         section {
             h2 { "Models tried" }
-            p.hint { (report.choice.clone().unwrap_or_default()) "." }
+            p.hint { (report.choice) "." }
             div.scroll tabindex="0" role="group" aria-label="Table, scrollable" {
                 table {
                     thead {
@@ -524,16 +527,16 @@ fn candidates(report: &SegmentationReport) -> Markup {
                                 (model.strain, 3), (model.residual_mm, 2),
                             ];
                             tr {
-                                th scope="row" { (or_dash(&model.template)) }
+                                th scope="row" { (model.template) }
                                 @for (value, decimals) in figures {
-                                    td.n { (number(value.unwrap_or(f64::NAN), decimals)) }
+                                    td.n { (number(value, decimals)) }
                                 }
                             }
                         }
                         @for model in refused {
                             tr {
-                                th scope="row" { (or_dash(&model.template)) }
-                                td colspan="4" { "left out: " (or_dash(&model.reason)) }
+                                th scope="row" { (model.template) }
+                                td colspan="4" { "left out: " (model.reason) }
                             }
                         }
                     }
@@ -545,20 +548,19 @@ fn candidates(report: &SegmentationReport) -> Markup {
 
 /// Everything else, by its name in the report, without lists of an entry for each node or step.
 fn particulars(report: &SegmentationReport) -> Markup {
-    let short = |object: &Map<String, Value>| {
-        let kept = object.iter().filter(|(name, value)| {
+    let short = |mut object: Map<String, Value>| {
+        object.retain(|name, value| {
             let long = value.as_array().is_some_and(|list| list.len() > 4);
             !long && !name.starts_with("affine")
         });
-        let kept = kept.map(|(name, value)| (name.clone(), value.clone()));
-        Value::Object(kept.collect())
+        Value::Object(object)
     };
-    let place = report.localisation.clone().unwrap_or_default();
+    let place = report.localisation.as_ref().map(object);
     document::particulars(&[
-        ("Parameters", short(&report.parameters)),
-        ("Fit", short(&report.fit)),
-        ("Place", short(&place)),
-        ("Input", short(&report.input)),
+        ("Parameters", short(report.parameters.clone())),
+        ("Fit", short(object(&report.fit))),
+        ("Place", short(place.unwrap_or_default())),
+        ("Input", short(object(&report.input))),
     ])
 }
 
@@ -566,11 +568,12 @@ fn particulars(report: &SegmentationReport) -> Markup {
 mod tests {
     use super::*;
     use crate::mesh::shapes;
-    use serde_json::json;
+    use crate::report::RaisedFlag;
+    use crate::report::segmentation_report::tests::first_report;
 
-    fn page(report: Value) -> String {
+    fn page(report: &SegmentationReport) -> String {
         segmentation_page(&SegmentationPage {
-            report: &serde_json::from_value(report).unwrap(),
+            report,
             mesh: &shapes::tetrahedron(2.0),
             uncertainty: &[],
             other: None,
@@ -583,15 +586,8 @@ mod tests {
     }
 
     #[test]
-    fn missing_fields_and_nulls_are_left_out() {
-        let page = page(json!({
-            "volumes_ml": { "wall": 12.25, "cavity": null },
-            "wall_thickness_mm": null,
-            "measures": null,
-            "polar": null,
-            "localisation": null,
-            "a_later_version": 1,
-        }));
+    fn what_a_report_does_not_have_is_left_out() {
+        let page = page(&first_report());
         // What the script may draw is no part of what this page says.
         let page = page.split("<script").next().unwrap_or_default();
         assert!(page.contains("<h1>Organ: segmentation</h1>"));
@@ -610,10 +606,15 @@ mod tests {
 
     #[test]
     fn flags_lower_the_verdict_and_are_listed_with_their_reasons() {
-        let page = page(json!({
-            "parameters": { "organ": "left_ventricle" },
-            "flags": [{ "code": "dark_apex", "reason": "No wall at the <apex>." }],
-        }));
+        let mut report = first_report();
+        report
+            .parameters
+            .insert("organ".into(), "left_ventricle".into());
+        report.flags.push(RaisedFlag {
+            code: "dark_apex".into(),
+            reason: "No wall at the <apex>.".into(),
+        });
+        let page = page(&report);
         assert!(page.contains("<h1>Left ventricle: segmentation</h1>"));
         assert!(page.contains("There is one reason to look closer."));
         assert!(page.contains("<li>No wall at the &lt;apex&gt;.</li>"));

@@ -2,30 +2,28 @@
 //!
 //! A stage's fact appears in the report by one line here.
 
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 
-use super::elements::outward_components;
-use super::sections::{FitnessForms, StartSummary, SurfaceSection};
+use super::elements::{Elements, Shape, Smoothness, outward_components};
+use super::sections::{
+    FitnessFormStages, FitnessForms, FitnessReport, FitnessScales, FitnessTermStages, FitnessTerms,
+    OptimiseReport, RetileReport, StartSummary, SurfaceReport,
+};
 use crate::mesh::topology;
 use crate::optimise::fitness::{Lengths, Scales};
-use crate::optimise::{Ended, FitnessForm, FitnessSummary, OptimiseFacts, Optimised};
-use crate::retile::{RetileFacts, Tiled};
-use crate::surface::{Surface, SurfaceFacts, VolumeKind};
+use crate::optimise::{
+    Ended, FitnessForm, FitnessSummary, OptimiseFacts, OptimiseParameters, Optimised,
+};
+use crate::retile::Tiled;
+use crate::surface::{Surface, VolumeKind};
 
-fn object(value: Value) -> Map<String, Value> {
-    match value {
-        Value::Object(map) => map,
-        _ => Map::new(),
-    }
-}
-
-pub(super) fn surface(surface: &Surface) -> SurfaceSection {
-    let mesh = &surface.mesh;
+pub(super) fn surface(surface: &Surface) -> SurfaceReport {
+    let (mesh, facts) = (&surface.mesh, &surface.facts);
     // `Surface` is always a closed manifold: 3F = 2E.
     let edges = 3 * mesh.triangles.len() / 2;
     let components = topology::components(mesh.vertices.len(), &mesh.triangles);
-    SurfaceSection {
-        iso_value: surface.facts.iso_value,
+    SurfaceReport {
+        iso_value: facts.iso_value,
         vertices: mesh.vertices.len(),
         triangles: mesh.triangles.len(),
         euler_characteristic: mesh.vertices.len() as i64 - edges as i64
@@ -35,70 +33,99 @@ pub(super) fn surface(surface: &Surface) -> SurfaceSection {
         volume_ml: mesh.volume() / 1000.0,
         area_mm2: mesh.area(),
         voxel_mm: surface.spacing,
-        facts: surface_facts(&surface.facts),
+        genus: facts.genus,
+        iso_fraction: facts.iso_fraction,
+        reference_intensity: facts.reference,
+        otsu: facts.otsu,
+        intensity_range: facts.range,
+        kind: kind_name(facts.kind).to_owned(),
+        label: facts.label,
+        ventricle_score: facts.ventricle_score,
+        noise: facts.noise,
+        mask_ml: facts.mask_ml,
+        region_ml: facts.region_ml,
+        touches_border: facts.touches_border,
+        not_finite_voxels: facts.not_finite,
+        neighbour_voxels_cut: facts.neighbour_voxels_cut,
+        neighbour_cut_mm2: facts.neighbour_cut_mm2,
+        components_before: facts.components_before,
+        cavities_before: facts.cavities_before,
+        handles_before: facts.handles_before,
+        voxels_dropped: facts.voxels_dropped,
+        voxels_cut: facts.voxels_cut,
+        voxels_filled: facts.voxels_filled,
     }
 }
 
-fn surface_facts(facts: &SurfaceFacts) -> Map<String, Value> {
-    object(json!({
-        "genus": facts.genus,
-        "iso_fraction": facts.iso_fraction,
-        "reference_intensity": facts.reference,
-        "otsu": facts.otsu,
-        "intensity_range": facts.range,
-        "kind": match facts.kind {
-            VolumeKind::Intensity => "intensity",
-            VolumeKind::Mask => "mask",
-            VolumeKind::Labels => "labels",
-        },
-        "label": facts.label,
-        "ventricle_score": facts.ventricle_score,
-        "noise": facts.noise.map(|noise| json!({
-            "intensity": noise.intensity,
-            "offset_mm": noise.offset_mm,
-            "correlation_mm": noise.correlation_mm,
-            "moved_mm": noise.moved_mm,
-        })),
-        "mask_ml": facts.mask_ml,
-        "region_ml": facts.region_ml,
-        "touches_border": facts.touches_border,
-        "not_finite_voxels": facts.not_finite,
-        "neighbour_voxels_cut": facts.neighbour_voxels_cut,
-        "neighbour_cut_mm2": facts.neighbour_cut_mm2,
-        "components_before": facts.components_before,
-        "cavities_before": facts.cavities_before,
-        "handles_before": facts.handles_before,
-        "voxels_dropped": facts.voxels_dropped,
-        "voxels_cut": facts.voxels_cut,
-        "voxels_filled": facts.voxels_filled,
-    }))
+fn kind_name(kind: VolumeKind) -> &'static str {
+    match kind {
+        VolumeKind::Intensity => "intensity",
+        VolumeKind::Mask => "mask",
+        VolumeKind::Labels => "labels",
+    }
 }
 
-pub(super) fn retile(facts: &RetileFacts, starts: &[StartSummary]) -> Map<String, Value> {
-    object(json!({
-        "seed": facts.seed,
-        "repulsion_rounds": facts.repulsion_rounds,
-        "repeats": facts.repeats,
-        "relaxation_rounds": facts.relaxation_rounds,
-        "attempts": facts.attempts,
-        "starts": starts,
-    }))
+/// The figures of the mesh `tiled`, whose elements are `elements`.
+pub(super) fn retile(
+    tiled: &Tiled,
+    elements: &Elements,
+    starts: Vec<StartSummary>,
+) -> RetileReport {
+    let facts = &tiled.facts;
+    RetileReport {
+        seed: facts.seed,
+        repulsion_rounds: facts.repulsion_rounds,
+        repeats: facts.repeats,
+        relaxation_rounds: facts.relaxation_rounds,
+        attempts: facts.attempts,
+        starts,
+        shape: Shape::of(elements),
+        smoothness: Smoothness::of(elements),
+    }
 }
 
-pub(super) fn optimise(facts: &OptimiseFacts) -> Map<String, Value> {
-    object(json!({
-        "flips": facts.flips,
-        "sweeps": facts.sweeps,
-        "ended": match facts.ended {
-            Ended::NoFlipGains => "no_flip_gains",
-            Ended::Cycle => "cycle",
-            Ended::SweepLimit => "sweep_limit",
+pub(super) fn optimise(facts: &OptimiseFacts) -> OptimiseReport {
+    let ended = match facts.ended {
+        Ended::NoFlipGains => "no_flip_gains",
+        Ended::Cycle => "cycle",
+        Ended::SweepLimit => "sweep_limit",
+    };
+    OptimiseReport {
+        flips: facts.flips,
+        sweeps: facts.sweeps,
+        ended: ended.to_owned(),
+        fit_rounds: facts.fit_rounds,
+        fit_flips: facts.fit_flips,
+        fit_shortened: facts.fit_shortened,
+        self_intersections_before: facts.self_intersections_before,
+    }
+}
+
+/// The fitness after each stage; the gain is that of the form that drove the flips.
+pub(super) fn fitness(optimised: &Optimised, parameters: &OptimiseParameters) -> FitnessReport {
+    let stages = [&optimised.retiled, &optimised.fitted, &optimised.optimised];
+    let [retiled, fitted, driven] = stages.map(|s| driving_form(s, parameters.fitness));
+    let [forms_retiled, forms_fitted, forms_optimised] = stages.map(forms);
+    let [terms_retiled, terms_fitted, terms_optimised] = stages.map(terms);
+    FitnessReport {
+        form: form_name(parameters.fitness).to_owned(),
+        retiled,
+        fitted,
+        optimised: driven,
+        gain_percent: 100.0 * (driven / retiled - 1.0),
+        weights: parameters.weights,
+        scales: scales(optimised.lengths),
+        forms: FitnessFormStages {
+            retiled: forms_retiled,
+            fitted: forms_fitted,
+            optimised: forms_optimised,
         },
-        "fit_rounds": facts.fit_rounds,
-        "fit_flips": facts.fit_flips,
-        "fit_shortened": facts.fit_shortened,
-        "self_intersections_before": facts.self_intersections_before,
-    }))
+        terms: FitnessTermStages {
+            retiled: terms_retiled,
+            fitted: terms_fitted,
+            optimised: terms_optimised,
+        },
+    }
 }
 
 pub(super) fn warnings(surface: &Surface, tiled: &Tiled, optimised: &Optimised) -> Vec<String> {
@@ -113,7 +140,7 @@ pub(super) fn warnings(surface: &Surface, tiled: &Tiled, optimised: &Optimised) 
     .collect()
 }
 
-pub(super) fn form_name(form: FitnessForm) -> &'static str {
+fn form_name(form: FitnessForm) -> &'static str {
     match form {
         FitnessForm::Raw => "raw",
         FitnessForm::Normalised => "normalised",
@@ -121,7 +148,7 @@ pub(super) fn form_name(form: FitnessForm) -> &'static str {
     }
 }
 
-pub(super) fn driving_form(summary: &FitnessSummary, form: FitnessForm) -> f64 {
+fn driving_form(summary: &FitnessSummary, form: FitnessForm) -> f64 {
     match form {
         FitnessForm::Raw => summary.raw,
         FitnessForm::Normalised => summary.normalised,
@@ -129,7 +156,7 @@ pub(super) fn driving_form(summary: &FitnessSummary, form: FitnessForm) -> f64 {
     }
 }
 
-pub(super) fn forms(summary: &&FitnessSummary) -> FitnessForms {
+fn forms(summary: &FitnessSummary) -> FitnessForms {
     FitnessForms {
         raw: summary.raw,
         normalised: summary.normalised,
@@ -137,8 +164,17 @@ pub(super) fn forms(summary: &&FitnessSummary) -> FitnessForms {
     }
 }
 
+fn terms(summary: &FitnessSummary) -> FitnessTerms {
+    FitnessTerms {
+        a_deg: summary.a_mean.to_degrees(),
+        b_deg: summary.b_mean.to_degrees(),
+        c: summary.c_mean,
+        d_mm: summary.d_mean,
+    }
+}
+
 /// Numerators and floors of A, B (radians), C and D (mm) in every form.
-pub(super) fn scales(lengths: Lengths) -> Map<String, Value> {
+fn scales(lengths: Lengths) -> Map<String, Value> {
     [
         FitnessForm::Raw,
         FitnessForm::Normalised,
@@ -147,7 +183,11 @@ pub(super) fn scales(lengths: Lengths) -> Map<String, Value> {
     .into_iter()
     .map(|form| {
         let scales = Scales::new(form, lengths);
-        let value = json!({ "numerator": scales.numerator, "floor": scales.floor });
+        let scales = FitnessScales {
+            numerator: scales.numerator,
+            floor: scales.floor,
+        };
+        let value = serde_json::to_value(scales).expect("plain numbers");
         (form_name(form).to_owned(), value)
     })
     .collect()

@@ -7,6 +7,7 @@ use crate::numeric::round_step::round_step;
 
 /// Mean, spread and percentiles of a list of numbers. All zero for an empty list.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct Summary {
     /// Arithmetic mean.
     pub mean: f64,
@@ -57,6 +58,7 @@ impl Summary {
 /// Counts over equal bins, before and after optimisation side by side. The bin [lower,
 /// lower + width) is the first; the last one includes its upper end.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct Histogram {
     /// Lower end of the first bin.
     pub lower: f64,

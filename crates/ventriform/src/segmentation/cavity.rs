@@ -1,4 +1,4 @@
-//! The cavity of a ventricle as a mask, from what the files of a segmentation say.
+//! The cavity of a ventricle as a mask, from its wall and long axis.
 
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
@@ -7,29 +7,21 @@ use crate::locate::cup::Cup;
 use crate::mesh::TriMesh;
 use crate::model::wall::VentricleWall;
 use crate::progress::{Cancelled, Monitor};
-use serde_json::Value;
+use crate::report::LongAxis;
 
-/// The voxels of the cavity within the wall `mesh` (LPS mm), whose mask on the grid at `frame` is `wall`.
-/// The long axis and the patient's superior direction are those of the report; `None` if it states
-/// none, as of organs without a cavity.
+/// The voxels of the cavity within the wall `mesh` (LPS mm) with the long axis `axis`, whose mask on the grid at
+/// `frame` is `wall`. `superior` is the direction to the patient's head, LPS. `None` if the axis has no length.
 ///
 /// # Errors
 /// [`Cancelled`].
 pub fn cavity(
-    report: &Value,
+    axis: &LongAxis,
+    superior: &Vec3,
     mesh: &TriMesh,
     (wall, frame): (&Mask, &VoxelToPatient),
     monitor: &Monitor<'_>,
 ) -> Result<Option<Mask>, Cancelled> {
-    let [base, apex, superior] = [
-        "/fit/long_axis/base",
-        "/fit/long_axis/apex",
-        "/posture/superior",
-    ]
-    .map(|place| report.pointer(place).and_then(point));
-    let (Some(base), Some(apex)) = (base, apex) else {
-        return Ok(None);
-    };
+    let [base, apex] = axis.ends();
     let Some(axis) = (apex - base).try_normalize(1e-6) else {
         return Ok(None);
     };
@@ -39,12 +31,6 @@ pub fn cavity(
         length: (apex - base).norm(),
         breadth: 1.0,
     };
-    let superior = superior.unwrap_or_else(Vec3::z);
-    let seen = VentricleWall::new(mesh, &cup, &superior, monitor)?;
+    let seen = VentricleWall::new(mesh, &cup, superior, monitor)?;
     seen.cavity(wall, frame, monitor).map(Some)
-}
-
-fn point(value: &Value) -> Option<Vec3> {
-    let numbers: Vec<f64> = value.as_array()?.iter().filter_map(Value::as_f64).collect();
-    <[f64; 3]>::try_from(numbers).ok().map(Vec3::from)
 }

@@ -4,7 +4,6 @@ use super::cavity::cavity;
 use super::from_files::{ExpertFacts, SegmentedVolume};
 use super::mask_place::MaskPlace;
 use super::region::region;
-use super::report::report_json;
 use crate::deform::WallEdge;
 use crate::export::dicom::{DicomError, DicomObject, DicomResults, Moment, SourceScan, Structure};
 use crate::export::open_part::open_part;
@@ -13,14 +12,13 @@ use crate::grid::voxelise::Mask;
 use crate::mesh::TriMesh;
 use crate::mesh::part::Part;
 use crate::model::wall_parts;
-use crate::parameters::Parameters;
-use crate::polar;
+use crate::polar::{self, PolarDocument};
 use crate::progress::{Cancelled, Monitor, Stage};
-use crate::report::{self, SegmentationPage, SegmentationReport};
+use crate::report::{self, SegmentationPage, SegmentationSummary};
 use crate::volume::dicom::Provenance;
 use crate::volume::nifti::{self, LabelEntry, MaskError, StoredType};
 use crate::volume::{AffineSource, Reading};
-use serde_json::{Map, Value, json};
+use serde::Serialize;
 
 /// The mask of the wall that was asked for.
 const MASK: &str = "mask.nii.gz";
@@ -171,7 +169,7 @@ impl SegmentedVolume {
         let metadata = Metadata {
             volume_id,
             frame_of_reference_uid: self.reading.frame_of_reference().map(str::to_owned),
-            quality: self.summary(),
+            quality: report::object(&self.summary()),
             ..Metadata::new("Fitted model")
         };
         let shown = fit.shown_uncertainty(edge).unwrap_or_default();
@@ -226,18 +224,6 @@ impl SegmentedVolume {
         warnings
     }
 
-    /// The report, with the parameters used, the facts of the input and warnings.
-    pub fn report(&self) -> Value {
-        let mut report = report_json(&self.segmentation);
-        if let Some(object) = report.as_object_mut() {
-            let parameters = self.parameters.to_json();
-            object.insert("parameters".into(), parameters.into());
-            object.insert("input".into(), report::input(&self.reading.facts));
-            object.insert("warnings".into(), self.warnings().into());
-        }
-        report
-    }
-
     /// The report as a self-contained page; `files` are those of [`SegmentedVolume::files`]. It names
     /// patient, study and series as far as `scan` does.
     pub fn page(&self, files: &[NamedFile], scan: Option<&Provenance>) -> NamedFile {
@@ -245,13 +231,12 @@ impl SegmentedVolume {
             let found = files.iter().find(|file| file.name == name);
             found.map(|file| file.bytes.as_slice())
         };
-        let report: SegmentationReport = serde_json::from_value(self.report())
-            .expect("the page reads the fields of the report by the types it was written with");
         let edge = self.parameters.deform.edge;
         let fit = &self.segmentation.fit;
-        let map = self.segmentation.polar.as_ref().map(polar::json);
+        let map = self.segmentation.polar.as_ref().map(PolarDocument::of);
+        let map = map.map(|map| report::object(&map).into());
         let page = report::segmentation_page(&SegmentationPage {
-            report: &report,
+            report: &self.report(),
             mesh: &fit.mesh,
             uncertainty: fit.shown_uncertainty(edge).unwrap_or_default(),
             other: fit
@@ -271,23 +256,8 @@ impl SegmentedVolume {
     }
 
     /// The main figures, for lists and mesh files.
-    pub fn summary(&self) -> Map<String, Value> {
-        let report = report_json(&self.segmentation);
-        let fit = &report["fit"];
-        [
-            ("template", report["template"].clone()),
-            ("choice", report["choice"].clone()),
-            ("candidates", report["candidates"].clone()),
-            ("reason", fit["reason"].clone()),
-            ("confidence", fit["confidence"].clone()),
-            ("volumes_ml", report["volumes_ml"].clone()),
-            ("measures", report["measures"].clone()),
-            ("flags", report["flags"].clone()),
-            ("vertices", json!(self.segmentation.fit.mesh.vertices.len())),
-        ]
-        .into_iter()
-        .map(|(key, value)| (key.to_owned(), value))
-        .collect()
+    pub fn summary(&self) -> SegmentationSummary {
+        SegmentationSummary::of(self.report(), self.segmentation.fit.mesh.vertices.len())
     }
 
     /// The scan that the results belong to, with the given identity.
@@ -308,10 +278,14 @@ impl SegmentedVolume {
         let report = self.report();
         let polar = made.polar.as_ref().map(polar::png);
         let placed = (&made.mask, &self.reading.volume.frame);
-        // A silent monitor is never cancelled.
-        let cavity =
-            cavity(&report, &made.fit.mesh, placed, &Monitor::silent()).unwrap_or_default();
-        let results = DicomResults::new(scan, structure, &made.mask, &made.fit.mesh, &report)
+        let cavity = report.axes().and_then(|(axis, superior)| {
+            // A silent monitor is never cancelled.
+            let cavity = cavity(&axis, &superior, &made.fit.mesh, placed, &Monitor::silent());
+            cavity.unwrap_or_default()
+        });
+        let text = json_line(&report);
+        let results = DicomResults::new(scan, structure, &made.mask, &made.fit.mesh, &text)
+            .with_figures(&report)
             .with_cavity(cavity.as_ref())
             .with_pictures(Some(&made.slices), polar.as_deref());
         let mut files = Vec::new();
@@ -351,9 +325,13 @@ impl SegmentedVolume {
         place: &MaskPlace<'_>,
         monitor: &Monitor<'_>,
     ) -> Result<[NamedFile; 2], SegmentationFilesError> {
-        let report = report_json(&self.segmentation);
         let mesh = &self.segmentation.fit.mesh;
-        let cavity = cavity(&report, mesh, (wall, &place.frame), monitor)?;
+        let cavity = match self.report().axes() {
+            Some((axis, superior)) => {
+                cavity(&axis, &superior, mesh, (wall, &place.frame), monitor)?
+            }
+            None => None,
+        };
         let mut labels: Vec<u8> = wall.voxels.iter().map(|inside| u8::from(*inside)).collect();
         if let Some(cavity) = &cavity {
             let inside = labels.iter_mut().zip(&cavity.voxels);
@@ -389,7 +367,11 @@ impl SegmentedVolume {
             media_type: "image/png",
             bytes: polar::png(map),
         };
-        Ok(vec![json_file("polar.json", &polar::json(map)), svg, png])
+        Ok(vec![
+            json_file("polar.json", &PolarDocument::of(map)),
+            svg,
+            png,
+        ])
     }
 }
 
@@ -407,12 +389,18 @@ fn nifti_file(
     })
 }
 
-fn json_file(name: &str, value: &Value) -> NamedFile {
+fn json_file(name: &str, document: &impl Serialize) -> NamedFile {
+    let text = serde_json::to_string_pretty(document).expect("every key of a document is a text");
     NamedFile {
         name: name.into(),
         media_type: "application/json",
-        bytes: format!("{value:#}\n").into_bytes(),
+        bytes: format!("{text}\n").into_bytes(),
     }
+}
+
+/// A document as JSON in one line.
+fn json_line(document: &impl Serialize) -> String {
+    serde_json::to_string(document).expect("every key of a document is a text")
 }
 
 fn other(what: &'static str, error: &dyn std::error::Error) -> SegmentationFilesError {

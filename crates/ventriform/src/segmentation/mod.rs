@@ -17,7 +17,7 @@
 //!    judge the chosen one together ([`consensus`](crate::deform::consensus)).
 //! 6. With a reader's profile, the wall is drawn as that reader would ([`crate::reader`]).
 //! 7. [`segment`](mod@segment) makes mask, measures, polar map and [`slices`] of the fit.
-//! 8. [`report_json`] is the report; [`SegmentedVolume::files`] are the files written, the same on
+//! 8. [`SegmentedVolume::report`] is the report; [`SegmentedVolume::files`] are the files written, the same on
 //!    the command line and over HTTP.
 
 mod order;
@@ -49,5 +49,4 @@ pub use fitting::{OrganSearch, RankedTemplate, fit_built_in};
 pub use from_files::{ExpertFacts, SegmentedVolume, from_files};
 pub use named_template::{NamedTemplate, RefusedTemplate};
 pub use order::{NamedMesh, NamedReader, SegmentationOrder};
-pub use report::{agreement_json, report_json};
 pub use segment::{AppliedReader, ImageResolution, Segmentation, SegmentationParameters, segment};

@@ -29,6 +29,7 @@
 //! L looks like shape.
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Bvh;
@@ -71,15 +72,16 @@ const FEWEST_VERTICES: usize = 200;
 /// Fewest vertices per parallel task.
 const PER_TASK: usize = 512;
 
-/// The noise of a scan, measured where the surface lies.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The noise of a scan where its surface lies.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct SurfaceNoise {
     /// Standard deviation of the intensities, in the volume's units.
     pub intensity: f64,
     /// Standard deviation of the surface's place, mm: that of the intensities over the steepness
     /// of the image across the surface, the median over all vertices.
     pub offset_mm: f64,
-    /// Full width at half maximum of the correlation between places, mm; 0 without noise.
+    /// Full width at half maximum of the noise's correlation between places, mm; 0 without noise.
     pub correlation_mm: f64,
     /// Root mean square of the distances by which the vertices were moved, mm.
     pub moved_mm: f64,

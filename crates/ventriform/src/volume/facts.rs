@@ -2,6 +2,7 @@
 
 use crate::mesh_files::MeshFormat;
 use nalgebra::Matrix4;
+use serde::{Deserialize, Serialize};
 
 /// Format of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -200,7 +201,8 @@ pub struct IntensitySummary {
 }
 
 /// One label of a label map.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct LabelCount {
     /// Value of the voxels.
     pub label: i64,

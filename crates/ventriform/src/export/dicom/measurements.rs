@@ -11,14 +11,15 @@
 use super::codes::{CAVITY, Code, MILLIMETRE, OWN_SCHEME, dcm, own, sct, ucum};
 use super::data_set::{DataSet, reference};
 use super::{DicomObject, DicomResults};
+use crate::polar::PolarSegment;
+use crate::report::SegmentationReport;
 use dicom_core::Tag;
 use dicom_dictionary_std::{tags, uids};
-use serde_json::Value;
 
-/// A figure of the report and how it is coded.
-struct Figure {
-    /// Its place in `report.json` (RFC 6901).
-    pointer: &'static str,
+/// A figure of a report, or of an entry `T` of one, and how it is coded.
+struct Figure<T = SegmentationReport> {
+    /// The figure; `None` or not finite where there is none.
+    value: fn(&T) -> Option<f64>,
     concept: Code,
     unit: Code,
     /// How it was derived from the single values.
@@ -40,47 +41,47 @@ const GRAM: Code = ucum("g", "gram");
 const PERCENT: Code = ucum("%", "Percent");
 const RATIO: Code = ucum("1", "no units");
 
-const fn figure(pointer: &'static str, concept: Code, unit: Code) -> Figure {
+const fn figure<T>(value: fn(&T) -> Option<f64>, concept: Code, unit: Code) -> Figure<T> {
     Figure {
-        pointer,
+        value,
         concept,
         unit,
         derivation: None,
     }
 }
 
-impl Figure {
-    const fn mean(self) -> Self {
-        Self {
-            derivation: Some(MEAN),
-            ..self
-        }
+const fn mean<T>(value: fn(&T) -> Option<f64>, concept: Code, unit: Code) -> Figure<T> {
+    Figure {
+        value,
+        concept,
+        unit,
+        derivation: Some(MEAN),
     }
 }
 
 /// What is measured of the whole structure. A new figure of the report is a new line here.
 const FIGURES: &[Figure] = &[
-    figure("/volumes_ml/wall", VOLUME, MILLILITRE),
-    figure("/mass_g", MASS, GRAM),
-    figure("/wall_thickness_mm", THICKNESS, MILLIMETRE).mean(),
-    figure("/polar/extent_percent", DEFECT, PERCENT),
+    figure(|r| Some(r.volumes_ml.wall), VOLUME, MILLILITRE),
+    figure(|r| r.mass_g, MASS, GRAM),
+    mean(|r| r.wall_thickness_mm, THICKNESS, MILLIMETRE),
+    figure(|r| Some(r.polar.as_ref()?.extent_percent), DEFECT, PERCENT),
     figure(
-        "/measures/jaccard",
+        |r| Some(r.measures?.jaccard),
         own("JACCARD", "Jaccard index with the expert's mask"),
         RATIO,
     ),
     figure(
-        "/measures/dice",
+        |r| Some(r.measures?.dice),
         own("DICE", "Dice index with the expert's mask"),
         RATIO,
     ),
     figure(
-        "/measures/contour_distance_mm",
+        |r| r.measures?.contour_distance_mm,
         own("CONTOUR-MM", "Mean contour distance to the expert's mask"),
         MILLIMETRE,
     ),
     figure(
-        "/measures/hausdorff_mm",
+        |r| r.measures?.hausdorff_mm,
         own("HAUSDORFF-MM", "Hausdorff distance to the expert's mask"),
         MILLIMETRE,
     ),
@@ -105,37 +106,53 @@ const PARTS: [Part; 5] = [
         name: "cavity",
         method: None,
         site: Some(CAVITY),
-        figures: &[figure("/volumes_ml/cavity", VOLUME, MILLILITRE)],
+        figures: &[figure(|r| r.volumes_ml.cavity, VOLUME, MILLILITRE)],
     },
     Part {
         name: "apparent wall",
         method: Some(APPARENT),
         site: None,
         figures: &[
-            figure("/volumes_ml/apparent/wall", VOLUME, MILLILITRE),
-            figure("/thickness_mm/apparent/mean", THICKNESS, MILLIMETRE).mean(),
+            figure(|r| Some(r.volumes_ml.apparent?.wall), VOLUME, MILLILITRE),
+            mean(
+                |r| Some(r.thickness_mm?.apparent.mean),
+                THICKNESS,
+                MILLIMETRE,
+            ),
         ],
     },
     Part {
         name: "apparent cavity",
         method: Some(APPARENT),
         site: Some(CAVITY),
-        figures: &[figure("/volumes_ml/apparent/cavity", VOLUME, MILLILITRE)],
+        figures: &[figure(
+            |r| Some(r.volumes_ml.apparent?.cavity),
+            VOLUME,
+            MILLILITRE,
+        )],
     },
     Part {
         name: "anatomical wall",
         method: Some(ANATOMICAL),
         site: None,
         figures: &[
-            figure("/volumes_ml/anatomical/wall", VOLUME, MILLILITRE),
-            figure("/thickness_mm/anatomical/mean", THICKNESS, MILLIMETRE).mean(),
+            figure(|r| Some(r.volumes_ml.anatomical?.wall), VOLUME, MILLILITRE),
+            mean(
+                |r| Some(r.thickness_mm?.anatomical.mean),
+                THICKNESS,
+                MILLIMETRE,
+            ),
         ],
     },
     Part {
         name: "anatomical cavity",
         method: Some(ANATOMICAL),
         site: Some(CAVITY),
-        figures: &[figure("/volumes_ml/anatomical/cavity", VOLUME, MILLILITRE)],
+        figures: &[figure(
+            |r| Some(r.volumes_ml.anatomical?.cavity),
+            VOLUME,
+            MILLILITRE,
+        )],
     },
 ];
 
@@ -160,10 +177,10 @@ const WALL_SEGMENTS: [Code; 17] = [
     sct("128564006", "Apex of left ventricle"),
 ];
 
-/// What is measured of each of them, from its entry in `/polar/segments`.
-const SEGMENT_FIGURES: &[Figure] = &[
-    figure("/mean_percent", PERFUSION, PERCENT).mean(),
-    figure("/extent_percent", DEFECT, PERCENT),
+/// What is measured of each of them.
+const SEGMENT_FIGURES: &[Figure<PolarSegment>] = &[
+    mean(|s| s.mean_percent, PERFUSION, PERCENT),
+    figure(|s| Some(s.extent_percent), DEFECT, PERCENT),
 ];
 
 /// Puts everything that is particular to this object.
@@ -253,9 +270,9 @@ fn image_library(results: &DicomResults<'_>) -> Option<DataSet> {
 fn groups(results: &DicomResults<'_>) -> Vec<DataSet> {
     let mut groups = vec![whole(results)];
     groups.extend(PARTS.iter().filter_map(|part| of_part(results, part)));
-    let segments = results.report.pointer("/polar/segments");
-    for segment in segments.and_then(Value::as_array).into_iter().flatten() {
-        let number = segment["number"].as_u64().unwrap_or(0) as usize;
+    let polar = results.figures.and_then(|report| report.polar.as_ref());
+    for segment in polar.iter().flat_map(|polar| &polar.segments) {
+        let number = segment.number;
         let site = number.checked_sub(1).and_then(|at| WALL_SEGMENTS.get(at));
         let figures = measured(segment, SEGMENT_FIGURES);
         let (Some(site), false) = (site, figures.is_empty()) else {
@@ -300,19 +317,18 @@ fn whole(results: &DicomResults<'_>) -> DataSet {
             ));
         }
     }
-    content.extend(measured(results.report, FIGURES));
-    let flags = results.report.pointer("/flags").and_then(Value::as_array);
-    for flag in flags.into_iter().flatten() {
-        if let Some(reason) = flag["reason"].as_str() {
-            content.push(text("CONTAINS", dcm("121106", "Comment"), reason));
-        }
+    if let Some(report) = results.figures {
+        content.extend(measured(report, FIGURES));
+        let comment = dcm("121106", "Comment");
+        let flags = report.flags.iter();
+        content.extend(flags.map(|flag| text("CONTAINS", comment, &flag.reason)));
     }
     group(if images.is_some() { "1411" } else { "1501" }, content)
 }
 
 /// The group of one part; `None` where the report tells nothing of it.
 fn of_part(results: &DicomResults<'_>, part: &Part) -> Option<DataSet> {
-    let figures = measured(results.report, part.figures);
+    let figures = measured(results.figures?, part.figures);
     if figures.is_empty() {
         return None;
     }
@@ -338,10 +354,10 @@ fn segment_reference(results: &DicomResults<'_>) -> DataSet {
     item
 }
 
-/// Those of `figures` that `report` has, as NUM items.
-fn measured(report: &Value, figures: &[Figure]) -> Vec<DataSet> {
-    let item = |figure: &Figure| {
-        let number = report.pointer(figure.pointer)?.as_f64()?;
+/// Those of `figures` that `source` has, as NUM items.
+fn measured<T>(source: &T, figures: &[Figure<T>]) -> Vec<DataSet> {
+    let item = |figure: &Figure<T>| {
+        let number = (figure.value)(source).filter(|number| number.is_finite())?;
         let mut value = DataSet::new();
         value.decimals(tags::NUMERIC_VALUE, &[number]);
         value.code(tags::MEASUREMENT_UNITS_CODE_SEQUENCE, figure.unit);

@@ -46,8 +46,8 @@ use self::uid::Uids;
 use super::ExportError;
 use crate::grid::voxelise::Mask;
 use crate::mesh::TriMesh;
+use crate::report::SegmentationReport;
 use dicom_dictionary_std::{tags, uids};
-use serde_json::Value;
 
 /// Why a result cannot be written as DICOM.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -231,7 +231,7 @@ pub struct DicomResults<'a> {
     structure: Structure,
     mask: &'a Mask,
     mesh: &'a TriMesh,
-    report: &'a Value,
+    figures: Option<&'a SegmentationReport>,
     cavity: Option<&'a Mask>,
     slices: Option<&'a [u8]>,
     polar: Option<&'a [u8]>,
@@ -240,20 +240,20 @@ pub struct DicomResults<'a> {
 
 impl<'a> DicomResults<'a> {
     /// Results of `scan`, which show `structure`: the mask on the scan's grid, the mesh (LPS mm) and
-    /// the report (`report.json`).
+    /// the text of the report, as JSON in one line, from which UIDs are derived.
     pub fn new(
         scan: &'a SourceScan,
         structure: Structure,
         mask: &'a Mask,
         mesh: &'a TriMesh,
-        report: &'a Value,
+        report: &str,
     ) -> Self {
         Self {
             scan,
             structure,
             mask,
             mesh,
-            report,
+            figures: None,
             cavity: None,
             slices: None,
             polar: None,
@@ -266,8 +266,17 @@ impl<'a> DicomResults<'a> {
                 add(&numbers.flat_map(f64::to_le_bytes).collect::<Vec<_>>());
                 let corners = mesh.triangles.iter().flatten();
                 add(&corners.flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>());
-                add(report.to_string().as_bytes());
+                add(report.as_bytes());
             }),
+        }
+    }
+
+    /// Adds the figures of a segmentation, for [`DicomObject::Measurements`].
+    #[must_use]
+    pub fn with_figures(self, report: &'a SegmentationReport) -> Self {
+        Self {
+            figures: Some(report),
+            ..self
         }
     }
 

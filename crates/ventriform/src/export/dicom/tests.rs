@@ -7,11 +7,13 @@ use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
 use crate::grid::voxelise::voxelise;
 use crate::mesh::shapes;
+use crate::polar::{PolarSegment, PolarSummary};
+use crate::report::segmentation_report::tests::first_report;
+use crate::report::{RaisedFlag, SegmentationReport, Thickness, Thicknesses, WallVolumes};
 use crate::volume::dicom::Provenance;
 use dicom_core::Tag;
 use dicom_object::{DefaultDicomObject, InMemDicomObject, from_reader};
 use nalgebra::Matrix3;
-use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 
 const SHAPE: [usize; 3] = [30, 26, 22];
@@ -53,8 +55,32 @@ struct Scene {
     scan: SourceScan,
     mask: Mask,
     mesh: TriMesh,
-    report: Value,
+    report: SegmentationReport,
     png: Vec<u8>,
+}
+
+fn polar() -> PolarSummary {
+    let segment = |number: usize| PolarSegment {
+        number,
+        name: "x".into(),
+        territory: None,
+        mean_percent: Some(60.0 + number as f64),
+        extent_percent: number as f64,
+        area_mm2: 100.0,
+    };
+    PolarSummary {
+        reference: 1.0,
+        threshold_percent: 60.0,
+        extent_percent: 12.5,
+        note: String::new(),
+        segments: (1..=17).map(segment).collect(),
+        territories: Vec::new(),
+        rows: 32,
+        columns: 60,
+        orientation: "frame".into(),
+        first_column: None,
+        direction: None,
+    }
 }
 
 impl Scene {
@@ -71,15 +97,15 @@ impl Scene {
         }
         let mask = voxelise(&mesh, SHAPE, &frame);
         assert!(mask.count() > 500);
-        let segments: Vec<Value> = (1..=17)
-            .map(|n| json!({"number": n, "mean_percent": 60 + n, "extent_percent": n}))
-            .collect();
-        let report = json!({
-            "volumes_ml": {"wall": 101.25, "cavity": 55.5},
-            "wall_thickness_mm": 9.5,
-            "polar": {"extent_percent": 12.5, "segments": segments},
-            "flags": [{"code": "x", "reason": "The wall is thin; größer als üblich."}],
-        });
+        let mut report = first_report();
+        report.volumes_ml.wall = 101.25;
+        report.volumes_ml.cavity = Some(55.5);
+        report.wall_thickness_mm = Some(9.5);
+        report.polar = Some(polar());
+        report.flags = vec![RaisedFlag {
+            code: "x".into(),
+            reason: "The wall is thin; größer als üblich.".into(),
+        }];
         Self {
             scan: SourceScan::new(provenance, frame, SHAPE, placed, moment()),
             mask,
@@ -91,7 +117,9 @@ impl Scene {
 
     fn results(&self) -> DicomResults<'_> {
         let structure = Structure::of("left_ventricle");
-        DicomResults::new(&self.scan, structure, &self.mask, &self.mesh, &self.report)
+        let text = serde_json::to_string(&self.report).unwrap();
+        DicomResults::new(&self.scan, structure, &self.mask, &self.mesh, &text)
+            .with_figures(&self.report)
             .with_pictures(Some(&self.png), Some(&self.png))
     }
 
@@ -457,9 +485,14 @@ fn each_volume_has_a_group_that_says_which_it_is() {
     let whole = apart(&scene.read(DicomObject::Measurements));
     let sites: Vec<&str> = whole.iter().map(|(_, site, _)| site.as_str()).collect();
     assert_eq!(sites, ["87878005", "LV-CAVITY"]);
-    scene.report["volumes_ml"]["apparent"] = json!({"wall": 120.5, "cavity": 40.25});
-    scene.report["volumes_ml"]["anatomical"] = json!({"wall": 101.25, "cavity": 55.5});
-    scene.report["thickness_mm"] = json!({"anatomical": {"mean": 9.5}});
+    let volumes = |wall, cavity| Some(WallVolumes { wall, cavity });
+    scene.report.volumes_ml.apparent = volumes(120.5, 40.25);
+    scene.report.volumes_ml.anatomical = volumes(101.25, 55.5);
+    let thickness = |mean| Thickness { mean, spread: 1.0 };
+    scene.report.thickness_mm = Some(Thicknesses {
+        apparent: thickness(f64::NAN),
+        anatomical: thickness(9.5),
+    });
     let set = scene.read(DicomObject::Measurements);
     let part = |method: &str, site: &str, number| (method.to_owned(), site.to_owned(), number);
     assert_eq!(
@@ -571,7 +604,7 @@ fn equal_input_gives_equal_bytes_and_other_input_other_uids() {
     }
     let uid = |scene: &Scene| text(&scene.read(DicomObject::Mask), tags::SOP_INSTANCE_UID);
     let mut other = straight();
-    other.report = json!({});
+    other.report = first_report();
     assert_ne!(uid(&scene), uid(&other));
     let mut other = straight();
     other.mask.voxels[0] ^= true;

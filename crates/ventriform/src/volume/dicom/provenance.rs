@@ -15,33 +15,35 @@ use std::fmt;
 
 macro_rules! provenance {
     ($($(#[$doc:meta])* $field:ident = $attribute:expr;)*) => {
-        /// Patient, study, series, instances and acquisition of a volume, as its DICOM header states
-        /// them (PS3.3 C.7, C.8.4). An attribute that is absent or empty is `None`.
-        ///
-        /// This is personal data. `Debug` shows no value of it, so that it cannot get into a log.
+        // Patient, study, series, instances and acquisition (PS3.3 C.7, C.8.4). An attribute that is
+        // absent or empty is `None`. This is personal data: `Debug` shows no value of it, so that it
+        // cannot get into a log.
+        /// Whose scan a volume is: what its DICOM header says, or was stated.
         #[derive(Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-        #[serde(default)]
+        #[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = Scan))]
         pub struct Provenance {
             $(
                 $(#[$doc])*
                 #[serde(skip_serializing_if = "Option::is_none")]
                 pub $field: Option<String>,
             )*
-            /// `rest` or `stress`, from the acquisition context, the protocol, or the descriptions of
-            /// series and study.
+            // From the acquisition context, the protocol, or the descriptions of series and study.
+            /// `rest` or `stress`.
             #[serde(skip_serializing_if = "Option::is_none")]
             pub rest_or_stress: Option<String>,
-            /// SOP Instance UIDs of a series of several instances, in the order of the volume's
-            /// slices; empty for a single one.
-            #[serde(skip_serializing_if = "Vec::is_empty")]
+            // In the order of the volume's slices; empty for a single one.
+            /// SOP Instance UIDs of a series of several instances; in `/identity` only.
+            #[serde(default, skip_serializing_if = "Vec::is_empty")]
             pub instance_uids: Vec<String>,
             /// For every slice of the volume, the number of its stored frame in the instance, from 1;
             /// empty for a series of single-frame instances, and for a segmentation.
-            #[serde(skip_serializing_if = "Vec::is_empty")]
+            #[serde(default, skip_serializing_if = "Vec::is_empty")]
+            #[cfg_attr(feature = "schema", schema(ignore))]
             pub slice_frames: Vec<u32>,
-            /// The fields of this that the data set has and that cannot be decoded
-            /// ([`decode`](super::characters)).
-            #[serde(skip_serializing_if = "Vec::is_empty")]
+            // See [`decode`](super::characters).
+            /// Fields that the file states and that cannot be decoded; while they belong to patient or
+            /// study, no DICOM object is made.
+            #[serde(default, skip_serializing_if = "Vec::is_empty")]
             pub undecoded: Vec<String>,
         }
 
@@ -133,12 +135,13 @@ provenance! {
     sop_class_uid = SOP_CLASS;
     /// SOP Instance UID (0008,0018); of a series of several instances, the first one's.
     sop_instance_uid = SOP_INSTANCE;
-    /// Acquisition Date (0008,0022), or the date in Acquisition `DateTime` (0008,002A), or the
-    /// Series Date, `YYYYMMDD`.
+    /// Acquisition Date (0008,0022), or the date in Acquisition `DateTime` (0008,002A), or
+    /// the Series Date, `YYYYMMDD`.
     acquisition_date = ACQUISITION_DATE;
     /// Acquisition Time (0008,0032), or the time in Acquisition `DateTime` (0008,002A).
     acquisition_time = ACQUISITION_TIME;
-    /// Meaning of the Radiopharmaceutical Code (0054,0304), or the Radiopharmaceutical (0018,0031).
+    /// Meaning of the Radiopharmaceutical Code (0054,0304), or the Radiopharmaceutical
+    /// (0018,0031).
     radiopharmaceutical = PHARMACEUTICAL_MEANING;
     /// Meaning of the Radionuclide Code (0054,0300).
     radionuclide = NUCLIDE_MEANING;

@@ -1,6 +1,6 @@
 //! Prints the figures that the confidence of a fit is calibrated on.
 //!
-//! `cargo run --release --example confidence -- FOLDER...` segments
+//! `cargo run --release -p ventriform-tools --bin confidence -- FOLDER...` segments
 //! `CASE/spect.nii.gz` of every case in the folders with the built-in hearts, once for each wall. Each
 //! case gives one line: its name, the Jaccard index of the apparent wall with `lv_expert_img.nii.gz` and
 //! of the anatomical wall with `lv_truth.nii.gz` (`-` without a fit), then, as JSON, for each wall the
@@ -18,7 +18,8 @@ use ventriform::deform::{Evidence, Flag, WallEdge};
 use ventriform::grid::agreement::compare;
 use ventriform::parameters::FitParameters;
 use ventriform::progress::Monitor;
-use ventriform::segmentation::{SegmentationOrder, SegmentedVolume, from_files, report_json};
+use ventriform::report::object;
+use ventriform::segmentation::{SegmentationOrder, SegmentedVolume, from_files};
 use ventriform::volume::given_mask::{MaskChoice, read_mask};
 use ventriform::volume::{ReadLimits, VolumeFile};
 
@@ -88,7 +89,7 @@ fn line(case: &Path) -> Result<String> {
         judged(&anatomical, "lv_truth.nii.gz")?,
     );
     let made = &apparent.segmentation;
-    let report = report_json(made);
+    let report = object(&apparent.report());
     let chances = |evidence: &Evidence| both.map(|edge| of_agreement(evidence, edge));
     let candidates: Vec<_> = (made.candidates.iter())
         .map(|c| json!({"template": c.name, "chances": c.evidence.as_ref().map(chances)}))

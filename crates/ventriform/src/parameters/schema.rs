@@ -1,0 +1,130 @@
+//! The tables of parameters as schemas of OpenAPI.
+
+use super::{FitParameters, Kind, ModelParameters, ParameterSpec, Parameters};
+use serde_json::{Value, json};
+use std::borrow::Cow;
+use utoipa::openapi::RefOr;
+use utoipa::openapi::schema::{
+    AdditionalProperties, ArrayBuilder, Object, ObjectBuilder, Schema, Type,
+};
+use utoipa::{PartialSchema, ToSchema};
+
+impl ToSchema for ModelParameters {
+    fn name() -> Cow<'static, str> {
+        "ModelParameters".into()
+    }
+}
+
+impl PartialSchema for ModelParameters {
+    fn schema() -> RefOr<Schema> {
+        object_of::<Self>("The parameters of a model")
+    }
+}
+
+impl ToSchema for FitParameters {
+    fn name() -> Cow<'static, str> {
+        "SegmentationParameters".into()
+    }
+}
+
+impl PartialSchema for FitParameters {
+    fn schema() -> RefOr<Schema> {
+        object_of::<Self>("The parameters of a segmentation")
+    }
+}
+
+fn object_of<P: Parameters>(description: &str) -> RefOr<Schema> {
+    let object = P::SPECS
+        .iter()
+        .fold(ObjectBuilder::new(), |object, spec| {
+            object.property(spec.name, schema_of(spec))
+        })
+        .description(Some(description))
+        .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
+    Schema::from(object.build()).into()
+}
+
+/// The schema of one parameter: type, range or words, default and help.
+pub fn schema_of<P: Parameters>(spec: &ParameterSpec<P>) -> Schema {
+    let object = ObjectBuilder::new()
+        .description(Some(spec.summary))
+        .default(default_of(spec));
+    match spec.kind {
+        Kind::Integer { min, max } => {
+            let object = object
+                .schema_type(Type::Integer)
+                .minimum(Some(min as usize));
+            match max {
+                u64::MAX => object,
+                _ => object.maximum(Some(max as usize)),
+            }
+            .into()
+        }
+        Kind::Number { min, max } => object
+            .schema_type(Type::Number)
+            .minimum(Some(min))
+            .maximum(Some(max))
+            .into(),
+        Kind::Switch => object.schema_type(Type::Boolean).into(),
+        Kind::Choice(words) => object
+            .schema_type(Type::String)
+            .enum_values(Some(words.iter().copied()))
+            .into(),
+        Kind::Direction(words) => {
+            let number = r"[+-]?[0-9]{1,9}(\.[0-9]{1,9})?";
+            let words = words.join("|");
+            object
+                .schema_type(Type::String)
+                .pattern(Some(format!("^({words}|{number},{number},{number})$")))
+                .examples([spec.default, "0,0,1"])
+                .into()
+        }
+        Kind::Integers { count } => list_of(Type::Integer, count, spec.summary),
+        Kind::Numbers { count } => list_of(Type::Number, count, spec.summary),
+        Kind::Stored {
+            prefixes,
+            word,
+            more,
+        } => {
+            let id = format!("({})[0-9a-f]{{1,64}}", prefixes.join("|"));
+            let pattern = match (word, more) {
+                ("", _) => format!("^{id}$"),
+                (_, 0) => format!("^({word}|{id})$"),
+                _ => format!("^({word}(,{id}){{0,{more}}}|{id})$"),
+            };
+            object
+                .schema_type(Type::String)
+                .pattern(Some(pattern))
+                .into()
+        }
+        Kind::Text { pattern, example } => object
+            .schema_type(Type::String)
+            .pattern(Some(pattern))
+            .examples([example])
+            .into(),
+    }
+}
+
+fn list_of(kind: Type, count: usize, summary: &str) -> Schema {
+    Schema::Array(
+        ArrayBuilder::new()
+            .description(Some(summary))
+            .items(Object::with_type(kind))
+            .min_items(Some(count))
+            .max_items(Some(count))
+            .build(),
+    )
+}
+
+fn default_of<P: Parameters>(spec: &ParameterSpec<P>) -> Option<Value> {
+    if spec.default.is_empty() {
+        return None;
+    }
+    Some(match spec.kind {
+        Kind::Integer { .. } | Kind::Number { .. } => {
+            serde_json::from_str(spec.default).unwrap_or(json!(spec.default))
+        }
+        Kind::Switch => json!(spec.default == "true"),
+        _ => json!(spec.default),
+    })
+}

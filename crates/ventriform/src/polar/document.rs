@@ -1,0 +1,154 @@
+//! The polar map as it is written in `polar.json` and summed up in reports.
+
+use super::picture::rings;
+use super::{COLUMNS, PolarMap, ROWS, Segment, territory};
+use serde::{Deserialize, Serialize};
+
+/// A polar map without its pixels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct PolarSummary {
+    /// The intensity that counts as 100 per cent.
+    pub reference: f64,
+    /// Share of it below which wall counts as a defect.
+    pub threshold_percent: f64,
+    /// Share of the wall below it.
+    pub extent_percent: f64,
+    /// What the percentages refer to.
+    pub note: String,
+    /// The 17 segments.
+    pub segments: Vec<PolarSegment>,
+    /// The walls of the three arteries; none if the orientation is unknown.
+    #[serde(default)]
+    #[cfg_attr(feature = "schema", schema(required))]
+    pub territories: Vec<PolarTerritory>,
+    /// Rows of pixels, from apex to base.
+    pub rows: usize,
+    /// Columns of pixels, around the axis.
+    pub columns: usize,
+    /// What told the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`.
+    #[serde(default)]
+    #[cfg_attr(feature = "schema", schema(required))]
+    pub orientation: String,
+    /// Where the first column looks; null if the orientation is unknown.
+    pub first_column: Option<String>,
+    /// The order of the columns; null if the orientation is unknown.
+    pub direction: Option<String>,
+}
+
+/// A polar map, as in `polar.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = PolarMap))]
+pub struct PolarDocument {
+    /// All but the pixels.
+    #[serde(flatten)]
+    pub summary: PolarSummary,
+    /// The pixels in per cent of the reference; null where there is no wall.
+    pub values_percent: Vec<Vec<Option<f64>>>,
+    /// The number of the segment to which each pixel belongs.
+    pub segment_of: Vec<Vec<usize>>,
+    /// For every column, the distances from the apex in rows at which apex, apical, mid and basal level
+    /// end; row n reaches from n to n + 1. Absent from maps of older versions.
+    pub level_ends: Option<Vec<[f64; 4]>>,
+    /// The radii at which these levels end on the drawn map, as shares of its own. Absent from maps of
+    /// older versions.
+    pub rings: Option<Vec<f64>>,
+}
+
+/// The wall that an artery usually feeds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = Territory))]
+pub struct PolarTerritory {
+    /// LAD, LCX or RCA.
+    pub name: String,
+    /// Mean uptake in per cent of the reference.
+    pub mean_percent: Option<f64>,
+    /// Share of its area below the threshold.
+    pub extent_percent: f64,
+    /// Its area, mm².
+    pub area_mm2: f64,
+}
+
+/// One segment of a polar map.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct PolarSegment {
+    /// 1 to 17.
+    pub number: usize,
+    /// Its name.
+    pub name: String,
+    /// The coronary artery that usually feeds it; null if the orientation is unknown.
+    pub territory: Option<String>,
+    /// Mean uptake in per cent of the reference.
+    pub mean_percent: Option<f64>,
+    /// Share of its area below the threshold.
+    pub extent_percent: f64,
+    /// Its area, mm².
+    pub area_mm2: f64,
+}
+
+fn round(x: f64) -> f64 {
+    (100.0 * x).round() / 100.0
+}
+
+impl PolarSummary {
+    /// Segments and extents. Without orientation no territories, and `None` for what depends on sides.
+    pub fn of(map: &PolarMap) -> Self {
+        let oriented = map.is_oriented();
+        let segment = |s: &Segment| PolarSegment {
+            number: s.number,
+            name: map.name_of(s.number),
+            territory: oriented.then(|| territory(s.number).to_owned()),
+            mean_percent: s.mean_percent.map(round),
+            extent_percent: round(s.extent_percent),
+            area_mm2: round(s.area),
+        };
+        let territories = map.territories.iter().filter(|_| oriented);
+        let territories = territories.map(|t| PolarTerritory {
+            name: t.name.to_owned(),
+            mean_percent: t.mean_percent.map(round),
+            extent_percent: round(t.extent_percent),
+            area_mm2: round(t.area),
+        });
+        Self {
+            reference: map.reference,
+            threshold_percent: 100.0 * map.threshold,
+            extent_percent: round(map.extent_percent),
+            note: "per cent of the hottest quarter of this scan's own wall; no normal database, not TPD"
+                .to_owned(),
+            segments: map.segments.iter().map(segment).collect(),
+            territories: territories.collect(),
+            rows: ROWS,
+            columns: COLUMNS,
+            orientation: map.orientation.as_str().to_owned(),
+            first_column: oriented.then(|| "lateral".to_owned()),
+            direction: oriented.then(|| "lateral, anterior, septal, inferior".to_owned()),
+        }
+    }
+}
+
+impl PolarDocument {
+    /// The summary, the pixels in per cent of the reference (`None` where there is no wall), and where the
+    /// picture has them.
+    pub fn of(map: &PolarMap) -> Self {
+        let percent = |x: f64| {
+            if map.reference > 0.0 {
+                round(100.0 * x / map.reference)
+            } else {
+                0.0
+            }
+        };
+        let pixels = map.pixels.chunks(COLUMNS);
+        let pixels = pixels.map(|row| row.iter().map(|p| p.map(|p| percent(p.max))).collect());
+        let numbers = |row| (0..COLUMNS).map(move |column| map.segment_of(row, column));
+        let ends = map.levels.ends().iter();
+        let ends = ends.map(|ends| ends.map(|rows| (1e3 * rows).round() / 1e3));
+        Self {
+            summary: PolarSummary::of(map),
+            values_percent: pixels.collect(),
+            segment_of: (0..ROWS).map(|row| numbers(row).collect()).collect(),
+            level_ends: Some(ends.collect()),
+            rings: Some(rings(map).map(|share| (1e4 * share).round() / 1e4).into()),
+        }
+    }
+}

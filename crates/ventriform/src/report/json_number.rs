@@ -1,0 +1,24 @@
+//! Numbers of reports: how they are rounded, and those that JSON cannot express.
+
+use crate::geometry::Vec3;
+use serde::{Deserialize, Deserializer};
+
+/// Rounds to 4 decimals.
+pub(super) fn round(x: f64) -> f64 {
+    (1e4 * x).round() / 1e4
+}
+
+/// A point or a direction, rounded to 4 decimals.
+pub(super) fn point(p: &Vec3) -> [f64; 3] {
+    [p.x, p.y, p.z].map(round)
+}
+
+/// Reads `null`, as which JSON has a number that is not finite, as NaN.
+pub(super) fn or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
+}
+
+/// What stands for a number that reports of older versions do not have.
+pub(super) fn not_stated() -> f64 {
+    f64::NAN
+}

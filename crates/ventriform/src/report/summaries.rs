@@ -1,0 +1,128 @@
+//! The main figures of what jobs make, for lists: the reports have all.
+
+use super::fit_report::FittedVolumes;
+use super::segmentation_report::{
+    AgreementReport, CandidateReport, RaisedFlag, SegmentationReport,
+};
+use crate::reader::{ReaderOffsets, ReaderProfile};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+/// The main figures of a model; the report has all.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct ModelSummary {
+    /// Number of vertices.
+    pub vertices: usize,
+    /// Number of triangles.
+    pub triangles: usize,
+    /// V - E + F.
+    pub euler_characteristic: i64,
+    /// Intersecting pairs of triangles.
+    pub self_intersections: usize,
+    /// Mean 2r/R of the triangles.
+    pub radius_ratio_mean: f64,
+    /// Smallest 2r/R.
+    pub radius_ratio_min: f64,
+    /// Mean angle between neighbours, degrees.
+    pub dihedral_mean_deg: f64,
+    /// Mean distance to the surface, mm.
+    pub distance_mean_mm: f64,
+    /// Largest distance to the surface, mm.
+    pub hausdorff_mm: f64,
+    /// How much more volume the model encloses than the surface, percent.
+    pub volume_error_percent: f64,
+    /// The paper's fitness.
+    pub fitness: f64,
+}
+
+/// The main figures of a segmentation; the report has all.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct SegmentationSummary {
+    /// Name of the fitted model.
+    pub template: String,
+    /// Why that one was taken.
+    pub choice: String,
+    /// Models that were fitted.
+    pub candidates: Vec<CandidateReport>,
+    /// Why the motion ended.
+    pub reason: String,
+    /// How reliable the fit is, 0 to 1.
+    pub confidence: f64,
+    /// Volumes.
+    pub volumes_ml: FittedVolumes,
+    /// Agreement with the expert's mask.
+    pub measures: Option<AgreementReport>,
+    /// Reasons to look closer.
+    pub flags: Vec<RaisedFlag>,
+    /// Number of vertices of the fitted mesh.
+    pub vertices: usize,
+}
+
+/// The main figures of a template.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct TemplateSummary {
+    /// Number of vertices.
+    pub vertices: usize,
+    /// Number of triangles.
+    pub triangles: usize,
+    /// Enclosed volume, millilitres.
+    pub volume_ml: f64,
+    /// Length of its cup, mm; ventricles only.
+    pub length_mm: Option<f64>,
+    /// What was assumed or changed of the mesh, in sentences.
+    pub warnings: Vec<String>,
+}
+
+/// What a reader's profile holds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct ReaderSummary {
+    /// The wall that the distances start from: `apparent` or `anatomical`.
+    pub edge: String,
+    /// Number of masks that it was learnt on.
+    pub masks: usize,
+    /// The distances that are applied, mm.
+    pub offsets_mm: ReaderOffsets,
+}
+
+impl SegmentationSummary {
+    /// The main figures of `report`, whose mesh has that many vertices.
+    pub fn of(report: SegmentationReport, vertices: usize) -> Self {
+        Self {
+            template: report.template,
+            choice: report.choice,
+            candidates: report.candidates,
+            reason: report.fit.reason,
+            confidence: report.fit.confidence,
+            volumes_ml: report.volumes_ml,
+            measures: report.measures,
+            flags: report.flags,
+            vertices,
+        }
+    }
+}
+
+impl ReaderSummary {
+    /// The main figures of `profile`.
+    pub fn of(profile: &ReaderProfile) -> Self {
+        Self {
+            edge: profile.edge.as_str().to_owned(),
+            masks: profile.masks(),
+            offsets_mm: profile.offsets(),
+        }
+    }
+}
+
+/// A document as a JSON object, its fields in their order.
+///
+/// # Panics
+/// If it is none, or has keys that are no text.
+pub fn object(document: &impl Serialize) -> Map<String, Value> {
+    match serde_json::to_value(document) {
+        Ok(Value::Object(object)) => object,
+        other => panic!("a document is an object: {other:?}"),
+    }
+}

@@ -1,0 +1,3410 @@
+// Made of openapi/ventriform.json by `npm run types`. Do not edit.
+
+export type paths = Record<string, never>;
+export type webhooks = Record<string, never>;
+export interface components {
+    schemas: {
+        /** @description A mask against an expert's. */
+        Agreement: {
+            /**
+             * Format: double
+             * @description The same in mm.
+             */
+            contour_distance_mm?: number | null;
+            /**
+             * Format: double
+             * @description Mean contour distance, voxels.
+             */
+            contour_distance_voxels?: number | null;
+            /**
+             * Format: double
+             * @description Dice index.
+             */
+            dice: number;
+            /**
+             * Format: double
+             * @description Volume of the expert's mask.
+             */
+            expert_volume_ml: number;
+            /**
+             * Format: double
+             * @description Its 95th percentile.
+             */
+            hausdorff95_mm?: number | null;
+            /**
+             * Format: double
+             * @description Hausdorff distance.
+             */
+            hausdorff_mm?: number | null;
+            /**
+             * Format: double
+             * @description Jaccard index.
+             */
+            jaccard: number;
+            /**
+             * Format: double
+             * @description How much larger the mask is, ml.
+             */
+            volume_difference_ml: number;
+            /**
+             * Format: double
+             * @description How much larger the mask is, percent.
+             */
+            volume_difference_percent?: number | null;
+            /**
+             * Format: double
+             * @description Volume of the mask.
+             */
+            volume_ml: number;
+        };
+        /** @description The reader's profile that a wall was drawn by. */
+        AppliedReader: {
+            /** @description The wall that the distances start from. */
+            edge: string;
+            /**
+             * Format: int64
+             * @description Number of masks that it was learnt on.
+             */
+            masks: number;
+            /** @description Its name. */
+            name: string;
+            /** @description The distances, mm. */
+            offsets_mm: components["schemas"]["ReaderOffsets"];
+            /** @description SHA-256 of the profile, hexadecimal. */
+            sha256: string;
+            /**
+             * Format: double
+             * @description Share of the distances that was applied: 1 unless the surface would intersect itself.
+             */
+            share_applied: number;
+        };
+        /** @description Which AuditEvent records an act. */
+        AuditEventName: {
+            /** @description Its hash, which the hashes of all later events cover. */
+            hash: string;
+            /**
+             * @description Its id, as `GET /v1/audit` shows it.
+             * @example 1234
+             */
+            id: string;
+        };
+        /** @description A page of the audit trail. */
+        AuditPage: {
+            /** @description The events, newest first: AuditEvent resources of FHIR R4. */
+            events: Record<string, never>[];
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+        };
+        /** @description One model's fit. */
+        Candidate: {
+            /**
+             * Format: double
+             * @description Share of the surface along which an edge is seen.
+             */
+            active: number;
+            /**
+             * Format: double
+             * @description What it is ranked by: its confidence by its own figures.
+             */
+            confidence: number;
+            /**
+             * Format: double
+             * @description What decides between equals.
+             */
+            merit: number;
+            /**
+             * Format: double
+             * @description Distance to the edges, weighted root mean square.
+             */
+            residual_mm: number;
+            /**
+             * Format: double
+             * @description Root of the mean squared strain.
+             */
+            strain: number;
+            /** @description The model's name. */
+            template: string;
+        };
+        /** @description Signed distances from a model to its surface, as in `distance.json`. */
+        Closeness: {
+            /**
+             * @description Distance of the centroid of each part, mm, rounded to 0.001; positive outside of the
+             *     surface. Triangle by triangle, `parts`² each.
+             */
+            distances_mm: number[];
+            /**
+             * Format: int64
+             * @description Parts that each side of a triangle is cut into.
+             */
+            parts: number;
+        };
+        /** @description A message about a job to one receiver. */
+        Delivery: {
+            /**
+             * Format: int32
+             * @description Number of attempts.
+             */
+            attempts: number;
+            /**
+             * @description What it tells.
+             * @example succeeded
+             */
+            event: string;
+            /**
+             * @description Its id; the header `webhook-id` of every attempt.
+             * @example msg_2c26b46b68ffc68ff99b453c1d304134
+             */
+            id: string;
+            /**
+             * Format: date-time
+             * @description When it was tried last (RFC 3339).
+             */
+            last_attempt_at?: string | null;
+            /**
+             * @description How it last ended: `delivered`, `gone` (410), `rejected` (another status), `timed-out`,
+             *     `unreachable`, `refused` (by this service, for its address), `too-old`, `too-many`,
+             *     `endpoint-removed`.
+             */
+            last_outcome?: string | null;
+            /**
+             * Format: int32
+             * @description The status of the receiver's last answer.
+             */
+            last_status?: number | null;
+            /**
+             * Format: date-time
+             * @description When it is tried next (RFC 3339).
+             */
+            next_attempt_at?: string | null;
+            /**
+             * Format: date-time
+             * @description When the event happened (RFC 3339).
+             */
+            occurred_at: string;
+            /**
+             * @description `pending`, `delivered`, or `dead` if it was given up.
+             * @example delivered
+             */
+            state: string;
+            /** @description Where it goes. */
+            url: string;
+            /** @description The registered webhook; absent for the job's own. */
+            webhook?: string | null;
+        };
+        /** @description The messages about a job. */
+        DeliveryList: {
+            /** @description The newest first, at most 100. */
+            deliveries: components["schemas"]["Delivery"][];
+        };
+        /** @description Something that the service depends on. */
+        Dependency: {
+            /** @description What is wrong with it. */
+            detail?: string | null;
+            /**
+             * @description `database`, `files`, `disk`, or `workers`: processes that compute jobs.
+             * @example database
+             */
+            name: string;
+            /** @description Whether no work can be accepted without it. */
+            required: boolean;
+            /**
+             * @description `ok` or `failing`.
+             * @example ok
+             */
+            status: string;
+        };
+        /**
+         * @description Data sets; a request has one
+         * @example [
+         *       {
+         *         "00741000": {
+         *           "vr": "CS",
+         *           "Value": [
+         *             "SCHEDULED"
+         *           ]
+         *         }
+         *       }
+         *     ]
+         */
+        DicomJson: {
+            [key: string]: unknown;
+        }[];
+        /** @description Distances between a model and its surface, and what they enclose. */
+        Distance: {
+            /**
+             * Format: double
+             * @description How much more area the model has than the surface, percent.
+             */
+            area_error_percent: number;
+            /**
+             * Format: double
+             * @description Upper bound of the largest distance, mm; absent for very large meshes.
+             */
+            hausdorff_at_most_mm?: number | null;
+            /**
+             * Format: double
+             * @description The largest distance of either direction (Hausdorff) that was found, mm: a lower bound.
+             */
+            hausdorff_mm: number;
+            /**
+             * Format: double
+             * @description The Hausdorff distance in the same unit.
+             */
+            hausdorff_voxels: number;
+            /**
+             * Format: double
+             * @description The larger of the two directions' 95th percentiles, mm.
+             */
+            hd95_mm: number;
+            /**
+             * Format: double
+             * @description Mean of the two directions' means, mm.
+             */
+            mean_mm: number;
+            /**
+             * Format: double
+             * @description The mean in units of the smallest voxel spacing.
+             */
+            mean_voxels: number;
+            /** @description From points of the model to the surface. */
+            model_to_surface: components["schemas"]["DistanceDirection"];
+            /**
+             * Format: double
+             * @description Root mean square over both directions, mm.
+             */
+            rms_mm: number;
+            /** @description From points of the surface to the model. */
+            surface_to_model: components["schemas"]["DistanceDirection"];
+            /**
+             * Format: double
+             * @description Volume enclosed by the surface, millilitres.
+             */
+            surface_volume_ml: number;
+            /**
+             * Format: double
+             * @description How much more volume the model encloses than the surface, percent.
+             */
+            volume_error_percent: number;
+            /**
+             * Format: double
+             * @description Volume enclosed by the model, millilitres.
+             */
+            volume_ml: number;
+            /**
+             * Format: double
+             * @description The smallest voxel spacing, mm.
+             */
+            voxel_mm: number;
+        };
+        /** @description Distances of one side's points to the other side. */
+        DistanceDirection: {
+            /**
+             * Format: double
+             * @description Upper bound of the largest distance, mm; absent for very large meshes.
+             */
+            max_at_most_mm?: number | null;
+            /**
+             * Format: double
+             * @description Largest distance found at any point, mm.
+             */
+            max_mm: number;
+            /**
+             * Format: double
+             * @description Mean over the even samples, mm.
+             */
+            mean_mm: number;
+            /**
+             * Format: double
+             * @description 95th percentile over the even samples, mm.
+             */
+            p95_mm: number;
+            /**
+             * Format: double
+             * @description Root mean square over the even samples, mm.
+             */
+            rms_mm: number;
+            /**
+             * Format: int64
+             * @description Number of even samples.
+             */
+            samples: number;
+        };
+        /** @description A file that can be downloaded. */
+        Download: {
+            /**
+             * Format: int64
+             * @description Its length in bytes.
+             */
+            bytes: number;
+            /** @description Its path. */
+            href: string;
+            /** @description Its media type. */
+            media_type: string;
+            /**
+             * @description The file's name.
+             * @example mesh.glb
+             */
+            name: string;
+            /** @description SHA-256 of its content, hexadecimal; also its `ETag`. */
+            sha256: string;
+        };
+        /** @description A file of an erased item. */
+        ErasedFile: {
+            /**
+             * Format: int64
+             * @description Its length in bytes.
+             */
+            bytes: number;
+            /** @description Its name in the store. */
+            name: string;
+            /** @description SHA-256 of its content, hexadecimal. */
+            sha256: string;
+        };
+        /** @description An erased item. */
+        ErasedItem: {
+            /** @description Its files. */
+            files: components["schemas"]["ErasedFile"][];
+            /** @description Whether its files were erased; not if another tenant stored the same content. */
+            files_erased: boolean;
+            /** @description Its id. */
+            id: string;
+        };
+        /**
+         * @description Why something was erased.
+         * @enum {string}
+         */
+        ErasureReason: "request" | "retention";
+        /** @description The figures behind confidence and flags. */
+        Evidence: {
+            /**
+             * Format: double
+             * @description Share of sensors that see an edge.
+             */
+            active_sensors: number;
+            /**
+             * Format: double
+             * @description Mean correlation of image and wall in their projections; null where the orientation is unknown.
+             */
+            agreement_of_views?: number | null;
+            /**
+             * Format: double
+             * @description Share of the wall beside which something takes up more than that.
+             */
+            beside: number;
+            /**
+             * Format: double
+             * @description Volume of the cavity.
+             */
+            cavity_ml: number;
+            /**
+             * Format: double
+             * @description Chance that the patient moved, 0 to 1.
+             */
+            chance_of_motion: number;
+            /**
+             * Format: double
+             * @description Share of the wall that takes up less than half as much as the bright wall does.
+             */
+            dark: number;
+            /**
+             * Format: double
+             * @description Share of the projections that show the second place; null likewise.
+             */
+            displaced_share?: number | null;
+            /**
+             * Format: double
+             * @description Distance of the two places along the bed; null likewise.
+             */
+            displacement_mm?: number | null;
+            /**
+             * Format: double
+             * @description How much better two places of the wall in two runs of projections explain the image than one, as a share of what one leaves unexplained; null likewise.
+             */
+            gain_of_two_places?: number | null;
+            /**
+             * Format: double
+             * @description How much darker the cavity is than the wall, 0 to 1.
+             */
+            hollowness: number;
+            /**
+             * Format: double
+             * @description How far the middle of the wall lies off the axis, as a share of that mean.
+             */
+            offset: number;
+            /**
+             * Format: double
+             * @description Distance to the edges, weighted root mean square.
+             */
+            residual_mm: number;
+            /**
+             * Format: double
+             * @description Distance of the septum from the axis over that of the free wall.
+             */
+            septal_bulge: number;
+            /**
+             * Format: double
+             * @description Length from rim to apex over the outer radius.
+             */
+            slenderness: number;
+            /**
+             * Format: double
+             * @description Root of the mean squared strain.
+             */
+            strain: number;
+            /**
+             * Format: double
+             * @description Mean distance of the nodes from the fits of the other built-in hearts; null without them.
+             */
+            template_spread_mm?: number | null;
+            /**
+             * Format: double
+             * @description Standard deviation of the wall's thickness.
+             */
+            thickness_spread_mm: number;
+            /**
+             * Format: double
+             * @description Standard deviation of the distance from the axis to the middle of the wall, as a share of its mean.
+             */
+            unroundness: number;
+        };
+        /** @description What a volume's file says. */
+        FileFacts: {
+            /** @description Maps a voxel index to LPS millimetres; row by row. */
+            affine_lps: number[][];
+            /** @description Maps a voxel index to RAS millimetres; row by row. */
+            affine_ras: number[][];
+            /** @description The part of the header that gave the affine. */
+            affine_source: string;
+            /** @description `little` or `big`. */
+            byte_order: string;
+            /** @description Whether it was gzipped. */
+            compressed: boolean;
+            /** @description Data type in the file. */
+            data_type: string;
+            /** @description Sizes of all dimensions in the file. */
+            file_shape: number[];
+            /** @description File format. */
+            format: string;
+            /**
+             * Format: int64
+             * @description The frame that was read, counted from 0.
+             */
+            frame?: number | null;
+            /**
+             * Format: int64
+             * @description Frames in the file.
+             */
+            frames: number;
+            /** @description The voxel values after slope and intercept. */
+            intensity: components["schemas"]["IntensityFacts"];
+            scaling?: components["schemas"]["Scaling"] | null;
+            /** @description Voxels along i, j, k. */
+            shape: number[];
+            /** @description Voxel spacing, millimetres. */
+            spacing_mm: number[];
+            /** @description The file's unit of length. */
+            unit: string;
+            /** @description Oddities of the file that do not prevent its use. */
+            warnings: string[];
+        };
+        /** @description A signing secret. */
+        WebhookSecret: {
+            /**
+             * Format: date-time
+             * @description Until when the secret before signs too (RFC 3339).
+             */
+            former_until: string;
+            /**
+             * @description `whsec_` and base64, as the libraries of Standard Webhooks take it.
+             * @example whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw
+             */
+            secret: string;
+        };
+        /** @description How a fit went, and the fitted model's pose. */
+        Fit: {
+            /**
+             * Format: double
+             * @description Share of sensors that see an edge.
+             */
+            active_sensors: number;
+            /**
+             * Format: double
+             * @description How reliable the fit is, 0 to 1.
+             */
+            confidence: number;
+            /** @description How far each vertex moved, mm. */
+            displacement_mm: number[];
+            /** @description Kinetic energy after each step. */
+            energy: number[];
+            /**
+             * Format: int64
+             * @description Steps of the motion.
+             */
+            iterations: number;
+            long_axis?: components["schemas"]["LongAxis"] | null;
+            /** @description Why the motion ended. */
+            reason: string;
+            /**
+             * Format: double
+             * @description Distance to the edges, weighted root mean square.
+             */
+            residual_mm: number;
+            /** @description Rotation of the model; row by row. */
+            rotation: number[][];
+            /**
+             * Format: int64
+             * @description Runs from different starts.
+             */
+            runs: number;
+            /**
+             * Format: double
+             * @description Size relative to the model.
+             */
+            scale: number;
+            /**
+             * Format: int64
+             * @description Intersecting pairs of triangles.
+             */
+            self_intersections: number;
+            /**
+             * Format: double
+             * @description Root of the mean squared strain.
+             */
+            strain: number;
+            /**
+             * Format: int64
+             * @description Triangles that turned over.
+             */
+            turned_triangles: number;
+        };
+        /** @description All forms of the fitness after each stage. */
+        FitnessFormStages: {
+            /** @description After the least-squares fit. */
+            fitted: components["schemas"]["FitnessForms"];
+            /** @description After optimisation. */
+            optimised: components["schemas"]["FitnessForms"];
+            /** @description After re-tiling. */
+            retiled: components["schemas"]["FitnessForms"];
+        };
+        /** @description Mean fitness in every form. */
+        FitnessForms: {
+            /**
+             * Format: double
+             * @description Every term in (0, 1].
+             */
+            normalised: number;
+            /**
+             * Format: double
+             * @description The paper's reciprocal terms, capped.
+             */
+            raw: number;
+            /**
+             * Format: double
+             * @description Angles in degrees floored at 1, distance in mm floored at 0.01, equal weights:
+             *     comparable between tools.
+             */
+            robust: number;
+        };
+        /** @description The paper's fitness: mean over all edges. */
+        FitnessReport: {
+            /**
+             * Format: double
+             * @description After the least-squares fit, before the last flips.
+             */
+            fitted: number;
+            /** @description The form in which `retiled`, `fitted` and `optimised` are given: the one that drove the flips. */
+            form: string;
+            /** @description All forms after each stage. */
+            forms: components["schemas"]["FitnessFormStages"];
+            /**
+             * Format: double
+             * @description From re-tiled to optimised, percent.
+             */
+            gain_percent: number;
+            /**
+             * Format: double
+             * @description After optimisation.
+             */
+            optimised: number;
+            /**
+             * Format: double
+             * @description After re-tiling.
+             */
+            retiled: number;
+            /** @description Numerators and floors of every form. */
+            scales: {
+                [key: string]: components["schemas"]["FitnessScales"];
+            };
+            /** @description Mean terms after each stage. */
+            terms: components["schemas"]["FitnessTermStages"];
+            /** @description Weights of the four terms. */
+            weights: number[];
+        };
+        /** @description Numerators and floors of the four terms. */
+        FitnessScales: {
+            /** @description Floors, in radians and millimetres. */
+            floor: number[];
+            /** @description Numerators, in radians and millimetres. */
+            numerator: number[];
+        };
+        /** @description Mean terms of the fitness after each stage. */
+        FitnessTermStages: {
+            /** @description After the least-squares fit. */
+            fitted: components["schemas"]["FitnessTerms"];
+            /** @description After optimisation. */
+            optimised: components["schemas"]["FitnessTerms"];
+            /** @description After re-tiling. */
+            retiled: components["schemas"]["FitnessTerms"];
+        };
+        /** @description Means of the four terms over all edges. */
+        FitnessTerms: {
+            /**
+             * Format: double
+             * @description Angle between the normals of the edge's triangles, degrees.
+             */
+            a_deg: number;
+            /**
+             * Format: double
+             * @description Mean angle to the four outer neighbours, degrees.
+             */
+            b_deg: number;
+            /**
+             * Format: double
+             * @description R/(2r) of the two triangles, 1 = equilateral.
+             */
+            c: number;
+            /**
+             * Format: double
+             * @description Distance of the edge's midpoint to the surface, mm.
+             */
+            d_mm: number;
+        };
+        /** @description Volumes of a fitted model, millilitres. */
+        FittedVolumes: {
+            anatomical?: components["schemas"]["WallVolumes"] | null;
+            apparent?: components["schemas"]["WallVolumes"] | null;
+            /**
+             * Format: double
+             * @description Of its cavity; ventricles only.
+             */
+            cavity?: number | null;
+            /**
+             * Format: double
+             * @description Of the wall that `edge` asks for, or of the whole organ.
+             */
+            wall: number;
+        };
+        /** @description A reason to look closer. */
+        Flag: {
+            /** @description Its stable name. */
+            code: string;
+            /** @description What was found. */
+            reason: string;
+        };
+        /** @description The state of the service. */
+        Health: {
+            /**
+             * @description Always `ok`.
+             * @example ok
+             */
+            status: string;
+            /** @description The program's version. */
+            version: string;
+        };
+        /**
+         * @description Counts over equal bins, before and after optimisation side by side. The bin [lower,
+         *     lower + width) is the first; the last one includes its upper end.
+         */
+        Histogram: {
+            /**
+             * Format: double
+             * @description Lower end of the first bin.
+             */
+            lower: number;
+            /** @description Counts of the optimised mesh. */
+            optimised: number[];
+            /** @description Counts of the re-tiled mesh. */
+            retiled: number[];
+            /**
+             * Format: double
+             * @description Width of a bin.
+             */
+            width: number;
+        };
+        /** @description Distributions before and after optimisation. */
+        Histograms: {
+            /** @description Angles between neighbouring triangles' normals, degrees. */
+            dihedral_deg: components["schemas"]["Histogram"];
+            /** @description Lengths of edges, mm. */
+            edge_length_mm: components["schemas"]["Histogram"];
+            /** @description Smallest angle of each triangle, degrees. */
+            min_angle_deg: components["schemas"]["Histogram"];
+            /** @description Radius ratios 2r/R. */
+            radius_ratio: components["schemas"]["Histogram"];
+            /** @description Edges at each vertex. */
+            valence: components["schemas"]["Histogram"];
+        };
+        HoldRequest: {
+            /**
+             * @description Why the volume must be kept
+             * @example Case 17/2026
+             */
+            reason: string;
+        };
+        /** @description A summary of voxel values. */
+        Intensity: {
+            /**
+             * Format: double
+             * @description Largest finite value.
+             */
+            max: number;
+            /**
+             * Format: double
+             * @description Mean of the finite values.
+             */
+            mean: number;
+            /**
+             * Format: double
+             * @description Smallest finite value.
+             */
+            min: number;
+            /**
+             * Format: int64
+             * @description Number of voxels that are NaN or infinite.
+             */
+            not_finite: number;
+        };
+        /** @description A summary of voxel values. */
+        IntensityFacts: {
+            /**
+             * Format: int64
+             * @description Voxels with a finite value.
+             */
+            finite_voxels: number;
+            /** @description Whether all values are whole numbers. */
+            integral: boolean;
+            /** @description The labels, if the volume looks like a label map. */
+            labels?: components["schemas"]["LabelCount"][] | null;
+            /**
+             * Format: double
+             * @description Largest finite value.
+             */
+            maximum: number;
+            /**
+             * Format: double
+             * @description Mean of the finite values.
+             */
+            mean: number;
+            /**
+             * Format: double
+             * @description Smallest finite value.
+             */
+            minimum: number;
+            /**
+             * Format: int64
+             * @description Voxels that are NaN or infinite.
+             */
+            missing_voxels: number;
+            /**
+             * Format: double
+             * @description Sum of the finite values.
+             */
+            sum: number;
+        };
+        /** @description An accepted job. */
+        Job: {
+            /**
+             * Format: int32
+             * @description How often a worker has started it.
+             */
+            attempts: number;
+            /** @description Whether a client has asked to cancel it. */
+            cancel_requested: boolean;
+            /**
+             * Format: date-time
+             * @description When it was accepted (RFC 3339).
+             */
+            created_at: string;
+            /** @description The DICOM objects of its result that are sent to an archive. */
+            deliveries?: components["schemas"]["ObjectDelivery"][] | null;
+            error?: components["schemas"]["Problem"] | null;
+            /**
+             * Format: date-time
+             * @description When it will probably start (RFC 3339), estimated from past jobs. Only while it waits.
+             */
+            estimated_start?: string | null;
+            /** @description The caller's own id for it. */
+            external_id?: string | null;
+            /**
+             * Format: date-time
+             * @description When it ended (RFC 3339).
+             */
+            finished_at?: string | null;
+            /**
+             * @description The job's id.
+             * @example job_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f
+             */
+            id: string;
+            /**
+             * @description The kind of work.
+             * @example model
+             */
+            kind: string;
+            /** @description The caller's own names and values for it. */
+            labels: {
+                [key: string]: string;
+            };
+            /** @description Related paths. */
+            links: components["schemas"]["JobLinks"];
+            /** @description The model it made; only for kind `model`. */
+            model?: string | null;
+            /** @description The parameters, including every default. */
+            parameters: components["schemas"]["JobParameters"];
+            /** @description How urgent it is. */
+            priority: components["schemas"]["Priority"];
+            /**
+             * Format: double
+             * @description The share of the work that is done.
+             */
+            progress: number;
+            /**
+             * Format: int64
+             * @description Place in the queue; the next job to start has 1. Only while it waits.
+             */
+            queue_position?: number | null;
+            /**
+             * Format: int64
+             * @description Grows with every change; also the id of the events.
+             */
+            revision: number;
+            /** @description The segmentation it made; only for kind `segmentation`. */
+            segmentation?: string | null;
+            source?: components["schemas"]["JobSource"] | null;
+            /**
+             * @description The stage of the work, after the first one has begun.
+             * @example retile
+             */
+            stage?: string | null;
+            /**
+             * Format: date-time
+             * @description When a worker last started it (RFC 3339).
+             */
+            started_at?: string | null;
+            /** @description Its state. */
+            state: components["schemas"]["JobState"];
+            /** @description The volume it works on; `null` until it has been fetched from `source`. */
+            volume?: string | null;
+        };
+        /** @description Paths of one job and of its results. */
+        JobLinks: {
+            /** @description Its changes as server-sent events. */
+            events: string;
+            /** @description The segmentation's mask. */
+            mask?: string | null;
+            /** @description The mesh of what it made. */
+            mesh?: string | null;
+            /** @description The model it made. */
+            model?: string | null;
+            /** @description The report on what it made. */
+            report?: string | null;
+            /** @description The segmentation it made. */
+            segmentation?: string | null;
+            /** @description This job. */
+            self: string;
+            /** @description Its volume, once it is stored. */
+            volume?: string | null;
+        };
+        /** @description A page of jobs. */
+        JobList: {
+            /** @description The jobs, newest first. */
+            jobs: components["schemas"]["Job"][];
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+        };
+        JobParameters: components["schemas"]["ModelParameters"] | components["schemas"]["SegmentationParameters"];
+        JobRequest: components["schemas"]["VolumeJobRequest"] | components["schemas"]["SourceJobRequest"];
+        /** @description A series in an archive. */
+        JobSource: {
+            /** @description The archive's name. */
+            archive?: string | null;
+            /**
+             * Format: int32
+             * @description Number of attempts to fetch it.
+             */
+            attempts: number;
+            /** @description Base URL of its DICOMweb service, if no archive is configured for it. */
+            dicomweb?: string | null;
+            /** @description Why the last attempt failed. */
+            last_error?: string | null;
+            /**
+             * Format: date-time
+             * @description When it is tried next (RFC 3339).
+             */
+            next_attempt_at?: string | null;
+            /** @description Series Instance UID; `null` likewise. */
+            series?: string | null;
+            /**
+             * @description `pending`, `fetched`, or `failed`.
+             * @example fetched
+             */
+            state: string;
+            /** @description Study Instance UID; `null` after the volume, or whose scan it is, was erased. */
+            study?: string | null;
+        };
+        /**
+         * @description The state of a job.
+         * @enum {string}
+         */
+        JobState: "queued" | "running" | "succeeded" | "failed" | "cancelled";
+        /** @description A key. Its secret is shown once, when it is made. */
+        Key: {
+            /**
+             * Format: date-time
+             * @description When it was made (RFC 3339).
+             */
+            created_at: string;
+            /**
+             * Format: date-time
+             * @description From when on it is refused (RFC 3339).
+             */
+            expires_at?: string | null;
+            /**
+             * @description Its id.
+             * @example 0123456789abcdef
+             */
+            id: string;
+            /** @description The key itself, to be sent as `Authorization: Bearer KEY`. Only in the answer that makes it. */
+            key?: string | null;
+            /**
+             * @description The key that has made it, if a key has: its requests count as requests of that key too.
+             * @example fedcba9876543210
+             */
+            made_by?: string | null;
+            /**
+             * @description What it is for.
+             * @example scanner 2
+             */
+            name: string;
+            /**
+             * Format: int64
+             * @description Jobs of its tenant that may wait; `null` is the service's general limit.
+             */
+            queued_jobs?: number | null;
+            /**
+             * Format: int64
+             * @description Requests per minute; `null` is the service's general limit.
+             */
+            requests_per_minute?: number | null;
+            /**
+             * Format: date-time
+             * @description When it was revoked (RFC 3339).
+             */
+            revoked_at?: string | null;
+            /** @description What it allows. */
+            scope: components["schemas"]["Scope"];
+            /** @description Whether it opens the service. */
+            state: components["schemas"]["KeyState"];
+            /**
+             * Format: int64
+             * @description Bytes that its tenant may store; `null` is the service's general limit.
+             */
+            stored_bytes?: number | null;
+            /**
+             * @description Whose items and jobs it opens.
+             * @example default
+             */
+            tenant: string;
+        };
+        /** @description A page of keys. */
+        KeyList: {
+            /** @description The keys, newest first. */
+            keys: components["schemas"]["Key"][];
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+        };
+        /**
+         * @description Whether a key opens the service.
+         * @enum {string}
+         */
+        KeyState: "active" | "expired" | "revoked";
+        /** @description One label of a label map. */
+        LabelCount: {
+            /**
+             * Format: int64
+             * @description Value of the voxels.
+             */
+            label: number;
+            /**
+             * Format: int64
+             * @description Number of voxels with that value.
+             */
+            voxels: number;
+        };
+        /** @description One distance of a reader's profile, mm. */
+        LearntOffset: {
+            /**
+             * Format: double
+             * @description Mean over the masks.
+             */
+            mean: number;
+            /**
+             * Format: double
+             * @description Standard deviation over the masks; 0 for one mask.
+             */
+            spread: number;
+            /**
+             * Format: double
+             * @description What is applied: the mean, drawn towards zero.
+             */
+            value: number;
+        };
+        /** @description The distances of a reader's profile. */
+        LearntOffsets: {
+            /** @description Inner surface, outward. */
+            endocardium: components["schemas"]["LearntOffset"];
+            /** @description Outer surface, outward. */
+            epicardium: components["schemas"]["LearntOffset"];
+            /** @description Rim, towards the base. */
+            rim: components["schemas"]["LearntOffset"];
+        };
+        /** @description A scan and its mask that a profile was learnt on. */
+        LearntOn: {
+            /** @description SHA-256 of the mask's file, hexadecimal. */
+            mask: string;
+            /** @description SHA-256 of the scan's file, hexadecimal. */
+            scan: string;
+        };
+        /** @description A legal hold. */
+        LegalHold: {
+            /** @description The name of the key that set it. */
+            by: string;
+            /** @description The reason that was given. */
+            reason: string;
+            /**
+             * Format: date-time
+             * @description Since when (RFC 3339).
+             */
+            since: string;
+        };
+        /** @description Where the organ was found. */
+        Localisation: {
+            /** @description Direction from base to apex. */
+            axis: number[];
+            /** @description Its centre. */
+            centre: number[];
+            /**
+             * Format: double
+             * @description How sure the search is, 0 to 1.
+             */
+            confidence: number;
+            /**
+             * Format: double
+             * @description Correlation with the shape sought.
+             */
+            correlation: number;
+            /**
+             * Format: double
+             * @description How hollow it is, 0 to 1.
+             */
+            hollowness: number;
+            /**
+             * Format: double
+             * @description Its length, mm.
+             */
+            length_mm: number;
+            /**
+             * Format: double
+             * @description Correlation of the next best place.
+             */
+            runner_up?: number | null;
+        };
+        /** @description The ends of a ventricle's long axis. */
+        LongAxis: {
+            /** @description The apex. */
+            apex: number[];
+            /** @description Centre of the base. */
+            base: number[];
+        };
+        MeshDocument: {
+            /** @description A figure of each point: `Uptake` (per cent) of a fitted wall, `Distance` (mm) of a model to the surface that it was made of; null where it is not known */
+            fields?: {
+                [key: string]: (number | null)[];
+            };
+            /** @enum {string} */
+            frame?: "LPS";
+            /** @description The volume's DICOM frame of reference */
+            frame_of_reference_uid?: string;
+            /** @description Unit normals of the points, outward */
+            normals?: number[][];
+            /** @description The part of a left ventricle's wall that each triangle is of: 1 endocardium, 2 epicardium, 3 base */
+            part?: number[];
+            /** @description Its main figures */
+            quality?: Record<string, never>;
+            /** @description The program that made it */
+            software?: string;
+            /** @description What the mesh shows */
+            title?: string;
+            /** @description Indices of three vertices each, counter-clockwise seen from outside */
+            triangles: number[][];
+            /** @description Standard deviation of each point's distance from the true surface */
+            uncertainty_mm?: number[];
+            /** @enum {string} */
+            unit?: "mm";
+            /** @description Points, LPS millimetres */
+            vertices: number[][];
+            /** @description Id of the volume it was made of */
+            volume?: string;
+        };
+        /** @description Counts, topology and size of a mesh. */
+        MeshFacts: {
+            /** @description No edge has a single triangle. */
+            closed: boolean;
+            /** @description The first defect found, in words. */
+            defect?: string | null;
+            /** @description No edge has more than two triangles. */
+            edge_manifold: boolean;
+            /**
+             * @description Neighbouring triangles traverse their common edge in opposite directions, so that their
+             *     normals point to the same side.
+             */
+            oriented: boolean;
+            /** @description The triangles face outward (the enclosed volume is positive). */
+            outward: boolean;
+            /**
+             * Format: int64
+             * @description Components with a positive enclosed volume. The others bound cavities of the wall, or face
+             *     the wrong way.
+             */
+            outward_components: number;
+            /** @description The triangles about every vertex form one cycle, and every edge has two of them. */
+            vertex_manifold: boolean;
+            /**
+             * Format: double
+             * @description Area, mm².
+             */
+            area_mm2: number;
+            /**
+             * Format: int64
+             * @description Connected components.
+             */
+            components: number;
+            /**
+             * Format: int64
+             * @description Number of edges.
+             */
+            edges: number;
+            /**
+             * Format: int64
+             * @description Euler characteristic V - E + F: 2 for each component without handles. Only vertices in
+             *     use count.
+             */
+            euler_characteristic: number;
+            /**
+             * Format: int64
+             * @description Handles over all components, of a closed manifold.
+             */
+            genus?: number | null;
+            /** @description Largest coordinates, LPS mm. */
+            max_mm: number[];
+            /** @description Smallest coordinates, LPS mm. */
+            min_mm: number[];
+            /**
+             * Format: int64
+             * @description Pairs of triangles that meet in more than shared vertices and edges, found exactly.
+             */
+            self_intersections: number;
+            /**
+             * Format: int64
+             * @description Number of triangles.
+             */
+            triangles: number;
+            /**
+             * Format: int64
+             * @description Number of vertices.
+             */
+            vertices: number;
+            /**
+             * Format: double
+             * @description Enclosed volume, millilitres.
+             */
+            volume_ml: number;
+        };
+        /** @description A model: what it was made of, its main figures, and its files. */
+        Model: {
+            /**
+             * Format: date-time
+             * @description When it was made (RFC 3339).
+             */
+            created_at: string;
+            dicom?: components["schemas"]["ScanUids"] | null;
+            /**
+             * Format: date-time
+             * @description When it will be erased unless it is computed again (RFC 3339); absent if it is kept.
+             */
+            expires_at?: string | null;
+            /** @description Its files. */
+            files: components["schemas"]["Download"][];
+            /**
+             * @description Derived from tenant, volume, parameters and mesh, so it is the same on every machine.
+             * @example mdl_2c26b46b68ffc68ff99b453c1d304134
+             */
+            id: string;
+            /** @description Related paths. */
+            links: components["schemas"]["ModelLinks"];
+            /** @description The parameters used, including every default. */
+            parameters: components["schemas"]["ModelParameters"];
+            /** @description The program that made it. */
+            software: components["schemas"]["Software"];
+            /** @description Counts and main figures; the report has all figures. */
+            summary: components["schemas"]["ModelSummary"];
+            /** @description The volume it was made of. */
+            volume: string;
+        };
+        /** @description Paths of one model. */
+        ModelLinks: {
+            /** @description DICOM objects of the scan's patient and study, for the archive. */
+            dicom: string[];
+            /** @description Its mesh, in the format that `Accept` asks for. */
+            mesh: string;
+            /** @description The report as an HTML page. */
+            page: string;
+            /** @description Its quality report. */
+            report: string;
+            /** @description This model. */
+            self: string;
+            /** @description Its volume. */
+            volume: string;
+        };
+        /** @description A page of models. */
+        ModelList: {
+            /** @description The models, newest first. */
+            models: components["schemas"]["Model"][];
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+        };
+        /** @description The parameters of a model */
+        ModelParameters: {
+            /** @description Higher density of points where the surface is curved: the spacing is proportional to curvature^-adaptive; 0 is uniform (default for refined: 0.25, for paper: 0) */
+            adaptive?: number;
+            /**
+             * @description Smallest height of the surface over one edge of uniform spacing, in percent of the surface's size, at which `adaptive` takes effect; 0 adapts everywhere
+             * @default 0.8
+             */
+            adaptive_from?: number;
+            /** @description Search for the object only inside this box of voxels: i0,j0,k0,i1,j1,k1, counted from 0, both corners included */
+            box?: number[];
+            /**
+             * @description auto measures the noise of the scan and takes that much off its surface; off leaves the surface at the iso-value of the voxels (default for refined: auto, for paper: off)
+             * @enum {string}
+             */
+            denoise?: "auto" | "off";
+            /**
+             * @description Weight of even dihedral angles in the fit, for triangles as small as a voxel; lowers the largest distance and the dihedral angles
+             * @default 0.07
+             */
+            fit_bend_weight?: number;
+            /**
+             * @description Weight that holds vertices in place in each round of the fit
+             * @default 0.0005
+             */
+            fit_damping?: number;
+            /**
+             * @description Target size of triangles in the fit: 0 pulls them all to one size, 1 keeps the size that each has
+             * @default 1
+             */
+            fit_free_size?: number;
+            /**
+             * @description Number of flips that the fit looks ahead to let irregular vertices cancel
+             * @default 3
+             */
+            fit_glide?: number;
+            /**
+             * @description Weight of the distances from the model's edge midpoints and triangle centres to the surface in the fit
+             * @default 1
+             */
+            fit_midpoint_weight?: number;
+            /**
+             * @description Share of its previous step that a vertex repeats in each round of the fit
+             * @default 0.6
+             */
+            fit_momentum?: number;
+            /**
+             * @description Additional weight of distant samples in the fit; lowers the largest distance
+             * @default 0.02
+             */
+            fit_peak_weight?: number;
+            /** @description Rounds of the least-squares fit; 0 leaves the points on the surface (default for refined: 10, for paper: 0) */
+            fit_rounds?: number;
+            /**
+             * @description Samples of the surface per triangle of the model in the fit
+             * @default 16
+             */
+            fit_samples?: number;
+            /**
+             * @description Weight of the triangles' shape relative to the squared distance in the fit
+             * @default 0.06
+             */
+            fit_shape_weight?: number;
+            /**
+             * @description Additional weight of badly shaped triangles in the fit
+             * @default 3
+             */
+            fit_worst_weight?: number;
+            /**
+             * @description Form of the fitness that the flips raise: raw (the paper's reciprocals), normalised (each term between 0 and 1), or robust (reciprocals with a floor of 1 degree and 0.01 mm) (default for refined: normalised, for paper: raw)
+             * @enum {string}
+             */
+            fitness?: "raw" | "normalised" | "robust";
+            /** @description Frame of a 4-D volume or gate, counted from 0 (0 is the first); without it, the gates of a heart beat are summed */
+            frame?: number;
+            /**
+             * @description What a flip must raise: local (the fitness of the pair of triangles, as in the paper) or total (the fitness of the mesh) (default for refined: total, for paper: local)
+             * @enum {string}
+             */
+            gain?: "local" | "total";
+            /**
+             * @description Geodesic distances that the repulsion uses (method paper): exact ones take many times longer and are meant for validation
+             * @default approximate
+             * @enum {string}
+             */
+            geodesics?: "approximate" | "exact";
+            /** @description Radius ratio 2r/R below which a flip must not create a triangle, unless it replaces one that is as bad; 0 allows slivers (default for refined: 0.9, for paper: 0) */
+            guard?: number;
+            /**
+             * @description Iso-value of the surface: auto, a percentage of the ventricle's maximum (50%), an intensity (absolute:0.47), or an intensity below which the object lies (below:0, for signed distances and objects darker than their surroundings)
+             * @default auto
+             * @example auto, 50% (of the ventricle's maximum), absolute:0.47 or below:0
+             */
+            iso?: string;
+            /**
+             * @description Which part of the volume is the object: auto (the left ventricle, or the label of a label map), none (everything above the iso-value) or largest (the largest component)
+             * @enum {string}
+             */
+            isolate?: "auto" | "none" | "largest";
+            /** @description Label of the object in a label map; 0 and negative ones too */
+            label?: number[];
+            /**
+             * @description Sigma of the Gaussian that smooths label maps before the surface is extracted, in voxels (edges of a cube of a voxel's volume): the same length along every axis
+             * @default 0.8
+             */
+            mask_smoothing?: number;
+            /**
+             * @description paper: repulsion and mutual tessellation on the surface; refined: centroidal points, their dual triangulation and a least-squares fit
+             * @default refined
+             * @enum {string}
+             */
+            method?: "paper" | "refined";
+            /**
+             * @description Number of points of the model
+             * @default 150
+             */
+            points?: number;
+            /**
+             * @description Maximum number of rounds of centroidal relaxation (method refined)
+             * @default 50
+             */
+            relaxation_iterations?: number;
+            /**
+             * @description Most repetitions of repulsion and tessellation, each from the points of the mesh before (method paper); fewer if the triangles' shape no longer improves
+             * @default 8
+             */
+            repeats?: number;
+            /**
+             * @description Rounds of geodesic repulsion (method paper)
+             * @default 40
+             */
+            repulsion_iterations?: number;
+            /**
+             * @description Share of an overlap by which one round of repulsion moves a point
+             * @default 0.15
+             */
+            repulsion_strength?: number;
+            /**
+             * @description Seed of the random numbers; the same seed gives the same bytes
+             * @default 1
+             */
+            seed?: number;
+            /** @description Voxel i,j,k (counted from 0) that belongs to the object */
+            seed_point?: number[];
+            /** @description Number of models to make, each from another seed; the best is kept (default for refined: 200 points in all, 1 to 4 models; for paper: 1) */
+            starts?: number;
+            /**
+             * @description genus0 removes handles, enclosed cavities and all but one component; keep leaves them
+             * @default genus0
+             * @enum {string}
+             */
+            topology?: "genus0" | "keep";
+            /**
+             * @description Weight of the smoothness between the two triangles of an edge
+             * @default 1
+             */
+            w1?: number;
+            /**
+             * @description Weight of the smoothness toward the neighbouring triangles
+             * @default 1
+             */
+            w2?: number;
+            /**
+             * @description Weight of the aspect ratio of the triangles
+             * @default 1
+             */
+            w3?: number;
+            /**
+             * @description Weight of the distance to the original surface
+             * @default 1
+             */
+            w4?: number;
+        };
+        /** @description The report of a model. Lengths are millimetres in the patient frame LPS. */
+        ModelReport: {
+            /** @description The model beside the iso-surface. */
+            distance: components["schemas"]["Distance"];
+            /** @description The paper's fitness after each stage. */
+            fitness: components["schemas"]["FitnessReport"];
+            /** @description Distributions before and after optimisation. */
+            histograms: components["schemas"]["Histograms"];
+            /** @description The volume's file. */
+            input: components["schemas"]["FileFacts"];
+            /** @description The model: counts and topology. */
+            mesh: components["schemas"]["MeshFacts"];
+            /** @description What optimisation did. */
+            optimise: components["schemas"]["OptimiseReport"];
+            /** @description Every parameter, defaults written out. */
+            parameters: components["schemas"]["ModelParameters"];
+            /** @description The mesh before optimisation. */
+            retile: components["schemas"]["RetileReport"];
+            /** @description The model: shape of its triangles. */
+            shape: components["schemas"]["Shape"];
+            /** @description The model: angles between neighbouring triangles. */
+            smoothness: components["schemas"]["Smoothness"];
+            /** @description The program that made the model. */
+            software: components["schemas"]["Software"];
+            /** @description The iso-surface. */
+            surface: components["schemas"]["SurfaceReport"];
+            /** @description Milliseconds of each stage and their `total`. */
+            timings_ms: {
+                [key: string]: number;
+            };
+            /** @description Sentences about the input and the model that a user should know. */
+            warnings: string[];
+        };
+        /** @description The main figures of a model; the report has all. */
+        ModelSummary: {
+            /**
+             * Format: double
+             * @description Mean angle between neighbours, degrees.
+             */
+            dihedral_mean_deg: number;
+            /**
+             * Format: double
+             * @description Mean distance to the surface, mm.
+             */
+            distance_mean_mm: number;
+            /**
+             * Format: int64
+             * @description V - E + F.
+             */
+            euler_characteristic: number;
+            /**
+             * Format: double
+             * @description The paper's fitness.
+             */
+            fitness: number;
+            /**
+             * Format: double
+             * @description Largest distance to the surface, mm.
+             */
+            hausdorff_mm: number;
+            /**
+             * Format: double
+             * @description Mean 2r/R of the triangles.
+             */
+            radius_ratio_mean: number;
+            /**
+             * Format: double
+             * @description Smallest 2r/R.
+             */
+            radius_ratio_min: number;
+            /**
+             * Format: int64
+             * @description Intersecting pairs of triangles.
+             */
+            self_intersections: number;
+            /**
+             * Format: int64
+             * @description Number of triangles.
+             */
+            triangles: number;
+            /**
+             * Format: int64
+             * @description Number of vertices.
+             */
+            vertices: number;
+            /**
+             * Format: double
+             * @description How much more volume the model encloses than the surface, percent.
+             */
+            volume_error_percent: number;
+        };
+        /** @description A key to be made. */
+        NewKey: {
+            /**
+             * Format: date-time
+             * @description From when on it is refused (RFC 3339); never if absent.
+             */
+            expires_at?: string | null;
+            /**
+             * @description What it is for.
+             * @example scanner 2
+             */
+            name: string;
+            /**
+             * Format: int64
+             * @description Jobs of the tenant that may wait; the service's general limit if absent.
+             */
+            queued_jobs?: number | null;
+            /**
+             * Format: int64
+             * @description Requests per minute; the service's general limit if absent.
+             */
+            requests_per_minute?: number | null;
+            /**
+             * @description What it allows: `read`, `submit` or `admin`.
+             * @example submit
+             */
+            scope: string;
+            /**
+             * Format: int64
+             * @description Bytes that the tenant may store; the service's general limit if absent.
+             */
+            stored_bytes?: number | null;
+        };
+        /** @description Why the service cannot accept work. */
+        NotReady: components["schemas"]["Problem"] & {
+            /** @description What the service depends on. */
+            checks: components["schemas"]["Dependency"][];
+        };
+        /** @description The delivery of a DICOM object to an archive. */
+        ObjectDelivery: {
+            /**
+             * Format: int32
+             * @description Number of attempts.
+             */
+            attempts: number;
+            /**
+             * @description Its id; absent until the job has succeeded.
+             * @example snd_2c26b46b68ffc68ff99b453c1d304134
+             */
+            id?: string | null;
+            /**
+             * Format: date-time
+             * @description When it was tried last (RFC 3339).
+             */
+            last_attempt_at?: string | null;
+            /** @description Why the last attempt failed. */
+            last_error?: string | null;
+            /**
+             * @description How it last ended: `stored`, `present` (the archive had it already), `failed`, `refused`,
+             *     `erased` (here, before it was sent).
+             */
+            last_outcome?: string | null;
+            /**
+             * @description The object.
+             * @example mask.dcm
+             */
+            name: string;
+            /**
+             * Format: date-time
+             * @description When it is tried next (RFC 3339).
+             */
+            next_attempt_at?: string | null;
+            /**
+             * @description `pending`, `delivered`, or `dead` if it was given up.
+             * @example delivered
+             */
+            state: string;
+            /**
+             * @description The archive.
+             * @example pacs
+             */
+            to: string;
+        };
+        /** @description What optimisation did. */
+        OptimiseReport: {
+            /** @description Why it ended: `no_flip_gains`, `cycle` or `sweep_limit`. */
+            ended: string;
+            /**
+             * Format: int64
+             * @description Edges flipped during the fit.
+             */
+            fit_flips: number;
+            /**
+             * Format: int64
+             * @description Rounds of the least-squares fit.
+             */
+            fit_rounds: number;
+            /**
+             * Format: int64
+             * @description Steps of the fit that were shortened.
+             */
+            fit_shortened: number;
+            /**
+             * Format: int64
+             * @description Edges flipped.
+             */
+            flips: number;
+            /**
+             * Format: int64
+             * @description Intersecting pairs of triangles before optimisation.
+             */
+            self_intersections_before: number;
+            /**
+             * Format: int64
+             * @description Sweeps over all edges.
+             */
+            sweeps: number;
+        };
+        /** @description A polar map, as in `polar.json`. */
+        PolarMap: {
+            /**
+             * Format: int64
+             * @description Columns of pixels, around the axis.
+             */
+            columns: number;
+            /** @description The order of the columns; null if the orientation is unknown. */
+            direction?: string | null;
+            /**
+             * Format: double
+             * @description Share of the wall below it.
+             */
+            extent_percent: number;
+            /** @description Where the first column looks; null if the orientation is unknown. */
+            first_column?: string | null;
+            /** @description What the percentages refer to. */
+            note: string;
+            /** @description What told the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`. */
+            orientation: string;
+            /**
+             * Format: double
+             * @description The intensity that counts as 100 per cent.
+             */
+            reference: number;
+            /**
+             * Format: int64
+             * @description Rows of pixels, from apex to base.
+             */
+            rows: number;
+            /** @description The 17 segments. */
+            segments: components["schemas"]["PolarSegment"][];
+            /** @description The walls of the three arteries; none if the orientation is unknown. */
+            territories: components["schemas"]["Territory"][];
+            /**
+             * Format: double
+             * @description Share of it below which wall counts as a defect.
+             */
+            threshold_percent: number;
+            /**
+             * @description For every column, the distances from the apex in rows at which apex, apical, mid and basal level
+             *     end; row n reaches from n to n + 1. Absent from maps of older versions.
+             */
+            level_ends?: number[][] | null;
+            /**
+             * @description The radii at which these levels end on the drawn map, as shares of its own. Absent from maps of
+             *     older versions.
+             */
+            rings?: number[] | null;
+            /** @description The number of the segment to which each pixel belongs. */
+            segment_of: number[][];
+            /** @description The pixels in per cent of the reference; null where there is no wall. */
+            values_percent: (number | null)[][];
+        };
+        /** @description One segment of a polar map. */
+        PolarSegment: {
+            /**
+             * Format: double
+             * @description Its area, mm².
+             */
+            area_mm2: number;
+            /**
+             * Format: double
+             * @description Share of its area below the threshold.
+             */
+            extent_percent: number;
+            /**
+             * Format: double
+             * @description Mean uptake in per cent of the reference.
+             */
+            mean_percent?: number | null;
+            /** @description Its name. */
+            name: string;
+            /**
+             * Format: int64
+             * @description 1 to 17.
+             */
+            number: number;
+            /** @description The coronary artery that usually feeds it; null if the orientation is unknown. */
+            territory?: string | null;
+        };
+        /** @description A polar map without its pixels. */
+        PolarSummary: {
+            /**
+             * Format: int64
+             * @description Columns of pixels, around the axis.
+             */
+            columns: number;
+            /** @description The order of the columns; null if the orientation is unknown. */
+            direction?: string | null;
+            /**
+             * Format: double
+             * @description Share of the wall below it.
+             */
+            extent_percent: number;
+            /** @description Where the first column looks; null if the orientation is unknown. */
+            first_column?: string | null;
+            /** @description What the percentages refer to. */
+            note: string;
+            /** @description What told the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`. */
+            orientation: string;
+            /**
+             * Format: double
+             * @description The intensity that counts as 100 per cent.
+             */
+            reference: number;
+            /**
+             * Format: int64
+             * @description Rows of pixels, from apex to base.
+             */
+            rows: number;
+            /** @description The 17 segments. */
+            segments: components["schemas"]["PolarSegment"][];
+            /** @description The walls of the three arteries; none if the orientation is unknown. */
+            territories: components["schemas"]["Territory"][];
+            /**
+             * Format: double
+             * @description Share of it below which wall counts as a defect.
+             */
+            threshold_percent: number;
+        };
+        /** @description Which way is up in the patient. */
+        Posture: {
+            /**
+             * Format: double
+             * @description How sure that is, 0 to 1.
+             */
+            confidence: number;
+            /** @description What told it: `superior`, `anterior`, `body`, `frame` or `unknown`. */
+            source: string;
+            /** @description The direction to the head. */
+            superior: number[];
+            /**
+             * Format: double
+             * @description Its angle to the scanner's axis.
+             */
+            tilt_degrees: number;
+        };
+        /**
+         * @description How urgent a job is.
+         * @enum {string}
+         */
+        Priority: "urgent" | "routine" | "bulk";
+        /** @description Why a request was not fulfilled (RFC 9457). */
+        Problem: {
+            /** @description What happened this time. */
+            detail: string;
+            /** @description The parameter, JSON field or header concerned. */
+            field?: string | null;
+            /** @description What to do about it. */
+            fix?: string | null;
+            /** @description The job that failed, if there was one. */
+            job?: string | null;
+            /**
+             * Format: int32
+             * @description The HTTP status.
+             */
+            status: number;
+            /** @description The kind of problem in words. */
+            title: string;
+            /**
+             * @description Stable identifier of the kind of problem.
+             * @example urn:ventriform:problem:unknown-parameter
+             */
+            type: string;
+        };
+        /** @description A reader: a profile by which segmentations are drawn. */
+        Reader: {
+            /**
+             * Format: date-time
+             * @description When it was added (RFC 3339).
+             */
+            created_at: string;
+            /** @description Its files. */
+            files: components["schemas"]["Download"][];
+            /**
+             * @description Derived from tenant and profile, so it is the same on every machine.
+             * @example rdr_2c26b46b68ffc68ff99b453c1d304134
+             */
+            id: string;
+            /** @description Related paths. */
+            links: components["schemas"]["ReaderLinks"];
+            /** @description Its name. */
+            name: string;
+            /** @description The program that added it. */
+            software: components["schemas"]["Software"];
+            /** @description What the profile holds. */
+            summary: components["schemas"]["ReaderSummary"];
+        };
+        WebhookRequest: {
+            /** @description What to tell; the three ends of a job unless given */
+            events?: ("started" | "succeeded" | "failed" | "cancelled")[];
+            /**
+             * @description What signs the deliveries (Standard Webhooks): `whsec_` and base64. Made by the service unless given, and never shown again
+             * @example whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw
+             */
+            secret?: string;
+            /**
+             * Format: uri
+             * @description Where to send deliveries: https, and a public host unless the operator allows it
+             * @example https://ris.example.org/hooks/ventriform
+             */
+            url: string;
+        };
+        /** @description Paths of one reader. */
+        ReaderLinks: {
+            /** @description Its profile. */
+            profile: string;
+            /** @description This reader. */
+            self: string;
+        };
+        /** @description A page of readers. */
+        ReaderList: {
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+            /** @description The readers, newest first. */
+            readers: components["schemas"]["Reader"][];
+        };
+        /** @description How far a reader's wall lies from the fitted one, mm. */
+        ReaderOffsets: {
+            /**
+             * Format: double
+             * @description How far the inner surface lies farther out.
+             */
+            endocardium: number;
+            /**
+             * Format: double
+             * @description How far the outer surface lies farther out.
+             */
+            epicardium: number;
+            /**
+             * Format: double
+             * @description How far the rim lies farther towards the base.
+             */
+            rim: number;
+        };
+        /** @description A reader's profile, as `ventriform calibrate` writes it. */
+        ReaderProfile: {
+            /** @description The wall that the distances start from: `apparent` or `anatomical`. */
+            edge: string;
+            /** @description `ventriform-reader-profile`. */
+            format: string;
+            /** @description What it was learnt on. */
+            learnt_on: components["schemas"]["LearntOn"][];
+            /**
+             * Format: int64
+             * @description Number of masks that it was learnt on: the length of `learnt_on`.
+             */
+            masks: number;
+            /** @description The distances, mm. */
+            offsets_mm: components["schemas"]["LearntOffsets"];
+            /**
+             * Format: int64
+             * @description 1.
+             */
+            version: number;
+        };
+        /** @description What a reader's profile holds. */
+        ReaderSummary: {
+            /** @description The wall that the distances start from: `apparent` or `anatomical`. */
+            edge: string;
+            /**
+             * Format: int64
+             * @description Number of masks that it was learnt on.
+             */
+            masks: number;
+            /** @description The distances that are applied, mm. */
+            offsets_mm: components["schemas"]["ReaderOffsets"];
+        };
+        /** @description Whether the service can accept work. */
+        Ready: {
+            /** @description What the service depends on. */
+            checks: components["schemas"]["Dependency"][];
+            /**
+             * @description Always `ok`.
+             * @example ok
+             */
+            status: string;
+            /** @description The program's version. */
+            version: string;
+        };
+        /**
+         * @description The receipt of an erasure. It stays when what it names is gone, and holds no name that was given
+         *     to an item.
+         */
+        Receipt: {
+            /** @description The AuditEvent that records it. */
+            audit_event: components["schemas"]["AuditEventName"];
+            /**
+             * Format: date-time
+             * @description When it was erased (RFC 3339).
+             */
+            erased_at: string;
+            /** @description The name of the key that asked for it; `retention` if it had reached its age. */
+            erased_by: string;
+            /**
+             * @description The receipt's id.
+             * @example ers_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f
+             */
+            id: string;
+            /**
+             * @description The item that was to be erased.
+             * @example vol_9f86d081884c7d659a2feaa0c55ad015
+             */
+            item: string;
+            /** @description The item, and what went with it. */
+            items: components["schemas"]["ErasedItem"][];
+            /** @description The jobs whose records went with it. */
+            jobs: string[];
+            /** @description Related paths. */
+            links: components["schemas"]["ReceiptLinks"];
+            /** @description Why it was erased. */
+            reason: components["schemas"]["ErasureReason"];
+        };
+        /** @description Paths of one receipt. */
+        ReceiptLinks: {
+            /** @description This receipt. */
+            self: string;
+        };
+        /** @description A page of receipts. */
+        ReceiptList: {
+            /** @description The receipts, newest first. */
+            erasures: components["schemas"]["Receipt"][];
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+        };
+        /** @description Objects that make up one volume. */
+        Received: {
+            /**
+             * Format: date-time
+             * @description When it last changed (RFC 3339).
+             */
+            changed_at: string;
+            /**
+             * Format: date-time
+             * @description When its first object came (RFC 3339).
+             */
+            created_at: string;
+            error?: components["schemas"]["Problem"] | null;
+            /**
+             * @description Its id.
+             * @example rcv_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f
+             */
+            id: string;
+            /** @description The values of Image Type. */
+            image_type: string[];
+            /** @description SOP Instance UID of an object that is a volume of its own; absent for a series of slices. */
+            instance?: string | null;
+            /** @description The job that a rule started. */
+            job?: string | null;
+            /** @description Related paths. */
+            links: components["schemas"]["ReceivedLinks"];
+            /** @description Modality. */
+            modality?: string | null;
+            /**
+             * Format: int64
+             * @description Number of its objects.
+             */
+            objects: number;
+            /**
+             * @description How its last object came: `c-store` or `stow-rs`.
+             * @example c-store
+             */
+            protocol: string;
+            /** @description The AE title, or the name of the key, that sent its last object. */
+            sender: string;
+            /** @description Series Instance UID. */
+            series: string;
+            /** @description What became of it. */
+            state: components["schemas"]["ReceivedState"];
+            /** @description Study Instance UID. */
+            study: string;
+            /** @description The volume made of it. */
+            volume?: string | null;
+            /**
+             * Format: int64
+             * @description Size of those that are not part of a volume, bytes.
+             */
+            waiting_bytes: number;
+        };
+        /** @description Paths of received objects. */
+        ReceivedLinks: {
+            /** @description The job. */
+            job?: string | null;
+            /** @description This entry; DELETE forgets it. */
+            self: string;
+            /** @description The volume. */
+            volume?: string | null;
+        };
+        /** @description A page of what was received. */
+        ReceivedList: {
+            /** @description The entries, newest first. */
+            intake: components["schemas"]["Received"][];
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+        };
+        /**
+         * @description What became of received objects.
+         * @enum {string}
+         */
+        ReceivedState: "gathering" | "filing" | "stored" | "failed";
+        /** @description A delivery that is tried again. */
+        Redelivered: components["schemas"]["Delivery"] | components["schemas"]["ObjectDelivery"];
+        /** @description A model that could not be fitted. */
+        RefusedTemplate: {
+            /** @description Why. */
+            reason: string;
+            /** @description The model's name. */
+            template: string;
+        };
+        /** @description Full width at half maximum of the image's point response. */
+        Resolution: {
+            /** @description `given` as a parameter, or `estimated` from the image. */
+            source: string;
+            /**
+             * Format: double
+             * @description Millimetres.
+             */
+            value: number;
+        };
+        /** @description Figures of the mesh before optimisation. */
+        RetileReport: {
+            /**
+             * Format: int64
+             * @description Attempts until the mesh was a manifold.
+             */
+            attempts: number;
+            /**
+             * Format: int64
+             * @description Rounds of relaxation.
+             */
+            relaxation_rounds: number;
+            /**
+             * Format: int64
+             * @description Repetitions of repulsion and tessellation.
+             */
+            repeats: number;
+            /**
+             * Format: int64
+             * @description Rounds of repulsion.
+             */
+            repulsion_rounds: number;
+            /**
+             * Format: int64
+             * @description Seed of the kept model's random numbers.
+             */
+            seed: number;
+            /** @description Shape of the triangles. */
+            shape: components["schemas"]["Shape"];
+            /** @description Angles between neighbouring triangles. */
+            smoothness: components["schemas"]["Smoothness"];
+            /** @description The models of which the best was kept. */
+            starts: components["schemas"]["Start"][];
+        };
+        /** @description intensity = slope × stored value + intercept. */
+        Scaling: {
+            /**
+             * Format: double
+             * @description The intercept.
+             */
+            intercept: number;
+            /**
+             * Format: double
+             * @description The slope.
+             */
+            slope: number;
+        };
+        /** @description Whose scan a volume is: what its DICOM header says, or was stated. */
+        Scan: {
+            /** @description Accession Number (0008,0050). */
+            accession_number?: string | null;
+            /**
+             * @description Acquisition Date (0008,0022), or the date in Acquisition `DateTime` (0008,002A), or
+             *     the Series Date, `YYYYMMDD`.
+             */
+            acquisition_date?: string | null;
+            /** @description Acquisition Time (0008,0032), or the time in Acquisition `DateTime` (0008,002A). */
+            acquisition_time?: string | null;
+            /** @description Convolution Kernel (0018,1210). */
+            convolution_kernel?: string | null;
+            /** @description Frame of Reference UID (0020,0052). */
+            frame_of_reference_uid?: string | null;
+            /** @description Image Type (0008,0008), values separated by backslashes. */
+            image_type?: string | null;
+            /** @description Radionuclide Total Dose (0018,1074) as stored: MBq in NM images, Bq in PET images. */
+            injected_dose?: string | null;
+            /** @description Radiopharmaceutical Start Time (0018,1072). */
+            injection_time?: string | null;
+            /** @description SOP Instance UIDs of a series of several instances; in `/identity` only. */
+            instance_uids?: string[];
+            /** @description Manufacturer (0008,0070) of the equipment. */
+            manufacturer?: string | null;
+            /** @description Modality (0008,0060). */
+            modality?: string | null;
+            /** @description Manufacturer's Model Name (0008,1090). */
+            model_name?: string | null;
+            /** @description Patient's Birth Date (0010,0030), `YYYYMMDD`. */
+            patient_birth_date?: string | null;
+            /** @description Patient ID (0010,0020). */
+            patient_id?: string | null;
+            /** @description Patient's Name (0010,0010), components separated by `^`. */
+            patient_name?: string | null;
+            /** @description Patient's Sex (0010,0040): `M`, `F` or `O`. */
+            patient_sex?: string | null;
+            /** @description Position Reference Indicator (0020,1040). */
+            position_reference_indicator?: string | null;
+            /** @description Protocol Name (0018,1030). */
+            protocol_name?: string | null;
+            /** @description Meaning of the Radionuclide Code (0054,0300). */
+            radionuclide?: string | null;
+            /**
+             * @description Meaning of the Radiopharmaceutical Code (0054,0304), or the Radiopharmaceutical
+             *     (0018,0031).
+             */
+            radiopharmaceutical?: string | null;
+            /** @description Reconstruction Method (0054,1103). */
+            reconstruction_method?: string | null;
+            /** @description Referring Physician's Name (0008,0090). */
+            referring_physician?: string | null;
+            /** @description `rest` or `stress`. */
+            rest_or_stress?: string | null;
+            /** @description Series Description (0008,103E). */
+            series_description?: string | null;
+            /** @description Series Number (0020,0011). */
+            series_number?: string | null;
+            /** @description Series Instance UID (0020,000E). */
+            series_uid?: string | null;
+            /** @description Software Versions (0018,1020). */
+            software_versions?: string | null;
+            /** @description SOP Class UID (0008,0016) of the instances. */
+            sop_class_uid?: string | null;
+            /** @description SOP Instance UID (0008,0018); of a series of several instances, the first one's. */
+            sop_instance_uid?: string | null;
+            /** @description Study Date (0008,0020), `YYYYMMDD`. */
+            study_date?: string | null;
+            /** @description Study Description (0008,1030). */
+            study_description?: string | null;
+            /** @description Study ID (0020,0010). */
+            study_id?: string | null;
+            /** @description Study Time (0008,0030), `HHMMSS.FFFFFF`. */
+            study_time?: string | null;
+            /** @description Study Instance UID (0020,000D). */
+            study_uid?: string | null;
+            /**
+             * @description Fields that the file states and that cannot be decoded; while they belong to patient or
+             *     study, no DICOM object is made.
+             */
+            undecoded?: string[];
+        };
+        /** @description Study, series and Frame of Reference of a scan. */
+        ScanUids: {
+            /**
+             * @description Frame of Reference UID.
+             * @example 1.2.840.99999.1.3
+             */
+            frame_of_reference_uid?: string | null;
+            /**
+             * @description Series Instance UID.
+             * @example 1.2.840.99999.1.2
+             */
+            series_uid?: string | null;
+            /**
+             * @description Study Instance UID.
+             * @example 1.2.840.99999.1.1
+             */
+            study_uid?: string | null;
+        };
+        /**
+         * @description What a key allows.
+         * @enum {string}
+         */
+        Scope: "read" | "submit" | "admin";
+        /** @description A segmentation: a model fitted to a volume, with its main figures and its reliability. */
+        Segmentation: {
+            /**
+             * Format: date-time
+             * @description When it was made (RFC 3339).
+             */
+            created_at: string;
+            dicom?: components["schemas"]["ScanUids"] | null;
+            /**
+             * Format: date-time
+             * @description When it will be erased unless it is computed again (RFC 3339); absent if it is kept.
+             */
+            expires_at?: string | null;
+            /** @description Its files. */
+            files: components["schemas"]["Download"][];
+            /**
+             * @description Derived from tenant, volume, parameters and mesh, so it is the same on every machine.
+             * @example seg_2c26b46b68ffc68ff99b453c1d304134
+             */
+            id: string;
+            /** @description Related paths. */
+            links: components["schemas"]["SegmentationLinks"];
+            /** @description The parameters used, including every default. */
+            parameters: components["schemas"]["SegmentationParameters"];
+            /** @description The program that made it. */
+            software: components["schemas"]["Software"];
+            /** @description The chosen model and the merit of every candidate, why the fit stopped, its confidence, volumes, agreement with the expert's mask, and warnings; the report has all figures. */
+            summary: components["schemas"]["SegmentationSummary"];
+            /** @description The volume it was made of. */
+            volume: string;
+        };
+        /** @description The registered receivers. */
+        WebhookList: {
+            /** @description The oldest first. */
+            webhooks: components["schemas"]["Webhook"][];
+        };
+        SegmentationForm: {
+            /**
+             * Format: binary
+             * @description An expert's mask (above 0.5) to measure against
+             */
+            expert?: string;
+            /**
+             * Format: binary
+             * @description The volume; several files make up one
+             */
+            volume: string;
+        };
+        /** @description Paths of one segmentation. */
+        SegmentationLinks: {
+            /** @description DICOM objects of the scan's patient and study, for the archive. */
+            dicom: string[];
+            /** @description The mask on the volume's grid. */
+            mask: string;
+            /** @description The fitted mesh, in the format that `Accept` asks for. */
+            mesh: string;
+            /** @description The report as an HTML page. */
+            page: string;
+            /** @description The polar map; left ventricles only. */
+            polar?: string | null;
+            /** @description The report. */
+            report: string;
+            /** @description This segmentation. */
+            self: string;
+            /** @description The volume. */
+            volume: string;
+        };
+        /** @description A page of segmentations. */
+        SegmentationList: {
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+            /** @description The segmentations, newest first. */
+            segmentations: components["schemas"]["Segmentation"][];
+        };
+        /** @description The parameters of a segmentation */
+        SegmentationParameters: {
+            /** @description Direction from the long axis to the anterior wall, x,y,z in the LPS frame of the volume: where segments are counted from if no superior direction is stated, as in short-axis slices (there, often 0,-1,0: the top of the picture) */
+            anterior?: number[];
+            /** @description Direction from base to apex, x,y,z in LPS, of any length: the search stays within 35 degrees of it */
+            axis?: number[];
+            /** @description A point of the ventricle's base, x,y,z in LPS millimetres: the rim of the wall is put there (moved by at most 20 mm towards the apex or 40 mm away from it). Default: where image and anatomy put it */
+            base?: number[];
+            /**
+             * @description Sigma of the Gaussian that smooths the image for the sensors, millimetres
+             * @default 3
+             */
+            blur?: number;
+            /**
+             * @description Stiffness that keeps the shape of the whole model, square millimetres
+             * @default 6
+             */
+            body_stiffness?: number;
+            /** @description Box of voxels that contains the centre of the organ: i0,j0,k0,i1,j1,k1, counted from 0, both corners included */
+            box?: number[];
+            /** @description A point in the cavity, x,y,z in LPS millimetres: the search stays within 25 mm of it and does not question it. Default: the organ is searched for in the whole volume */
+            center?: number[];
+            /**
+             * @description Damping of the motion per time step
+             * @default 1
+             */
+            damping?: number;
+            /**
+             * @description Which wall of a ventricle mask, mesh and measures show: apparent (as it looks in the blurred image) or anatomical (the wall itself, without the thickness that blur adds). The report has the volumes of both
+             * @default apparent
+             * @enum {string}
+             */
+            edge?: "apparent" | "anatomical";
+            /** @description Id of a volume with an expert's mask to compare with: a mask, a label map, a DICOM Segmentation, probabilities of which those above 0.5 count, or a closed mesh (STL, PLY, OBJ, VTK, VTP, glTF) */
+            expert?: string;
+            /** @description Frame of a 4-D volume or gate, counted from 0 (0 is the first); without it, the gates of a heart beat are summed */
+            frame?: number;
+            /**
+             * @description Which structure of the expert's mask is meant, if the file holds several: the number of a label or segment, or the name or code of a segment. Default: the only one; of segments, the one coded as myocardium
+             * @example 2, or the name of a DICOM segment
+             */
+            label?: string;
+            /**
+             * @description Final search range of the sensors, millimetres to either side
+             * @default 6
+             */
+            last_reach?: number;
+            /**
+             * @description How far outside the detected edge the contour is drawn, millimetres
+             * @default 0
+             */
+            margin?: number;
+            /**
+             * @description Grid of the masks and labels that are written: scan (the scan's own) or orthogonal (of a scan whose axes are not at right angles, as of a tilted gantry, a grid at right angles that covers it; NIfTI's qform and ITK know no other)
+             * @default scan
+             * @enum {string}
+             */
+            mask_grid?: "scan" | "orthogonal";
+            /**
+             * @description Mass of the whole model relative to a sensor force of 1 per millimetre
+             * @default 0.1
+             */
+            mass?: number;
+            /**
+             * @description Maximum number of time steps
+             * @default 100
+             */
+            max_iterations?: number;
+            /**
+             * @description Frame of an expert's mask that is a mesh: lps (DICOM, x to the left, y to posterior) or ras (NIfTI, x to the right, y to anterior). Default: what its file states (SPACE=LPS, SPACE=RAS); otherwise lps
+             * @enum {string}
+             */
+            mesh_frame?: "lps" | "ras";
+            /**
+             * @description Unit of an expert's mask that is a mesh. Default: what its file states; otherwise mm (of glTF m), if the size is that of an organ
+             * @enum {string}
+             */
+            mesh_unit?: "mm" | "cm" | "m";
+            /**
+             * @description Id of the model to fit (a template, a model or an earlier segmentation), or auto: fits the built-in hearts, the templates flagged `library` and the models named after it (auto,tpl_12,mdl_34), and keeps the fit with the greatest confidence. Alternative name: template
+             * @default auto
+             */
+            model?: string;
+            /**
+             * @description Factor by which the search range shrinks from step to step
+             * @default 0.85
+             */
+            narrowing?: number;
+            /**
+             * @description Organ that the model shows. All but the left ventricle are searched for as the largest bright region and have no polar map
+             * @default left_ventricle
+             * @enum {string}
+             */
+            organ?: "left_ventricle" | "liver" | "kidney" | "generic";
+            /**
+             * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
+             * @default 4.5
+             */
+            polar_blur?: number;
+            /**
+             * @description How far the samples of the polar map extend beyond the wall on both sides, millimetres
+             * @default 3
+             */
+            polar_extension?: number;
+            /**
+             * @description How wide the levels of the polar map are drawn: standard (rings of equal width) or area (each level has the share of the map that it has of the wall)
+             * @default standard
+             * @enum {string}
+             */
+            polar_projection?: "standard" | "area";
+            /**
+             * @description Share of the wall's reference uptake below which a sample counts as a defect
+             * @default 0.6
+             */
+            polar_threshold?: number;
+            /**
+             * @description Initial search range of the sensors, millimetres to either side
+             * @default 10
+             */
+            reach?: number;
+            /** @description Id of a reader's profile to draw the wall by: moves the endocardium, the epicardium and the rim by the distances that `ventriform calibrate` learnt from that reader's masks. Its edge must be that of `edge`. Default: the wall as it was fitted */
+            reader?: string;
+            /**
+             * @description Whether an expert's mask on another grid of voxels is resampled by the nearest voxel; without it, such a mask is refused
+             * @default false
+             */
+            resample?: boolean;
+            /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres. The anatomical wall is as much thinner as this blur makes a wall look thicker. Default: by calibration on simulated hearts */
+            resolution?: number;
+            /**
+             * @description Rotation of the model about the long axis, in degrees, in addition to the smallest rotation that aligns the axes
+             * @default 0
+             */
+            roll?: number;
+            /** @description Voxel i,j,k (counted from 0) in the cavity; use this or center */
+            seed_point?: number[];
+            /**
+             * @description What the sensors detect: half_maximum (the point half-way down the steepest outward fall), gradient (the steepest point of that fall), unsigned (the steepest change in either direction) or level (the crossing of half of the organ's uptake)
+             * @default half_maximum
+             * @enum {string}
+             */
+            sensor?: "half_maximum" | "gradient" | "unsigned" | "level";
+            /**
+             * @description Stiffness that keeps the length of edges, square millimetres
+             * @default 2.5
+             */
+            spring_stiffness?: number;
+            /**
+             * @description Which direction is superior in the patient, from which the segments of the polar map are counted: body (from the outline of the body, if enough of it is in view, else as the volume's frame states), frame (as the frame states) or the direction itself, x,y,z in the LPS frame of the volume
+             * @default body
+             * @example body
+             * @example 0,0,1
+             */
+            superior?: string;
+            /**
+             * @description Stiffness that keeps the thickness of the wall
+             * @default 0.02
+             */
+            thickness_stiffness?: number;
+            /**
+             * @description Length of one time step of the motion
+             * @default 1
+             */
+            time_step?: number;
+            /**
+             * @description Largest displacement of a node per step at which the model counts as at rest, millimetres
+             * @default 0.04
+             */
+            tolerance?: number;
+            /**
+             * @description Stiffness that keeps each node's position among its neighbours, square millimetres
+             * @default 7.5
+             */
+            torsion_stiffness?: number;
+        };
+        /** @description The report of a segmentation. Lengths are millimetres in the patient frame LPS. */
+        SegmentationReport: {
+            /** @description Models that were fitted. */
+            candidates: components["schemas"]["Candidate"][];
+            /** @description Why that one was taken. */
+            choice: string;
+            evidence?: components["schemas"]["Evidence"] | null;
+            /** @description How the fit went. */
+            fit: components["schemas"]["Fit"];
+            /** @description Reasons to look closer. */
+            flags: components["schemas"]["Flag"][];
+            /** @description The volume's file. */
+            input: components["schemas"]["FileFacts"];
+            localisation?: components["schemas"]["Localisation"] | null;
+            /** @description Which voxels the mask holds. */
+            mask_rule: string;
+            /**
+             * Format: double
+             * @description Mass of the myocardium, g, from the anatomical wall; ventricles only.
+             */
+            mass_g?: number | null;
+            measures?: components["schemas"]["Agreement"] | null;
+            /** @description Every parameter, defaults written out. */
+            parameters: components["schemas"]["SegmentationParameters"];
+            polar?: components["schemas"]["PolarSummary"] | null;
+            posture?: components["schemas"]["Posture"] | null;
+            reader?: components["schemas"]["AppliedReader"] | null;
+            /** @description Models that could not be fitted. */
+            refused: components["schemas"]["RefusedTemplate"][];
+            resolution_mm?: components["schemas"]["Resolution"] | null;
+            /** @description Name of the fitted model. */
+            template: string;
+            thickness_mm?: components["schemas"]["Thicknesses"] | null;
+            uncertainty_mm?: components["schemas"]["Uncertainties"] | null;
+            /** @description Volumes. */
+            volumes_ml: components["schemas"]["FittedVolumes"];
+            /**
+             * Format: double
+             * @description Mean thickness of the wall that `edge` asks for; ventricles only.
+             */
+            wall_thickness_mm?: number | null;
+            /** @description Warnings about the volume's file. */
+            warnings: string[];
+        };
+        /** @description The main figures of a segmentation; the report has all. */
+        SegmentationSummary: {
+            /** @description Models that were fitted. */
+            candidates: components["schemas"]["Candidate"][];
+            /** @description Why that one was taken. */
+            choice: string;
+            /**
+             * Format: double
+             * @description How reliable the fit is, 0 to 1.
+             */
+            confidence: number;
+            /** @description Reasons to look closer. */
+            flags: components["schemas"]["Flag"][];
+            measures?: components["schemas"]["Agreement"] | null;
+            /** @description Why the motion ended. */
+            reason: string;
+            /** @description Name of the fitted model. */
+            template: string;
+            /**
+             * Format: int64
+             * @description Number of vertices of the fitted mesh.
+             */
+            vertices: number;
+            /** @description Volumes. */
+            volumes_ml: components["schemas"]["FittedVolumes"];
+        };
+        /** @description How well-shaped the triangles are. */
+        Shape: {
+            /** @description Areas of triangles, mm². */
+            area_mm2: components["schemas"]["Summary"];
+            /** @description Lengths of edges, mm. */
+            edge_length_mm: components["schemas"]["Summary"];
+            /** @description Largest angle of each triangle, degrees. */
+            max_angle_deg: components["schemas"]["Summary"];
+            /** @description Smallest angle of each triangle, degrees, 60 = equilateral. */
+            min_angle_deg: components["schemas"]["Summary"];
+            /** @description Radius ratio 2r/R, 1 = equilateral. */
+            radius_ratio: components["schemas"]["Summary"];
+            /** @description Edges at each vertex. */
+            valence: components["schemas"]["Valence"];
+        };
+        /** @description How smooth the mesh is. */
+        Smoothness: {
+            /** @description Angle between the normals of neighbouring triangles, degrees, 0 = flat. */
+            dihedral_deg: components["schemas"]["Summary"];
+        };
+        /** @description The program that made a product. */
+        Software: {
+            /** @description The program. */
+            name: string;
+            /** @description Its version. */
+            version: string;
+        };
+        SourceJobRequest: {
+            /**
+             * @description The id in the caller's own system
+             * @example A-2026-17
+             */
+            external_id?: string;
+            /**
+             * @description The kind of work
+             * @default model
+             * @enum {string}
+             */
+            kind?: "model" | "segmentation";
+            /**
+             * @description The caller's own names and values
+             * @example {
+             *       "study": "42"
+             *     }
+             */
+            labels?: {
+                [key: string]: string;
+            };
+            parameters?: components["schemas"]["JobParameters"];
+            /**
+             * @description How urgent the job is: every waiting job of a higher priority starts before it
+             * @default routine
+             * @enum {string}
+             */
+            priority?: "urgent" | "routine" | "bulk";
+            /** @description DICOM objects of the result that are sent to an archive */
+            send?: ("mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm")[];
+            source: components["schemas"]["SourceRequest"];
+            /** @description The archive that they are sent to; that of `source` unless given */
+            to?: string;
+            webhook?: components["schemas"]["WebhookRequest"];
+        };
+        SourceRequest: {
+            /**
+             * @description Name of a configured archive
+             * @example pacs
+             */
+            archive?: string;
+            /** @description Base URL of a DICOMweb service, instead of `archive`: of a configured archive, or of a host that the operator has allowed */
+            dicomweb?: string;
+            /** @description Series Instance UID */
+            series: string;
+            /** @description Study Instance UID */
+            study: string;
+        };
+        /** @description One of the models of which the best was kept. */
+        Start: {
+            /**
+             * Format: double
+             * @description Mean distance to the surface, two-sided, mm.
+             */
+            distance_mean_mm: number;
+            /**
+             * Format: double
+             * @description Largest distance to the surface, two-sided, mm.
+             */
+            hausdorff_mm: number;
+            /**
+             * Format: double
+             * @description Mean 2r/R of its triangles.
+             */
+            radius_ratio_mean: number;
+            /**
+             * Format: int64
+             * @description Its seed.
+             */
+            seed: number;
+        };
+        /** @description Whose scan a volume is, as a caller states it. */
+        StatedScan: {
+            /** @description Accession Number. */
+            accession_number?: string | null;
+            /** @description Frame of Reference UID. */
+            frame_of_reference_uid?: string | null;
+            /** @description Patient's Birth Date, `YYYYMMDD`. */
+            patient_birth_date?: string | null;
+            /**
+             * @description Patient ID; needed for a file that is not DICOM.
+             * @example 4711
+             */
+            patient_id?: string | null;
+            /**
+             * @description Patient's Name, components separated by `^`.
+             * @example Doe^Jane
+             */
+            patient_name?: string | null;
+            /** @description Patient's Sex: M, F or O. */
+            patient_sex?: string | null;
+            /** @description Referring Physician's Name, components separated by `^`. */
+            referring_physician?: string | null;
+            /** @description Study Date, `YYYYMMDD`. */
+            study_date?: string | null;
+            /** @description Study ID. */
+            study_id?: string | null;
+            /**
+             * @description Study Instance UID; needed for a file that is not DICOM.
+             * @example 1.2.840.99999.1.1
+             */
+            study_uid?: string | null;
+        };
+        /** @description Mean, spread and percentiles of a list of numbers. All zero for an empty list. */
+        Summary: {
+            /**
+             * Format: double
+             * @description Standard deviation over the mean.
+             */
+            cv: number;
+            /**
+             * Format: double
+             * @description Largest.
+             */
+            max: number;
+            /**
+             * Format: double
+             * @description Arithmetic mean.
+             */
+            mean: number;
+            /**
+             * Format: double
+             * @description 50th percentile.
+             */
+            median: number;
+            /**
+             * Format: double
+             * @description Smallest.
+             */
+            min: number;
+            /**
+             * Format: double
+             * @description 5th percentile.
+             */
+            p5: number;
+            /**
+             * Format: double
+             * @description 95th percentile.
+             */
+            p95: number;
+            /**
+             * Format: double
+             * @description Root of the mean square.
+             */
+            rms: number;
+        };
+        /** @description The noise of a scan where its surface lies. */
+        SurfaceNoise: {
+            /**
+             * Format: double
+             * @description Full width at half maximum of the noise's correlation between places, mm; 0 without noise.
+             */
+            correlation_mm: number;
+            /**
+             * Format: double
+             * @description Standard deviation of the intensities, in the volume's units.
+             */
+            intensity: number;
+            /**
+             * Format: double
+             * @description Root mean square of the distances by which the vertices were moved, mm.
+             */
+            moved_mm: number;
+            /**
+             * Format: double
+             * @description Standard deviation of the surface's place, mm: that of the intensities over the steepness
+             *     of the image across the surface, the median over all vertices.
+             */
+            offset_mm: number;
+        };
+        /** @description Figures of the iso-surface. */
+        SurfaceReport: {
+            /**
+             * Format: double
+             * @description Area, mm².
+             */
+            area_mm2: number;
+            /**
+             * Format: int64
+             * @description Enclosed cavities before they were filled.
+             */
+            cavities_before: number;
+            /**
+             * Format: int64
+             * @description Connected components.
+             */
+            components: number;
+            /**
+             * Format: int64
+             * @description Components before all but one were removed.
+             */
+            components_before: number;
+            /**
+             * Format: int64
+             * @description V - E + F.
+             */
+            euler_characteristic: number;
+            /**
+             * Format: int64
+             * @description Handles over all components.
+             */
+            genus: number;
+            /**
+             * Format: int64
+             * @description Handles before they were removed.
+             */
+            handles_before: number;
+            /** @description Smallest and largest intensity. */
+            intensity_range: number[];
+            /**
+             * Format: double
+             * @description The iso-value as a share of the reference intensity.
+             */
+            iso_fraction: number;
+            /**
+             * Format: double
+             * @description The iso-value, in the volume's units.
+             */
+            iso_value: number;
+            /** @description `intensity`, `mask` or `labels`. */
+            kind: string;
+            /**
+             * Format: int64
+             * @description The object's label.
+             */
+            label?: number | null;
+            /**
+             * Format: double
+             * @description Volume of the voxels that carry the label, millilitres, which the surface is made to enclose;
+             *     null for intensities.
+             */
+            mask_ml?: number | null;
+            /**
+             * Format: double
+             * @description Area of that cut, mm².
+             */
+            neighbour_cut_mm2: number;
+            /**
+             * Format: int64
+             * @description Voxels of neighbouring organs that were cut off.
+             */
+            neighbour_voxels_cut: number;
+            noise?: components["schemas"]["SurfaceNoise"] | null;
+            /**
+             * Format: int64
+             * @description Voxels that are NaN or infinite.
+             */
+            not_finite_voxels: number;
+            /**
+             * Format: double
+             * @description Otsu's threshold.
+             */
+            otsu?: number | null;
+            /**
+             * Format: int64
+             * @description Components that face outward; the others bound cavities.
+             */
+            outward_components: number;
+            /**
+             * Format: double
+             * @description The object's maximum, which percentages refer to.
+             */
+            reference_intensity: number;
+            /**
+             * Format: double
+             * @description Volume of the object's voxels, millilitres.
+             */
+            region_ml: number;
+            /** @description Whether the object touches the volume's border. */
+            touches_border: boolean;
+            /**
+             * Format: int64
+             * @description Number of triangles.
+             */
+            triangles: number;
+            /**
+             * Format: double
+             * @description How much the object looks like a left ventricle.
+             */
+            ventricle_score?: number | null;
+            /**
+             * Format: int64
+             * @description Number of vertices.
+             */
+            vertices: number;
+            /**
+             * Format: double
+             * @description Enclosed volume, millilitres.
+             */
+            volume_ml: number;
+            /**
+             * Format: double
+             * @description Smallest voxel spacing, mm.
+             */
+            voxel_mm: number;
+            /**
+             * Format: int64
+             * @description Voxels cut to open handles.
+             */
+            voxels_cut: number;
+            /**
+             * Format: int64
+             * @description Voxels of dropped components.
+             */
+            voxels_dropped: number;
+            /**
+             * Format: int64
+             * @description Voxels filled to close handles and cavities.
+             */
+            voxels_filled: number;
+        };
+        TagsPatch: {
+            /**
+             * @description The id in the caller's own system
+             * @example A-2026-17
+             */
+            external_id?: string | null;
+            /**
+             * @description The caller's own names and values
+             * @example {
+             *       "study": "42"
+             *     }
+             */
+            labels?: {
+                [key: string]: string | null;
+            } | null;
+        };
+        /** @description A template: a model that jobs name, or that every `model=auto` fits. */
+        Template: {
+            /**
+             * Format: date-time
+             * @description When it was added (RFC 3339).
+             */
+            created_at: string;
+            /** @description Its files. */
+            files: components["schemas"]["Download"][];
+            /**
+             * @description Derived from tenant, organ and mesh, so it is the same on every machine.
+             * @example tpl_2c26b46b68ffc68ff99b453c1d304134
+             */
+            id: string;
+            /** @description Whether every `model=auto` fits it. Otherwise only jobs that name it do. */
+            library: boolean;
+            /** @description Related paths. */
+            links: components["schemas"]["TemplateLinks"];
+            /** @description Its name. */
+            name: string;
+            /**
+             * @description The organ it shows.
+             * @example left_ventricle
+             */
+            organ: string;
+            /** @description The program that added it. */
+            software: components["schemas"]["Software"];
+            /** @description Counts and main figures. */
+            summary: components["schemas"]["TemplateSummary"];
+        };
+        /** @description A registered receiver. */
+        Webhook: {
+            /**
+             * Format: date-time
+             * @description When it was registered (RFC 3339).
+             */
+            created_at: string;
+            /** @description What it is told. */
+            events: string[];
+            /**
+             * Format: date-time
+             * @description Since when it answers 410 and is told nothing (RFC 3339).
+             */
+            gone_at?: string | null;
+            /**
+             * @description Its id.
+             * @example whk_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f
+             */
+            id: string;
+            /** @description What signs its deliveries; shown only when it is registered. */
+            secret?: string | null;
+            /**
+             * @description Where it is.
+             * @example https://ris.example.org/hooks/ventriform
+             */
+            url: string;
+        };
+        /** @description Paths of one template. */
+        TemplateLinks: {
+            /** @description Its mesh, in the format that `Accept` asks for. */
+            mesh: string;
+            /** @description This template. */
+            self: string;
+        };
+        /** @description A page of templates. */
+        TemplateList: {
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+            /** @description The templates, newest first. */
+            templates: components["schemas"]["Template"][];
+        };
+        TemplatePatch: {
+            /** @description Whether every `model=auto` fits the template */
+            library?: boolean | null;
+        };
+        /** @description The main figures of a template. */
+        TemplateSummary: {
+            /**
+             * Format: double
+             * @description Length of its cup, mm; ventricles only.
+             */
+            length_mm?: number | null;
+            /**
+             * Format: int64
+             * @description Number of triangles.
+             */
+            triangles: number;
+            /**
+             * Format: int64
+             * @description Number of vertices.
+             */
+            vertices: number;
+            /**
+             * Format: double
+             * @description Enclosed volume, millilitres.
+             */
+            volume_ml: number;
+            /** @description What was assumed or changed of the mesh, in sentences. */
+            warnings: string[];
+        };
+        /** @description The wall that an artery usually feeds. */
+        Territory: {
+            /**
+             * Format: double
+             * @description Its area, mm².
+             */
+            area_mm2: number;
+            /**
+             * Format: double
+             * @description Share of its area below the threshold.
+             */
+            extent_percent: number;
+            /**
+             * Format: double
+             * @description Mean uptake in per cent of the reference.
+             */
+            mean_percent?: number | null;
+            /** @description LAD, LCX or RCA. */
+            name: string;
+        };
+        /** @description Thickness of a wall, mm. */
+        Thickness: {
+            /**
+             * Format: double
+             * @description Its mean.
+             */
+            mean: number;
+            /**
+             * Format: double
+             * @description Its standard deviation over the wall.
+             */
+            spread: number;
+        };
+        /** @description Thickness of both walls, mm. */
+        Thicknesses: {
+            /** @description Of the wall corrected for the blur. */
+            anatomical: components["schemas"]["Thickness"];
+            /** @description Of the wall as the blurred image shows it. */
+            apparent: components["schemas"]["Thickness"];
+        };
+        /** @description Standard deviation of the nodes' distance from the walls, millimetres. */
+        Uncertainties: {
+            /** @description From the wall itself. */
+            anatomical: components["schemas"]["Uncertainty"];
+            /** @description From the wall as it looks. */
+            apparent: components["schemas"]["Uncertainty"];
+        };
+        /** @description Standard deviation of the nodes' distance from a wall, millimetres. */
+        Uncertainty: {
+            /**
+             * Format: double
+             * @description The greatest.
+             */
+            greatest: number;
+            /**
+             * Format: double
+             * @description Median over the nodes.
+             */
+            median: number;
+            /**
+             * Format: double
+             * @description 95th percentile over the nodes.
+             */
+            percentile_95: number;
+        };
+        UploadForm: {
+            /**
+             * Format: binary
+             * @description The volume; several files make up one: a .hdr/.img pair, a DICOM series
+             */
+            file: string;
+        };
+        /** @description How many edges meet at a vertex. */
+        Valence: {
+            /** @description Number of vertices for each valence. */
+            counts: {
+                [key: string]: number;
+            };
+            /**
+             * Format: double
+             * @description Share of vertices with five, six or seven.
+             */
+            share_5_to_7: number;
+            /**
+             * Format: double
+             * @description Share of vertices with six edges, the regular case.
+             */
+            share_6: number;
+        };
+        /** @description A stored volume: what its header says. */
+        Volume: {
+            /** @description Maps a voxel index to millimetres in the patient frame LPS; row by row. */
+            affine: number[][];
+            /**
+             * @description The part of the header that gave the affine.
+             * @example sform
+             */
+            affine_source: string;
+            /**
+             * Format: int64
+             * @description Size of all its files in bytes.
+             */
+            bytes: number;
+            /** @description Whether it was gzipped. */
+            compressed: boolean;
+            /**
+             * Format: date-time
+             * @description When it was stored (RFC 3339).
+             */
+            created_at: string;
+            dicom?: components["schemas"]["Scan"] | null;
+            /**
+             * @description Data type in the file.
+             * @example int16
+             */
+            dtype: string;
+            /**
+             * Format: date-time
+             * @description When it will be erased unless it is uploaded or used again (RFC 3339); absent if it is kept.
+             */
+            expires_at?: string | null;
+            /** @description The caller's own id for it. */
+            external_id?: string | null;
+            /**
+             * Format: int64
+             * @description Number of its files.
+             */
+            files: number;
+            /**
+             * @description File format.
+             * @example NIfTI-1
+             */
+            format: string;
+            /**
+             * @description The frame of `affine`.
+             * @example LPS
+             */
+            frame: string;
+            /**
+             * Format: int64
+             * @description How many volumes of that shape the file holds; if several, the parameter `frame` chooses
+             *     one.
+             */
+            frames: number;
+            /**
+             * @description Derived from the SHA-256 of the content, so it is the same on every machine.
+             * @example vol_9f86d081884c7d659a2feaa0c55ad015
+             */
+            id: string;
+            /** @description The voxel values after slope and intercept. */
+            intensity: components["schemas"]["Intensity"];
+            /** @description The voxel values in rising order if the volume looks like a label map. */
+            label_values?: number[] | null;
+            /** @description The caller's own names and values for it. */
+            labels: {
+                [key: string]: string;
+            };
+            legal_hold?: components["schemas"]["LegalHold"] | null;
+            /** @description Related paths. */
+            links: components["schemas"]["VolumeLinks"];
+            /** @description Its files as they were uploaded. */
+            originals: components["schemas"]["VolumeFile"][];
+            /** @description Voxels along i, j, k of one frame. */
+            shape: number[];
+            /** @description Voxel spacing along the first three axes, millimetres. */
+            spacing_mm: number[];
+            /** @description Oddities of the file that do not prevent its use. */
+            warnings: string[];
+        };
+        /** @description An uploaded file. */
+        VolumeFile: {
+            /**
+             * Format: int64
+             * @description Its length in bytes.
+             */
+            bytes: number;
+            /** @description Its path. */
+            href: string;
+            /** @description Its media type. */
+            media_type: string;
+            /**
+             * @description Its name in the store; not that of the upload.
+             * @example volume.nii.gz
+             */
+            name: string;
+            /** @description SHA-256 of its content, hexadecimal; also its `ETag`. */
+            sha256: string;
+        };
+        VolumeJobRequest: {
+            /**
+             * @description The id in the caller's own system
+             * @example A-2026-17
+             */
+            external_id?: string;
+            /**
+             * @description The kind of work
+             * @default model
+             * @enum {string}
+             */
+            kind?: "model" | "segmentation";
+            /**
+             * @description The caller's own names and values
+             * @example {
+             *       "study": "42"
+             *     }
+             */
+            labels?: {
+                [key: string]: string;
+            };
+            parameters?: components["schemas"]["JobParameters"];
+            /**
+             * @description How urgent the job is: every waiting job of a higher priority starts before it
+             * @default routine
+             * @enum {string}
+             */
+            priority?: "urgent" | "routine" | "bulk";
+            /** @description DICOM objects of the result that are sent to an archive */
+            send?: ("mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm")[];
+            /** @description The archive that they are sent to; that of `source` unless given */
+            to?: string;
+            /**
+             * @description Id of the volume
+             * @example vol_9f86d081884c7d659a2feaa0c55ad015
+             */
+            volume: string;
+            webhook?: components["schemas"]["WebhookRequest"];
+        };
+        /** @description Paths of one volume. */
+        VolumeLinks: {
+            /** @description The uploaded file; absent if there are several. */
+            content?: string | null;
+            /** @description Its legal hold: PUT sets it, DELETE lifts it. */
+            hold: string;
+            /** @description Whose scan it is: PUT states it, DELETE erases it. */
+            identity: string;
+            /** @description Three middle slices as PNG. */
+            preview: string;
+            /** @description This volume. */
+            self: string;
+        };
+        /** @description A page of volumes. */
+        VolumeList: {
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+            /** @description The volumes, newest first. */
+            volumes: components["schemas"]["Volume"][];
+        };
+        /** @description Volumes of one wall, millilitres. */
+        WallVolumes: {
+            /**
+             * Format: double
+             * @description Of the cavity.
+             */
+            cavity: number;
+            /**
+             * Format: double
+             * @description Of the wall.
+             */
+            wall: number;
+        };
+    };
+    responses: never;
+    parameters: never;
+    requestBodies: never;
+    headers: never;
+    pathItems: never;
+}
+export type Agreement = components['schemas']['Agreement'];
+export type AppliedReader = components['schemas']['AppliedReader'];
+export type AuditEventName = components['schemas']['AuditEventName'];
+export type AuditPage = components['schemas']['AuditPage'];
+export type Candidate = components['schemas']['Candidate'];
+export type Closeness = components['schemas']['Closeness'];
+export type Delivery = components['schemas']['Delivery'];
+export type DeliveryList = components['schemas']['DeliveryList'];
+export type Dependency = components['schemas']['Dependency'];
+export type DicomJson = components['schemas']['DicomJson'];
+export type Distance = components['schemas']['Distance'];
+export type DistanceDirection = components['schemas']['DistanceDirection'];
+export type Download = components['schemas']['Download'];
+export type ErasedFile = components['schemas']['ErasedFile'];
+export type ErasedItem = components['schemas']['ErasedItem'];
+export type ErasureReason = components['schemas']['ErasureReason'];
+export type Evidence = components['schemas']['Evidence'];
+export type FileFacts = components['schemas']['FileFacts'];
+export type WebhookSecret = components['schemas']['WebhookSecret'];
+export type Fit = components['schemas']['Fit'];
+export type FitnessFormStages = components['schemas']['FitnessFormStages'];
+export type FitnessForms = components['schemas']['FitnessForms'];
+export type FitnessReport = components['schemas']['FitnessReport'];
+export type FitnessScales = components['schemas']['FitnessScales'];
+export type FitnessTermStages = components['schemas']['FitnessTermStages'];
+export type FitnessTerms = components['schemas']['FitnessTerms'];
+export type FittedVolumes = components['schemas']['FittedVolumes'];
+export type Flag = components['schemas']['Flag'];
+export type Health = components['schemas']['Health'];
+export type Histogram = components['schemas']['Histogram'];
+export type Histograms = components['schemas']['Histograms'];
+export type HoldRequest = components['schemas']['HoldRequest'];
+export type Intensity = components['schemas']['Intensity'];
+export type IntensityFacts = components['schemas']['IntensityFacts'];
+export type Job = components['schemas']['Job'];
+export type JobLinks = components['schemas']['JobLinks'];
+export type JobList = components['schemas']['JobList'];
+export type JobParameters = components['schemas']['JobParameters'];
+export type JobRequest = components['schemas']['JobRequest'];
+export type JobSource = components['schemas']['JobSource'];
+export type JobState = components['schemas']['JobState'];
+export type Key = components['schemas']['Key'];
+export type KeyList = components['schemas']['KeyList'];
+export type KeyState = components['schemas']['KeyState'];
+export type LabelCount = components['schemas']['LabelCount'];
+export type LearntOffset = components['schemas']['LearntOffset'];
+export type LearntOffsets = components['schemas']['LearntOffsets'];
+export type LearntOn = components['schemas']['LearntOn'];
+export type LegalHold = components['schemas']['LegalHold'];
+export type Localisation = components['schemas']['Localisation'];
+export type LongAxis = components['schemas']['LongAxis'];
+export type MeshDocument = components['schemas']['MeshDocument'];
+export type MeshFacts = components['schemas']['MeshFacts'];
+export type Model = components['schemas']['Model'];
+export type ModelLinks = components['schemas']['ModelLinks'];
+export type ModelList = components['schemas']['ModelList'];
+export type ModelParameters = components['schemas']['ModelParameters'];
+export type ModelReport = components['schemas']['ModelReport'];
+export type ModelSummary = components['schemas']['ModelSummary'];
+export type NewKey = components['schemas']['NewKey'];
+export type NotReady = components['schemas']['NotReady'];
+export type ObjectDelivery = components['schemas']['ObjectDelivery'];
+export type OptimiseReport = components['schemas']['OptimiseReport'];
+export type PolarMap = components['schemas']['PolarMap'];
+export type PolarSegment = components['schemas']['PolarSegment'];
+export type PolarSummary = components['schemas']['PolarSummary'];
+export type Posture = components['schemas']['Posture'];
+export type Priority = components['schemas']['Priority'];
+export type Problem = components['schemas']['Problem'];
+export type Reader = components['schemas']['Reader'];
+export type WebhookRequest = components['schemas']['WebhookRequest'];
+export type ReaderLinks = components['schemas']['ReaderLinks'];
+export type ReaderList = components['schemas']['ReaderList'];
+export type ReaderOffsets = components['schemas']['ReaderOffsets'];
+export type ReaderProfile = components['schemas']['ReaderProfile'];
+export type ReaderSummary = components['schemas']['ReaderSummary'];
+export type Ready = components['schemas']['Ready'];
+export type Receipt = components['schemas']['Receipt'];
+export type ReceiptLinks = components['schemas']['ReceiptLinks'];
+export type ReceiptList = components['schemas']['ReceiptList'];
+export type Received = components['schemas']['Received'];
+export type ReceivedLinks = components['schemas']['ReceivedLinks'];
+export type ReceivedList = components['schemas']['ReceivedList'];
+export type ReceivedState = components['schemas']['ReceivedState'];
+export type Redelivered = components['schemas']['Redelivered'];
+export type RefusedTemplate = components['schemas']['RefusedTemplate'];
+export type Resolution = components['schemas']['Resolution'];
+export type RetileReport = components['schemas']['RetileReport'];
+export type Scaling = components['schemas']['Scaling'];
+export type Scan = components['schemas']['Scan'];
+export type ScanUids = components['schemas']['ScanUids'];
+export type Scope = components['schemas']['Scope'];
+export type Segmentation = components['schemas']['Segmentation'];
+export type WebhookList = components['schemas']['WebhookList'];
+export type SegmentationForm = components['schemas']['SegmentationForm'];
+export type SegmentationLinks = components['schemas']['SegmentationLinks'];
+export type SegmentationList = components['schemas']['SegmentationList'];
+export type SegmentationParameters = components['schemas']['SegmentationParameters'];
+export type SegmentationReport = components['schemas']['SegmentationReport'];
+export type SegmentationSummary = components['schemas']['SegmentationSummary'];
+export type Shape = components['schemas']['Shape'];
+export type Smoothness = components['schemas']['Smoothness'];
+export type Software = components['schemas']['Software'];
+export type SourceJobRequest = components['schemas']['SourceJobRequest'];
+export type SourceRequest = components['schemas']['SourceRequest'];
+export type Start = components['schemas']['Start'];
+export type StatedScan = components['schemas']['StatedScan'];
+export type Summary = components['schemas']['Summary'];
+export type SurfaceNoise = components['schemas']['SurfaceNoise'];
+export type SurfaceReport = components['schemas']['SurfaceReport'];
+export type TagsPatch = components['schemas']['TagsPatch'];
+export type Template = components['schemas']['Template'];
+export type Webhook = components['schemas']['Webhook'];
+export type TemplateLinks = components['schemas']['TemplateLinks'];
+export type TemplateList = components['schemas']['TemplateList'];
+export type TemplatePatch = components['schemas']['TemplatePatch'];
+export type TemplateSummary = components['schemas']['TemplateSummary'];
+export type Territory = components['schemas']['Territory'];
+export type Thickness = components['schemas']['Thickness'];
+export type Thicknesses = components['schemas']['Thicknesses'];
+export type Uncertainties = components['schemas']['Uncertainties'];
+export type Uncertainty = components['schemas']['Uncertainty'];
+export type UploadForm = components['schemas']['UploadForm'];
+export type Valence = components['schemas']['Valence'];
+export type Volume = components['schemas']['Volume'];
+export type VolumeFile = components['schemas']['VolumeFile'];
+export type VolumeJobRequest = components['schemas']['VolumeJobRequest'];
+export type VolumeLinks = components['schemas']['VolumeLinks'];
+export type VolumeList = components['schemas']['VolumeList'];
+export type WallVolumes = components['schemas']['WallVolumes'];
+export type $defs = Record<string, never>;
+export type operations = Record<string, never>;
