@@ -86,6 +86,13 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "geometry", "numeric", "mesh", "progress", "grid", "locate", "model",
         ],
     ),
+    (
+        "judge",
+        &[
+            "geometry", "numeric", "mesh", "progress", "grid", "locate", "model", "deform",
+        ],
+    ),
+    ("fit", &["progress", "grid", "model", "deform", "judge"]),
     ("polar", &["geometry", "grid", "draw", "locate", "model"]),
     (
         "reader",
@@ -144,6 +151,8 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "export",
             "model",
             "deform",
+            "judge",
+            "fit",
             "polar",
             "reader",
             "report",
@@ -168,6 +177,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "export",
             "model",
             "deform",
+            "judge",
             "reader",
             "parameters",
             "pipeline",

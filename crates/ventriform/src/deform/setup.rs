@@ -109,7 +109,7 @@ impl FitSetup {
 
     /// The same with sensors that see nothing of the septum; `None` for other organs, and where the
     /// orientation is unknown.
-    pub fn without_septum(self) -> Option<Self> {
+    pub fn without_septum(&self) -> Option<Self> {
         let cup = self.localisation.as_ref()?.cup;
         if self.patient_orientation.source == OrientationSource::Unknown {
             return None;
@@ -122,7 +122,7 @@ impl FitSetup {
                 middle: cup.axis.cross(&anterior),
                 half_angle: SEPTAL,
             }),
-            ..self
+            ..self.clone()
         })
     }
 

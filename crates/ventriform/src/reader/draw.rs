@@ -3,13 +3,13 @@
 //! 1. Every node moves along its ray from the long axis ([`VentricleWall`]), by the distance of the inner
 //!    surface, of the outer one, or between the two in proportion to its depth in the wall. Where the
 //!    wall would get thinner than [`THINNEST`], both move less.
-//! 2. The rim moves along the long axis; nodes up to [`rim::REACH`] from it move
+//! 2. The rim moves along the long axis; nodes up to [`base_plane::REACH`] from it move
 //!    less and less, so that the wall is stretched there.
 //!
 //! On a wall that is perpendicular to its rays, the surfaces move by exactly these distances.
 
 use super::profile::ReaderOffsets;
-use crate::deform::{Fit, rim};
+use crate::deform::{FittedModel, base_plane};
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
@@ -21,15 +21,15 @@ const THINNEST: f64 = 3.0;
 
 /// `fit` with the shown wall moved by `offsets`, and the share of them that was applied: 1, or less
 /// where the whole would make the surface intersect itself. Its two measured walls
-/// ([`Fit::surfaces`]) stay. Organs other than ventricles stay as they are.
+/// ([`FittedModel::surfaces`]) stay. Organs other than ventricles stay as they are.
 ///
 /// # Errors
 /// [`Cancelled`].
 pub fn drawn(
-    fit: Fit,
+    fit: FittedModel,
     offsets: &ReaderOffsets,
     monitor: &Monitor,
-) -> Result<(Fit, f64), Cancelled> {
+) -> Result<(FittedModel, f64), Cancelled> {
     let (Some(cup), Some(orientation), Some(wall)) = (fit.cup, fit.patient_orientation, &fit.wall)
     else {
         return Ok((fit, 0.0));
@@ -41,7 +41,7 @@ pub fn drawn(
     let moved = |share: f64| {
         let offsets = ReaderOffsets::from_array(offsets.to_array().map(|o| share * o));
         let mesh = with_surfaces_moved(&fit.mesh, wall, &offsets);
-        rim::extended(&mesh, &cup, superior, offsets.rim)
+        base_plane::extended(&mesh, &cup, superior, offsets.rim)
     };
     // A fit that intersects itself already must not do so more often.
     let before = self_intersections(&fit.mesh).len();
@@ -54,7 +54,7 @@ pub fn drawn(
         return Ok((fit, 0.0));
     };
     let wall = VentricleWall::new(&mesh, &cup, superior, monitor)?;
-    let fit = Fit {
+    let fit = FittedModel {
         wall_ml: mesh.volume() / 1000.0,
         wall: Some(wall),
         mesh,
@@ -172,7 +172,7 @@ mod tests {
             }
             assert!(judged.iter().all(|n| *n > 200), "{judged:?}");
         }
-        let lower = rim::extended(&mesh, &cup, &Vec3::y(), 3.0);
+        let lower = base_plane::extended(&mesh, &cup, &Vec3::y(), 3.0);
         let top = |mesh: &TriMesh| mesh.vertices.iter().map(|p| p.z).fold(f64::MIN, f64::max);
         assert!((top(&lower) - top(&mesh) - 3.0).abs() < 0.2);
         let apex = |mesh: &TriMesh| mesh.vertices.iter().map(|p| p.z).fold(f64::MAX, f64::min);

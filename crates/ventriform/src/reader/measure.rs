@@ -16,7 +16,7 @@
 //! A ray that does not start in the mask, or does not leave it within [`REACH`], counts for nothing.
 
 use super::profile::ReaderOffsets;
-use crate::deform::Fit;
+use crate::deform::FittedModel;
 use crate::geometry::frame::VoxelToPatient;
 use crate::geometry::{Vec3, triangle};
 use crate::grid::voxelise::Mask;
@@ -35,7 +35,7 @@ const LEAST_SEEN: f64 = 0.4;
 /// The distances from the shown wall of `fit`, whose mask is `own`, to that of the mask `drawn`. The grid of
 /// both is at `frame`. `None` if the two overlap in too little of the wall, or the organ is no ventricle.
 pub fn measure(
-    fit: &Fit,
+    fit: &FittedModel,
     own: &Mask,
     drawn: &Mask,
     frame: &VoxelToPatient,
@@ -48,7 +48,7 @@ pub fn measure(
 }
 
 /// The medians of the distances from the surface of `fit` to a mask.
-fn medians(fit: &Fit, drawn: &Mask, frame: &VoxelToPatient) -> Option<ReaderOffsets> {
+fn medians(fit: &FittedModel, drawn: &Mask, frame: &VoxelToPatient) -> Option<ReaderOffsets> {
     let (wall, cup) = (fit.wall.as_ref()?, fit.cup?);
     let drawn = MaskField { mask: drawn, frame };
     let (mut inner, mut outer, mut rim) = (Vec::new(), Vec::new(), Vec::new());

@@ -88,11 +88,11 @@ impl SegmentedVolume {
                     .into(),
             }
         })?;
-        let mask = place.mask(&segmentation.mask, &segmentation.fit.mesh);
+        let mask = place.mask(&segmentation.mask, &segmentation.fit.model.mesh);
         let mut files = vec![self.mask(MASK, &mask, &place, monitor)?];
         if let (Some(mask), Some(surface)) = (
             &segmentation.other_mask,
-            segmentation.fit.other_surface(edge),
+            segmentation.fit.model.other_surface(edge),
         ) {
             let name = match edge {
                 WallEdge::Apparent => ANATOMICAL_MASK,
@@ -120,7 +120,7 @@ impl SegmentedVolume {
             media_type: "image/png",
             bytes: self.segmentation.slices.clone(),
         });
-        let region = region(&self.reading.volume, &fit.mesh, monitor)?;
+        let region = region(&self.reading.volume, &fit.model.mesh, monitor)?;
         let region = nifti::write(&region, StoredType::Scaled8, true);
         files.push(NamedFile {
             name: REGION.into(),
@@ -174,14 +174,15 @@ impl SegmentedVolume {
             quality: self.summary(),
             ..Metadata::new("Fitted model")
         };
-        let shown = fit.shown_uncertainty(edge).unwrap_or_default();
-        let mut meshes = vec![("mesh", &fit.mesh, shown)];
-        if let Some(other) = fit.other_surface(edge) {
+        let shown = fit.uncertainty(edge).unwrap_or_default();
+        let mut meshes = vec![("mesh", &fit.model.mesh, shown)];
+        if let Some(other) = fit.model.other_surface(edge) {
             let name = match edge {
                 WallEdge::Apparent => "mesh_anatomical",
                 WallEdge::Anatomical => "mesh_apparent",
             };
-            meshes.push((name, &other.mesh, &other.uncertainty));
+            let uncertainty = fit.uncertainty(edge.other()).unwrap_or_default();
+            meshes.push((name, &other.mesh, uncertainty));
         }
         let described = |(name, mesh, uncertainty): (&'static str, &'a TriMesh, &[f64])| {
             let metadata = Metadata {
@@ -197,7 +198,7 @@ impl SegmentedVolume {
 
     /// The part of the wall that each triangle of `mesh` is of; empty for other organs.
     fn parts(&self, mesh: &TriMesh, monitor: &Monitor<'_>) -> Result<Vec<Part>, Cancelled> {
-        let parts = match &self.segmentation.fit.cup {
+        let parts = match &self.segmentation.fit.model.cup {
             Some(cup) => wall_parts(mesh, cup, monitor)?,
             None => None,
         };
@@ -206,7 +207,7 @@ impl SegmentedVolume {
 
     /// The uptake of the wall at every vertex of `mesh`; ventricles only.
     fn uptake(&self, mesh: &TriMesh) -> Option<VertexField> {
-        let surfaces = self.segmentation.fit.surfaces.as_ref()?;
+        let surfaces = self.segmentation.fit.model.surfaces.as_ref()?;
         let map = self.segmentation.polar.as_ref()?;
         let of = |p| map.uptake_at(&surfaces.apparent.wall, p);
         let values: Vec<f64> = mesh.vertices.iter().map(of).collect();
@@ -252,11 +253,14 @@ impl SegmentedVolume {
         let map = self.segmentation.polar.as_ref().map(polar::json);
         let page = report::segmentation_page(&SegmentationPage {
             report: &report,
-            mesh: &fit.mesh,
-            uncertainty: fit.shown_uncertainty(edge).unwrap_or_default(),
-            other: fit
-                .other_surface(edge)
-                .map(|other| (&other.mesh, other.uncertainty.as_slice())),
+            mesh: &fit.model.mesh,
+            uncertainty: fit.uncertainty(edge).unwrap_or_default(),
+            other: fit.model.other_surface(edge).map(|other| {
+                (
+                    &other.mesh,
+                    fit.uncertainty(edge.other()).unwrap_or_default(),
+                )
+            }),
             slices: bytes("slices.png"),
             polar: bytes("polar.svg"),
             polar_map: map.as_ref(),
@@ -283,7 +287,10 @@ impl SegmentedVolume {
             ("volumes_ml", report["volumes_ml"].clone()),
             ("measures", report["measures"].clone()),
             ("flags", report["flags"].clone()),
-            ("vertices", json!(self.segmentation.fit.mesh.vertices.len())),
+            (
+                "vertices",
+                json!(self.segmentation.fit.model.mesh.vertices.len()),
+            ),
         ]
         .into_iter()
         .map(|(key, value)| (key.to_owned(), value))
@@ -310,8 +317,8 @@ impl SegmentedVolume {
         let placed = (&made.mask, &self.reading.volume.frame);
         // A silent monitor is never cancelled.
         let cavity =
-            cavity(&report, &made.fit.mesh, placed, &Monitor::silent()).unwrap_or_default();
-        let results = DicomResults::new(scan, structure, &made.mask, &made.fit.mesh, &report)
+            cavity(&report, &made.fit.model.mesh, placed, &Monitor::silent()).unwrap_or_default();
+        let results = DicomResults::new(scan, structure, &made.mask, &made.fit.model.mesh, &report)
             .with_cavity(cavity.as_ref())
             .with_pictures(Some(&made.slices), polar.as_deref());
         let mut files = Vec::new();
@@ -352,7 +359,7 @@ impl SegmentedVolume {
         monitor: &Monitor<'_>,
     ) -> Result<[NamedFile; 2], SegmentationFilesError> {
         let report = report_json(&self.segmentation);
-        let mesh = &self.segmentation.fit.mesh;
+        let mesh = &self.segmentation.fit.model.mesh;
         let cavity = cavity(&report, mesh, (wall, &place.frame), monitor)?;
         let mut labels: Vec<u8> = wall.voxels.iter().map(|inside| u8::from(*inside)).collect();
         if let Some(cavity) = &cavity {

@@ -3,9 +3,10 @@
 use serde_json::{Value, json};
 
 use super::segment::{AppliedReader, Segmentation};
-use crate::deform::{Evidence, Fit, confidence, consensus};
+use crate::deform::FittedModel;
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
+use crate::judge::{Evidence, Judgement, confidence, consensus};
 use crate::model::wall::VentricleWall;
 use crate::numeric::order;
 use crate::polar;
@@ -20,8 +21,8 @@ fn point(p: &Vec3) -> [f64; 3] {
 
 /// The figures of a segmentation as JSON. Lengths are mm (LPS), volumes ml.
 pub fn report_json(segmentation: &Segmentation) -> Value {
-    let fit = &segmentation.fit;
-    let flags: Vec<Value> = fit
+    let (fit, judgement) = (&segmentation.fit.model, &segmentation.fit.judgement);
+    let flags: Vec<Value> = judgement
         .flags
         .iter()
         .map(|f| json!({"code": f.code(), "reason": f.to_string()}))
@@ -65,8 +66,8 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
             "tilt_degrees": round(p.tilt()),
             "confidence": round(p.confidence),
         })),
-        "fit": fit_json(fit),
-        "evidence": fit.evidence.as_ref().map(|e| evidence(e, consensus::spread(&fit.nodes))),
+        "fit": fit_json(fit, judgement),
+        "evidence": judgement.evidence.as_ref().map(|e| evidence(e, consensus::spread(&judgement.nodes))),
         "volumes_ml": volumes(fit),
         "mass_g": fit.surfaces.as_ref().map(|s| round(MYOCARDIUM * s.anatomical.wall_ml)),
         "wall_thickness_mm": fit.wall.as_ref().map(|w| round(w.thickness)),
@@ -74,9 +75,9 @@ pub fn report_json(segmentation: &Segmentation) -> Value {
             "apparent": thickness(&s.apparent.wall),
             "anatomical": thickness(&s.anatomical.wall),
         })),
-        "uncertainty_mm": fit.surfaces.as_ref().map(|s| json!({
-            "apparent": uncertainty(&s.apparent.uncertainty),
-            "anatomical": uncertainty(&s.anatomical.uncertainty),
+        "uncertainty_mm": judgement.uncertainty.as_ref().map(|u| json!({
+            "apparent": uncertainty(&u.apparent),
+            "anatomical": uncertainty(&u.anatomical),
         })),
         "resolution_mm": segmentation.resolution.map(|r| json!({
             "value": round(r.value),
@@ -112,7 +113,7 @@ fn reader(applied: &AppliedReader) -> Value {
 const MYOCARDIUM: f64 = 1.05;
 
 /// The volumes of the wall that is shown and, of a ventricle, those of both walls.
-fn volumes(fit: &Fit) -> Value {
+fn volumes(fit: &FittedModel) -> Value {
     let mut volumes = json!({
         "wall": round(fit.wall_ml),
         "cavity": fit.wall.as_ref().map(|w| round(w.cavity_ml)),
@@ -152,11 +153,11 @@ fn uncertainty(nodes: &[f64]) -> Value {
 }
 
 /// How the motion went, and the fitted model's pose.
-fn fit_json(fit: &Fit) -> Value {
+fn fit_json(fit: &FittedModel, judgement: &Judgement) -> Value {
     let displacements: Vec<f64> = fit.displacements.iter().map(|d| round(d.norm())).collect();
     json!({
         "reason": fit.reason.as_str(),
-        "confidence": round(fit.confidence),
+        "confidence": round(judgement.confidence),
         "iterations": fit.iterations,
         "runs": fit.runs,
         "residual_mm": round(fit.residual),
@@ -222,7 +223,7 @@ fn choice(segmentation: &Segmentation) -> String {
     }
 }
 
-fn rows(fit: &Fit) -> Vec<[f64; 3]> {
+fn rows(fit: &FittedModel) -> Vec<[f64; 3]> {
     let m = fit.rotation.matrix();
     (0..3)
         .map(|r| [0, 1, 2].map(|c| round(m[(r, c)])))

@@ -12,7 +12,7 @@
 
 use nalgebra::Matrix3;
 
-use crate::deform::Fit;
+use crate::deform::FittedModel;
 use crate::draw::Image;
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
@@ -66,7 +66,7 @@ pub struct Cut {
 
 impl Cut {
     /// Through the organ that `fit` shows.
-    pub fn of(fit: &Fit) -> Self {
+    pub fn of(fit: &FittedModel) -> Self {
         match (&fit.cup, &fit.patient_orientation) {
             (Some(cup), Some(orientation)) => Self::heart(cup, &orientation.superior),
             _ => Self::body(&fit.mesh),

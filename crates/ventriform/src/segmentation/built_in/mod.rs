@@ -7,7 +7,7 @@
 //! phantoms. The cup of each is embedded as well, because finding it takes as long as a fit.
 //!
 //! The four shapes were chosen among seven on 143 fits of simulated hearts (the calibrating seeds of
-//! [`crate::deform::confidence`]): usual and long are the two between which choosing gains most
+//! [`crate::judge::confidence`]): usual and long are the two between which choosing gains most
 //! (mean Jaccard index +0.003 of the apparent and +0.005 of the anatomical wall over the usual one
 //! alone, of at most +0.007); small and large add nothing to that choice, but the mean over four
 //! hearts tells bad fits better than one fit does.

@@ -50,8 +50,8 @@
 //! heart in one place, which may not be its place in another image.
 
 use super::evidence::Evidence;
-use super::parameters::WallEdge;
-use super::views::Views;
+use super::motion::Views;
+use crate::deform::{FittedModel, WallEdge};
 
 /// One term of a weighted sum.
 struct Term {
@@ -193,6 +193,21 @@ pub fn of_set(chances: &[f64], best: &Evidence, edge: WallEdge) -> f64 {
 /// more (12 infarcts and a turned heart of the simulator's seeds 2101, 2103, 4102 and 4202).
 pub fn of_a_part(chance: f64) -> f64 {
     0.35 * chance
+}
+
+/// The chance of a good fit of `model`, which has this `chance` by all else, in view of what told its position.
+pub(super) fn in_view_of_search(chance: f64, model: &FittedModel) -> f64 {
+    match &model.localisation {
+        Some(found) if found.infarcted => of_a_part(chance),
+        _ => chance,
+    }
+}
+
+/// The confidence of a model's position, 0 (a guess) to 1: that of the search for a ventricle, lowered where few
+/// sensors see an edge. 0.5 or less for other organs.
+pub fn of_position(model: &FittedModel) -> f64 {
+    let search = model.localisation.as_ref().map_or(0.5, |l| l.confidence);
+    search * (model.active / 0.5).min(1.0)
 }
 
 /// The logarithm of the odds of a chance, between those of about 1 and 99 per cent.

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use nalgebra::Matrix3;
 
-use super::views::Views;
+use super::motion::Views;
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::model::wall::{COLUMNS, ROWS, VentricleWall, WallRay};
