@@ -5,7 +5,7 @@
 //!
 //! 1. [`evidence`]: figures of the wall as the sensors left it, before its base plane was put;
 //!    [`motion`]: whether the projections of the image show the wall in two positions.
-//! 2. [`confidence`]: the chances of a good fit, of motion and of a heart.
+//! 2. [`confidence`]: the chances of a good fit, of motion and of a heart, by calibrated logistic models.
 //! 3. [`flags`]: the warnings, by [`flag_rules`]; [`uncertainty`]: how far each node may be off.
 //! 4. [`septum`]: whether the fit is to be made again without the septum's sensors; [`refusal`]: whether it is a
 //!    heart at all.
@@ -14,12 +14,14 @@
 //! Guaranteed: the model is not changed. Not guaranteed: that a wrong fit is noticed; docs/evaluation.md has the
 //! figures of hearts that were held out.
 
+pub mod calibration;
 pub mod confidence;
 pub mod consensus;
 pub mod evidence;
 mod fit;
 mod flag_rules;
 pub mod flags;
+pub mod logistic;
 pub mod motion;
 pub mod refusal;
 pub mod septum;
