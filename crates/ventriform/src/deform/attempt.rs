@@ -16,9 +16,9 @@ use crate::model::wall::{self, VentricleWall};
 use crate::progress::{Cancelled, Monitor};
 
 /// Repetitions of a folded fit.
-const RETRIES: usize = 3;
+const MAX_RETRIES: usize = 3;
 /// Factor of the stiffness from one repetition to the next.
-const STIFFER: f64 = 4.0;
+const STIFFNESS_FACTOR: f64 = 4.0;
 
 /// One run of the motion and its folds.
 pub struct Attempt {
@@ -48,8 +48,10 @@ impl Attempt {
             ..wide
         };
         let mut best: Option<Self> = None;
-        for run in 1..=1 + RETRIES {
-            let stiffness = parameters.stiffness.times(STIFFER.powi(run as i32 - 1));
+        for run in 1..=1 + MAX_RETRIES {
+            let stiffness = parameters
+                .stiffness
+                .times(STIFFNESS_FACTOR.powi(run as i32 - 1));
             let body = Elastic::new(aligned, &template.struts, stiffness);
             let moved = dynamics::run(
                 aligned,

@@ -53,7 +53,7 @@ pub struct FitSetup {
 
 /// Half of the angle that the right ventricle's wall may take up beside the septum, degrees. Chosen
 /// on the calibrating seeds (703 among them).
-const SEPTAL: f64 = 65.0;
+const RV_SECTOR_HALF_ANGLE_DEG: f64 = 65.0;
 
 impl FitSetup {
     /// Poses `template` at `place` and blurs the image about it.
@@ -120,7 +120,7 @@ impl FitSetup {
                 centre: cup.centre,
                 axis: cup.axis,
                 middle: cup.axis.cross(&anterior),
-                half_angle: SEPTAL,
+                half_angle: RV_SECTOR_HALF_ANGLE_DEG,
             }),
             ..self.clone()
         })

@@ -45,7 +45,7 @@ pub const MOTION_BY_SHAPE: Logistic = Logistic {
 };
 
 /// A left ventricle where the model was fitted.
-pub const HEART: Logistic = Logistic {
+pub const HEART_FITTED: Logistic = Logistic {
     intercept: 1.58,
     terms: &[
         Term::new("hollowness", 0.437, 0.171, 1.66),

@@ -119,7 +119,7 @@ pub fn of_motion(e: &Evidence) -> f64 {
 pub fn of_heart(e: &Evidence, search: f64) -> Option<f64> {
     let views = e.views.as_ref()?;
     let values = [e.hollowness, views.agreement, search];
-    Some(calibration::HEART.probability(&values))
+    Some(calibration::HEART_FITTED.probability(&values))
 }
 
 #[cfg(test)]

@@ -13,19 +13,19 @@ use crate::locate::{Hints, LocateError, NotAHeart};
 /// Where [`confidence::of_heart`] does not decide, a fitted model is no heart if less than this share of its
 /// area sees an edge, and the edges are farther away than this (weighted rms, mm). Hearts have at least 0.63 or at most 1.15,
 /// also with 100 % defects over seven segments; noise has at most 0.51 and at least 1.6.
-const EDGELESS: (f64, f64) = (0.57, 1.3);
+const NO_WALL_EDGE_LIMITS: (f64, f64) = (0.57, 1.3);
 
 /// Likewise, if the search's confidence and the chance of a good fit are below one
 /// of these pairs. Hearts that fit badly, for motion or infarcts, are found with 0.32 at least, and
 /// with 0.58 where the chance is below the second limit; what was found in scans without a heart had
 /// 0.38 at most.
-const UNLIKELY: [(f64, f64); 2] = [(0.3, 0.25), (0.5, 0.05)];
+const UNLIKELY_HEART_LIMITS: [(f64, f64); 2] = [(0.3, 0.25), (0.5, 0.05)];
 /// Least chance of a heart ([`confidence::of_heart`]). Of 106 fits of hearts one has less (motion; Jaccard index 0.21),
 /// of 59 fits to scans without one or beside it all but one, which took a hot right ventricle (calibrating seeds).
-const LIKELY: f64 = 0.5;
+const MIN_HEART_PROBABILITY: f64 = 0.5;
 /// In a map of labels, or with a greater share of the model beyond the volume (per cent), the search's
 /// confidence does not count.
-const OUTSIDE: f64 = 50.0;
+const MAX_OUTSIDE_PERCENT: f64 = 50.0;
 
 /// Refuses a ventricle that is more likely none: by [`confidence::of_heart`], or, in a map of labels and
 /// where it is unknown how the patient lay, one whose model found no wall or that neither the search nor the fit
@@ -55,7 +55,7 @@ pub fn require_heart(
 fn why_no_heart(model: &FittedModel, judgement: &Judgement, search: f64) -> Option<NotAHeart> {
     let misled = judgement.flags.iter().any(|flag| match flag {
         Flag::LabelMap { .. } => true,
-        Flag::TouchesBorder { share } => *share > OUTSIDE,
+        Flag::TouchesBorder { share } => *share > MAX_OUTSIDE_PERCENT,
         _ => false,
     });
     if !misled
@@ -63,7 +63,7 @@ fn why_no_heart(model: &FittedModel, judgement: &Judgement, search: f64) -> Opti
         && let Some(views) = &evidence.views
         && let Some(chance) = confidence::of_heart(evidence, search)
     {
-        return (chance < LIKELY).then_some(NotAHeart::Unseen {
+        return (chance < MIN_HEART_PROBABILITY).then_some(NotAHeart::Unseen {
             hollowness: evidence.hollowness,
             agreement: views.agreement,
             search,
@@ -71,11 +71,11 @@ fn why_no_heart(model: &FittedModel, judgement: &Judgement, search: f64) -> Opti
         });
     }
     let (active, residual, chance) = (model.active, model.residual, judgement.confidence);
-    if active < EDGELESS.0 && !(residual < EDGELESS.1) {
+    if active < NO_WALL_EDGE_LIMITS.0 && !(residual < NO_WALL_EDGE_LIMITS.1) {
         return Some(NotAHeart::Edgeless { active, residual });
     }
     let believed = if misled { 0.0 } else { search };
-    UNLIKELY
+    UNLIKELY_HEART_LIMITS
         .iter()
         .any(|(limit, least)| believed < *limit && chance < *least)
         .then_some(NotAHeart::Unlikely { search, chance })
@@ -112,7 +112,7 @@ mod tests {
         assert_eq!(reason(0.5, f64::NAN, 0.9, 0.9, 1.0), "edgeless");
         assert_eq!(reason(0.5, 1.2, 0.9, 0.9, 1.0), "");
         assert_eq!(reason(0.6, 1.4, 0.9, 0.9, 1.0), "");
-        for (limit, least) in UNLIKELY {
+        for (limit, least) in UNLIKELY_HEART_LIMITS {
             assert_eq!(
                 reason(0.9, 1.0, limit - 0.01, least - 0.01, 1.0),
                 "unlikely"
@@ -120,8 +120,11 @@ mod tests {
             assert_eq!(reason(0.9, 1.0, limit, least, 1.0), "");
         }
         // The search does not count where most of the model lies beyond the volume.
-        assert_eq!(reason(0.9, 1.0, 0.9, 0.2, OUTSIDE), "");
-        assert_eq!(reason(0.9, 1.0, 0.9, 0.2, OUTSIDE + 1.0), "unlikely");
+        assert_eq!(reason(0.9, 1.0, 0.9, 0.2, MAX_OUTSIDE_PERCENT), "");
+        assert_eq!(
+            reason(0.9, 1.0, 0.9, 0.2, MAX_OUTSIDE_PERCENT + 1.0),
+            "unlikely"
+        );
     }
 
     #[test]

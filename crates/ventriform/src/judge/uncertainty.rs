@@ -94,28 +94,29 @@ pub(super) fn node_evidence(
 /// a half, and that squared.
 type UncertaintyTerms = [f64; 6];
 
-const APPARENT: UncertaintyTerms = [1.515, -1.017, 0.482, -0.112, -0.046, 1.002];
-const ANATOMICAL: UncertaintyTerms = [1.448, -1.190, 0.641, -0.124, 0.151, 1.292];
+const APPARENT_TERMS: UncertaintyTerms = [1.515, -1.017, 0.482, -0.112, -0.046, 1.002];
+const ANATOMICAL_TERMS: UncertaintyTerms = [1.448, -1.190, 0.641, -0.124, 0.151, 1.292];
 
 /// The distance that stands for that from other fits where there are none: its median, mm.
-const USUAL_SPREAD: f64 = 0.8;
+const MEDIAN_SPREAD_MM: f64 = 0.8;
 /// Least and greatest result, mm.
-const RANGE: [f64; 2] = [0.5, 15.0];
+const UNCERTAINTY_RANGE_MM: [f64; 2] = [0.5, 15.0];
 
 /// The standard deviation of the distance of each node from the wall of that `edge`, mm, where a good fit
 /// has this `chance`.
 pub fn of_nodes(nodes: &[NodeEvidence], chance: f64, edge: WallEdge) -> Vec<f64> {
     let terms = match edge {
-        WallEdge::Apparent => &APPARENT,
-        WallEdge::Anatomical => &ANATOMICAL,
+        WallEdge::Apparent => &APPARENT_TERMS,
+        WallEdge::Anatomical => &ANATOMICAL_TERMS,
     };
     let odds = confidence::log_odds(chance);
     let of = |node: &NodeEvidence| {
         let way = node.way.clamp(0.0, 1.0) - 0.5;
-        let spread = node.spread.unwrap_or(USUAL_SPREAD);
+        let spread = node.spread.unwrap_or(MEDIAN_SPREAD_MM);
         let values = [1.0, node.seen, (spread + 0.3).ln(), odds, way, way * way];
         let sum: f64 = terms.iter().zip(values).map(|(c, x)| c * x).sum();
-        sum.exp().clamp(RANGE[0], RANGE[1])
+        sum.exp()
+            .clamp(UNCERTAINTY_RANGE_MM[0], UNCERTAINTY_RANGE_MM[1])
     };
     nodes.iter().map(of).collect()
 }
@@ -152,13 +153,13 @@ mod tests {
                 way: 1.0,
                 spread: Some(1e6),
             };
-            assert_eq!(of(lost, 0.0), RANGE[1]);
+            assert_eq!(of(lost, 0.0), UNCERTAINTY_RANGE_MM[1]);
             let sure = NodeEvidence {
                 seen: 1.0,
                 spread: Some(0.0),
                 ..node
             };
-            assert!((RANGE[0]..1.0).contains(&of(sure, 1.0)));
+            assert!((UNCERTAINTY_RANGE_MM[0]..1.0).contains(&of(sure, 1.0)));
         }
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! 1. Every node moves along its ray from the long axis ([`VentricleWall`]), by the distance of the inner
 //!    surface, of the outer one, or between the two in proportion to its depth in the wall. Where the
-//!    wall would get thinner than [`THINNEST`], both move less.
-//! 2. The rim moves along the long axis; nodes up to [`base_plane::REACH`] from it move
+//!    wall would get thinner than [`MIN_THICKNESS_MM`], both move less.
+//! 2. The rim moves along the long axis; nodes up to [`base_plane::STRETCHED_LENGTH_MM`] from it move
 //!    less and less, so that the wall is stretched there.
 //!
 //! On a wall that is perpendicular to its rays, the surfaces move by exactly these distances.
@@ -17,7 +17,7 @@ use crate::model::wall::{COLUMNS, ROWS, VentricleWall};
 use crate::progress::{Cancelled, Monitor};
 
 /// The thickness that is left at least, mm.
-const THINNEST: f64 = 3.0;
+const MIN_THICKNESS_MM: f64 = 3.0;
 
 /// `fit` with the shown wall moved by `offsets`, and the share of them that was applied: 1, or less
 /// where the whole would make the surface intersect itself. Its two measured walls
@@ -86,7 +86,7 @@ impl WallEdges {
             let first = (0..ROWS).find_map(known);
             for row in 0..ROWS {
                 last = known(row).or(last);
-                edges[row * COLUMNS + column] = last.or(first).unwrap_or([0.0, THINNEST]);
+                edges[row * COLUMNS + column] = last.or(first).unwrap_or([0.0, MIN_THICKNESS_MM]);
             }
         }
         Self(edges)
@@ -98,7 +98,7 @@ impl WallEdges {
         let [inner, outer] = self.at(place.row, place.column);
         let thickness = (outer - inner).max(1e-6);
         let thinner = offsets.endocardium - offsets.epicardium;
-        let most = (thickness - THINNEST).max(0.0);
+        let most = (thickness - MIN_THICKNESS_MM).max(0.0);
         let part = if thinner > most { most / thinner } else { 1.0 };
         let depth = ((place.distance - inner) / thickness).clamp(0.0, 1.0);
         let along = offsets.endocardium * (1.0 - depth) + offsets.epicardium * depth;
